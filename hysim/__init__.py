@@ -1,0 +1,78 @@
+"""hysim: simulate, identify, discover, compensate and compare hysteretic actuators.
+
+The names below are the whole public face, in reading order. They are loaded when first used: the bare
+import costs the standard library only.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+_MODULES = ("datasets", "metrics", "plot", "signals")
+_HOME = {
+    "Record": "hysim.records",
+    "load": "hysim.files",
+    "simulate": "hysim.simulation",
+    "Simulation": "hysim.simulation",
+    "identify": "hysim.identification",
+    "Identification": "hysim.identification",
+    "discover": "hysim.discovery",
+    "Discovery": "hysim.discovery",
+    "compare": "hysim.comparison",
+    "Comparison": "hysim.comparison",
+    "loop_metrics": "hysim.metrics",
+    "LoopMetrics": "hysim.metrics",
+    "BoucWen": "hysim.models.boucwen",
+    "PolynomialBoucWen": "hysim.models.boucwen",
+    "Duhem": "hysim.models.duhem",
+    "TransferFunction": "hysim.models.transfer_function",
+    "Line": "hysim.models.static",
+    "SingleValued": "hysim.models.static",
+    "save": "hysim.models.storage",
+    "load_model": "hysim.models.storage",
+    "SimulationError": "hysim.errors",
+}
+
+__all__ = ["__version__", *_MODULES, *_HOME]
+
+if TYPE_CHECKING:
+    from hysim import datasets as datasets
+    from hysim import metrics as metrics
+    from hysim import plot as plot
+    from hysim import signals as signals
+    from hysim.comparison import Comparison as Comparison
+    from hysim.comparison import compare as compare
+    from hysim.discovery import Discovery as Discovery
+    from hysim.discovery import discover as discover
+    from hysim.errors import SimulationError as SimulationError
+    from hysim.files import load as load
+    from hysim.identification import Identification as Identification
+    from hysim.identification import identify as identify
+    from hysim.metrics import LoopMetrics as LoopMetrics
+    from hysim.metrics import loop_metrics as loop_metrics
+    from hysim.models.boucwen import BoucWen as BoucWen
+    from hysim.models.boucwen import PolynomialBoucWen as PolynomialBoucWen
+    from hysim.models.duhem import Duhem as Duhem
+    from hysim.models.static import Line as Line
+    from hysim.models.static import SingleValued as SingleValued
+    from hysim.models.storage import load_model as load_model
+    from hysim.models.storage import save as save
+    from hysim.models.transfer_function import TransferFunction as TransferFunction
+    from hysim.records import Record as Record
+    from hysim.simulation import Simulation as Simulation
+    from hysim.simulation import simulate as simulate
+else:
+
+    def __getattr__(name: str) -> Any:
+        if name in _MODULES:
+            value = importlib.import_module(f"hysim.{name}")
+        elif name in _HOME:
+            value = getattr(importlib.import_module(_HOME[name]), name)
+        else:
+            raise AttributeError(f"module 'hysim' has no attribute {name!r}")
+        globals()[name] = value
+        return value
+
+    def __dir__() -> list[str]:
+        return sorted(__all__)

@@ -1,0 +1,153 @@
+"""Frozen values: dataclasses that are compared, hashed, copied and pickled by what they hold.
+
+`frozen` makes keyword-only dataclasses whose arrays are read-only float64, also after unpickling and
+copying. `checked` is the stricter form for specifications (models, records): every number must be finite.
+"""
+
+import dataclasses
+import functools
+import math
+import typing
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any, TypeVar, dataclass_transform
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+T = TypeVar("T")
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True)
+def frozen(cls: type[T]) -> type[T]:
+    """Make `cls` a frozen keyword-only dataclass with read-only arrays and equality by value."""
+    return _freeze(cls, finite=False)
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True)
+def checked(cls: type[T]) -> type[T]:
+    """Make `cls` frozen, and refuse numbers that are not finite."""
+    return _freeze(cls, finite=True)
+
+
+def read_only(
+    values: npt.ArrayLike, name: str = "values", *, ndim: int | None = None, finite: bool = True
+) -> FloatArray:
+    """Return a read-only contiguous float64 copy of `values`.
+
+    Raises
+    ------
+    TypeError
+        If the values are not real numbers.
+    ValueError
+        If the number of axes is not `ndim`, or (with `finite`) an element is not finite.
+    """
+    array = _as_float_array(values, name)
+    if ndim is not None and array.ndim != ndim:
+        raise ValueError(
+            f"{name} must have {ndim} axis, got shape {array.shape}"
+            if ndim == 1
+            else f"{name} must have {ndim} axes, got shape {array.shape}"
+        )
+    if finite and not np.isfinite(array).all():
+        place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        index = place[0] if len(place) == 1 else place
+        raise ValueError(f"{name} must be finite, got {array[place]} at index {index}")
+    array.setflags(write=False)
+    return array
+
+
+def _as_float_array(values: npt.ArrayLike, name: str) -> FloatArray:
+    if np.iscomplexobj(values):
+        raise TypeError(f"{name} must be real numbers, got complex ones")
+    try:
+        return np.array(values, dtype=np.float64, order="C")
+    except (TypeError, ValueError) as error:
+        raise TypeError(f"{name} must be numbers, got {type(values).__name__}: {error}") from None
+
+
+def _freeze(cls: type[T], *, finite: bool) -> type[T]:
+    check = cls.__dict__.get("__post_init__")
+
+    def coerce_then_check(self: Any) -> None:
+        for name, coerce in _coercions(type(self), finite).items():
+            object.__setattr__(self, name, coerce(getattr(self, name), name))
+        if check is not None:
+            check(self)
+
+    cls.__post_init__ = coerce_then_check  # type: ignore[attr-defined]
+    cls.__eq__ = _equal  # type: ignore[assignment, method-assign]
+    cls.__hash__ = _hash  # type: ignore[assignment, method-assign]
+    cls.__reduce__ = _reduce  # type: ignore[assignment, method-assign]
+    return dataclasses.dataclass(frozen=True, kw_only=True, eq=False)(cls)
+
+
+@functools.cache
+def _coercions(cls: type, finite: bool) -> dict[str, Callable[[Any, str], Any]]:
+    rules = {
+        float: functools.partial(_as_float, finite=finite),
+        tuple[float, ...]: functools.partial(_as_float_tuple, finite=finite),
+        FloatArray: functools.partial(read_only, finite=finite),
+        FloatArray | None: lambda value, name: None if value is None else read_only(value, name, finite=finite),
+        float | None: lambda value, name: None if value is None else _as_float(value, name, finite=finite),
+    }
+    hints = typing.get_type_hints(cls)
+    coercions = {field.name: rules.get(hints[field.name]) for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
+    coercions |= {name: _as_mapping for name in coercions if typing.get_origin(hints[name]) is Mapping}
+    return {name: coerce for name, coerce in coercions.items() if coerce is not None}
+
+
+def _as_float(value: Any, name: str, *, finite: bool) -> float:
+    if isinstance(value, (str, bytes, bool)) or np.ndim(value) != 0:
+        raise TypeError(f"{name} must be a number, got {value!r}")
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name} must be a number, got {value!r}") from None
+    if finite and not math.isfinite(number):
+        raise ValueError(f"{name} must be finite, got {number}")
+    return number
+
+
+def _as_float_tuple(values: Any, name: str, *, finite: bool) -> tuple[float, ...]:
+    return tuple(read_only(np.atleast_1d(values), name, ndim=1, finite=finite).tolist())
+
+
+def _as_mapping(values: Mapping[Any, Any], name: str) -> Mapping[Any, Any]:
+    if not isinstance(values, Mapping):
+        raise TypeError(f"{name} must be a mapping, got {type(values).__name__}")
+    return MappingProxyType(dict(values))
+
+
+def _items(value: Any) -> dict[str, Any]:
+    return {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+
+
+def _key(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.shape, (value + 0.0).tobytes()
+    if isinstance(value, Mapping):
+        return tuple((name, _key(item)) for name, item in sorted(value.items()))
+    if isinstance(value, (tuple, list)):
+        return tuple(_key(item) for item in value)
+    return value
+
+
+def _equal(self: Any, other: object) -> Any:
+    if type(self) is not type(other):
+        return NotImplemented
+    return _key(tuple(_items(self).values())) == _key(tuple(_items(other).values()))
+
+
+def _hash(self: Any) -> int:
+    return hash((type(self), _key(tuple(_items(self).values()))))
+
+
+def _reduce(self: Any) -> tuple[Any, ...]:
+    plain = {name: dict(item) if isinstance(item, MappingProxyType) else item for name, item in _items(self).items()}
+    return _rebuild, (type(self), plain)
+
+
+def _rebuild(cls: type, items: dict[str, Any]) -> Any:
+    return cls(**items)

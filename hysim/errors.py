@@ -1,0 +1,5 @@
+"""The one error class of hysim; wrong arguments raise the built-in `ValueError` or `TypeError`."""
+
+
+class SimulationError(RuntimeError):
+    """A simulation left the finite numbers; the message names the sample or the time."""

@@ -1,0 +1,1 @@
+"""Compiled numerics on plain floats and arrays; nothing here knows a class."""

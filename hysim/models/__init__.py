@@ -1,0 +1,1 @@
+"""Laws, plants and chain stages: frozen specifications, one family a file."""

@@ -1,0 +1,85 @@
+"""What a family declares about itself, so that `identify` needs to know none.
+
+Identification searches a box of *coordinates* that the family chooses: scaled, free of redundancy,
+of order one. The family turns coordinates into the user's parameters. Parameters in which the output is
+affine are not searched: for given others, the best ones are the solution of a linear regression.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import field
+from typing import Any, Protocol
+
+from hysim._frozen import FloatArray, frozen
+from hysim.records import Record
+
+Parameters = Mapping[str, Any]
+"""User's names to floats or to arrays of shape (n_sets,)."""
+
+
+@frozen
+class SearchSpace:
+    """The box in which a family's parameters are searched on one record.
+
+    Parameters
+    ----------
+    coordinates : tuple of str, length n_x
+        Names of the internal coordinates.
+    lower, upper : array, shape (n_x,)
+        The box. An unbounded side is infinite.
+    starts : array, shape (n_starts, n_x)
+        Points from which a search should begin beside the random ones.
+    names : tuple of str
+        The user's free parameters in the order in which they are reported, the linear ones among them.
+    linear : tuple of str
+        The free parameters in which the output is affine.
+    held : mapping
+        The user's parameters that are not free, and their values.
+    parameters : callable
+        Coordinates, shape (n_sets, n_x), to the free parameters that are not linear, each (n_sets,).
+    redundant : tuple of tuples of str
+        Groups of parameters of which the data can tell only the product.
+    regions : mapping
+        Name to the box (lower, upper) of a part of the space that has a meaning of its own.
+    bounds : mapping
+        The user's bounds on linear parameters, name to (lower, upper).
+    """
+
+    coordinates: tuple[str, ...]
+    lower: FloatArray
+    upper: FloatArray
+    starts: FloatArray
+    names: tuple[str, ...]
+    linear: tuple[str, ...]
+    held: Mapping[str, float]
+    parameters: Callable[[FloatArray], dict[str, FloatArray]]
+    redundant: tuple[tuple[str, ...], ...] = ()
+    regions: Mapping[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+
+class Identifiable(Protocol):
+    """What `identify` takes: a model class, a model as the start, or a structure."""
+
+    def search_space(
+        self,
+        record: Record,
+        *,
+        fixed: Mapping[str, float] | None = None,
+        free: tuple[str, ...] = (),
+        bounds: Mapping[str, tuple[float, float]] | None = None,
+        initial: str = "free",
+    ) -> SearchSpace:
+        """Declare the box for `record`."""
+        ...
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """Columns in which the output is affine, shape (n_sets, n_samples, n_linear + 1).
+
+        Output = columns[..., :-1] @ (all linear parameters in the family's order) + columns[..., -1].
+        A set that leaves the finite numbers has columns that are not finite.
+        """
+        ...
+
+    def assemble(self, parameters: Mapping[str, float]) -> Any:
+        """Build the model from the user's parameters."""
+        ...
