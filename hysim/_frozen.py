@@ -68,7 +68,7 @@ def _as_float_array(values: npt.ArrayLike, name: str) -> FloatArray:
 
 
 def _freeze(cls: type[T], *, finite: bool) -> type[T]:
-    check = cls.__dict__.get("__post_init__")
+    check = getattr(cls, "__post_init__", None)
 
     def coerce_then_check(self: Any) -> None:
         for name, coerce in _coercions(type(self), finite).items():

@@ -4,7 +4,8 @@ A model is a specification. It is frozen and keyword-only, its numbers are finit
 compared by value. Evolving state is separate: it is passed in and handed back.
 """
 
-from typing import Any, Protocol, TypeVar, dataclass_transform, runtime_checkable
+from collections.abc import Callable
+from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar, dataclass_transform
 
 from hysim._frozen import FloatArray, checked
 
@@ -21,7 +22,14 @@ def model(cls: type[T]) -> type[T]:
     return specification
 
 
-@runtime_checkable
+class CompiledLaw(NamedTuple):
+    """A law as loops take it: `y = step(parameters, state, u)`, where the state moves along in place."""
+
+    step: Callable[[FloatArray, FloatArray, float], float]
+    parameters: FloatArray
+    state: FloatArray
+
+
 class Law(Protocol):
     """A rate-independent hysteresis law: its output depends on the path of the input, not on time."""
 
@@ -34,10 +42,16 @@ class Law(Protocol):
         ...
 
 
-@runtime_checkable
 class Dynamic(Protocol):
-    """A plant whose output depends on time."""
+    """A plant whose output depends on time; it says so by `dynamic = True`."""
+
+    dynamic: ClassVar[bool] = True
 
     def response(self, u: FloatArray, sample_time: float) -> FloatArray:
         """Output at the samples of `u`, shape (n,), taken every `sample_time`."""
         ...
+
+
+def needs_time(plant: Any) -> bool:
+    """Whether a plant is `Dynamic`."""
+    return bool(getattr(plant, "dynamic", False))

@@ -30,8 +30,10 @@ class SearchSpace:
         Points from which a search should begin beside the random ones.
     names : tuple of str
         The user's free parameters in the order in which they are reported, the linear ones among them.
+    columns : tuple of str
+        All parameters in which the output is affine, free or held, in the order of the regressors.
     linear : tuple of str
-        The free parameters in which the output is affine.
+        Those of them that are free.
     held : mapping
         The user's parameters that are not free, and their values.
     parameters : callable
@@ -49,6 +51,7 @@ class SearchSpace:
     upper: FloatArray
     starts: FloatArray
     names: tuple[str, ...]
+    columns: tuple[str, ...]
     linear: tuple[str, ...]
     held: Mapping[str, float]
     parameters: Callable[[FloatArray], dict[str, FloatArray]]
@@ -73,9 +76,9 @@ class Identifiable(Protocol):
         ...
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """Columns in which the output is affine, shape (n_sets, n_samples, n_linear + 1).
+        """Columns in which the output is affine, shape (n_sets, n_samples, n_columns + 1).
 
-        Output = columns[..., :-1] @ (all linear parameters in the family's order) + columns[..., -1].
+        Output = columns[..., :-1] @ (the parameters named by `SearchSpace.columns`) + columns[..., -1].
         A set that leaves the finite numbers has columns that are not finite.
         """
         ...
@@ -83,3 +86,48 @@ class Identifiable(Protocol):
     def assemble(self, parameters: Mapping[str, float]) -> Any:
         """Build the model from the user's parameters."""
         ...
+
+
+def held_parameters(
+    defaults: Mapping[str, float],
+    redundant: tuple[tuple[str, ...], ...],
+    fixed: Mapping[str, float],
+    free: tuple[str, ...],
+) -> dict[str, float]:
+    """The parameters that are not free: the fixed ones, and one of each redundant group that has none of them.
+
+    Raises
+    ------
+    ValueError
+        If a name is unknown, or both fixed and free.
+    """
+    for argument, names in (("fixed", tuple(fixed)), ("free", tuple(free))):
+        for name in names:
+            if name not in defaults:
+                raise ValueError(f"{argument} names {name!r}; the parameters are {', '.join(defaults)}")
+    if both := set(fixed) & set(free):
+        raise ValueError(f"{sorted(both)[0]!r} is both fixed and free")
+    held = {name: float(value) for name, value in fixed.items()}
+    for group in redundant:
+        candidates = [name for name in group if name not in free]
+        if candidates and not held.keys() & set(group):
+            held[candidates[0]] = defaults[candidates[0]]
+    return held
+
+
+def checked_bounds(
+    bounds: Mapping[str, tuple[float, float]], defaults: Mapping[str, float], held: Mapping[str, float]
+) -> dict[str, tuple[float, float]]:
+    """The user's bounds as floats.
+
+    Raises
+    ------
+    ValueError
+        If a name is unknown or held, or a lower bound is not below its upper one.
+    """
+    for name, pair in bounds.items():
+        if name not in defaults or name in held:
+            raise ValueError(f"bounds name {name!r}, which is not free; the parameters are {', '.join(defaults)}")
+        if len(pair) != 2 or not pair[0] < pair[1]:
+            raise ValueError(f"bounds of {name!r} must be (lower, upper) with lower < upper, got {pair}")
+    return {name: (float(lower), float(upper)) for name, (lower, upper) in bounds.items()}

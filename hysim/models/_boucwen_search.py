@@ -1,0 +1,170 @@
+"""The box in which the Bouc-Wen laws are searched.
+
+With U the span of the input and Z = |A| U, the law in z/Z and u/U has the shape coefficients
+
+    loading   = (beta + gamma) Z^n / |A|      unloading = (beta - gamma) Z^n / |A|
+
+which act on different stretches of the path, and hold the thermodynamically admissible laws
+(-beta <= gamma <= beta) where both are >= 0. A positive loading coefficient l bends the branch over at
+z = Z / k with k = l^(1/n): the coordinate c measures this knee, is smooth and signed, and is of order one
+for every n,
+
+    l = k (1 + |k|)^(n - 1),    k = sinh(c)
+
+The box is |k| <= 40 for both, n in [0.5, 10] on a log scale, z0/Z in [-1, 1], and open for the
+parameters in which the output is affine. A parameter that the user bounds is its own coordinate,
+between these bounds.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.models._search import SearchSpace, checked_bounds, held_parameters
+from hysim.records import Record
+
+REDUNDANT = (("A", "gain"),)
+_KNEE = float(np.arcsinh(40.0))
+_BOX = {
+    "A": (-10.0, 10.0),
+    "loading": (-_KNEE, _KNEE),
+    "unloading": (-_KNEE, _KNEE),
+    "beta": (-_KNEE, _KNEE),
+    "gamma": (-_KNEE, _KNEE),
+    "n": (0.5, 10.0),
+    "z0": (-1.0, 1.0),
+}
+
+
+def search_space(
+    defaults: Mapping[str, float],
+    columns: tuple[str, ...],
+    record: Record,
+    fixed: Mapping[str, float] | None,
+    free: tuple[str, ...],
+    bounds: Mapping[str, tuple[float, float]] | None,
+    initial: str,
+) -> SearchSpace:
+    """Declare the coordinates, their box and the way back to the user's parameters for one record.
+
+    Raises
+    ------
+    ValueError
+        If the input is constant, `initial` is unknown, or a name or a bound does not fit.
+    """
+    if initial not in ("free", "rest"):
+        raise ValueError(f'initial must be "free" or "rest", got {initial!r}')
+    at_rest = {"z0": 0.0} if initial == "rest" and "z0" not in free else {}
+    held = held_parameters(defaults, REDUNDANT, at_rest | dict(fixed or {}), free)
+    limits = checked_bounds(bounds or {}, defaults, held)
+    chart = _chart(defaults | held, frozenset(defaults) - frozenset(held), limits, record)
+    box = {name: limits.get(name, _BOX[name]) for name in chart.coordinates}
+    box |= {"n": (float(np.log(box["n"][0])), float(np.log(box["n"][1])))} if "n" in box else {}
+    lower, upper = (np.array([pair[side] for pair in box.values()]) for side in (0, 1))
+    quadrant = np.array([max(low, 0.0) if name in _PAIR else low for name, (low, _) in box.items()])
+    return SearchSpace(
+        coordinates=chart.coordinates,
+        lower=lower,
+        upper=upper,
+        starts=np.clip(chart.encode(defaults | held), lower, upper)[np.newaxis],
+        names=tuple(name for name in defaults if name not in held),
+        columns=columns,
+        linear=tuple(name for name in columns if name not in held),
+        held=held,
+        parameters=chart.decode,
+        redundant=REDUNDANT,
+        regions={"admissible": (quadrant, upper)} if set(_PAIR) <= set(box) else {},
+        bounds={name: pair for name, pair in limits.items() if name in columns},
+    )
+
+
+_PAIR = ("loading", "unloading")
+
+
+@dataclass(frozen=True)
+class _Chart:
+    """Coordinates of the memory's free parameters, and the way there and back."""
+
+    coordinates: tuple[str, ...]
+    values: Mapping[str, float]  # every parameter, where it is not free
+    limits: Mapping[str, tuple[float, float]]  # parameters that are their own coordinates
+    span: float
+    slope: float  # what A is measured in
+
+    def decode(self, x: FloatArray) -> dict[str, FloatArray]:
+        """Parameters of the memory, each (n_sets,), from coordinates (n_sets, n_x)."""
+        raw = dict(zip(self.coordinates, np.atleast_2d(x).T, strict=True))
+        held = {name: np.full(np.atleast_2d(x).shape[0], self.values[name]) for name in _MEMORY}
+        A = raw["A"] * (1.0 if "A" in self.limits else self.slope) if "A" in raw else held["A"]
+        n = np.exp(raw["n"]) if "n" in raw else held["n"]
+        unit = self._unit(A, n)
+        parameters = held | {"A": A, "n": n}
+        shape = {name: _shape(raw[name], n) * unit for name in ("loading", "unloading", "beta", "gamma") if name in raw}
+        if "loading" in shape:
+            parameters["beta"] = 0.5 * (shape["loading"] + shape["unloading"])
+            parameters["gamma"] = 0.5 * (shape["loading"] - shape["unloading"])
+        scaled = shape | ({"z0": raw["z0"] * self._slope(A) * self.span} if "z0" in raw else {})
+        parameters |= {name: scaled[name] for name in ("beta", "gamma", "z0") if name in scaled}
+        return parameters | {name: raw[name] for name in self.limits if name in ("beta", "gamma", "z0")}
+
+    def encode(self, parameters: Mapping[str, float]) -> FloatArray:
+        """Coordinates (n_x,) of one set of parameters."""
+        A, n = np.array(parameters["A"]), np.array(parameters["n"])
+        beta, gamma, unit = parameters["beta"], parameters["gamma"], self._unit(A, n)
+        scaled = {
+            "A": A / self.slope,
+            "loading": _knee((beta + gamma) / unit, n),
+            "unloading": _knee((beta - gamma) / unit, n),
+            "beta": _knee(beta / unit, n),
+            "gamma": _knee(gamma / unit, n),
+            "z0": parameters["z0"] / (self._slope(A) * self.span),
+        }
+        scaled |= {name: np.array(parameters[name]) for name in self.limits if name in scaled}
+        return np.array([float(np.log(n)) if name == "n" else float(scaled[name]) for name in self.coordinates])
+
+    def _slope(self, A: FloatArray) -> FloatArray:
+        return np.where(A == 0.0, 1.0, np.abs(A))
+
+    def _unit(self, A: FloatArray, n: FloatArray) -> FloatArray:
+        slope = self._slope(A)
+        return np.asarray(slope / (slope * self.span) ** n)
+
+
+_MEMORY = ("A", "beta", "gamma", "n", "z0")
+
+
+def _shape(c: FloatArray, n: FloatArray) -> FloatArray:
+    """Shape coefficient l from its coordinate."""
+    k = np.sinh(c)
+    return np.asarray(k * (1.0 + np.abs(k)) ** (n - 1.0))
+
+
+def _knee(coefficient: FloatArray, n: FloatArray) -> float:
+    """Coordinate of a shape coefficient l, the inverse of `_shape`, by bisection."""
+    low, high = 0.0, 2.0
+    while _shape(np.array(high), n) < abs(coefficient) and high < 300.0:
+        high *= 2.0
+    for _ in range(80):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _shape(np.array(middle), n) < abs(coefficient) else (low, middle)
+    return float(np.copysign(high, coefficient)) if coefficient else 0.0
+
+
+def _chart(
+    values: Mapping[str, float], free: frozenset[str], limits: Mapping[str, tuple[float, float]], record: Record
+) -> _Chart:
+    span = float(np.ptp(record.u))
+    if span == 0.0:
+        raise ValueError("the input is constant: nothing can be identified from it")
+    paired = {"beta", "gamma"} <= free and not {"beta", "gamma"} & limits.keys()
+    shapes = _PAIR if paired else ("beta", "gamma")
+    coordinates = [name for name in ("A", *shapes, "n", "z0") if name in free or (paired and name in _PAIR)]
+    return _Chart(
+        coordinates=tuple(coordinates),
+        values=values,
+        limits=limits,
+        span=span,
+        slope=float(np.ptp(record.y)) / (abs(values["gain"]) or 1.0) / span or 1.0,
+    )

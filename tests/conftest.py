@@ -1,0 +1,17 @@
+"""Settings of the whole test suite."""
+
+import hashlib
+import os
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+
+# numba's cache does not see an edit in another file: it is kept apart for each state of the kernels.
+kernels = b"".join(path.read_bytes() for path in sorted((ROOT / "hysim" / "kernels").glob("*.py")))
+os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".numba_cache" / hashlib.sha256(kernels).hexdigest()[:16]))
+os.environ.setdefault("MPLBACKEND", "agg")
+
+import hypothesis  # noqa: E402  numba must not be imported before the cache folder is set
+
+hypothesis.settings.register_profile("hysim", deadline=None, derandomize=True, max_examples=60)
+hypothesis.settings.load_profile("hysim")

@@ -1,0 +1,34 @@
+"""Random laws and inputs for the invariants."""
+
+import numpy as np
+from hypothesis import strategies as st
+
+import hysim as hs
+
+EXPONENTS = st.sampled_from([0.5, 0.8, 1.0, 1.3, 1.5, 2.0, 2.7, 5.0, 12.0])
+
+
+@st.composite
+def bounded_laws(draw) -> hs.BoucWen:
+    """Laws whose memory is bounded for every input: classes I and II, started inside."""
+    loading = draw(st.floats(0.05, 5.0))
+    unloading = draw(st.floats(-5.0, 5.0))
+    n = draw(EXPONENTS)
+    return hs.BoucWen(
+        A=draw(st.floats(0.2, 3.0)),
+        beta=(loading + unloading) / 2,
+        gamma=(loading - unloading) / 2,
+        n=n,
+        feedthrough=draw(st.floats(-2.0, 2.0)),
+        gain=draw(st.floats(-2.0, 2.0)),
+        offset=draw(st.floats(-1.0, 1.0)),
+        z0=0.0,
+    )
+
+
+@st.composite
+def short_inputs(draw, amplitude: float = 0.4) -> np.ndarray:
+    """Random walks with plateaus that stay where no law above escapes."""
+    values = draw(st.lists(st.floats(-amplitude, amplitude), min_size=2, max_size=30))
+    repeats = draw(st.lists(st.integers(1, 3), min_size=len(values), max_size=len(values)))
+    return np.repeat(values, repeats)
