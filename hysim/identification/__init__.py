@@ -1,0 +1,10 @@
+"""Parameters from records: `identify` and its result.
+
+The model is simulated in free run, and the sum of squared output residuals is minimised over the box that
+the model's family declares (`SearchSpace`). Nothing here knows a family.
+"""
+
+from hysim.identification._identify import identify
+from hysim.identification._result import Candidate, Identification
+
+__all__ = ["Candidate", "Identification", "identify"]

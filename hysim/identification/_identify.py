@@ -1,0 +1,199 @@
+"""The verb `identify`: declare, search, describe."""
+
+from collections.abc import Mapping
+from dataclasses import MISSING, fields, replace
+from typing import Any
+
+import numpy as np
+
+from hysim import metrics
+from hysim._frozen import FloatArray
+from hysim.identification._projection import Projection
+from hysim.identification._result import Candidate, Identification
+from hysim.identification._search import Optimum, Progress, optima, polish
+from hysim.identification._uncertainty import covariance
+from hysim.models._search import Identifiable, SearchSpace
+from hysim.records import Record
+
+_AT_FOLD = 4  # a fold of the cross-validation begins from this many of the best optima
+
+
+def identify(
+    model_or_class: Any,
+    record: Record,
+    *,
+    fixed: Mapping[str, float] | None = None,
+    free: tuple[str, ...] = (),
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    initial: str = "free",
+    cross_validate: str | int | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Identification:
+    """Identify a model's parameters on a record, by its error in free run.
+
+    Parameters
+    ----------
+    model_or_class : model, model class or structure
+        `hysim.BoucWen`, `hysim.TransferFunction.structure(poles=4, zeros=1)`, ... A class gives its
+        defaults as one start of the search, an instance its values.
+    record : Record
+        Input and output, and for models with dynamics the time.
+    fixed : mapping, optional
+        Parameters that are not free, and their values.
+    free : tuple of str, optional
+        Names to take out of the set that is held by default. Of each redundant group one is held, for
+        Bouc-Wen ``A = 1``, since only A times gain can be told.
+    bounds : mapping, optional
+        Name to (lower, upper), in place of the family's own box.
+    initial : {"free", "rest"}
+        Whether the memory at the first sample is identified, or zero.
+    cross_validate : {None, "loo"} or int, optional
+        ``"loo"`` leaves one output sample out at a time, an int that many blocks of samples; the input is
+        kept. Fills `Identification.cv_rmse`.
+    seed : int
+        Of the starts of the search.
+    progress : callable, optional
+        Called as ``progress(done, total)``.
+
+    Returns
+    -------
+    Identification
+
+    Raises
+    ------
+    ValueError
+        If a name is unknown, the record is too short for the parameters, or its input is constant.
+    TypeError
+        If the first argument is not something that can be identified.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=40)
+    >>> rec = hs.Record(u=u, y=hs.BoucWen(beta=0.7, gamma=0.3, gain=2.0).response(u))
+    >>> fit = hs.identify(hs.BoucWen, rec, fixed={"n": 1.0, "feedthrough": 0.0})
+    >>> round(fit.estimates["beta"], 6), round(fit.estimates["gain"], 6)
+    (0.7, 2.0)
+    """
+    family = _family(model_or_class)
+    space = family.search_space(record, fixed=fixed, free=tuple(free), bounds=bounds, initial=initial)
+    if len(record) < len(space.names):
+        raise ValueError(f"{len(record)} samples cannot tell {len(space.names)} parameters: fix some of them")
+    folds = _folds(cross_validate, len(record))
+    problem = Projection(family, space, record)
+    found = optima(problem, seed=seed, progress=progress)
+    if not found:
+        raise ValueError("no law in the box stays finite on this record: check its units, or give bounds")
+    result = _describe(problem, found)
+    regions = {
+        name: _candidate(inside, optima(inside, seed=seed)[0])
+        for name, (lower, upper) in space.regions.items()
+        if not (np.all(found[0].x >= lower) and np.all(found[0].x <= upper))
+        for inside in [replace(problem, space=_within(space, lower, upper))]
+    }
+    return replace(result, regions=regions, cv_rmse=_cross_validated(problem, found, folds))
+
+
+def _family(model_or_class: Any) -> Identifiable:
+    """The object that declares the search: a class stands for the model with its defaults."""
+    family = model_or_class
+    if isinstance(family, type) and hasattr(family, "__dataclass_fields__"):
+        complete = all(f.default is not MISSING or f.default_factory is not MISSING for f in fields(family))
+        family = family() if complete else family
+    if not all(callable(getattr(family, name, None)) for name in ("search_space", "regressors", "assemble")):
+        raise TypeError(f"identify takes a model, a model class or a structure, got {model_or_class!r}")
+    return family  # type: ignore[no-any-return]
+
+
+def _within(space: SearchSpace, lower: FloatArray, upper: FloatArray) -> SearchSpace:
+    return replace(space, lower=lower, upper=upper, starts=np.clip(space.starts, lower, upper), regions={})
+
+
+def _estimates(problem: Projection, x: FloatArray) -> dict[str, float]:
+    space = problem.space
+    linear = problem.solve(x[np.newaxis])[0][0]
+    searched = {name: float(values[0]) for name, values in space.parameters(x[np.newaxis]).items()}
+    return searched | dict(space.held) | dict(zip(space.linear, linear.tolist(), strict=True))
+
+
+def _candidate(problem: Projection, optimum: Optimum) -> Candidate:
+    estimates = _estimates(problem, optimum.x)
+    y = problem.record.y
+    return Candidate(
+        model=problem.family.assemble(estimates),
+        estimates=estimates,
+        fit_percent=metrics.fit_percent(y, y - problem.residual(optimum.x)),
+        rmse=float(np.sqrt(optimum.cost / y.size)),
+    )
+
+
+def _describe(problem: Projection, found: list[Optimum]) -> Identification:
+    best = found[0]
+    names, n = problem.space.names, len(problem.record)
+    residual = problem.residual(best.x)
+    spread, reasons = covariance(problem, best.x, residual)
+    chosen = _candidate(problem, best)
+    rivals = tuple(
+        _candidate(problem, other) for other in found[1:] if _indistinct(other.cost, best.cost, n, len(names))
+    )
+    if rivals:
+        reasons.append(
+            f"{len(rivals)} other optimum within the noise"
+            if len(rivals) == 1
+            else f"{len(rivals)} other optima within the noise"
+        )
+    message = "converged" if best.converged else "the search did not converge"
+    return Identification(
+        model=chosen.model,
+        estimates=chosen.estimates,
+        stderr=dict(zip(names, np.sqrt(np.diag(spread)).tolist(), strict=True)),
+        covariance=spread,
+        free_names=names,
+        n_parameters=len(names),
+        fit_percent=chosen.fit_percent,
+        rmse=chosen.rmse,
+        fpe=metrics.fpe(residual, len(names)),
+        aic=metrics.aic(residual, len(names)),
+        bic=metrics.bic(residual, len(names)),
+        residual=residual,
+        success=best.converged,
+        message="; ".join([message, *reasons]),
+        rivals=rivals,
+    )
+
+
+def _indistinct(cost: float, best: float, n_samples: int, n_parameters: int) -> bool:
+    """Whether the likelihood ratio N ln(V / V_best) is inside the 95 % region of the optimum."""
+    from scipy.stats import chi2
+
+    if best == 0.0:
+        return cost == 0.0
+    return bool(n_samples * np.log(cost / best) < chi2.ppf(0.95, n_parameters))
+
+
+def _folds(cross_validate: str | int | None, n: int) -> list[FloatArray]:
+    if cross_validate is None:
+        return []
+    count = n if cross_validate == "loo" else cross_validate
+    if not isinstance(count, int) or isinstance(count, bool) or not 2 <= count <= n:
+        raise ValueError(
+            f'cross_validate must be None, "loo" or a number of blocks from 2 to {n}, got {cross_validate!r}'
+        )
+    return [np.asarray(block) for block in np.array_split(np.arange(n), count)]
+
+
+def _cross_validated(problem: Projection, found: list[Optimum], folds: list[FloatArray]) -> float:
+    """Rmse of the left-out samples; each fold is polished from the best optima of the whole record."""
+    if not folds:
+        return float("nan")
+    errors = np.empty(len(problem.record))
+    for left_out in folds:
+        weights = np.ones(errors.size)
+        weights[left_out] = 0.0
+        fold = replace(problem, weights=weights)
+        best = min((polish(fold, start.x) for start in found[:_AT_FOLD]), key=lambda optimum: optimum.cost)
+        linear = fold.solve(best.x[np.newaxis])[0][0]
+        columns, fixed_part = fold.split(problem.space.parameters(best.x[np.newaxis]))
+        errors[left_out] = (problem.record.y - fixed_part[0] - columns[0] @ linear)[left_out]
+    return float(np.sqrt(np.mean(errors**2)))

@@ -1,0 +1,147 @@
+"""The global search: many starts descend together, the best are polished.
+
+A scrambled Sobol sequence covers the box. Its best points that lie apart from each other, and the family's
+own starts, descend by projected Levenberg-Marquardt steps, all of them in one batch. The distinct optima
+that come out best are polished one by one by SciPy's trust-region method.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.identification._projection import Projection
+from hysim.models._search import SearchSpace
+
+N_SCREENED = 4096
+N_DESCENDING = 96
+N_STEPS = 40
+N_POLISHED = 8
+_CHUNK = 256
+_APART = 0.05  # distance of two starts, in units of the box, under which the better one stands for both
+_SAME = 0.01  # likewise of two points after the descent
+_TOLERANCE = 1e-10
+
+Progress = Callable[[int, int], None]
+
+
+class Optimum(NamedTuple):
+    """A local optimum: coordinates (n_x,), sum of squares, and whether the polish converged."""
+
+    x: FloatArray
+    cost: float
+    converged: bool
+
+
+def optima(problem: Projection, *, seed: int, progress: Progress | None = None) -> list[Optimum]:
+    """Distinct local optima of `problem`, best first; empty if nothing in the box stays finite."""
+    space = problem.space
+    if not space.coordinates:
+        return [polish(problem, np.empty(0))]
+    candidates = np.concatenate([space.starts, _uniform(space, N_SCREENED, seed)])
+    starts = _apart(space, candidates, _costs(problem, candidates), _APART, N_DESCENDING, len(space.starts))
+    reached, cost = descend(problem, starts)
+    found = []
+    best = _apart(space, reached, cost, _SAME, N_POLISHED)
+    for done, start in enumerate(best):
+        found.append(polish(problem, start))
+        if progress is not None:
+            progress(done + 1, len(best))
+    return _distinct(found)
+
+
+def descend(problem: Projection, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Points (n, n_x) after `N_STEPS` projected Levenberg-Marquardt steps from `x`, and their sums of squares."""
+    space, n_x = problem.space, x.shape[1]
+    width = space.upper - space.lower
+    damping = np.full(len(x), 1e-2)
+    residual = problem.solve(x)[1]
+    cost = np.sum(residual**2, axis=1)
+    active = np.isfinite(cost)
+    for _ in range(N_STEPS):
+        moving = np.flatnonzero(active)
+        if not moving.size:
+            break
+        slopes = np.nan_to_num(problem.jacobians(x[moving]), posinf=0.0, neginf=0.0) * width
+        gradient = np.einsum("snk,sn->sk", slopes, residual[moving])
+        held = ((x[moving] <= space.lower) & (gradient > 0.0)) | ((x[moving] >= space.upper) & (gradient < 0.0))
+        slopes[np.broadcast_to(held[:, np.newaxis], slopes.shape)] = 0.0
+        normal = slopes.transpose(0, 2, 1) @ slopes
+        diagonal = np.einsum("sii->si", normal)
+        scale = damping[moving, np.newaxis] * diagonal + 1e-12 * diagonal.max(axis=1, keepdims=True) + held + 1e-300
+        step = -np.linalg.solve(
+            normal + scale[..., np.newaxis] * np.eye(n_x), np.where(held, 0.0, gradient)[..., np.newaxis]
+        )
+        trial = np.clip(x[moving] + step[..., 0] * width, space.lower, space.upper)
+        trial_residual = problem.solve(trial)[1]
+        trial_cost = np.sum(trial_residual**2, axis=1)
+        better = trial_cost < cost[moving]
+        gained = np.where(better, 1.0 - trial_cost / cost[moving], 1.0)
+        up, down = moving[better], moving[~better]
+        x[up], residual[up], cost[up] = trial[better], trial_residual[better], trial_cost[better]
+        damping[up] *= 0.2
+        damping[down] *= 5.0
+        active[moving[(gained < 1e-7) | (damping[moving] > 1e8)]] = False
+    return x, cost
+
+
+def polish(problem: Projection, start: FloatArray) -> Optimum:
+    """The local optimum that is reached from `start`."""
+    from scipy.optimize import least_squares
+
+    space = problem.space
+    if not start.size:
+        return Optimum(start, float(np.sum(problem.residual(start) ** 2)), True)
+    inside = np.clip(start, space.lower, space.upper)
+    width = space.upper - space.lower
+    result = least_squares(
+        problem.residual,
+        np.clip(inside, space.lower + 1e-9 * width, space.upper - 1e-9 * width),
+        jac=problem.jacobian,
+        bounds=(space.lower, space.upper),
+        x_scale=width,
+        ftol=_TOLERANCE,
+        xtol=_TOLERANCE,
+        gtol=None,
+        max_nfev=200,
+    )
+    return Optimum(result.x, 2.0 * float(result.cost), result.status > 0)
+
+
+def _uniform(space: SearchSpace, n: int, seed: int) -> FloatArray:
+    """Spread `n` points over the box, a power of two, by a scrambled Sobol sequence."""
+    from scipy.stats import qmc
+
+    unit = qmc.Sobol(space.lower.size, rng=np.random.default_rng(seed)).random(n)
+    return np.asarray(space.lower + unit * (space.upper - space.lower))
+
+
+def _costs(problem: Projection, points: FloatArray) -> FloatArray:
+    """Sum of squares at each of the points (n, n_x), computed in chunks to bound the memory."""
+    chunks = [points[k : k + _CHUNK] for k in range(0, len(points), _CHUNK)]
+    return np.concatenate([np.sum(problem.solve(chunk)[1] ** 2, axis=1) for chunk in chunks])
+
+
+def _apart(
+    space: SearchSpace, points: FloatArray, cost: FloatArray, distance: float, most: int, n_given: int = 0
+) -> FloatArray:
+    """The first `n_given` points, and the best others that are apart from those already taken."""
+    unit = (points - space.lower) / (space.upper - space.lower)
+    ranked = np.concatenate([np.arange(n_given), n_given + np.argsort(cost[n_given:], kind="stable")])
+    chosen: list[int] = []
+    for k in ranked[np.isfinite(cost[ranked])]:
+        if len(chosen) == most:
+            break
+        if not chosen or np.abs(unit[chosen] - unit[k]).max(axis=1).min() > distance:
+            chosen.append(int(k))
+    return points[chosen]
+
+
+def _distinct(found: list[Optimum]) -> list[Optimum]:
+    """Optima of different cost, best first: the same cost to 1e-6 is the same optimum."""
+    kept: list[Optimum] = []
+    for optimum in sorted(found, key=lambda candidate: candidate.cost):
+        if not kept or optimum.cost > kept[-1].cost * (1.0 + 1e-6):
+            kept.append(optimum)
+    return kept
