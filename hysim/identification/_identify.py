@@ -10,7 +10,7 @@ from hysim import metrics
 from hysim._frozen import FloatArray
 from hysim.identification._projection import Projection
 from hysim.identification._result import Candidate, Identification
-from hysim.identification._search import Optimum, Progress, optima, polish
+from hysim.identification._search import Optimum, Progress, descend, optima
 from hysim.identification._uncertainty import covariance
 from hysim.models._search import Identifiable, SearchSpace
 from hysim.records import Record
@@ -184,16 +184,17 @@ def _folds(cross_validate: str | int | None, n: int) -> list[FloatArray]:
 
 
 def _cross_validated(problem: Projection, found: list[Optimum], folds: list[FloatArray]) -> float:
-    """Rmse of the left-out samples; each fold is polished from the best optima of the whole record."""
+    """Rmse of the left-out samples: every fold descends from the best optima of the whole record."""
     if not folds:
         return float("nan")
-    errors = np.empty(len(problem.record))
-    for left_out in folds:
-        weights = np.ones(errors.size)
-        weights[left_out] = 0.0
-        fold = replace(problem, weights=weights)
-        best = min((polish(fold, start.x) for start in found[:_AT_FOLD]), key=lambda optimum: optimum.cost)
-        linear = fold.solve(best.x[np.newaxis])[0][0]
-        columns, fixed_part = fold.split(problem.space.parameters(best.x[np.newaxis]))
-        errors[left_out] = (problem.record.y - fixed_part[0] - columns[0] @ linear)[left_out]
-    return float(np.sqrt(np.mean(errors**2)))
+    starts = np.array([optimum.x for optimum in found[:_AT_FOLD]])
+    weights = np.ones((len(folds), len(problem.record)))
+    for fold, left_out in enumerate(folds):
+        weights[fold, left_out] = 0.0
+    each = np.repeat(weights, len(starts), axis=0)
+    reached, costs = descend(problem, np.tile(starts, (len(folds), 1)), each)
+    best = np.arange(len(folds)) * len(starts) + costs.reshape(len(folds), -1).argmin(axis=1)
+    linear = problem.solve(reached[best], weights)[0]
+    columns, fixed_part = problem.split(problem.space.parameters(reached[best]))
+    errors = problem.record.y - fixed_part - (columns @ linear[..., np.newaxis])[..., 0]
+    return float(np.sqrt(np.mean(errors[weights == 0.0] ** 2)))

@@ -15,13 +15,14 @@ from hysim.identification._projection import Projection
 from hysim.models._search import SearchSpace
 
 N_SCREENED = 4096
-N_DESCENDING = 96
+N_DESCENDING = 64
 N_STEPS = 40
 N_POLISHED = 8
 _CHUNK = 256
 _APART = 0.05  # distance of two starts, in units of the box, under which the better one stands for both
 _SAME = 0.01  # likewise of two points after the descent
 _TOLERANCE = 1e-10
+_FLAT = 1e-15
 
 Progress = Callable[[int, int], None]
 
@@ -51,19 +52,25 @@ def optima(problem: Projection, *, seed: int, progress: Progress | None = None) 
     return _distinct(found)
 
 
-def descend(problem: Projection, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+def descend(
+    problem: Projection, x: FloatArray, weights: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray]:
     """Points (n, n_x) after `N_STEPS` projected Levenberg-Marquardt steps from `x`, and their sums of squares."""
+    x = x.copy()
     space, n_x = problem.space, x.shape[1]
     width = space.upper - space.lower
     damping = np.full(len(x), 1e-2)
-    residual = problem.solve(x)[1]
+    residual = problem.solve(x, weights)[1]
     cost = np.sum(residual**2, axis=1)
     active = np.isfinite(cost)
     for _ in range(N_STEPS):
         moving = np.flatnonzero(active)
         if not moving.size:
             break
-        slopes = np.nan_to_num(problem.jacobians(x[moving]), posinf=0.0, neginf=0.0) * width
+        weighted = None if weights is None else weights[moving]
+        slopes = width * np.nan_to_num(
+            problem.rough_jacobians(x[moving], residual[moving], weighted), posinf=0.0, neginf=0.0
+        )
         gradient = np.einsum("snk,sn->sk", slopes, residual[moving])
         held = ((x[moving] <= space.lower) & (gradient > 0.0)) | ((x[moving] >= space.upper) & (gradient < 0.0))
         slopes[np.broadcast_to(held[:, np.newaxis], slopes.shape)] = 0.0
@@ -74,7 +81,7 @@ def descend(problem: Projection, x: FloatArray) -> tuple[FloatArray, FloatArray]
             normal + scale[..., np.newaxis] * np.eye(n_x), np.where(held, 0.0, gradient)[..., np.newaxis]
         )
         trial = np.clip(x[moving] + step[..., 0] * width, space.lower, space.upper)
-        trial_residual = problem.solve(trial)[1]
+        trial_residual = problem.solve(trial, weighted)[1]
         trial_cost = np.sum(trial_residual**2, axis=1)
         better = trial_cost < cost[moving]
         gained = np.where(better, 1.0 - trial_cost / cost[moving], 1.0)
@@ -93,20 +100,20 @@ def polish(problem: Projection, start: FloatArray) -> Optimum:
     space = problem.space
     if not start.size:
         return Optimum(start, float(np.sum(problem.residual(start) ** 2)), True)
-    inside = np.clip(start, space.lower, space.upper)
     width = space.upper - space.lower
+    scale = float(np.linalg.norm(problem.record.y - problem.record.y.mean())) or 1.0  # makes gtol free of units
     result = least_squares(
-        problem.residual,
-        np.clip(inside, space.lower + 1e-9 * width, space.upper - 1e-9 * width),
-        jac=problem.jacobian,
+        lambda x: problem.residual(x) / scale,
+        np.clip(start, space.lower + 1e-9 * width, space.upper - 1e-9 * width),
+        jac=lambda x: problem.jacobian(x) / scale,
         bounds=(space.lower, space.upper),
         x_scale=width,
         ftol=_TOLERANCE,
         xtol=_TOLERANCE,
-        gtol=None,
+        gtol=_FLAT,
         max_nfev=200,
     )
-    return Optimum(result.x, 2.0 * float(result.cost), result.status > 0)
+    return Optimum(result.x, 2.0 * float(result.cost) * scale**2, result.status > 0)
 
 
 def _uniform(space: SearchSpace, n: int, seed: int) -> FloatArray:

@@ -1,0 +1,81 @@
+"""Imports point down only: to a lower rank, or inside one's own package."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import hysim
+
+PACKAGE = Path(hysim.__file__).parent
+
+RANKS = {
+    0: ("errors", "signals", "records", "metrics", "kernels", "_parallel", "_frozen", "_atomic"),
+    1: ("datasets", "files", "models", "vision"),
+    2: ("simulation", "benchmarks"),
+    3: ("identification",),
+    4: ("discovery", "control"),
+    5: ("comparison", "sweeps", "rig"),
+    6: ("plot",),
+    7: ("paper",),
+    8: ("cli", "__main__"),
+}
+RANK = {name: rank for rank, names in RANKS.items() for name in names}
+ONLY_IMPORTED_IN = {"pysindy": ("discovery/_pysindy.py",), "matplotlib": ("plot/",), "control": ("control/", "paper/")}
+MODULES = sorted(PACKAGE.rglob("*.py"))
+
+
+def imported(path: Path) -> list[str]:
+    """Every module that a file imports, at its top or inside a function."""
+    names = []
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            names += [f"{node.module}.{alias.name}" for alias in node.names]
+    return names
+
+
+def part(module: str) -> str:
+    """`records` for hysim.records.Record, `models` for hysim.models.boucwen."""
+    return module.split(".")[1]
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_imports_point_down(path):
+    relative = path.relative_to(PACKAGE)
+    own = relative.parts[0].removesuffix(".py")
+    if own == "__init__":
+        return  # the front door re-exports from every rank
+    assert own in RANK, f"{relative} has no rank"
+    for module in imported(path):
+        if module.startswith("hysim.") and part(module) != "__version__" and part(module) != own:
+            assert RANK[part(module)] < RANK[own], f"{relative} imports {module}"
+
+
+@pytest.mark.parametrize("library", ONLY_IMPORTED_IN)
+def test_a_library_is_imported_in_its_own_place_only(library):
+    users = {
+        str(path.relative_to(PACKAGE)) for path in MODULES for name in imported(path) if name.split(".")[0] == library
+    }
+    assert all(user.startswith(ONLY_IMPORTED_IN[library]) for user in users), users
+
+
+def test_kernels_know_no_class():
+    for path in (PACKAGE / "kernels").glob("*.py"):
+        assert not any(isinstance(node, ast.ClassDef) for node in ast.walk(ast.parse(path.read_text()))), path
+        own = [name for name in imported(path) if name.startswith("hysim.")]
+        assert all(part(name) in ("kernels", "_frozen") for name in own), path
+
+
+def test_nobody_walks_past_the_public_names_of_a_package():
+    """Private modules are imported inside their own package only."""
+    for path in MODULES:
+        own = path.relative_to(PACKAGE).parts[0]
+        for name in imported(path):
+            parts = name.split(".")
+            if parts[0] == "hysim" and len(parts) > 3 and parts[2].startswith("_"):
+                assert parts[1] == own or (parts[1], parts[2]) in {("models", "_search"), ("models", "_model")}, (
+                    path,
+                    name,
+                )

@@ -1,0 +1,171 @@
+"""`identify` finds the global optimum, says what the data tell, and refuses what it cannot do."""
+
+import numpy as np
+import pytest
+
+import hysim as hs
+from hysim.models._search import SearchSpace
+
+
+@pytest.fixture(scope="module")
+def table1() -> hs.Record:
+    return hs.datasets.table1()
+
+
+def loop_record(law, noise=0.0, seed=0) -> hs.Record:
+    u = np.concatenate([hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=60), [-0.4, 0.3, -0.2, 0.9]])
+    rng = np.random.default_rng(seed)
+    return hs.Record(u=u, y=law.response(u) + noise * rng.standard_normal(u.size))
+
+
+def test_clean_data_give_the_law_back():
+    law = hs.BoucWen(beta=1.4, gamma=-0.6, n=1.6, feedthrough=0.7, gain=-0.5, offset=0.2, z0=0.1)
+    fit = hs.identify(hs.BoucWen, loop_record(law))
+    assert fit.success
+    assert fit.fit_percent > 99.9999
+    for name, value in fit.estimates.items():
+        assert value == pytest.approx(getattr(law, name), abs=1e-5)  # the residual is quadratic in this error
+
+
+def test_polynomial_input_is_given_back():
+    law = hs.PolynomialBoucWen(beta=1.5, gamma=0.4, gain=-0.6, input_coefficients=(1.3, 0.2, -0.1))
+    start = hs.PolynomialBoucWen(input_coefficients=(0.0, 0.0, 0.0))
+    fit = hs.identify(start, loop_record(law), fixed={"n": 1.0})
+    assert fit.model.input_coefficients == pytest.approx(law.input_coefficients, abs=1e-5)
+    assert fit.model.beta == pytest.approx(law.beta, abs=1e-4)
+
+
+def test_table1_bouc_wen_reaches_its_global_optimum_and_lists_the_rival(table1):
+    fit = hs.identify(hs.BoucWen, table1)
+    # 95.7146 is what an exhaustive search of the same box reaches; the runner-up, at n = 1.03, is 5e-4 below
+    assert fit.fit_percent == pytest.approx(95.7146, abs=2e-4)
+    assert any(rival.fit_percent == pytest.approx(95.714, abs=1e-3) for rival in fit.rivals)
+    assert fit.n_parameters == 7
+    assert fit.estimates["A"] == 1.0
+    assert not fit.model.admissible
+    assert fit.regions["admissible"].fit_percent == pytest.approx(93.708, abs=1e-3)
+    assert fit.regions["admissible"].model.beta >= abs(fit.regions["admissible"].model.gamma) * (1 - 1e-12)
+
+
+def test_table1_with_a_quadratic_input(table1):
+    fit = hs.identify(hs.PolynomialBoucWen, table1, fixed={"n": 1.0})
+    assert fit.fit_percent == pytest.approx(96.3107, abs=1e-3)
+    assert fit.n_parameters == 7
+    assert np.abs(fit.residual).max() < table1.resolution
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_optimum_does_not_depend_on_the_seed(table1, seed):
+    reference = hs.identify(hs.PolynomialBoucWen, table1, fixed={"n": 1.0}, seed=0)
+    other = hs.identify(hs.PolynomialBoucWen, table1, fixed={"n": 1.0}, seed=seed)
+    assert other.rmse == pytest.approx(reference.rmse, rel=5e-7)  # the cost within 1e-6
+
+
+def test_standard_errors_are_those_of_repeated_experiments():
+    law = hs.BoucWen(beta=1.4, gamma=-0.6, n=1.0, feedthrough=0.7, gain=-0.5)
+    fits = [hs.identify(law, loop_record(law, 0.01, seed), fixed={"n": 1.0, "z0": 0.0}) for seed in range(40)]
+    for name in fits[0].free_names:
+        scatter = np.std([fit.estimates[name] for fit in fits], ddof=1)
+        # 40 draws: the relative error of a standard deviation is 11 %; four of these
+        assert np.median([fit.stderr[name] for fit in fits]) == pytest.approx(scatter, rel=0.45)
+
+
+def test_fixed_free_and_the_redundant_pair(table1):
+    held = hs.identify(hs.BoucWen, table1, fixed={"n": 1.0, "gain": -0.005})
+    assert "A" in held.free_names
+    assert "gain" not in held.free_names
+    assert held.estimates["gain"] == -0.005
+    plain = hs.identify(hs.BoucWen, table1, fixed={"n": 1.0, "A": 2.0})
+    assert "gain" in plain.free_names
+    assert plain.estimates["A"] == 2.0
+
+
+def test_the_optimum_does_not_depend_on_the_held_slope(table1):
+    one = hs.identify(hs.BoucWen, table1, fixed={"n": 1.0})
+    two = hs.identify(hs.BoucWen, table1, fixed={"n": 1.0, "A": 2.0})
+    assert two.rmse == pytest.approx(one.rmse, rel=1e-6)
+    assert two.model.A * two.model.gain == pytest.approx(one.model.A * one.model.gain, rel=1e-3)
+
+
+def test_bounds_are_kept_and_said(table1):
+    bounds = {"gain": (-0.004, 0.0), "beta": (0.0, 0.02), "z0": (-5.0, 5.0)}
+    fit = hs.identify(hs.BoucWen, table1, fixed={"n": 1.0}, bounds=bounds)
+    for name, (lower, upper) in bounds.items():
+        assert lower <= fit.estimates[name] <= upper
+    assert "side of its box" in fit.message
+
+
+def test_rest_holds_the_memory_at_zero(table1):
+    fit = hs.identify(hs.BoucWen, table1, initial="rest", fixed={"n": 1.0})
+    assert fit.model.z0 == 0.0
+    assert "z0" not in fit.free_names
+
+
+def test_units_do_not_matter(table1):
+    """The same loop in millivolts and metres has the same optimum."""
+    scaled = hs.Record(u=table1.u * 1e3, y=table1.y * 1e-6)
+    fit = hs.identify(hs.PolynomialBoucWen, scaled, fixed={"n": 1.0})
+    assert fit.fit_percent == pytest.approx(96.3107, abs=1e-3)
+
+
+def test_cross_validation_is_leave_one_out(table1):
+    line = hs.identify(hs.Line, table1, cross_validate="loo")
+    design = np.column_stack([np.ones(52), table1.u])
+    leverage = np.einsum("nk,kn->n", design, np.linalg.pinv(design))
+    closed_form = np.sqrt(np.mean((line.residual / (1 - leverage)) ** 2))
+    assert line.cv_rmse == pytest.approx(closed_form, rel=1e-12)
+    assert np.isnan(hs.identify(hs.Line, table1).cv_rmse)
+
+
+def test_transfer_function_reaches_the_optimum_above_nyquist(table1):
+    structure = hs.TransferFunction.structure(poles=4, zeros=1, hold="zoh", sample="start", initial="rest")
+    fit = hs.identify(structure, table1)
+    assert fit.fit_percent == pytest.approx(91.55, abs=0.01)
+    assert fit.n_parameters == 6
+    assert fit.fpe == pytest.approx(0.005996, abs=2e-5)
+
+
+def test_a_constant_output_parameter_that_cannot_be_told_is_nan():
+    """Without curvature the memory is the input: feedthrough and gain cannot be told apart."""
+    u = np.linspace(0.0, 1.0, 30)
+    fit = hs.identify(hs.BoucWen, hs.Record(u=u, y=2 * u), fixed={"beta": 0.0, "gamma": 0.0, "n": 1.0, "z0": 0.0})
+    assert np.isnan(fit.stderr["gain"])
+    assert np.isnan(fit.stderr["feedthrough"])
+    assert "cannot tell" in fit.message
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        ({"fixed": {"bta": 1.0}}, ValueError, "fixed names 'bta'; the parameters are A, beta"),
+        ({"free": ("alpha",)}, ValueError, "free names 'alpha'"),
+        ({"bounds": {"beta": (1.0, 0.0)}}, ValueError, "lower < upper"),
+        ({"bounds": {"A": (0.0, 1.0)}}, ValueError, "not free"),
+        ({"initial": "warm"}, ValueError, '"free" or "rest"'),
+        ({"cross_validate": "lots"}, ValueError, "loo"),
+        ({"cross_validate": 1}, ValueError, "from 2 to 52"),
+        ({"fixed": {"n": 1.0}, "free": ("n",)}, ValueError, "both fixed and free"),
+    ],
+)
+def test_wrong_arguments_are_named(table1, arguments, error, message):
+    with pytest.raises(error, match=message):
+        hs.identify(hs.BoucWen, table1, **arguments)
+
+
+def test_records_that_say_nothing_are_refused(table1):
+    with pytest.raises(ValueError, match="constant"):
+        hs.identify(hs.BoucWen, hs.Record(u=np.ones(20), y=np.arange(20.0)))
+    with pytest.raises(ValueError, match="cannot tell 7 parameters"):
+        hs.identify(hs.BoucWen, table1[:5])
+    with pytest.raises(TypeError, match="takes a model"):
+        hs.identify("bouc-wen", table1)
+
+
+def test_a_search_space_is_data(table1):
+    space = hs.BoucWen().search_space(table1)
+    assert isinstance(space, SearchSpace)
+    assert space.redundant == (("A", "gain"),)
+    assert space.linear == ("feedthrough", "gain", "offset")
+    back = space.parameters(space.starts)
+    assert back["beta"][0] == pytest.approx(0.5)
+    assert back["n"][0] == pytest.approx(1.0)
