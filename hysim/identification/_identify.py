@@ -25,7 +25,7 @@ def identify(
     fixed: Mapping[str, float] | None = None,
     free: tuple[str, ...] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
-    initial: str = "free",
+    initial: str | None = None,
     cross_validate: str | int | None = None,
     seed: int = 0,
     progress: Progress | None = None,
@@ -46,8 +46,9 @@ def identify(
         Bouc-Wen ``A = 1``, since only A times gain can be told.
     bounds : mapping, optional
         Name to (lower, upper), in place of the family's own box.
-    initial : {"free", "rest"}
-        Whether the memory at the first sample is identified, or zero.
+    initial : {"free", "rest"}, optional
+        Whether the state at the first sample is identified, or rest; by default as the family has it (free
+        for a memory, as the structure says for a transfer function).
     cross_validate : {None, "loo"} or int, optional
         ``"loo"`` leaves one output sample out at a time, an int that many blocks of samples; the input is
         kept. Fills `Identification.cv_rmse`.

@@ -45,7 +45,7 @@ def search_space(
     fixed: Mapping[str, float] | None,
     free: tuple[str, ...],
     bounds: Mapping[str, tuple[float, float]] | None,
-    initial: str,
+    initial: str | None,
 ) -> SearchSpace:
     """Declare the coordinates, their box and the way back to the user's parameters for one record.
 
@@ -54,7 +54,7 @@ def search_space(
     ValueError
         If the input is constant, `initial` is unknown, or a name or a bound does not fit.
     """
-    if initial not in ("free", "rest"):
+    if initial not in (None, "free", "rest"):
         raise ValueError(f'initial must be "free" or "rest", got {initial!r}')
     at_rest = {"z0": 0.0} if initial == "rest" and "z0" not in free else {}
     held = held_parameters(defaults, REDUNDANT, at_rest | dict(fixed or {}), free)

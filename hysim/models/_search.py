@@ -70,7 +70,7 @@ class Identifiable(Protocol):
         fixed: Mapping[str, float] | None = None,
         free: tuple[str, ...] = (),
         bounds: Mapping[str, tuple[float, float]] | None = None,
-        initial: str = "free",
+        initial: str | None = None,
     ) -> SearchSpace:
         """Declare the box for `record`."""
         ...

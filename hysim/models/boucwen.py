@@ -217,7 +217,7 @@ class _BoucWenLaw:
         fixed: Mapping[str, float] | None = None,
         free: tuple[str, ...] = (),
         bounds: Mapping[str, tuple[float, float]] | None = None,
-        initial: str = "free",
+        initial: str | None = None,
     ) -> SearchSpace:
         """The box that `identify` searches; see `hysim.models._boucwen_search`."""
         return _boucwen_search.search_space(self.scalars, self.columns, record, fixed, free, bounds, initial)

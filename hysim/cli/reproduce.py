@@ -1,0 +1,43 @@
+"""`hysim reproduce`: the paper's 52 points, every model side by side, as a report."""
+
+import argparse
+import sys
+from typing import Any
+
+SUCCESS, NOT_CONVERGED = 0, 1
+
+
+def add_to(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "reproduce",
+        help="rebuild the paper's results and write a report",
+        description="Identify, discover and compare models on the 52 voltage-displacement points of the paper, "
+        "and write report.html, summary.json, figures and tables.",
+    )
+    parser.add_argument("--out", metavar="DIR", default="reproduction", help="folder to write into (default: %(default)s)")
+    parser.add_argument("--quick", action="store_true", help="leave the cross-validation out")
+    parser.set_defaults(command=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Reproduce, and print the short table."""
+    from hysim.paper import reproduce
+
+    done = reproduce(options.out, quick=options.quick, progress=_progress)
+    comparison, loop = done.study.comparison, done.study.comparison.loop
+    print(
+        f"Table 1: {len(comparison.record)} points, stroke {loop.stroke:.3f} um; the loop is {loop.max_width:.3f} um wide "
+        f"at {loop.max_width_at:g} V, {loop.mean_width:.4f} um on average, area {loop.area:.2f} um V"
+    )
+    print(comparison.to_text())
+    for name, fit in done.study.fits.items():
+        for region, best in fit.regions.items():
+            print(f"{name}: the best {region} law fits {best.fit_percent:.2f} %")
+    print(f"sindy: {done.study.discovery.equation}  ({done.study.discovery.verdict})")
+    print(f"report: {done.folder / 'report.html'}")
+    return SUCCESS if all(fit.success for fit in done.study.fits.values()) else NOT_CONVERGED
+
+
+def _progress(done: int, total: int, what: str) -> None:
+    print(f"[{done + 1}/{total + 1}] {what}", file=sys.stderr, flush=True)

@@ -1,0 +1,74 @@
+"""The box in which a Duhem law is searched: its own structure, around its own coefficients.
+
+A coordinate is a coefficient measured by what its term contributes over the span of the input, in units
+of the stroke; y0 is measured in strokes. The box reaches 10 to both sides of the law's own coefficients,
+and 1 of its y0. A parameter that the user bounds has these bounds.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.models._duhem_terms import Term, coefficient_units
+from hysim.models._search import SearchSpace, checked_bounds, held_parameters
+from hysim.records import Record
+
+_REACH = 10.0
+_REACH_Y0 = 1.0
+
+
+def search_space(
+    defaults: Mapping[str, float],
+    record: Record,
+    fixed: Mapping[str, float] | None,
+    free: tuple[str, ...],
+    bounds: Mapping[str, tuple[float, float]] | None,
+    initial: str,
+) -> SearchSpace:
+    """Declare the box for the terms and y0 in `defaults`.
+
+    Raises
+    ------
+    ValueError
+        If the input is constant, `initial` is unknown, or a name or a bound does not fit.
+    """
+    if initial not in ("free", "rest"):
+        raise ValueError(f'initial must be "free" or "rest", got {initial!r}')
+    if np.ptp(record.u) == 0.0:
+        raise ValueError("the input is constant: nothing can be identified from it")
+    at_rest = {"y0": 0.0} if initial == "rest" and "y0" not in free else {}
+    held = held_parameters(defaults, (), at_rest | dict(fixed or {}), free)
+    limits = checked_bounds(bounds or {}, defaults, held)
+    names = tuple(name for name in defaults if name not in held)
+    unit = _units(defaults, record)
+    scale = np.array([unit[name] for name in names])
+    start = np.array([defaults[name] for name in names]) / scale
+    reach = np.array([_REACH_Y0 if name == "y0" else _REACH for name in names])
+    lower, upper = start - reach, start + reach
+    for k, name in enumerate(names):
+        if name in limits:
+            lower[k], upper[k] = np.array(limits[name]) / scale[k]
+
+    def parameters(x: FloatArray) -> dict[str, FloatArray]:
+        sets = np.atleast_2d(x) * scale
+        constants = {name: np.full(len(sets), value) for name, value in held.items()}
+        return constants | dict(zip(names, sets.T, strict=True))
+
+    return SearchSpace(
+        coordinates=names,
+        lower=lower,
+        upper=upper,
+        starts=np.clip(start, lower, upper)[np.newaxis],
+        names=names,
+        columns=(),
+        linear=(),
+        held=held,
+        parameters=parameters,
+    )
+
+
+def _units(defaults: Mapping[str, float], record: Record) -> dict[str, float]:
+    names = [name for name in defaults if name != "y0"]
+    units = coefficient_units(record.u, record.y, map(Term.parse, names)).tolist()
+    return dict(zip(names, units, strict=True)) | {"y0": float(np.ptp(record.y)) or 1.0}

@@ -1,0 +1,85 @@
+"""Models to and from JSON: the version of hysim, the family, the parameters, the units."""
+
+import importlib
+import json
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hysim import __version__
+from hysim._atomic import write_text
+from hysim.models._model import FAMILIES
+
+_MODULES = ("boucwen", "duhem", "static", "transfer_function")
+
+
+def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None) -> None:
+    """Write a model to a JSON file; every number comes back to the bit.
+
+    Parameters
+    ----------
+    model : model
+        Of one of hysim's families.
+    path : path
+        The file; it appears whole or not at all.
+    units : mapping, optional
+        Labels of the units of ``"t"``, ``"u"`` and ``"y"``.
+
+    Raises
+    ------
+    TypeError
+        If `model` is not a model.
+    OSError
+        If the file cannot be written.
+    """
+    family = type(model).__name__
+    if FAMILIES.get(family) is not type(model):
+        raise TypeError(f"save takes a model of hysim, got {family}")
+    document = {
+        "hysim": __version__,
+        "family": family,
+        "parameters": {field.name: _plain(getattr(model, field.name)) for field in fields(model)},
+        "units": dict(units or {}),
+    }
+    write_text(path, json.dumps(document, indent=2, allow_nan=False) + "\n")
+
+
+def load_model(path: str | Path) -> Any:
+    """Read a model that `save` wrote.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+
+    Returns
+    -------
+    model
+
+    Raises
+    ------
+    ValueError
+        If the file does not hold a model; the message names the file and what is wrong.
+    OSError
+        If it cannot be read.
+    """
+    for module in _MODULES:
+        importlib.import_module(f"hysim.models.{module}")
+    try:
+        document = json.loads(Path(path).read_text(encoding="utf-8"))
+        family, parameters = document["family"], dict(document["parameters"])
+    except (KeyError, TypeError, ValueError, RecursionError) as error:
+        raise ValueError(f"{path} does not hold a model of hysim: {type(error).__name__}: {error}") from None
+    if family not in FAMILIES:
+        raise ValueError(f"{path} holds a model of the family {family!r}; there are {', '.join(sorted(FAMILIES))}")
+    try:
+        return FAMILIES[family](**parameters)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{path} does not hold a {family}: {error}") from None
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray) else list(value) if isinstance(value, tuple) else value

@@ -1,0 +1,336 @@
+"""Continuous-time transfer functions, simulated and identified from sampled data.
+
+    G(s) = exp(-delay s) (num_0 s^m + ... + num_m) / (den_0 s^n + ... + den_n),   m <= n
+
+The input between two samples is held (``hold="zoh"``) or linear (``hold="foh"``); under either the response
+is exact, by matrix exponentials. Where the input is held, the output of a sample may be taken at the start
+of the hold (``sample="start"``), before that sample's input has done anything, or at its end. System
+identification tools take the start; a record that was read when each voltage had settled, such as a
+staircase, belongs to the end, and taking it as the start shifts the output by one sample.
+
+Time is counted in samples inside: with den monic and s' = s h the plant's states are x_j = s'^j / den'(s') u,
+j = 0 ... n - 1, and the output is affine in the numerator and in the initial state, which is the free
+response and its derivatives at the first sample, (y, y', ..., y^(n-1)).
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, checked, read_only
+from hysim.kernels import linear as kernels
+from hysim.models._model import model
+from hysim.models._search import Parameters, SearchSpace, checked_bounds, held_parameters
+from hysim.records import Record
+
+FREQUENCY = (0.1, 4.0 * np.pi)  # box of a section's frequency: turns over the record / 2 pi, rad per sample
+DAMPING = (1e-3, 30.0)  # box of its damping ratio; two real poles above 1
+
+
+@model
+class TransferFunction:
+    """Continuous-time transfer function.
+
+    Parameters
+    ----------
+    num, den : sequence of float
+        Coefficients of descending powers of s [s^-1]. The numerator's degree is at most the denominator's.
+    delay : float
+        Dead time [s], not negative.
+    hold : {"zoh", "foh"}
+        Whether the input is held between samples, or linear.
+    sample : {"start", "end"}
+        Whether an output is taken at the start or the end of the time for which its input is held; with
+        ``hold="foh"`` it is taken at the sample.
+    initial_state : sequence of float
+        Free response at the first sample and its derivatives, (y, y', ...); empty for rest.
+
+    Raises
+    ------
+    ValueError
+        If the plant is not proper, den begins with zero, or an option is unknown.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> lag = hs.TransferFunction(num=(1.0,), den=(1.0, 1.0), sample="end")
+    >>> lag.response([1.0, 1.0], sample_time=1.0).round(6).tolist()
+    [0.632121, 0.864665]
+    """
+
+    num: tuple[float, ...]
+    den: tuple[float, ...]
+    delay: float = 0.0
+    hold: str = "zoh"
+    sample: str = "start"
+    initial_state: tuple[float, ...] = ()
+
+    dynamic: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        _check_options(self.hold, self.sample)
+        if not self.den or self.den[0] == 0.0:
+            raise ValueError(f"den must begin with a coefficient that is not zero, got {self.den}")
+        if not self.num:
+            raise ValueError("num must hold at least one coefficient")
+        if len(self.num) > len(self.den):
+            raise ValueError(f"the numerator's degree {len(self.num) - 1} is above the denominator's {self.order}")
+        if self.delay < 0.0:
+            raise ValueError(f"delay must not be negative, got {self.delay}")
+        if len(self.initial_state) not in (0, self.order):
+            raise ValueError(f"initial_state must be empty or hold {self.order} numbers, got {len(self.initial_state)}")
+
+    @property
+    def order(self) -> int:
+        """Number of poles."""
+        return len(self.den) - 1
+
+    @property
+    def poles(self) -> npt.NDArray[np.complex128]:
+        """Roots of the denominator [rad/s]."""
+        return np.roots(self.den).astype(np.complex128)
+
+    @property
+    def zeros(self) -> npt.NDArray[np.complex128]:
+        """Roots of the numerator [rad/s]."""
+        return np.roots(self.num).astype(np.complex128)
+
+    @property
+    def dc_gain(self) -> float:
+        """G(0) [unit of y / unit of u]; infinite with a pole at zero."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return float(np.divide(self.num[-1], self.den[-1]))
+
+    def response(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
+        """Output at the samples of `u`, exact under the hold.
+
+        Parameters
+        ----------
+        u : array, shape (n,)
+            Input, zero before its first sample.
+        sample_time : float
+            Time between two samples [s].
+
+        Returns
+        -------
+        array, shape (n,)
+
+        Raises
+        ------
+        ValueError
+            If `u` is not finite or the sample time not positive.
+        """
+        inputs = read_only(u, "u", ndim=1)
+        if not sample_time > 0.0:
+            raise ValueError(f"sample_time must be positive, got {sample_time}")
+        monic = np.array(self.den)[np.newaxis, 1:] / self.den[0]
+        numerator = np.concatenate([np.zeros(self.order + 1 - len(self.num)), self.num]) / self.den[0]
+        coefficients = np.concatenate([numerator, self.initial_state or np.zeros(self.order)])
+        columns = _columns(monic, inputs, sample_time, self.delay, self.hold, self.sample)
+        return np.asarray(columns[0] @ coefficients)
+
+    @classmethod
+    def structure(
+        cls, *, poles: int, zeros: int, hold: str = "zoh", sample: str = "start", initial: str = "rest"
+    ) -> "TransferFunctionStructure":
+        """What `hysim.identify` takes: numbers of poles and zeros, and how the record was sampled.
+
+        Parameters
+        ----------
+        poles, zeros : int
+            Their numbers, zeros <= poles.
+        hold, sample : str
+            As in the constructor.
+        initial : {"rest", "free"}
+            Whether the initial state is zero, or identified.
+        """
+        return TransferFunctionStructure(poles=poles, zeros=zeros, hold=hold, sample=sample, initial=initial)
+
+
+@checked
+class TransferFunctionStructure:
+    """The shape of a transfer function, to be identified; see `TransferFunction.structure`.
+
+    The search runs over second-order sections s^2 + 2 zeta omega s + omega^2 (and one of first order for an
+    odd number of poles) on log scales, which are stable by construction: omega from 0.1 rad over the whole
+    record to four times the Nyquist rate, zeta from 0.001 to 30.
+    """
+
+    poles: int
+    zeros: int
+    hold: str = "zoh"
+    sample: str = "start"
+    initial: str = "rest"
+
+    def __post_init__(self) -> None:
+        _check_options(self.hold, self.sample)
+        if not 0 <= self.zeros <= self.poles or self.poles < 1:
+            raise ValueError(f"there must be at least one pole, and no more zeros than poles, got {self}")
+        if self.initial not in ("rest", "free"):
+            raise ValueError(f'initial must be "rest" or "free", got {self.initial!r}')
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The names in which the output is affine: numerator, initial state."""
+        return (*(f"num[{k}]" for k in range(self.zeros + 1)), *(f"x0[{k}]" for k in range(self.poles)))
+
+    @property
+    def denominator(self) -> tuple[str, ...]:
+        """The names that are searched; ``den[0]`` is one."""
+        return tuple(f"den[{k}]" for k in range(1, self.poles + 1))
+
+    def search_space(
+        self,
+        record: Record,
+        *,
+        fixed: Mapping[str, float] | None = None,
+        free: tuple[str, ...] = (),
+        bounds: Mapping[str, tuple[float, float]] | None = None,
+        initial: str | None = None,
+    ) -> SearchSpace:
+        """The box of the sections.
+
+        Raises
+        ------
+        ValueError
+            If the record has no even time, or a coefficient of the denominator is fixed or bounded.
+        """
+        sample_time = record.sample_time
+        if np.ptp(record.u) == 0.0 and record.u[0] == 0.0:
+            raise ValueError("the input is zero throughout: nothing can be identified from it")
+        names = (*self.denominator, *self.columns)
+        defaults = dict.fromkeys(names, 0.0)
+        for name in (*(fixed or {}), *(bounds or {})):
+            if name in self.denominator:
+                raise ValueError(f"{name!r} cannot be fixed or bounded: the denominator is searched by its sections")
+        rest = {} if (initial or self.initial) == "free" else {f"x0[{k}]": 0.0 for k in range(self.poles)}
+        held = held_parameters(defaults, (), {**rest, **(fixed or {})}, free)
+        limits = checked_bounds(bounds or {}, defaults, held)
+        pairs = self.poles // 2
+        low, high = np.log(FREQUENCY[0] / len(record)), np.log(FREQUENCY[1])
+        coordinates = [f"{what}[{k}]" for k in range(pairs) for what in ("log frequency", "log damping")]
+        box = [(low, high), (float(np.log(DAMPING[0])), float(np.log(DAMPING[1])))] * pairs
+        if self.poles % 2:
+            coordinates.append("log rate")
+            box.append((low, high))
+        lower, upper = np.array(box).T
+        return SearchSpace(
+            coordinates=tuple(coordinates),
+            lower=lower,
+            upper=upper,
+            starts=np.empty((0, len(box))),
+            names=tuple(name for name in names if name not in held),
+            columns=self.columns,
+            linear=tuple(name for name in self.columns if name not in held),
+            held=held,
+            parameters=lambda x: self._denominators(np.atleast_2d(x), sample_time),
+            bounds=limits,
+        )
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """Columns of the numerator and of the initial state, and zero, (n_sets, n_samples, n_columns + 1)."""
+        monic = np.stack([np.atleast_1d(parameters[name]) for name in self.denominator], axis=1)
+        columns = _columns(monic, record.u, record.sample_time, 0.0, self.hold, self.sample)
+        return np.concatenate([columns[..., self.poles - self.zeros :], np.zeros_like(columns[..., :1])], axis=-1)
+
+    def assemble(self, parameters: Mapping[str, float]) -> TransferFunction:
+        """The transfer function with these parameters."""
+        initial_state = tuple(parameters[f"x0[{k}]"] for k in range(self.poles))
+        return TransferFunction(
+            num=tuple(parameters[f"num[{k}]"] for k in range(self.zeros + 1)),
+            den=(1.0, *(parameters[name] for name in self.denominator)),
+            hold=self.hold,
+            sample=self.sample,
+            initial_state=initial_state if any(initial_state) else (),
+        )
+
+    def _denominators(self, x: FloatArray, sample_time: float) -> dict[str, FloatArray]:
+        product = np.ones((len(x), 1))
+        for k in range(self.poles // 2):
+            frequency, damping = np.exp(x[:, 2 * k]), np.exp(x[:, 2 * k + 1])
+            product = _times(product, [np.ones(len(x)), 2.0 * damping * frequency, frequency**2])
+        if self.poles % 2:
+            product = _times(product, [np.ones(len(x)), np.exp(x[:, -1])])
+        return {name: product[:, k] / sample_time**k for k, name in enumerate(self.denominator, 1)}
+
+
+def _check_options(hold: str, sample: str) -> None:
+    if hold not in ("zoh", "foh"):
+        raise ValueError(f'hold must be "zoh" or "foh", got {hold!r}')
+    if sample not in ("start", "end"):
+        raise ValueError(f'sample must be "start" or "end", got {sample!r}')
+    if (hold, sample) == ("foh", "end"):
+        raise ValueError('sample="end" needs an input that is held, hold="zoh"')
+
+
+def _times(polynomials: FloatArray, factor: list[FloatArray]) -> FloatArray:
+    """Products of rows of polynomials with one factor for each row."""
+    product = np.zeros((len(polynomials), polynomials.shape[1] + len(factor) - 1))
+    for k, coefficient in enumerate(factor):
+        product[:, k : k + polynomials.shape[1]] += coefficient[:, np.newaxis] * polynomials
+    return product
+
+
+def _columns(
+    monic: FloatArray, u: FloatArray, sample_time: float, delay: float, hold: str, sample: str
+) -> FloatArray:
+    """What the output is affine in: b_0 ... b_n of the numerator, then the initial state, (n_sets, N, 2 n + 1).
+
+    `monic` (n_sets, n) holds the denominators without their leading one, in seconds.
+    """
+    from scipy.linalg import expm
+
+    n_sets, n = monic.shape
+    powers = sample_time ** np.arange(1, n + 1)
+    counted = monic * powers  # the denominators in samples
+    whole, part = divmod(delay / sample_time, 1.0)
+    pieces = np.array([part, 1.0 - part]) if part > 0.0 else np.ones(1)
+    # exp of [[A, B, 0], [0, 0, 1], [0, 0, 0]] holds A's exponential, and the responses to a step and a ramp
+    generator = np.zeros((n_sets, n + 2, n + 2))
+    generator[:, np.arange(n), np.arange(1, n + 1)] = 1.0
+    generator[:, n - 1, :n] = -counted[:, ::-1]
+    generator[:, n - 1, n] = 1.0
+    generator[:, n, n + 1] = 1.0
+    with np.errstate(over="ignore", invalid="ignore"):
+        exponentials = expm(generator[:, np.newaxis] * pieces[:, np.newaxis, np.newaxis])
+        begin, end = _pieces(u, int(whole), part, hold)
+        ramp = exponentials[..., :n, n + 1] / pieces[:, np.newaxis]
+        A = np.ascontiguousarray(exponentials[..., :n, :n])
+        forced = np.empty((n_sets, u.size + 1, n))
+        kernels.states(A, exponentials[..., :n, n] - ramp, ramp, begin, end, np.zeros((n_sets, n)), forced)
+        free = _free_responses(A, u.size + 1)
+        at = slice(1, None) if sample == "end" else slice(0, -1)
+        through = end[:, -1] if sample == "end" else begin[:, 0]
+        x = forced[:, at] * powers[::-1]  # s^j / den(s), j ascending, in seconds
+        feedthrough = through - np.einsum("snj,sj->sn", x, monic[:, ::-1])
+        return np.concatenate([feedthrough[..., np.newaxis], x[..., ::-1], free[:, at] * powers / sample_time], axis=-1)
+
+
+def _pieces(u: FloatArray, whole: int, part: float, hold: str) -> tuple[FloatArray, FloatArray]:
+    """Input at the begin and the end of each piece of each step, (n_steps, n_pieces), after the delay."""
+    late = np.concatenate([np.zeros(whole + 1), u, u[-1:]])[: u.size + 2]  # late[k + 1] belongs to sample k
+    now, before = late[1 : u.size + 1], late[: u.size]
+    if hold == "zoh":
+        levels = np.stack([before, now], axis=1) if part > 0.0 else now[:, np.newaxis]
+        return levels, levels
+    after = late[2:]
+    if part == 0.0:
+        return now[:, np.newaxis], after[:, np.newaxis]
+    entering = np.where(np.arange(u.size) <= whole, 0.0, part * before + (1.0 - part) * now)
+    leaving = now + (1.0 - part) * (after - now)
+    met = np.where(np.arange(u.size) <= whole, 0.0, now)
+    started = np.arange(u.size) >= whole
+    begin = np.stack([entering, np.where(started, now, 0.0)], axis=1)
+    return begin, np.stack([met, np.where(started, leaving, 0.0)], axis=1)
+
+
+def _free_responses(A: FloatArray, n_samples: int) -> FloatArray:
+    """First rows of the powers of the step's matrix: the free response to each initial derivative."""
+    step = A[:, 0] if A.shape[1] == 1 else A[:, 1] @ A[:, 0]
+    rows = np.zeros((len(A), n_samples, A.shape[-1]))
+    rows[:, 0, 0] = 1.0
+    for k in range(1, n_samples):
+        rows[:, k] = np.einsum("sj,sjk->sk", rows[:, k - 1], step)
+    return rows

@@ -1,0 +1,100 @@
+"""What `reproduce` computes: every model on the 52 points of Table 1."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from hysim._frozen import frozen
+from hysim.comparison import Comparison, compare
+from hysim.datasets import table1
+from hysim.discovery import Discovery, discover
+from hysim.identification import Identification, identify
+from hysim.models.boucwen import BoucWen, PolynomialBoucWen
+from hysim.models.static import Line, SingleValued
+from hysim.models.transfer_function import TransferFunction
+from hysim.paper.equations import PrintedModel, printed_model
+
+Progress = Callable[[int, int, str], None]
+
+
+@frozen
+class Study:
+    """The models of Table 1, and how they compare.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        All models at the samples of Table 1.
+    printed : PrintedModel
+        Equation (1) at its best dwell.
+    fits : mapping
+        Name to the identification of each model that was identified.
+    discovery : Discovery
+        What SINDy found.
+    """
+
+    comparison: Comparison
+    printed: PrintedModel
+    fits: Mapping[str, Identification]
+    discovery: Discovery
+
+
+def study(*, quick: bool = False, progress: Progress | None = None) -> Study:
+    """Identify, discover and compare on Table 1.
+
+    Parameters
+    ----------
+    quick : bool
+        Leave the cross-validation out.
+    progress : callable, optional
+        Called as ``progress(done, total, what)`` before each step.
+    """
+    record = table1()
+    folds = None if quick else "loo"
+    structure = TransferFunction.structure(poles=4, zeros=1, hold="zoh", sample="start", initial="rest")
+    subjects: dict[str, Callable[[], Any]] = {
+        "eq1-printed": printed_model,
+        "tf-identified": lambda: identify(structure, record, cross_validate=folds),
+        "bouc-wen": lambda: identify(BoucWen, record, cross_validate=folds),
+        "bouc-wen-asymmetric": lambda: identify(PolynomialBoucWen, record, fixed={"n": 1.0}, cross_validate=folds),
+        "sindy": lambda: discover(record, cross_validate=not quick),
+        "line": lambda: identify(Line, record, cross_validate=folds),
+        "single-valued": lambda: identify(SingleValued, record, cross_validate=folds),
+    }
+    results = {}
+    for done, (name, make) in enumerate(subjects.items()):
+        if progress is not None:
+            progress(done, len(subjects), name)
+        results[name] = make()
+    if progress is not None:
+        progress(len(subjects), len(subjects), "comparison")
+    return Study(
+        comparison=compare(results, record),
+        printed=results["eq1-printed"],
+        fits={name: result for name, result in results.items() if isinstance(result, Identification)},
+        discovery=results["sindy"],
+    )
+
+
+def model_measures(study: Study) -> dict[str, dict[str, float | int | None]]:
+    """The measures of each model by its name, with units in their keys; None where one does not apply."""
+    quantum = study.comparison.record.resolution or math.nan
+    return {
+        row.name: {
+            "n_parameters": row.n_parameters,
+            "fit_percent": row.fit_percent,
+            "rmse_um": row.rmse,
+            "cv_rmse_um": _or_none(row.cv_rmse),
+            "max_residual_px": row.max_residual / quantum,
+            "max_width_um": row.max_width,
+            "max_width_at_V": row.max_width_at,
+            "area_um_V": row.area,
+            "width_rmse_um": row.width_rmse,
+        }
+        | ({} if row.name == "eq1-printed" else {"fpe": _or_none(row.fpe)})
+        for row in study.comparison.rows
+    }
+
+
+def _or_none(value: float) -> float | None:
+    return None if math.isnan(value) else value
