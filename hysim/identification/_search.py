@@ -63,7 +63,7 @@ def descend(
     residual = problem.solve(x, weights)[1]
     cost = np.sum(residual**2, axis=1)
     active = np.isfinite(cost)
-    for _ in range(N_STEPS):
+    for _ in range(N_STEPS if n_x else 0):
         moving = np.flatnonzero(active)
         if not moving.size:
             break

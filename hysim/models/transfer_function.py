@@ -20,12 +20,13 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, checked, read_only
+from hysim.errors import SimulationError
 from hysim.kernels import linear as kernels
 from hysim.models._model import model
 from hysim.models._search import Parameters, SearchSpace, checked_bounds, held_parameters
 from hysim.records import Record
 
-FREQUENCY = (0.1, 4.0 * np.pi)  # box of a section's frequency: turns over the record / 2 pi, rad per sample
+FREQUENCY = (0.1, np.pi)  # box of a section's frequency: rad over the whole record, rad per sample
 DAMPING = (1e-3, 30.0)  # box of its damping ratio; two real poles above 1
 
 
@@ -119,17 +120,25 @@ class TransferFunction:
 
         Raises
         ------
+        SimulationError
+            If the output leaves the finite numbers, as an unstable plant's may; it names the sample.
         ValueError
-            If `u` is not finite or the sample time not positive.
+            If `u` is not finite or has not one axis, or the sample time is not positive.
         """
         inputs = read_only(u, "u", ndim=1)
-        if not sample_time > 0.0:
-            raise ValueError(f"sample_time must be positive, got {sample_time}")
-        monic = np.array(self.den)[np.newaxis, 1:] / self.den[0]
-        numerator = np.concatenate([np.zeros(self.order + 1 - len(self.num)), self.num]) / self.den[0]
-        coefficients = np.concatenate([numerator, self.initial_state or np.zeros(self.order)])
-        columns = _columns(monic, inputs, sample_time, self.delay, self.hold, self.sample)
-        return np.asarray(columns[0] @ coefficients)
+        if not 0.0 < sample_time < np.inf:
+            raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
+        with np.errstate(all="ignore"):
+            monic = np.array(self.den)[np.newaxis, 1:] / self.den[0]
+            numerator = np.concatenate([np.zeros(self.order + 1 - len(self.num)), self.num]) / self.den[0]
+            coefficients = np.concatenate([numerator, self.initial_state or np.zeros(self.order)])
+            columns = _columns(monic, inputs, float(sample_time), self.delay, self.hold, self.sample)
+            used = coefficients != 0.0  # a state that overflows does not matter where it is not seen
+            y = np.asarray(columns[0][:, used] @ coefficients[used])
+        if not np.isfinite(y).all():
+            k = int(np.argmin(np.isfinite(y)))
+            raise SimulationError(f"the output leaves the finite numbers at sample {k}; the poles are {self.poles}")
+        return y
 
     @classmethod
     def structure(
@@ -155,7 +164,8 @@ class TransferFunctionStructure:
 
     The search runs over second-order sections s^2 + 2 zeta omega s + omega^2 (and one of first order for an
     odd number of poles) on log scales, which are stable by construction: omega from 0.1 rad over the whole
-    record to four times the Nyquist rate, zeta from 0.001 to 30.
+    record to the Nyquist rate, zeta from 0.001 to 30, so that real poles may lie at both ends. Resonances
+    above the Nyquist rate are left out: samples cannot tell them from those below, and they fit noise.
     """
 
     poles: int
@@ -280,57 +290,53 @@ def _columns(
 
     `monic` (n_sets, n) holds the denominators without their leading one, in seconds.
     """
-    from scipy.linalg import expm
-
     n_sets, n = monic.shape
-    powers = sample_time ** np.arange(1, n + 1)
-    counted = monic * powers  # the denominators in samples
-    whole, part = divmod(delay / sample_time, 1.0)
-    pieces = np.array([part, 1.0 - part]) if part > 0.0 else np.ones(1)
-    # exp of [[A, B, 0], [0, 0, 1], [0, 0, 0]] holds A's exponential, and the responses to a step and a ramp
-    generator = np.zeros((n_sets, n + 2, n + 2))
-    generator[:, np.arange(n), np.arange(1, n + 1)] = 1.0
-    generator[:, n - 1, :n] = -counted[:, ::-1]
-    generator[:, n - 1, n] = 1.0
-    generator[:, n, n + 1] = 1.0
-    with np.errstate(over="ignore", invalid="ignore"):
-        exponentials = expm(generator[:, np.newaxis] * pieces[:, np.newaxis, np.newaxis])
-        begin, end = _pieces(u, int(whole), part, hold)
-        ramp = exponentials[..., :n, n + 1] / pieces[:, np.newaxis]
-        A = np.ascontiguousarray(exponentials[..., :n, :n])
-        forced = np.empty((n_sets, u.size + 1, n))
-        kernels.states(A, exponentials[..., :n, n] - ramp, ramp, begin, end, np.zeros((n_sets, n)), forced)
-        free = _free_responses(A, u.size + 1)
+    degrees = np.arange(1, n + 1)
+    late = min(delay / sample_time, float(u.size))
+    begin, end, lengths = _pieces(u, late, hold)
+    with np.errstate(all="ignore"):
+        rate = np.max(np.abs(monic) ** (1.0 / degrees), axis=1, initial=1.0 / sample_time)[:, np.newaxis]
+        scaled = monic / rate**degrees
+        F = np.zeros((n_sets, n, n))
+        F[:, np.arange(n - 1), np.arange(1, n)] = 1.0
+        F[:, n - 1 :, :] = -scaled[:, np.newaxis, ::-1]
+        spans = rate * sample_time * lengths
+        A, B0, B1 = _transitions(F, spans)
+        forced, free = np.empty((2, n_sets, u.size + 1, n))
+        kernels.states(A, B0, B1, begin, end, np.zeros((n_sets, n)), forced)
+        kernels.free_responses(A[:, 0] if lengths.size == 1 else A[:, 1] @ A[:, 0], free)
         at = slice(1, None) if sample == "end" else slice(0, -1)
+        x = forced[:, at, ::-1]
         through = end[:, -1] if sample == "end" else begin[:, 0]
-        x = forced[:, at] * powers[::-1]  # s^j / den(s), j ascending, in seconds
-        feedthrough = through - np.einsum("snj,sj->sn", x, monic[:, ::-1])
-        return np.concatenate([feedthrough[..., np.newaxis], x[..., ::-1], free[:, at] * powers / sample_time], axis=-1)
+        feedthrough = through - (x @ scaled[..., np.newaxis])[..., 0]
+        back = rate[:, np.newaxis] ** -degrees
+        return np.concatenate([feedthrough[..., np.newaxis], x * back, free[:, at] * back * rate[..., np.newaxis]], axis=-1)
 
 
-def _pieces(u: FloatArray, whole: int, part: float, hold: str) -> tuple[FloatArray, FloatArray]:
-    """Input at the begin and the end of each piece of each step, (n_steps, n_pieces), after the delay."""
-    late = np.concatenate([np.zeros(whole + 1), u, u[-1:]])[: u.size + 2]  # late[k + 1] belongs to sample k
-    now, before = late[1 : u.size + 1], late[: u.size]
-    if hold == "zoh":
-        levels = np.stack([before, now], axis=1) if part > 0.0 else now[:, np.newaxis]
-        return levels, levels
-    after = late[2:]
-    if part == 0.0:
-        return now[:, np.newaxis], after[:, np.newaxis]
-    entering = np.where(np.arange(u.size) <= whole, 0.0, part * before + (1.0 - part) * now)
-    leaving = now + (1.0 - part) * (after - now)
-    met = np.where(np.arange(u.size) <= whole, 0.0, now)
-    started = np.arange(u.size) >= whole
-    begin = np.stack([entering, np.where(started, now, 0.0)], axis=1)
-    return begin, np.stack([met, np.where(started, leaving, 0.0)], axis=1)
+def _transitions(F: FloatArray, spans: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """A, B0 and B1 of x' = F x + (0, ..., 0, v) over each of the spans (n_sets, n_pieces); see `kernels.linear`."""
+    n = F.shape[-1]
+    generators = np.zeros((*spans.shape, n + 2, n + 2))
+    generators[..., :n, :n] = F[:, np.newaxis] * spans[..., np.newaxis, np.newaxis]
+    generators[..., n - 1 : n, n] = spans[..., np.newaxis]
+    generators[..., n, n + 1] = 1.0
+    exponentials = np.empty_like(generators)
+    kernels.exponentials(generators.reshape(-1, n + 2, n + 2), exponentials.reshape(-1, n + 2, n + 2))
+    held, rising = exponentials[..., :n, n], exponentials[..., :n, n + 1]
+    return np.ascontiguousarray(exponentials[..., :n, :n]), held - rising, np.ascontiguousarray(rising)
 
 
-def _free_responses(A: FloatArray, n_samples: int) -> FloatArray:
-    """First rows of the powers of the step's matrix: the free response to each initial derivative."""
-    step = A[:, 0] if A.shape[1] == 1 else A[:, 1] @ A[:, 0]
-    rows = np.zeros((len(A), n_samples, A.shape[-1]))
-    rows[:, 0, 0] = 1.0
-    for k in range(1, n_samples):
-        rows[:, k] = np.einsum("sj,sjk->sk", rows[:, k - 1], step)
-    return rows
+def _pieces(u: FloatArray, late: float, hold: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The input `late` samples later, by pieces: at their begin and end, (n_steps, n_pieces), and their lengths.
+
+    A step holds the end of one of the input's stretches between samples, and the begin of the next.
+    """
+    whole, part = divmod(late, 1.0)
+    before = np.zeros(int(whole) + 1)
+    level = np.concatenate([before, u])
+    rise = np.concatenate([before, np.diff(u, append=u[-1:]) if hold == "foh" else np.zeros_like(u)])
+    ends = [(0, 1.0 - part, 1.0), (1, 0.0, 1.0 - part)] if part > 0.0 else [(1, 0.0, 1.0)]
+    stretches = [(level[k : k + u.size], rise[k : k + u.size], start, stop) for k, start, stop in ends]
+    begin = np.stack([value + start * slope for value, slope, start, _ in stretches], axis=1)
+    end = np.stack([value + stop * slope for value, slope, _, stop in stretches], axis=1)
+    return begin, end, np.array([stop - start for _, start, stop in ends])

@@ -57,7 +57,7 @@ def study(*, quick: bool = False, progress: Progress | None = None) -> Study:
         "tf-identified": lambda: identify(structure, record, cross_validate=folds),
         "bouc-wen": lambda: identify(BoucWen, record, cross_validate=folds),
         "bouc-wen-asymmetric": lambda: identify(PolynomialBoucWen, record, fixed={"n": 1.0}, cross_validate=folds),
-        "sindy": lambda: discover(record, cross_validate=not quick),
+        "sindy": lambda: discover(record, cross_validate=folds),
         "line": lambda: identify(Line, record, cross_validate=folds),
         "single-valued": lambda: identify(SingleValued, record, cross_validate=folds),
     }

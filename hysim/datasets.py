@@ -1,0 +1,90 @@
+"""The two tables of measurements that the paper prints.
+
+Source: B. B. Muhammad, M. H. Rahman, M. R. Ahmad, M. Bashir, "A novel model of PZT actuator and its application
+in hysteresis and vibration controls", Jurnal Teknologi, 2016. The files in `hysim/data` hold the values as
+printed. The paper prints no time for either table: the times here are ours, and evenly spaced.
+"""
+
+import math
+from importlib.resources import files
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.records import Record
+
+PIXEL = 0.0763
+"""Table 1's resolution [um]: every displacement is a whole multiple of it, to 5 nm."""
+
+SQUARE_WAVE_FREQUENCY = 1.01626
+"""Of Table 2's input [Hz]; a period has four samples."""
+
+
+def table1(dwell: float = 1.0) -> Record:
+    """Table 1: a staircase of 52 voltages from 0 to 125 V and back, and the displacements at them.
+
+    Parameters
+    ----------
+    dwell : float
+        Time from one sample to the next [s], which the paper does not print.
+
+    Returns
+    -------
+    Record
+        Voltage [V], displacement [um] and time `dwell * k` [s]; the resolution is one camera pixel.
+
+    Raises
+    ------
+    ValueError
+        If the dwell is not positive and finite.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> rec = hs.datasets.table1()
+    >>> len(rec), rec.u[25:27].tolist(), rec.y[25:27].tolist(), rec.units["y"]
+    (52, [125.0, 125.0], [2.671, 2.671], 'um')
+    """
+    if not (math.isfinite(dwell) and dwell > 0):
+        raise ValueError(f"dwell must be positive and finite, got {dwell}")
+    _, _, voltage, displacement = _columns("table1.csv")
+    return _record(voltage, displacement, sample_time=dwell, resolution=PIXEL, name="Table 1")
+
+
+def table2() -> Record:
+    """Table 2: 10 samples of a square wave between 18 and 50 V, and the displacements at them.
+
+    Returns
+    -------
+    Record
+        Voltage [V], displacement [um] and time [s]: four samples a period of 1.01626 Hz. No resolution is known.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> rec = hs.datasets.table2()
+    >>> len(rec), round(rec.sample_time, 3), round(float(rec.y.max() - rec.y.min()), 3)
+    (10, 0.246, 1.021)
+    """
+    _, _, displacement, voltage = _columns("table2.csv")
+    sample_time = 1 / (4 * SQUARE_WAVE_FREQUENCY)
+    return _record(voltage, displacement, sample_time=sample_time, resolution=None, name="Table 2")
+
+
+def _columns(file: str) -> FloatArray:
+    lines = (files("hysim") / "data" / file).read_text(encoding="utf-8").splitlines()
+    rows = [line for line in lines if not line.startswith("#")][1:]
+    return np.loadtxt(rows, delimiter=",").T
+
+
+def _record(
+    voltage: FloatArray, displacement: FloatArray, *, sample_time: float, resolution: float | None, name: str
+) -> Record:
+    return Record(
+        u=voltage,
+        y=displacement,
+        t=sample_time * np.arange(float(voltage.size)),
+        units={"t": "s", "u": "V", "y": "um"},
+        resolution=resolution,
+        name=name,
+    )

@@ -1,0 +1,96 @@
+"""The complete cycles of an input.
+
+The input turns where it retreats from an extreme by more than a threshold; the record's ends count as turning
+points. Three consecutive turning points are a complete cycle if the outer two lie near one extreme of the
+record and the middle one near the other. A plateau at a turning point is divided in its middle.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+
+NEAR = 0.05
+"""How near to an extreme of the record a full cycle must turn, as a fraction of the input's span."""
+
+ROUNDING = 1e-12
+"""What counts as equal, as a fraction of the span or the stroke."""
+
+
+class Cycle(NamedTuple):
+    """The samples of a cycle's branches, and those of both in the order of time."""
+
+    loading: slice
+    unloading: slice
+    path: slice
+
+
+def last_cycles(u: FloatArray, cycles: int, tolerance: float) -> list[Cycle]:
+    """The last complete cycles that share no branch, the latest first."""
+    if cycles < 1:
+        raise ValueError(f"cycles must be at least 1, got {cycles}")
+    if not 0 <= tolerance < 0.5:
+        raise ValueError(f"tolerance is a fraction of the input's span from 0 to below 0.5, got {tolerance}")
+    low, high = u.min(), u.max()
+    plateaus = _turning_points(u, tolerance * (high - low))
+    levels = u[[first for first, _ in plateaus]]
+    near = NEAR * (high - low)
+    side = (levels >= high - near).astype(int) - (levels <= low + near)
+
+    begins: list[int] = []
+    k = side.size - 1
+    while k >= 2:
+        if side[k] == side[k - 2] == -side[k - 1] != 0:
+            begins.append(k - 2)
+            k -= 2
+        else:
+            k -= 1
+    if len(begins) < cycles:
+        raise ValueError(_too_few(cycles, len(begins), levels))
+
+    starts = [plateaus[0][0], *((first + last + 1) // 2 for first, last in plateaus[1:])]
+    stops = [*((first + last) // 2 + 1 for first, last in plateaus[:-1]), plateaus[-1][1] + 1]
+    found = []
+    for k in begins[:cycles]:
+        halves = slice(starts[k], stops[k + 1]), slice(starts[k + 1], stops[k + 2])
+        loading, unloading = halves if side[k] < 0 else halves[::-1]
+        found.append(Cycle(loading, unloading, slice(starts[k], stops[k + 2])))
+    return found
+
+
+def _too_few(asked: int, found: int, levels: FloatArray) -> str:
+    shown = ", ".join(f"{level:.6g}" for level in levels[:8]) + (", ..." if levels.size > 8 else "")
+    return (
+        f"asked for {asked} complete cycle(s) of the input, found {found}: it turns at {shown}. A cycle goes from "
+        f"one extreme to the other and back, each within {NEAR:.0%} of the span (a sine from mid height needs one "
+        "and a half periods). Give a longer record, or a larger tolerance if noise makes the input turn"
+    )
+
+
+def _turning_points(u: FloatArray, threshold: float) -> list[tuple[int, int]]:
+    """First and last sample of each extreme from which the input retreats by more than the threshold.
+
+    The first and the last one are the record's ends, or the extremes that lie within the threshold of them.
+    """
+    begins = np.flatnonzero(np.append(True, np.abs(np.diff(u)) > ROUNDING * np.ptp(u)))
+    ends = np.append(begins[1:], u.size) - 1
+    rises = np.diff(u[begins]) > 0
+    extremes = np.concatenate([[0], np.flatnonzero(rises[1:] != rises[:-1]) + 1, [begins.size - 1]])
+    levels = u[begins[extremes]]
+
+    reach = np.maximum.accumulate(levels) - np.minimum.accumulate(levels)
+    sign = -1 if levels[np.argmax(reach > threshold)] > levels[0] else 1
+    plateaus = []
+    best, first, last = levels[0], 0, int(ends[0])
+    for run, level in zip(extremes.tolist(), levels.tolist(), strict=True):
+        if level == best:
+            last = int(ends[run])
+            continue
+        is_turn = sign * (best - level) > threshold
+        if is_turn:
+            plateaus.append((first, last))
+            sign = -sign
+        if is_turn or sign * (level - best) > 0:
+            best, first, last = level, int(begins[run]), int(ends[run])
+    return [*plateaus, (first, last)]

@@ -1,0 +1,156 @@
+"""The measures of a fit.
+
+With the residual e = y - y_model of N samples, V = mean(e^2) and d fitted parameters (the noise level is not
+counted):
+
+    rmse = sqrt(V),    nrmse = rmse / (max y - min y),    fit = 100 (1 - ||e|| / ||y - mean(y)||) %
+    FPE = V (1 + d/N) / (1 - d/N),    AIC = N ln V + 2 d,    BIC = N ln V + d ln N
+
+What does not exist is nan: a fit to a constant y, a criterion with d >= N.
+"""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, read_only
+
+
+def rmse(y: npt.ArrayLike, y_model: npt.ArrayLike) -> float:
+    """Root mean square of y - y_model [unit of y].
+
+    Raises
+    ------
+    ValueError
+        If lengths differ, a value is not finite or there is no sample.
+
+    Examples
+    --------
+    >>> rmse([0.0, 2.0], [1.0, 1.0])
+    1.0
+    """
+    return _rms(np.subtract(*_measured_and_model(y, y_model)))
+
+
+def nrmse(y: npt.ArrayLike, y_model: npt.ArrayLike) -> float:
+    """Root mean square error over the range of y: rmse / (max y - min y); nan for a constant y.
+
+    Raises
+    ------
+    ValueError
+        If lengths differ, a value is not finite or there is no sample.
+
+    Examples
+    --------
+    >>> nrmse([0.0, 2.0], [1.0, 1.0])
+    0.5
+    """
+    measured, model = _measured_and_model(y, y_model)
+    span = float(np.ptp(measured))
+    return _rms(measured - model) / span if span > 0 else math.nan
+
+
+def fit_percent(y: npt.ArrayLike, y_model: npt.ArrayLike) -> float:
+    """Fit 100 (1 - ||y - y_model|| / ||y - mean(y)||) [%]; nan for a constant y.
+
+    100 is a perfect model, 0 is as good as the mean of y, and a worse one is negative.
+
+    Raises
+    ------
+    ValueError
+        If lengths differ, a value is not finite or there is no sample.
+
+    Examples
+    --------
+    >>> fit_percent([0.0, 2.0, 4.0], [0.0, 2.0, 4.0]), fit_percent([0.0, 2.0, 4.0], [2.0, 2.0, 2.0])
+    (100.0, 0.0)
+    """
+    measured, model = _measured_and_model(y, y_model)
+    if np.ptp(measured) == 0:
+        return math.nan
+    return 100.0 * (1.0 - _rms(measured - model) / _rms(measured - measured.mean()))
+
+
+def fpe(residual: npt.ArrayLike, n_parameters: int) -> float:
+    """Final prediction error V (1 + d/N) / (1 - d/N) [unit of y, squared]; nan where d >= N.
+
+    Source: H. Akaike, Ann. Inst. Statist. Math. 21 (1969) 243.
+
+    Parameters
+    ----------
+    residual : array, shape (N,)
+        Measured minus model [unit of y].
+    n_parameters : int
+        Number d of fitted parameters.
+
+    Raises
+    ------
+    ValueError
+        If there is no sample, a value is not finite or `n_parameters` is negative.
+
+    Examples
+    --------
+    >>> fpe([1.0, -1.0, 1.0, -1.0], 2)
+    3.0
+    """
+    v, n, d = _mean_square(residual, n_parameters)
+    return v * (1 + d / n) / (1 - d / n) if d < n else math.nan
+
+
+def aic(residual: npt.ArrayLike, n_parameters: int) -> float:
+    """Akaike's information criterion N ln V + 2 d; nan where d >= N, -inf where the residual is zero.
+
+    Parameters and errors are those of `fpe`.
+
+    Source: H. Akaike, IEEE Trans. Autom. Control 19 (1974) 716, without the constant that all models share.
+
+    Examples
+    --------
+    >>> aic([1.0, -1.0, 1.0, -1.0], 2)
+    4.0
+    """
+    v, n, d = _mean_square(residual, n_parameters)
+    return n * _log(v) + 2 * d if d < n else math.nan
+
+
+def bic(residual: npt.ArrayLike, n_parameters: int) -> float:
+    """Bayesian information criterion N ln V + d ln N; nan where d >= N, -inf where the residual is zero.
+
+    Parameters and errors are those of `fpe`.
+
+    Source: G. Schwarz, Ann. Statist. 6 (1978) 461, without the constant that all models share.
+
+    Examples
+    --------
+    >>> round(bic([1.0, -1.0, 1.0, -1.0], 2), 6)
+    2.772589
+    """
+    v, n, d = _mean_square(residual, n_parameters)
+    return n * _log(v) + d * math.log(n) if d < n else math.nan
+
+
+def _measured_and_model(y: npt.ArrayLike, y_model: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    measured, model = read_only(y, "y", ndim=1), read_only(y_model, "y_model", ndim=1)
+    if measured.size != model.size:
+        raise ValueError(f"y and y_model must have equal lengths, got {measured.size} and {model.size}")
+    if measured.size == 0:
+        raise ValueError("a fit needs at least 1 sample, got none")
+    return measured, model
+
+
+def _mean_square(residual: npt.ArrayLike, n_parameters: int) -> tuple[float, int, int]:
+    e = read_only(residual, "residual", ndim=1)
+    if e.size == 0:
+        raise ValueError("a criterion needs at least 1 residual, got none")
+    if n_parameters < 0:
+        raise ValueError(f"n_parameters must be at least 0, got {n_parameters}")
+    return float(np.mean(e**2)), e.size, n_parameters
+
+
+def _rms(values: FloatArray) -> float:
+    return math.sqrt(np.mean(values**2))
+
+
+def _log(value: float) -> float:
+    return math.log(value) if value > 0 else -math.inf

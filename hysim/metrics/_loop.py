@@ -1,0 +1,236 @@
+"""The measures of a loop.
+
+A cycle of the input has a loading branch, on which u rises, and an unloading branch, on which it falls. Both
+are linear between their samples, y_l(u) and y_u(u).
+
+    w(u)           = y_u(u) - y_l(u)                             signed width
+    max_width      = max |w|,    mid_width = |w| at mid span
+    signed area    = 1/2 sum_k (u_k y_{k+1} - u_{k+1} y_k)       along the path, closed by a straight line
+    mean_width     = area / (max u - min u)
+    relative_width = max_width / stroke,    stroke = max y - min y
+
+A positive signed area is a counterclockwise loop: unloading above loading, as a piezoelectric actuator has
+it. `area` is its magnitude.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Literal, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, frozen, read_only
+from hysim.metrics._cycles import ROUNDING, last_cycles
+
+
+@frozen
+class LoopMetrics:
+    """The measures of one loop.
+
+    Parameters
+    ----------
+    max_width, max_width_at : float
+        Largest magnitude of the width [unit of y], and the input there [unit of u]; of equals the lowest.
+    mean_width, mid_width : float
+        Area over input span, and the width's magnitude at mid span [unit of y].
+    area : float
+        Enclosed area, at least 0 [unit of y times unit of u].
+    stroke : float
+        Largest minus smallest output of the cycle [unit of y].
+    relative_width : float
+        `max_width` over `stroke`; nan for a constant output.
+    orientation : {"counterclockwise", "clockwise", "none"}
+        Sense in which the path runs in the plane of u (to the right) and y (up); "none" where the area is
+        zero to rounding.
+    closure_gap : float
+        Output at the cycle's end minus output at its start [unit of y]: positive where y has drifted up, 0
+        for a steady cycle. Of several cycles the mean.
+    n_cycles : int
+        How many cycles were averaged.
+    u : array, shape (m,)
+        Increasing inputs: every input of either branch, over their common range [unit of u].
+    loading, unloading, width : array, shape (m,)
+        The branches at `u`, and unloading minus loading [unit of y].
+    """
+
+    max_width: float
+    max_width_at: float
+    mean_width: float
+    mid_width: float
+    area: float
+    stroke: float
+    relative_width: float
+    orientation: Literal["counterclockwise", "clockwise", "none"]
+    closure_gap: float
+    n_cycles: int
+    u: FloatArray
+    loading: FloatArray
+    unloading: FloatArray
+    width: FloatArray
+
+    @overload
+    def width_at(self, u: float) -> float: ...
+    @overload
+    def width_at(self, u: Sequence[float] | FloatArray) -> FloatArray: ...
+    def width_at(self, u: float | Sequence[float] | FloatArray) -> float | FloatArray:
+        """Signed width at an input.
+
+        Parameters
+        ----------
+        u : float or array, any shape [unit of u]
+
+        Returns
+        -------
+        float or array
+            Unloading minus loading [unit of y]; nan outside the loop's range.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> loop = hs.loop_metrics([0, 1, 2, 1, 0], [0, 1, 4, 3, 0])
+        >>> loop.width_at(0.5), loop.width_at([1.0, 3.0]).tolist()
+        (1.0, [2.0, nan])
+        """
+        width = np.interp(u, self.u, self.width, left=math.nan, right=math.nan)
+        return width if np.ndim(u) else float(width)
+
+
+def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, tolerance: float = 0.01) -> LoopMetrics:
+    """Measure the loop of the last complete cycle, or the average loop of the last few.
+
+    A cycle is three consecutive turning points of the input, the outer two within 5 % of the input's span of
+    one extreme of the record, the middle one within 5 % of the other: min-max-min or max-min-max. The record's
+    ends count as turning points. A plateau at a turning point is divided in its middle, half to each branch (a
+    sample in the very middle to both); at the record's ends it belongs to the cycle as a whole. Of several
+    samples of a branch at one input the last, settled one is taken. The samples of a branch are sorted by
+    input, so that wiggles below the tolerance do not break the interpolation.
+
+    Parameters
+    ----------
+    u : array, shape (n,)
+        Input.
+    y : array, shape (n,)
+        Output.
+    cycles : int
+        Number of last complete cycles whose branches are averaged, at their common inputs, against noise. All
+        measures are then those of the averaged loop.
+    tolerance : float
+        Reversals of the input smaller than this fraction of its span are ignored: noise, glitches.
+
+    Returns
+    -------
+    LoopMetrics
+
+    Raises
+    ------
+    ValueError
+        If lengths differ, a value is not finite, there are fewer than 3 samples, the input is constant, or it
+        has fewer complete cycles than asked for.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> rec = hs.datasets.table1()
+    >>> loop = hs.loop_metrics(rec.u, rec.y)
+    >>> round(loop.max_width, 3), loop.max_width_at, round(loop.mean_width, 4), loop.orientation
+    (0.232, 35.0, 0.1407, 'counterclockwise')
+    """
+    inputs, outputs = _samples_of_a_loop(u, y)
+    found = last_cycles(inputs, cycles, tolerance)
+    loadings = [_curve(inputs[cycle.loading], outputs[cycle.loading]) for cycle in found]
+    unloadings = [_curve(inputs[cycle.unloading], outputs[cycle.unloading]) for cycle in found]
+    grid = _common_inputs([x for x, _ in loadings + unloadings])
+    loading = _mean_curve(grid, loadings)
+    unloading = _mean_curve(grid, unloadings)
+    if cycles == 1:
+        path_u, path_y = inputs[found[0].path], outputs[found[0].path]
+    else:
+        path_u, path_y = np.append(grid, grid[::-1]), np.append(loading, unloading[::-1])
+
+    width = unloading - loading
+    magnitude = np.abs(width)
+    span, stroke = float(np.ptp(path_u)), float(np.ptp(path_y))
+    area = _signed_area(path_u, path_y)
+    max_width = float(magnitude.max())
+    return LoopMetrics(
+        max_width=max_width,
+        max_width_at=float(grid[np.argmax(magnitude >= max_width - ROUNDING * stroke)]),
+        mean_width=abs(area) / span,
+        mid_width=abs(float(np.interp(path_u.min() + span / 2, grid, width))),
+        area=abs(area),
+        stroke=stroke,
+        relative_width=max_width / stroke if stroke > 0 else math.nan,
+        orientation=_orientation(area, ROUNDING * span * stroke),
+        closure_gap=float(np.mean([outputs[cycle.path][-1] - outputs[cycle.path][0] for cycle in found])),
+        n_cycles=cycles,
+        u=grid,
+        loading=loading,
+        unloading=unloading,
+        width=width,
+    )
+
+
+def width_rmse(a: LoopMetrics, b: LoopMetrics) -> float:
+    """Root mean square difference of the signed widths, at the inputs of `a` that `b` reaches [unit of y].
+
+    Raises
+    ------
+    ValueError
+        If the two loops have no input in common.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> narrow, wide = (hs.loop_metrics([0, 1, 2, 1, 0], [0, 1, 4, top, 0]) for top in (3, 6))
+    >>> hs.metrics.width_rmse(narrow, wide) == (9 / 3) ** 0.5
+    True
+    """
+    other = b.width_at(a.u)
+    common = ~np.isnan(other)
+    if not common.any():
+        raise ValueError(
+            f"the loops share no input: one runs from {a.u[0]} to {a.u[-1]}, the other from {b.u[0]} to {b.u[-1]}"
+        )
+    return math.sqrt(np.mean((a.width[common] - other[common]) ** 2))
+
+
+def _curve(u: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    order = np.argsort(u, kind="stable")
+    x = u[order]
+    is_last = np.append(x[1:] > x[:-1], True)
+    return x[is_last], y[order][is_last]
+
+
+def _common_inputs(inputs: list[FloatArray]) -> FloatArray:
+    union = np.unique(np.concatenate(inputs))
+    low, high = max(x[0] for x in inputs), min(x[-1] for x in inputs)
+    common: FloatArray = union[(union >= low) & (union <= high)]
+    return common
+
+
+def _mean_curve(grid: FloatArray, curves: list[tuple[FloatArray, FloatArray]]) -> FloatArray:
+    mean: FloatArray = np.mean([np.interp(grid, x, y) for x, y in curves], axis=0)
+    return mean
+
+
+def _signed_area(u: FloatArray, y: FloatArray) -> float:
+    x, v = u - u.mean(), y - y.mean()
+    return float(np.sum(x * np.roll(v, -1) - np.roll(x, -1) * v)) / 2
+
+
+def _orientation(area: float, rounding: float) -> Literal["counterclockwise", "clockwise", "none"]:
+    if abs(area) <= rounding:
+        return "none"
+    return "counterclockwise" if area > 0 else "clockwise"
+
+
+def _samples_of_a_loop(u: npt.ArrayLike, y: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    inputs, outputs = read_only(u, "u", ndim=1), read_only(y, "y", ndim=1)
+    if inputs.size != outputs.size:
+        raise ValueError(f"u and y must have equal lengths, got {inputs.size} and {outputs.size}")
+    if inputs.size < 3:
+        raise ValueError(f"a loop needs at least 3 samples, got {inputs.size}")
+    if np.ptp(inputs) == 0:
+        raise ValueError(f"the input is constant at {inputs[0]}: a loop needs one that goes to and fro")
+    return inputs, outputs

@@ -1,0 +1,29 @@
+"""Pictures of results: functions of a result and, if wanted, of the Axes to draw on.
+
+Each returns the Axes it drew on, or an array of them, and shows nothing. On given Axes a picture takes their
+look and pyplot is not imported; without them it is a new pyplot figure in the house style. Nothing here
+changes matplotlib's settings outside its own calls.
+"""
+
+from hysim.plot._comparisons import loops, residuals, widths
+from hysim.plot._discoveries import selection
+from hysim.plot._records import history, loop, traces
+from hysim.plot._style import Axes, Figure, figure, house_style, panels
+from hysim.plot._svg import save_svg, to_svg
+
+__all__ = [
+    "Axes",
+    "Figure",
+    "figure",
+    "history",
+    "house_style",
+    "loop",
+    "loops",
+    "panels",
+    "residuals",
+    "save_svg",
+    "selection",
+    "to_svg",
+    "traces",
+    "widths",
+]

@@ -1,0 +1,169 @@
+"""Pictures of records and simulations: the loop, and the signals against time."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.plot._style import MEASURED, POINTS, Axes, AxesArray, label, line, one, several
+from hysim.records import Record
+
+_DRAWN = {"zoh": "steps-post", "foh": "default"}
+_MARKERS = "os^D"
+
+
+class InputOutput(Protocol):
+    """What can be drawn as a loop: a Record, a Simulation or the like, with `units` and `name` if it has them."""
+
+    @property
+    def u(self) -> FloatArray: ...
+    @property
+    def y(self) -> FloatArray: ...
+
+
+def loop(*results: InputOutput, ax: Axes | None = None) -> Axes:
+    """Draw outputs against inputs, over each other.
+
+    Parameters
+    ----------
+    *results : Record, Simulation or anything with `u` and `y`
+        A record is drawn as points, anything else as a line with an arrow on its last loading and unloading branch.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ValueError
+        If no result is given.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> rec = hs.datasets.table1()
+    >>> hs.plot.loop(rec, ax=hs.plot.figure().add_subplot()).get_ylabel()
+    'Displacement [µm]'
+    """
+    if not results:
+        raise ValueError("there is nothing to draw: give at least one result with u and y")
+    records = [result for result in results if isinstance(result, Record)]
+    others = [result for result in results if not isinstance(result, Record)]
+    with one(ax) as axes:
+        for k, record in enumerate(records):
+            axes.plot(record.u, record.y, label=_name(record), marker=_MARKERS[k % len(_MARKERS)], **_MEASURED_LOOP)
+        for k, result in enumerate(others):
+            (drawn,) = axes.plot(result.u, result.y, label=_name(result), **line(k))
+            _arrows(axes, result, drawn.get_color())
+        units = _units(results)
+        axes.set(xlabel=label(units, "u"), ylabel=label(units, "y"))
+        if len(results) > 1:
+            axes.legend()
+    return axes
+
+
+_MEASURED_LOOP: dict[str, Any] = {"color": POINTS, "linewidth": 0.8, "markersize": 4.0, "markerfacecolor": "white", "markeredgecolor": MEASURED}
+
+
+def history(record: Record, axes: Sequence[Axes] | AxesArray | None = None, *, hold: str = "zoh") -> AxesArray:
+    """Draw output and input against time, one over the other.
+
+    Parameters
+    ----------
+    record : Record
+        Without a time it is drawn against the sample's number.
+    axes : two Axes, optional
+        For the output and for the input.
+    hold : {"zoh", "foh"}
+        How the input runs between samples: held, which makes steps, or along a straight line.
+
+    Returns
+    -------
+    array of Axes, shape (2,)
+
+    Raises
+    ------
+    ValueError
+        If `hold` is another word or fewer than two Axes are given.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> canvas = hs.plot.figure()
+    >>> [ax.get_ylabel() for ax in hs.plot.history(hs.datasets.table1(), canvas.subplots(2, sharex=True))]
+    ['Displacement [µm]', 'Voltage [V]']
+    """
+    if hold not in _DRAWN:
+        raise ValueError(f'hold must be "zoh" or "foh", got {hold!r}')
+    t = np.arange(float(record.u.size)) if record.t is None else record.t
+    end = 2.0 * t[-1] - t[-2]
+    with several(axes, 2, height=2.1) as (upper, lower):
+        upper.plot(t, record.y, marker="o", **_MEASURED_LOOP)
+        lower.plot(np.append(t, end), np.append(record.u, record.u[-1]), color=MEASURED, drawstyle=_DRAWN[hold])
+        upper.set_ylabel(label(record.units, "y"))
+        lower.set_ylabel(label(record.units, "u"))
+        lower.set_xlabel("Sample" if record.t is None else label(record.units, "t"))
+    return np.array([upper, lower])
+
+
+def traces(
+    series: Mapping[str, tuple[FloatArray, FloatArray]],
+    ax: Axes | None = None,
+    *,
+    units: Mapping[str, str] | None = None,
+) -> Axes:
+    """Draw outputs against time, over each other.
+
+    Parameters
+    ----------
+    series : mapping
+        Name to times and outputs, arrays of one length each.
+    ax : Axes, optional
+        Where to draw.
+    units : mapping, optional
+        Labels of the units of ``"t"`` and ``"y"``.
+
+    Returns
+    -------
+    Axes
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> t = [0.0, 1.0, 2.0]
+    >>> ax = hs.plot.traces({"lag": (t, [0.0, 0.6, 0.9])}, hs.plot.figure().add_subplot(), units={"t": "s"})
+    >>> ax.get_xlabel(), ax.get_ylabel()
+    ('Time [s]', 'Output')
+    """
+    with one(ax) as axes:
+        for k, (name, (t, y)) in enumerate(series.items()):
+            axes.plot(t, y, label=name, **line(k))
+        axes.set(xlabel=label(units or {}, "t"), ylabel=label(units or {}, "y"))
+        if len(series) > 1:
+            axes.legend()
+    return axes
+
+
+def _arrows(ax: Axes, result: InputOutput, colour: Any) -> None:
+    """An arrowhead where the input last crosses the middle of its span upwards, and one downwards."""
+    u, y = result.u, result.y
+    above = u >= 0.5 * (u.min() + u.max())
+    style = {"arrowstyle": "-|>", "color": colour, "mutation_scale": 14, "shrinkA": 0, "shrinkB": 0}
+    for turn in (above[1:] > above[:-1], above[1:] < above[:-1]):
+        for k in np.flatnonzero(turn)[-1:]:
+            ax.annotate("", xy=(u[k + 1], y[k + 1]), xytext=(u[k], y[k]), arrowprops=style)
+
+
+def _name(result: Any) -> str:
+    return getattr(result, "name", "") or type(result).__name__.lower()
+
+
+def _units(results: Sequence[Any]) -> dict[str, str]:
+    """The units of all results, those of the first one that has them."""
+    units: dict[str, str] = {}
+    for result in results:
+        units = dict(getattr(result, "units", {})) | units
+    return units

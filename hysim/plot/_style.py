@@ -1,0 +1,161 @@
+"""The house style: thin spines, a light grid, and lines told apart by dash and lightness as well as by colour.
+
+The colours are those of M. Okabe and K. Ito (2008), chosen for the colour-blind.
+"""
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import matplotlib.style
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure
+
+AxesArray = npt.NDArray[np.object_]
+
+WIDTH = 6.0
+"""Of a figure [in]: narrow enough to be read on a phone, where it shrinks to 360 pixels."""
+
+MEASURED = "#333333"
+POINTS = "#9a9a9a"
+GUIDE = "#777777"
+
+_LINES = (
+    ("#D55E00", (0, (1, 1.2))),
+    ("#CC79A7", (0, (6, 1.5, 1, 1.5))),
+    ("#56B4E9", "solid"),
+    ("#0072B2", (0, (5, 1.5))),
+    ("#009E73", "solid"),
+    ("#E69F00", (0, (3, 1.5, 1, 1.5, 1, 1.5))),
+    ("#222222", (0, (1, 3))),
+)
+
+_STYLE = {
+    "axes.axisbelow": True,
+    "axes.edgecolor": "#555555",
+    "axes.grid": True,
+    "axes.labelsize": 10,
+    "axes.linewidth": 0.6,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlelocation": "left",
+    "axes.titlesize": 10,
+    "figure.constrained_layout.h_pad": 0.06,
+    "figure.constrained_layout.w_pad": 0.06,
+    "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial", "Helvetica"],
+    "font.size": 10,
+    "grid.color": "#e2e2e2",
+    "grid.linewidth": 0.6,
+    "legend.fontsize": 9.5,
+    "legend.frameon": False,
+    "legend.handlelength": 2.4,
+    "lines.linewidth": 1.5,
+    "svg.fonttype": "none",
+    "xtick.color": "#555555",
+    "xtick.labelcolor": "#222222",
+    "xtick.labelsize": 9.5,
+    "xtick.major.width": 0.6,
+    "ytick.color": "#555555",
+    "ytick.labelcolor": "#222222",
+    "ytick.labelsize": 9.5,
+    "ytick.major.width": 0.6,
+}
+
+_QUANTITIES = {
+    **dict.fromkeys(("V", "mV", "kV"), "Voltage"),
+    **dict.fromkeys(("nm", "um", "µm", "mm", "m"), "Displacement"),
+    **dict.fromkeys(("mN", "N", "kN"), "Force"),
+    **dict.fromkeys(("us", "µs", "ms", "s"), "Time"),
+}
+_NAMES = {"t": "Time", "u": "Input", "y": "Output"}
+
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """Context, or decorator, in which figures and Axes are made in the house style whatever the user's settings."""
+    with matplotlib.style.context(_STYLE, after_reset=True):
+        yield
+
+
+def figure(width: float = WIDTH, height: float = 4.0) -> Figure:
+    """An empty figure, `width` by `height` [in], made without pyplot.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> with hs.plot.house_style():
+    ...     canvas = hs.plot.figure()
+    ...     _ = hs.plot.loop(hs.datasets.table1(), ax=canvas.add_subplot())
+    >>> hs.plot.to_svg(canvas)[:4]
+    '<svg'
+    """
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def panels(canvas: Figure, n: int, *, columns: int = 1, sharey: bool = False) -> AxesArray:
+    """Add `n` Axes row by row to a figure, over one input axis; inner ones have no labels of what they share."""
+    made = np.empty(n, dtype=object)
+    for k in range(n):
+        first = made[0] if k else None
+        made[k] = canvas.add_subplot(
+            math.ceil(n / columns), columns, k + 1, sharex=first, sharey=first if sharey else None
+        )
+        if k + columns < n:
+            _without_labels(made[k].xaxis)
+        if sharey and k % columns:
+            _without_labels(made[k].yaxis)
+    return made
+
+
+def _without_labels(axis: Axis) -> None:
+    axis.set_tick_params(labelbottom=False, labelleft=False)
+    axis.label.set_visible(False)
+
+
+@contextmanager
+def one(ax: Axes | None, height: float = 4.0) -> Iterator[Axes]:
+    """The given Axes; or new ones, and the house style while they are drawn on."""
+    with several(None if ax is None else [ax], 1, height) as axes:
+        yield axes[0]
+
+
+@contextmanager
+def several(
+    axes: Sequence[Axes] | AxesArray | None, n: int, height: float, *, columns: int = 1, sharey: bool = False
+) -> Iterator[AxesArray]:
+    """The first `n` of the given Axes; or new ones in rows of `height` [in], and the house style meanwhile."""
+    if axes is not None:
+        given = np.ravel(np.asarray(axes, dtype=object))
+        if given.size < n:
+            raise ValueError(f"{n} Axes are needed, got {given.size}")
+        yield given[:n]
+        return
+    import matplotlib.pyplot as plt
+
+    with house_style():
+        canvas = plt.figure(figsize=(WIDTH, height * math.ceil(n / columns)), layout="constrained")
+        yield panels(canvas, n, columns=columns, sharey=sharey)
+
+
+def line(k: int) -> dict[str, Any]:
+    """Colour and dashes of the k-th of several lines."""
+    colour, dashes = _LINES[k % len(_LINES)]
+    return {"color": colour, "linestyle": dashes}
+
+
+def label(units: Mapping[str, str], signal: str) -> str:
+    """`Voltage [V]` of ``{"u": "V"}`` and ``"u"``; `Input` where no unit is known."""
+    if signal not in units:
+        return _NAMES[signal]
+    unit = units[signal]
+    return f"{_QUANTITIES.get(unit, _NAMES[signal])} [{printed(unit)}]"
+
+
+def printed(unit: str) -> str:
+    """A unit with its micro sign: `µm` of ``"um"``."""
+    return re.sub(r"\bu(?=(m|s|V|A|N)\b)", "µ", unit)

@@ -1,0 +1,194 @@
+"""The polynomial Duhem law against closed forms, a literal ODE solver, and its own promises."""
+
+import math
+import pickle
+
+import numpy as np
+import pytest
+from hysim.errors import SimulationError
+from hysim.models.duhem_terms import Term
+from scipy.integrate import solve_ivp
+
+import hysim as hs
+
+# Degree 2 in both variables, an inner loop, long and short moves, a rest.
+GENERAL = hs.Duhem(
+    p=[[0.8, 0.1, -0.2], [0.05, 0.02, 0.0], [-0.1, 0.0, 0.0]], q=[[0.1, -0.6, 0.03], [0.5, 0.0, 0.0]], y0=0.3
+)
+PATH = np.array([0.0, 0.1, 0.7, 2.0, 2.0, 1.1, 1.4, -0.6, -2.0, -2.0, 0.3, 1.7])
+
+
+def literal(law: hs.Duhem, u: np.ndarray) -> np.ndarray:
+    """dy/du = p + s q, segment by segment, by an adaptive Runge-Kutta method that never sees a reversal."""
+    y = [law.y0]
+    for start, end in zip(u[:-1], u[1:], strict=True):
+        sign = np.sign(end - start)
+
+        def slope(v: float, w: np.ndarray, sign: float = sign) -> np.ndarray:
+            p, q = (np.polynomial.polynomial.polyval2d(v, w[0], part) for part in (law.p, law.q))
+            return np.array([p + sign * q])
+
+        y.append(y[-1] if sign == 0 else solve_ivp(slope, (start, end), [y[-1]], "DOP853", rtol=1e-13, atol=1e-14).y[0, -1])
+    return np.array(y)
+
+
+def coleman_hodgdon(a: float, b: float, c: float, y0: float, u: np.ndarray) -> np.ndarray:
+    """Closed form of y' = a |u'| (c u - y) + b u' on the monotone segments of u."""
+    y = [y0]
+    for start, end in zip(u[:-1], u[1:], strict=True):
+        decay = math.exp(-a * abs(end - start))
+        y.append(c * end + (y[-1] - c * start) * decay + np.sign(end - start) * (b - c) * (1.0 - decay) / a)
+    return np.array(y)
+
+
+@pytest.mark.parametrize(("a", "b", "c"), [(1.0, 0.345, 3.1635), (0.3, 2.0, 1.0), (30.0, 0.5, 1.0)])
+def test_coleman_hodgdon_is_its_closed_form(a, b, c):
+    law = hs.Duhem.from_terms({"u'": b, "|u'| u": a * c, "|u'| y": -a}, y0=0.4)
+    expected = coleman_hodgdon(a, b, c, 0.4, PATH)
+    # The promise of the series: 1e-12 of the range, whatever the length of a move.
+    assert np.abs(law.response(PATH) - expected).max() < 1e-12 * np.ptp(expected)
+
+
+def test_dahl_is_bouc_wen_of_n_1_and_gamma_0():
+    dahl = hs.Duhem.from_terms({"u'": 1.5, "|u'| y": -0.75})
+    bouc_wen = hs.BoucWen(A=1.5, beta=0.75, gamma=0.0, n=1.0)
+    assert dahl.response(PATH) == pytest.approx(bouc_wen.response(PATH), abs=1e-12)  # the series' promise
+
+
+def test_a_steep_law_is_its_closed_form():
+    law = hs.Duhem.from_terms({"u'": 1.0, "u' y^2": 1.0})
+    u = np.array([0.0, 1.0, 1.57, -1.5])  # tan reaches 1256 at the third sample: its condition number is 1971
+    assert law.response(u) == pytest.approx(np.tan(u), rel=1971 * 1e-15)
+
+
+def test_a_polynomial_of_the_input_alone_is_its_integral():
+    law = hs.Duhem.from_terms({"u' u^5": 6.0}, y0=1.0)
+    assert law.response([0.0, 2.0, -1.0, 0.0]) == pytest.approx([1.0, 65.0, 2.0, 1.0], rel=1e-14)  # rounding of 2^6
+
+
+def test_literal_integration_agrees():
+    expected = literal(GENERAL, PATH)
+    assert np.abs(GENERAL.response(PATH) - expected).max() < 1e-11 * np.ptp(expected)  # the solver's own tolerance
+
+
+def test_samples_inserted_on_a_segment_do_not_change_the_others():
+    fine = np.concatenate([np.linspace(a, b, 7)[:-1] for a, b in zip(PATH[:-1], PATH[1:], strict=True)] + [PATH[-1:]])
+    coarse, dense = GENERAL.response(PATH), GENERAL.response(fine)[::6]
+    assert np.abs(coarse - dense).max() < 1e-12 * np.ptp(coarse)  # both are within this of the truth
+
+
+def test_rests_change_nothing():
+    rested = np.repeat(PATH, 3)
+    assert np.array_equal(GENERAL.response(rested), np.repeat(GENERAL.response(PATH), 3))
+
+
+@pytest.mark.parametrize("cut", range(PATH.size + 1))
+def test_cut_at_a_sample_and_continued_is_the_same_bits(cut):
+    first, state = GENERAL.advance(PATH[:cut])
+    second, _ = GENERAL.advance(PATH[cut:], state if cut else None)
+    assert np.array_equal(np.concatenate([first, second]), GENERAL.response(PATH))
+
+
+def test_batch_is_the_path_to_the_bit():
+    factors = np.linspace(0.5, 1.5, 200)
+    sets = {"p": factors[:, None, None] * GENERAL.p, "q": GENERAL.q, "y0": factors}
+    together = hs.Duhem.responses(sets, PATH)
+    for k in (0, 77, 199):
+        alone = hs.Duhem(p=sets["p"][k], q=GENERAL.q, y0=factors[k]).response(PATH)
+        assert np.array_equal(together[k], alone)
+    assert np.array_equal(together, hs.Duhem.responses(sets, np.tile(PATH, (200, 1)), workers=1))
+
+
+def test_the_compiled_step_is_the_path_to_the_bit():
+    law = GENERAL.compiled(PATH[0])
+    assert np.array_equal([law.step(law.parameters, law.state, u) for u in PATH], GENERAL.response(PATH))
+
+
+def test_the_memory_is_the_output():
+    assert np.array_equal(GENERAL.memory(PATH), GENERAL.response(PATH))
+
+
+def test_without_rectified_terms_the_way_back_is_the_way_there():
+    u = np.linspace(0.0, 1.5, 30)
+    there, back = np.split(hs.Duhem(p=GENERAL.p, q=[[0.0]]).response(np.concatenate([u, u[::-1]])), 2)
+    assert np.abs(there - back[::-1]).max() < 1e-12 * np.ptp(there)  # the series' promise
+
+
+def test_an_escape_names_its_sample_and_spares_the_rest_of_a_batch():
+    law = hs.Duhem.from_terms({"u' y^2": 1.0}, y0=1.0)  # y = 1 / (1 - u)
+    with pytest.raises(SimulationError, match=r"escapes to infinity at sample 2 \(u = 2\)"):
+        law.response([0.0, 0.5, 2.0, 0.5])
+    batch = hs.Duhem.responses({"p": law.p, "q": law.q, "y0": [1.0, 0.25]}, [0.0, 0.5, 2.0])
+    assert np.isposinf(batch[0]).all()
+    assert batch[1] == pytest.approx([0.25, 0.25 / 0.875, 0.5], rel=1e-14)  # a few roundings
+
+
+def test_a_law_too_stiff_to_follow_says_so():
+    law = hs.Duhem.from_terms({"|u'| u^2": 1e9, "|u'| y": -1e9})
+    with pytest.raises(SimulationError, match="too stiff to be followed at sample 1"):
+        law.response([0.0, 1.0])
+
+
+def test_terms_and_arrays_are_one_law():
+    again = hs.Duhem.from_terms(GENERAL.terms, y0=GENERAL.y0)
+    assert again.terms == GENERAL.terms
+    assert np.array_equal(again.response(PATH), GENERAL.response(PATH))
+    assert list(GENERAL.terms) == [
+        *("u'", "u' u", "u' y", "u' u^2", "u' u y", "u' y^2"),
+        *("|u'|", "|u'| u", "|u'| y", "|u'| y^2"),
+    ]
+    assert GENERAL.terms["u' u y"] == GENERAL.p[1, 1]
+
+
+@pytest.mark.parametrize("name", ["u", "u' z", "u' y u", "u' u^1", "u' u^0", "|u'|y", "u' u u", "", "2 u'"])
+def test_names_outside_the_vocabulary_are_refused(name):
+    with pytest.raises(ValueError, match="unknown term"):
+        hs.Duhem.from_terms({name: 1.0})
+
+
+def test_every_term_has_one_name():
+    terms = [Term(rectified, degree, j) for rectified in (False, True) for degree in range(4) for j in range(degree + 1)]
+    assert [Term.parse(term.name) for term in terms] == terms == sorted(terms)
+
+
+def test_the_equation_reads_to_four_digits():
+    law = hs.Duhem.from_terms({"u'": 0.0123456, "u' u": 4.5e-5, "|u'|": -1.0, "|u'| u y^2": -2.0})
+    assert law.equation == "y' = u' (0.01235 + 4.5e-05 u) + |u'| (-1 - 2 u y^2)"
+    assert hs.Duhem(p=[[0.0]], q=[[0.0]]).equation == "y' = 0"
+
+
+def test_arguments_are_checked():
+    with pytest.raises(ValueError, match="p must have two axes"):
+        hs.Duhem(p=[1.0], q=[[1.0]])
+    with pytest.raises(ValueError, match="q must be finite"):
+        hs.Duhem(p=[[1.0]], q=[[math.nan]])
+    with pytest.raises(ValueError, match="u must be finite, got nan at index 1"):
+        GENERAL.response([0.0, math.nan])
+    with pytest.raises(TypeError, match="the parameters of Duhem are p, q and y0"):
+        hs.Duhem.responses({"p": [[1.0]], "q": [[1.0]], "z0": 0.0}, PATH)
+    with pytest.raises(ValueError, match="one length or length 1"):
+        hs.Duhem.responses({"p": [[1.0]], "q": [[1.0]], "y0": [0.0, 1.0]}, np.zeros((3, 4)))
+
+
+def test_a_law_is_a_value():
+    assert pickle.loads(pickle.dumps(GENERAL)) == GENERAL
+    assert hash(hs.Duhem(p=[[1]], q=[[0]])) == hash(hs.Duhem(p=[[1.0]], q=[[0.0]]))
+
+
+def test_the_search_space_begins_at_the_law_and_goes_back_to_it():
+    record = hs.Record(u=PATH, y=GENERAL.response(PATH))
+    space = GENERAL.search_space(record, fixed={"u'": 0.8}, bounds={"|u'|": (0.0, 0.5)})
+    assert space.names == (*list(GENERAL.terms)[1:], "y0")
+    values = space.parameters(space.starts)
+    assert {name: value[0] for name, value in values.items()} == pytest.approx({**GENERAL.terms, "y0": 0.3}, rel=1e-14)
+    assert space.parameters(space.lower)["|u'|"][0] == 0.0
+    assert space.parameters(space.upper)["|u'|"][0] == pytest.approx(0.5, rel=1e-15)
+    assert GENERAL.regressors(values, record)[0, :, 0] == pytest.approx(record.y, abs=1e-14)  # rounding of the scaling
+    assert GENERAL.assemble(values | {"y0": 0.3}).terms == pytest.approx(GENERAL.terms, rel=1e-14)
+
+
+def test_at_rest_the_law_starts_at_zero():
+    record = hs.Record(u=PATH, y=GENERAL.response(PATH))
+    assert GENERAL.search_space(record, initial="rest").held == {"y0": 0.0}
+    with pytest.raises(ValueError, match='initial must be "free" or "rest"'):
+        GENERAL.search_space(record, initial="periodic")

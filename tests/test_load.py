@@ -1,0 +1,162 @@
+"""Text files become records, and what cannot is refused with its line."""
+
+import io
+
+import pytest
+
+import hysim as hs
+
+LOOP = "time [s],voltage [V],displacement (um),note\n0,0,0.0,up\n1,5,0.079,\n2,10,0.152,top\n"
+
+
+def load(text, **options):
+    return hs.load(io.StringIO(text), **{"u": "u", "y": "y"} | options)
+
+
+def write(tmp_path, content):
+    path = tmp_path / "loop.csv"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+def test_a_file_becomes_a_record_with_the_units_of_its_header(tmp_path):
+    rec = hs.load(write(tmp_path, LOOP), u="voltage", y="displacement", t="time", resolution=0.0763)
+    assert rec == hs.Record(
+        u=[0, 5, 10],
+        y=[0, 0.079, 0.152],
+        t=[0, 1, 2],
+        units={"t": "s", "u": "V", "y": "um"},
+        resolution=0.0763,
+        name="loop",
+    )
+
+
+def test_what_the_caller_says_goes_before_what_the_file_says():
+    rec = load(LOOP, u="voltage", y="displacement", units={"y": "micrometre"}, name="mine")
+    assert (dict(rec.units), rec.name) == ({"u": "V", "y": "micrometre"}, "mine")
+
+
+@pytest.mark.parametrize("u", ["voltage", "voltage [V]", 1])
+def test_a_column_is_chosen_by_name_or_number(u):
+    assert load(LOOP, u=u, y=2).u.tolist() == [0, 5, 10]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "u,y\n0,1\n2,3\n",
+        "u;y\n0;1\n2;3\n",
+        "u\ty\n0\t1\n2\t3\n",
+        "  u   y\n  0   1\n  2   3\n",
+        "u,y\r\n0,1\r\n2,3\r\n",
+        "u,y\n0,1\n2,3",
+        "\ufeffu,y\n0,1\n2,3\n",
+        "# made by hand\n\nu, y\n# more\n0, 1\n\n  2, 3\n",
+        '"u","y"\n"0","1"\n"2","3e0"\n',
+    ],
+    ids=["comma", "semicolon", "tab", "blanks", "windows", "no last newline", "byte order mark", "comments", "quotes"],
+)
+def test_the_layout_is_found(text, tmp_path):
+    expected = hs.Record(u=[0, 2], y=[1, 3], name="loop")
+    assert hs.load(write(tmp_path, text), u="u", y="y") == expected
+    assert load(text, name="loop") == expected
+
+
+def test_blanks_between_columns_leave_units_with_their_names():
+    rec = load("voltage [V]  travel (um)\n0 1\n2 3\n", u="voltage", y="travel")
+    assert (rec.u.tolist(), dict(rec.units)) == ([0, 2], {"u": "V", "y": "um"})
+
+
+def test_a_delimiter_can_be_said():
+    assert load("u|y,z\n0|1\n2|3\n", y="y,z", delimiter="|").y.tolist() == [1, 3]
+    assert load("u y;z\n0 1\n2 3\n", y="y;z", delimiter=" ").y.tolist() == [1, 3]
+
+
+def test_a_file_without_a_header_has_columns_by_number():
+    assert load("0,1\n2,3\n", u=0, y=1).u.tolist() == [0, 2]
+    with pytest.raises(ValueError, match="no column 'u', the columns are: 0, 1"):
+        load("0,1\n2,3\n", y=1)
+
+
+GAPS = "u,y\n0,0\n1,1\n2,\n3,3\n4,nan\n5,5\n6,6\nNA,7\n"
+
+
+def test_a_missing_value_is_an_error_with_its_line_and_column():
+    with pytest.raises(ValueError, match=r"line 4, column 'y': the value is missing; on_missing=\"drop\""):
+        load(GAPS)
+
+
+def test_samples_with_missing_values_can_be_dropped():
+    rec = load(GAPS, on_missing="drop")
+    assert (rec.u.tolist(), rec.y.tolist()) == ([0, 1, 3, 5, 6], [0, 1, 3, 5, 6])
+
+
+def test_a_record_can_be_split_at_missing_values():
+    pieces = load(GAPS, on_missing="split", units={"u": "V"}, name="run")
+    assert [piece.u.tolist() for piece in pieces] == [[0, 1], [5, 6]]  # the lone sample at 3 is no record
+    assert {(piece.name, piece.units["u"]) for piece in pieces} == {("run", "V")}
+    assert [piece.u.tolist() for piece in load("u,y\n0,0\n1,1\n", on_missing="split")] == [[0, 1]]
+
+
+def test_time_may_begin_again_after_a_gap():
+    text = "t,u,y\n0,0,0\n1,1,1\n,,\n0,2,2\n1,3,3\n"
+    assert [piece.t.tolist() for piece in load(text, t="t", on_missing="split")] == [[0, 1], [0, 1]]
+    with pytest.raises(ValueError, match="line 5: time must increase"):
+        load(text, t="t", on_missing="drop")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "the file is empty"),
+        ("\n# nothing\n", "the file is empty"),
+        ("u,y\n", "no sample"),
+        ("u,z\n0,1\n", "no column 'y', the columns are: u, z"),
+        ("u,y,y\n0,1,2\n", "2 columns are called 'y'"),
+        ("u,y\n0,1\n2,high\n", "line 3, column 'y': expected a finite number, got 'high'"),
+        ("u;y\n0;1\n2;3,5\n", r"line 3, column 'y': .* got '3,5' \(write decimals with a point\)"),
+        ("u,y\n0,1\n1_0,3\n", "line 3, column 'u': expected a finite number, got '1_0'"),
+        ("u,y\n0,1\n# note\n-inf,3\n", "line 4, column 'u': expected a finite number, got '-inf'"),
+        ("u,y\n0,1\n2,3,4\n", "line 3: expected 2 cells, got 3"),
+        ("u,y\n0,1\n2\n", "line 3: expected 2 cells, got 1"),
+        ("u,y\n0,1\n", "at least 2 samples, there are 1"),
+        ("u,y\n0\0,1\n", "not a text file"),
+    ],
+)
+def test_what_is_no_record_is_refused(text, message):
+    with pytest.raises(ValueError, match=message):
+        load(text)
+
+
+def test_a_number_beyond_the_columns_is_refused():
+    for number in (2, -1):
+        with pytest.raises(ValueError, match=f"no column {number}, there are columns 0 to 1"):
+            load("0,1\n2,3\n", u=number, y=1)
+
+
+@pytest.mark.parametrize("content", [b"\x89PNG\r\n\x1a\n\xff", "u,y\n0,1\n".encode("utf-16")], ids=["image", "utf-16"])
+def test_a_file_that_is_no_text_is_refused_by_name(tmp_path, content):
+    with pytest.raises(ValueError, match=r"loop\.csv is not a UTF-8 text file"):
+        hs.load(write(tmp_path, content), u="u", y="y")
+
+
+def test_errors_name_the_file(tmp_path):
+    with pytest.raises(ValueError, match=r"loop\.csv: line 2: expected 2 cells"):
+        hs.load(write(tmp_path, "u,y\n0\n"), u="u", y="y")
+    with pytest.raises(FileNotFoundError, match="none"):
+        hs.load(tmp_path / "none.csv", u="u", y="y")
+
+
+def test_wrong_arguments_are_refused():
+    with pytest.raises(ValueError, match="one of error, drop, split, got 'skip'"):
+        load(LOOP, on_missing="skip")
+    with pytest.raises(ValueError, match="one character, got ', '"):
+        load(LOOP, delimiter=", ")
+    with pytest.raises(TypeError, match="open the file as text"):
+        hs.load(io.BytesIO(b"u,y\n"), u="u", y="y")
+
+
+def test_a_stream_is_read_from_where_it_stands(tmp_path):
+    with write(tmp_path, "title\nu,y\n0,1\n2,3\n").open(encoding="utf-8") as stream:
+        stream.readline()
+        assert hs.load(stream, u="u", y="y").name == "loop"

@@ -1,0 +1,257 @@
+"""Loops of known width and area are measured as what they are."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import hysim as hs
+
+ROUNDING = 1e-12  # relative; sums of some hundred terms of order one
+
+
+def ellipse(cycles=1, n=400, a=2.0, b=0.5, start=np.pi, sense=1):
+    """Counterclockwise for sense 1, from the leftmost point by default: area pi a b, width 2 b sqrt(1 - (u/a)^2)."""
+    phase = start + sense * 2 * np.pi * (np.arange(cycles * n + 1) % n) / n
+    return a * np.cos(phase), b * np.sin(phase)
+
+
+def play(u, radius, y=0.0):
+    """The play operator, literally: the output is pushed along by a slot of half width `radius`."""
+    out = []
+    for value in u:
+        y = min(max(y, value - radius), value + radius)
+        out.append(y)
+    return np.array(out)
+
+
+def widths(loop):
+    return loop.max_width, loop.max_width_at, loop.mean_width, loop.mid_width, loop.area, loop.orientation
+
+
+def test_table_1_has_the_published_loop():
+    rec = hs.datasets.table1()
+    loop = hs.loop_metrics(rec.u, rec.y)
+    assert loop.max_width == pytest.approx(0.232, rel=ROUNDING)
+    assert loop.max_width_at == 35.0
+    assert loop.area == pytest.approx(17.59, abs=0.005)  # quoted with two decimals
+    assert loop.mean_width == pytest.approx(0.1407, abs=5e-5)  # quoted with four decimals
+    assert loop.relative_width == pytest.approx(0.232 / 2.671, rel=ROUNDING)
+    assert (loop.stroke, loop.orientation, loop.closure_gap, loop.n_cycles) == (2.671, "counterclockwise", 0.0, 1)
+    expected = [0, -3, 153, 153, 229, 229, 153, 232, 229, 229, 229, 229, 229, 153, 229, 153, 75, 76, 153, 76, 76, 76]
+    nanometres = 1000 * loop.width_at(np.arange(0.0, 130.0, 5.0))
+    assert nanometres.round(9).tolist() == [*expected, 76, 80, 4, 0]
+
+
+@pytest.mark.parametrize(("sense", "orientation"), [(1, "counterclockwise"), (-1, "clockwise")])
+def test_an_ellipse_has_area_pi_a_b_and_width_2_b(sense, orientation):
+    u, y = ellipse(n=4000, sense=sense)
+    loop = hs.loop_metrics(u, y)
+    inscribed = 1e-6  # a polygon of n corners lacks 2 pi^2 / (3 n^2) = 4e-7 of the area
+    assert loop.area == pytest.approx(np.pi * 2.0 * 0.5, rel=inscribed)
+    assert loop.mean_width == pytest.approx(np.pi * 2.0 * 0.5 / 4.0, rel=inscribed)
+    assert (loop.max_width, loop.mid_width) == pytest.approx((1.0, 1.0), rel=ROUNDING)
+    assert loop.max_width_at == pytest.approx(0.0, abs=ROUNDING)
+    assert loop.orientation == orientation
+    assert loop.width_at(1.0) == pytest.approx(sense * math.sqrt(0.75), rel=1e-5)  # chord error (pi/n)^2 of the curve
+
+
+def test_a_play_operator_gives_a_parallelogram_and_the_lowest_of_equal_widths():
+    radius = 0.25
+    u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=80)
+    loop = hs.loop_metrics(u, play(u, radius))
+    assert loop.max_width == pytest.approx(2 * radius, rel=ROUNDING)
+    assert loop.max_width_at == pytest.approx(-1.0 + 2 * radius, abs=ROUNDING)
+    assert loop.area == pytest.approx(2 * radius * (2.0 - 2 * radius), rel=ROUNDING)
+    assert loop.stroke == pytest.approx(2.0 - 2 * radius, rel=ROUNDING)
+    assert loop.orientation == "counterclockwise"
+
+
+def test_a_single_valued_curve_has_no_loop():
+    u = hs.signals.triangle(0.0, 1.0, cycles=1, samples_per_cycle=20)
+    loop = hs.loop_metrics(u, np.exp(u))
+    assert (loop.max_width, loop.max_width_at, loop.orientation) == (0.0, 0.0, "none")
+    assert loop.area == pytest.approx(0.0, abs=ROUNDING)
+
+
+def test_a_constant_output_has_no_relative_width():
+    loop = hs.loop_metrics([0, 1, 0], [3, 3, 3])
+    assert loop.stroke == 0.0
+    assert math.isnan(loop.relative_width)
+
+
+def test_an_unclosed_loop_is_closed_by_a_straight_line():
+    loop = hs.loop_metrics([0, 1, 2, 1, 0], [0, 0, 1, 1, 1])
+    assert loop.area == pytest.approx(1.5, rel=ROUNDING)  # the unit square below y = 1 and half of the next
+    assert loop.closure_gap == 1.0
+    assert loop.width_at([0.0, 1.0, 2.0]).tolist() == [1.0, 1.0, 0.0]
+
+
+@pytest.mark.parametrize("n_peak", [1, 2, 3, 4, 7])
+def test_a_plateau_at_the_peak_is_divided_in_its_middle(n_peak):
+    creep = np.linspace(2.0, 3.0, n_peak) if n_peak > 1 else np.array([2.0])
+    u = np.concatenate([[0, 1], np.full(n_peak, 2), [1, 0]])
+    y = np.concatenate([[0, 1], creep, [2.5, 0]])
+    loop = hs.loop_metrics(u, y)
+    assert loop.loading[-1] == creep[(n_peak - 1) // 2]
+    assert loop.unloading[-1] == creep[-1]
+
+
+def test_of_several_samples_at_one_input_the_last_is_taken():
+    u = hs.signals.staircase(0.0, 2.0, 1.0, samples_per_step=3)
+    y = np.arange(18.0)
+    loop = hs.loop_metrics(u, y)
+    assert (loop.loading.tolist(), loop.unloading.tolist()) == ([2.0, 5.0, 8.0], [17.0, 14.0, 11.0])
+
+
+@pytest.mark.parametrize("start", [0.0, np.pi / 2, np.pi, 1.234])
+def test_a_sine_that_begins_anywhere_is_cut_at_its_extremes(start):
+    u, y = ellipse(cycles=3, start=start)
+    loop = hs.loop_metrics(u, y)
+    assert loop.max_width == pytest.approx(1.0, rel=1e-4)  # chord error of 400 samples, (pi/n)^2
+    assert loop.area == pytest.approx(np.pi, rel=2e-4)  # inscribed polygon, 2 pi^2 / (3 n^2), and a cut between samples
+    assert loop.orientation == "counterclockwise"
+
+
+def test_the_last_cycle_counts():
+    u = hs.signals.triangle(0.0, 1.0, cycles=3, samples_per_cycle=8)
+    y = np.cumsum(np.arange(u.size))
+    assert hs.loop_metrics(u, y) == hs.loop_metrics(u[16:], y[16:])
+
+
+def test_minor_loops_and_an_unfinished_cycle_after_the_last_complete_one_are_left_out():
+    u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=80)
+    longer = np.concatenate([u, [-0.4, 0.3, -0.2, 0.8]])
+    assert hs.loop_metrics(longer, play(longer, 0.25)) == hs.loop_metrics(u, play(u, 0.25))
+
+
+def test_glitches_below_the_tolerance_make_no_branches():
+    u = hs.signals.triangle(0.0, 1.0, cycles=2, samples_per_cycle=200)
+    clean = hs.loop_metrics(u, play(u, 0.1))
+    glitches = u.copy()
+    glitches[[37, 237, 333]] += [-0.004, 0.009, -0.009]
+    loop = hs.loop_metrics(glitches, play(u, 0.1))
+    height = 0.009
+    assert loop.max_width == pytest.approx(clean.max_width, abs=height + ROUNDING)  # on branches of slope one
+    assert loop.mid_width == pytest.approx(clean.mid_width, rel=ROUNDING)
+    assert loop.area == pytest.approx(clean.area, abs=2 * height * 0.01)  # each dent spans two steps of 0.01
+
+
+def test_a_noisy_input_above_the_tolerance_is_refused_and_a_larger_tolerance_mends_it():
+    u = hs.signals.triangle(0.0, 1.0, cycles=2, samples_per_cycle=200)
+    noisy = u + 0.02 * np.sin(1.7 * np.arange(u.size) ** 2)
+    with pytest.raises(ValueError, match="larger tolerance"):
+        hs.loop_metrics(noisy, play(u, 0.1))
+    assert hs.loop_metrics(noisy, play(u, 0.1), tolerance=0.05).mid_width == pytest.approx(0.2, abs=0.05)  # 0.02 twice
+
+
+def test_averaged_cycles_measure_the_loop_under_the_noise():
+    cycles, sigma = 64, 0.05
+    u = hs.signals.triangle(-1.0, 1.0, cycles=cycles + 1, samples_per_cycle=80)
+    clean = play(u, 0.25)
+    noisy = clean + np.random.default_rng(7).normal(0.0, sigma, u.size)
+    one, many = (hs.loop_metrics(u, noisy, cycles=k) for k in (1, cycles))
+    # A width is the difference of two means: 4 standard deviations, for the largest of 40.
+    assert many.max_width == pytest.approx(0.5, abs=4 * sigma * math.sqrt(2 / cycles))
+    assert abs(many.max_width - 0.5) < abs(one.max_width - 0.5)
+    assert (one.n_cycles, many.n_cycles, many.orientation) == (1, cycles, "counterclockwise")
+
+
+def test_the_average_of_equal_cycles_is_any_of_them():
+    u = hs.signals.triangle(-1.0, 1.0, cycles=4, samples_per_cycle=80)
+    y = play(u, 0.25, y=-0.75)
+    one, three = (hs.loop_metrics(u, y, cycles=k) for k in (1, 3))
+    assert three.width == pytest.approx(one.width, abs=ROUNDING)
+    assert (three.area, three.stroke) == pytest.approx((one.area, one.stroke), rel=ROUNDING)
+
+
+def test_a_drift_is_averaged_over_the_cycles():
+    u = hs.signals.triangle(0.0, 1.0, cycles=3, samples_per_cycle=10)
+    assert hs.loop_metrics(u, u + 0.1 * np.arange(u.size), cycles=3).closure_gap == pytest.approx(1.0, rel=ROUNDING)
+
+
+def test_the_width_is_signed_inside_and_nan_outside():
+    loop = hs.loop_metrics([0, 1, 2, 1, 0], [0, 3, 4, 1, 0])
+    assert isinstance(loop.width_at(0.5), float)
+    assert loop.width_at(0.5) == -1.0
+    assert np.isnan(loop.width_at([-0.1, 2.1])).all()
+    assert loop.width_at(np.zeros((2, 3))).shape == (2, 3)
+
+
+def test_the_width_error_is_the_rms_difference_of_signed_widths():
+    up, down = (hs.loop_metrics([0, 1, 2, 1, 0], [0, 1, 2, top, 0]) for top in (2.0, 0.0))
+    assert hs.metrics.width_rmse(up, down) == pytest.approx(2.0 / math.sqrt(3), rel=ROUNDING)
+    assert hs.metrics.width_rmse(up, up) == 0.0
+    far = hs.loop_metrics([5, 6, 5], [0, 1, 0])
+    with pytest.raises(ValueError, match="share no input"):
+        hs.metrics.width_rmse(up, far)
+
+
+@pytest.mark.parametrize(
+    ("u", "y", "message"),
+    [
+        ([0, 1, 0], [0, 1], "equal lengths, got 3 and 2"),
+        ([0, 1], [0, 1], "at least 3 samples, got 2"),
+        ([2, 2, 2], [0, 1, 0], "constant at 2"),
+        ([0, math.nan, 0], [0, 1, 0], "u must be finite, got nan at index 1"),
+        ([0, 1, 0], [0, 1, math.inf], "y must be finite, got inf at index 2"),
+        ([0, 1, 2, 3], [0, 1, 2, 3], "found 0: it turns at 0, 3"),
+        ([0, 1, 0.5], [0, 1, 0], "found 0: it turns at 0, 1, 0.5"),
+        (np.sin(np.linspace(0, 2 * np.pi, 50)), np.zeros(50), "one and a half periods"),
+    ],
+)
+def test_what_is_no_loop_is_refused(u, y, message):
+    with pytest.raises(ValueError, match=message):
+        hs.loop_metrics(u, y)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [({"cycles": 3}, "asked for 3 .* found 2"), ({"cycles": 0}, "at least 1"), ({"tolerance": -0.1}, "fraction")],
+)
+def test_wrong_options_are_refused(options, message):
+    u = hs.signals.triangle(0.0, 1.0, cycles=2, samples_per_cycle=8)
+    with pytest.raises(ValueError, match=message):
+        hs.loop_metrics(u, u, **options)
+
+
+@st.composite
+def loops(draw):
+    """A closed cycle between 0 and 1 with its own inputs and outputs on each branch."""
+    inner = st.lists(st.integers(1, 999), max_size=8, unique=True)
+    up, down = sorted(draw(inner)), sorted(draw(inner), reverse=True)
+    u = np.array([0, *up, 1000, *down, 0]) / 1000
+    values = st.integers(-1000, 1000)
+    y = np.array(draw(st.lists(values, min_size=u.size - 1, max_size=u.size - 1))) / 1000
+    return u, np.append(y, y[0])
+
+
+OPPOSITE = {"counterclockwise": "clockwise", "clockwise": "counterclockwise", "none": "none"}
+
+
+@given(loops())
+def test_reversing_the_path_turns_the_loop_round_and_keeps_its_widths(loop):
+    u, y = loop
+    forth, back = hs.loop_metrics(u, y), hs.loop_metrics(u[::-1], y[::-1])
+    assert back.width == pytest.approx(-forth.width, abs=ROUNDING)
+    assert widths(back)[:5] == pytest.approx(widths(forth)[:5], abs=ROUNDING)
+    assert back.orientation == OPPOSITE[forth.orientation]
+
+
+@given(loops(), st.floats(0.1, 10.0), st.floats(-10.0, 10.0).filter(lambda factor: abs(factor) > 0.1))
+def test_scaling_scales_the_widths_with_y_and_the_area_with_both(loop, a, b):
+    u, y = loop
+    one, scaled = hs.loop_metrics(u, y), hs.loop_metrics(a * u, b * y)
+    assert scaled.max_width == pytest.approx(abs(b) * one.max_width, abs=10 * ROUNDING)  # factors up to 10
+    assert scaled.mean_width == pytest.approx(abs(b) * one.mean_width, abs=10 * ROUNDING)
+    assert scaled.area == pytest.approx(abs(a * b) * one.area, abs=100 * ROUNDING)
+
+
+@given(loops(), st.integers(-5, 5), st.integers(-5, 5))
+def test_shifting_changes_the_place_only(loop, du, dy):
+    u, y = loop
+    one, shifted = hs.loop_metrics(u, y), hs.loop_metrics(u + du, y + dy)
+    assert shifted.width_at(one.u + du) == pytest.approx(one.width, abs=ROUNDING, nan_ok=True)
+    assert (shifted.area, shifted.max_width) == pytest.approx((one.area, one.max_width), abs=ROUNDING)

@@ -1,0 +1,92 @@
+"""Models go to JSON and come back to the bit; files that hold none are refused in one line."""
+
+import copy
+import dataclasses
+import json
+import pickle
+
+import numpy as np
+import pytest
+
+import hysim as hs
+
+MODELS = [
+    hs.BoucWen(A=1 / 3, beta=0.1, gamma=-np.pi, n=1.7),
+    hs.PolynomialBoucWen(input_coefficients=(0.1, 1e-17, 3e300)),
+    hs.Duhem.from_terms({"u'": 0.1, "|u'| u y": -2 / 3}, y0=0.7),
+    hs.TransferFunction(num=(1 / 3,), den=(1.0, 2.0), delay=0.1, sample="end"),
+    hs.Line(offset=0.1, slope=1e-300),
+    hs.SingleValued(u=[0.0, 0.1], y=[1 / 3, 2.0]),
+]
+
+
+def family(model) -> str:
+    return type(model).__name__
+
+
+@pytest.mark.parametrize("model", MODELS, ids=family)
+def test_a_model_comes_back_to_the_bit(model, tmp_path):
+    path = tmp_path / "model.json"
+    hs.save(model, path, units={"u": "V", "y": "um"})
+    assert hs.load_model(path) == model
+    document = json.loads(path.read_text())
+    assert document["family"] == family(model)
+    assert document["units"] == {"u": "V", "y": "um"}
+    assert document["hysim"] == hs.__version__
+    assert [entry.name for entry in tmp_path.iterdir()] == ["model.json"]
+
+
+@pytest.mark.parametrize("model", MODELS, ids=family)
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda model: pickle.loads(pickle.dumps(model))])
+def test_a_model_is_a_value(model, copied):
+    twin = copied(model)
+    assert twin == model
+    assert hash(twin) == hash(model)
+    assert twin is not model
+    for field in dataclasses.fields(twin):
+        value = getattr(twin, field.name)
+        assert not isinstance(value, np.ndarray) or not value.flags.writeable
+        with pytest.raises(dataclasses.FrozenInstanceError):
+            setattr(twin, field.name, value)
+
+
+@pytest.mark.parametrize("model", MODELS, ids=family)
+def test_a_typo_in_a_parameter_is_an_error(model):
+    arguments = {field.name: getattr(model, field.name) for field in dataclasses.fields(model)}
+    with pytest.raises(TypeError, match="gian"):
+        type(model)(**arguments, gian=1.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "does not hold a model"),
+        ("[1, 2]", "does not hold a model"),
+        ("{}", "does not hold a model"),
+        ('{"family": "Preisach", "parameters": {}}', "family 'Preisach'; there are BoucWen, "),
+        ('{"family": "BoucWen", "parameters": {"bta": 1}}', "bta"),
+        ('{"family": "BoucWen", "parameters": {"beta": NaN}}', "beta must be finite"),
+        ('{"family": "BoucWen", "parameters": {"beta": "much"}}', "beta must be a number"),
+        ('{"family": "Line", "parameters": 3}', "does not hold a model"),
+    ],
+)
+def test_a_file_without_a_model_is_named(tmp_path, text, message):
+    path = tmp_path / "bad.json"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=message) as caught:
+        hs.load_model(path)
+    assert "bad.json" in str(caught.value)
+
+
+def test_what_is_no_model_is_not_saved(tmp_path):
+    with pytest.raises(TypeError, match="takes a model"):
+        hs.save({"beta": 1.0}, tmp_path / "model.json")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_failed_write_leaves_the_old_file(tmp_path):
+    path = tmp_path / "model.json"
+    hs.save(MODELS[0], path)
+    with pytest.raises(ValueError, match="JSON"):
+        hs.save(hs.Line(), path, units={"u": float("nan")})
+    assert hs.load_model(path) == MODELS[0]
