@@ -71,21 +71,21 @@ def _freeze(cls: type[T], *, finite: bool) -> type[T]:
     check = getattr(cls, "__post_init__", None)
 
     def coerce_then_check(self: Any) -> None:
-        for name, coerce in _coercions(type(self), finite).items():
+        for name, coerce in _coercions(type(self), finite).items():  # type: ignore[arg-type]
             object.__setattr__(self, name, coerce(getattr(self, name), name))
         if check is not None:
             check(self)
 
     cls.__post_init__ = coerce_then_check  # type: ignore[attr-defined]
-    cls.__eq__ = _equal  # type: ignore[assignment, method-assign]
-    cls.__hash__ = _hash  # type: ignore[assignment, method-assign]
-    cls.__reduce__ = _reduce  # type: ignore[assignment, method-assign]
+    cls.__eq__ = _equal  # type: ignore[method-assign]
+    cls.__hash__ = _hash  # type: ignore[method-assign]
+    cls.__reduce__ = _reduce  # type: ignore[method-assign]
     return dataclasses.dataclass(frozen=True, kw_only=True, eq=False)(cls)
 
 
 @functools.cache
 def _coercions(cls: type, finite: bool) -> dict[str, Callable[[Any, str], Any]]:
-    rules = {
+    rules: dict[Any, Callable[[Any, str], Any]] = {
         float: functools.partial(_as_float, finite=finite),
         tuple[float, ...]: functools.partial(_as_float_tuple, finite=finite),
         FloatArray: functools.partial(read_only, finite=finite),
@@ -93,7 +93,7 @@ def _coercions(cls: type, finite: bool) -> dict[str, Callable[[Any, str], Any]]:
         float | None: lambda value, name: None if value is None else _as_float(value, name, finite=finite),
     }
     hints = typing.get_type_hints(cls)
-    coercions = {field.name: rules.get(hints[field.name]) for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
+    coercions = {field.name: rules.get(hints[field.name]) for field in dataclasses.fields(cls)}
     coercions |= {name: _as_mapping for name in coercions if typing.get_origin(hints[name]) is Mapping}
     return {name: coerce for name, coerce in coercions.items() if coerce is not None}
 

@@ -10,9 +10,9 @@ EXPONENTS = st.sampled_from([0.5, 0.8, 1.0, 1.3, 1.5, 2.0, 2.7, 5.0, 12.0])
 
 @st.composite
 def bounded_laws(draw) -> hs.BoucWen:
-    """Laws whose memory is bounded for every input: classes I and II, started inside."""
+    """Laws whose memory is bounded for every input: classes I and II (beta >= 0), started inside."""
     loading = draw(st.floats(0.05, 5.0))
-    unloading = draw(st.floats(-5.0, 5.0))
+    unloading = draw(st.floats(-loading, 5.0))
     n = draw(EXPONENTS)
     return hs.BoucWen(
         A=draw(st.floats(0.2, 3.0)),

@@ -19,7 +19,8 @@ RANKS = {
     5: ("comparison", "sweeps", "rig"),
     6: ("plot",),
     7: ("paper",),
-    8: ("cli", "__main__"),
+    8: ("cli",),
+    9: ("__main__",),
 }
 RANK = {name: rank for rank, names in RANKS.items() for name in names}
 ONLY_IMPORTED_IN = {"pysindy": ("discovery/_pysindy.py",), "matplotlib": ("plot/",), "control": ("control/", "paper/")}

@@ -8,13 +8,13 @@ import sys
 import numpy as np
 import pysindy
 import pytest
-from hysim.discovery import Discovery, _refinement, discover, leave_one_out, refit
+
+import hysim as hs
+from hysim.discovery import Discovery, _refinement, cross_validated_rmse, discover, refit
 from hysim.discovery._derivatives import branches, smoothed
 from hysim.discovery._library import duhem_terms, regression
 from hysim.discovery._pysindy import sparse_fit, sparse_path
 from hysim.discovery._selection import complete_structures, is_complete, thinned
-
-import hysim as hs
 
 DAHL = {"u'": 1.0, "|u'| y": -1.0}
 COLEMAN_HODGDON = {"u'": 0.345, "|u'| u": 3.1635, "|u'| y": -1.0}
@@ -42,7 +42,7 @@ def table1() -> hs.Record:
 
 @pytest.fixture(scope="module")
 def on_table1(table1) -> Discovery:
-    return discover(table1)
+    return discover(table1, cross_validate="loo")
 
 
 @pytest.mark.parametrize("terms", [DAHL, COLEMAN_HODGDON, QUADRATIC])
@@ -66,7 +66,7 @@ def test_the_structure_survives_5_percent_noise(terms):
 def test_table_1_has_a_law_of_few_terms(on_table1):
     scores = on_table1.scores
     assert scores["n_terms"] == len(on_table1.coefficients) <= 7
-    assert scores["n_parameters"] == scores["n_terms"] + 1
+    assert on_table1.n_parameters == scores["n_terms"] + 1
     assert scores["fit_percent"] >= 96.45
     assert on_table1.verdict == "cannot be told from one rate"
 
@@ -80,18 +80,17 @@ def test_table_1_has_the_measured_loop(on_table1, table1):
 
 
 def test_table_1_is_predicted_with_each_sample_left_out(on_table1, table1):
-    left_out = leave_one_out(on_table1.model, table1)
+    left_out = on_table1.cv_rmse
     assert on_table1.scores["rmse"] < left_out <= 0.035
 
 
 def test_scores_are_those_of_the_free_run(on_table1, table1):
     residual = table1.y - on_table1.model.response(table1.u)
     spread = np.linalg.norm(table1.y - table1.y.mean())
-    n, d = len(table1), on_table1.scores["n_parameters"]
+    n, d = len(table1), on_table1.n_parameters
     assert on_table1.scores["fit_percent"] == pytest.approx(100 * (1 - np.linalg.norm(residual) / spread), rel=1e-12)
     assert on_table1.scores["rmse"] == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-12)
-    # The floor of 1e-12 squared strokes moves V, 1e-4 squared strokes here, by 1e-8 of itself.
-    assert on_table1.scores["bic"] == pytest.approx(n * np.log(np.mean(residual**2)) + d * np.log(n), rel=1e-8)
+    assert on_table1.scores["bic"] == pytest.approx(n * np.log(np.mean(residual**2)) + d * np.log(n), rel=1e-12)
 
 
 def test_the_path_goes_from_dense_to_sparse(on_table1):
@@ -104,7 +103,7 @@ def test_the_path_goes_from_dense_to_sparse(on_table1):
 
 
 def test_the_same_record_gives_the_same_bits(on_table1, table1):
-    assert discover(table1) == on_table1
+    assert discover(table1, cross_validate="loo") == on_table1
 
 
 def test_the_seed_does_not_decide_what_is_found(on_table1, table1):
@@ -142,10 +141,10 @@ def test_a_curve_without_a_loop_has_no_structure():
 
 
 def test_a_lag_under_one_triangle_cannot_be_told_from_hysteresis():
-    u = np.tile(zigzag(0.0, 1.0, -1.0, 0.0), 3)
+    u = np.tile(zigzag(0.0, 1.0, -1.0, 0.0, per_branch=12), 2)
     y = np.zeros(u.size)
     for k in range(1, u.size):
-        y[k] = y[k - 1] + 0.1 * (u[k] - y[k - 1])
+        y[k] = y[k - 1] + 0.3 * (u[k] - y[k - 1])
     found = discover(hs.Record(u=u, y=y))
     assert found.scores["fit_percent"] > 95.0  # a fine law, and no hysteresis at all
     assert found.verdict == "cannot be told from one rate"
@@ -186,6 +185,8 @@ def test_arguments_are_checked():
         discover(record_of(DAHL), degree=-1)
     with pytest.raises(ValueError, match="weights must be 204 numbers"):
         refit(hs.Duhem.from_terms(DAHL), record_of(DAHL), weights=[1.0])
+    with pytest.raises(ValueError, match='folds must be "loo" or a number of blocks from 2 to 204, got 1'):
+        cross_validated_rmse(hs.Duhem.from_terms(DAHL), record_of(DAHL), 1)
 
 
 def test_terms_that_a_record_cannot_tell_apart_are_left_out_by_name():
@@ -204,6 +205,15 @@ def test_refit_leaves_out_what_has_no_weight():
     start = hs.Duhem.from_terms({name: 0.9 * value for name, value in COLEMAN_HODGDON.items()})
     found = refit(start, hs.Record(u=record.u, y=spoilt), weights=weights)
     assert found.terms == pytest.approx(COLEMAN_HODGDON, abs=1e-7)  # as for clean laws
+
+
+def test_samples_that_are_left_out_cost_little_where_there_are_many():
+    law, record = hs.Duhem.from_terms(DAHL), record_of(DAHL, noise=0.05)
+    noise = np.sqrt(np.mean((record.y - law.response(record.u)) ** 2))
+    one_by_one = cross_validated_rmse(law, record)
+    # Theory for 3 numbers from 204 samples: 1 + 3/204 of the noise; this draw may differ by as much again.
+    assert one_by_one == pytest.approx(noise, rel=0.03)
+    assert cross_validated_rmse(law, record, len(record)) == one_by_one
 
 
 def test_slopes_are_never_taken_across_a_reversal():
@@ -227,7 +237,7 @@ def test_the_features_are_those_of_the_law():
     problem = regression(record_of(QUADRATIC), duhem_terms(2))
     exact = np.array([QUADRATIC.get(term.name, 0.0) for term in problem.terms])
     predicted = problem.features @ (exact * problem.sizes / problem.slope_size)
-    assert np.abs(predicted - problem.slope).max() < 1e-6  # truncation of the branch polynomials
+    assert np.abs(predicted - problem.slope).max() < 1e-4  # truncation of the branch polynomials, degree 12 at most
     assert np.sqrt(np.mean(problem.features**2, axis=0)) == pytest.approx(1.0, rel=1e-12)
 
 
@@ -242,12 +252,9 @@ def test_every_threshold_on_the_path_changes_the_structure():
 
 
 def test_complete_structures_are_those_that_a_shift_of_the_origin_keeps():
-    """225 pairs of down-closed sets of six monomials, less the 15 without... counted by their sizes."""
     terms = duhem_terms(2)
     listed = complete_structures(terms, 10_000)
-    brute = [
-        chosen for size in range(1, 13) for chosen in itertools.combinations(terms, size) if is_complete(chosen)
-    ]
+    brute = [chosen for size in range(1, 13) for chosen in itertools.combinations(terms, size) if is_complete(chosen)]
     assert listed == brute
     assert complete_structures(terms, 5) == brute[:5]
 
@@ -265,7 +272,14 @@ def test_thinning_keeps_reversals_and_the_law():
 def test_pysindy_is_what_the_adapter_expects():
     stlsq = inspect.signature(pysindy.STLSQ).parameters
     assert {"threshold", "alpha", "max_iter", "unbias"} <= set(stlsq)
-    assert list(inspect.signature(pysindy.SINDy.fit).parameters)[:6] == ["self", "x", "t", "x_dot", "u", "feature_names"]
+    assert list(inspect.signature(pysindy.SINDy.fit).parameters)[:6] == [
+        "self",
+        "x",
+        "t",
+        "x_dot",
+        "u",
+        "feature_names",
+    ]
     assert {"optimizer", "feature_library"} <= set(inspect.signature(pysindy.SINDy).parameters)
     library = inspect.signature(pysindy.CustomLibrary).parameters
     assert {"library_functions", "function_names", "interaction_only"} <= set(library)

@@ -1,15 +1,16 @@
 """The polynomial Duhem law against closed forms, a literal ODE solver, and its own promises."""
 
+import itertools
 import math
 import pickle
 
 import numpy as np
 import pytest
-from hysim.errors import SimulationError
-from hysim.models.duhem_terms import Term
 from scipy.integrate import solve_ivp
 
 import hysim as hs
+from hysim.errors import SimulationError
+from hysim.models.duhem_terms import Term
 
 # Degree 2 in both variables, an inner loop, long and short moves, a rest.
 GENERAL = hs.Duhem(
@@ -21,21 +22,23 @@ PATH = np.array([0.0, 0.1, 0.7, 2.0, 2.0, 1.1, 1.4, -0.6, -2.0, -2.0, 0.3, 1.7])
 def literal(law: hs.Duhem, u: np.ndarray) -> np.ndarray:
     """dy/du = p + s q, segment by segment, by an adaptive Runge-Kutta method that never sees a reversal."""
     y = [law.y0]
-    for start, end in zip(u[:-1], u[1:], strict=True):
+    for start, end in itertools.pairwise(u):
         sign = np.sign(end - start)
 
         def slope(v: float, w: np.ndarray, sign: float = sign) -> np.ndarray:
             p, q = (np.polynomial.polynomial.polyval2d(v, w[0], part) for part in (law.p, law.q))
             return np.array([p + sign * q])
 
-        y.append(y[-1] if sign == 0 else solve_ivp(slope, (start, end), [y[-1]], "DOP853", rtol=1e-13, atol=1e-14).y[0, -1])
+        y.append(
+            y[-1] if sign == 0 else solve_ivp(slope, (start, end), [y[-1]], "DOP853", rtol=1e-13, atol=1e-14).y[0, -1]
+        )
     return np.array(y)
 
 
 def coleman_hodgdon(a: float, b: float, c: float, y0: float, u: np.ndarray) -> np.ndarray:
     """Closed form of y' = a |u'| (c u - y) + b u' on the monotone segments of u."""
     y = [y0]
-    for start, end in zip(u[:-1], u[1:], strict=True):
+    for start, end in itertools.pairwise(u):
         decay = math.exp(-a * abs(end - start))
         y.append(c * end + (y[-1] - c * start) * decay + np.sign(end - start) * (b - c) * (1.0 - decay) / a)
     return np.array(y)
@@ -72,7 +75,7 @@ def test_literal_integration_agrees():
 
 
 def test_samples_inserted_on_a_segment_do_not_change_the_others():
-    fine = np.concatenate([np.linspace(a, b, 7)[:-1] for a, b in zip(PATH[:-1], PATH[1:], strict=True)] + [PATH[-1:]])
+    fine = np.concatenate([np.linspace(a, b, 7)[:-1] for a, b in itertools.pairwise(PATH)] + [PATH[-1:]])
     coarse, dense = GENERAL.response(PATH), GENERAL.response(fine)[::6]
     assert np.abs(coarse - dense).max() < 1e-12 * np.ptp(coarse)  # both are within this of the truth
 
@@ -147,7 +150,9 @@ def test_names_outside_the_vocabulary_are_refused(name):
 
 
 def test_every_term_has_one_name():
-    terms = [Term(rectified, degree, j) for rectified in (False, True) for degree in range(4) for j in range(degree + 1)]
+    terms = [
+        Term(rectified, degree, j) for rectified in (False, True) for degree in range(4) for j in range(degree + 1)
+    ]
     assert [Term.parse(term.name) for term in terms] == terms == sorted(terms)
 
 

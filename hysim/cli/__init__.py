@@ -14,7 +14,9 @@ from hysim.cli import reproduce
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
-    parser = argparse.ArgumentParser(prog="hysim", description="Simulate, identify, discover and compare hysteretic actuators.")
+    parser = argparse.ArgumentParser(
+        prog="hysim", description="Simulate, identify, discover and compare hysteretic actuators."
+    )
     parser.add_argument("--version", action="version", version=f"hysim {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     reproduce.add_to(commands)

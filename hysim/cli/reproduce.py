@@ -15,7 +15,9 @@ def add_to(commands: Any) -> None:
         description="Identify, discover and compare models on the 52 voltage-displacement points of the paper, "
         "and write report.html, summary.json, figures and tables.",
     )
-    parser.add_argument("--out", metavar="DIR", default="reproduction", help="folder to write into (default: %(default)s)")
+    parser.add_argument(
+        "--out", metavar="DIR", default="reproduction", help="folder to write into (default: %(default)s)"
+    )
     parser.add_argument("--quick", action="store_true", help="leave the cross-validation out")
     parser.set_defaults(command=run)
 
@@ -27,8 +29,8 @@ def run(options: argparse.Namespace) -> int:
     done = reproduce(options.out, quick=options.quick, progress=_progress)
     comparison, loop = done.study.comparison, done.study.comparison.loop
     print(
-        f"Table 1: {len(comparison.record)} points, stroke {loop.stroke:.3f} um; the loop is {loop.max_width:.3f} um wide "
-        f"at {loop.max_width_at:g} V, {loop.mean_width:.4f} um on average, area {loop.area:.2f} um V"
+        f"Table 1: {len(comparison.record)} points, stroke {loop.stroke:.3f} um; the loop is {loop.max_width:.3f} um "
+        f"wide at {loop.max_width_at:g} V, {loop.mean_width:.4f} um on average, area {loop.area:.2f} um V"
     )
     print(comparison.to_text())
     for name, fit in done.study.fits.items():

@@ -8,6 +8,7 @@ one, with the mean of their outputs. Branches of fewer than MIN_SAMPLES such poi
 about a slope and are left out.
 """
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,7 +33,7 @@ class Branch:
     @property
     def length(self) -> FloatArray:
         """Loading length from the first sample, strictly increasing."""
-        return np.abs(self.u - self.u[0])
+        return np.asarray(np.abs(self.u - self.u[0]))
 
 
 def branches(u: FloatArray, y: FloatArray) -> list[Branch]:
@@ -41,7 +42,7 @@ def branches(u: FloatArray, y: FloatArray) -> list[Branch]:
     direction = np.sign(np.diff(u))
     reversals = np.flatnonzero(direction[1:] != direction[:-1]) + 1
     edges = [0, *reversals.tolist(), u.size - 1]
-    pieces = [slice(first, last + 1) for first, last in zip(edges[:-1], edges[1:], strict=True)]
+    pieces = [slice(first, last + 1) for first, last in itertools.pairwise(edges)]
     return [smoothed(u[piece], y[piece]) for piece in pieces if u[piece].size >= MIN_SAMPLES]
 
 

@@ -11,12 +11,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from hysim import metrics
 from hysim._frozen import FloatArray, frozen
 from hysim.discovery import _pysindy
 from hysim.discovery._library import duhem_terms, regression
 from hysim.discovery._refinement import POLISH, Candidate, FreeRun, law
 from hysim.discovery._selection import SEARCHED, Progress, Search, preferred, thinned
-from hysim.discovery._validation import leave_one_out
+from hysim.discovery._validation import cross_validated_rmse
 from hysim.models.duhem import Duhem
 from hysim.records import Record
 
@@ -44,9 +45,13 @@ class Discovery:
     verdict : str
         ``"cannot be told from one rate"``, ``"no structure found"`` or ``"unstable"``; see `discover`.
     scores : mapping
-        Of the law's free run: ``"fit_percent"`` [%], ``"rmse"`` [unit of y], ``"bic"``, ``"n_terms"``,
-        ``"n_parameters"`` (the terms, and y0); of the search: ``"threshold"``, the largest one whose structure
-        still has all terms of the law, ``"n_structures"`` refined, ``"condition"`` of the regression.
+        Of the law's free run, as in `hysim.metrics`: ``"fit_percent"`` [%], ``"rmse"`` [unit of y], ``"bic"``,
+        and ``"n_terms"``; of the search: ``"threshold"``, the largest one whose structure still has all terms of
+        the law, ``"n_structures"`` refined, ``"condition"`` of the regression.
+    n_parameters : int
+        What was fitted: the terms, and y0.
+    cv_rmse : float
+        Cross-validated rmse [unit of y]; nan if it was not asked for.
     left_out : tuple of str
         Terms of the library that this record cannot tell from those of lower degree.
     thresholds, path_n_terms, path_fit_percent, path_bic : array, shape (n_thresholds,)
@@ -59,24 +64,20 @@ class Discovery:
     equation: str
     verdict: str
     scores: Mapping[str, float]
+    n_parameters: int
+    cv_rmse: float
     left_out: tuple[str, ...]
     thresholds: FloatArray
     path_n_terms: FloatArray
     path_fit_percent: FloatArray
     path_bic: FloatArray
-    cv_rmse: float = math.nan
-
-    @property
-    def n_parameters(self) -> int:
-        """The terms, and y0."""
-        return len(self.coefficients) + 1
 
 
 def discover(
     record: Record,
     *,
     degree: int = 2,
-    cross_validate: str | None = None,
+    cross_validate: str | int | None = None,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Discovery:
@@ -94,8 +95,9 @@ def discover(
         Input and output; its time is not used. The input is taken as exact, and must reverse.
     degree : int
         Highest total degree of the monomials u^i y^j.
-    cross_validate : {None, "loo"}
-        ``"loo"`` fills `Discovery.cv_rmse`; see `leave_one_out`.
+    cross_validate : {None, "loo"} or int, optional
+        ``"loo"`` leaves one output sample out at a time, an int that many blocks of samples; the input and
+        the structure are kept, the numbers fitted anew. Fills `Discovery.cv_rmse`.
     seed : int
         Of the random restarts of the last refinement.
     progress : callable, optional
@@ -120,8 +122,8 @@ def discover(
 
     Notes
     -----
-    BIC = N ln V + d ln N with V the mean squared residual in free run, not below 1e-12 of the squared stroke:
-    smaller residuals are no evidence. d counts the terms and y0.
+    Structures are compared by BIC = N ln V + d ln N with V the mean squared residual in free run plus 1e-12
+    squared strokes: smaller residuals are no evidence. d counts the terms and y0.
 
     Sources: S. L. Brunton, J. L. Proctor and J. N. Kutz, PNAS 113 (2016); PySINDy 2.1.
 
@@ -136,8 +138,6 @@ def discover(
     """
     if not isinstance(record, Record):
         raise TypeError(f"discover takes a Record, got {type(record).__name__}: hs.Record(u=u, y=y)")
-    if cross_validate not in (None, "loo"):
-        raise ValueError(f'cross_validate must be None or "loo", got {cross_validate!r}')
     problem = regression(record, duhem_terms(degree))
     path = _pysindy.sparse_path(problem)
     structures = [problem.kept(coefficients) for _, coefficients in path]
@@ -145,32 +145,40 @@ def discover(
     refined = [search.refine(structure) for structure in structures]
     search.eliminate()
     search.enumerate_complete(progress)
-    whole = FreeRun(record)
-    chosen = _restarted(whole, preferred(search.found), seed)
-    dense_enough = [t for (t, _), s in zip(path, structures, strict=True) if set(chosen.terms) <= set(s)]
+    chosen = _restarted(FreeRun(record), preferred(search.found), seed)
     model = law(chosen)
+    path_scores = [_scores(candidate, search.free_run.record) for candidate in refined]
     return Discovery(
         model=model,
         coefficients=model.terms,
         equation=model.equation,
         verdict=_verdict(chosen, refined),
         scores={
-            "fit_percent": whole.fit_percent(chosen),
-            "rmse": whole.rmse(chosen),
-            "bic": whole.bic(chosen),
+            **_scores(chosen, record),
             "n_terms": len(chosen.terms),
-            "n_parameters": chosen.n_parameters,
-            "threshold": max(dense_enough, default=0.0),
+            "threshold": max(t for (t, _), s in zip(path, structures, strict=True) if set(chosen.terms) <= set(s)),
             "n_structures": len(search.tried),
             "condition": problem.condition,
         },
+        n_parameters=chosen.n_parameters,
+        cv_rmse=math.nan if cross_validate is None else cross_validated_rmse(model, record, cross_validate),
         left_out=tuple(term.name for term in problem.dependent),
         thresholds=np.array([threshold for threshold, _ in path]),
         path_n_terms=np.array([len(structure) for structure in structures]),
-        path_fit_percent=np.array([-np.inf if c is None else search.free_run.fit_percent(c) for c in refined]),
-        path_bic=np.array([np.inf if c is None else search.free_run.bic(c) for c in refined]),
-        cv_rmse=leave_one_out(model, record) if cross_validate else math.nan,
+        path_fit_percent=np.array([scores["fit_percent"] for scores in path_scores]),
+        path_bic=np.array([scores["bic"] for scores in path_scores]),
     )
+
+
+def _scores(candidate: Candidate | None, record: Record) -> dict[str, float]:
+    if candidate is None:
+        return {"fit_percent": -math.inf, "rmse": math.inf, "bic": math.inf}
+    residual = candidate.residual * float(np.ptp(record.y))
+    return {
+        "fit_percent": metrics.fit_percent(record.y, record.y - residual),
+        "rmse": metrics.rmse(record.y, record.y - residual),
+        "bic": metrics.bic(residual, candidate.n_parameters),
+    }
 
 
 def _restarted(free_run: FreeRun, chosen: Candidate, seed: int) -> Candidate:
@@ -187,6 +195,6 @@ def _restarted(free_run: FreeRun, chosen: Candidate, seed: int) -> Candidate:
 
 
 def _verdict(chosen: Candidate, path: list[Candidate | None]) -> str:
-    if not any(path):
+    if all(candidate is None for candidate in path):
         return UNSTABLE
     return ONE_RATE if any(term.rectified for term in chosen.terms) else NO_STRUCTURE

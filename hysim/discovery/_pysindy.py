@@ -41,9 +41,7 @@ def sparse_fit(regression: Regression, threshold: float) -> FloatArray:
 
     samples = len(regression.features)
     library = pysindy.CustomLibrary(
-        library_functions=[
-            _column(term, size) for term, size in zip(regression.terms, regression.sizes, strict=True)
-        ],
+        library_functions=[_column(term, size) for term, size in zip(regression.terms, regression.sizes, strict=True)],
         function_names=[_named(term) for term in regression.terms],
     )
     optimizer = pysindy.STLSQ(threshold=threshold, alpha=RIDGE * samples, max_iter=_MAX_ITERATIONS, unbias=False)

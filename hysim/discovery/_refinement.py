@@ -21,8 +21,8 @@ from hysim._frozen import FloatArray
 from hysim._parallel import in_chunks
 from hysim.discovery._library import Regression
 from hysim.kernels import duhem as kernels
-from hysim.models.duhem_terms import Term, branches, coefficient_units, polynomials
 from hysim.models.duhem import Duhem
+from hysim.models.duhem_terms import Term, branches, coefficient_units, polynomials
 from hysim.records import Record
 
 BOUND = 30.0
@@ -31,7 +31,7 @@ _DIVERGED = 1e3  # the residual, in strokes, of a free run that has
 _DIFFERENCE = 1e-6  # truncation and rounding of a central difference are both near 1e-10
 RANKING = 1e-5  # relative change of the cost at which a descent ends: far less than a difference of BIC that counts
 POLISH = 1e-12
-_MAX_EVALUATIONS = 200
+_MAX_EVALUATIONS = 60
 _RIDGES = tuple(10.0**power for power in range(-9, 1))
 _SAMPLES_PER_THREAD = 20_000
 
@@ -104,9 +104,7 @@ class FreeRun:
         left[~np.isfinite(left)] = _DIVERGED
         return left if self.weights is None else left * np.sqrt(self.weights)
 
-    def refine(
-        self, terms: tuple[Term, ...], starts: FloatArray, *, tolerance: float = RANKING
-    ) -> Candidate | None:
+    def refine(self, terms: tuple[Term, ...], starts: FloatArray, *, tolerance: float = RANKING) -> Candidate | None:
         """The optimum that is reached from the best of `starts` (n_starts, n_terms + 1), or None if all diverge."""
         from scipy.optimize import least_squares
 
@@ -137,18 +135,6 @@ class FreeRun:
         """Starts (n_ridges, n_terms + 1) from ridge regressions of the slope: the stiffer, the tamer the free run."""
         y0 = regression.branches[0].y[0]
         return np.array([[*regression.ridge(terms, weight), y0] for weight in _RIDGES])
-
-    def rmse(self, candidate: Candidate) -> float:
-        """Root mean square of the residual, in the unit of y."""
-        return self.stroke * math.sqrt(candidate.cost / len(self.record))
-
-    def fit_percent(self, candidate: Candidate) -> float:
-        """100 (1 - norm of the residual / norm of y - mean(y))."""
-        return 100.0 * (1.0 - self.rmse(candidate) / float(np.std(self.record.y)))
-
-    def bic(self, candidate: Candidate) -> float:
-        """BIC with residuals in the unit of y instead of strokes."""
-        return candidate.bic + 2.0 * len(self.record) * math.log(self.stroke)
 
 
 def law(candidate: Candidate) -> Duhem:

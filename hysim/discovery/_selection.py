@@ -90,9 +90,8 @@ class Search:
         """Step 3."""
         structures = complete_structures(self.regression.terms, MOST_COMPLETE)
         for done, terms in enumerate(structures):
-            if not self._could_win(len(terms)):
-                break
-            self.refine(terms)
+            if self._could_win(len(terms)):
+                self.refine(terms)
             if progress is not None:
                 progress(done + 1, len(structures))
 

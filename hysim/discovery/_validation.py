@@ -3,13 +3,13 @@
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
+from hysim._frozen import read_only
 from hysim.discovery._refinement import POLISH, FreeRun, law
-from hysim.models.duhem_terms import Term
 from hysim.models.duhem import Duhem
+from hysim.models.duhem_terms import Term
 from hysim.records import Record
 
-_WARM = 1e-7  # relative change of the cost: a left-out sample moves the optimum by little, and all are averaged
+_WARM = 1e-7  # relative change of the cost: a left-out sample moves the optimum by little, and the rmse is an average
 
 
 def refit(model: Duhem, record: Record, *, weights: npt.ArrayLike | None = None, tolerance: float = POLISH) -> Duhem:
@@ -55,11 +55,11 @@ def refit(model: Duhem, record: Record, *, weights: npt.ArrayLike | None = None,
     return law(found)
 
 
-def leave_one_out(model: Duhem, record: Record) -> float:
-    """Rmse of a Duhem law on samples left out of its fit, one at a time [unit of y].
+def cross_validated_rmse(model: Duhem, record: Record, folds: str | int = "loo") -> float:
+    """Rmse of a Duhem law on samples that were left out of its fit [unit of y].
 
-    The input is kept; only the residual of the sample is left out. The structure is kept, coefficients and
-    y0 are fitted anew, so that this judges the law, not the search for its structure.
+    The input is kept, only the residuals of the left-out samples are not seen. The structure is kept too,
+    coefficients and y0 are fitted anew: this judges the law, not the search for its structure.
 
     Parameters
     ----------
@@ -67,6 +67,8 @@ def leave_one_out(model: Duhem, record: Record) -> float:
         The law, fitted to the whole record.
     record : Record
         The record.
+    folds : "loo" or int
+        Leave one sample out at a time, or one of so many blocks of samples.
 
     Returns
     -------
@@ -75,24 +77,25 @@ def leave_one_out(model: Duhem, record: Record) -> float:
     Raises
     ------
     ValueError
-        If the law diverges on the record.
+        If `folds` is neither "loo" nor a number from 2 to n, or the law diverges on the record.
 
     Examples
     --------
     >>> import hysim as hs
-    >>> from hysim.discovery import leave_one_out
+    >>> from hysim.discovery import cross_validated_rmse
     >>> law = hs.Duhem.from_terms({"u'": 1.0, "|u'| y": -1.0})
     >>> u = [0.0, 1.0, 2.0, 1.0, 0.0, -1.0, 0.0]
-    >>> leave_one_out(law, hs.Record(u=u, y=law.response(u))) < 1e-9
+    >>> cross_validated_rmse(law, hs.Record(u=u, y=law.response(u))) < 1e-9
     True
     """
-    return float(np.sqrt(np.mean(_left_out_errors(model, record) ** 2)))
-
-
-def _left_out_errors(model: Duhem, record: Record) -> FloatArray:
-    errors = np.empty(len(record))
-    for k in range(len(record)):
-        weights = np.ones(len(record))
-        weights[k] = 0.0
-        errors[k] = record.y[k] - refit(model, record, weights=weights, tolerance=_WARM).response(record.u)[k]
-    return errors
+    n = len(record)
+    count = n if folds == "loo" else folds
+    if not isinstance(count, int) or isinstance(count, bool) or not 2 <= count <= n:
+        raise ValueError(f'folds must be "loo" or a number of blocks from 2 to {n}, got {folds!r}')
+    errors = np.empty(n)
+    for block in np.array_split(np.arange(n), count):
+        weights = np.ones(n)
+        weights[block] = 0.0
+        refitted = refit(model, record, weights=weights, tolerance=_WARM)
+        errors[block] = (record.y - refitted.response(record.u))[block]
+    return float(np.sqrt(np.mean(errors**2)))

@@ -52,9 +52,7 @@ def optima(problem: Projection, *, seed: int, progress: Progress | None = None) 
     return _distinct(found)
 
 
-def descend(
-    problem: Projection, x: FloatArray, weights: FloatArray | None = None
-) -> tuple[FloatArray, FloatArray]:
+def descend(problem: Projection, x: FloatArray, weights: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
     """Points (n, n_x) after `N_STEPS` projected Levenberg-Marquardt steps from `x`, and their sums of squares."""
     x = x.copy()
     space, n_x = problem.space, x.shape[1]

@@ -12,8 +12,6 @@ import numba
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_OPTIONS = {"nogil": True, "error_model": "numpy"}
-
 
 def kernel(function: F) -> F:
     """Compile `function` at its first call with each combination of argument types."""
@@ -26,7 +24,10 @@ def signed_kernel(signature: Any) -> Callable[[F], F]:
 
 
 def _compiled(function: F, *signature: Any) -> F:
+    compiler: Any = numba.njit
+    options = {"nogil": True, "error_model": "numpy"}
     try:
-        return numba.njit(*signature, cache=True, **_OPTIONS)(function)  # type: ignore[no-any-return]
+        compiled: F = compiler(*signature, cache=True, **options)(function)
     except RuntimeError:  # numba found no writable folder for its cache
-        return numba.njit(*signature, **_OPTIONS)(function)  # type: ignore[no-any-return]
+        compiled = compiler(*signature, **options)(function)
+    return compiled

@@ -100,7 +100,7 @@ def power_flow(w: float, c: float, n: float, length: float) -> float:
     base = 1.0 + m * c * w**m * length
     if base <= 0.0:
         return math.inf if m > 0.0 else 0.0
-    return w * base ** (-1.0 / m)
+    return float(w * base ** (-1.0 / m))
 
 
 @kernel
@@ -146,7 +146,7 @@ def taylor_step(w: float, a: float, c: float, n: float, h: float, scratch: Float
         total += t[k + 1]
         if abs(t[k + 1]) + abs(t[k]) < _NEGLIGIBLE * w:
             break
-    return w + total
+    return float(w + total)
 
 
 @kernel
@@ -248,9 +248,7 @@ def prepare(A: float, beta: float, gamma: float, n: float, constants: FloatArray
 
 
 @kernel
-def path(
-    A: float, beta: float, gamma: float, n: float, last_u: float, z: float, u: FloatArray, out: FloatArray
-) -> int:
+def path(A: float, beta: float, gamma: float, n: float, last_u: float, z: float, u: FloatArray, out: FloatArray) -> int:
     """Memory at the samples of `u` from (last_u, z) into `out`: the first sample that is not finite, or -1."""
     constants, scratch = np.empty(N_CONSTANTS), np.empty(N_SCRATCH)
     prepare(A, beta, gamma, n, constants)
@@ -290,7 +288,7 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     A, beta, gamma, n = parameters[0], parameters[1], parameters[2], parameters[3]
     z = advance(state[1], u - state[0], A, beta, gamma, n, parameters[6 : 6 + N_CONSTANTS], state[2:])
     state[0], state[1] = u, z
-    return parameters[5] + polynomial(u, parameters[6 + N_CONSTANTS :]) + parameters[4] * z
+    return float(parameters[5] + polynomial(u, parameters[6 + N_CONSTANTS :]) + parameters[4] * z)
 
 
 @kernel

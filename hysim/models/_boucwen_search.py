@@ -26,6 +26,8 @@ from hysim.models._search import SearchSpace, checked_bounds, held_parameters
 from hysim.records import Record
 
 REDUNDANT = (("A", "gain"),)
+_MEMORY = ("A", "beta", "gamma", "n", "z0")
+_PAIR = ("loading", "unloading")
 _KNEE = float(np.arcsinh(40.0))
 _BOX = {
     "A": (-10.0, 10.0),
@@ -57,9 +59,9 @@ def search_space(
     if initial not in (None, "free", "rest"):
         raise ValueError(f'initial must be "free" or "rest", got {initial!r}')
     at_rest = {"z0": 0.0} if initial == "rest" and "z0" not in free else {}
-    held = held_parameters(defaults, REDUNDANT, at_rest | dict(fixed or {}), free)
+    held = held_parameters(defaults, REDUNDANT, {**at_rest, **(fixed or {})}, free)
     limits = checked_bounds(bounds or {}, defaults, held)
-    chart = _chart(defaults | held, frozenset(defaults) - frozenset(held), limits, record)
+    chart = _chart({**defaults, **held}, frozenset(defaults) - frozenset(held), limits, record)
     box = {name: limits.get(name, _BOX[name]) for name in chart.coordinates}
     box |= {"n": (float(np.log(box["n"][0])), float(np.log(box["n"][1])))} if "n" in box else {}
     lower, upper = (np.array([pair[side] for pair in box.values()]) for side in (0, 1))
@@ -68,7 +70,7 @@ def search_space(
         coordinates=chart.coordinates,
         lower=lower,
         upper=upper,
-        starts=np.clip(chart.encode(defaults | held), lower, upper)[np.newaxis],
+        starts=np.clip(chart.encode({**defaults, **held}), lower, upper)[np.newaxis],
         names=tuple(name for name in defaults if name not in held),
         columns=columns,
         linear=tuple(name for name in columns if name not in held),
@@ -78,9 +80,6 @@ def search_space(
         regions={"admissible": (quadrant, upper)} if set(_PAIR) <= set(box) else {},
         bounds={name: pair for name, pair in limits.items() if name in columns},
     )
-
-
-_PAIR = ("loading", "unloading")
 
 
 @dataclass(frozen=True)
@@ -113,7 +112,7 @@ class _Chart:
         """Coordinates (n_x,) of one set of parameters."""
         A, n = np.array(parameters["A"]), np.array(parameters["n"])
         beta, gamma, unit = parameters["beta"], parameters["gamma"], self._unit(A, n)
-        scaled = {
+        scaled: dict[str, FloatArray | float] = {
             "A": A / self.slope,
             "loading": _knee((beta + gamma) / unit, n),
             "unloading": _knee((beta - gamma) / unit, n),
@@ -121,8 +120,9 @@ class _Chart:
             "gamma": _knee(gamma / unit, n),
             "z0": parameters["z0"] / (self._slope(A) * self.span),
         }
-        scaled |= {name: np.array(parameters[name]) for name in self.limits if name in scaled}
-        return np.array([float(np.log(n)) if name == "n" else float(scaled[name]) for name in self.coordinates])
+        scaled |= {name: parameters[name] for name in self.limits if name in scaled}
+        scaled["n"] = np.log(n)
+        return np.array([float(scaled[name]) for name in self.coordinates])
 
     def _slope(self, A: FloatArray) -> FloatArray:
         return np.where(A == 0.0, 1.0, np.abs(A))
@@ -130,9 +130,6 @@ class _Chart:
     def _unit(self, A: FloatArray, n: FloatArray) -> FloatArray:
         slope = self._slope(A)
         return np.asarray(slope / (slope * self.span) ** n)
-
-
-_MEMORY = ("A", "beta", "gamma", "n", "z0")
 
 
 def _shape(c: FloatArray, n: FloatArray) -> FloatArray:

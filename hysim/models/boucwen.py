@@ -13,9 +13,10 @@ Sources: R. Bouc 1967; Y. K. Wen, J. Eng. Mech. Div. 102 (1976); the polynomial 
 piezoelectric loops after Wang, Chen and Bai 2015; the classes after Ikhouane and Rodellar 2007.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -35,7 +36,7 @@ State = tuple[float, float]
 MEMORY = ("A", "beta", "gamma", "n", "z0")
 
 
-class _BoucWenLaw:
+class _BoucWenLaw(ABC):
     """What both laws share: the memory, and an output that is a polynomial of u plus gain z.
 
     A law adds its fields, and says how its input coefficients are called.
@@ -49,7 +50,10 @@ class _BoucWenLaw:
     offset: float
     z0: float
 
-    coefficient_names: tuple[str, ...]
+    @property
+    @abstractmethod
+    def coefficient_names(self) -> tuple[str, ...]:
+        """One name for each coefficient of the input."""
 
     def __post_init__(self) -> None:
         if self.n <= 0.0:
@@ -237,11 +241,13 @@ class _BoucWenLaw:
 
     def _memory(self, u: FloatArray, state: State) -> FloatArray:
         z = np.empty(u.size)
-        escaped = kernels.path(self.A, self.beta, self.gamma, self.n, *map(float, state), u, z)
+        last_u, z0 = state
+        escaped = kernels.path(self.A, self.beta, self.gamma, self.n, float(last_u), float(z0), u, z)
         if escaped >= 0:
             raise SimulationError(
                 f"the memory escapes to infinity at sample {escaped} (u = {u[escaped]:g}): with beta + gamma = "
-                f"{self.beta + self.gamma:g} and beta - gamma = {self.beta - self.gamma:g} only a shorter input bounds it"
+                f"{self.beta + self.gamma:g} and beta - gamma = {self.beta - self.gamma:g} only a shorter input "
+                "bounds it"
             )
         return z
 
@@ -335,7 +341,10 @@ class BoucWen(_BoucWenLaw):
     offset: float = 0.0
     z0: float = 0.0
 
-    coefficient_names: ClassVar[tuple[str, ...]] = ("feedthrough",)
+    @property
+    def coefficient_names(self) -> tuple[str, ...]:
+        """One name, of the feedthrough."""
+        return ("feedthrough",)
 
 
 @model
@@ -373,7 +382,7 @@ class PolynomialBoucWen(_BoucWenLaw):
     input_coefficients: tuple[float, ...] = (0.0, 0.0)
 
     @property
-    def coefficient_names(self) -> tuple[str, ...]:  # type: ignore[override]
+    def coefficient_names(self) -> tuple[str, ...]:
         """One name for each input coefficient."""
         return tuple(f"input_coefficients[{k}]" for k in range(len(self.input_coefficients)))
 

@@ -1,8 +1,8 @@
 """Yardsticks without memory: what a model must beat to have learnt anything about hysteresis.
 
-    Line           y = offset + slope u
-    SingleValued   y = f(u), linear between knots; fitted, the mean output at each input of the record,
-                   which no function of the input alone can beat
+Line           y = offset + slope u
+SingleValued   y = f(u), linear between knots; fitted, the mean output at each input of the record,
+               which no function of the input alone can beat
 """
 
 from collections.abc import Mapping
@@ -91,7 +91,7 @@ class SingleValued:
 
     def __post_init__(self) -> None:
         if self.u.ndim != 1 or self.u.shape != self.y.shape or not self.u.size:
-            raise ValueError(f"u and y must have one axis and equal lengths, got shapes {self.u.shape} and {self.y.shape}")
+            raise ValueError(f"u and y must be equally long vectors, got shapes {self.u.shape} and {self.y.shape}")
         if not (np.diff(self.u) > 0.0).all():
             raise ValueError("the knots' inputs u must increase")
 

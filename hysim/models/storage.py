@@ -36,7 +36,7 @@ def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None
         If the file cannot be written.
     """
     family = type(model).__name__
-    if FAMILIES.get(family) is not type(model):
+    if FAMILIES.get(family) not in (type(model),):
         raise TypeError(f"save takes a model of hysim, got {family}")
     document = {
         "hysim": __version__,

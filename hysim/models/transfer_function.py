@@ -283,9 +283,7 @@ def _times(polynomials: FloatArray, factor: list[FloatArray]) -> FloatArray:
     return product
 
 
-def _columns(
-    monic: FloatArray, u: FloatArray, sample_time: float, delay: float, hold: str, sample: str
-) -> FloatArray:
+def _columns(monic: FloatArray, u: FloatArray, sample_time: float, delay: float, hold: str, sample: str) -> FloatArray:
     """What the output is affine in: b_0 ... b_n of the numerator, then the initial state, (n_sets, N, 2 n + 1).
 
     `monic` (n_sets, n) holds the denominators without their leading one, in seconds.
@@ -310,7 +308,8 @@ def _columns(
         through = end[:, -1] if sample == "end" else begin[:, 0]
         feedthrough = through - (x @ scaled[..., np.newaxis])[..., 0]
         back = rate[:, np.newaxis] ** -degrees
-        return np.concatenate([feedthrough[..., np.newaxis], x * back, free[:, at] * back * rate[..., np.newaxis]], axis=-1)
+        from_state = free[:, at] * back * rate[..., np.newaxis]
+        return np.concatenate([feedthrough[..., np.newaxis], x * back, from_state], axis=-1)
 
 
 def _transitions(F: FloatArray, spans: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

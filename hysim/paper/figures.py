@@ -2,12 +2,16 @@
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from hysim import plot
 from hysim._frozen import FloatArray
 from hysim.comparison import Comparison
 from hysim.discovery import Discovery
 from hysim.metrics import LoopMetrics, loop_metrics
 from hysim.records import Record
+
+_MARK = "#B34700"
 
 
 @plot.house_style()
@@ -23,7 +27,9 @@ def figure4(record: Record) -> plot.Figure:
     """The hysteresis loop, its widest place marked."""
     canvas = plot.figure(height=4.4)
     ax = plot.loop(record, ax=canvas.add_subplot())
-    _mark_widest(ax, loop_metrics(record.u, record.y))
+    measured = loop_metrics(record.u, record.y)
+    _mark_widest(ax, measured)
+    _name_branches(ax, measured)
     return canvas
 
 
@@ -31,7 +37,8 @@ def figure4(record: Record) -> plot.Figure:
 def figure5(responses: Mapping[str, tuple[FloatArray, FloatArray]]) -> plot.Figure:
     """Responses to a step of one volt, as times [s] and displacements [um] by name."""
     canvas = plot.figure(height=3.6)
-    plot.traces(responses, canvas.add_subplot(), units={"t": "s", "y": "um"})
+    ax = plot.traces(responses, canvas.add_subplot(), units={"t": "s"})
+    ax.set_ylabel("Displacement per volt [µm/V]")
     return canvas
 
 
@@ -47,7 +54,7 @@ def model_loops(comparison: Comparison) -> plot.Figure:
 def model_residuals(comparison: Comparison) -> plot.Figure:
     """Each model's residuals in pixels."""
     canvas = plot.figure(height=9.0)
-    plot.residuals(comparison, plot.panels(canvas, len(comparison.rows), columns=2, sharey=True))
+    plot.residuals(comparison, plot.panels(canvas, len(comparison.rows), columns=2, sharey=True), quanta="pixels")
     return canvas
 
 
@@ -68,8 +75,17 @@ def discovery_path(discovery: Discovery) -> plot.Figure:
 
 
 def _mark_widest(ax: plot.Axes, loop: LoopMetrics) -> None:
-    u = loop.max_width_at
-    k = int(abs(loop.u - u).argmin())
-    ends = (loop.loading[k], loop.unloading[k])
-    ax.annotate("", xy=(u, ends[0]), xytext=(u, ends[1]), arrowprops={"arrowstyle": "<->", "color": "#D55E00"})
-    ax.annotate(f"widest: {loop.max_width:.3f} µm at {u:g} V", xy=(u, ends[1]), xytext=(-8, 14), textcoords="offset points", ha="right", color="#D55E00")
+    k = int(np.argmin(np.abs(loop.u - loop.max_width_at)))
+    lower, upper = (loop.u[k], loop.loading[k]), (loop.u[k], loop.unloading[k])
+    ax.annotate("", xy=lower, xytext=upper, arrowprops={"arrowstyle": "<->", "color": _MARK, "linewidth": 1.2})
+    text = f"widest: {loop.max_width:.3f} µm at {loop.max_width_at:g} V"
+    ax.annotate(text, xy=lower, xytext=(6, -20), textcoords="offset points", color=_MARK)
+
+
+def _name_branches(ax: plot.Axes, loop: LoopMetrics) -> None:
+    k = (2 * loop.u.size) // 3
+    for name, branch, offset, side in (
+        ("loading", loop.loading, (8, -14), "left"),
+        ("unloading", loop.unloading, (-8, 8), "right"),
+    ):
+        ax.annotate(name, xy=(loop.u[k], branch[k]), xytext=offset, textcoords="offset points", ha=side)

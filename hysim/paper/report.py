@@ -55,12 +55,12 @@ def _lead(study: Study) -> str:
     linear, single = comparison["eq1-printed"], comparison["single-valued"]
     law, found = comparison["bouc-wen-asymmetric"], comparison["sindy"]
     return _paragraph(
-        "Table 1 of B. B. Muhammad, M. H. Rahman, M. R. Ahmad and M. Bashir, “A novel model of PZT actuator and its "
-        "application in hysteresis and vibration controls”, Jurnal Teknologi (2016), recomputed by hysim.",
+        "Table 1 of B. B. Muhammad, M. H. Rahman, M. R. Ahmad and M. Bashir, “A novel model of PZT actuator and "
+        "its application in hysteresis and vibration controls”, Jurnal Teknologi (2016), recomputed by hysim.",
         "source",
     ) + _paragraph(
-        f"The measured loop is {loop.max_width:.3f} µm wide at {loop.max_width_at:g} V. The linear model that the paper "
-        f"prints fits the points to {linear.fit_percent:.1f} %, and no curve that gives one displacement for each "
+        f"The measured loop is {loop.max_width:.3f} µm wide at {loop.max_width_at:g} V. The linear model that the "
+        f"paper prints fits the points to {linear.fit_percent:.1f} %, and no curve that gives one displacement for each "
         f"voltage can do better than {single.fit_percent:.2f} %: what is missing is memory. With it, a Bouc-Wen law "
         f"with {law.n_parameters} parameters fits to {law.fit_percent:.2f} % and opens {law.max_width:.3f} µm; a law "
         f"that SINDy discovers fits to {found.fit_percent:.2f} % and opens {found.max_width:.3f} µm."
@@ -89,8 +89,8 @@ def _measured(study: Study, drawn: Drawn) -> str:
         )
         + _figure(
             drawn["figure4"],
-            "The paper's Figure 4, regenerated: the hysteresis loop. Every displacement is a whole number of pixels, so "
-            "a third of the loop's width is below the camera's resolution.",
+            "The paper's Figure 4, regenerated: the hysteresis loop. Every displacement is a whole number of pixels, "
+            f"and one pixel is {100 * quantum / loop.max_width:.0f} % of the loop's width.",
         )
     )
 
@@ -111,12 +111,12 @@ def _models(study: Study, drawn: Drawn) -> str:
     ]  # fmt: skip
     measured = study.comparison.loop
     best = [
-        "measured", "", "", "", "", "", f"{measured.max_width:.3f}", f"{measured.max_width_at:g}", f"{measured.area:.2f}", "",
+        "measured", *[""] * 5, f"{measured.max_width:.3f}", f"{measured.max_width_at:g}", f"{measured.area:.2f}", "",
     ]  # fmt: skip
     return (
         _paragraph(
-            "Every model is simulated in free run over the 52 voltages and judged by the same measures. “Single-valued” "
-            "is the best possible curve that gives one displacement for each voltage: a model that does not beat it "
+            "Every model is simulated in free run over the 52 voltages and judged by the same measures. "
+            "“Single-valued” is the best possible curve that gives one displacement for each voltage: a model that does not beat it "
             "has learnt nothing about hysteresis. The printed model has one parameter fitted here, the dwell."
         )
         + _table(header, [best, *rows])
@@ -144,8 +144,8 @@ def _linear(study: Study, drawn: Drawn) -> str:
         )
         + _equation(f"G(s) = {_ratio(fit.model.num, fit.model.den)}\npoles {poles} rad/s")
         + _paragraph(
-            "So the paper's figures are about what a four-pole model identified on Table 1 reaches; the coefficients it "
-            "prints do not reach them at any dwell. Either loop is phase lag: it closes when the dwell is long."
+            "So the paper's figures are about what a four-pole model identified on Table 1 reaches; the coefficients "
+            "it prints do not reach them at any dwell. Either loop is phase lag: it closes when the dwell is long."
         )
         + _figure(
             drawn["figure5"],
@@ -159,7 +159,8 @@ def _bouc_wen(study: Study) -> str:
     plain, asymmetric = study.fits["bouc-wen"], study.fits["bouc-wen-asymmetric"]
     admissible = plain.regions.get("admissible")
     inside = (
-        f" The best law with −β ≤ γ ≤ β, which creates no energy whatever the input, fits to {admissible.fit_percent:.2f} %."
+        " The best law with −β ≤ γ ≤ β, which creates no energy whatever the input, fits to "
+        f"{admissible.fit_percent:.2f} %."
         if admissible
         else ""
     )
@@ -169,13 +170,16 @@ def _bouc_wen(study: Study) -> str:
         for rival in plain.rivals
     )
     return (
-        _equation("dz/du = A - |z|^n (gamma + beta sign(z du))\nbouc-wen:             y = offset + feedthrough u + gain z\n"
-                  "bouc-wen-asymmetric:  y = offset + c1 u + c2 u^2 + gain z,  n = 1")
+        _equation(
+            "dz/du = A - |z|^n (gamma + beta sign(z du))\n"
+            "bouc-wen:             y = offset + feedthrough u + gain z\n"
+            "bouc-wen-asymmetric:  y = offset + c1 u + c2 u^2 + gain z,  n = 1"
+        )
         + _paragraph(f"Symmetric: {plain.fit_percent:.2f} % with {plain.n_parameters} parameters.{inside}{rivals}")
         + _parameters(plain)
         + _paragraph(
-            f"With a quadratic input: {asymmetric.fit_percent:.2f} % with {asymmetric.n_parameters} parameters; the loop is "
-            "asymmetric, widest at low voltage, which the plain law cannot follow."
+            f"With a quadratic input: {asymmetric.fit_percent:.2f} % with {asymmetric.n_parameters} parameters; the loop "
+            "is asymmetric, widest at low voltage, which the plain law cannot follow."
         )
         + _parameters(asymmetric)
     )
@@ -185,9 +189,10 @@ def _discovered(study: Study, drawn: Drawn) -> str:
     found, row = study.discovery, study.comparison["sindy"]
     return (
         _paragraph(
-            "PySINDy regresses the slope of each branch on terms u′ uⁱ yʲ and |u′| uⁱ yʲ; the structures along its path of "
-            f"thresholds are refitted by their error in free run, and the one with the lowest BIC is kept: "
-            f"{len(found.coefficients)} terms, {row.fit_percent:.2f} % in free run."
+            "PySINDy regresses the slope of each branch on terms u′ uⁱ yʲ and |u′| uⁱ yʲ; the structures along its path "
+            "of thresholds, and those reached from them, are refitted by their error in free run. Of those that the "
+            "BIC cannot tell from the best, the one is kept whose form does not depend on the instruments' zeros, "
+            f"then the smallest: {len(found.coefficients)} terms, {row.fit_percent:.2f} % in free run."
         )
         + _equation(found.equation)
         + _table(["term", "coefficient"], [[term, f"{value:.6g}"] for term, value in found.coefficients.items()])
@@ -202,11 +207,11 @@ def _discovered(study: Study, drawn: Drawn) -> str:
 def _definitions() -> str:
     items = [
         "fit = 100 (1 − ‖y − ŷ‖ / ‖y − mean(y)‖) %, ŷ in free run from the voltage alone.",
-        "loop width w(u) = displacement when unloading minus displacement when loading, at the same voltage; its largest "
-        "magnitude, and the voltage of that (the lowest, if several).",
+        "loop width w(u) = displacement when unloading minus displacement when loading, at the same voltage; its "
+        "largest magnitude, and the voltage of that (the lowest, if several).",
         "area by the shoelace formula along the cycle; mean width = area / span of the voltage.",
-        "left-one-out rmse: each displacement in turn is kept from the fit, all voltages are kept, and the errors at the "
-        "points left out are collected. For the discovered law the terms are kept and the coefficients refitted.",
+        "left-one-out rmse: each displacement in turn is kept from the fit, all voltages are kept, and the errors at "
+        "the points left out are collected. For the discovered law the terms are kept and the coefficients refitted.",
         "FPE = V (1 + d/N) / (1 − d/N), V the mean squared residual, N points, d parameters.",
     ]
     return "<ul>" + "".join(f"<li>{escape(item)}</li>" for item in items) + "</ul>"

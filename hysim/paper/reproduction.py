@@ -17,7 +17,6 @@ import numpy as np
 
 from hysim._atomic import write_text
 from hysim._frozen import frozen
-from hysim.metrics import LoopMetrics
 from hysim.paper import figures
 from hysim.paper.equations import EQUATION_1, EQUATION_7, step_response
 from hysim.paper.report import report_page
@@ -44,7 +43,9 @@ class Reproduction:
     study: Study
 
 
-def reproduce(out: str | Path = "reproduction", *, quick: bool = False, progress: Progress | None = None) -> Reproduction:
+def reproduce(
+    out: str | Path = "reproduction", *, quick: bool = False, progress: Progress | None = None
+) -> Reproduction:
     """Reproduce the paper on its 52 points, and write the report.
 
     Parameters
@@ -126,10 +127,11 @@ def _summary(computed: Study) -> dict[str, Any]:
 def _tables(computed: Study) -> dict[str, str]:
     comparison = computed.comparison
     record, rows = comparison.record, comparison.rows
-    outputs = [["voltage [V]", "measured [um]", *(f"{row.name} [um]" for row in rows)]]
-    outputs += np.column_stack([record.u, record.y, *(row.y for row in rows)]).tolist()
-    widths = [["voltage [V]", "measured [um]", *(f"{row.name} [um]" for row in rows)]]
-    widths += np.column_stack([comparison.loop.u, comparison.loop.width, *(_width(row.loop, comparison.loop) for row in rows)]).tolist()
+    header = ["voltage [V]", "measured [um]", *(f"{row.name} [um]" for row in rows)]
+    outputs = [header, *np.column_stack([record.u, record.y, *(row.y for row in rows)]).tolist()]
+    levels = comparison.loop.u
+    modelled = [row.loop.width_at(levels) for row in rows]
+    widths = [header, *np.column_stack([levels, comparison.loop.width, *modelled]).tolist()]
     measures = model_measures(computed)
     keys = list(dict.fromkeys(key for row in measures.values() for key in row))
     models = [["model", *keys], *([name, *(row.get(key) for key in keys)] for name, row in measures.items())]
@@ -139,10 +141,6 @@ def _tables(computed: Study) -> dict[str, str]:
     parameters += [["sindy", term, value, None] for term, value in computed.discovery.coefficients.items()]
     named = {"models": models, "outputs": outputs, "widths": widths, "parameters": parameters}
     return {f"tables/{name}.csv": _csv(table) for name, table in named.items()}
-
-
-def _width(loop: LoopMetrics, measured: LoopMetrics) -> np.ndarray[Any, Any]:
-    return np.asarray(loop.width_at(measured.u))
 
 
 def _csv(table: Sequence[Sequence[Any]]) -> str:

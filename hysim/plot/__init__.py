@@ -5,10 +5,13 @@ look and pyplot is not imported; without them it is a new pyplot figure in the h
 changes matplotlib's settings outside its own calls.
 """
 
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
 from hysim.plot._comparisons import loops, residuals, widths
 from hysim.plot._discoveries import selection
 from hysim.plot._records import history, loop, traces
-from hysim.plot._style import Axes, Figure, figure, house_style, panels
+from hysim.plot._style import figure, house_style, panels
 from hysim.plot._svg import save_svg, to_svg
 
 __all__ = [

@@ -6,11 +6,12 @@ from contextlib import AbstractContextManager
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from hysim._frozen import FloatArray
 from hysim.comparison import Comparison, ComparisonRow
-from hysim.plot._style import GUIDE, MEASURED, POINTS, Axes, AxesArray, label, line, one, printed, several
+from hysim.plot._style import GUIDE, MEASURED, POINTS, AxesArray, label, line, one, printed, several
 
 _FILLED: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 3.6, "markeredgewidth": 0.8}
 _OPEN = _FILLED | {"markerfacecolor": "white"}
@@ -53,7 +54,9 @@ def loops(comparison: Comparison, axes: Sequence[Axes] | AxesArray | None = None
     return panels
 
 
-def residuals(comparison: Comparison, axes: Sequence[Axes] | AxesArray | None = None) -> AxesArray:
+def residuals(
+    comparison: Comparison, axes: Sequence[Axes] | AxesArray | None = None, *, quanta: str = "quanta"
+) -> AxesArray:
     """Draw measured minus model against the input, a panel a model: loading filled, unloading open.
 
     Residuals are counted in quanta of the sensor, with lines at half a quantum (what rounding alone leaves)
@@ -65,6 +68,8 @@ def residuals(comparison: Comparison, axes: Sequence[Axes] | AxesArray | None = 
         The models on one record.
     axes : Axes, one for each model, optional
         Where to draw.
+    quanta : str
+        What the sensor's quanta are called, for instance ``"pixels"``.
 
     Returns
     -------
@@ -77,7 +82,7 @@ def residuals(comparison: Comparison, axes: Sequence[Axes] | AxesArray | None = 
     """
     record = comparison.record
     quantum = record.resolution or 1.0
-    unit = "quanta" if record.resolution else printed(record.units.get("y", ""))
+    unit = quanta if record.resolution else printed(record.units.get("y", ""))
     rising = _rising(record.u)
     with _panels(axes, comparison) as panels:
         for ax, row in zip(panels, comparison.rows, strict=True):
@@ -91,7 +96,8 @@ def residuals(comparison: Comparison, axes: Sequence[Axes] | AxesArray | None = 
             ax.plot(record.u[~rising], residual[~rising], color=MEASURED, label="unloading", **_OPEN)
             _entitle(ax, row, f"largest {np.abs(residual).max():.2f} {unit}")
             ax.set(xlabel=label(record.units, "u"), ylabel=f"Residual [{unit}]" if unit else "Residual")
-        panels[0].legend(ncols=2)
+            ax.margins(y=0.2)
+        panels[0].legend(loc="lower center", ncols=2, borderaxespad=0.0, columnspacing=1.0, handletextpad=0.2)
     return panels
 
 
@@ -110,19 +116,17 @@ def widths(comparison: Comparison, ax: Axes | None = None) -> Axes:
     Axes
     """
     units = comparison.record.units
-    with one(ax, height=4.6) as axes:
+    with one(ax, height=4.8) as axes:
         axes.plot(comparison.loop.u, comparison.loop.width, color=MEASURED, label="measured", zorder=3, **_OPEN)
         for k, row in enumerate(comparison.rows):
             axes.plot(row.loop.u, row.loop.width, label=row.name, **line(k))
         unit = f" [{printed(units['y'])}]" if "y" in units else ""
         axes.set(xlabel=label(units, "u"), ylabel=f"Loop width{unit}")
-        axes.legend(ncols=2)
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
     return axes
 
 
-def _panels(
-    axes: Sequence[Axes] | AxesArray | None, comparison: Comparison
-) -> AbstractContextManager[AxesArray]:
+def _panels(axes: Sequence[Axes] | AxesArray | None, comparison: Comparison) -> AbstractContextManager[AxesArray]:
     n = len(comparison.rows)
     return several(axes, n, height=2.15, columns=min(n, 2), sharey=True)
 

@@ -4,13 +4,22 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from hysim._frozen import FloatArray
-from hysim.plot._style import MEASURED, POINTS, Axes, AxesArray, label, line, one, several
+from hysim.plot._style import MEASURED, POINTS, AxesArray, label, line, one, several
 from hysim.records import Record
 
 _DRAWN = {"zoh": "steps-post", "foh": "default"}
 _MARKERS = "os^D"
+_POINTS: dict[str, Any] = {
+    "color": POINTS,
+    "linewidth": 0.8,
+    "markersize": 4.0,
+    "markerfacecolor": "white",
+    "markeredgecolor": MEASURED,
+}
+_ARROW = 0.03  # its length along the input, of the span
 
 
 class InputOutput(Protocol):
@@ -54,7 +63,7 @@ def loop(*results: InputOutput, ax: Axes | None = None) -> Axes:
     others = [result for result in results if not isinstance(result, Record)]
     with one(ax) as axes:
         for k, record in enumerate(records):
-            axes.plot(record.u, record.y, label=_name(record), marker=_MARKERS[k % len(_MARKERS)], **_MEASURED_LOOP)
+            axes.plot(record.u, record.y, label=_name(record), marker=_MARKERS[k % len(_MARKERS)], **_POINTS)
         for k, result in enumerate(others):
             (drawn,) = axes.plot(result.u, result.y, label=_name(result), **line(k))
             _arrows(axes, result, drawn.get_color())
@@ -63,9 +72,6 @@ def loop(*results: InputOutput, ax: Axes | None = None) -> Axes:
         if len(results) > 1:
             axes.legend()
     return axes
-
-
-_MEASURED_LOOP: dict[str, Any] = {"color": POINTS, "linewidth": 0.8, "markersize": 4.0, "markerfacecolor": "white", "markeredgecolor": MEASURED}
 
 
 def history(record: Record, axes: Sequence[Axes] | AxesArray | None = None, *, hold: str = "zoh") -> AxesArray:
@@ -101,7 +107,7 @@ def history(record: Record, axes: Sequence[Axes] | AxesArray | None = None, *, h
     t = np.arange(float(record.u.size)) if record.t is None else record.t
     end = 2.0 * t[-1] - t[-2]
     with several(axes, 2, height=2.1) as (upper, lower):
-        upper.plot(t, record.y, marker="o", **_MEASURED_LOOP)
+        upper.plot(t, record.y, marker="o", **_POINTS)
         lower.plot(np.append(t, end), np.append(record.u, record.u[-1]), color=MEASURED, drawstyle=_DRAWN[hold])
         upper.set_ylabel(label(record.units, "y"))
         lower.set_ylabel(label(record.units, "u"))
@@ -152,9 +158,11 @@ def _arrows(ax: Axes, result: InputOutput, colour: Any) -> None:
     u, y = result.u, result.y
     above = u >= 0.5 * (u.min() + u.max())
     style = {"arrowstyle": "-|>", "color": colour, "mutation_scale": 14, "shrinkA": 0, "shrinkB": 0}
-    for turn in (above[1:] > above[:-1], above[1:] < above[:-1]):
-        for k in np.flatnonzero(turn)[-1:]:
-            ax.annotate("", xy=(u[k + 1], y[k + 1]), xytext=(u[k], y[k]), arrowprops=style)
+    for crossing in (above[1:] > above[:-1], above[1:] < above[:-1]):
+        for head in np.flatnonzero(crossing)[-1:] + 1:
+            away = np.abs(u[:head] - u[head]) >= _ARROW * np.ptp(u)
+            tail = np.flatnonzero(away)[-1] if away.any() else head - 1
+            ax.annotate("", xy=(u[head], y[head]), xytext=(u[tail], y[tail]), arrowprops=style)
 
 
 def _name(result: Any) -> str:

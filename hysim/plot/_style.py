@@ -13,7 +13,6 @@ import matplotlib.style
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 
 AxesArray = npt.NDArray[np.object_]
@@ -22,17 +21,17 @@ WIDTH = 6.0
 """Of a figure [in]: narrow enough to be read on a phone, where it shrinks to 360 pixels."""
 
 MEASURED = "#333333"
-POINTS = "#9a9a9a"
+POINTS = "#a6a6a6"
 GUIDE = "#777777"
 
 _LINES = (
-    ("#D55E00", (0, (1, 1.2))),
-    ("#CC79A7", (0, (6, 1.5, 1, 1.5))),
-    ("#56B4E9", "solid"),
-    ("#0072B2", (0, (5, 1.5))),
-    ("#009E73", "solid"),
-    ("#E69F00", (0, (3, 1.5, 1, 1.5, 1, 1.5))),
-    ("#222222", (0, (1, 3))),
+    ("#0072B2", "solid"),
+    ("#D55E00", (0, (4, 1.5))),
+    ("#009E73", (0, (6, 1.5, 1, 1.5))),
+    ("#CC79A7", (0, (1, 1))),
+    ("#222222", "solid"),
+    ("#56B4E9", (0, (10, 2))),
+    ("#E69F00", (0, (1, 2.5))),
 )
 
 _STYLE = {
@@ -98,23 +97,20 @@ def figure(width: float = WIDTH, height: float = 4.0) -> Figure:
 
 
 def panels(canvas: Figure, n: int, *, columns: int = 1, sharey: bool = False) -> AxesArray:
-    """Add `n` Axes row by row to a figure, over one input axis; inner ones have no labels of what they share."""
+    """Add `n` Axes row by row to a figure, over one input axis, and label what they share on the outer ones."""
+    rows = math.ceil(n / columns)
     made = np.empty(n, dtype=object)
     for k in range(n):
         first = made[0] if k else None
-        made[k] = canvas.add_subplot(
-            math.ceil(n / columns), columns, k + 1, sharex=first, sharey=first if sharey else None
-        )
-        if k + columns < n:
-            _without_labels(made[k].xaxis)
+        made[k] = canvas.add_subplot(rows, columns, k + 1, sharex=first, sharey=first if sharey else None)
+        if k < (rows - 1) * columns:
+            made[k].tick_params(labelbottom=columns > 1)
+            made[k].xaxis.label.set_visible(False)
         if sharey and k % columns:
-            _without_labels(made[k].yaxis)
+            made[k].tick_params(labelleft=False)
+            made[k].yaxis.label.set_visible(False)
+    canvas.align_ylabels(made)
     return made
-
-
-def _without_labels(axis: Axis) -> None:
-    axis.set_tick_params(labelbottom=False, labelleft=False)
-    axis.label.set_visible(False)
 
 
 @contextmanager

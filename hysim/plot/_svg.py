@@ -10,9 +10,10 @@ import re
 from pathlib import Path
 
 import matplotlib
+from matplotlib.figure import Figure
 
 from hysim._atomic import write_text
-from hysim.plot._style import Figure, house_style
+from hysim.plot._style import house_style
 
 _METADATA = dict.fromkeys(("Date", "Creator", "Format", "Type"))
 _REFERENCE = re.compile(r'(\bid="|href="#|url\(#)')
