@@ -70,7 +70,7 @@ def simulate(
     >>> import hysim as hs
     >>> sim = hs.simulate(hs.BoucWen(), None, [0.0, 1.0, 0.0])
     >>> sim.y.round(6).tolist()
-    [0.0, 0.632121, -0.367879]
+    [0.0, 0.632121, -0.307799]
     """
     if not callable(getattr(plant, "response", None)):
         raise TypeError(f"simulate takes a model with a response, got {type(plant).__name__}")

@@ -4,6 +4,8 @@ import copy
 import dataclasses
 import json
 import pickle
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -68,6 +70,9 @@ def test_a_typo_in_a_parameter_is_an_error(model):
         ('{"family": "BoucWen", "parameters": {"beta": NaN}}', "beta must be finite"),
         ('{"family": "BoucWen", "parameters": {"beta": "much"}}', "beta must be a number"),
         ('{"family": "Line", "parameters": 3}', "does not hold a model"),
+        ('{"family": "Line", "parameters": []}', "does not hold a model"),
+        ('{"family": "Line", "parameters": {"slope": 1}}', "offset missing"),
+        ('{"family": ["Line"], "parameters": {}}', "there are BoucWen, "),
     ],
 )
 def test_a_file_without_a_model_is_named(tmp_path, text, message):
@@ -90,3 +95,24 @@ def test_a_failed_write_leaves_the_old_file(tmp_path):
     with pytest.raises(ValueError, match="JSON"):
         hs.save(hs.Line(), path, units={"u": float("nan")})
     assert hs.load_model(path) == MODELS[0]
+
+
+def test_a_file_that_is_not_text_is_named(tmp_path):
+    path = tmp_path / "bad.json"
+    path.write_bytes(b"\xff\xfe")
+    with pytest.raises(ValueError, match=r"bad\.json does not hold a model"):
+        hs.load_model(path)
+
+
+def test_nothing_is_left_beside_a_file_that_cannot_be_replaced(tmp_path):
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(OSError, match="folder"):
+        hs.save(hs.Line(), tmp_path / "folder")
+    assert [entry.name for entry in tmp_path.iterdir()] == ["folder"]
+
+
+def test_a_family_that_nobody_imported_is_found(tmp_path):
+    path = tmp_path / "model.json"
+    hs.save(MODELS[2], path)
+    code = f"import hysim as hs; print(type(hs.load_model({str(path)!r})).__name__)"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "Duhem\n"

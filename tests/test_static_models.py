@@ -52,3 +52,22 @@ def test_a_static_curve_is_constant_outside_its_knots():
 def test_knots_that_make_no_function_are_refused(u, y):
     with pytest.raises(ValueError, match="u"):
         hs.SingleValued(u=u, y=y)
+
+
+def test_the_levels_are_named_after_the_input():
+    record = hs.Record(u=[0.0, 2.5, 0.1, -0.0], y=[1.0, 2.0, 3.0, 5.0])
+    fit = hs.identify(hs.SingleValued, record, fixed={"y(2.5)": 7.0})
+    assert fit.free_names == ("y(0)", "y(0.1)")
+    assert fit.model.u.tolist() == [0.0, 0.1, 2.5]
+    assert fit.model.y == pytest.approx([3.0, 3.0, 7.0])
+
+
+def test_the_yardsticks_have_no_memory():
+    u = np.array([0.0, 1.0, 0.5, 1.0, 0.0, 0.5])
+    for model in (hs.Line(offset=0.3, slope=2.0), hs.SingleValued(u=[0.0, 1.0], y=[0.3, -1.0])):
+        assert model.response(u).tolist() == [float(model.response([value])[0]) for value in u]
+
+
+def test_a_line_through_a_constant_input_is_refused():
+    with pytest.raises(ValueError, match="constant"):
+        hs.identify(hs.Line, hs.Record(u=np.ones(5), y=np.arange(5.0)))

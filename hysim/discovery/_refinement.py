@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, read_only
 from hysim._parallel import in_chunks
 from hysim.discovery._library import Regression
 from hysim.kernels import duhem as kernels
@@ -90,12 +90,13 @@ class FreeRun:
         """Free runs (n_sets, n_samples) of coefficients and y0 (n_sets, n_terms + 1), inf where one diverges."""
         u, y = self.record.u[np.newaxis], np.empty((len(unknowns), len(self.record)))
         rising, falling = branches(*polynomials(terms, unknowns[:, :-1]))
-        y0, bound = unknowns[:, -1].copy(), BOUND * self.stroke + float(np.abs(self.record.y).max())
-        in_chunks(
-            lambda start, stop: kernels.batch(rising, falling, y0, u, bound, y, start, stop),
-            len(unknowns),
-            minimum=1 + _SAMPLES_PER_THREAD // len(self.record),
-        )
+        y0, bound = read_only(unknowns[:, -1]), BOUND * self.stroke + float(np.abs(self.record.y).max())
+
+        def work(start: int, stop: int) -> None:
+            with np.errstate(all="ignore"):  # a divergence overflows, and uncompiled kernels would warn of it
+                kernels.batch(rising, falling, y0, u, bound, y, start, stop)
+
+        in_chunks(work, len(unknowns), minimum=1 + _SAMPLES_PER_THREAD // len(self.record))
         return y
 
     def residuals(self, terms: Sequence[Term], unknowns: FloatArray) -> FloatArray:

@@ -36,7 +36,7 @@ TRIED = 2
 MOST_COMPLETE = 118  # at degree 2 all of up to 7 terms
 SEARCHED = 2000
 INDISTINCT = 2.0
-HOPELESS = 20.0  # of BIC above the best, after which no smaller structure is tried
+HOPELESS = 20.0  # BIC above the best, beyond which a structure is not followed further
 
 Progress = Callable[[int, int], None]
 Structure = tuple[Term, ...]
@@ -87,7 +87,7 @@ class Search:
                     self.refine(loss.terms, loss.unknowns)
 
     def enumerate_complete(self, progress: Progress | None = None) -> None:
-        """Step 3."""
+        """Step 3: the complete structures, from the smallest up."""
         structures = complete_structures(self.regression.terms, MOST_COMPLETE)
         for done, terms in enumerate(structures):
             if self._could_win(len(terms)):
@@ -123,6 +123,6 @@ def complete_structures(terms: Sequence[Term], most: int) -> list[Structure]:
 
 
 def preferred(found: list[Candidate]) -> Candidate:
-    """Step 3, of candidates sorted by BIC."""
+    """Step 4, of candidates sorted by BIC."""
     rivals = [candidate for candidate in found if candidate.bic <= found[0].bic + INDISTINCT]
     return min(rivals, key=lambda c: (not is_complete(c.terms), len(c.terms), c.bic))

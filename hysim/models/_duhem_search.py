@@ -24,7 +24,7 @@ def search_space(
     fixed: Mapping[str, float] | None,
     free: tuple[str, ...],
     bounds: Mapping[str, tuple[float, float]] | None,
-    initial: str,
+    initial: str | None,
 ) -> SearchSpace:
     """Declare the box for the terms and y0 in `defaults`.
 
@@ -33,7 +33,7 @@ def search_space(
     ValueError
         If the input is constant, `initial` is unknown, or a name or a bound does not fit.
     """
-    if initial not in ("free", "rest"):
+    if initial not in (None, "free", "rest"):
         raise ValueError(f'initial must be "free" or "rest", got {initial!r}')
     if np.ptp(record.u) == 0.0:
         raise ValueError("the input is constant: nothing can be identified from it")

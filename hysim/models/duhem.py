@@ -31,6 +31,8 @@ from hysim.records import Record
 State = tuple[float, float]
 """Last input and output."""
 
+_BOUND = 1e3
+
 
 @model
 class Duhem:
@@ -55,7 +57,7 @@ class Duhem:
     >>> law.equation
     "y' = u' (1) + |u'| (-1 y)"
     >>> law.response([0.0, 1.0, -1.0]).round(6).tolist()
-    [0.0, 0.632121, -0.779118]
+    [0.0, 0.632121, -0.779117]
     """
 
     p: FloatArray
@@ -155,7 +157,8 @@ class Duhem:
             state = (float(inputs[0]) if inputs.size else 0.0), self.y0
         y = np.empty(inputs.size)
         rising, falling = branches(self.p, self.q)
-        lost = kernels.path(rising, falling, float(state[0]), float(state[1]), inputs, kernels.LARGEST, y)
+        with np.errstate(all="ignore"):  # an escape overflows, and uncompiled kernels would warn of it
+            lost = kernels.path(rising, falling, float(state[0]), float(state[1]), inputs, kernels.LARGEST, y)
         if lost >= 0:
             what = "is too stiff to be followed" if np.isnan(y[lost]) else "escapes to infinity"
             raise SimulationError(f"the output {what} at sample {lost} (u = {inputs[lost]:g}): {self.equation}")
@@ -195,6 +198,42 @@ class Duhem:
         ValueError
             If lengths do not fit, or a value is not finite.
         """
+        return cls._outputs(parameters, u, kernels.LARGEST, workers)
+
+    def search_space(
+        self,
+        record: Record,
+        *,
+        fixed: Mapping[str, float] | None = None,
+        free: tuple[str, ...] = (),
+        bounds: Mapping[str, tuple[float, float]] | None = None,
+        initial: str | None = None,
+    ) -> SearchSpace:
+        """The box that `identify` searches; see `hysim.models._duhem_search`."""
+        return _duhem_search.search_space({**self.terms, "y0": self.y0}, record, fixed, free, bounds, initial)
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """The output itself, shape (n_sets, n_samples, 1): it is affine in none of the parameters.
+
+        A law that goes 1000 times as far as the record counts as one that escapes: following it costs much
+        and can only lose.
+        """
+        values = {**self.terms, "y0": self.y0, **parameters}
+        names = list(values)
+        sets = np.stack(np.broadcast_arrays(*map(np.atleast_1d, values.values())), axis=1)
+        is_term = np.array([name != "y0" for name in names])
+        p, q = polynomials([Term.parse(name) for name in names if name != "y0"], sets[:, is_term])
+        bound = _BOUND * (float(np.abs(record.y).max()) or 1.0)
+        return self._outputs({"p": p, "q": q, "y0": sets[:, ~is_term][:, 0]}, record.u, bound, None)[..., np.newaxis]
+
+    def assemble(self, parameters: Mapping[str, float]) -> Self:
+        """The law with these parameters, one number for each name."""
+        return self.from_terms(
+            {name: value for name, value in parameters.items() if name != "y0"}, y0=parameters.get("y0", self.y0)
+        )
+
+    @classmethod
+    def _outputs(cls, parameters: Parameters, u: npt.ArrayLike, bound: float, workers: int | None) -> FloatArray:
         if not {"p", "q"} <= set(parameters) <= {"p", "q", "y0"}:
             raise TypeError(f"the parameters of Duhem are p, q and y0, got {', '.join(parameters)}")
         axes = {"p": 3, "q": 3, "y0": 1, "u": 2}
@@ -211,40 +250,13 @@ class Duhem:
         )
         y0 = read_only(np.broadcast_to(given["y0"], n_sets))
         y = np.empty((n_sets, given["u"].shape[1]))
-        in_chunks(
-            lambda start, stop: kernels.batch(rising, falling, y0, given["u"], kernels.LARGEST, y, start, stop),
-            n_sets,
-            workers=workers,
-        )
+
+        def work(start: int, stop: int) -> None:
+            with np.errstate(all="ignore"):
+                kernels.batch(rising, falling, y0, given["u"], bound, y, start, stop)
+
+        in_chunks(work, n_sets, workers=workers)
         return y
-
-    def search_space(
-        self,
-        record: Record,
-        *,
-        fixed: Mapping[str, float] | None = None,
-        free: tuple[str, ...] = (),
-        bounds: Mapping[str, tuple[float, float]] | None = None,
-        initial: str = "free",
-    ) -> SearchSpace:
-        """The box that `identify` searches; see `hysim.models._duhem_search`."""
-        return _duhem_search.search_space({**self.terms, "y0": self.y0}, record, fixed, free, bounds, initial)
-
-    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """The output itself, shape (n_sets, n_samples, 1): it is affine in none of the parameters."""
-        values = {**self.terms, "y0": self.y0, **parameters}
-        names = list(values)
-        sets = np.stack(np.broadcast_arrays(*map(np.atleast_1d, values.values())), axis=1)
-        is_term = np.array([name != "y0" for name in names])
-        p, q = polynomials([Term.parse(name) for name in names if name != "y0"], sets[:, is_term])
-        y = self.responses({"p": p, "q": q, "y0": sets[:, ~is_term][:, 0]}, record.u)
-        return y[..., np.newaxis]
-
-    def assemble(self, parameters: Mapping[str, float]) -> Self:
-        """The law with these parameters, one number for each name."""
-        return self.from_terms(
-            {name: value for name, value in parameters.items() if name != "y0"}, y0=parameters.get("y0", self.y0)
-        )
 
 
 def _with_axes(values: npt.ArrayLike, ndim: int) -> npt.NDArray[np.generic]:

@@ -77,11 +77,14 @@ def polynomials(terms: Sequence[Term], coefficients: FloatArray) -> tuple[FloatA
 
 
 def branches(p: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The polynomials p + q where u rises and p - q where it falls, of one shape (..., rows, columns)."""
+    """The polynomials p + q where u rises and p - q where it falls, of one shape (..., rows, columns), read-only."""
     if p.shape[-2:] != q.shape[-2:]:
         rows, columns = (max(p.shape[axis], q.shape[axis]) for axis in (-2, -1))
         p, q = _padded(p, rows, columns), _padded(q, rows, columns)
-    return p + q, p - q
+    rising, falling = p + q, p - q
+    for part in (rising, falling):  # kernels are compiled anew for arrays that can be written
+        part.setflags(write=False)
+    return rising, falling
 
 
 def _padded(part: FloatArray, rows: int, columns: int) -> FloatArray:

@@ -109,7 +109,7 @@ class SingleValued:
         bounds: Mapping[str, tuple[float, float]] | None = None,
         initial: str | None = None,
     ) -> SearchSpace:
-        """One linear parameter for each different input of the record, called ``y(input)``."""
+        """One linear parameter for each different input of the record, ``"y(0)"``, ``"y(2.5)"``, ..."""
         return _linear_space({_name(level): 0.0 for level in np.unique(record.u).tolist()}, fixed, free, bounds)
 
     @classmethod
@@ -126,7 +126,7 @@ class SingleValued:
 
 
 def _name(level: float) -> str:
-    return f"y({level!r})"
+    return f"y({repr(level + 0.0).removesuffix('.0')})"  # adding zero takes the sign off -0.0
 
 
 def _linear_space(

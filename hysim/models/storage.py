@@ -70,15 +70,18 @@ def load_model(path: str | Path) -> Any:
         importlib.import_module(f"hysim.models.{module}")
     try:
         document = json.loads(Path(path).read_text(encoding="utf-8"))
-        family, parameters = document["family"], dict(document["parameters"])
+        family, parameters = str(document["family"]), {**document["parameters"]}
     except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise ValueError(f"{path} does not hold a model of hysim: {type(error).__name__}: {error}") from None
     if family not in FAMILIES:
         raise ValueError(f"{path} holds a model of the family {family!r}; there are {', '.join(sorted(FAMILIES))}")
     try:
-        return FAMILIES[family](**parameters)
+        loaded = FAMILIES[family](**parameters)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{path} does not hold a {family}: {error}") from None
+    if missing := [field.name for field in fields(loaded) if field.name not in parameters]:
+        raise ValueError(f"{path} does not hold a whole {family}: {', '.join(missing)} missing")
+    return loaded
 
 
 def _plain(value: Any) -> Any:

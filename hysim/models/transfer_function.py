@@ -4,13 +4,14 @@
 
 The input between two samples is held (``hold="zoh"``) or linear (``hold="foh"``); under either the response
 is exact, by matrix exponentials. Where the input is held, the output of a sample may be taken at the start
-of the hold (``sample="start"``), before that sample's input has done anything, or at its end. System
-identification tools take the start; a record that was read when each voltage had settled, such as a
-staircase, belongs to the end, and taking it as the start shifts the output by one sample.
+of the hold (``sample="start"``), before that sample's input has moved the states, or at its end. System
+identification tools take the start. A staircase that was read when each step had settled belongs to the end:
+taken as the start, each output must be explained by the step before, and is one sample too early for it.
 
-Time is counted in samples inside: with den monic and s' = s h the plant's states are x_j = s'^j / den'(s') u,
-j = 0 ... n - 1, and the output is affine in the numerator and in the initial state, which is the free
-response and its derivatives at the first sample, (y, y', ..., y^(n-1)).
+With den monic the plant's states are x_j = s^j / den(s) u, j = 0 ... n - 1, in a time unit that makes the
+coefficients of den at most one, and the output is affine in the numerator and in the initial state, which
+is the free response and its derivatives at the begin of the first hold, (y, y', ..., y^(n-1)): the state
+of the observability form.
 """
 
 from collections.abc import Mapping
@@ -46,7 +47,7 @@ class TransferFunction:
         Whether an output is taken at the start or the end of the time for which its input is held; with
         ``hold="foh"`` it is taken at the sample.
     initial_state : sequence of float
-        Free response at the first sample and its derivatives, (y, y', ...); empty for rest.
+        Free response and its derivatives at the begin of the first hold, (y, y', ...); empty for rest.
 
     Raises
     ------
@@ -176,10 +177,11 @@ class TransferFunctionStructure:
 
     def __post_init__(self) -> None:
         _check_options(self.hold, self.sample)
+        _check_initial(self.initial)
+        if not all(isinstance(number, int) for number in (self.poles, self.zeros)):
+            raise TypeError(f"numbers of poles and zeros must be int, got {self}")
         if not 0 <= self.zeros <= self.poles or self.poles < 1:
             raise ValueError(f"there must be at least one pole, and no more zeros than poles, got {self}")
-        if self.initial not in ("rest", "free"):
-            raise ValueError(f'initial must be "rest" or "free", got {self.initial!r}')
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -205,8 +207,10 @@ class TransferFunctionStructure:
         Raises
         ------
         ValueError
-            If the record has no even time, or a coefficient of the denominator is fixed or bounded.
+            If the record has no even time or no input, `initial` or a name is unknown, or a coefficient of
+            the denominator is fixed or bounded.
         """
+        _check_initial(initial or self.initial)
         sample_time = record.sample_time
         if np.ptp(record.u) == 0.0 and record.u[0] == 0.0:
             raise ValueError("the input is zero throughout: nothing can be identified from it")
@@ -215,7 +219,8 @@ class TransferFunctionStructure:
         for name in (*(fixed or {}), *(bounds or {})):
             if name in self.denominator:
                 raise ValueError(f"{name!r} cannot be fixed or bounded: the denominator is searched by its sections")
-        rest = {} if (initial or self.initial) == "free" else {f"x0[{k}]": 0.0 for k in range(self.poles)}
+        at_rest = self.columns[self.zeros + 1 :] if (initial or self.initial) == "rest" else ()
+        rest = {name: 0.0 for name in at_rest if name not in free}
         held = held_parameters(defaults, (), {**rest, **(fixed or {})}, free)
         limits = checked_bounds(bounds or {}, defaults, held)
         pairs = self.poles // 2
@@ -273,6 +278,11 @@ def _check_options(hold: str, sample: str) -> None:
         raise ValueError(f'sample must be "start" or "end", got {sample!r}')
     if (hold, sample) == ("foh", "end"):
         raise ValueError('sample="end" needs an input that is held, hold="zoh"')
+
+
+def _check_initial(initial: str) -> None:
+    if initial not in ("rest", "free"):
+        raise ValueError(f'initial must be "rest" or "free", got {initial!r}')
 
 
 def _times(polynomials: FloatArray, factor: list[FloatArray]) -> FloatArray:

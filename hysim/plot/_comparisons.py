@@ -13,7 +13,7 @@ from hysim._frozen import FloatArray
 from hysim.comparison import Comparison, ComparisonRow
 from hysim.plot._style import GUIDE, MEASURED, POINTS, AxesArray, label, line, one, printed, several
 
-_FILLED: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 3.6, "markeredgewidth": 0.8}
+_FILLED: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 3.8, "markeredgewidth": 0.8}
 _OPEN = _FILLED | {"markerfacecolor": "white"}
 
 
@@ -45,9 +45,9 @@ def loops(comparison: Comparison, axes: Sequence[Axes] | AxesArray | None = None
     """
     record = comparison.record
     with _panels(axes, comparison) as panels:
-        for k, (ax, row) in enumerate(zip(panels, comparison.rows, strict=True)):
+        for ax, row in zip(panels, comparison.rows, strict=True):
             ax.plot(record.u, record.y, color=POINTS, label="measured", **_FILLED)
-            ax.plot(record.u, row.y, label="model", **line(k) | {"linestyle": "solid"})
+            ax.plot(record.u, row.y, label="model", **line(0))
             _entitle(ax, row, f"width {_in_unit(row.max_width, comparison)}")
             ax.set(xlabel=label(record.units, "u"), ylabel=label(record.units, "y"))
         panels[0].legend(loc="lower right")
@@ -117,7 +117,7 @@ def widths(comparison: Comparison, ax: Axes | None = None) -> Axes:
     """
     units = comparison.record.units
     with one(ax, height=4.8) as axes:
-        axes.plot(comparison.loop.u, comparison.loop.width, color=MEASURED, label="measured", zorder=3, **_OPEN)
+        axes.plot(comparison.loop.u, comparison.loop.width, color=MEASURED, label="measured", zorder=3, **_FILLED)
         for k, row in enumerate(comparison.rows):
             axes.plot(row.loop.u, row.loop.width, label=row.name, **line(k))
         unit = f" [{printed(units['y'])}]" if "y" in units else ""

@@ -21,7 +21,7 @@ WIDTH = 6.0
 """Of a figure [in]: narrow enough to be read on a phone, where it shrinks to 360 pixels."""
 
 MEASURED = "#333333"
-POINTS = "#a6a6a6"
+POINTS = "#b0b0b0"
 GUIDE = "#777777"
 
 _LINES = (

@@ -1,0 +1,63 @@
+"""A model is what it holds: numbers that are finite, its own, and all that equality asks for."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import hysim as hs
+
+NUMBERS = [
+    (hs.BoucWen, {"beta": 0.7}, "beta"),
+    (hs.PolynomialBoucWen, {"input_coefficients": (1.0, 0.2)}, "input_coefficients"),
+    (hs.Duhem, {"p": [[1.0]], "q": [[0.0, -1.0]]}, "q"),
+    (hs.TransferFunction, {"num": (1.0,), "den": (1.0, 2.0)}, "den"),
+    (hs.Line, {"slope": 2.0}, "slope"),
+    (hs.SingleValued, {"u": [0.0, 1.0], "y": [0.0, 2.0]}, "y"),
+]
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize(("family", "arguments", "name"), NUMBERS)
+def test_a_number_that_is_not_finite_is_refused_by_name(family, arguments, name, bad):
+    values = np.array(arguments[name], dtype=float)
+    values.flat[-1] = bad
+    with pytest.raises(ValueError, match=f"{name} must be finite"):
+        family(**arguments | {name: values})
+
+
+@pytest.mark.parametrize("wrong", ["one", 1j, {}])
+@pytest.mark.parametrize(("family", "arguments", "name"), NUMBERS)
+def test_what_is_no_number_is_refused_by_name(family, arguments, name, wrong):
+    with pytest.raises(TypeError, match=f"{name} must be"):
+        family(**arguments | {name: wrong})
+
+
+@pytest.mark.parametrize(("family", "arguments", "name"), NUMBERS)
+def test_parameters_go_by_name(family, arguments, name):
+    with pytest.raises(TypeError, match="positional"):
+        family(*arguments.values())
+
+
+@pytest.mark.parametrize(("family", "arguments", "name"), NUMBERS)
+def test_equality_and_hash_see_every_number(family, arguments, name):
+    model = family(**arguments)
+    assert model == family(**arguments)
+    assert {model: 1}[family(**arguments)] == 1
+    values = np.array(arguments[name], dtype=float)
+    values.flat[-1] *= 1 + 2**-52
+    assert model != family(**arguments | {name: values})
+
+
+def test_families_with_the_same_numbers_differ():
+    assert hs.Line() != hs.SingleValued(u=[0.0], y=[0.0])
+    assert hs.Line() != dataclasses.asdict(hs.Line())
+
+
+def test_an_array_of_the_caller_stays_the_callers():
+    y = np.array([0.0, 2.0])
+    curve = hs.SingleValued(u=[0.0, 1.0], y=y)
+    y[1] = 5.0
+    assert curve.y.tolist() == [0.0, 2.0]
+    with pytest.raises(ValueError, match="read-only"):
+        curve.y[0] = 1.0
