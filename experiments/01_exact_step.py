@@ -161,6 +161,4 @@ def write(rows: list[dict[str, float | str]], n_samples: int) -> None:
 
 if __name__ == "__main__":
     for line in main():
-        print(
-            f"n = {line['n']:<4} {line['method']:24} error {line['error']:.1e}  {line['ns_per_sample']:10.0f} ns a sample"
-        )
+        print(f"n = {line['n']:<4} {line['method']:24} {line['error']:.1e} {line['ns_per_sample']:10.0f} ns a sample")

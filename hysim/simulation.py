@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen, read_only
-from hysim.models._model import needs_time
+from hysim.models.model import needs_time
 from hysim.records import Record
 
 

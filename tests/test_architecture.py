@@ -77,7 +77,4 @@ def test_nobody_walks_past_the_public_names_of_a_package():
         for name in imported(path):
             parts = name.split(".")
             if parts[0] == "hysim" and len(parts) > 3 and parts[2].startswith("_"):
-                assert parts[1] == own or (parts[1], parts[2]) in {("models", "_search"), ("models", "_model")}, (
-                    path,
-                    name,
-                )
+                assert parts[1] == own, (path, name)

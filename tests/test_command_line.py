@@ -19,7 +19,9 @@ def reproduction(tmp_path_factory) -> tuple[Path, str, str]:
     """One full run in a process of its own: folder, stdout, stderr."""
     folder = tmp_path_factory.mktemp("reproduction") / "out"
     done = subprocess.run(
-        [sys.executable, "-W", "error", "-m", "hysim", "reproduce", "--out", str(folder)], capture_output=True, text=True
+        [sys.executable, "-W", "error", "-m", "hysim", "reproduce", "--out", str(folder)],
+        capture_output=True,
+        text=True,
     )
     assert done.returncode == 0, done.stderr
     return folder, done.stdout, done.stderr

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hysim as hs
-from hysim.models._search import SearchSpace
+from hysim.models.search_space import SearchSpace
 
 
 @pytest.fixture(scope="module")

@@ -85,9 +85,9 @@ def discover(
 
     The slope dy/dL along the loading length, dL = \\|du\\|, is taken branch by branch and regressed on the terms
     by PySINDy's STLSQ, from a dense law to a sparse one. Every structure on that path is refined by its error
-    in free run; the search goes on from there by taking terms away. Of the structures whose BIC is within 2 of
-    the lowest, which the record cannot tell apart, the one is taken whose form does not depend on the zeros of
-    u and y, then the one of fewest terms.
+    in free run; the search goes on from there by taking terms away, and by trying every structure whose form
+    does not depend on where u and y are zero. Of the structures whose BIC is within 2 of the lowest, which the
+    record cannot tell apart, one of these is taken first, then the one of fewest terms.
 
     Parameters
     ----------

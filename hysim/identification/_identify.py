@@ -1,5 +1,6 @@
 """The verb `identify`: declare, search, describe."""
 
+import inspect
 from collections.abc import Mapping
 from dataclasses import MISSING, fields, replace
 from typing import Any
@@ -12,7 +13,7 @@ from hysim.identification._projection import Projection
 from hysim.identification._result import Candidate, Identification
 from hysim.identification._search import Optimum, Progress, descend, optima
 from hysim.identification._uncertainty import covariance
-from hysim.models._search import Identifiable, SearchSpace
+from hysim.models.search_space import Identifiable, SearchSpace
 from hysim.records import Record
 
 _AT_FOLD = 4  # a fold of the cross-validation begins from this many of the best optima
@@ -98,12 +99,18 @@ def identify(
 
 def _family(model_or_class: Any) -> Identifiable:
     """The object that declares the search: a class stands for the model with its defaults."""
-    family = model_or_class
-    if isinstance(family, type) and hasattr(family, "__dataclass_fields__"):
-        complete = all(f.default is not MISSING or f.default_factory is not MISSING for f in fields(family))
-        family = family() if complete else family
+    family: Any = model_or_class
     if not all(callable(getattr(family, name, None)) for name in ("search_space", "regressors", "assemble")):
         raise TypeError(f"identify takes a model, a model class or a structure, got {model_or_class!r}")
+    belongs_to_the_class = inspect.ismethod(family.search_space)
+    if isinstance(family, type) and not belongs_to_the_class:
+        required = [f.name for f in fields(family) if f.default is MISSING and f.default_factory is MISSING]
+        if required:
+            raise TypeError(
+                f"{family.__name__} has no defaults for {', '.join(required)}: pass an instance as the start, "
+                "or use discover"
+            )
+        family = family()
     return family  # type: ignore[no-any-return]
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.models._search import Identifiable, Parameters, SearchSpace
+from hysim.models.search_space import Identifiable, Parameters, SearchSpace
 from hysim.records import Record
 
 _RANK = 1e-11  # singular values of the normalised columns below this are taken as zero

@@ -12,7 +12,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.identification._projection import Projection
-from hysim.models._search import SearchSpace
+from hysim.models.search_space import SearchSpace
 
 N_SCREENED = 4096
 N_DESCENDING = 64

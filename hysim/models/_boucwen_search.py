@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.models._search import SearchSpace, checked_bounds, held_parameters
+from hysim.models.search_space import SearchSpace, checked_bounds, held_parameters
 from hysim.records import Record
 
 REDUNDANT = (("A", "gain"),)

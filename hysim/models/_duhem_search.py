@@ -10,8 +10,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.models._search import SearchSpace, checked_bounds, held_parameters
 from hysim.models.duhem_terms import Term, coefficient_units
+from hysim.models.search_space import SearchSpace, checked_bounds, held_parameters
 from hysim.records import Record
 
 _REACH = 10.0

@@ -26,8 +26,8 @@ from hysim._parallel import in_chunks
 from hysim.errors import SimulationError
 from hysim.kernels import boucwen as kernels
 from hysim.models import _boucwen_search
-from hysim.models._model import CompiledLaw, model
-from hysim.models._search import Parameters, SearchSpace
+from hysim.models.model import CompiledLaw, model
+from hysim.models.search_space import Parameters, SearchSpace
 from hysim.records import Record
 
 State = tuple[float, float]

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim.models._model import model
-from hysim.models._search import Parameters, SearchSpace, checked_bounds, held_parameters
+from hysim.models.model import model
+from hysim.models.search_space import Parameters, SearchSpace, checked_bounds, held_parameters
 from hysim.records import Record
 
 

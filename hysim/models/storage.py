@@ -11,7 +11,7 @@ import numpy as np
 
 from hysim import __version__
 from hysim._atomic import write_text
-from hysim.models._model import FAMILIES
+from hysim.models.model import FAMILIES
 
 _MODULES = ("boucwen", "duhem", "static", "transfer_function")
 
@@ -34,6 +34,14 @@ def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None
         If `model` is not a model.
     OSError
         If the file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile, hysim as hs
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     hs.save(hs.Line(slope=0.1), f"{folder}/line.json", units={"u": "V", "y": "um"})
+    ...     hs.load_model(f"{folder}/line.json")
+    Line(offset=0.0, slope=0.1)
     """
     family = type(model).__name__
     if FAMILIES.get(family) not in (type(model),):

@@ -23,8 +23,8 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, checked, read_only
 from hysim.errors import SimulationError
 from hysim.kernels import linear as kernels
-from hysim.models._model import model
-from hysim.models._search import Parameters, SearchSpace, checked_bounds, held_parameters
+from hysim.models.model import model
+from hysim.models.search_space import Parameters, SearchSpace, checked_bounds, held_parameters
 from hysim.records import Record
 
 FREQUENCY = (0.1, np.pi)  # box of a section's frequency: rad over the whole record, rad per sample
@@ -155,6 +155,22 @@ class TransferFunction:
             As in the constructor.
         initial : {"rest", "free"}
             Whether the initial state is zero, or identified.
+
+        Returns
+        -------
+        TransferFunctionStructure
+
+        Raises
+        ------
+        ValueError, TypeError
+            If the numbers do not fit, or an option is unknown.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> fit = hs.identify(hs.TransferFunction.structure(poles=4, zeros=1), hs.datasets.table1(dwell=1.0))
+        >>> fit.n_parameters, round(fit.fit_percent, 1)
+        (6, 91.5)
         """
         return TransferFunctionStructure(poles=poles, zeros=zeros, hold=hold, sample=sample, initial=initial)
 

@@ -60,9 +60,9 @@ def _lead(study: Study) -> str:
         "source",
     ) + _paragraph(
         f"The measured loop is {loop.max_width:.3f} µm wide at {loop.max_width_at:g} V. The linear model that the "
-        f"paper prints fits the points to {linear.fit_percent:.1f} %, and no curve that gives one displacement for each "
-        f"voltage can do better than {single.fit_percent:.2f} %: what is missing is memory. With it, a Bouc-Wen law "
-        f"with {law.n_parameters} parameters fits to {law.fit_percent:.2f} % and opens {law.max_width:.3f} µm; a law "
+        f"paper prints fits the points to {linear.fit_percent:.2f} %, and no curve that gives one displacement for "
+        f"each voltage can do better than {single.fit_percent:.2f} %: what is missing is memory. With it, a Bouc-Wen "
+        f"law with {law.n_parameters} parameters fits to {law.fit_percent:.2f} % and opens {law.max_width:.3f} µm; a law "
         f"that SINDy discovers fits to {found.fit_percent:.2f} % and opens {found.max_width:.3f} µm."
     )
 
@@ -116,8 +116,9 @@ def _models(study: Study, drawn: Drawn) -> str:
     return (
         _paragraph(
             "Every model is simulated in free run over the 52 voltages and judged by the same measures. "
-            "“Single-valued” is the best possible curve that gives one displacement for each voltage: a model that does not beat it "
-            "has learnt nothing about hysteresis. The printed model has one parameter fitted here, the dwell."
+            "“Single-valued” is the best possible curve that gives one displacement for each voltage: a model that "
+            "does not beat it has learnt nothing about hysteresis. The printed model has one parameter "
+            "fitted here, the dwell."
         )
         + _table(header, [best, *rows])
         + _figure(drawn["loops"], "Each model's loop over the measured points.")
@@ -178,8 +179,8 @@ def _bouc_wen(study: Study) -> str:
         + _paragraph(f"Symmetric: {plain.fit_percent:.2f} % with {plain.n_parameters} parameters.{inside}{rivals}")
         + _parameters(plain)
         + _paragraph(
-            f"With a quadratic input: {asymmetric.fit_percent:.2f} % with {asymmetric.n_parameters} parameters; the loop "
-            "is asymmetric, widest at low voltage, which the plain law cannot follow."
+            f"With a quadratic input: {asymmetric.fit_percent:.2f} % with {asymmetric.n_parameters} parameters. "
+            "The measured loop is wider at low voltage than at high; the quadratic term lets the model follow that."
         )
         + _parameters(asymmetric)
     )
@@ -189,9 +190,9 @@ def _discovered(study: Study, drawn: Drawn) -> str:
     found, row = study.discovery, study.comparison["sindy"]
     return (
         _paragraph(
-            "PySINDy regresses the slope of each branch on terms u′ uⁱ yʲ and |u′| uⁱ yʲ; the structures along its path "
-            "of thresholds, and those reached from them, are refitted by their error in free run. Of those that the "
-            "BIC cannot tell from the best, the one is kept whose form does not depend on the instruments' zeros, "
+            "PySINDy regresses the slope of each branch on terms u′ uⁱ yʲ and |u′| uⁱ yʲ; the structures along its "
+            "path of thresholds, and those reached from them, are refitted by their error in free run. Of those that "
+            "the BIC cannot tell from the best, the one is kept whose form does not depend on the instruments' zeros, "
             f"then the smallest: {len(found.coefficients)} terms, {row.fit_percent:.2f} % in free run."
         )
         + _equation(found.equation)
