@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 import hysim as hs
 from hysim.errors import SimulationError
 from hysim.models.duhem_terms import Term
+from hysim.models.search_space import Freedom
 
 # Degree 2 in both variables, an inner loop, long and short moves, a rest.
 GENERAL = hs.Duhem(
@@ -182,7 +183,7 @@ def test_a_law_is_a_value():
 
 def test_the_search_space_begins_at_the_law_and_goes_back_to_it():
     record = hs.Record(u=PATH, y=GENERAL.response(PATH))
-    space = GENERAL.search_space(record, fixed={"u'": 0.8}, bounds={"|u'|": (0.0, 0.5)})
+    space = GENERAL.search_space(record, Freedom(fixed={"u'": 0.8}, bounds={"|u'|": (0.0, 0.5)}))
     assert space.names == (*list(GENERAL.terms)[1:], "y0")
     values = space.parameters(space.starts)
     assert {name: value[0] for name, value in values.items()} == pytest.approx({**GENERAL.terms, "y0": 0.3}, rel=1e-14)
@@ -194,6 +195,6 @@ def test_the_search_space_begins_at_the_law_and_goes_back_to_it():
 
 def test_at_rest_the_law_starts_at_zero():
     record = hs.Record(u=PATH, y=GENERAL.response(PATH))
-    assert GENERAL.search_space(record, initial="rest").held == {"y0": 0.0}
+    assert GENERAL.search_space(record, Freedom(initial="rest")).held == {"y0": 0.0}
     with pytest.raises(ValueError, match='initial must be "free" or "rest"'):
-        GENERAL.search_space(record, initial="periodic")
+        GENERAL.search_space(record, Freedom(initial="periodic"))

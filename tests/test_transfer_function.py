@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scipy import signal
 
 import hysim as hs
+from hysim.models.search_space import Freedom
 
 EXACT = 1e-12  # matrix exponentials and a few hundred multiplications
 
@@ -216,12 +217,12 @@ def test_what_is_free_follows_the_structure_and_the_arguments():
     rest = structure.search_space(record)
     assert rest.names == ("den[1]", "den[2]", "num[0]", "num[1]")
     assert dict(rest.held) == {"x0[0]": 0.0, "x0[1]": 0.0}
-    assert structure.search_space(record, initial="free").names[-2:] == ("x0[0]", "x0[1]")
-    one = structure.search_space(record, free=("x0[1]",), fixed={"num[1]": 2.0}, bounds={"num[0]": (0.0, 1.0)})
+    assert structure.search_space(record, Freedom(initial="free")).names[-2:] == ("x0[0]", "x0[1]")
+    one = structure.search_space(record, Freedom(free=("x0[1]",), fixed={"num[1]": 2.0}, bounds={"num[0]": (0.0, 1.0)}))
     assert one.linear == ("num[0]", "x0[1]")
     assert dict(one.bounds) == {"num[0]": (0.0, 1.0)}
-    with pytest.raises(ValueError, match='"rest" or "free"'):
-        structure.search_space(record, initial="warm")
+    with pytest.raises(ValueError, match='"free" or "rest"'):
+        structure.search_space(record, Freedom(initial="warm"))
 
 
 def test_the_unit_of_time_does_not_matter():

@@ -124,7 +124,7 @@ class FreeRun:
             lambda x: self.residuals(terms, x[np.newaxis] * units)[0],
             starts[np.argmin(costs)] / units,
             jac=jacobian,
-            method="lm",
+            method="trf",  # "lm" (SciPy 1.17) now and then gives other bits from the same start
             ftol=tolerance,
             xtol=1e-2 * tolerance,
             gtol=tolerance,

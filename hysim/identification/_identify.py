@@ -13,7 +13,7 @@ from hysim.identification._projection import Projection
 from hysim.identification._result import Candidate, Identification
 from hysim.identification._search import Optimum, Progress, descend, optima
 from hysim.identification._uncertainty import covariance
-from hysim.models.search_space import Identifiable, SearchSpace
+from hysim.models.search_space import Freedom, Identifiable, SearchSpace
 from hysim.records import Record
 
 _AT_FOLD = 4  # a fold of the cross-validation begins from this many of the best optima
@@ -79,7 +79,7 @@ def identify(
     (0.7, 2.0)
     """
     family = _family(model_or_class)
-    space = family.search_space(record, fixed=fixed, free=tuple(free), bounds=bounds, initial=initial)
+    space = family.search_space(record, Freedom(fixed or {}, tuple(free), bounds or {}, initial))
     if len(record) < len(space.names):
         raise ValueError(f"{len(record)} samples cannot tell {len(space.names)} parameters: fix some of them")
     folds = _folds(cross_validate, len(record))

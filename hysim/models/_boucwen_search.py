@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.models.search_space import SearchSpace, checked_bounds, held_parameters
+from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record
 
 REDUNDANT = (("A", "gain"),)
@@ -44,10 +44,7 @@ def search_space(
     defaults: Mapping[str, float],
     columns: tuple[str, ...],
     record: Record,
-    fixed: Mapping[str, float] | None,
-    free: tuple[str, ...],
-    bounds: Mapping[str, tuple[float, float]] | None,
-    initial: str | None,
+    freedom: Freedom,
 ) -> SearchSpace:
     """Declare the coordinates, their box and the way back to the user's parameters for one record.
 
@@ -56,11 +53,8 @@ def search_space(
     ValueError
         If the input is constant, `initial` is unknown, or a name or a bound does not fit.
     """
-    if initial not in (None, "free", "rest"):
-        raise ValueError(f'initial must be "free" or "rest", got {initial!r}')
-    at_rest = {"z0": 0.0} if initial == "rest" and "z0" not in free else {}
-    held = held_parameters(defaults, REDUNDANT, {**at_rest, **(fixed or {})}, free)
-    limits = checked_bounds(bounds or {}, defaults, held)
+    held = freedom.held(defaults, redundant=REDUNDANT, at_rest=("z0",) if freedom.starts_at_rest() else ())
+    limits = freedom.limits(defaults, held)
     chart = _chart({**defaults, **held}, frozenset(defaults) - frozenset(held), limits, record)
     box = {name: limits.get(name, _BOX[name]) for name in chart.coordinates}
     box |= {"n": (float(np.log(box["n"][0])), float(np.log(box["n"][1])))} if "n" in box else {}

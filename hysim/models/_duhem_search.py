@@ -11,7 +11,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.models.duhem_terms import Term, coefficient_units
-from hysim.models.search_space import SearchSpace, checked_bounds, held_parameters
+from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record
 
 _REACH = 10.0
@@ -21,10 +21,7 @@ _REACH_Y0 = 1.0
 def search_space(
     defaults: Mapping[str, float],
     record: Record,
-    fixed: Mapping[str, float] | None,
-    free: tuple[str, ...],
-    bounds: Mapping[str, tuple[float, float]] | None,
-    initial: str | None,
+    freedom: Freedom,
 ) -> SearchSpace:
     """Declare the box for the terms and y0 in `defaults`.
 
@@ -33,13 +30,10 @@ def search_space(
     ValueError
         If the input is constant, `initial` is unknown, or a name or a bound does not fit.
     """
-    if initial not in (None, "free", "rest"):
-        raise ValueError(f'initial must be "free" or "rest", got {initial!r}')
     if np.ptp(record.u) == 0.0:
         raise ValueError("the input is constant: nothing can be identified from it")
-    at_rest = {"y0": 0.0} if initial == "rest" and "y0" not in free else {}
-    held = held_parameters(defaults, (), at_rest | dict(fixed or {}), free)
-    limits = checked_bounds(bounds or {}, defaults, held)
+    held = freedom.held(defaults, at_rest=("y0",) if freedom.starts_at_rest() else ())
+    limits = freedom.limits(defaults, held)
     names = tuple(name for name in defaults if name not in held)
     unit = _units(defaults, record)
     scale = np.array([unit[name] for name in names])

@@ -27,7 +27,7 @@ from hysim.errors import SimulationError
 from hysim.kernels import boucwen as kernels
 from hysim.models import _boucwen_search
 from hysim.models.model import CompiledLaw, model
-from hysim.models.search_space import Parameters, SearchSpace
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
 State = tuple[float, float]
@@ -214,17 +214,9 @@ class _BoucWenLaw(ABC):
         y[~np.isfinite(z[:, -1])] = np.inf
         return y
 
-    def search_space(
-        self,
-        record: Record,
-        *,
-        fixed: Mapping[str, float] | None = None,
-        free: tuple[str, ...] = (),
-        bounds: Mapping[str, tuple[float, float]] | None = None,
-        initial: str | None = None,
-    ) -> SearchSpace:
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box that `identify` searches; see `hysim.models._boucwen_search`."""
-        return _boucwen_search.search_space(self.scalars, self.columns, record, fixed, free, bounds, initial)
+        return _boucwen_search.search_space(self.scalars, self.columns, record, freedom)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns u, u^2, ..., z, 1, 0 of the output, shape (n_sets, n_samples, n_columns + 1)."""

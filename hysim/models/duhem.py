@@ -25,7 +25,7 @@ from hysim.kernels import duhem as kernels
 from hysim.models import _duhem_search
 from hysim.models.duhem_terms import Term, branches, equation, polynomials
 from hysim.models.model import CompiledLaw, model
-from hysim.models.search_space import Parameters, SearchSpace
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
 State = tuple[float, float]
@@ -200,17 +200,9 @@ class Duhem:
         """
         return cls._outputs(parameters, u, kernels.LARGEST, workers)
 
-    def search_space(
-        self,
-        record: Record,
-        *,
-        fixed: Mapping[str, float] | None = None,
-        free: tuple[str, ...] = (),
-        bounds: Mapping[str, tuple[float, float]] | None = None,
-        initial: str | None = None,
-    ) -> SearchSpace:
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box that `identify` searches; see `hysim.models._duhem_search`."""
-        return _duhem_search.search_space({**self.terms, "y0": self.y0}, record, fixed, free, bounds, initial)
+        return _duhem_search.search_space({**self.terms, "y0": self.y0}, record, freedom)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """The output itself, shape (n_sets, n_samples, 1): it is affine in none of the parameters.

@@ -5,8 +5,8 @@ of order one. The family turns coordinates into the user's parameters. Parameter
 affine are not searched: for given others, the best ones are the solution of a linear regression.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from hysim._frozen import FloatArray, frozen
@@ -60,18 +60,75 @@ class SearchSpace:
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Freedom:
+    """What the user says about the parameters; see `hysim.identify` for the meaning."""
+
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    free: tuple[str, ...] = ()
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    initial: str | None = None
+
+    def starts_at_rest(self, default: str = "free") -> bool:
+        """Whether the initial state is held at rest, where the user says nothing by the family's default."""
+        if self.initial not in (None, "free", "rest"):
+            raise ValueError(f'initial must be "free" or "rest", got {self.initial!r}')
+        return (self.initial or default) == "rest"
+
+    def held(
+        self,
+        defaults: Mapping[str, float],
+        *,
+        redundant: tuple[tuple[str, ...], ...] = (),
+        at_rest: Iterable[str] = (),
+    ) -> dict[str, float]:
+        """The parameters that are not free, and their values.
+
+        They are the fixed ones, those that are zero `at_rest`, and the first of each redundant group that
+        has none of them; a name in `free` is taken out of the last two.
+
+        Raises
+        ------
+        ValueError
+            If a name is unknown, or both fixed and free.
+        """
+        for argument, names in (("fixed", tuple(self.fixed)), ("free", self.free)):
+            for name in names:
+                if name not in defaults:
+                    raise ValueError(f"{argument} names {name!r}; the parameters are {', '.join(defaults)}")
+        if both := set(self.fixed) & set(self.free):
+            raise ValueError(f"{sorted(both)[0]!r} is both fixed and free")
+        held = {name: 0.0 for name in at_rest if name not in self.free}
+        held |= {name: float(value) for name, value in self.fixed.items()}
+        for group in redundant:
+            candidates = [name for name in group if name not in self.free]
+            if candidates and not held.keys() & set(group):
+                held[candidates[0]] = defaults[candidates[0]]
+        return held
+
+    def limits(self, defaults: Mapping[str, float], held: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+        """The bounds as floats.
+
+        Raises
+        ------
+        ValueError
+            If a name is unknown or held, or a lower bound is not below its upper one.
+        """
+        for name, pair in self.bounds.items():
+            if name not in defaults or name in held:
+                raise ValueError(f"bounds name {name!r}, which is not free; the parameters are {', '.join(defaults)}")
+            if len(pair) != 2 or not pair[0] < pair[1]:
+                raise ValueError(f"bounds of {name!r} must be (lower, upper) with lower < upper, got {pair}")
+        return {name: (float(lower), float(upper)) for name, (lower, upper) in self.bounds.items()}
+
+
+ALL_FREE = Freedom()
+
+
 class Identifiable(Protocol):
     """What `identify` takes: a model class, a model as the start, or a structure."""
 
-    def search_space(
-        self,
-        record: Record,
-        *,
-        fixed: Mapping[str, float] | None = None,
-        free: tuple[str, ...] = (),
-        bounds: Mapping[str, tuple[float, float]] | None = None,
-        initial: str | None = None,
-    ) -> SearchSpace:
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """Declare the box for `record`."""
         ...
 
@@ -86,48 +143,3 @@ class Identifiable(Protocol):
     def assemble(self, parameters: Mapping[str, float]) -> Any:
         """Build the model from the user's parameters."""
         ...
-
-
-def held_parameters(
-    defaults: Mapping[str, float],
-    redundant: tuple[tuple[str, ...], ...],
-    fixed: Mapping[str, float],
-    free: tuple[str, ...],
-) -> dict[str, float]:
-    """The parameters that are not free: the fixed ones, and one of each redundant group that has none of them.
-
-    Raises
-    ------
-    ValueError
-        If a name is unknown, or both fixed and free.
-    """
-    for argument, names in (("fixed", tuple(fixed)), ("free", tuple(free))):
-        for name in names:
-            if name not in defaults:
-                raise ValueError(f"{argument} names {name!r}; the parameters are {', '.join(defaults)}")
-    if both := set(fixed) & set(free):
-        raise ValueError(f"{sorted(both)[0]!r} is both fixed and free")
-    held = {name: float(value) for name, value in fixed.items()}
-    for group in redundant:
-        candidates = [name for name in group if name not in free]
-        if candidates and not held.keys() & set(group):
-            held[candidates[0]] = defaults[candidates[0]]
-    return held
-
-
-def checked_bounds(
-    bounds: Mapping[str, tuple[float, float]], defaults: Mapping[str, float], held: Mapping[str, float]
-) -> dict[str, tuple[float, float]]:
-    """The user's bounds as floats.
-
-    Raises
-    ------
-    ValueError
-        If a name is unknown or held, or a lower bound is not below its upper one.
-    """
-    for name, pair in bounds.items():
-        if name not in defaults or name in held:
-            raise ValueError(f"bounds name {name!r}, which is not free; the parameters are {', '.join(defaults)}")
-        if len(pair) != 2 or not pair[0] < pair[1]:
-            raise ValueError(f"bounds of {name!r} must be (lower, upper) with lower < upper, got {pair}")
-    return {name: (float(lower), float(upper)) for name, (lower, upper) in bounds.items()}

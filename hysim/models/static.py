@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
 from hysim.models.model import model
-from hysim.models.search_space import Parameters, SearchSpace, checked_bounds, held_parameters
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
 
@@ -42,19 +42,11 @@ class Line:
         """Output at the samples of `u`, shape (n,)."""
         return self.offset + self.slope * read_only(u, "u", ndim=1)
 
-    def search_space(
-        self,
-        record: Record,
-        *,
-        fixed: Mapping[str, float] | None = None,
-        free: tuple[str, ...] = (),
-        bounds: Mapping[str, tuple[float, float]] | None = None,
-        initial: str | None = None,
-    ) -> SearchSpace:
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """Nothing to search: both parameters are linear."""
         if np.ptp(record.u) == 0.0:
             raise ValueError("the input is constant: nothing can be identified from it")
-        return _linear_space(dict.fromkeys(self.columns, 0.0), fixed, free, bounds)
+        return _linear_space(dict.fromkeys(self.columns, 0.0), freedom)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns 1, u, 0, shape (1, n_samples, 3)."""
@@ -100,17 +92,9 @@ class SingleValued:
         return np.interp(read_only(u, "u", ndim=1), self.u, self.y)
 
     @classmethod
-    def search_space(
-        cls,
-        record: Record,
-        *,
-        fixed: Mapping[str, float] | None = None,
-        free: tuple[str, ...] = (),
-        bounds: Mapping[str, tuple[float, float]] | None = None,
-        initial: str | None = None,
-    ) -> SearchSpace:
+    def search_space(cls, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """One linear parameter for each different input of the record, ``"y(0)"``, ``"y(2.5)"``, ..."""
-        return _linear_space({_name(level): 0.0 for level in np.unique(record.u).tolist()}, fixed, free, bounds)
+        return _linear_space({_name(level): 0.0 for level in np.unique(record.u).tolist()}, freedom)
 
     @classmethod
     def regressors(cls, parameters: Parameters, record: Record) -> FloatArray:
@@ -131,11 +115,9 @@ def _name(level: float) -> str:
 
 def _linear_space(
     defaults: Mapping[str, float],
-    fixed: Mapping[str, float] | None,
-    free: tuple[str, ...],
-    bounds: Mapping[str, tuple[float, float]] | None,
+    freedom: Freedom,
 ) -> SearchSpace:
-    held = held_parameters(defaults, (), fixed or {}, free)
+    held = freedom.held(defaults)
     names = tuple(name for name in defaults if name not in held)
     return SearchSpace(
         coordinates=(),
@@ -147,5 +129,5 @@ def _linear_space(
         linear=names,
         held=held,
         parameters=lambda x: {},
-        bounds=checked_bounds(bounds or {}, defaults, held),
+        bounds=freedom.limits(defaults, held),
     )

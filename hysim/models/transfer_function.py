@@ -8,10 +8,9 @@ of the hold (``sample="start"``), before that sample's input has moved the state
 identification tools take the start. A staircase that was read when each step had settled belongs to the end:
 taken as the start, each output must be explained by the step before, and is one sample too early for it.
 
-With den monic the plant's states are x_j = s^j / den(s) u, j = 0 ... n - 1, in a time unit that makes the
-coefficients of den at most one, and the output is affine in the numerator and in the initial state, which
-is the free response and its derivatives at the begin of the first hold, (y, y', ..., y^(n-1)): the state
-of the observability form.
+With den monic the output is affine in the numerator and in the initial state, which is the free response
+and its derivatives at the begin of the first hold, (y, y', ..., y^(n-1)): the state of the observability
+form.
 """
 
 from collections.abc import Mapping
@@ -22,9 +21,9 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, checked, read_only
 from hysim.errors import SimulationError
-from hysim.kernels import linear as kernels
+from hysim.models._linear_response import affine_columns
 from hysim.models.model import model
-from hysim.models.search_space import Parameters, SearchSpace, checked_bounds, held_parameters
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
 FREQUENCY = (0.1, np.pi)  # box of a section's frequency: rad over the whole record, rad per sample
@@ -133,7 +132,7 @@ class TransferFunction:
             monic = np.array(self.den)[np.newaxis, 1:] / self.den[0]
             numerator = np.concatenate([np.zeros(self.order + 1 - len(self.num)), self.num]) / self.den[0]
             coefficients = np.concatenate([numerator, self.initial_state or np.zeros(self.order)])
-            columns = _columns(monic, inputs, float(sample_time), self.delay, self.hold, self.sample)
+            columns = affine_columns(monic, inputs, float(sample_time), self.delay, self.hold, self.sample)
             used = coefficients != 0.0  # a state that overflows does not matter where it is not seen
             y = np.asarray(columns[0][:, used] @ coefficients[used])
         if not np.isfinite(y).all():
@@ -193,7 +192,8 @@ class TransferFunctionStructure:
 
     def __post_init__(self) -> None:
         _check_options(self.hold, self.sample)
-        _check_initial(self.initial)
+        if self.initial not in ("rest", "free"):
+            raise ValueError(f'initial must be "rest" or "free", got {self.initial!r}')
         if not all(isinstance(number, int) for number in (self.poles, self.zeros)):
             raise TypeError(f"numbers of poles and zeros must be int, got {self}")
         if not 0 <= self.zeros <= self.poles or self.poles < 1:
@@ -209,15 +209,7 @@ class TransferFunctionStructure:
         """The names that are searched; ``den[0]`` is one."""
         return tuple(f"den[{k}]" for k in range(1, self.poles + 1))
 
-    def search_space(
-        self,
-        record: Record,
-        *,
-        fixed: Mapping[str, float] | None = None,
-        free: tuple[str, ...] = (),
-        bounds: Mapping[str, tuple[float, float]] | None = None,
-        initial: str | None = None,
-    ) -> SearchSpace:
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box of the sections.
 
         Raises
@@ -226,19 +218,17 @@ class TransferFunctionStructure:
             If the record has no even time or no input, `initial` or a name is unknown, or a coefficient of
             the denominator is fixed or bounded.
         """
-        _check_initial(initial or self.initial)
         sample_time = record.sample_time
         if np.ptp(record.u) == 0.0 and record.u[0] == 0.0:
             raise ValueError("the input is zero throughout: nothing can be identified from it")
         names = (*self.denominator, *self.columns)
         defaults = dict.fromkeys(names, 0.0)
-        for name in (*(fixed or {}), *(bounds or {})):
+        for name in (*freedom.fixed, *freedom.bounds):
             if name in self.denominator:
                 raise ValueError(f"{name!r} cannot be fixed or bounded: the denominator is searched by its sections")
-        at_rest = self.columns[self.zeros + 1 :] if (initial or self.initial) == "rest" else ()
-        rest = {name: 0.0 for name in at_rest if name not in free}
-        held = held_parameters(defaults, (), {**rest, **(fixed or {})}, free)
-        limits = checked_bounds(bounds or {}, defaults, held)
+        at_rest = self.columns[self.zeros + 1 :] if freedom.starts_at_rest(self.initial) else ()
+        held = freedom.held(defaults, at_rest=at_rest)
+        limits = freedom.limits(defaults, held)
         pairs = self.poles // 2
         low, high = np.log(FREQUENCY[0] / len(record)), np.log(FREQUENCY[1])
         coordinates = [f"{what}[{k}]" for k in range(pairs) for what in ("log frequency", "log damping")]
@@ -263,7 +253,7 @@ class TransferFunctionStructure:
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns of the numerator and of the initial state, and zero, (n_sets, n_samples, n_columns + 1)."""
         monic = np.stack([np.atleast_1d(parameters[name]) for name in self.denominator], axis=1)
-        columns = _columns(monic, record.u, record.sample_time, 0.0, self.hold, self.sample)
+        columns = affine_columns(monic, record.u, record.sample_time, 0.0, self.hold, self.sample)
         return np.concatenate([columns[..., self.poles - self.zeros :], np.zeros_like(columns[..., :1])], axis=-1)
 
     def assemble(self, parameters: Mapping[str, float]) -> TransferFunction:
@@ -296,72 +286,9 @@ def _check_options(hold: str, sample: str) -> None:
         raise ValueError('sample="end" needs an input that is held, hold="zoh"')
 
 
-def _check_initial(initial: str) -> None:
-    if initial not in ("rest", "free"):
-        raise ValueError(f'initial must be "rest" or "free", got {initial!r}')
-
-
 def _times(polynomials: FloatArray, factor: list[FloatArray]) -> FloatArray:
     """Products of rows of polynomials with one factor for each row."""
     product = np.zeros((len(polynomials), polynomials.shape[1] + len(factor) - 1))
     for k, coefficient in enumerate(factor):
         product[:, k : k + polynomials.shape[1]] += coefficient[:, np.newaxis] * polynomials
     return product
-
-
-def _columns(monic: FloatArray, u: FloatArray, sample_time: float, delay: float, hold: str, sample: str) -> FloatArray:
-    """What the output is affine in: b_0 ... b_n of the numerator, then the initial state, (n_sets, N, 2 n + 1).
-
-    `monic` (n_sets, n) holds the denominators without their leading one, in seconds.
-    """
-    n_sets, n = monic.shape
-    degrees = np.arange(1, n + 1)
-    late = min(delay / sample_time, float(u.size))
-    begin, end, lengths = _pieces(u, late, hold)
-    with np.errstate(all="ignore"):
-        rate = np.max(np.abs(monic) ** (1.0 / degrees), axis=1, initial=1.0 / sample_time)[:, np.newaxis]
-        scaled = monic / rate**degrees
-        F = np.zeros((n_sets, n, n))
-        F[:, np.arange(n - 1), np.arange(1, n)] = 1.0
-        F[:, n - 1 :, :] = -scaled[:, np.newaxis, ::-1]
-        spans = rate * sample_time * lengths
-        A, B0, B1 = _transitions(F, spans)
-        forced, free = np.empty((2, n_sets, u.size + 1, n))
-        kernels.states(A, B0, B1, begin, end, np.zeros((n_sets, n)), forced)
-        kernels.free_responses(A[:, 0] if lengths.size == 1 else A[:, 1] @ A[:, 0], free)
-        at = slice(1, None) if sample == "end" else slice(0, -1)
-        x = forced[:, at, ::-1]
-        through = end[:, -1] if sample == "end" else begin[:, 0]
-        feedthrough = through - (x @ scaled[..., np.newaxis])[..., 0]
-        back = rate[:, np.newaxis] ** -degrees
-        from_state = free[:, at] * back * rate[..., np.newaxis]
-        return np.concatenate([feedthrough[..., np.newaxis], x * back, from_state], axis=-1)
-
-
-def _transitions(F: FloatArray, spans: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """A, B0 and B1 of x' = F x + (0, ..., 0, v) over each of the spans (n_sets, n_pieces); see `kernels.linear`."""
-    n = F.shape[-1]
-    generators = np.zeros((*spans.shape, n + 2, n + 2))
-    generators[..., :n, :n] = F[:, np.newaxis] * spans[..., np.newaxis, np.newaxis]
-    generators[..., n - 1 : n, n] = spans[..., np.newaxis]
-    generators[..., n, n + 1] = 1.0
-    exponentials = np.empty_like(generators)
-    kernels.exponentials(generators.reshape(-1, n + 2, n + 2), exponentials.reshape(-1, n + 2, n + 2))
-    held, rising = exponentials[..., :n, n], exponentials[..., :n, n + 1]
-    return np.ascontiguousarray(exponentials[..., :n, :n]), held - rising, np.ascontiguousarray(rising)
-
-
-def _pieces(u: FloatArray, late: float, hold: str) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The input `late` samples later, by pieces: at their begin and end, (n_steps, n_pieces), and their lengths.
-
-    A step holds the end of one of the input's stretches between samples, and the begin of the next.
-    """
-    whole, part = divmod(late, 1.0)
-    before = np.zeros(int(whole) + 1)
-    level = np.concatenate([before, u])
-    rise = np.concatenate([before, np.diff(u, append=u[-1:]) if hold == "foh" else np.zeros_like(u)])
-    ends = [(0, 1.0 - part, 1.0), (1, 0.0, 1.0 - part)] if part > 0.0 else [(1, 0.0, 1.0)]
-    stretches = [(level[k : k + u.size], rise[k : k + u.size], start, stop) for k, start, stop in ends]
-    begin = np.stack([value + start * slope for value, slope, start, _ in stretches], axis=1)
-    end = np.stack([value + stop * slope for value, slope, _, stop in stretches], axis=1)
-    return begin, end, np.array([stop - start for _, start, stop in ends])

@@ -62,8 +62,8 @@ def _lead(study: Study) -> str:
         f"The measured loop is {loop.max_width:.3f} µm wide at {loop.max_width_at:g} V. The linear model that the "
         f"paper prints fits the points to {linear.fit_percent:.2f} %, and no curve that gives one displacement for "
         f"each voltage can do better than {single.fit_percent:.2f} %: what is missing is memory. With it, a Bouc-Wen "
-        f"law with {law.n_parameters} parameters fits to {law.fit_percent:.2f} % and opens {law.max_width:.3f} µm; a law "
-        f"that SINDy discovers fits to {found.fit_percent:.2f} % and opens {found.max_width:.3f} µm."
+        f"law with {law.n_parameters} parameters fits to {law.fit_percent:.2f} % and opens {law.max_width:.3f} µm; a "
+        f"law that SINDy discovers fits to {found.fit_percent:.2f} % and opens {found.max_width:.3f} µm."
     )
 
 
