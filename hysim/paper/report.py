@@ -8,6 +8,7 @@ from string import Template
 from typing import NamedTuple
 
 from hysim.identification import Identification
+from hysim.metrics import loop_metrics
 from hysim.paper.equations import EQUATION_1, EQUATION_7
 from hysim.paper.study import Study
 
@@ -98,7 +99,7 @@ def _measured(study: Study, drawn: Drawn) -> str:
 def _models(study: Study, drawn: Drawn) -> str:
     quantum = study.comparison.record.resolution or math.nan
     header = [
-        "model", "parameters", "fit [%]", "rmse [µm]", "left-one-out rmse [µm]", "largest residual [pixels]",
+        "model", "parameters", "fit [%]", "rmse [µm]", "leave-one-out rmse [µm]", "largest residual [pixels]",
         "largest width [µm]", "at [V]", "area [µm V]", "rms error of the width [µm]",
     ]  # fmt: skip
     rows = [
@@ -133,7 +134,7 @@ def _models(study: Study, drawn: Drawn) -> str:
 
 def _linear(study: Study, drawn: Drawn) -> str:
     printed, fit = study.comparison["eq1-printed"], study.fits["tf-identified"]
-    poles = ", ".join(f"{p.real:.3f} {'+' if p.imag >= 0 else '-'} {abs(p.imag):.3f}i" for p in fit.model.poles)
+    poles = ", ".join(_complex(pole) for pole in fit.model.poles)
     return (
         _paragraph("Equation (1) as printed, in seconds:")
         + _equation(f"G(s) = {_ratio(EQUATION_1.num, EQUATION_1.den)}")
@@ -146,7 +147,8 @@ def _linear(study: Study, drawn: Drawn) -> str:
         + _equation(f"G(s) = {_ratio(fit.model.num, fit.model.den)}\npoles {poles} rad/s")
         + _paragraph(
             "So the paper's figures are about what a four-pole model identified on Table 1 reaches; the coefficients "
-            "it prints do not reach them at any dwell. Either loop is phase lag: it closes when the dwell is long."
+            "it prints do not reach them at any dwell. Either loop is phase lag, not memory: read at the end of each "
+            "dwell, it closes when the dwell is long."
         )
         + _figure(
             drawn["figure5"],
@@ -158,6 +160,7 @@ def _linear(study: Study, drawn: Drawn) -> str:
 
 def _bouc_wen(study: Study) -> str:
     plain, asymmetric = study.fits["bouc-wen"], study.fits["bouc-wen-asymmetric"]
+    u = study.comparison.record.u
     admissible = plain.regions.get("admissible")
     inside = (
         " The best law with −β ≤ γ ≤ β, which creates no energy whatever the input, fits to "
@@ -167,7 +170,8 @@ def _bouc_wen(study: Study) -> str:
     )
     rivals = "".join(
         f" Another optimum, {rival.fit_percent:.2f} %, is within the noise: n = {rival.estimates['n']:.3g}, "
-        f"β = {rival.estimates['beta']:.3g}, γ = {rival.estimates['gamma']:.3g}."
+        f"β = {rival.estimates['beta']:.3g}, γ = {rival.estimates['gamma']:.3g}, with a loop of "
+        f"{loop_metrics(u, rival.model.response(u)).max_width:.3f} µm."
         for rival in plain.rivals
     )
     return (
@@ -211,7 +215,7 @@ def _definitions() -> str:
         "loop width w(u) = displacement when unloading minus displacement when loading, at the same voltage; its "
         "largest magnitude, and the voltage of that (the lowest, if several).",
         "area by the shoelace formula along the cycle; mean width = area / span of the voltage.",
-        "left-one-out rmse: each displacement in turn is kept from the fit, all voltages are kept, and the errors at "
+        "leave-one-out rmse: each displacement in turn is kept from the fit, all voltages are kept, and the errors at "
         "the points left out are collected. For the discovered law the terms are kept and the coefficients refitted.",
         "FPE = V (1 + d/N) / (1 − d/N), V the mean squared residual, N points, d parameters.",
     ]
@@ -243,6 +247,12 @@ def _polynomial(coefficients: Sequence[float]) -> str:
         size = "" if abs(c) == 1.0 and factor else f"{abs(c):.4g}"
         text += (" - " if c < 0 else " + " if text else "") + " ".join(part for part in (size, factor) if part)
     return text.strip()
+
+
+def _complex(value: complex) -> str:
+    if value.imag == 0.0:
+        return f"{value.real:.3f}"
+    return f"{value.real:.3f} {'+' if value.imag > 0 else '-'} {abs(value.imag):.3f}i"
 
 
 def _number(value: float, digits: int, kind: str = "f") -> str:
