@@ -131,7 +131,7 @@ def _key(value: Any) -> Any:
         return tuple((name, _key(item)) for name, item in sorted(value.items()))
     if isinstance(value, (tuple, list)):
         return tuple(_key(item) for item in value)
-    return value
+    return "nan" if isinstance(value, float) and math.isnan(value) else value
 
 
 def _equal(self: Any, other: object) -> Any:

@@ -175,6 +175,8 @@ def compare(subjects: Mapping[str, Any], record: Record, *, cross_validate: str 
     >>> [row.name for row in tab.rows], round(tab["truth"].fit_percent, 3)
     (['line', 'truth'], 100.0)
     """
+    if not isinstance(record, Record):
+        raise TypeError(f"compare takes a Record, got {type(record).__name__}: hs.Record(u=u, y=y)")
     if not subjects:
         raise ValueError("there is nothing to compare: give at least one model by name")
     measured = loop_metrics(record.u, record.y)

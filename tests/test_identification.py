@@ -95,6 +95,18 @@ def test_bounds_are_kept_and_said(table1):
     assert "side of its box" in fit.message
 
 
+def test_a_sign_is_a_bound_too(table1):
+    bounds = {"beta": (0.0, np.inf), "gamma": (-np.inf, 0.0), "gain": (-np.inf, 0.0), "n": (0.0, np.inf)}
+    fit = hs.identify(hs.BoucWen, table1, bounds=bounds)
+    assert fit.estimates["beta"] >= 0.0
+    assert fit.estimates["gamma"] <= 0.0
+    assert fit.estimates["gain"] <= 0.0
+    assert 0.5 <= fit.estimates["n"] <= 10.0
+    assert fit.fit_percent > 90.0
+    with pytest.raises(ValueError, match="from zero to infinity"):
+        hs.identify(hs.BoucWen, table1, bounds={"beta": (1.0, np.inf)})
+
+
 def test_rest_holds_the_memory_at_zero(table1):
     fit = hs.identify(hs.BoucWen, table1, initial="rest", fixed={"n": 1.0})
     assert fit.model.z0 == 0.0
@@ -173,6 +185,10 @@ def test_records_that_say_nothing_are_refused(table1):
         hs.identify(hs.BoucWen, table1[:5])
     with pytest.raises(TypeError, match="takes a model"):
         hs.identify("bouc-wen", table1)
+    with pytest.raises(TypeError, match="takes a Record"):
+        hs.identify(hs.BoucWen, table1.y)
+    with pytest.raises(TypeError, match="no defaults for p, q"):
+        hs.identify(hs.Duhem, table1)
 
 
 def test_a_search_space_is_data(table1):

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 from hysim import __version__
 from hysim.cli import reproduce
+from hysim.errors import SimulationError
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -26,7 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("hysim: interrupted", file=sys.stderr)
         return 130
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, SimulationError) as error:
         print(f"hysim: error: {_line(error)}", file=sys.stderr)
         return 2
 

@@ -13,7 +13,7 @@ from hysim.identification._projection import Projection
 from hysim.identification._result import Candidate, Identification
 from hysim.identification._search import Optimum, Progress, descend, optima
 from hysim.identification._uncertainty import covariance
-from hysim.models.search_space import Freedom, Identifiable, SearchSpace
+from hysim.models.search_space import Freedom, Identifiable
 from hysim.records import Record
 
 _AT_FOLD = 4  # a fold of the cross-validation begins from this many of the best optima
@@ -79,6 +79,8 @@ def identify(
     (0.7, 2.0)
     """
     family = _family(model_or_class)
+    if not isinstance(record, Record):
+        raise TypeError(f"identify takes a Record, got {type(record).__name__}: hs.Record(u=u, y=y)")
     space = family.search_space(record, Freedom(fixed or {}, tuple(free), bounds or {}, initial))
     if len(record) < len(space.names):
         raise ValueError(f"{len(record)} samples cannot tell {len(space.names)} parameters: fix some of them")
@@ -88,13 +90,7 @@ def identify(
     if not found:
         raise ValueError("no law in the box stays finite on this record: check its units, or give bounds")
     result = _describe(problem, found)
-    regions = {
-        name: _candidate(inside, optima(inside, seed=seed)[0])
-        for name, (lower, upper) in space.regions.items()
-        if not (np.all(found[0].x >= lower) and np.all(found[0].x <= upper))
-        for inside in [replace(problem, space=_within(space, lower, upper))]
-    }
-    return replace(result, regions=regions, cv_rmse=_cross_validated(problem, found, folds))
+    return replace(result, regions=_regions(problem, found[0], seed), cv_rmse=_cross_validated(problem, found, folds))
 
 
 def _family(model_or_class: Any) -> Identifiable:
@@ -114,8 +110,18 @@ def _family(model_or_class: Any) -> Identifiable:
     return family  # type: ignore[no-any-return]
 
 
-def _within(space: SearchSpace, lower: FloatArray, upper: FloatArray) -> SearchSpace:
-    return replace(space, lower=lower, upper=upper, starts=np.clip(space.starts, lower, upper), regions={})
+def _regions(problem: Projection, best: Optimum, seed: int) -> dict[str, Candidate]:
+    """The best candidate inside each named region that the optimum is not in."""
+    space = problem.space
+    candidates: dict[str, Candidate] = {}
+    for name, (lower, upper) in space.regions.items():
+        if np.all(best.x >= lower) and np.all(best.x <= upper):
+            continue
+        box = replace(space, lower=lower, upper=upper, starts=np.clip(space.starts, lower, upper), regions={})
+        inside = replace(problem, space=box)
+        if found := optima(inside, seed=seed):
+            candidates[name] = _candidate(inside, found[0])
+    return candidates
 
 
 def _estimates(problem: Projection, x: FloatArray) -> dict[str, float]:

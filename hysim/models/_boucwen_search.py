@@ -13,7 +13,7 @@ for every n,
 
 The box is |k| <= 40 for both, n in [0.5, 10] on a log scale, z0/Z in [-1, 1], and open for the
 parameters in which the output is affine. A parameter that the user bounds is its own coordinate,
-between these bounds.
+between these bounds; bounds from or to zero and infinity cut the box at zero.
 """
 
 from collections.abc import Mapping
@@ -54,9 +54,11 @@ def search_space(
         If the input is constant, `initial` is unknown, or a name or a bound does not fit.
     """
     held = freedom.held(defaults, redundant=REDUNDANT, at_rest=("z0",) if freedom.starts_at_rest() else ())
-    limits = freedom.limits(defaults, held)
-    chart = _chart({**defaults, **held}, frozenset(defaults) - frozenset(held), limits, record)
-    box = {name: limits.get(name, _BOX[name]) for name in chart.coordinates}
+    bounds = freedom.limits(defaults, held)
+    signs = {name: pair for name, pair in bounds.items() if name in _MEMORY and np.isinf(pair).any()}
+    limits = {name: pair for name, pair in bounds.items() if name in _MEMORY and name not in signs}
+    chart = _chart({**defaults, **held}, frozenset(defaults) - frozenset(held), limits, frozenset(signs), record)
+    box = {name: limits.get(name, _cut(name, signs.get(name))) for name in chart.coordinates}
     box |= {"n": (float(np.log(box["n"][0])), float(np.log(box["n"][1])))} if "n" in box else {}
     lower, upper = (np.array([pair[side] for pair in box.values()]) for side in (0, 1))
     quadrant = np.array([max(low, 0.0) if name in _PAIR else low for name, (low, _) in box.items()])
@@ -72,8 +74,18 @@ def search_space(
         parameters=chart.decode,
         redundant=REDUNDANT,
         regions={"admissible": (quadrant, upper)} if set(_PAIR) <= set(box) else {},
-        bounds={name: pair for name, pair in limits.items() if name in columns},
+        bounds={name: pair for name, pair in bounds.items() if name in columns},
     )
+
+
+def _cut(name: str, sign: tuple[float, float] | None) -> tuple[float, float]:
+    """The default box, cut at zero where the user asks for a sign."""
+    lower, upper = _BOX[name]
+    if sign is None:
+        return lower, upper
+    if 0.0 not in sign and sign != (-np.inf, np.inf):
+        raise ValueError(f"bounds of {name!r} must be finite, or reach from zero to infinity, got {sign}")
+    return max(lower, sign[0]), min(upper, sign[1])
 
 
 @dataclass(frozen=True)
@@ -144,12 +156,16 @@ def _knee(coefficient: FloatArray, n: FloatArray) -> float:
 
 
 def _chart(
-    values: Mapping[str, float], free: frozenset[str], limits: Mapping[str, tuple[float, float]], record: Record
+    values: Mapping[str, float],
+    free: frozenset[str],
+    limits: Mapping[str, tuple[float, float]],
+    signed: frozenset[str],
+    record: Record,
 ) -> _Chart:
     span = float(np.ptp(record.u))
     if span == 0.0:
         raise ValueError("the input is constant: nothing can be identified from it")
-    paired = {"beta", "gamma"} <= free and not {"beta", "gamma"} & limits.keys()
+    paired = {"beta", "gamma"} <= free and not {"beta", "gamma"} & (limits.keys() | signed)
     shapes = _PAIR if paired else ("beta", "gamma")
     coordinates = [name for name in ("A", *shapes, "n", "z0") if name in free or (paired and name in _PAIR)]
     return _Chart(
