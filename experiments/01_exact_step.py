@@ -16,7 +16,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import hysim as hs
-from hysim.plot import figure, save_svg
+from hysim.plot import Figure, figure, house_style, save_svg
 
 RESULTS = Path(__file__).parent / "results" / "exact_step"
 BETA, GAMMA = 0.6, 0.3
@@ -148,15 +148,21 @@ def write(rows: list[dict[str, float | str]], n_samples: int) -> None:
         writer.writerows(rows)
     result = {"samples": n_samples, "beta": BETA, "gamma": GAMMA, "rows": rows}
     (RESULTS / "result.json").write_text(json.dumps(result, indent=2) + "\n")
-    canvas = figure(height=4.2)
+    with house_style():
+        save_svg(draw(rows), RESULTS / "figure.svg", name="exact_step")
+
+
+def draw(rows: list[dict[str, float | str]]) -> Figure:
+    """Error against time, log-log."""
+    canvas = figure(height=4.4)
     ax = canvas.add_subplot()
     for name, marker in zip(METHODS, "*osv^D", strict=True):
         points = [(row["ns_per_sample"], row["error"]) for row in rows if row["method"] == name]
         ax.loglog(*zip(*points, strict=True), marker, label=name, markersize=11 if name == "hysim" else 6)
     ax.set(xlabel="Time a sample [ns]", ylabel="Largest error [share of the range]")
-    ax.legend(loc="lower right", frameon=False)
-    ax.grid(alpha=0.3)
-    save_svg(canvas, RESULTS / "figure.svg", name="exact_step")
+    ax.set_title("Each method at n = 1, 1.5 and 2")
+    ax.legend(loc="lower right")
+    return canvas
 
 
 if __name__ == "__main__":

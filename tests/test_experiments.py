@@ -27,8 +27,14 @@ def test_results_are_committed_whole(path):
     json.loads((folder / "result.json").read_text())
 
 
-def test_exact_step_is_exact():
-    result = json.loads((EXPERIMENTS[0].parent / "results" / "exact_step" / "result.json").read_text())
-    own = [row for row in result["rows"] if row["method"] == "hysim"]
-    assert {row["n"] for row in own} == {1.0, 1.5, 2.0}
-    assert all(row["error"] < 1e-14 for row in own)
+def test_the_readme_quotes_the_committed_result():
+    folder = EXPERIMENTS[0].parent
+    rows = json.loads((folder / "results" / "exact_step" / "result.json").read_text())["rows"]
+    readme = (folder.parent / "README.md").read_text().replace("\n ", "")
+    own = [row["error"] for row in rows if row["method"] == "hysim"]
+    lsoda = [row for row in rows if "LSODA" in row["method"]]
+    least, most = (f"{round(pick(row['time_ratio'] for row in lsoda), -2):,.0f}" for pick in (min, max))
+    assert len(own) == len(lsoda) == 3
+    assert max(own) < 1e-15
+    assert all(0.5e-4 < row["error"] < 2e-4 for row in lsoda)
+    assert f"{least} to {most} times as long".replace(",", " ") in readme
