@@ -136,3 +136,17 @@ def test_a_law_is_a_value():
     assert law == pickle.loads(pickle.dumps(law))
     assert hash(law) == hash(hs.PolynomialBoucWen(input_coefficients=(1.0, 2.0)))
     assert law != hs.PolynomialBoucWen(input_coefficients=(1.0, 3.0))
+
+
+def test_one_compiled_loop_takes_every_law():
+    """A loop that is compiled once takes laws of other families through the same type of step."""
+    u = np.sin(np.linspace(0.0, 12.0, 200))
+    for law in (
+        hs.BoucWen(n=1.6, gain=-0.3, feedthrough=1.0),
+        hs.PolynomialBoucWen(n=2.0, input_coefficients=(1.0, 0.2, -0.1)),
+        hs.Duhem.from_terms({"u'": 1.0, "u' u": 0.1, "|u'| y": -0.7}, y0=0.2),
+    ):
+        compiled = law.compiled(u[0])
+        y = np.empty(u.size)
+        assert drive(compiled.step, compiled.parameters, compiled.state, u, y) == -1
+        assert np.array_equal(y, law.response(u))
