@@ -33,9 +33,12 @@ def in_chunks(work: Callable[[int, int], None], n_items: int, *, workers: int | 
         raise ValueError(f"workers must be at least 1, got {workers}")
     n_chunks = max(1, min(workers or cores(), n_items // minimum))
     edges = [n_items * k // n_chunks for k in range(n_chunks + 1)]
-    if n_chunks == 1:
-        work(0, n_items)
+    own, *others = itertools.pairwise(edges)
+    if not others:
+        work(*own)
         return
-    with ThreadPoolExecutor(n_chunks) as pool:
-        for done in [pool.submit(work, *edge) for edge in itertools.pairwise(edges)]:
-            done.result()
+    with ThreadPoolExecutor(len(others)) as pool:
+        running = [pool.submit(work, *chunk) for chunk in others]
+        work(*own)
+        for chunk in running:
+            chunk.result()

@@ -27,6 +27,14 @@ def test_clean_data_give_the_law_back():
         assert value == pytest.approx(getattr(law, name), abs=1e-5)  # the residual is quadratic in this error
 
 
+def test_a_perfect_line_is_fitted_without_a_warning():
+    """Nothing left to explain: sums of squares of zero, and curvature that the data cannot tell."""
+    u = hs.signals.triangle(0.0, 1.0, cycles=2, samples_per_cycle=20)
+    fit = hs.identify(hs.BoucWen, hs.Record(u=u, y=3.0 * u))
+    assert fit.rmse < 1e-12
+    assert fit.model.response(u) == pytest.approx(3.0 * u, abs=1e-10)
+
+
 def test_polynomial_input_is_given_back():
     law = hs.PolynomialBoucWen(beta=1.5, gamma=0.4, gain=-0.6, input_coefficients=(1.3, 0.2, -0.1))
     start = hs.PolynomialBoucWen(input_coefficients=(0.0, 0.0, 0.0))

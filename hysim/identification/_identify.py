@@ -17,6 +17,7 @@ from hysim.models.search_space import Freedom, Identifiable
 from hysim.records import Record
 
 _AT_FOLD = 4  # a fold of the cross-validation begins from this many of the best optima
+_FOLD_TOLERANCE = 1e-7
 
 
 def identify(
@@ -206,7 +207,7 @@ def _cross_validated(problem: Projection, found: list[Optimum], folds: list[Floa
     for fold, left_out in enumerate(folds):
         weights[fold, left_out] = 0.0
     each = np.repeat(weights, len(starts), axis=0)
-    reached, costs = descend(problem, np.tile(starts, (len(folds), 1)), each)
+    reached, costs = descend(problem, np.tile(starts, (len(folds), 1)), each, tolerance=_FOLD_TOLERANCE)
     best = np.arange(len(folds)) * len(starts) + costs.reshape(len(folds), -1).argmin(axis=1)
     linear = problem.solve(reached[best], weights)[0]
     columns, fixed_part = problem.split(problem.space.parameters(reached[best]))

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim.identification._projection import Projection
@@ -21,10 +22,12 @@ N_POLISHED = 8
 _CHUNK = 256
 _APART = 0.05  # distance of two starts, in units of the box, under which the better one stands for both
 _SAME = 0.01  # likewise of two points after the descent
+_STUCK = 1e8  # damping beyond which no step can help
 _TOLERANCE = 1e-10
 _FLAT = 1e-15
 
 Progress = Callable[[int, int], None]
+Flags = npt.NDArray[np.bool_]
 
 
 class Optimum(NamedTuple):
@@ -52,43 +55,51 @@ def optima(problem: Projection, *, seed: int, progress: Progress | None = None) 
     return _distinct(found)
 
 
-def descend(problem: Projection, x: FloatArray, weights: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
-    """Points (n, n_x) after `N_STEPS` projected Levenberg-Marquardt steps from `x`, and their sums of squares."""
+def descend(
+    problem: Projection, x: FloatArray, weights: FloatArray | None = None, *, tolerance: float = 1e-5
+) -> tuple[FloatArray, FloatArray]:
+    """Points (n, n_x) after projected Levenberg-Marquardt steps from `x` (n, n_x), and their sums of squares.
+
+    A point rests when a step lowers its sum by less than the share `tolerance`, and all after `N_STEPS`.
+    """
     x = x.copy()
-    space, n_x = problem.space, x.shape[1]
-    width = space.upper - space.lower
+    lower, upper = problem.space.lower, problem.space.upper
     damping = np.full(len(x), 1e-2)
     residual = problem.solve(x, weights)[1]
     cost = np.sum(residual**2, axis=1)
-    active = np.isfinite(cost)
-    for _ in range(N_STEPS if n_x else 0):
-        moving = np.flatnonzero(active)
+    moving = np.flatnonzero(np.isfinite(cost))
+    for _ in range(N_STEPS if x.shape[1] else 0):
         if not moving.size:
             break
-        weighted = None if weights is None else weights[moving]
-        slopes = width * np.nan_to_num(
-            problem.rough_jacobians(x[moving], residual[moving], weighted), posinf=0.0, neginf=0.0
-        )
-        gradient = np.einsum("snk,sn->sk", slopes, residual[moving])
-        held = ((x[moving] <= space.lower) & (gradient > 0.0)) | ((x[moving] >= space.upper) & (gradient < 0.0))
-        slopes[np.broadcast_to(held[:, np.newaxis], slopes.shape)] = 0.0
-        normal = slopes.transpose(0, 2, 1) @ slopes
-        diagonal = np.einsum("sii->si", normal)
-        scale = damping[moving, np.newaxis] * diagonal + 1e-12 * diagonal.max(axis=1, keepdims=True) + held + 1e-300
-        step = -np.linalg.solve(
-            normal + scale[..., np.newaxis] * np.eye(n_x), np.where(held, 0.0, gradient)[..., np.newaxis]
-        )
-        trial = np.clip(x[moving] + step[..., 0] * width, space.lower, space.upper)
-        trial_residual = problem.solve(trial, weighted)[1]
+        shares = None if weights is None else weights[moving]
+        slopes = (upper - lower) * problem.rough_jacobians(x[moving], residual[moving], shares)
+        step = _damped_step(slopes, residual[moving], damping[moving], x[moving] <= lower, x[moving] >= upper)
+        trial = np.clip(x[moving] + step * (upper - lower), lower, upper)
+        trial_residual = problem.solve(trial, shares)[1]
         trial_cost = np.sum(trial_residual**2, axis=1)
         better = trial_cost < cost[moving]
-        gained = np.where(better, 1.0 - trial_cost / cost[moving], 1.0)
-        up, down = moving[better], moving[~better]
-        x[up], residual[up], cost[up] = trial[better], trial_residual[better], trial_cost[better]
-        damping[up] *= 0.2
-        damping[down] *= 5.0
-        active[moving[(gained < 1e-7) | (damping[moving] > 1e8)]] = False
+        gained = 1.0 - np.divide(trial_cost, cost[moving], out=np.zeros_like(cost[moving]), where=better)
+        won = moving[better]
+        x[won], residual[won], cost[won] = trial[better], trial_residual[better], trial_cost[better]
+        damping[moving] *= np.where(better, 0.2, 5.0)
+        moving = moving[(gained >= tolerance) & (damping[moving] <= _STUCK)]
     return x, cost
+
+
+def _damped_step(
+    slopes: FloatArray, residual: FloatArray, damping: FloatArray, at_lower: Flags, at_upper: Flags
+) -> FloatArray:
+    """Steps (n, n_x) that solve (J^T J + damping diag(J^T J)) step = -J^T r; none leads out of the box at a side."""
+    slopes = np.nan_to_num(slopes, posinf=0.0, neginf=0.0)
+    gradient = np.einsum("snk,sn->sk", slopes, residual)
+    held = (at_lower & (gradient > 0.0)) | (at_upper & (gradient < 0.0))
+    slopes = np.where(held[:, np.newaxis], 0.0, slopes)
+    normal = slopes.transpose(0, 2, 1) @ slopes
+    diagonal = np.einsum("sii->si", normal)
+    # a coordinate without slope keeps its place instead of making the matrix singular
+    floor = np.where(diagonal > 0.0, 1e-12 * diagonal.max(axis=1, keepdims=True), 1.0)
+    damped = normal + (damping[:, np.newaxis] * diagonal + floor)[..., np.newaxis] * np.eye(diagonal.shape[1])
+    return np.asarray(np.linalg.solve(damped, -np.where(held, 0.0, gradient)[..., np.newaxis])[..., 0])
 
 
 def polish(problem: Projection, start: FloatArray) -> Optimum:
