@@ -1,5 +1,7 @@
 """`identify` finds the global optimum, says what the data tell, and refuses what it cannot do."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -33,6 +35,19 @@ def test_a_perfect_line_is_fitted_without_a_warning():
     fit = hs.identify(hs.BoucWen, hs.Record(u=u, y=3.0 * u))
     assert fit.rmse < 1e-12
     assert fit.model.response(u) == pytest.approx(3.0 * u, abs=1e-10)
+
+
+def test_a_long_record_takes_little_memory():
+    """20 001 samples: what is held at once is a few hundred evaluations, never a square of the samples."""
+    t = np.linspace(0.0, 20.0, 20_001)
+    law = hs.BoucWen(beta=0.8, gamma=-0.3, feedthrough=0.7, gain=-0.5)
+    u = np.sin(2.1 * t) + 0.6 * np.sin(7.3 * t)
+    tracemalloc.start()
+    fit = hs.identify(hs.BoucWen, hs.Record(u=u, y=law.response(u)), fixed={"n": 1.0})
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert fit.model.beta == pytest.approx(0.8, abs=1e-5)
+    assert peak < 200e6
 
 
 def test_polynomial_input_is_given_back():

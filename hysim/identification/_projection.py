@@ -16,6 +16,8 @@ from hysim._frozen import FloatArray
 from hysim.models.search_space import Identifiable, Parameters, SearchSpace
 from hysim.records import Record
 
+_CHUNK = 200_000  # samples that are evaluated at once, to bound the memory
+_LARGEST = 1e150  # beyond it squares overflow: such a set counts as one that has escaped
 _RANK = 1e-11  # singular values of the normalised columns below this are taken as zero
 _DIFFERENCE = 1e-6  # step of a central difference in units of the box: truncation and rounding both ~1e-10
 
@@ -36,11 +38,20 @@ class Projection:
 
         A set that leaves the finite numbers has residuals of inf.
         """
+        size = max(1, _CHUNK // len(self.record))
+        parts = [
+            self._solve(x[k : k + size], None if weights is None else weights[k : k + size])
+            for k in range(0, len(x), size)
+        ]
+        linear, residuals = zip(*parts, strict=True)
+        return np.concatenate(linear), np.concatenate(residuals)
+
+    def _solve(self, x: FloatArray, weights: FloatArray | None) -> tuple[FloatArray, FloatArray]:
         columns, fixed_part = self.split(self.space.parameters(x))
         target = self.record.y - fixed_part
         if weights is not None:
             columns, target = columns * weights[..., np.newaxis], target * weights
-        broken = ~(np.isfinite(columns).all(axis=(1, 2)) & np.isfinite(target).all(axis=1))
+        broken = ~((np.abs(columns) < _LARGEST).all(axis=(1, 2)) & (np.abs(target) < _LARGEST).all(axis=1))
         columns[broken], target[broken] = 0.0, 0.0
         linear = self._regress(columns, target)
         residual = target - (columns @ linear[..., np.newaxis])[..., 0]

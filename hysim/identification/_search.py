@@ -5,6 +5,7 @@ own starts, descend by projected Levenberg-Marquardt steps, all of them in one b
 that come out best are polished one by one by SciPy's trust-region method.
 """
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -19,7 +20,7 @@ N_SCREENED = 4096
 N_DESCENDING = 64
 N_STEPS = 40
 N_POLISHED = 8
-_CHUNK = 256
+_LONG = 512  # samples beyond which fewer points are tried: each costs more, and longer records have fewer optima
 _APART = 0.05  # distance of two starts, in units of the box, under which the better one stands for both
 _SAME = 0.01  # likewise of two points after the descent
 _STUCK = 1e8  # damping beyond which no step can help
@@ -43,8 +44,10 @@ def optima(problem: Projection, *, seed: int, progress: Progress | None = None) 
     space = problem.space
     if not space.coordinates:
         return [polish(problem, np.empty(0))]
-    candidates = np.concatenate([space.starts, _uniform(space, N_SCREENED, seed)])
-    starts = _apart(space, candidates, _costs(problem, candidates), _APART, N_DESCENDING, len(space.starts))
+    share = min(1.0, _LONG / len(problem.record))
+    candidates = np.concatenate([space.starts, _uniform(space, max(256, round(N_SCREENED * share)), seed)])
+    n_starts = max(16, round(N_DESCENDING * share))
+    starts = _apart(space, candidates, _costs(problem, candidates), _APART, n_starts, len(space.starts))
     reached, cost = descend(problem, starts)
     found = []
     best = _apart(space, reached, cost, _SAME, N_POLISHED)
@@ -126,17 +129,17 @@ def polish(problem: Projection, start: FloatArray) -> Optimum:
 
 
 def _uniform(space: SearchSpace, n: int, seed: int) -> FloatArray:
-    """Spread `n` points over the box, a power of two, by a scrambled Sobol sequence."""
+    """Spread `n` points over the box by a scrambled Sobol sequence."""
     from scipy.stats import qmc
 
-    unit = qmc.Sobol(space.lower.size, rng=np.random.default_rng(seed)).random(n)
+    sequence = qmc.Sobol(space.lower.size, rng=np.random.default_rng(seed))
+    unit = sequence.random_base2(math.ceil(math.log2(n)))[:n]
     return np.asarray(space.lower + unit * (space.upper - space.lower))
 
 
 def _costs(problem: Projection, points: FloatArray) -> FloatArray:
-    """Sum of squares at each of the points (n, n_x), computed in chunks to bound the memory."""
-    chunks = [points[k : k + _CHUNK] for k in range(0, len(points), _CHUNK)]
-    return np.concatenate([np.sum(problem.solve(chunk)[1] ** 2, axis=1) for chunk in chunks])
+    """Sum of squares at each of the points (n, n_x)."""
+    return np.concatenate([np.sum(problem.solve(chunk)[1] ** 2, axis=1) for chunk in np.array_split(points, 16)])
 
 
 def _apart(

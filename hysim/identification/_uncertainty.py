@@ -36,12 +36,12 @@ def covariance(problem: Projection, x: FloatArray, residual: FloatArray) -> tupl
     jacobian[:, known], way_back[:, known] = 0.0, 0.0
     norms = np.linalg.norm(jacobian, axis=0)
     norms[norms == 0.0] = 1.0
-    _, singular, right = np.linalg.svd(jacobian / norms)
+    _, singular, right = np.linalg.svd(jacobian / norms, full_matrices=False)
     told = singular > _SINGULAR * singular[0]
     directions = way_back / norms @ right.T
-    spread = directions[:, : told.size][:, told] / singular[told]
+    spread = directions[:, told] / singular[told]
     result = float(residual @ residual) / freedom * spread @ spread.T
-    blind = np.abs(np.delete(directions, np.flatnonzero(told), axis=1)).max(axis=1, initial=0.0)
+    blind = np.abs(directions[:, ~told]).max(axis=1, initial=0.0)
     size = np.abs(directions).max(axis=1)
     lost = blind > 1e-3 * size
     if lost.any():

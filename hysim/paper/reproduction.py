@@ -138,7 +138,8 @@ def _tables(computed: Study) -> dict[str, str]:
     parameters: list[list[Any]] = [["model", "parameter", "value", "standard error"]]
     for name, fit in computed.fits.items():
         parameters += [[name, key, value, fit.stderr.get(key)] for key, value in fit.estimates.items()]
-    parameters += [["sindy", term, value, None] for term, value in computed.discovery.coefficients.items()]
+    found = {**computed.discovery.coefficients, "y0": computed.discovery.model.y0}
+    parameters += [["sindy", term, value, None] for term, value in found.items()]
     named = {"models": models, "outputs": outputs, "widths": widths, "parameters": parameters}
     return {f"tables/{name}.csv": _csv(table) for name, table in named.items()}
 
