@@ -9,6 +9,9 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
+Progress = Callable[[int, int], None]
+"""Called as ``progress(done, total)``."""
+
 
 def cores() -> int:
     """Number of processor cores that this process may use."""

@@ -13,11 +13,13 @@ import numpy as np
 
 from hysim import metrics
 from hysim._frozen import FloatArray, frozen
+from hysim._parallel import Progress
 from hysim.discovery import _pysindy
 from hysim.discovery._library import duhem_terms, regression
 from hysim.discovery._refinement import POLISH, Candidate, FreeRun, law
-from hysim.discovery._selection import SEARCHED, Progress, Search, preferred, thinned
+from hysim.discovery._selection import SEARCHED, Search, preferred, thinned
 from hysim.discovery._validation import cross_validated_rmse
+from hysim.identification.folds import folds
 from hysim.models.duhem import Duhem
 from hysim.records import Record
 
@@ -138,6 +140,8 @@ def discover(
     """
     if not isinstance(record, Record):
         raise TypeError(f"discover takes a Record, got {type(record).__name__}: hs.Record(u=u, y=y)")
+    if cross_validate is not None:
+        folds(cross_validate, len(record), name="cross_validate")
     problem = regression(record, duhem_terms(degree))
     path = _pysindy.sparse_path(problem)
     structures = [problem.kept(coefficients) for _, coefficients in path]

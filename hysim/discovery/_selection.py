@@ -20,12 +20,13 @@ Long records are searched on about SEARCHED of their samples, the reversals amon
 rate-independent law at a sample does not depend on the samples between it and the last reversal.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from hysim._frozen import FloatArray
+from hysim._parallel import Progress
 from hysim.discovery._library import Regression
 from hysim.discovery._refinement import Candidate, FreeRun, information, without
 from hysim.models.duhem_terms import Term
@@ -38,7 +39,6 @@ SEARCHED = 2000
 INDISTINCT = 2.0
 HOPELESS = 20.0  # BIC above the best, beyond which a structure is not followed further
 
-Progress = Callable[[int, int], None]
 Structure = tuple[Term, ...]
 
 

@@ -5,6 +5,7 @@ import numpy.typing as npt
 
 from hysim._frozen import read_only
 from hysim.discovery._refinement import POLISH, FreeRun, law
+from hysim.identification.folds import folds as blocks
 from hysim.models.duhem import Duhem
 from hysim.models.duhem_terms import Term
 from hysim.records import Record
@@ -89,11 +90,8 @@ def cross_validated_rmse(model: Duhem, record: Record, folds: str | int = "loo")
     True
     """
     n = len(record)
-    count = n if folds == "loo" else folds
-    if not isinstance(count, int) or isinstance(count, bool) or not 2 <= count <= n:
-        raise ValueError(f'folds must be "loo" or a number of blocks from 2 to {n}, got {folds!r}')
     errors = np.empty(n)
-    for block in np.array_split(np.arange(n), count):
+    for block in blocks(folds, n):
         weights = np.ones(n)
         weights[block] = 0.0
         refitted = refit(model, record, weights=weights, tolerance=_WARM)

@@ -6,18 +6,22 @@ from dataclasses import MISSING, fields, replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from hysim import metrics
 from hysim._frozen import FloatArray
+from hysim._parallel import Progress
 from hysim.identification._projection import Projection
 from hysim.identification._result import Candidate, Identification
-from hysim.identification._search import Optimum, Progress, descend, optima
+from hysim.identification._search import Optimum, descend, optima
 from hysim.identification._uncertainty import covariance
+from hysim.identification.folds import folds
 from hysim.models.search_space import Freedom, Identifiable
 from hysim.records import Record
 
 _AT_FOLD = 4  # a fold of the cross-validation begins from this many of the best optima
 _FOLD_TOLERANCE = 1e-7
+_SAMPLES_AT_ONCE = 1_000_000  # of all folds that descend together, to bound the memory
 
 
 def identify(
@@ -85,13 +89,15 @@ def identify(
     space = family.search_space(record, Freedom(fixed or {}, tuple(free), bounds or {}, initial))
     if len(record) < len(space.names):
         raise ValueError(f"{len(record)} samples cannot tell {len(space.names)} parameters: fix some of them")
-    folds = _folds(cross_validate, len(record))
+    left_out = [] if cross_validate is None else folds(cross_validate, len(record), name="cross_validate")
     problem = Projection(family, space, record)
     found = optima(problem, seed=seed, progress=progress)
     if not found:
         raise ValueError("no law in the box stays finite on this record: check its units, or give bounds")
     result = _describe(problem, found)
-    return replace(result, regions=_regions(problem, found[0], seed), cv_rmse=_cross_validated(problem, found, folds))
+    return replace(
+        result, regions=_regions(problem, found[0], seed), cv_rmse=_cross_validated(problem, found, left_out)
+    )
 
 
 def _family(model_or_class: Any) -> Identifiable:
@@ -187,29 +193,25 @@ def _indistinct(cost: float, best: float, n_samples: int, n_parameters: int) -> 
     return bool(n_samples * np.log(cost / best) < chi2.ppf(0.95, n_parameters))
 
 
-def _folds(cross_validate: str | int | None, n: int) -> list[FloatArray]:
-    if cross_validate is None:
-        return []
-    count = n if cross_validate == "loo" else cross_validate
-    if not isinstance(count, int) or isinstance(count, bool) or not 2 <= count <= n:
-        raise ValueError(
-            f'cross_validate must be None, "loo" or a number of blocks from 2 to {n}, got {cross_validate!r}'
-        )
-    return [np.asarray(block) for block in np.array_split(np.arange(n), count)]
-
-
-def _cross_validated(problem: Projection, found: list[Optimum], folds: list[FloatArray]) -> float:
+def _cross_validated(problem: Projection, found: list[Optimum], left_out: list[npt.NDArray[np.intp]]) -> float:
     """Rmse of the left-out samples: every fold descends from the best optima of the whole record."""
-    if not folds:
+    if not left_out:
         return float("nan")
+    at_once = max(1, _SAMPLES_AT_ONCE // (_AT_FOLD * len(problem.record)))
+    groups = [left_out[k : k + at_once] for k in range(0, len(left_out), at_once)]
+    return float(np.sqrt(np.mean(np.concatenate([_left_out_errors(problem, found, group) for group in groups]) ** 2)))
+
+
+def _left_out_errors(problem: Projection, found: list[Optimum], left_out: list[npt.NDArray[np.intp]]) -> FloatArray:
+    """Errors of the samples that each of some folds leaves out, one fold after the other."""
     starts = np.array([optimum.x for optimum in found[:_AT_FOLD]])
-    weights = np.ones((len(folds), len(problem.record)))
-    for fold, left_out in enumerate(folds):
-        weights[fold, left_out] = 0.0
+    weights = np.ones((len(left_out), len(problem.record)))
+    for fold, samples in enumerate(left_out):
+        weights[fold, samples] = 0.0
     each = np.repeat(weights, len(starts), axis=0)
-    reached, costs = descend(problem, np.tile(starts, (len(folds), 1)), each, tolerance=_FOLD_TOLERANCE)
-    best = np.arange(len(folds)) * len(starts) + costs.reshape(len(folds), -1).argmin(axis=1)
+    reached, costs = descend(problem, np.tile(starts, (len(left_out), 1)), each, tolerance=_FOLD_TOLERANCE)
+    best = np.arange(len(left_out)) * len(starts) + costs.reshape(len(left_out), -1).argmin(axis=1)
     linear = problem.solve(reached[best], weights)[0]
     columns, fixed_part = problem.split(problem.space.parameters(reached[best]))
     errors = problem.record.y - fixed_part - (columns @ linear[..., np.newaxis])[..., 0]
-    return float(np.sqrt(np.mean(errors[weights == 0.0] ** 2)))
+    return np.asarray(errors[weights == 0.0])

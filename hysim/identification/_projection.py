@@ -38,13 +38,17 @@ class Projection:
 
         A set that leaves the finite numbers has residuals of inf.
         """
-        size = max(1, _CHUNK // len(self.record))
-        parts = [
-            self._solve(x[k : k + size], None if weights is None else weights[k : k + size])
-            for k in range(0, len(x), size)
-        ]
+        parts = [self._solve(x[part], None if weights is None else weights[part]) for part in self._parts(len(x))]
         linear, residuals = zip(*parts, strict=True)
         return np.concatenate(linear), np.concatenate(residuals)
+
+    def costs(self, x: FloatArray) -> FloatArray:
+        """Sums of squares (n_sets,), without holding the residuals of all sets at once."""
+        return np.concatenate([np.sum(self._solve(x[part], None)[1] ** 2, axis=1) for part in self._parts(len(x))])
+
+    def _parts(self, n_sets: int) -> list[slice]:
+        size = max(1, _CHUNK // len(self.record))
+        return [slice(k, k + size) for k in range(0, n_sets, size)]
 
     def _solve(self, x: FloatArray, weights: FloatArray | None) -> tuple[FloatArray, FloatArray]:
         columns, fixed_part = self.split(self.space.parameters(x))

@@ -6,13 +6,13 @@ that come out best are polished one by one by SciPy's trust-region method.
 """
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
+from hysim._parallel import Progress
 from hysim.identification._projection import Projection
 from hysim.models.search_space import SearchSpace
 
@@ -27,7 +27,6 @@ _STUCK = 1e8  # damping beyond which no step can help
 _TOLERANCE = 1e-10
 _FLAT = 1e-15
 
-Progress = Callable[[int, int], None]
 Flags = npt.NDArray[np.bool_]
 
 
@@ -47,7 +46,7 @@ def optima(problem: Projection, *, seed: int, progress: Progress | None = None) 
     share = min(1.0, _LONG / len(problem.record))
     candidates = np.concatenate([space.starts, _uniform(space, max(256, round(N_SCREENED * share)), seed)])
     n_starts = max(16, round(N_DESCENDING * share))
-    starts = _apart(space, candidates, _costs(problem, candidates), _APART, n_starts, len(space.starts))
+    starts = _apart(space, candidates, problem.costs(candidates), _APART, n_starts, len(space.starts))
     reached, cost = descend(problem, starts)
     found = []
     best = _apart(space, reached, cost, _SAME, N_POLISHED)
@@ -135,11 +134,6 @@ def _uniform(space: SearchSpace, n: int, seed: int) -> FloatArray:
     sequence = qmc.Sobol(space.lower.size, rng=np.random.default_rng(seed))
     unit = sequence.random_base2(math.ceil(math.log2(n)))[:n]
     return np.asarray(space.lower + unit * (space.upper - space.lower))
-
-
-def _costs(problem: Projection, points: FloatArray) -> FloatArray:
-    """Sum of squares at each of the points (n, n_x)."""
-    return np.concatenate([np.sum(problem.solve(chunk)[1] ** 2, axis=1) for chunk in np.array_split(points, 16)])
 
 
 def _apart(
