@@ -19,6 +19,9 @@ from hysim.metrics import LoopMetrics, loop_metrics
 from hysim.records import Record
 from hysim.simulation import simulate
 
+_SHORT = 200  # samples; leaving one out at a time costs as many fits as there are samples
+_BLOCKS = 10
+
 
 @frozen
 class ComparisonRow:
@@ -142,7 +145,7 @@ class Comparison:
         ]
 
 
-def compare(subjects: Mapping[str, Any], record: Record, *, cross_validate: str | int | None = "loo") -> Comparison:
+def compare(subjects: Mapping[str, Any], record: Record, *, cross_validate: str | int | None = "auto") -> Comparison:
     """Compare models on a record.
 
     Parameters
@@ -152,8 +155,9 @@ def compare(subjects: Mapping[str, Any], record: Record, *, cross_validate: str 
         `discover`; or a class or structure, which is identified on the record.
     record : Record
         With at least one complete cycle of the input.
-    cross_validate : {None, "loo"} or int
-        How the classes and structures are cross-validated; see `identify`.
+    cross_validate : {"auto", "loo", None} or int
+        How the classes and structures are cross-validated; see `identify`. ``"auto"`` leaves one sample out at
+        a time on records of up to 200 samples, and one of 10 blocks on longer ones.
 
     Returns
     -------
@@ -179,6 +183,8 @@ def compare(subjects: Mapping[str, Any], record: Record, *, cross_validate: str 
         raise TypeError(f"compare takes a Record, got {type(record).__name__}: hs.Record(u=u, y=y)")
     if not subjects:
         raise ValueError("there is nothing to compare: give at least one model by name")
+    if cross_validate == "auto":
+        cross_validate = "loo" if len(record) <= _SHORT else _BLOCKS
     measured = loop_metrics(record.u, record.y)
     rows = [_row(name, subject, record, measured, cross_validate) for name, subject in subjects.items()]
     return Comparison(record=record, loop=measured, rows=tuple(rows))

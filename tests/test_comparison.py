@@ -80,6 +80,13 @@ def test_tables_hold_every_row(comparison):
     assert all(line.count("|") == markdown[0].count("|") for line in markdown)
 
 
+def test_long_records_are_cross_validated_by_blocks():
+    u = hs.signals.triangle(0.0, 1.0, cycles=3, samples_per_cycle=80)
+    record = hs.Record(u=u, y=hs.BoucWen(beta=2.0, gamma=0.5).response(u))
+    row = hs.compare({"line": hs.Line}, record)["line"]
+    assert row.cv_rmse == hs.identify(hs.Line, record, cross_validate=10).cv_rmse
+
+
 def test_without_a_resolution_there_are_no_quanta(table1):
     bare = hs.Record(u=table1.u, y=table1.y)
     header = hs.compare({"line": hs.Line}, bare).to_csv().splitlines()[0]
