@@ -128,6 +128,9 @@ def test_a_sign_is_a_bound_too(table1):
     assert fit.fit_percent > 90.0
     with pytest.raises(ValueError, match="from zero to infinity"):
         hs.identify(hs.BoucWen, table1, bounds={"beta": (1.0, np.inf)})
+    for pair in ((0.0, 2.0), (-np.inf, 0.0), (-1.0, 3.0)):
+        with pytest.raises(ValueError, match="bounds of 'n' must be positive"):
+            hs.identify(hs.BoucWen, table1, bounds={"n": pair})
 
 
 def test_rest_holds_the_memory_at_zero(table1):

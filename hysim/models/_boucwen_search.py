@@ -55,6 +55,8 @@ def search_space(
     """
     held = freedom.held(defaults, redundant=REDUNDANT, at_rest=("z0",) if freedom.starts_at_rest() else ())
     bounds = freedom.limits(defaults, held)
+    if "n" in bounds and not (bounds["n"][0] >= 0.0 and (bounds["n"][0] > 0.0 or np.isinf(bounds["n"][1]))):
+        raise ValueError(f"bounds of 'n' must be positive, got {bounds['n']}")
     signs = {name: pair for name, pair in bounds.items() if name in _MEMORY and np.isinf(pair).any()}
     limits = {name: pair for name, pair in bounds.items() if name in _MEMORY and name not in signs}
     chart = _chart({**defaults, **held}, frozenset(defaults) - frozenset(held), limits, frozenset(signs), record)
