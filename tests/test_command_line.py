@@ -1,7 +1,6 @@
 """`hysim reproduce` writes whole files, the same bytes each time, and fails in one line."""
 
 import json
-import os
 import re
 import subprocess
 import sys
@@ -131,7 +130,12 @@ def test_an_interruption_exits_with_130(tmp_path, monkeypatch, capsys):
     assert not list((tmp_path / "out").iterdir())
 
 
-@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root may write everywhere")
-def test_a_read_only_folder_is_refused_before_anything_is_computed(tmp_path, capsys):
-    tmp_path.chmod(0o500)
+def test_a_read_only_folder_is_refused_before_anything_is_computed(tmp_path, monkeypatch, capsys):
+    def refused(*_, **__):
+        raise PermissionError(13, "Permission denied", str(tmp_path))
+
+    monkeypatch.setattr("hysim.paper.reproduction.tempfile.TemporaryFile", refused)
+    monkeypatch.setattr("hysim.paper.reproduction.study", lambda **_: pytest.fail("computed all the same"))
     assert main(["reproduce", "--out", str(tmp_path)]) == 2
+    assert capsys.readouterr().err == f"hysim: error: {tmp_path}: Permission denied\n"
+    assert not list(tmp_path.iterdir())
