@@ -115,7 +115,8 @@ class _BoucWenLaw(ABC):
         Raises
         ------
         SimulationError
-            If the memory escapes to infinity, which takes beta + gamma < 0; it names the sample.
+            If the memory escapes to infinity, which takes beta + gamma < 0, or beta - gamma < 0 and a memory
+            beyond its bound; it names the sample.
         ValueError
             If u is not finite or has not one axis.
         """

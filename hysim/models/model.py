@@ -5,7 +5,7 @@ compared by value. Evolving state is separate: it is passed in and handed back.
 """
 
 from collections.abc import Callable
-from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar, dataclass_transform
+from typing import Any, ClassVar, NamedTuple, Protocol, TypeGuard, TypeVar, dataclass_transform
 
 from hysim._frozen import FloatArray, checked
 
@@ -30,18 +30,6 @@ class CompiledLaw(NamedTuple):
     state: FloatArray
 
 
-class Law(Protocol):
-    """A rate-independent hysteresis law: its output depends on the path of the input, not on time."""
-
-    def response(self, u: FloatArray) -> FloatArray:
-        """Output at the samples of the piecewise-linear input `u`, shape (n,)."""
-        ...
-
-    def advance(self, u: FloatArray, state: Any) -> tuple[FloatArray, Any]:
-        """Output at the samples of `u`, continued from `state`, and the state after the last sample."""
-        ...
-
-
 class Dynamic(Protocol):
     """A plant whose output depends on time; it says so by `dynamic = True`."""
 
@@ -52,6 +40,6 @@ class Dynamic(Protocol):
         ...
 
 
-def needs_time(plant: Any) -> bool:
+def needs_time(plant: Any) -> TypeGuard[Dynamic]:
     """Whether a plant is `Dynamic`."""
     return bool(getattr(plant, "dynamic", False))
