@@ -174,7 +174,10 @@ def scaled_flow(
         if c < 0.0 and power * _NEGLIGIBLE > 1.0:
             return power_flow(w, c, n, length), 0.0
         h = min(length, _STEP * w / (max(n, 1.0) * (1.0 + power)))
-        w = taylor_step(w, a, c, n, h, scratch)
+        following = taylor_step(w, a, c, n, h, scratch)
+        if following == w:  # at the balance to rounding, where every further step would be the same
+            return w, 0.0
+        w = following
         length -= h
     return w, 0.0
 
