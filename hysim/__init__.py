@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
 
-_MODULES = ("datasets", "metrics", "plot", "signals")
+_MODULES = ("control", "datasets", "metrics", "plot", "signals")
 _HOME = {
     "Record": "hysim.records",
     "load": "hysim.files",
@@ -19,6 +19,12 @@ _HOME = {
     "Identification": "hysim.identification",
     "discover": "hysim.discovery",
     "Discovery": "hysim.discovery",
+    "PID": "hysim.control",
+    "close_loop": "hysim.control",
+    "ClosedLoop": "hysim.control",
+    "tune": "hysim.control",
+    "Tuning": "hysim.control",
+    "to_control": "hysim.control",
     "compare": "hysim.comparison",
     "Comparison": "hysim.comparison",
     "loop_metrics": "hysim.metrics",
@@ -27,6 +33,7 @@ _HOME = {
     "PolynomialBoucWen": "hysim.models.boucwen",
     "Duhem": "hysim.models.duhem",
     "TransferFunction": "hysim.models.transfer_function",
+    "Actuator": "hysim.models.actuator",
     "Line": "hysim.models.static",
     "SingleValued": "hysim.models.static",
     "save": "hysim.models.storage",
@@ -37,12 +44,19 @@ _HOME = {
 __all__ = ["__version__", *_MODULES, *_HOME]
 
 if TYPE_CHECKING:
+    from hysim import control as control
     from hysim import datasets as datasets
     from hysim import metrics as metrics
     from hysim import plot as plot
     from hysim import signals as signals
     from hysim.comparison import Comparison as Comparison
     from hysim.comparison import compare as compare
+    from hysim.control import PID as PID
+    from hysim.control import ClosedLoop as ClosedLoop
+    from hysim.control import Tuning as Tuning
+    from hysim.control import close_loop as close_loop
+    from hysim.control import to_control as to_control
+    from hysim.control import tune as tune
     from hysim.discovery import Discovery as Discovery
     from hysim.discovery import discover as discover
     from hysim.errors import SimulationError as SimulationError
@@ -51,6 +65,7 @@ if TYPE_CHECKING:
     from hysim.identification import identify as identify
     from hysim.metrics import LoopMetrics as LoopMetrics
     from hysim.metrics import loop_metrics as loop_metrics
+    from hysim.models.actuator import Actuator as Actuator
     from hysim.models.boucwen import BoucWen as BoucWen
     from hysim.models.boucwen import PolynomialBoucWen as PolynomialBoucWen
     from hysim.models.duhem import Duhem as Duhem

@@ -88,6 +88,9 @@ def _coercions(cls: type, finite: bool) -> dict[str, Callable[[Any, str], Any]]:
     rules: dict[Any, Callable[[Any, str], Any]] = {
         float: functools.partial(_as_float, finite=finite),
         tuple[float, ...]: functools.partial(_as_float_tuple, finite=finite),
+        tuple[float, ...] | None: lambda value, name: (
+            None if value is None else _as_float_tuple(value, name, finite=finite)
+        ),
         FloatArray: functools.partial(read_only, finite=finite),
         FloatArray | None: lambda value, name: None if value is None else read_only(value, name, finite=finite),
         float | None: lambda value, name: None if value is None else _as_float(value, name, finite=finite),

@@ -19,6 +19,9 @@ MODELS = [
     hs.TransferFunction(num=(1 / 3,), den=(1.0, 2.0), delay=0.1, sample="end"),
     hs.Line(offset=0.1, slope=1e-300),
     hs.SingleValued(u=[0.0, 0.1], y=[1 / 3, 2.0]),
+    hs.Actuator(hysteresis=hs.BoucWen(n=1.7), vibration=hs.TransferFunction(num=(1.0,), den=(1.0, 0.1, 3.0))),
+    hs.PID(kp=1 / 3, ki=0.1, limits=(0.0, 125.0)),
+    hs.PID(kd=-0.0, tracking_time=0.1),
 ]
 
 
@@ -65,14 +68,14 @@ def test_a_typo_in_a_parameter_is_an_error(model):
         ("", "does not hold a model"),
         ("[1, 2]", "does not hold a model"),
         ("{}", "does not hold a model"),
-        ('{"family": "Preisach", "parameters": {}}', "family 'Preisach'; there are BoucWen, "),
+        ('{"family": "Preisach", "parameters": {}}', "family 'Preisach'; there are Actuator, BoucWen, "),
         ('{"family": "BoucWen", "parameters": {"bta": 1}}', "bta"),
         ('{"family": "BoucWen", "parameters": {"beta": NaN}}', "beta must be finite"),
         ('{"family": "BoucWen", "parameters": {"beta": "much"}}', "beta must be a number"),
         ('{"family": "Line", "parameters": 3}', "does not hold a model"),
         ('{"family": "Line", "parameters": []}', "does not hold a model"),
         ('{"family": "Line", "parameters": {"slope": 1}}', "offset missing"),
-        ('{"family": ["Line"], "parameters": {}}', "there are BoucWen, "),
+        ('{"family": ["Line"], "parameters": {}}', "there are Actuator, BoucWen, "),
     ],
 )
 def test_a_file_without_a_model_is_named(tmp_path, text, message):

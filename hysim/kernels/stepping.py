@@ -26,3 +26,9 @@ def drive(step: Step, parameters: FloatArray, state: FloatArray, u: FloatArray, 
         if not abs(out[k]) < 1.7976931348623157e308:
             return k
     return -1
+
+
+@signed_kernel(float64(CONSTANTS, VECTOR, float64))
+def line(parameters: FloatArray, state: FloatArray, u: float) -> float:
+    """The law without memory, `parameters` (offset, slope)."""
+    return float(parameters[0] + parameters[1] * u)

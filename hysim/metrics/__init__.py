@@ -1,6 +1,28 @@
-"""Arrays to numbers: the measures of loops and of fits, each defined once."""
+"""Arrays to numbers: the measures of loops, of fits and of responses to a step, each defined once."""
 
 from hysim.metrics._fit import aic, bic, fit_percent, fpe, nrmse, rmse
 from hysim.metrics._loop import LoopMetrics, loop_metrics, width_rmse
+from hysim.metrics._steps import (
+    StepMetrics,
+    VibrationReduction,
+    reduction_percent,
+    step_metrics,
+    vibration_reduction,
+)
 
-__all__ = ["LoopMetrics", "aic", "bic", "fit_percent", "fpe", "loop_metrics", "nrmse", "rmse", "width_rmse"]
+__all__ = [
+    "LoopMetrics",
+    "StepMetrics",
+    "VibrationReduction",
+    "aic",
+    "bic",
+    "fit_percent",
+    "fpe",
+    "loop_metrics",
+    "nrmse",
+    "reduction_percent",
+    "rmse",
+    "step_metrics",
+    "vibration_reduction",
+    "width_rmse",
+]

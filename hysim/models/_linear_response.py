@@ -18,17 +18,11 @@ def affine_columns(
     `monic` (n_sets, n) holds the denominators without their leading one, in seconds.
     """
     n_sets, n = monic.shape
-    degrees = np.arange(1, n + 1)
     late = min(delay / sample_time, float(u.size))
     begin, end, lengths = _pieces(u, late, hold)
     with np.errstate(all="ignore"):
-        rate = np.max(np.abs(monic) ** (1.0 / degrees), axis=1, initial=1.0 / sample_time)[:, np.newaxis]
-        scaled = monic / rate**degrees
-        F = np.zeros((n_sets, n, n))
-        F[:, np.arange(n - 1), np.arange(1, n)] = 1.0
-        F[:, n - 1 :, :] = -scaled[:, np.newaxis, ::-1]
-        spans = rate * sample_time * lengths
-        A, B0, B1 = _transitions(F, spans)
+        F, rate, scaled = scaled_companion(monic, sample_time)
+        A, B0, B1 = transitions(F, rate * sample_time * lengths)
         forced, free = np.empty((2, n_sets, u.size + 1, n))
         kernels.states(A, B0, B1, begin, end, np.zeros((n_sets, n)), forced)
         kernels.free_responses(A[:, 0] if lengths.size == 1 else A[:, 1] @ A[:, 0], free)
@@ -36,12 +30,24 @@ def affine_columns(
         x = forced[:, at, ::-1]
         through = end[:, -1] if sample == "end" else begin[:, 0]
         feedthrough = through - (x @ scaled[..., np.newaxis])[..., 0]
-        back = rate[:, np.newaxis] ** -degrees
+        back = rate[:, np.newaxis] ** -np.arange(1, n + 1)
         from_state = free[:, at] * back * rate[..., np.newaxis]
         return np.concatenate([feedthrough[..., np.newaxis], x * back, from_state], axis=-1)
 
 
-def _transitions(F: FloatArray, spans: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def scaled_companion(monic: FloatArray, sample_time: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Companion matrices F, the rates that scale time (n_sets, 1), and the scaled coefficients (n_sets, n)."""
+    n_sets, n = monic.shape
+    degrees = np.arange(1, n + 1)
+    rate = np.max(np.abs(monic) ** (1.0 / degrees), axis=1, initial=1.0 / sample_time)[:, np.newaxis]
+    scaled = monic / rate**degrees
+    F = np.zeros((n_sets, n, n))
+    F[:, np.arange(n - 1), np.arange(1, n)] = 1.0
+    F[:, n - 1 :, :] = -scaled[:, np.newaxis, ::-1]
+    return F, rate, scaled
+
+
+def transitions(F: FloatArray, spans: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """A, B0 and B1 of x' = F x + (0, ..., 0, v) over each of the spans (n_sets, n_pieces); see `kernels.linear`."""
     n = F.shape[-1]
     generators = np.zeros((*spans.shape, n + 2, n + 2))

@@ -12,7 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim.models.model import model
+from hysim.kernels import stepping
+from hysim.models.model import CompiledLaw, model
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
@@ -41,6 +42,10 @@ class Line:
     def response(self, u: npt.ArrayLike) -> FloatArray:
         """Output at the samples of `u`, shape (n,)."""
         return self.offset + self.slope * read_only(u, "u", ndim=1)
+
+    def compiled(self, u0: float = 0.0) -> CompiledLaw:
+        """The line as compiled loops take it; it has no state, whatever the input `u0` before."""
+        return CompiledLaw(stepping.line, read_only([self.offset, self.slope]), np.empty(0))
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """Nothing to search: both parameters are linear."""

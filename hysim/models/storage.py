@@ -1,4 +1,7 @@
-"""Models to and from JSON: the version of hysim, the family, the parameters, the units."""
+"""Models to and from JSON: the version of hysim, the family, the parameters, the units.
+
+A model inside another, such as the law of an actuator, is a family with its parameters in its place.
+"""
 
 import importlib
 import json
@@ -9,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from hysim import __version__
+import hysim
 from hysim._atomic import write_text
 from hysim.models.model import FAMILIES
 
-_MODULES = ("boucwen", "duhem", "static", "transfer_function")
+_MODULES = ("actuator", "boucwen", "duhem", "static", "transfer_function")
 
 
 def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None) -> None:
@@ -43,15 +46,9 @@ def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None
     ...     hs.load_model(f"{folder}/line.json")
     Line(offset=0.0, slope=0.1)
     """
-    family = type(model).__name__
-    if FAMILIES.get(family) not in (type(model),):
-        raise TypeError(f"save takes a model of hysim, got {family}")
-    document = {
-        "hysim": __version__,
-        "family": family,
-        "parameters": {field.name: _plain(getattr(model, field.name)) for field in fields(model)},
-        "units": dict(units or {}),
-    }
+    if not _is_model(model):
+        raise TypeError(f"save takes a model of hysim, got {type(model).__name__}")
+    document = {"hysim": hysim.__version__, **_plain(model), "units": dict(units or {})}
     write_text(path, json.dumps(document, indent=2, allow_nan=False) + "\n")
 
 
@@ -78,19 +75,39 @@ def load_model(path: str | Path) -> Any:
         importlib.import_module(f"hysim.models.{module}")
     try:
         document = json.loads(Path(path).read_text(encoding="utf-8"))
-        family, parameters = str(document["family"]), {**document["parameters"]}
+        head = {"family": document["family"], "parameters": {**document["parameters"]}}
     except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise ValueError(f"{path} does not hold a model of hysim: {type(error).__name__}: {error}") from None
+    return _model(head, path)
+
+
+def _model(document: Mapping[str, Any], path: str | Path) -> Any:
+    """The model of a family with its parameters, models among them."""
+    family, given = str(document["family"]), document["parameters"]
+    if family in hysim.__all__:
+        getattr(hysim, family)  # loads its module, which enters the families that live elsewhere
     if family not in FAMILIES:
         raise ValueError(f"{path} holds a model of the family {family!r}; there are {', '.join(sorted(FAMILIES))}")
     try:
+        parameters = {name: _model(value, path) if _is_nested(value) else value for name, value in given.items()}
         loaded = FAMILIES[family](**parameters)
-    except (TypeError, ValueError) as error:
+    except (AttributeError, TypeError, ValueError) as error:
         raise ValueError(f"{path} does not hold a {family}: {error}") from None
     if missing := [field.name for field in fields(loaded) if field.name not in parameters]:
         raise ValueError(f"{path} does not hold a whole {family}: {', '.join(missing)} missing")
     return loaded
 
 
+def _is_model(value: Any) -> bool:
+    return FAMILIES.get(type(value).__name__) is type(value)
+
+
+def _is_nested(value: Any) -> bool:
+    return isinstance(value, dict) and value.keys() == {"family", "parameters"}
+
+
 def _plain(value: Any) -> Any:
+    if _is_model(value):
+        parameters = {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
+        return {"family": type(value).__name__, "parameters": parameters}
     return value.tolist() if isinstance(value, np.ndarray) else list(value) if isinstance(value, tuple) else value

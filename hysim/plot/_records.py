@@ -31,6 +31,21 @@ class InputOutput(Protocol):
     def y(self) -> FloatArray: ...
 
 
+class Response(Protocol):
+    """What can be drawn as a response: a closed loop or the like."""
+
+    @property
+    def t(self) -> FloatArray: ...
+    @property
+    def reference(self) -> FloatArray: ...
+    @property
+    def y(self) -> FloatArray: ...
+    @property
+    def measurement(self) -> FloatArray: ...
+    @property
+    def units(self) -> Mapping[str, str]: ...
+
+
 def loop(*results: InputOutput, ax: Axes | None = None) -> Axes:
     """Draw outputs against inputs, over each other.
 
@@ -151,6 +166,34 @@ def traces(
         if len(series) > 1:
             axes.legend()
     return axes
+
+
+def response(run: Response, ax: Axes | None = None) -> Axes:
+    """Draw what a closed loop made of its reference, against time.
+
+    Parameters
+    ----------
+    run : ClosedLoop, or anything with t, reference, y, measurement and units
+        The measurement is drawn where it is not the true displacement.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+
+    Examples
+    --------
+    >>> import numpy as np, hysim as hs
+    >>> lag, t = hs.TransferFunction(num=(1.0,), den=(1.0, 1.0)), np.arange(0.0, 5.0, 0.01)
+    >>> run = hs.close_loop(lag, hs.PID(kp=4.0, ki=4.0), t, np.ones(t.size), units={"t": "s", "y": "um"})
+    >>> hs.plot.response(run, hs.plot.figure().add_subplot()).get_ylabel()
+    'Displacement [µm]'
+    """
+    series = {"reference": (run.t, run.reference), "displacement": (run.t, run.y)}
+    if not np.array_equal(run.measurement, run.y):
+        series["measurement"] = (run.t, run.measurement)
+    return traces(series, ax, units=run.units)
 
 
 def _arrows(ax: Axes, result: InputOutput, colour: Any) -> None:

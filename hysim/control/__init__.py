@@ -1,0 +1,31 @@
+"""Controllers, the loops they close, and what these loops achieve."""
+
+from hysim.control._assessment import (
+    HysteresisAssessment,
+    SquareWaveAssessment,
+    StepAssessment,
+    assess_hysteresis,
+    assess_square_wave,
+    assess_step,
+)
+from hysim.control._loop import ClosedLoop, close_loop
+from hysim.control._margins import LinearLoop
+from hysim.control._pid import PID
+from hysim.control._to_control import to_control
+from hysim.control._tune import Tuning, tune
+
+__all__ = [
+    "PID",
+    "ClosedLoop",
+    "HysteresisAssessment",
+    "LinearLoop",
+    "SquareWaveAssessment",
+    "StepAssessment",
+    "Tuning",
+    "assess_hysteresis",
+    "assess_square_wave",
+    "assess_step",
+    "close_loop",
+    "to_control",
+    "tune",
+]

@@ -1,0 +1,218 @@
+"""PID with two degrees of freedom, as it runs on a sampled controller.
+
+In continuous time, with the error e = r - y:
+
+    u = kp (b r - y) + ki integral e dt + kd d/dt (c r - y) / (1 + T_f s),    within the limits
+
+The paper's standard form (17), u = Kp (e + 1/Ti integral e dt + Td de/dt), is kp = Kp, ki = Kp / Ti,
+kd = Kp Td, with b = c = 1 and T_f = 0. How it is sampled is written in `hysim.kernels.controllers`.
+"""
+
+import math
+from typing import NamedTuple, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, read_only
+from hysim.kernels import controllers as kernels
+from hysim.models.model import model
+
+State = tuple[float, float, float, float]
+"""Last command before the limits, integral part, derivative part, and last c r - y."""
+
+
+class CompiledController(NamedTuple):
+    """A controller as loops take it: `u = step(parameters, state, reference, measurement)`."""
+
+    step: object
+    parameters: FloatArray
+    state: FloatArray
+
+
+@model
+class PID:
+    """Sampled PID controller with limits, anti-windup and a filtered derivative.
+
+    Parameters
+    ----------
+    kp : float
+        Proportional gain [unit of u / unit of y].
+    ki, kd : float
+        Gains of the integral [unit of u / (unit of y s)] and of the derivative [unit of u s / unit of y].
+    derivative_filter : float
+        Time constant T_f of the derivative's first-order filter [s]; 0 for none.
+    limits : (float, float), optional
+        Lowest and highest voltage; None for none [unit of u].
+    tracking_time : float, optional
+        Time in which the integral gives way while the voltage is limited [s]; by default sqrt(Ti Td), and Ti
+        without a derivative. Not below a sample time. Without an integral there is nothing to wind up.
+    setpoint_weight : float
+        b, the part of the reference that the proportional action sees.
+    derivative_weight : float
+        c, the part that the derivative sees: 0 differentiates the measurement alone, so that a step of the
+        reference gives no kick; 1 differentiates the error.
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite, a time is negative, or the limits are not an interval.
+
+    Notes
+    -----
+    The gains have the sign of the plant's gain. `advance` starts, and a loop starts, without a bump: as if
+    the controller had held the resting voltage at the resting displacement for ever.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> hs.PID.standard(2.0, Ti=4.0, Td=0.5) == hs.PID(kp=2.0, ki=0.5, kd=1.0)
+    True
+    """
+
+    kp: float = 0.0
+    ki: float = 0.0
+    kd: float = 0.0
+    derivative_filter: float = 0.0
+    limits: tuple[float, ...] | None = None
+    tracking_time: float | None = None
+    setpoint_weight: float = 1.0
+    derivative_weight: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.derivative_filter < 0.0:
+            raise ValueError(f"derivative_filter is a time and must not be negative, got {self.derivative_filter}")
+        if self.tracking_time is not None and self.tracking_time < 0.0:
+            raise ValueError(f"tracking_time must not be negative, got {self.tracking_time}")
+        if self.limits is not None and not (len(self.limits) == 2 and self.limits[0] <= self.limits[1]):
+            raise ValueError(f"limits must be (lowest, highest), got {self.limits}")
+
+    @classmethod
+    def standard(
+        cls,
+        Kp: float,
+        Ti: float = math.inf,
+        Td: float = 0.0,
+        *,
+        derivative_filter: float = 0.0,
+        limits: tuple[float, float] | None = None,
+        tracking_time: float | None = None,
+        setpoint_weight: float = 1.0,
+        derivative_weight: float = 0.0,
+    ) -> Self:
+        """The PID in its standard form, u = Kp (e + 1/Ti integral e dt + Td de/dt).
+
+        Parameters
+        ----------
+        Kp : float
+            Gain [unit of u / unit of y].
+        Ti, Td : float
+            Integral time, infinite for none, and derivative time [s].
+        derivative_filter, limits, tracking_time, setpoint_weight, derivative_weight
+            As in the constructor.
+
+        Raises
+        ------
+        ValueError
+            If Ti is not positive, or as the constructor.
+        """
+        if not Ti > 0.0:
+            raise ValueError(f"Ti must be positive, got {Ti}: an infinite one leaves the integral out")
+        return cls(
+            kp=Kp,
+            ki=Kp / Ti,
+            kd=Kp * Td,
+            derivative_filter=derivative_filter,
+            limits=limits,
+            tracking_time=tracking_time,
+            setpoint_weight=setpoint_weight,
+            derivative_weight=derivative_weight,
+        )
+
+    def start(self, u: float = 0.0, y: float = 0.0) -> State:
+        """The state of a controller that has held the voltage `u` at the displacement `y` for ever."""
+        return u, u - self.kp * (self.setpoint_weight - 1.0) * y, 0.0, (self.derivative_weight - 1.0) * y
+
+    def advance(
+        self, reference: npt.ArrayLike, measurement: npt.ArrayLike, sample_time: float, state: State | None = None
+    ) -> tuple[FloatArray, State]:
+        """Voltages for the samples of a reference and of a measurement.
+
+        Parameters
+        ----------
+        reference, measurement : array, shape (n,)
+            [unit of y]
+        sample_time : float
+            Time between two samples [s].
+        state : State, optional
+            To continue from; by default `start` at no voltage and at the first measurement.
+
+        Returns
+        -------
+        u : array, shape (n,)
+            Voltages within the limits, the same bits as in a loop.
+        state : State
+            After the last sample.
+
+        Raises
+        ------
+        ValueError
+            If lengths differ, a value is not finite, or the sample time is not positive.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> u, state = hs.PID(kp=1.0, ki=0.5).advance([1.0, 1.0], [0.0, 0.0], sample_time=1.0)
+        >>> u.tolist(), state[1]
+        ([1.0, 1.5], 1.0)
+        """
+        r, y = read_only(reference, "reference", ndim=1), read_only(measurement, "measurement", ndim=1)
+        if r.size != y.size:
+            raise ValueError(f"reference and measurement must have equal lengths, got {r.size} and {y.size}")
+        begin = self.start(y=float(y[0]) if y.size else 0.0) if state is None else state
+        moving = np.array(begin, dtype=float)
+        command, u = np.empty((2, r.size))
+        step, parameters, _ = self.compiled(sample_time)
+        kernels.replay(step, parameters, moving, r, y, command, u)
+        last, integral, derivative, seen = moving.tolist()
+        return u, (last, integral, derivative, seen)
+
+    def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
+        """From the negative measurement to the command, as the sampled controller has it; limits apart.
+
+        Parameters
+        ----------
+        frequency : array, any shape
+            Not zero where there is an integral [rad/s].
+        sample_time : float
+            [s]
+
+        Returns
+        -------
+        array of complex
+        """
+        z = np.exp(1j * np.asarray(frequency, dtype=float) * sample_time)
+        lag = self.derivative_filter + sample_time
+        derivative = self.kd / lag * (z - 1.0) / (z - self.derivative_filter / lag)
+        integral = self.ki * sample_time / (z - 1.0) if self.ki else 0.0
+        return np.asarray(self.kp + integral + derivative)
+
+    def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
+        """The controller as compiled loops take it, at rest at `u0` and `y0`."""
+        if not 0.0 < sample_time < math.inf:
+            raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
+        lowest, highest = self.limits or (-math.inf, math.inf)
+        lag = self.derivative_filter + sample_time
+        parameters = [
+            self.kp, self.ki * sample_time, self.kd / lag, self.derivative_filter / lag, self.setpoint_weight,
+            self.derivative_weight, lowest, highest, self._tracking(sample_time),
+        ]  # fmt: skip
+        return CompiledController(kernels.pid, read_only(parameters, finite=False), np.array(self.start(u0, y0)))
+
+    def _tracking(self, sample_time: float) -> float:
+        """h / T_t, at most one."""
+        if self.ki == 0.0:
+            return 0.0
+        given = self.tracking_time
+        squared = self.kd / self.ki if self.kd else (self.kp / self.ki) ** 2
+        return sample_time / max(sample_time, math.sqrt(abs(squared)) if given is None else given)

@@ -1,0 +1,96 @@
+"""The verb `to_control`: plants and controllers as systems of python-control."""
+
+from typing import Any
+
+import numpy as np
+
+from hysim.control._loop import as_actuator
+from hysim.control._pid import PID
+from hysim.models.transfer_function import TransferFunction
+
+
+def to_control(plant: Any, sample_time: float | None = None) -> Any:
+    """A linear plant or a PID as a system of python-control.
+
+    Parameters
+    ----------
+    plant : TransferFunction, Actuator without a law, or PID
+        A PID becomes the system from its error to its command, without limits; its derivative acts on the
+        error, which leaves its loop's poles as they are.
+    sample_time : float, optional
+        Of the system's discrete form, exact under the hold [s]; by default it stays continuous.
+
+    Returns
+    -------
+    control.TransferFunction or control.StateSpace
+
+    Raises
+    ------
+    TypeError
+        If there is no linear system.
+    ValueError
+        If a plant with a dead time is to stay continuous, or a pure derivative is.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> lag = hs.TransferFunction(num=(1.0,), den=(1.0, 1.0))
+    >>> loop = hs.to_control(lag) * hs.to_control(hs.PID(kp=4.0))
+    >>> round(float((loop / (1 + loop)).dcgain()), 3)
+    0.8
+    """
+    if isinstance(plant, PID):
+        return _pid(plant, sample_time)
+    actuator = as_actuator(plant)
+    if actuator.hysteresis is not None:
+        raise TypeError(f"a {type(actuator.hysteresis).__name__} is not linear")
+    return _continuous(actuator.vibration) if sample_time is None else _discrete(actuator, sample_time)
+
+
+def _continuous(plant: TransferFunction | None) -> Any:
+    import control
+
+    if plant is None:
+        return control.tf([1.0], [1.0])
+    if plant.delay:
+        raise ValueError("a dead time has no continuous transfer function; give a sample_time")
+    return control.tf(plant.num, plant.den)
+
+
+def _discrete(actuator: Any, sample_time: float) -> Any:
+    """The stage of `hysim.models.sampled`, its held values in a chain of further states."""
+    import control
+
+    stage = actuator.sampled(sample_time)
+    n, held = stage.C.size, stage.lag + 1
+    A = np.zeros((n + held, n + held))
+    A[:n, :n] = stage.A
+    A[:n, -1] = stage.B_old  # the last of the chain is v_(k-1-lag)
+    A[n + 1 :, n:-1] = np.eye(held - 1)
+    B = np.zeros((n + held, 1))
+    B[n] = 1.0
+    if stage.lag:
+        A[:n, -2] = stage.B_new
+    else:
+        B[:n, 0] = stage.B_new
+    C = np.concatenate([stage.C, np.zeros(held - 1), [stage.D]])
+    return control.ss(A, B, C[np.newaxis], 0.0, sample_time)
+
+
+def _pid(pid: PID, sample_time: float | None) -> Any:
+    import control
+
+    if sample_time is None:
+        if pid.kd and not pid.derivative_filter:
+            raise ValueError("a derivative without a filter is not proper; give a derivative_filter or a sample_time")
+        integral, derivative = control.tf([pid.ki], [1.0, 0.0]), control.tf([pid.kd, 0.0], [pid.derivative_filter, 1.0])
+        return control.tf([pid.kp], [1.0]) + (integral if pid.ki else 0.0) + (derivative if pid.kd else 0.0)
+    z = control.tf("z")
+    z.dt = sample_time
+    lag = pid.derivative_filter + sample_time
+    total = control.tf([pid.kp], [1.0], sample_time)
+    if pid.ki:
+        total = total + pid.ki * sample_time / (z - 1.0)
+    if pid.kd:
+        total = total + pid.kd / lag * (z - 1.0) / (z - pid.derivative_filter / lag)
+    return total
