@@ -12,6 +12,15 @@ os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".numba_cache" / hashlib.sha
 os.environ.setdefault("MPLBACKEND", "agg")
 
 import hypothesis  # noqa: E402  numba must not be imported before the cache folder is set
+import pytest  # noqa: E402
 
 hypothesis.settings.register_profile("hysim", deadline=None, derandomize=True, max_examples=60)
 hypothesis.settings.load_profile("hysim")
+
+
+@pytest.fixture(scope="session")
+def paper_study():
+    """The models of Table 1, identified once for all tests of the paper."""
+    from hysim.paper.study import study
+
+    return study(quick=True)

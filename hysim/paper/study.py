@@ -12,7 +12,7 @@ from hysim.identification import Identification, identify
 from hysim.models.boucwen import BoucWen, PolynomialBoucWen
 from hysim.models.static import Line, SingleValued
 from hysim.models.transfer_function import TransferFunction
-from hysim.paper.equations import PrintedModel, printed_model
+from hysim.paper.best_dwell import PrintedModel, printed_model
 
 Progress = Callable[[int, int, str], None]
 
@@ -39,7 +39,18 @@ class Study:
     discovery: Discovery
 
 
-def study(*, quick: bool = False, progress: Progress | None = None) -> Study:
+def asymmetric_law(quick: bool) -> Identification:
+    """The Bouc-Wen law with n = 1 and a quadratic input on Table 1."""
+    return identify(PolynomialBoucWen, table1(), fixed={"n": 1.0}, cross_validate=None if quick else "loo")
+
+
+def study(
+    *,
+    quick: bool = False,
+    progress: Progress | None = None,
+    found: Callable[[str, Any], None] = lambda name, result: None,
+    asymmetric: Callable[[bool], Identification] = asymmetric_law,
+) -> Study:
     """Identify, discover and compare on Table 1.
 
     Parameters
@@ -48,6 +59,10 @@ def study(*, quick: bool = False, progress: Progress | None = None) -> Study:
         Leave the cross-validation out.
     progress : callable, optional
         Called as ``progress(done, total, what)`` before each step.
+    found : callable
+        Called as ``found(name, result)`` after each.
+    asymmetric : callable
+        Gives the asymmetric law, perhaps from where it has been computed meanwhile.
     """
     record = table1()
     folds = None if quick else "loo"
@@ -56,7 +71,7 @@ def study(*, quick: bool = False, progress: Progress | None = None) -> Study:
         "eq1-printed": printed_model,
         "tf-identified": lambda: identify(structure, record, cross_validate=folds),
         "bouc-wen": lambda: identify(BoucWen, record, cross_validate=folds),
-        "bouc-wen-asymmetric": lambda: identify(PolynomialBoucWen, record, fixed={"n": 1.0}, cross_validate=folds),
+        "bouc-wen-asymmetric": lambda: asymmetric(quick),
         "sindy": lambda: discover(record, cross_validate=folds),
         "line": lambda: identify(Line, record, cross_validate=folds),
         "single-valued": lambda: identify(SingleValued, record, cross_validate=folds),
@@ -66,6 +81,7 @@ def study(*, quick: bool = False, progress: Progress | None = None) -> Study:
         if progress is not None:
             progress(done, len(subjects), name)
         results[name] = make()
+        found(name, results[name])
     if progress is not None:
         progress(len(subjects), len(subjects), "comparison")
     return Study(
