@@ -1,13 +1,19 @@
-"""Work cut into chunks over threads.
+"""Work cut into chunks over threads, and work beside one's own in a second process.
 
 Kernels release the interpreter lock, so that a pool of threads keeps all cores busy. How the work is
-cut does not change a result: every item is computed by itself.
+cut does not change a result: every item is computed by itself. Searches in Python hold the lock; they go
+to a second process.
 """
 
 import itertools
+import multiprocessing
 import os
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import contextmanager
+from typing import Any
 
 Progress = Callable[[int, int], None]
 """Called as ``progress(done, total)``."""
@@ -45,3 +51,33 @@ def in_chunks(work: Callable[[int, int], None], n_items: int, *, workers: int | 
         work(*own)
         for chunk in running:
             chunk.result()
+
+
+@contextmanager
+def second_process() -> Iterator[Executor]:
+    """An executor of one further process, forked from this one; where that is no use, one that works at once.
+
+    It is no use on one core, and it is not safe on systems that do not fork. An interrupt is the parent's
+    alone.
+    """
+    if not sys.platform.startswith("linux") or cores() < 2:
+        yield _AtOnce()
+        return
+    forked, ignore = multiprocessing.get_context("fork"), (signal.SIGINT, signal.SIG_IGN)
+    pool = ProcessPoolExecutor(1, mp_context=forked, initializer=signal.signal, initargs=ignore)
+    try:
+        yield pool
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+class _AtOnce(Executor):
+    """Runs what is submitted before it returns."""
+
+    def submit(self, function: Callable[..., Any], /, *args: Any, **options: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        try:
+            future.set_result(function(*args, **options))
+        except Exception as error:
+            future.set_exception(error)
+        return future

@@ -11,6 +11,10 @@ import pytest
 from hysim.cli import main
 
 MODELS = ["eq1-printed", "tf-identified", "bouc-wen", "bouc-wen-asymmetric", "sindy", "line", "single-valued"]
+FIGURES = [
+    "figure3", "figure4", "figure5", "figure9", "figure10", "figure12", "figure13", "figure14",
+    "loops", "widths", "residuals", "discovery", "hysteresis", "dwell",
+]  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -34,11 +38,9 @@ def summary(reproduction) -> dict:
 def test_every_promised_file_is_there(reproduction):
     folder = reproduction[0]
     assert {path.name for path in folder.iterdir()} == {"report.html", "summary.json", "figures", "tables"}
-    assert {"figure3.svg", "figure4.svg", "figure5.svg", "loops.svg", "widths.svg", "residuals.svg"} <= {
-        path.name for path in (folder / "figures").iterdir()
-    }
+    assert {path.name for path in (folder / "figures").iterdir()} == {f"{name}.svg" for name in FIGURES}
     assert {path.name for path in (folder / "tables").iterdir()} == {
-        "models.csv", "outputs.csv", "widths.csv", "parameters.csv",
+        "models.csv", "outputs.csv", "widths.csv", "parameters.csv", "claims.csv", "control.csv", "dwell.csv",
     }  # fmt: skip
 
 
@@ -46,7 +48,7 @@ def test_stdout_holds_the_table_and_stderr_the_progress(reproduction):
     _, out, err = reproduction
     assert "0.232 um wide at 35 V" in out
     assert all(name in out for name in MODELS)
-    assert err.count("\n") == len(MODELS) + 1
+    assert err.count("\n") == len(MODELS) + 3
 
 
 def test_summary_of_the_measured_loop(summary):
@@ -58,7 +60,6 @@ def test_summary_of_the_measured_loop(summary):
     assert table["max_width_at_V"] == 35
     assert table["mean_width_um"] == pytest.approx(0.1407, abs=5e-5)  # half of the last printed digit
     assert table["area_um_V"] == pytest.approx(17.59, abs=5e-3)
-    assert (summary["claims"], summary["control"], summary["dwell"]) == ([], {}, [])
 
 
 def test_summary_of_the_models(summary):
@@ -81,12 +82,59 @@ def test_summary_of_the_models(summary):
     assert models["line"]["max_width_um"] == pytest.approx(0.0, abs=1e-12)
 
 
+def test_summary_of_the_claims(summary):
+    claims = summary["claims"]
+    keys = {"id", "where", "printed", "recomputed", "unit", "verdict", "note"}
+    assert len(claims) >= 25
+    assert len({claim["id"] for claim in claims}) == len(claims)
+    assert all(keys <= claim.keys() for claim in claims)
+    assert {claim["verdict"] for claim in claims} == {
+        "reproduced", "not reproduced", "inconsistent in print", "not checkable",
+    }  # fmt: skip
+    verdicts = {claim["id"]: claim["verdict"] for claim in claims}
+    assert verdicts["hysteresis-90-bouc-wen"] == "reproduced"
+    assert verdicts["hysteresis-90-eq1"] == "not reproduced"
+    assert verdicts["vibration-97-overshoot-eq4"] == "reproduced"
+
+
+def test_summary_of_control(summary):
+    hysteresis, vibration = summary["control"]["hysteresis"], summary["control"]["vibration"]
+    head = {"plant", "reference", "controller", "conditions"}
+    assert all(head <= row.keys() for row in (*hysteresis, *vibration))
+    limited = [row for row in hysteresis if row["plant"] == "bouc-wen+eq7" and row["limits"] != "unlimited"]
+    assert all(row["hysteresis_reduction_percent"] >= 90.0 for row in limited)
+    assert all(row["lag_reduction_percent"] is None for row in limited)
+    assert all(row["hysteresis_reduction_percent"] is None for row in hysteresis if row["plant"] == "eq1")
+    for plant in ("eq4", "eq6"):
+        steps = [row for row in vibration if row["plant"] == plant and row["reference"].startswith("step")]
+        assert {str(row["limits"]) for row in steps} == {"[0.0, 125.0]", "[-16.0, 16.0]", "unlimited"}
+        assert len({row["controller"] for row in steps}) == 1  # one PID each
+        assert all(row["overshoot_reduction_percent"] >= 95.0 for row in steps)
+        assert all(row["residual_rms_reduction_percent"] >= 97.0 for row in steps)
+        assert all(row["settling_time_reduction_percent"] >= 85.0 for row in steps)
+        assert all(low <= row["conditions"]["lowest_u_V"] and row["conditions"]["highest_u_V"] <= high
+                   for row in steps if row["limits"] != "unlimited" for low, high in [row["limits"]])  # fmt: skip
+        waves = [row for row in vibration if row["plant"] == plant and row["reference"].startswith("square")]
+        assert len(waves) == 3
+        assert all(row["peak_excess_percent"] < 1.0 for row in waves)
+
+
+def test_summary_of_the_dwell(summary):
+    rows = summary["dwell"]
+    assert [row["dwell_s"] for row in rows] == [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0]
+    widths = [row["bouc_wen_max_width_um"] for row in rows]
+    assert max(widths) - min(widths) <= 1e-12 * summary["table1"]["stroke_um"]
+    assert all(row["eq1_max_width_um"] < 0.01 for row in rows if row["dwell_s"] >= 10.0)
+    # at the start of the hold the loop tends to two steps of 5 V times the static gain
+    assert rows[-1]["eq1_at_start_max_width_um"] == pytest.approx(10.0 * 0.1521 / 6.93, abs=1e-4)
+
+
 def test_the_report_is_self_contained(reproduction):
     page = (reproduction[0] / "report.html").read_text()
     assert "<script" not in page
     assert not re.findall(r"""(?:src|href)=["'](?!#)""", page)  # links inside the page only
     assert "url(http" not in page
-    assert page.count("<svg") == 7
+    assert page.count("<svg") == len(FIGURES)
     ids = re.findall(r'\bid="([^"]+)"', page)
     assert len(ids) == len(set(ids))
 
@@ -125,7 +173,7 @@ def test_an_interruption_exits_with_130(tmp_path, monkeypatch, capsys):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("hysim.paper.reproduction.study", interrupted)
+    monkeypatch.setattr("hysim.paper.reproduction.find", interrupted)
     assert main(["reproduce", "--out", str(tmp_path / "out")]) == 130
     assert not list((tmp_path / "out").iterdir())
 
@@ -135,7 +183,7 @@ def test_a_read_only_folder_is_refused_before_anything_is_computed(tmp_path, mon
         raise PermissionError(13, "Permission denied", str(tmp_path))
 
     monkeypatch.setattr("hysim.paper.reproduction.tempfile.TemporaryFile", refused)
-    monkeypatch.setattr("hysim.paper.reproduction.study", lambda **_: pytest.fail("computed all the same"))
+    monkeypatch.setattr("hysim.paper.reproduction.find", lambda **_: pytest.fail("computed all the same"))
     assert main(["reproduce", "--out", str(tmp_path)]) == 2
     assert capsys.readouterr().err == f"hysim: error: {tmp_path}: Permission denied\n"
     assert not list(tmp_path.iterdir())

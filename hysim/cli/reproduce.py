@@ -27,18 +27,19 @@ def run(options: argparse.Namespace) -> int:
     from hysim.paper import reproduce
 
     done = reproduce(options.out, quick=options.quick, progress=_progress)
-    comparison, loop = done.study.comparison, done.study.comparison.loop
+    study = done.findings.study
+    comparison, loop = study.comparison, study.comparison.loop
     print(
         f"Table 1: {len(comparison.record)} points, stroke {loop.stroke:.3f} um; the loop is {loop.max_width:.3f} um "
         f"wide at {loop.max_width_at:g} V, {loop.mean_width:.4f} um on average, area {loop.area:.2f} um V"
     )
     print(comparison.to_text())
-    for name, fit in done.study.fits.items():
+    for name, fit in study.fits.items():
         for region, best in fit.regions.items():
             print(f"{name}: the best {region} law fits {best.fit_percent:.2f} %")
-    print(f"sindy: {done.study.discovery.equation}  ({done.study.discovery.verdict})")
+    print(f"sindy: {study.discovery.equation}  ({study.discovery.verdict})")
     print(f"report: {done.folder / 'report.html'}")
-    return SUCCESS if all(fit.success for fit in done.study.fits.values()) else NOT_CONVERGED
+    return SUCCESS if all(fit.success for fit in study.fits.values()) else NOT_CONVERGED
 
 
 def _progress(done: int, total: int, what: str) -> None:

@@ -1,17 +1,23 @@
-"""The report's figures: the paper's Figures 3, 4 and 5 regenerated, and the models of Table 1 in pictures."""
+"""The report's figures: the paper's, regenerated, and the models and loops in pictures."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from hysim import plot
 from hysim._frozen import FloatArray
 from hysim.comparison import Comparison
 from hysim.discovery import Discovery
 from hysim.metrics import LoopMetrics, loop_metrics
+from hysim.paper.dwell import DwellWidth
+from hysim.paper.loops import PERIOD, HysteresisCase, SquareCase, StepCase
 from hysim.records import Record
 
 _MARK = "#B34700"
+_POINTS = 900  # of a line, at most
+_SAMPLES = {"t": "samples", "y": "um"}
+_SECONDS = {"t": "s", "y": "um"}
 
 
 @plot.house_style()
@@ -72,6 +78,98 @@ def discovery_path(discovery: Discovery) -> plot.Figure:
     canvas = plot.figure(height=4.4)
     plot.selection(discovery, plot.panels(canvas, 2))
     return canvas
+
+
+@plot.house_style()
+def figure9(record: Record) -> plot.Figure:
+    """Table 2: displacement and voltage against time."""
+    return figure3(record)
+
+
+@plot.house_style()
+def figure10(responses: Mapping[str, tuple[FloatArray, FloatArray]]) -> plot.Figure:
+    """Responses to a step of one volt, as times [samples] and displacements [um] by name."""
+    canvas = plot.figure(height=3.6)
+    ax = plot.traces(responses, canvas.add_subplot(), units={"t": "samples"})
+    ax.set_ylabel("Displacement per volt [µm/V]")
+    return canvas
+
+
+@plot.house_style()
+def step_figure(case: StepCase, duration: float, *, seconds: bool) -> plot.Figure:
+    """A step with and without control, and the voltage that it takes: the paper's Figures 12 and 14."""
+    canvas = plot.figure(height=5.0)
+    upper, lower = plot.panels(canvas, 2)
+    closed, units = case.found.closed, _SECONDS if seconds else _SAMPLES
+    shown = _thinned(closed.t <= duration)
+    t = closed.t[shown]
+    series = {
+        "reference": closed.reference,
+        "with PID": closed.y,
+        "without": case.found.open_y,
+    }
+    plot.traces({name: (t, y[shown]) for name, y in series.items()}, upper, units=units)
+    plot.traces({"voltage": (t, closed.u[shown])}, lower, units={**units, "y": "V"})
+    return canvas
+
+
+@plot.house_style()
+def figure13(cases: Sequence[SquareCase]) -> plot.Figure:
+    """The last two periods of the square waves, one over the other."""
+    canvas = plot.figure(height=2.4 * len(cases))
+    axes = [canvas.add_subplot(len(cases), 1, k + 1) for k in range(len(cases))]
+    for ax, case in zip(axes, cases, strict=True):
+        closed = case.found.closed
+        begin = closed.t[-1] - 2.0 * case.period
+        shown = _thinned(closed.t >= begin)
+        series = {"reference": closed.reference, "with PID": closed.y, "without": case.found.open_y}
+        plot.traces({name: (closed.t[shown] - begin, y[shown]) for name, y in series.items()}, ax, units=_SAMPLES)
+        ax.set_title(f"period {case.period:g} samples")
+        ax.set_xlabel(ax.get_xlabel() if ax is axes[-1] else "")
+        if ax is not axes[0] and (legend := ax.get_legend()):
+            legend.remove()
+    return canvas
+
+
+@plot.house_style()
+def hysteresis_figure(case: HysteresisCase) -> plot.Figure:
+    """The triangle's last cycle: displacement, and its deviation, against the reference."""
+    canvas = plot.figure(height=6.4)
+    upper, lower = plot.panels(canvas, 2)
+    closed = case.found.closed
+    shown = _thinned(closed.t >= closed.t[-1] - PERIOD)
+    reference = closed.reference[shown]
+    outputs = {"with PID": closed.y[shown], "without": case.found.open_y[shown]}
+    plot.traces({name: (reference, y) for name, y in outputs.items()}, upper)
+    plot.traces({name: (reference, y - reference) for name, y in outputs.items()}, lower)
+    upper.set(xlabel="", ylabel="Displacement [µm]")
+    lower.set(xlabel="Reference [µm]", ylabel="Displacement less reference [µm]")
+    lower.legend().remove()
+    return canvas
+
+
+@plot.house_style()
+def dwell_figure(widths: Sequence[DwellWidth]) -> plot.Figure:
+    """Largest loop width against dwell."""
+    canvas = plot.figure(height=4.0)
+    dwells = np.array([width.dwell for width in widths])
+    series = {
+        "(1)": [width.linear for width in widths],
+        "(1), read at the start": [width.linear_at_start for width in widths],
+        "Bouc-Wen": [width.law for width in widths],
+        "Bouc-Wen and (7)": [width.law_and_dynamics for width in widths],
+    }
+    ax = plot.traces({name: (dwells, np.array(values)) for name, values in series.items()}, canvas.add_subplot())
+    ax.set(xscale="log", xlabel="Dwell [s]", ylabel="Largest loop width [µm]", xticks=dwells)
+    ax.set_xticks(dwells, [f"{dwell:g}" for dwell in dwells])
+    ax.minorticks_off()
+    return canvas
+
+
+def _thinned(shown: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
+    """Indices of some of the samples shown, the last one among them."""
+    (indices,) = np.nonzero(shown)
+    return indices[:: max(1, indices.size // _POINTS)]
 
 
 def _mark_widest(ax: plot.Axes, loop: LoopMetrics) -> None:

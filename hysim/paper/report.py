@@ -1,7 +1,7 @@
 """The report: one self-contained page, figures inline, no script, nothing loaded from elsewhere."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from html import escape
 from importlib.resources import files
 from string import Template
@@ -9,7 +9,16 @@ from typing import NamedTuple
 
 from hysim.identification import Identification
 from hysim.metrics import loop_metrics
+from hysim.paper.control_chapters import (
+    claims_chapter,
+    control_chapter,
+    definitions,
+    dwell_chapter,
+    identification_section,
+)
 from hysim.paper.equations import EQUATION_1, EQUATION_7
+from hysim.paper.findings import Findings
+from hysim.paper.markup import complex_number, equation, figure, number, paragraph, ratio, table
 from hysim.paper.study import Study
 
 TITLE = "A piezo stack's 52 points, reproduced"
@@ -26,17 +35,18 @@ class Chapter(NamedTuple):
     body: str
 
 
-def report_page(study: Study, drawn: Drawn) -> str:
+def report_page(findings: Findings, drawn: Drawn) -> str:
     """The whole page."""
+    study = findings.study
     chapters = [
         Chapter("measured", "What was measured", _measured(study, drawn)),
         Chapter("models", "All models side by side", _models(study, drawn)),
-        Chapter("linear", "The paper's linear model", _linear(study, drawn)),
+        Chapter("linear", "The paper's linear models", _linear(findings, drawn)),
         Chapter("bouc-wen", "The Bouc-Wen models", _bouc_wen(study)),
         Chapter("discovered", "The discovered law", _discovered(study, drawn)),
-        Chapter("claims", "The paper's claims", _empty("claim by claim, printed value beside recomputed value")),
-        Chapter("control", "Control", _empty("the loops behind the paper's 90 % and 97 %")),
-        Chapter("dwell", "Loop width against dwell", _empty("how lag and hysteresis differ when the dwell changes")),
+        Chapter("claims", "The paper's claims", claims_chapter(findings.claims)),
+        Chapter("control", "Control", control_chapter(findings.loops, drawn)),
+        Chapter("dwell", "Loop width against dwell", dwell_chapter(findings.dwell, drawn)),
         Chapter("definitions", "How the numbers are defined", _definitions()),
     ]
     template = Template(files("hysim.paper").joinpath("report.html").read_text(encoding="utf-8"))
@@ -55,11 +65,11 @@ def _lead(study: Study) -> str:
     comparison, loop = study.comparison, study.comparison.loop
     linear, single = comparison["eq1-printed"], comparison["single-valued"]
     law, found = comparison["bouc-wen-asymmetric"], comparison["sindy"]
-    return _paragraph(
+    return paragraph(
         "Table 1 of B. B. Muhammad, M. H. Rahman, M. R. Ahmad and M. Bashir, “A novel model of PZT actuator and "
         "its application in hysteresis and vibration controls”, Jurnal Teknologi (2016), recomputed by hysim.",
         "source",
-    ) + _paragraph(
+    ) + paragraph(
         f"The measured loop is {loop.max_width:.3f} µm wide at {loop.max_width_at:g} V. The linear model that the "
         f"paper prints fits the points to {linear.fit_percent:.2f} %, and no curve that gives one displacement for "
         f"each voltage can do better than {single.fit_percent:.2f} %: what is missing is memory. With it, a Bouc-Wen "
@@ -82,16 +92,18 @@ def _measured(study: Study, drawn: Drawn) -> str:
         ["orientation", loop.orientation],
     ]
     return (
-        _table(["measure of Table 1", "value"], rows)
-        + _figure(
+        table(["measure of Table 1", "value"], rows)
+        + figure(
             drawn["figure3"],
-            "The paper's Figure 3, regenerated: input and output against time. The paper prints no time; one second "
-            "for each voltage is our choice, and no rate-independent result depends on it.",
+            "The paper's Figure 3, regenerated: in words, output and input of the experiment against time. Ours shows "
+            "Table 1 with one second for each voltage; the paper prints no time, and no rate-independent result "
+            "depends on it.",
         )
-        + _figure(
+        + figure(
             drawn["figure4"],
-            "The paper's Figure 4, regenerated: the hysteresis loop. Every displacement is a whole number of pixels, "
-            f"and one pixel is {100 * quantum / loop.max_width:.0f} % of the loop's width.",
+            "The paper's Figure 4, regenerated: in words, the actuator's hysteresis and its nonlinearity. Ours shows "
+            "both, and that every displacement is a whole number of pixels; one pixel is "
+            f"{100 * quantum / loop.max_width:.0f} % of the loop's width.",
         )
     )
 
@@ -104,7 +116,7 @@ def _models(study: Study, drawn: Drawn) -> str:
     ]  # fmt: skip
     rows = [
         [
-            row.name, str(row.n_parameters), f"{row.fit_percent:.2f}", f"{row.rmse:.4f}", _number(row.cv_rmse, 4),
+            row.name, str(row.n_parameters), f"{row.fit_percent:.2f}", f"{row.rmse:.4f}", number(row.cv_rmse, 4),
             f"{row.max_residual / quantum:.2f}", f"{row.max_width:.3f}", f"{row.max_width_at:g}", f"{row.area:.2f}",
             f"{row.width_rmse:.4f}",
         ]
@@ -115,16 +127,16 @@ def _models(study: Study, drawn: Drawn) -> str:
         "measured", *[""] * 5, f"{measured.max_width:.3f}", f"{measured.max_width_at:g}", f"{measured.area:.2f}", "",
     ]  # fmt: skip
     return (
-        _paragraph(
+        paragraph(
             "Every model is simulated in free run over the 52 voltages and judged by the same measures. "
             "“Single-valued” is the best possible curve that gives one displacement for each voltage: a model that "
             "does not beat it has learnt nothing about hysteresis. The printed model has one parameter "
             "fitted here, the dwell."
         )
-        + _table(header, [best, *rows])
-        + _figure(drawn["loops"], "Each model's loop over the measured points.")
-        + _figure(drawn["widths"], "Loop width, unloading minus loading at the same voltage, measured and modelled.")
-        + _figure(
+        + table(header, [best, *rows])
+        + figure(drawn["loops"], "Each model's loop over the measured points.")
+        + figure(drawn["widths"], "Loop width, unloading minus loading at the same voltage, measured and modelled.")
+        + figure(
             drawn["residuals"],
             "Residuals, measured minus model, in camera pixels. Rounding to whole pixels alone leaves half a pixel "
             "either way.",
@@ -132,29 +144,33 @@ def _models(study: Study, drawn: Drawn) -> str:
     )
 
 
-def _linear(study: Study, drawn: Drawn) -> str:
+def _linear(findings: Findings, drawn: Drawn) -> str:
+    study = findings.study
     printed, fit = study.comparison["eq1-printed"], study.fits["tf-identified"]
-    poles = ", ".join(_complex(pole) for pole in fit.model.poles)
+    poles = ", ".join(complex_number(pole) for pole in fit.model.poles)
     return (
-        _paragraph("Equation (1) as printed, in seconds:")
-        + _equation(f"G(s) = {_ratio(EQUATION_1.num, EQUATION_1.den)}")
-        + _paragraph(
+        paragraph("Equation (1) as printed, in seconds:")
+        + equation(f"G(s) = {ratio(EQUATION_1.num, EQUATION_1.den)}")
+        + paragraph(
             f"With the voltage held for each dwell, the displacement taken at its start and the plant at rest before, "
             f"the best dwell is {study.printed.dwell:.2f} s and the fit {printed.fit_percent:.2f} %; the paper states "
             f"91.5 %. A model of the same structure identified anew, at one second for each voltage, reaches "
             f"{fit.fit_percent:.2f} % with a final prediction error of {fit.fpe:.6f} (the paper states 0.00587):"
         )
-        + _equation(f"G(s) = {_ratio(fit.model.num, fit.model.den)}\npoles {poles} rad/s")
-        + _paragraph(
+        + equation(f"G(s) = {ratio(fit.model.num, fit.model.den)}\npoles {poles} rad/s")
+        + paragraph(
             "So the paper's figures are about what a four-pole model identified on Table 1 reaches; the coefficients "
             "it prints do not reach them at any dwell. Either loop is phase lag, not memory: read at the end of each "
             "dwell, it closes when the dwell is long."
         )
-        + _figure(
+        + figure(
             drawn["figure5"],
             "The paper's Figure 5, regenerated: response to a step of one volt of Equation (1) and of the second-order "
-            f"model (7), (8), G(s) = {_ratio(EQUATION_7.num, EQUATION_7.den)}.",
+            f"model (7), (8), G(s) = {ratio(EQUATION_7.num, EQUATION_7.den)}. In words, the paper's shows an actual "
+            "and an estimated response, called similar; these two overshoot alike and fit each other to "
+            f"{findings.similarity:.0f} %.",
         )
+        + identification_section(findings.reidentification, drawn)
     )
 
 
@@ -175,14 +191,14 @@ def _bouc_wen(study: Study) -> str:
         for rival in plain.rivals
     )
     return (
-        _equation(
+        equation(
             "dz/du = A - |z|^n (gamma + beta sign(z du))\n"
             "bouc-wen:             y = offset + feedthrough u + gain z\n"
             "bouc-wen-asymmetric:  y = offset + c1 u + c2 u^2 + gain z,  n = 1"
         )
-        + _paragraph(f"Symmetric: {plain.fit_percent:.2f} % with {plain.n_parameters} parameters.{inside}{rivals}")
+        + paragraph(f"Symmetric: {plain.fit_percent:.2f} % with {plain.n_parameters} parameters.{inside}{rivals}")
         + _parameters(plain)
-        + _paragraph(
+        + paragraph(
             f"With a quadratic input: {asymmetric.fit_percent:.2f} % with {asymmetric.n_parameters} parameters. "
             "The measured loop is wider at low voltage than at high; the quadratic term lets the model follow that."
         )
@@ -193,19 +209,19 @@ def _bouc_wen(study: Study) -> str:
 def _discovered(study: Study, drawn: Drawn) -> str:
     found, row = study.discovery, study.comparison["sindy"]
     return (
-        _paragraph(
+        paragraph(
             "PySINDy regresses the slope of each branch on terms u′ uⁱ yʲ and |u′| uⁱ yʲ; the structures along its "
             "path of thresholds, and those reached from them, are refitted by their error in free run. Of those that "
             "the BIC cannot tell from the best, the one is kept whose form does not depend on the instruments' zeros, "
             f"then the smallest: {len(found.coefficients)} terms, {row.fit_percent:.2f} % in free run."
         )
-        + _equation(found.equation)
-        + _table(["term", "coefficient"], [[term, f"{value:.6g}"] for term, value in found.coefficients.items()])
-        + _paragraph(
+        + equation(found.equation)
+        + table(["term", "coefficient"], [[term, f"{value:.6g}"] for term, value in found.coefficients.items()])
+        + paragraph(
             f"Verdict: {found.verdict}. On a record at one rate a lag and a hysteresis can give the same loop; only a "
             "second rate could tell them apart."
         )
-        + _figure(drawn["discovery"], "The path of thresholds: number of terms against the quality in free run.")
+        + figure(drawn["discovery"], "The path of thresholds: number of terms against the quality in free run.")
     )
 
 
@@ -218,60 +234,14 @@ def _definitions() -> str:
         "leave-one-out rmse: each displacement in turn is kept from the fit, all voltages are kept, and the errors at "
         "the points left out are collected. For the discovered law the terms are kept and the coefficients refitted.",
         "FPE = V (1 + d/N) / (1 − d/N), V the mean squared residual, N points, d parameters.",
+        *definitions(),
     ]
     return "<ul>" + "".join(f"<li>{escape(item)}</li>" for item in items) + "</ul>"
 
 
-def _empty(subject: str) -> str:
-    return _paragraph(f"Not part of this version: {subject}.", "empty")
-
-
 def _parameters(fit: Identification) -> str:
     rows = [
-        [name, f"{value:.6g}", _number(fit.stderr.get(name, math.nan), 2, "g") if name in fit.stderr else "held"]
+        [name, f"{value:.6g}", number(fit.stderr.get(name, math.nan), 2, "g") if name in fit.stderr else "held"]
         for name, value in fit.estimates.items()
     ]
-    return _table(["parameter", "value", "standard error"], rows) + _paragraph(f"Search: {fit.message}.", "source")
-
-
-def _ratio(num: Sequence[float], den: Sequence[float]) -> str:
-    return f"({_polynomial(num)}) / ({_polynomial(den)})"
-
-
-def _polynomial(coefficients: Sequence[float]) -> str:
-    degree = len(coefficients) - 1
-    text = ""
-    for k, c in enumerate(coefficients):
-        power = degree - k
-        factor = "s" if power == 1 else f"s^{power}" if power else ""
-        size = "" if abs(c) == 1.0 and factor else f"{abs(c):.4g}"
-        text += (" - " if c < 0 else " + " if text else "") + " ".join(part for part in (size, factor) if part)
-    return text.strip()
-
-
-def _complex(value: complex) -> str:
-    if value.imag == 0.0:
-        return f"{value.real:.3f}"
-    return f"{value.real:.3f} {'+' if value.imag > 0 else '-'} {abs(value.imag):.3f}i"
-
-
-def _number(value: float, digits: int, kind: str = "f") -> str:
-    return "–" if math.isnan(value) else f"{value:.{digits}{kind}}"
-
-
-def _paragraph(text: str, kind: str = "") -> str:
-    return f'<p class="{kind}">{escape(text)}</p>' if kind else f"<p>{escape(text)}</p>"
-
-
-def _equation(text: str) -> str:
-    return f'<div class="equation">{escape(text)}</div>'
-
-
-def _figure(svg: str, caption: str) -> str:
-    return f"<figure>\n{svg}\n<figcaption>{escape(caption)}</figcaption>\n</figure>"
-
-
-def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    head = "".join(f"<th>{escape(cell)}</th>" for cell in header)
-    body = "\n".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
-    return f'<div class="scroll"><table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody></table></div>'
+    return table(["parameter", "value", "standard error"], rows) + paragraph(f"Search: {fit.message}.", "source")

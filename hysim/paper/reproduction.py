@@ -17,11 +17,17 @@ import numpy as np
 
 from hysim._atomic import write_text
 from hysim._frozen import frozen
+from hysim.datasets import table2
 from hysim.paper import figures
-from hysim.paper.equations import EQUATION_1, EQUATION_7, step_response
+from hysim.paper.dwell import dwell_measures
+from hysim.paper.equations import EQUATION_1, EQUATION_4, EQUATION_6, EQUATION_7, step_response
+from hysim.paper.findings import Findings, find
+from hysim.paper.loops import control_measures
 from hysim.paper.report import report_page
-from hysim.paper.study import Progress, Study, model_measures, study
+from hysim.paper.study import Progress, model_measures
 from hysim.plot import to_svg
+
+_CLAIM = ("id", "where", "statement", "printed", "recomputed", "unit", "verdict", "method", "note")
 
 
 @frozen
@@ -34,13 +40,13 @@ class Reproduction:
         Where it wrote.
     files : tuple of str
         The files, relative to the folder.
-    study : Study
+    findings : Findings
         What was computed.
     """
 
     folder: Path
     files: tuple[str, ...]
-    study: Study
+    findings: Findings
 
 
 def reproduce(
@@ -70,30 +76,32 @@ def reproduce(
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=folder):
         pass
-    computed = study(quick=quick, progress=progress)
+    computed = find(quick=quick, progress=progress)
     files = contents(computed)
     for name, text in files.items():
         path = folder / name
         path.parent.mkdir(exist_ok=True)
         write_text(path, text)
-    return Reproduction(folder=folder, files=tuple(files), study=computed)
+    return Reproduction(folder=folder, files=tuple(files), findings=computed)
 
 
-def contents(computed: Study) -> dict[str, str]:
+def contents(computed: Findings) -> dict[str, str]:
     """Every file's text by its name relative to the folder."""
     drawn = {name: to_svg(figure, name=name) for name, figure in _figures(computed).items()}
     summary = _summary(computed)
     return {
         **{f"figures/{name}.svg": svg for name, svg in drawn.items()},
-        **_tables(computed),
+        **_tables(computed, summary),
         "summary.json": json.dumps(_rounded(summary), indent=2, allow_nan=False) + "\n",
         "report.html": report_page(computed, drawn),
     }
 
 
-def _figures(computed: Study) -> dict[str, Any]:
-    comparison = computed.comparison
+def _figures(computed: Findings) -> dict[str, Any]:
+    comparison, loops = computed.study.comparison, computed.loops
     steps = {"Eq. (1)": step_response(EQUATION_1), "Eqs. (7), (8)": step_response(EQUATION_7)}
+    vibrations = {"Eq. (4)": step_response(EQUATION_4, 80.0), "Eq. (6)": step_response(EQUATION_6, 80.0)}
+    step_on = {case.plant: case for case in reversed(loops.steps)}
     return {
         "figure3": figures.figure3(comparison.record),
         "figure4": figures.figure4(comparison.record),
@@ -101,12 +109,19 @@ def _figures(computed: Study) -> dict[str, Any]:
         "loops": figures.model_loops(comparison),
         "widths": figures.model_widths(comparison),
         "residuals": figures.model_residuals(comparison),
-        "discovery": figures.discovery_path(computed.discovery),
+        "discovery": figures.discovery_path(computed.study.discovery),
+        "figure9": figures.figure9(table2()),
+        "figure10": figures.figure10(vibrations),
+        "figure12": figures.step_figure(step_on["eq1"], 15.0, seconds=True),
+        "figure13": figures.figure13([case for case in loops.squares if case.plant == "eq4"]),
+        "figure14": figures.step_figure(step_on["eq4"], 60.0, seconds=False),
+        "hysteresis": figures.hysteresis_figure(loops.hysteresis[0]),
+        "dwell": figures.dwell_figure(computed.dwell),
     }
 
 
-def _summary(computed: Study) -> dict[str, Any]:
-    record, loop = computed.comparison.record, computed.comparison.loop
+def _summary(computed: Findings) -> dict[str, Any]:
+    record, loop = computed.study.comparison.record, computed.study.comparison.loop
     return {
         "table1": {
             "n": len(record),
@@ -117,31 +132,43 @@ def _summary(computed: Study) -> dict[str, Any]:
             "mean_width_um": loop.mean_width,
             "area_um_V": loop.area,
         },
-        "models": model_measures(computed),
-        "claims": [],
-        "control": {},
-        "dwell": [],
+        "models": model_measures(computed.study),
+        "claims": [{key: getattr(claim, key) for key in _CLAIM} for claim in computed.claims],
+        "control": control_measures(computed.loops),
+        "dwell": [dwell_measures(width) for width in computed.dwell],
     }
 
 
-def _tables(computed: Study) -> dict[str, str]:
-    comparison = computed.comparison
+def _tables(computed: Findings, summary: dict[str, Any]) -> dict[str, str]:
+    study, comparison = computed.study, computed.study.comparison
     record, rows = comparison.record, comparison.rows
     header = ["voltage [V]", "measured [um]", *(f"{row.name} [um]" for row in rows)]
     outputs = [header, *np.column_stack([record.u, record.y, *(row.y for row in rows)]).tolist()]
     levels = comparison.loop.u
     modelled = [row.loop.width_at(levels) for row in rows]
     widths = [header, *np.column_stack([levels, comparison.loop.width, *modelled]).tolist()]
-    measures = model_measures(computed)
-    keys = list(dict.fromkeys(key for row in measures.values() for key in row))
-    models = [["model", *keys], *([name, *(row.get(key) for key in keys)] for name, row in measures.items())]
     parameters: list[list[Any]] = [["model", "parameter", "value", "standard error"]]
-    for name, fit in computed.fits.items():
+    for name, fit in study.fits.items():
         parameters += [[name, key, value, fit.stderr.get(key)] for key, value in fit.estimates.items()]
-    found = {**computed.discovery.coefficients, "y0": computed.discovery.model.y0}
+    found = {**study.discovery.coefficients, "y0": study.discovery.model.y0}
     parameters += [["sindy", term, value, None] for term, value in found.items()]
-    named = {"models": models, "outputs": outputs, "widths": widths, "parameters": parameters}
+    control = [row for rows in summary["control"].values() for row in rows]
+    named = {
+        "models": _by_columns([{"model": name, **row} for name, row in summary["models"].items()]),
+        "outputs": outputs,
+        "widths": widths,
+        "parameters": parameters,
+        "claims": _by_columns(summary["claims"]),
+        "control": _by_columns([{key: value for key, value in row.items() if key != "conditions"} for row in control]),
+        "dwell": _by_columns(summary["dwell"]),
+    }
     return {f"tables/{name}.csv": _csv(table) for name, table in named.items()}
+
+
+def _by_columns(rows: Sequence[dict[str, Any]]) -> list[list[Any]]:
+    """A header of every key, and the rows under it."""
+    keys = list(dict.fromkeys(key for row in rows for key in row))
+    return [keys, *([row.get(key) for key in keys] for row in rows)]
 
 
 def _csv(table: Sequence[Sequence[Any]]) -> str:
@@ -153,6 +180,8 @@ def _csv(table: Sequence[Sequence[Any]]) -> str:
 def _cell(value: Any) -> str:
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""
+    if isinstance(value, list):
+        return " to ".join(_cell(item) for item in value)
     return value if isinstance(value, str) else str(_rounded(value))
 
 

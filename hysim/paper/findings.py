@@ -1,0 +1,102 @@
+"""Everything that `reproduce` computes, before any of it is written."""
+
+from concurrent.futures import Future
+from typing import Any
+
+from hysim._frozen import frozen
+from hysim._parallel import second_process
+from hysim.models.actuator import Actuator
+from hysim.paper.approximations import approximations
+from hysim.paper.claims import Claim, claims
+from hysim.paper.dwell import DwellWidth, dwell_widths
+from hysim.paper.equations import EQUATION_1
+from hysim.paper.loops import DYNAMICS_7, Loops, control_measures, loops
+from hysim.paper.reidentification import Reidentification, reidentify
+from hysim.paper.study import Progress, Study, asymmetric_law, study
+
+
+@frozen
+class Findings:
+    """What was computed.
+
+    Parameters
+    ----------
+    study : Study
+        The models of Table 1.
+    reidentification : Reidentification
+        Equations (1) and (4) identified anew.
+    loops : Loops
+        The closed loops.
+    dwell : tuple of DwellWidth
+        Loop width against dwell.
+    claims : tuple of Claim
+        Every claim with its verdict.
+    similarity : float
+        Fit of (7)'s step response to that of (1) [%].
+    """
+
+    study: Study
+    reidentification: Reidentification
+    loops: Loops
+    dwell: tuple[DwellWidth, ...]
+    claims: tuple[Claim, ...]
+    similarity: float
+
+
+def find(*, quick: bool = False, progress: Progress | None = None) -> Findings:
+    """Compute everything.
+
+    Parameters
+    ----------
+    quick : bool
+        Leave the cross-validation out.
+    progress : callable, optional
+        Called as ``progress(done, total, what)`` before each step.
+    """
+    with second_process() as beside:
+        asymmetric = beside.submit(asymmetric_law, quick)
+        begun: dict[str, Future[Any]] = {}
+
+        def begin(name: str, fit: Any) -> None:
+            if name == "tf-identified":
+                begun["reidentification"] = beside.submit(reidentify, fit)
+            if name == "bouc-wen-asymmetric":
+                begun["loops"] = beside.submit(loops, fit.model)
+
+        steps = _Steps(progress)
+        models = study(quick=quick, progress=steps.inner, found=begin, asymmetric=lambda _: asymmetric.result())
+        steps.next("closed loops")
+        reidentification, closed = begun["reidentification"].result(), begun["loops"].result()
+    steps.next("claims")
+    law = models.fits["bouc-wen"].model
+    return Findings(
+        study=models,
+        reidentification=reidentification,
+        loops=closed,
+        dwell=dwell_widths(
+            models.comparison.record.u,
+            EQUATION_1,
+            Actuator(hysteresis=law),
+            Actuator(hysteresis=law, vibration=DYNAMICS_7),
+        ),
+        claims=claims(models, control_measures(closed)),
+        similarity=approximations()[0].fit_percent,
+    )
+
+
+class _Steps:
+    """Progress over the study's steps and those after it."""
+
+    after = 2
+
+    def __init__(self, progress: Progress | None) -> None:
+        self.progress, self.done, self.total = progress, 0, 0
+
+    def inner(self, done: int, total: int, what: str) -> None:
+        self.done, self.total = done, total + self.after
+        self.next(what, advance=0)
+
+    def next(self, what: str, advance: int = 1) -> None:
+        self.done += advance
+        if self.progress is not None:
+            self.progress(self.done, self.total, what)
