@@ -27,7 +27,16 @@ def test_results_are_committed_whole(path):
     json.loads((folder / "result.json").read_text())
 
 
-def test_the_readme_quotes_the_committed_result():
+def test_the_readme_quotes_the_lag_that_a_pid_can_take_away():
+    folder = EXPERIMENTS[0].parent
+    rows = json.loads((folder / "results" / "lag_of_equation_1" / "result.json").read_text())["rows"]
+    percent = {row["bound"]: f"{row['lag_reduction_percent']:.0f} %" for row in rows}
+    readme = " ".join((folder.parent / "README.md").read_text().split())
+    assert f"the maximum sensitivity, 2, takes {percent[2.0]} of it away" in readme
+    assert f"(maximum sensitivity 10: {percent[10.0]}, 20: {percent[20.0]})" in readme
+
+
+def test_the_readme_quotes_the_exact_step():
     folder = EXPERIMENTS[0].parent
     rows = json.loads((folder / "results" / "exact_step" / "result.json").read_text())["rows"]
     readme = (folder.parent / "README.md").read_text().replace("\n ", "")
