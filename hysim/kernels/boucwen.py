@@ -22,37 +22,75 @@ import math
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import kernel
-from hysim.kernels.charts import N_CHARTS, N_EXPONENT, forget, move, power_flow, prepare_exponent
+from hysim.kernels._compile import borrowed, kernel
+from hysim.kernels.charts import N_WORK, further, in_chart, power_flow, prepare_exponent
 from hysim.kernels.elementary import linear_advance, quadratic_advance
 
-# The constants of a law: w*, 1/w* and |a|/w* loading, the same unloading, and those of its exponent.
-_SIDE = 3
-_EXPONENT = 2 * _SIDE
-N_CONSTANTS = _EXPONENT + N_EXPONENT
-N_SCRATCH = N_CHARTS
-
-_EXTREME = 1.0e300  # a balance beyond it, or below its inverse, is one of a vanishing term
+# The first places of a law's workspace: last u and z, for `step`; then w*, 1/w* and |a|/w* loading, and unloading.
+_LOADING, _UNLOADING = 2, 5
+_EXTREME = 690.0  # of |log w*|: beyond it, one of the two terms has vanished
 
 
 # ---------------------------------------------------------------------------------- scalar functions
 
 
 @kernel
-def flow(
-    w: float, a: float, c: float, n: float, length: float, side: int, constants: FloatArray, scratch: FloatArray
-) -> tuple[float, float]:
-    """Move along w' = a - c w^n for `length`, or until w = 0: the change of w, and the length left over.
+def power_advance(z: float, du: float, A: float, beta: float, gamma: float, n: float, work: FloatArray) -> float:
+    """As `advance` for other n than 1 and 2."""
+    sign = 1.0 if (z > 0.0 and du > 0.0) or (z < 0.0 and du < 0.0) or (z == 0.0 and A > 0.0) else -1.0
+    if sign > 0.0:
+        a, c, side = A, beta + gamma, _LOADING
+    else:
+        a, c, side = -A, beta - gamma, _UNLOADING
+    balance = work[side]
+    if balance > 0.0:
+        sigma = 0 if (a > 0.0) == (c > 0.0) else 1
+        change, left, end = in_chart(abs(z) * work[side + 1], a > 0.0, sigma, n, abs(du) * work[side + 2], work)
+        along = sign * (abs(z) + balance * change)
+        if left > 0.0:
+            along = leave_chart(abs(z), sign, A, beta, gamma, n, change, end, left, work)
+    else:
+        along = leave_chart(abs(z), sign, A, beta, gamma, n, 0.0, 0.0, abs(du), work)
+    return along if du > 0.0 else -along
 
-    `side` is 0 for the constants of loading, 1 for those of unloading.
+
+@kernel
+def leave_chart(
+    w: float,
+    sign: float,
+    A: float,
+    beta: float,
+    gamma: float,
+    n: float,
+    change: float,
+    end: float,
+    left: float,
+    work: FloatArray,
+) -> float:
+    """Memory along the input, from `w` on the side of `sign`, with the first chart (if there is one) behind.
+
+    It has brought a `change`, up to its `end`, with the length `left`, all in units of w*.
     """
-    balance, inverse, rate = constants[_SIDE * side], constants[_SIDE * side + 1], constants[_SIDE * side + 2]
-    if 0.0 < balance < math.inf:
-        change, left = move(
-            w * inverse, a > 0.0, 0 if (a > 0.0) == (c > 0.0) else 1, n, length * rate, constants[_EXPONENT:], scratch
-        )
-        return (change * balance, 0.0) if left == 0.0 else (-w, left / rate)
-    if balance == 0.0:
+    for _ in range(2):  # the second time from w = 0, on the other side, where w grows
+        a, c, side = sign * A, beta + sign * gamma, _LOADING if sign > 0.0 else _UNLOADING
+        balance = work[side]
+        if balance > 0.0:
+            change, left = further(change, end, a > 0.0, 0 if (a > 0.0) == (c > 0.0) else 1, n, left, work)
+            change, left = change * balance, left / work[side + 2]
+        else:
+            change, left = degenerate(w, a, c, n, left)
+        if left == 0.0:
+            break
+        sign, w, change, end = -sign, 0.0, 0.0, 0.0
+        rate = work[_LOADING + 2 if sign > 0.0 else _UNLOADING + 2]
+        left = left * rate if rate > 0.0 else left
+    return sign * (w + change)
+
+
+@kernel
+def degenerate(w: float, a: float, c: float, n: float, length: float) -> tuple[float, float]:
+    """Change of w, and length left over at w = 0, on w' = a - c w^n where one of the terms has vanished."""
+    if a == 0.0 or (c != 0.0 and w > 1.0):
         return power_flow(w, c, n, length) - w, 0.0
     if a < 0.0 and w + a * length < 0.0:
         return -w, length + w / a
@@ -60,68 +98,35 @@ def flow(
 
 
 @kernel
-def advance(
-    z: float, du: float, A: float, beta: float, gamma: float, n: float, constants: FloatArray, scratch: FloatArray
-) -> float:
-    """Memory after the input has moved monotonically by `du`; `constants` come from `prepare`."""
+def advance(z: float, du: float, A: float, beta: float, gamma: float, n: float, work: FloatArray) -> float:
+    """Memory after the input has moved monotonically by `du`; `work` comes from `prepare`."""
     if du == 0.0:
         return z
     if n == 1.0:
         return linear_advance(z, du, A, beta + gamma, beta - gamma)
     if n == 2.0:
         return quadratic_advance(z, du, A, beta + gamma, beta - gamma)
-    return power_advance(z, du, A, beta, gamma, n, constants, scratch)
+    return power_advance(z, du, A, beta, gamma, n, work)
 
 
 @kernel
-def power_advance(
-    z: float, du: float, A: float, beta: float, gamma: float, n: float, constants: FloatArray, scratch: FloatArray
-) -> float:
-    """As `advance` for other n."""
-    direction = math.copysign(1.0, du)
-    loading = direction * z > 0.0 or (z == 0.0 and A > 0.0)
-    w, length = abs(z), abs(du)
-    if loading:
-        change, left = flow(w, A, beta + gamma, n, length, 0, constants, scratch)
-    else:
-        change, left = flow(w, -A, beta - gamma, n, length, 1, constants, scratch)
-    if left > 0.0:  # the rest of the way begins at z = 0, on the other side, where w grows
-        w, loading = 0.0, not loading
-        if loading:
-            change, left = flow(w, A, beta + gamma, n, left, 0, constants, scratch)
-        else:
-            change, left = flow(w, -A, beta - gamma, n, left, 1, constants, scratch)
-    return direction * (w + change) if loading else -direction * (w + change)
+def prepare(A: float, beta: float, gamma: float, n: float, last_n: float, work: FloatArray) -> None:
+    """Make `work`, shape (N_WORK,), ready for a law; it has been ready for the exponent `last_n`."""
+    if n == 1.0 or n == 2.0:  # noqa: PLR1714
+        return
+    prepare_side(A, beta + gamma, n, work[_LOADING:])
+    prepare_side(A, beta - gamma, n, work[_UNLOADING:])
+    if n != last_n:
+        prepare_exponent(n, work)
 
 
 @kernel
-def prepare(A: float, beta: float, gamma: float, n: float, constants: FloatArray) -> None:
-    """Fill `constants`, shape (N_CONSTANTS,)."""
-    prepare_side(A, beta + gamma, n, constants)
-    prepare_side(A, beta - gamma, n, constants[_SIDE:])
-    if not elementary(n):
-        prepare_exponent(n, constants[_EXPONENT:])
-
-
-@kernel
-def elementary(n: float) -> bool:
-    """Whether the law needs no constants."""
-    return n == 1.0 or n == 2.0  # noqa: PLR1714  (a tuple would be built)
-
-
-@kernel
-def prepare_side(A: float, c: float, n: float, constants: FloatArray) -> None:
-    """Fill w*, 1/w* and |A|/w*; w* is 0 or inf where one of the terms vanishes."""
-    balance = math.inf
-    if A == 0.0:
-        balance = 0.0
-    elif c != 0.0:
-        exponent = (math.log(abs(A)) - math.log(abs(c))) / n
-        balance = abs(A / c) ** (1.0 / n) if abs(exponent) < 600.0 else 0.0 if exponent < 0.0 else math.inf
-    constants[0] = balance
-    constants[1] = constants[2] = 0.0
-    if 0.0 < balance < math.inf:
-        constants[1], constants[2] = 1.0 / balance, abs(A) / balance
+def prepare_side(A: float, c: float, n: float, side: FloatArray) -> None:
+    """Fill w*, 1/w* and |A|/w*; they are 0 where one of the terms vanishes, or w* is not a number of this size."""
+    side[0] = side[1] = side[2] = 0.0
+    if A != 0.0 and c != 0.0 and abs(math.log(abs(A)) - math.log(abs(c))) < _EXTREME * n:
+        side[0] = abs(A / c) ** (1.0 / n)
+        side[1], side[2] = 1.0 / side[0], abs(A) / side[0]
 
 
 # ---------------------------------------------------------------------------------- path and batch
@@ -130,10 +135,9 @@ def prepare_side(A: float, c: float, n: float, constants: FloatArray) -> None:
 @kernel
 def path(A: float, beta: float, gamma: float, n: float, last_u: float, z: float, u: FloatArray, out: FloatArray) -> int:
     """Memory at the samples of `u` from (last_u, z) into `out`: the first sample that is not finite, or -1."""
-    constants, scratch = np.zeros(N_CONSTANTS), np.empty(N_SCRATCH)
-    prepare(A, beta, gamma, n, constants)
-    forget(scratch)
-    return along(A, beta, gamma, n, last_u, z, u, constants, scratch, out)
+    work = np.empty(N_WORK)
+    prepare(A, beta, gamma, n, 0.0, work)
+    return along(A, beta, gamma, n, last_u, z, u, work, out)
 
 
 @kernel
@@ -145,17 +149,36 @@ def along(
     last_u: float,
     z: float,
     u: FloatArray,
-    constants: FloatArray,
-    scratch: FloatArray,
+    work: FloatArray,
     out: FloatArray,
 ) -> int:
-    """As `path`, with the law's constants."""
-    for k in range(u.size):
-        z = advance(z, u[k] - last_u, A, beta, gamma, n, constants, scratch)
-        last_u = u[k]
-        out[k] = z
-        if not math.isfinite(z):
-            return k
+    """As `path`, with a workspace that is ready. The loops are the same but for the function that they inline."""
+    loading, unloading = beta + gamma, beta - gamma
+    charts = borrowed(work)
+    if n == 1.0:
+        for k in range(u.size):
+            du = u[k] - last_u
+            z = z if du == 0.0 else linear_advance(z, du, A, loading, unloading)
+            last_u = u[k]
+            out[k] = z
+            if not math.isfinite(z):
+                return k
+    elif n == 2.0:
+        for k in range(u.size):
+            du = u[k] - last_u
+            z = z if du == 0.0 else quadratic_advance(z, du, A, loading, unloading)
+            last_u = u[k]
+            out[k] = z
+            if not math.isfinite(z):
+                return k
+    else:
+        for k in range(u.size):
+            du = u[k] - last_u
+            z = z if du == 0.0 else power_advance(z, du, A, beta, gamma, n, charts)
+            last_u = u[k]
+            out[k] = z
+            if not math.isfinite(z):
+                return k
     return -1
 
 
@@ -164,21 +187,17 @@ def batch(parameters: FloatArray, u: FloatArray, out: FloatArray, start: int, st
     """Memories of the laws `start` to `stop - 1`.
 
     `parameters` is (n_sets, 5) with columns A, beta, gamma, n, z0; `u` is (1, n_samples) or
-    (n_sets, n_samples); `out` is (n_sets, n_samples). A law that escapes is a row of inf.
+    (n_sets, n_samples); `out` is (n_sets, n_samples). A law that escapes is a row of inf. Neighbours of
+    equal n share their charts.
     """
-    constants, scratch = np.zeros(N_CONSTANTS), np.empty(N_SCRATCH)
-    last_n = math.nan
+    work = np.empty(N_WORK)
+    last_n = 0.0
     for i in range(start, stop):
         A, beta, gamma, n, z0 = parameters[i]
         row = u[min(i, u.shape[0] - 1)]
-        if n == last_n:
-            prepare_side(A, beta + gamma, n, constants)
-            prepare_side(A, beta - gamma, n, constants[_SIDE:])
-        else:
-            prepare(A, beta, gamma, n, constants)
-            forget(scratch)
-            last_n = n
-        if along(A, beta, gamma, n, row[0], z0, row, constants, scratch, out[i]) >= 0:
+        prepare(A, beta, gamma, n, last_n, work)
+        last_n = n
+        if along(A, beta, gamma, n, row[0], z0, row, work, out[i]) >= 0:
             out[i] = math.inf
 
 
@@ -187,21 +206,21 @@ def batch(parameters: FloatArray, u: FloatArray, out: FloatArray, start: int, st
 
 @kernel
 def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
-    """Output at the next input `u`; `state` is (last u, z, scratch) and moves along.
+    """Output at the next input `u`; `state` is a law's workspace with the last u and z in front, and moves along.
 
-    `parameters` is (A, beta, gamma, n, gain, offset, constants, c1, c2, ...) with the output
+    `parameters` is (A, beta, gamma, n, gain, offset, c1, c2, ...) with the output
     y = offset + c1 u + c2 u^2 + ... + gain z.
     """
     A, beta, gamma, n = parameters[0], parameters[1], parameters[2], parameters[3]
-    z = advance(state[1], u - state[0], A, beta, gamma, n, parameters[6 : 6 + N_CONSTANTS], state[2:])
+    z = advance(state[1], u - state[0], A, beta, gamma, n, borrowed(state))
     state[0], state[1] = u, z
-    return float(parameters[5] + polynomial(u, parameters[6 + N_CONSTANTS :]) + parameters[4] * z)
+    return float(parameters[5] + polynomial(u, parameters, 6) + parameters[4] * z)
 
 
 @kernel
-def polynomial(u: float, coefficients: FloatArray) -> float:
-    """c1 u + c2 u^2 + ..."""
+def polynomial(u: float, coefficients: FloatArray, first: int) -> float:
+    """c1 u + c2 u^2 + ..., with c1 at `first`."""
     total = 0.0
-    for k in range(coefficients.size - 1, -1, -1):
+    for k in range(coefficients.size - 1, first - 1, -1):
         total = (total + coefficients[k]) * u
     return total

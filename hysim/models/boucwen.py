@@ -174,11 +174,11 @@ class _BoucWenLaw(ABC):
     def compiled(self, u0: float = 0.0) -> CompiledLaw:
         """The law as compiled loops take it; the state is that of a first sample at the input `u0`."""
         scalars = self.scalars
-        constants = np.empty(kernels.N_CONSTANTS)
-        kernels.prepare(self.A, self.beta, self.gamma, self.n, constants)
-        head = [self.A, self.beta, self.gamma, self.n, self.gain, self.offset]
-        parameters = np.concatenate([head, constants, [scalars[name] for name in self.coefficient_names]])
-        state = np.concatenate([[u0, self.z0], np.zeros(kernels.N_SCRATCH)])
+        law = [self.A, self.beta, self.gamma, self.n]
+        parameters = np.array([*law, self.gain, self.offset, *(scalars[name] for name in self.coefficient_names)])
+        state = np.zeros(kernels.N_WORK)
+        kernels.prepare(*law, 0.0, state)
+        state[:2] = u0, self.z0
         return CompiledLaw(kernels.step, read_only(parameters, finite=False), state)
 
     @classmethod
