@@ -22,7 +22,7 @@ import math
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import borrowed, kernel
+from hysim.kernels._compile import borrowed, inlined, kernel
 from hysim.kernels.charts import N_WORK, further, in_chart, power_flow, prepare_exponent
 from hysim.kernels.elementary import linear_advance, quadratic_advance
 
@@ -34,7 +34,7 @@ _EXTREME = 690.0  # of |log w*|: beyond it, one of the two terms has vanished
 # ---------------------------------------------------------------------------------- scalar functions
 
 
-@kernel
+@inlined
 def power_advance(z: float, du: float, A: float, beta: float, gamma: float, n: float, work: FloatArray) -> float:
     """As `advance` for other n than 1 and 2."""
     sign = 1.0 if (z > 0.0 and du > 0.0) or (z < 0.0 and du < 0.0) or (z == 0.0 and A > 0.0) else -1.0
@@ -90,7 +90,7 @@ def leave_chart(
 @kernel
 def degenerate(w: float, a: float, c: float, n: float, length: float) -> tuple[float, float]:
     """Change of w, and length left over at w = 0, on w' = a - c w^n where one of the terms has vanished."""
-    if a == 0.0 or (c != 0.0 and w > 1.0):
+    if a == 0.0 or (c != 0.0 and abs(a) < abs(c)):
         return power_flow(w, c, n, length) - w, 0.0
     if a < 0.0 and w + a * length < 0.0:
         return -w, length + w / a
