@@ -28,7 +28,7 @@ from hysim.kernels.elementary import linear_advance, quadratic_advance
 
 # The first places of a law's workspace: last u and z, for `step`; then w*, 1/w* and |a|/w* loading, and unloading.
 _LOADING, _UNLOADING = 2, 5
-_EXTREME = 690.0  # of |log w*|: beyond it, one of the two terms has vanished
+_EXTREME = 690.0  # of |log(A/c)| and of |log w*|: beyond it, one of the two terms counts as vanished
 
 
 # ---------------------------------------------------------------------------------- scalar functions
@@ -112,7 +112,7 @@ def advance(z: float, du: float, A: float, beta: float, gamma: float, n: float, 
 @kernel
 def prepare(A: float, beta: float, gamma: float, n: float, last_n: float, work: FloatArray) -> None:
     """Make `work`, shape (N_WORK,), ready for a law; it has been ready for the exponent `last_n`."""
-    if n == 1.0 or n == 2.0:  # noqa: PLR1714
+    if n == 1.0 or n == 2.0:
         return
     prepare_side(A, beta + gamma, n, work[_LOADING:])
     prepare_side(A, beta - gamma, n, work[_UNLOADING:])
@@ -124,7 +124,7 @@ def prepare(A: float, beta: float, gamma: float, n: float, last_n: float, work: 
 def prepare_side(A: float, c: float, n: float, side: FloatArray) -> None:
     """Fill w*, 1/w* and |A|/w*; they are 0 where one of the terms vanishes, or w* is not a number of this size."""
     side[0] = side[1] = side[2] = 0.0
-    if A != 0.0 and c != 0.0 and abs(math.log(abs(A)) - math.log(abs(c))) < _EXTREME * n:
+    if A != 0.0 and c != 0.0 and abs(math.log(abs(A)) - math.log(abs(c))) < _EXTREME * min(n, 1.0):
         side[0] = abs(A / c) ** (1.0 / n)
         side[1], side[2] = 1.0 / side[0], abs(A) / side[0]
 
@@ -133,15 +133,7 @@ def prepare_side(A: float, c: float, n: float, side: FloatArray) -> None:
 
 
 @kernel
-def path(A: float, beta: float, gamma: float, n: float, last_u: float, z: float, u: FloatArray, out: FloatArray) -> int:
-    """Memory at the samples of `u` from (last_u, z) into `out`: the first sample that is not finite, or -1."""
-    work = np.empty(N_WORK)
-    prepare(A, beta, gamma, n, 0.0, work)
-    return along(A, beta, gamma, n, last_u, z, u, work, out)
-
-
-@kernel
-def along(
+def path(
     A: float,
     beta: float,
     gamma: float,
@@ -152,7 +144,10 @@ def along(
     work: FloatArray,
     out: FloatArray,
 ) -> int:
-    """As `path`, with a workspace that is ready. The loops are the same but for the function that they inline."""
+    """Memory at the samples of `u` from (last_u, z) into `out`: the first sample that is not finite, or -1.
+
+    `work` comes from `prepare`. The three loops are the same but for the function that they inline.
+    """
     loading, unloading = beta + gamma, beta - gamma
     charts = borrowed(work)
     if n == 1.0:
@@ -183,12 +178,12 @@ def along(
 
 
 @kernel
-def batch(parameters: FloatArray, u: FloatArray, out: FloatArray, start: int, stop: int) -> None:
-    """Memories of the laws `start` to `stop - 1`.
+def batch(parameters: FloatArray, output: FloatArray, u: FloatArray, out: FloatArray, start: int, stop: int) -> None:
+    """Outputs of the laws `start` to `stop - 1`.
 
-    `parameters` is (n_sets, 5) with columns A, beta, gamma, n, z0; `u` is (1, n_samples) or
-    (n_sets, n_samples); `out` is (n_sets, n_samples). A law that escapes is a row of inf. Neighbours of
-    equal n share their charts.
+    `parameters` is (n_sets, 5) with columns A, beta, gamma, n, z0; `output` is (n_sets, 2 + degree) with
+    columns gain, offset, c1, c2, ...; `u` is (1, n_samples) or (n_sets, n_samples); `out` is
+    (n_sets, n_samples). A law that escapes is a row of inf. Neighbours of equal n share their charts.
     """
     work = np.empty(N_WORK)
     last_n = 0.0
@@ -197,8 +192,12 @@ def batch(parameters: FloatArray, u: FloatArray, out: FloatArray, start: int, st
         row = u[min(i, u.shape[0] - 1)]
         prepare(A, beta, gamma, n, last_n, work)
         last_n = n
-        if along(A, beta, gamma, n, row[0], z0, row, work, out[i]) >= 0:
+        if row.size and path(A, beta, gamma, n, row[0], z0, row, work, out[i]) >= 0:
             out[i] = math.inf
+            continue
+        gain, offset = output[i, 0], output[i, 1]
+        for k in range(row.size):
+            out[i, k] = offset + polynomial(row[k], output[i], 2) + gain * out[i, k]
 
 
 # ---------------------------------------------------------------------------------- one sample at a time

@@ -41,9 +41,7 @@ _LARGEST_EXPONENT = 700.0
 # ends, the length in T, two series; and room for a Taylor series.
 FREE = 8
 _VISITED = FREE
-_ZERO_THERE, _ZERO_BACK, _SATURATION_THERE, _SATURATION_BACK, _PLACES = (
-    FREE + 2 + k * 8 for k in (0, 1, 2, 4, 6)
-)
+_ZERO_THERE, _ZERO_BACK, _SATURATION_THERE, _SATURATION_BACK, _PLACES = (FREE + 2 + k * 8 for k in (0, 1, 2, 4, 6))
 _W_ZERO, _W_LOW, _W_HIGH, _S_LOW, _S_HIGH, _W_FAR, _T_ZERO, _LAST_CELL = (_PLACES + k for k in (*range(7), 8))
 _EDGES = _PLACES + 10
 _CELLS = _EDGES + 2 * (_N_CELLS + 1)
@@ -268,7 +266,7 @@ def find(w: float, forwards: bool, side: int, i: int, work: FloatArray) -> int:
 def walk(
     i: int, s: float, forwards: bool, side: int, last: int, n: float, work: FloatArray
 ) -> tuple[int, float, float]:
-    """From the place s, beyond the end of the cell `i`, to a cell and a place inside, or what is left after the last."""
+    """From the place s, beyond the end of the cell `i`, to a cell and a place in it, or what is left after the last."""
     cell = visit(i, side, n, work)
     left = (s - work[cell + _ABOVE] if forwards else work[cell + _BELOW] - s) * work[cell + _CENTRE]
     final, by = (last, 1) if forwards else (0, -1)
@@ -334,9 +332,7 @@ def cell_series(x: float, n: float, q: FloatArray, p: FloatArray, slope: FloatAr
 
 
 @kernel
-def far_step(
-    w: float, forwards: bool, side: int, n: float, length: float, work: FloatArray
-) -> tuple[float, float]:
+def far_step(w: float, forwards: bool, side: int, n: float, length: float, work: FloatArray) -> tuple[float, float]:
     """As `further`, for a step of the flow about w, as long as its series serves."""
     a = 1.0 if forwards else -1.0
     c = a if side == 0 else -a

@@ -21,7 +21,7 @@ def _tangent_series() -> tuple[float, ...]:
     """Coefficients of tanh(sqrt(y)) / sqrt(y) in powers of y, from T' = 1 - T^2."""
     c = [Fraction(1)]
     for k in range(1, N_TERMS):
-        c.append(-sum(c[j] * c[k - 1 - j] for j in range(k)) / (2 * k + 1))
+        c.append(-sum((c[j] * c[k - 1 - j] for j in range(k)), Fraction(0)) / (2 * k + 1))
     return tuple(float(value) for value in c)
 
 
