@@ -5,11 +5,12 @@ writable the function is compiled anew in each process. It releases the interpre
 follows IEEE 754 (a division by zero is an infinity): kernels raise nothing, they return codes.
 """
 
+import os
 from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numba
-from numba.core import cgutils, config
+from numba.core import cgutils
 from numba.extending import intrinsic
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -61,5 +62,5 @@ def _borrowed(_: Any, array: Any) -> Any:
     return array(array), code
 
 
-if not config.DISABLE_JIT:
-    borrowed = intrinsic(_borrowed)
+if os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0"):
+    borrowed = intrinsic(_borrowed)  # type: ignore[assignment]

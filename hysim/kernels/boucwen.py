@@ -46,7 +46,7 @@ def power_advance(z: float, du: float, A: float, beta: float, gamma: float, n: f
     if balance > 0.0:
         sigma = 0 if (a > 0.0) == (c > 0.0) else 1
         change, left, end = in_chart(abs(z) * work[side + 1], a > 0.0, sigma, n, abs(du) * work[side + 2], work)
-        along = sign * (abs(z) + balance * change)
+        along: float = sign * (abs(z) + balance * change)
         if left > 0.0:
             along = leave_chart(abs(z), sign, A, beta, gamma, n, change, end, left, work)
     else:
@@ -197,7 +197,10 @@ def batch(parameters: FloatArray, output: FloatArray, u: FloatArray, out: FloatA
             continue
         gain, offset = output[i, 0], output[i, 1]
         for k in range(row.size):
-            out[i, k] = offset + polynomial(row[k], output[i], 2) + gain * out[i, k]
+            total = 0.0  # as `polynomial`, without a view for each sample
+            for j in range(output.shape[1] - 1, 1, -1):
+                total = (total + output[i, j]) * row[k]
+            out[i, k] = offset + total + gain * out[i, k]
 
 
 # ---------------------------------------------------------------------------------- one sample at a time
