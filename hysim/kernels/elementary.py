@@ -105,8 +105,10 @@ def quadratic_flow(along: float, A: float, k: float, tangent: float) -> float:
     slope = A - k * along * along
     if slope == 0.0:
         return along
+    if tangent == math.inf:
+        return math.copysign(math.inf, slope)
     denominator = 1.0 + k * along * tangent
-    if denominator <= 0.0 or tangent == math.inf:
+    if denominator <= 0.0:
         return math.copysign(math.inf, slope)
     return along + slope * tangent / denominator
 
