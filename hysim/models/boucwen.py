@@ -22,10 +22,11 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim._parallel import in_chunks
 from hysim.errors import SimulationError
 from hysim.kernels import boucwen as kernels
+from hysim.kernels.charts import N_WORK
 from hysim.models import _boucwen_search
+from hysim.models._batch import Batch, Reduction
 from hysim.models.model import CompiledLaw, model
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
@@ -174,16 +175,24 @@ class _BoucWenLaw(ABC):
     def compiled(self, u0: float = 0.0) -> CompiledLaw:
         """The law as compiled loops take it; the state is that of a first sample at the input `u0`."""
         scalars = self.scalars
-        constants = np.empty(kernels.N_CONSTANTS)
-        kernels.prepare(self.A, self.beta, self.gamma, self.n, constants)
-        head = [self.A, self.beta, self.gamma, self.n, self.gain, self.offset]
-        parameters = np.concatenate([head, constants, [scalars[name] for name in self.coefficient_names]])
-        state = np.concatenate([[u0, self.z0], np.zeros(kernels.N_SCRATCH)])
+        law = self.A, self.beta, self.gamma, self.n
+        parameters = np.array([*law, self.gain, self.offset, *(scalars[name] for name in self.coefficient_names)])
+        state = np.zeros(N_WORK)
+        kernels.prepare(*law, 0.0, state)
+        state[:2] = u0, self.z0
         return CompiledLaw(kernels.step, read_only(parameters, finite=False), state)
 
     @classmethod
-    def responses(cls, parameters: Parameters, u: npt.ArrayLike, *, workers: int | None = None) -> FloatArray:
-        """Outputs of many laws at once, on all cores.
+    def responses(
+        cls,
+        parameters: Parameters,
+        u: npt.ArrayLike,
+        *,
+        reduce: Reduction | None = None,
+        target: npt.ArrayLike | None = None,
+        workers: int | None = None,
+    ) -> FloatArray:
+        """Outputs of many laws at once, on all cores, or one number of each.
 
         Parameters
         ----------
@@ -191,29 +200,41 @@ class _BoucWenLaw(ABC):
             The constructor's names to one value for each set, shape (n_sets,), or to one for all.
         u : array, shape (n_samples,) or (n_sets, n_samples)
             One input for all sets, or one for each.
+        reduce : {"sse", "max_width", "area", "final"}, optional
+            Keep of each output only the sum of its squared differences from `target`, the measure of this
+            name of `loop_metrics` (last complete cycle), or the last sample. The outputs are never held
+            together: a million sets need no million rows.
+        target : array, shape (n_samples,)
+            With ``reduce="sse"`` what the outputs are compared with [unit of y].
         workers : int, optional
             Number of threads; by default one for each core. The result does not depend on it.
 
         Returns
         -------
-        array, shape (n_sets, n_samples)
-            Each row the same bits as `response`. A law whose memory escapes is a row of inf.
+        array, shape (n_sets, n_samples), or (n_sets,) with `reduce`
+            Each row the same bits as `response`. A law whose memory escapes is a row of inf, or inf.
 
         Raises
         ------
         TypeError
             If a name is not one of the constructor's.
         ValueError
-            If lengths do not fit, or a value is not one that the constructor takes.
+            If lengths do not fit, a value is not one that the constructor takes, or the input has no
+            complete cycle to measure.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> u = hs.signals.triangle(-1.0, 1.0, cycles=3, samples_per_cycle=40)
+        >>> hs.BoucWen.responses({"beta": [0.3, 0.5, 0.7]}, u, reduce="area").round(3).tolist()
+        [0.41, 0.595, 0.746]
         """
         sets = cls._to_scalars(parameters)
         template = cls._from_scalars({name: float(np.ravel(values)[0]) for name, values in sets.items()})
-        scalars, z, inputs = template._memories(sets, u, workers)
-        y = _output(
-            [scalars[name] for name in template.coefficient_names], scalars["gain"], scalars["offset"], inputs, z
-        )
-        y[~np.isfinite(z[:, -1])] = np.inf
-        return y
+        columns, inputs = template._columns(sets, u)
+        output = np.stack([columns[name] for name in ("gain", "offset", *template.coefficient_names)], axis=1)
+        laws = Batch(template._table(columns), read_only(output), inputs)
+        return laws.rows(workers) if reduce is None else laws.reduced(reduce, target, workers)
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box that `identify` searches; see `hysim.models._boucwen_search`."""
@@ -221,7 +242,9 @@ class _BoucWenLaw(ABC):
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns u, u^2, ..., z, 1, 0 of the output, shape (n_sets, n_samples, n_columns + 1)."""
-        z, inputs = self._memories(parameters, record.u, None)[1:]
+        columns, inputs = self._columns(parameters, record.u)
+        table = self._table(columns)
+        z = Batch(table, read_only(np.tile([1.0, 0.0], (len(table), 1))), inputs).rows(None)
         powers = [np.broadcast_to(inputs**k, z.shape) for k in range(1, len(self.coefficient_names) + 1)]
         return np.stack([*powers, z, np.ones_like(z), np.zeros_like(z)], axis=-1)
 
@@ -233,9 +256,10 @@ class _BoucWenLaw(ABC):
         return (float(u[0]) if u.size else 0.0), self.z0
 
     def _memory(self, u: FloatArray, state: State) -> FloatArray:
-        z = np.empty(u.size)
-        last_u, z0 = state
-        escaped = kernels.path(self.A, self.beta, self.gamma, self.n, float(last_u), float(z0), u, z)
+        z, work = np.empty(u.size), np.empty(N_WORK)
+        law = self.A, self.beta, self.gamma, self.n
+        kernels.prepare(*law, 0.0, work)
+        escaped = kernels.path(*law, float(state[0]), float(state[1]), u, work, z)
         if escaped >= 0:
             raise SimulationError(
                 f"the memory escapes to infinity at sample {escaped} (u = {u[escaped]:g}): with beta + gamma = "
@@ -244,10 +268,8 @@ class _BoucWenLaw(ABC):
             )
         return z
 
-    def _memories(
-        self, sets: Parameters, u: npt.ArrayLike, workers: int | None
-    ) -> tuple[dict[str, FloatArray], FloatArray, FloatArray]:
-        """Every scalar as a column over the sets (those not given are the law's own), memories, inputs."""
+    def _columns(self, sets: Parameters, u: npt.ArrayLike) -> tuple[dict[str, FloatArray], FloatArray]:
+        """Every scalar over the sets, shape (n_sets,) each (those not given are the law's own), and the inputs."""
         defaults = self.scalars
         if unknown := set(sets) - set(defaults):
             raise TypeError(
@@ -265,10 +287,11 @@ class _BoucWenLaw(ABC):
             raise ValueError(f"n must be positive, got {given['n'].min()}")
         columns = {name: np.full(n_sets, value) for name, value in defaults.items()}
         columns |= {name: np.broadcast_to(values, n_sets) for name, values in given.items()}
-        table = np.stack([columns[name] for name in MEMORY], axis=1)
-        z = np.empty((n_sets, inputs.shape[1]))
-        in_chunks(lambda start, stop: kernels.batch(table, inputs, z, start, stop), n_sets, workers=workers)
-        return {name: values[:, np.newaxis] for name, values in columns.items()}, z, inputs
+        return columns, inputs
+
+    @staticmethod
+    def _table(columns: Mapping[str, FloatArray]) -> FloatArray:
+        return read_only(np.stack([columns[name] for name in MEMORY], axis=1))
 
 
 def _output(
