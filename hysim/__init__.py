@@ -25,6 +25,8 @@ _HOME = {
     "LoopMetrics": "hysim.metrics",
     "BoucWen": "hysim.models.boucwen",
     "PolynomialBoucWen": "hysim.models.boucwen",
+    "BoucWenInverse": "hysim.models.boucwen_inverse",
+    "LimitCycle": "hysim.models.limit_cycle",
     "Duhem": "hysim.models.duhem",
     "TransferFunction": "hysim.models.transfer_function",
     "Line": "hysim.models.static",
@@ -53,7 +55,9 @@ if TYPE_CHECKING:
     from hysim.metrics import loop_metrics as loop_metrics
     from hysim.models.boucwen import BoucWen as BoucWen
     from hysim.models.boucwen import PolynomialBoucWen as PolynomialBoucWen
+    from hysim.models.boucwen_inverse import BoucWenInverse as BoucWenInverse
     from hysim.models.duhem import Duhem as Duhem
+    from hysim.models.limit_cycle import LimitCycle as LimitCycle
     from hysim.models.static import Line as Line
     from hysim.models.static import SingleValued as SingleValued
     from hysim.models.storage import load_model as load_model

@@ -25,7 +25,9 @@ from hysim._frozen import FloatArray, read_only
 from hysim._parallel import in_chunks
 from hysim.errors import SimulationError
 from hysim.kernels import boucwen as kernels
-from hysim.models import _boucwen_search
+from hysim.models import _boucwen_facts, _boucwen_search, boucwen_inverse, limit_cycle
+from hysim.models.boucwen_inverse import BoucWenInverse, InverseState
+from hysim.models.limit_cycle import LimitCycle
 from hysim.models.model import CompiledLaw, model
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
@@ -99,6 +101,124 @@ class _BoucWenLaw(ABC):
         if self.A < 0.0 and unloading > 0.0:
             return "III" if loading >= 0.0 else "IV" if self.beta >= 0.0 else "none"
         return "V" if self.A == 0.0 and loading > 0.0 and unloading >= 0.0 else "none"
+
+    @property
+    def passive(self) -> bool:
+        """Whether the memory is a passive map from the velocity u' to z that is bounded for every input.
+
+        This is class I: A > 0, beta + gamma > 0 and beta >= gamma, that is, sigma >= 1/2 in normalised form.
+        """
+        return self.stability_class == "I"
+
+    @property
+    def saturation(self) -> float:
+        """What |z| tends to on a long stretch of the input, (A / (beta + gamma))^(1/n) for A > 0; inf if nothing."""
+        return _boucwen_facts.saturation(self.A, self.beta, self.gamma, self.n)
+
+    @property
+    def memory_bound(self) -> float:
+        """Bound of |z| for every input that begins with z0; inf if there is none."""
+        return _boucwen_facts.memory_bound(self.A, self.beta, self.gamma, self.n, self.z0, self.stability_class)
+
+    def limit_cycle(self, amplitude: float) -> LimitCycle:
+        """Steady loop of the memory between the inputs -amplitude and amplitude.
+
+        Parameters
+        ----------
+        amplitude : float
+            [unit of u].
+
+        Returns
+        -------
+        LimitCycle
+            Peak, coercive input, width at u = 0 and energy, to rounding; a law with beta > 0 approaches it
+            from every memory inside its bound.
+
+        Raises
+        ------
+        ValueError
+            If the amplitude is not positive, or A = 0.
+        SimulationError
+            If the memory escapes to infinity within one stroke.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> loop = hs.BoucWen(beta=0.5, gamma=0.5).limit_cycle(1.0)
+        >>> round(loop.peak, 12), round(loop.coercive, 12), round(loop.energy, 12)
+        (0.721535457239, 0.278464542761, 0.593244754991)
+        """
+        return limit_cycle.limit_cycle(self.A, self.beta, self.gamma, self.n, float(amplitude))
+
+    def tangent(self, direction: npt.ArrayLike, z: npt.ArrayLike, u: npt.ArrayLike = 0.0) -> FloatArray:
+        """Slope dy/du of the output at the memory `z`, for an input at `u` that moves in `direction`.
+
+        Parameters
+        ----------
+        direction : array
+            Velocity u' or its sign, not zero.
+        z, u : array
+            Memory and input, broadcast against the direction; only a polynomial's slope depends on u.
+
+        Returns
+        -------
+        array
+            [unit of y / unit of u].
+
+        Raises
+        ------
+        ValueError
+            If a direction is zero: the slope ahead and the one behind differ.
+        """
+        velocity, memory = np.asarray(direction, dtype=float), np.asarray(z, dtype=float)
+        if not np.all(velocity):
+            raise ValueError("direction must not be zero: an input that stands still has two slopes")
+        dz = self.A - np.abs(memory) ** self.n * (self.gamma + self.beta * np.sign(memory * np.sign(velocity)))
+        static = np.polynomial.polynomial.polyval(np.asarray(u, dtype=float), boucwen_inverse.derivative(self))
+        return np.asarray(static + self.gain * dz)
+
+    def slope_bounds(self, low: float = -np.inf, high: float = np.inf) -> tuple[float, float]:
+        """Bounds of the slope dy/du over every input between `low` and `high` that begins with z0.
+
+        Parameters
+        ----------
+        low, high : float
+            Range of the input [unit of u]; a law without polynomial does not depend on it.
+
+        Returns
+        -------
+        (float, float)
+            Infinite where the memory is not bounded and the slope neither. They are approached by inputs
+            that saturate the memory, so that they are sharp for a law without polynomial.
+
+        Examples
+        --------
+        A piezoelectric stack by Low and Guo: 1 - 0.56 is left of the slope just after a reversal.
+
+        >>> import hysim as hs
+        >>> law = hs.BoucWen(A=0.35, beta=0.02, gamma=0.005, feedthrough=1.0, gain=-1.0)
+        >>> [round(bound, 12) for bound in law.slope_bounds()]
+        [0.44, 1.0]
+        """
+        if not low <= high:
+            raise ValueError(f"low must not be above high, got {low} and {high}")
+        memory = _boucwen_facts.memory_slopes(self.A, self.beta, self.gamma, self.n, self.memory_bound)
+        scaled = sorted(self.gain * slope if self.gain else 0.0 for slope in memory)
+        static = _boucwen_facts.polynomial_range(boucwen_inverse.derivative(self), low, high)
+        with np.errstate(invalid="ignore"):
+            total = np.add(static, scaled)
+        lowest, highest = np.where(np.isnan(total), [-np.inf, np.inf], total).tolist()
+        return lowest, highest
+
+    def is_invertible(self, low: float = -np.inf, high: float = np.inf) -> bool:
+        """Whether the slope keeps its sign for every input between `low` and `high`: its bounds have one sign.
+
+        This is sufficient for an inverse, not necessary: on one record a law may do without, and
+        `inverse_response` looks at the record. For a piezoelectric stack by Low and Guo it reads
+        alpha max(1, 2 beta / (beta + gamma)) < 1.
+        """
+        bounds = self.slope_bounds(low, high)
+        return bounds[0] > 0.0 or bounds[1] < 0.0
 
     def memory(self, u: npt.ArrayLike) -> FloatArray:
         """Memory z at the samples of an input that is linear between them.
@@ -180,6 +300,59 @@ class _BoucWenLaw(ABC):
         parameters = np.concatenate([head, constants, [scalars[name] for name in self.coefficient_names]])
         state = np.concatenate([[u0, self.z0], np.zeros(kernels.N_SCRATCH)])
         return CompiledLaw(kernels.step, read_only(parameters, finite=False), state)
+
+    def inverse(self) -> BoucWenInverse:
+        """The law's inverse as an object, for loops that run sample by sample.
+
+        Returns
+        -------
+        BoucWenInverse
+            In the direction that the output has at u = 0, z = 0.
+
+        Raises
+        ------
+        ValueError
+            If the slope is zero there.
+        """
+        return boucwen_inverse.inverse(self)
+
+    def inverse_response(
+        self, y: npt.ArrayLike, u0: float | None = None, state: State | InverseState | None = None
+    ) -> FloatArray:
+        """Input that gives the output `y`, linear between the samples.
+
+        Parameters
+        ----------
+        y : array, shape (n_samples,)
+            Wanted output.
+        u0 : float, optional
+            Input at which the law rests, its memory at z0, before it moves to the first sample. By default
+            it rests at the first sample: the input that gives y[0] with the memory at z0, found from u = 0.
+        state : tuple of float, optional
+            Input and memory (and output) to continue from, in place of u0 and z0.
+
+        Returns
+        -------
+        array, shape (n_samples,)
+            Its `response` is y to rounding.
+
+        Raises
+        ------
+        SimulationError
+            If the slope dy/du does not keep its sign on the way, or the output does not reach a sample; the
+            message names the sample, the input and the slope there.
+        ValueError
+            If y is not finite or has not one axis, its first sample does not tell the first input (give u0),
+            or the slope is zero where the record begins.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> law = hs.BoucWen(A=0.35, beta=0.02, gamma=0.005, feedthrough=1.0, gain=-1.0)
+        >>> law.inverse_response(law.response([0.0, 30.0, 10.0])).round(9).tolist()
+        [0.0, 30.0, 10.0]
+        """
+        return boucwen_inverse.inverse_response(self, y, u0, state)
 
     @classmethod
     def responses(cls, parameters: Parameters, u: npt.ArrayLike, *, workers: int | None = None) -> FloatArray:
