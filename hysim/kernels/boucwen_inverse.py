@@ -8,7 +8,8 @@ a scalar equation, found by Newton's method inside a bracket that closes on it. 
 output itself, not of its increment: nothing drifts, and the law's response to these inputs is the given
 output to rounding.
 
-The slope must have one sign, `rising` = 1 or -1, all along the way. On one side of z = 0 the memory's slope
+The slope must have one sign, `rising` = 1 or -1, all along the way, and at its beginning in the other
+direction too, or the output would not tell which way the input went. On one side of z = 0 the memory's slope
 changes monotonically; with a linear P the ends of the stretch and the crossing of z = 0 therefore decide.
 With a polynomial a bound on P'' decides where it can, and a few points in between where it cannot.
 
@@ -27,6 +28,7 @@ MAX_STEPS = 400
 
 _EPSILON = 2.0**-52
 _ROUNDINGS = 16.0  # of the forward step, which may keep the residual from zero where the bracket has closed
+_FLAT = 1e-12  # of the slope ahead: what rounding makes of no slope at all on the way back
 _POINTS = 16  # looked at along a stretch that the bound on P'' leaves open
 
 
@@ -125,9 +127,9 @@ def solve(
     """
     memory = state[N_OWN:]
     upward = parameters[0] * direction
-    steepness = slope(u, z, direction, parameters)
-    state[1], state[2] = u, parameters[0] * steepness
-    if not steepness > 0.0:
+    steepness, back = slope(u, z, direction, parameters), slope(u, z, -direction, parameters)
+    state[1], state[2] = u, parameters[0] * min(steepness, back)
+    if not (steepness > 0.0 and back > -_FLAT * steepness):
         return False
     behind, beyond = u, direction * math.inf
     before_last = last = math.inf
@@ -138,7 +140,7 @@ def solve(
         error = upward * (forward(u, z, target, parameters, memory) - y)
         steepness = slope(target, memory[1], direction, parameters)
         noise = rounding(y, target, memory[1], parameters)
-        if abs(error) <= noise:
+        if abs(error) <= noise < math.inf:
             return True
         if error < 0.0 and steepness > 0.0:
             behind = target
@@ -153,7 +155,9 @@ def solve(
             trial = 0.5 * (behind + beyond)
             move = abs(trial - target)
         if trial in (behind, beyond, target):
-            return bool(abs(error) <= _ROUNDINGS * noise)
+            return bool(
+                abs(error) < math.inf and abs(error) <= _ROUNDINGS * (noise + _EPSILON * abs(target) * steepness)
+            )
         before_last, last = last, abs(move)
         target = trial
     return False

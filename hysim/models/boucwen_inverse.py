@@ -3,7 +3,7 @@
     offset + P(u) + gain z(u) = y,    segment by segment from the last sample to the next
 
 It exists where the output is monotone, that is, where dy/du = P'(u) + gain dz/du keeps one sign along the
-way. `hysim.kernels.boucwen_inverse` finds it to rounding. The state is that of the law, and the last output,
+way, and on the way back from each sample. `hysim.kernels.boucwen_inverse` finds it to rounding. The state is that of the law, and the last output,
 so that an output that stands still leaves the input where it is, to the bit.
 
 Where the memory is bounded, so is the slope, and a law whose bounds have one sign has an inverse for every
@@ -182,7 +182,7 @@ class BoucWenInverse:
     def _failure(self, sample: int, y: float, u: float, slope: float) -> str:
         wanted = "positive" if self.increasing else "negative"
         if slope > 0.0 if self.increasing else slope < 0.0:
-            return f"the output does not reach sample {sample} (y = {y:g}): at u = {u:g} its slope is down to {slope:g}"
+            return f"the output does not reach sample {sample} (y = {y:g}): at u = {u:g} its slope is {slope:g}"
         return (
             f"the law has no inverse at sample {sample} (y = {y:g}): at u = {u:g} its slope is {slope:g}, not {wanted}"
         )
