@@ -28,6 +28,7 @@ _HOME = {
     "BoucWenInverse": "hysim.models.boucwen_inverse",
     "LimitCycle": "hysim.models.limit_cycle",
     "Duhem": "hysim.models.duhem",
+    "CustomLaw": "hysim.models.custom",
     "TransferFunction": "hysim.models.transfer_function",
     "Line": "hysim.models.static",
     "SingleValued": "hysim.models.static",
@@ -56,6 +57,7 @@ if TYPE_CHECKING:
     from hysim.models.boucwen import BoucWen as BoucWen
     from hysim.models.boucwen import PolynomialBoucWen as PolynomialBoucWen
     from hysim.models.boucwen_inverse import BoucWenInverse as BoucWenInverse
+    from hysim.models.custom import CustomLaw as CustomLaw
     from hysim.models.duhem import Duhem as Duhem
     from hysim.models.limit_cycle import LimitCycle as LimitCycle
     from hysim.models.static import Line as Line

@@ -131,6 +131,7 @@ def solve(
     state[1], state[2] = u, parameters[0] * min(steepness, back)
     if not (steepness > 0.0 and back > -_FLAT * steepness):
         return False
+    at_start = rounding(y, u, z, parameters)
     behind, beyond = u, direction * math.inf
     before_last = last = math.inf
     target = u + direction * gap / steepness
@@ -139,7 +140,7 @@ def solve(
             return False
         error = upward * (forward(u, z, target, parameters, memory) - y)
         steepness = slope(target, memory[1], direction, parameters)
-        noise = rounding(y, target, memory[1], parameters)
+        noise = max(at_start, rounding(y, target, memory[1], parameters))
         if abs(error) <= noise < math.inf:
             return True
         if error < 0.0 and steepness > 0.0:

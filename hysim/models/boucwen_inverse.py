@@ -3,8 +3,9 @@
     offset + P(u) + gain z(u) = y,    segment by segment from the last sample to the next
 
 It exists where the output is monotone, that is, where dy/du = P'(u) + gain dz/du keeps one sign along the
-way, and on the way back from each sample. `hysim.kernels.boucwen_inverse` finds it to rounding. The state is that of the law, and the last output,
-so that an output that stands still leaves the input where it is, to the bit.
+way, and on the way back from each sample. `hysim.kernels.boucwen_inverse` finds it to rounding. The state is
+that of the law, and the last output, so that an output that stands still leaves the input where it is, to
+the bit.
 
 Where the memory is bounded, so is the slope, and a law whose bounds have one sign has an inverse for every
 output that it can reach. For a piezoelectric stack, y = d (u - h) with the memory h of Low and Guo, this is
