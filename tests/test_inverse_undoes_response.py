@@ -2,6 +2,7 @@
 
 import pickle
 
+import numba
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -44,16 +45,16 @@ def walk(rng: np.random.Generator, n_samples: int) -> np.ndarray:
     return np.cumsum(steps) - steps.sum() / 2
 
 
-@settings(max_examples=20)
+@settings(max_examples=2 if numba.config.DISABLE_JIT else 20)
 @given(invertible_laws(), st.integers(0, 2**32))
 def test_both_ways_on_10000_samples(law, seed):
-    u = walk(np.random.default_rng(seed), 10_000)
+    u = walk(np.random.default_rng(seed), 100 if numba.config.DISABLE_JIT else 10_000)
     y = law.response(u)
     found = law.inverse_response(y)
     assert np.abs(law.response(found) - y).max() <= CLOSE * np.ptp(y)
     assert np.abs(found - u).max() <= CLOSE * np.ptp(u)
     still = np.diff(y) == 0.0
-    assert still.sum() > 1000
+    assert still.sum() > 0.1 * u.size
     assert (np.diff(found)[still] == 0.0).all()
 
 

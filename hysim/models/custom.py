@@ -23,9 +23,8 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, checked, read_only
 from hysim._parallel import in_chunks
 from hysim.errors import SimulationError
-from hysim.kernels._compile import signed_kernel
-from hysim.kernels.many import drive_sets
-from hysim.kernels.stepping import CONSTANTS, VECTOR, Step, drive
+from hysim.kernels.custom import compile_step, drive_sets
+from hysim.kernels.stepping import Step, drive
 from hysim.models.model import CompiledLaw
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
@@ -290,11 +289,10 @@ def compiled_step(function: Callable[[Any, Any, float], float]) -> Step:
     if len(taken) != 3:
         raise TypeError(f"step must take (parameters, state, u), but {name} takes ({', '.join(taken)})")
     try:
-        compiled: Step = signed_kernel(numba.float64(CONSTANTS, VECTOR, numba.float64))(plain)
+        return compile_step(plain)
     except numba.core.errors.NumbaError as error:
         reason = " ".join(str(error).split())
         raise TypeError(f"{name} does not compile as step(parameters, state, u) -> y: {reason}") from None
-    return compiled
 
 
 def _number(value: Any, name: str) -> float:

@@ -31,8 +31,8 @@ from hysim._frozen import FloatArray, frozen
 from hysim.errors import SimulationError
 from hysim.kernels import boucwen as kernels
 
-_PANELS = 45  # on either half; what the innermost ones leave out is 2^-45 of the length to a power above 1
-_NODES = 40  # on each: the nearest pole of w^n is pi/n away in the angle, which n = 20 needs 40 for
+_PANELS = 32  # on either half; the innermost, where w^n is not analytic, weighs 2^-32 to a power above 1
+_NODES = 32  # on each: the nearest pole of w^n is pi/n away in the angle, which n = 20 needs them for
 
 
 @frozen

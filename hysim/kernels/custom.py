@@ -1,4 +1,4 @@
-"""Many parameter sets of a law that is taken as a pointer, each over the same input.
+"""A user's own step: compiled to the type of all steps, and driven over many parameter sets.
 
     out[i, k] = step(parameters[i], state[i], u[k])
 
@@ -9,10 +9,15 @@ from numba import float64, int64, types, void
 
 from hysim._frozen import FloatArray
 from hysim.kernels._compile import signed_kernel
-from hysim.kernels.stepping import CONSTANTS, STEP, Step, drive
+from hysim.kernels.stepping import CONSTANTS, STEP, VECTOR, Step, drive
 
 TABLE = types.Array(float64, 2, "C")
 CONSTANT_TABLE = types.Array(float64, 2, "C", readonly=True)
+
+
+def compile_step(function: Step) -> Step:
+    """Compile a plain function for the type `STEP`; numba's errors pass through."""
+    return signed_kernel(float64(CONSTANTS, VECTOR, float64))(function)
 
 
 @signed_kernel(void(STEP, CONSTANT_TABLE, TABLE, CONSTANTS, TABLE, int64, int64))
