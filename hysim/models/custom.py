@@ -16,7 +16,6 @@ from dataclasses import field, replace
 from types import MappingProxyType
 from typing import Any
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
@@ -290,7 +289,7 @@ def compiled_step(function: Callable[[Any, Any, float], float]) -> Step:
         raise TypeError(f"step must take (parameters, state, u), but {name} takes ({', '.join(taken)})")
     try:
         return compile_step(plain)
-    except numba.core.errors.NumbaError as error:
+    except Exception as error:  # numba raises its own, and now and then what its parts raise
         reason = " ".join(str(error).split())
         raise TypeError(f"{name} does not compile as step(parameters, state, u) -> y: {reason}") from None
 

@@ -32,7 +32,7 @@ from hysim.errors import SimulationError
 from hysim.kernels import boucwen as kernels
 
 _PANELS = 32  # on either half; the innermost, where w^n is not analytic, weighs 2^-32 to a power above 1
-_NODES = 32  # on each: the nearest pole of w^n is pi/n away in the angle, which n = 20 needs them for
+_NODES = 40  # on each: the nearest pole of w^n is pi/n away in the angle, which n = 20 needs them for
 
 
 @frozen
@@ -62,7 +62,7 @@ class LimitCycle:
 
 
 def limit_cycle(A: float, beta: float, gamma: float, n: float, amplitude: float) -> LimitCycle:
-    """Compute the steady loop, good to 1e-13 of each quantity where |beta| is not below 1e-3 |gamma|.
+    """Compute the steady loop, good to 1e-13 of each quantity where |beta| is above 1e-3 |gamma|.
 
     Raises
     ------
