@@ -231,6 +231,18 @@ def test_condition_for_a_piezoelectric_stack(alpha, beta, gamma):
     assert law.is_invertible() == (steepest < 1.0)
 
 
+@pytest.mark.parametrize(
+    "law",
+    [
+        hs.BoucWen(A=0.6, beta=0.05, gamma=0.01, feedthrough=1.0, gain=-1.0),  # alpha 2 sigma = 1, the limit
+        hs.BoucWen(A=1.0, beta=0.6, gamma=0.4),  # flat in the end
+    ],
+)
+def test_at_the_limit_nothing_is_promised(law):
+    assert law.slope_bounds()[0] == pytest.approx(0.0, abs=1e-15)
+    assert not law.is_invertible()
+
+
 def test_bounds_of_a_polynomial_depend_on_the_range():
     law = hs.PolynomialBoucWen(A=1.0, beta=0.5, gamma=0.5, gain=0.5, input_coefficients=(1.0, 0.0, -1.0))
     assert law.slope_bounds(-0.5, 1.0) == pytest.approx((-2.0, 1.5))

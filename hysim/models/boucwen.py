@@ -216,10 +216,11 @@ class _BoucWenLaw(ABC):
 
         This is sufficient for an inverse, not necessary: on one record a law may do without, and
         `inverse_response` looks at the record. For a piezoelectric stack by Low and Guo it reads
-        alpha max(1, 2 beta / (beta + gamma)) < 1.
+        alpha max(1, 2 beta / (beta + gamma)) < 1. A bound of zero to rounding counts as zero.
         """
         bounds = self.slope_bounds(low, high)
-        return bounds[0] > 0.0 or bounds[1] < 0.0
+        rounding = 1e-14 * (abs(self.gain * self.A) + float(np.abs(boucwen_inverse.coefficients(self)).max()))
+        return bounds[0] > rounding or bounds[1] < -rounding
 
     def memory(self, u: npt.ArrayLike) -> FloatArray:
         """Memory z at the samples of an input that is linear between them.
