@@ -180,7 +180,8 @@ def step(parameters: FloatArray, state: FloatArray, y: float) -> float:
     if y == state[0]:
         return float(u)
     upward = 1.0 if y > state[0] else -1.0
-    gap = upward * (y - forward(u, z, u, parameters, memory))
+    coefficients = parameters[N_HEAD : N_HEAD + int(parameters[7])]
+    gap = upward * (y - (parameters[6] + boucwen.polynomial(u, coefficients) + parameters[5] * z))
     direction = parameters[0] * upward
     if not gap <= 0.0 and not (
         solve(u, z, y, direction, gap, parameters, state) and monotone(u, z, direction, parameters, state)
