@@ -31,7 +31,10 @@ _HOME = {
     "LoopMetrics": "hysim.metrics",
     "BoucWen": "hysim.models.boucwen",
     "PolynomialBoucWen": "hysim.models.boucwen",
+    "BoucWenInverse": "hysim.models.boucwen_inverse",
+    "LimitCycle": "hysim.models.limit_cycle",
     "Duhem": "hysim.models.duhem",
+    "CustomLaw": "hysim.models.custom",
     "TransferFunction": "hysim.models.transfer_function",
     "Actuator": "hysim.models.actuator",
     "Line": "hysim.models.static",
@@ -68,7 +71,10 @@ if TYPE_CHECKING:
     from hysim.models.actuator import Actuator as Actuator
     from hysim.models.boucwen import BoucWen as BoucWen
     from hysim.models.boucwen import PolynomialBoucWen as PolynomialBoucWen
+    from hysim.models.boucwen_inverse import BoucWenInverse as BoucWenInverse
+    from hysim.models.custom import CustomLaw as CustomLaw
     from hysim.models.duhem import Duhem as Duhem
+    from hysim.models.limit_cycle import LimitCycle as LimitCycle
     from hysim.models.static import Line as Line
     from hysim.models.static import SingleValued as SingleValued
     from hysim.models.storage import load_model as load_model
