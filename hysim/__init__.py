@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
 
-_MODULES = ("datasets", "metrics", "plot", "signals")
+_MODULES = ("benchmarks", "datasets", "metrics", "plot", "signals")
 _HOME = {
     "Record": "hysim.records",
     "load": "hysim.files",
@@ -26,6 +26,7 @@ _HOME = {
     "BoucWen": "hysim.models.boucwen",
     "PolynomialBoucWen": "hysim.models.boucwen",
     "Duhem": "hysim.models.duhem",
+    "BoucWenOscillator": "hysim.models.oscillator",
     "TransferFunction": "hysim.models.transfer_function",
     "Line": "hysim.models.static",
     "SingleValued": "hysim.models.static",
@@ -37,6 +38,7 @@ _HOME = {
 __all__ = ["__version__", *_MODULES, *_HOME]
 
 if TYPE_CHECKING:
+    from hysim import benchmarks as benchmarks
     from hysim import datasets as datasets
     from hysim import metrics as metrics
     from hysim import plot as plot
@@ -54,6 +56,7 @@ if TYPE_CHECKING:
     from hysim.models.boucwen import BoucWen as BoucWen
     from hysim.models.boucwen import PolynomialBoucWen as PolynomialBoucWen
     from hysim.models.duhem import Duhem as Duhem
+    from hysim.models.oscillator import BoucWenOscillator as BoucWenOscillator
     from hysim.models.static import Line as Line
     from hysim.models.static import SingleValued as SingleValued
     from hysim.models.storage import load_model as load_model

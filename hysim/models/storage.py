@@ -1,4 +1,7 @@
-"""Models to and from JSON: the version of hysim, the family, the parameters, the units."""
+"""Models to and from JSON: the version of hysim, the family, the parameters, the units.
+
+A parameter that is a model itself is stored by its own family and parameters.
+"""
 
 import importlib
 import json
@@ -13,7 +16,7 @@ from hysim import __version__
 from hysim._atomic import write_text
 from hysim.models.model import FAMILIES
 
-_MODULES = ("boucwen", "duhem", "static", "transfer_function")
+_MODULES = ("boucwen", "duhem", "oscillator", "static", "transfer_function")
 
 
 def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None) -> None:
@@ -48,8 +51,7 @@ def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None
         raise TypeError(f"save takes a model of hysim, got {family}")
     document = {
         "hysim": __version__,
-        "family": family,
-        "parameters": {field.name: _plain(getattr(model, field.name)) for field in fields(model)},
+        **_description(model),
         "units": dict(units or {}),
     }
     write_text(path, json.dumps(document, indent=2, allow_nan=False) + "\n")
@@ -81,10 +83,18 @@ def load_model(path: str | Path) -> Any:
         family, parameters = str(document["family"]), {**document["parameters"]}
     except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise ValueError(f"{path} does not hold a model of hysim: {type(error).__name__}: {error}") from None
+    return _rebuilt(family, parameters, path)
+
+
+def _rebuilt(family: str, parameters: Mapping[str, Any], path: str | Path) -> Any:
     if family not in FAMILIES:
         raise ValueError(f"{path} holds a model of the family {family!r}; there are {', '.join(sorted(FAMILIES))}")
+    values = {
+        name: _rebuilt(str(value["family"]), value["parameters"], path) if _describes_model(value) else value
+        for name, value in parameters.items()
+    }
     try:
-        loaded = FAMILIES[family](**parameters)
+        loaded = FAMILIES[family](**values)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{path} does not hold a {family}: {error}") from None
     if missing := [field.name for field in fields(loaded) if field.name not in parameters]:
@@ -92,5 +102,16 @@ def load_model(path: str | Path) -> Any:
     return loaded
 
 
+def _describes_model(value: Any) -> bool:
+    return isinstance(value, dict) and set(value) == {"family", "parameters"} and isinstance(value["parameters"], dict)
+
+
+def _description(model: Any) -> dict[str, Any]:
+    parameters = {field.name: _plain(getattr(model, field.name)) for field in fields(model)}
+    return {"family": type(model).__name__, "parameters": parameters}
+
+
 def _plain(value: Any) -> Any:
+    if type(value) in FAMILIES.values():
+        return _description(value)
     return value.tolist() if isinstance(value, np.ndarray) else list(value) if isinstance(value, tuple) else value
