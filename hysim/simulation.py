@@ -79,7 +79,8 @@ def simulate(
     times = None if t is None else read_only(t, "t", ndim=1)
     if needs_time(plant):
         sample_time = Record(u=inputs, y=np.zeros_like(inputs), t=times).sample_time
-        own = plant.signals(inputs, sample_time) if _shows_more(plant) else {"y": plant.response(inputs, sample_time)}
+        signals_of = getattr(plant, "signals", None)
+        own = signals_of(inputs, sample_time) if signals_of else {"y": plant.response(inputs, sample_time)}
     else:
         if times is not None:
             Record(u=inputs, y=np.zeros_like(inputs), t=times)
@@ -94,7 +95,3 @@ def simulate(
         signals={name: values for name, values in signals.items() if values is not None},
         units=units or {},
     )
-
-
-def _shows_more(plant: Any) -> bool:
-    return callable(getattr(plant, "signals", None))

@@ -85,7 +85,7 @@ def rates(
 def memory_slope(z: float, v: float, plant: Plant) -> float:
     """dz/dy at z on the way of v."""
     A, beta, gamma, n = plant[5:]
-    return A - abs(z) ** n * (gamma + beta * np.sign(z * v))
+    return float(A - abs(z) ** n * (gamma + beta * np.sign(z * v)))
 
 
 @kernel
