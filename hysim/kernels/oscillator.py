@@ -20,7 +20,7 @@ with a step that ends there. A reversal may be missed by a share e = 1e-6 of the
 point is then wrong by e^2. A crossing costs the order only inside the piece that is missed.
 
 Each step also carries three integrals over time: of F y', of c y'^2 and of g z y'. The state is the tuple
-(y, y', z, integral of F y', of c y'^2, of g z y'); the plant is (m, c, k, offset, g, A, beta, gamma, n).
+(y, y', z, integral of F y', of c y'^2, of g z y'); the plant is (m, c, k, offset, g, A, beta, gamma, n, 1 / m).
 """
 
 import math
@@ -29,10 +29,10 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.kernels._compile import kernel
-from hysim.kernels.boucwen import N_CONSTANTS, N_SCRATCH, advance, polynomial, prepare
+from hysim.kernels.boucwen import N_CONSTANTS, N_SCRATCH, advance, linear_flow, polynomial, prepare
 
 State = tuple[float, float, float, float, float, float]
-Plant = tuple[float, float, float, float, float, float, float, float, float]
+Plant = tuple[float, float, float, float, float, float, float, float, float, float]
 
 SPLIT, RUNGE_KUTTA, NEWMARK, STRANG = range(4)
 
@@ -40,6 +40,7 @@ _REVERSAL = 1.0e-6  # share of the change of y' in a step by which its end may l
 _CROSSING = 1.0e-3  # likewise of z and a crossing
 _MOST_TRIALS = 60
 _ROUNDING = 2.0**-50
+_THIRD, _TWO_THIRDS = 1.0 / 3.0, 2.0 / 3.0
 
 
 # ---------------------------------------------------------------------------------- scalar functions
@@ -76,16 +77,24 @@ def rates(
     force: float, y: float, v: float, z: float, side: float, C: float, plant: Plant, curve: FloatArray
 ) -> tuple[float, float]:
     """Acceleration and z' on the branch where sign(z) is `side`, and on its continuation."""
-    mass, damping, stiffness, offset, gain, A, _, _, n = plant
-    acceleration = (force - damping * v - spring(y, stiffness, offset, curve) - gain * z) / mass
+    _, damping, stiffness, offset, gain, A, _, _, n, mobility = plant
+    acceleration = (force - damping * v - spring(y, stiffness, offset, curve) - gain * z) * mobility
     return acceleration, v * (A - C * power(side * z, n))
 
 
 @kernel
 def memory_slope(z: float, v: float, plant: Plant) -> float:
     """dz/dy at z on the way of v."""
-    A, beta, gamma, n = plant[5:]
+    A, beta, gamma, n = plant[5:9]
     return float(A - abs(z) ** n * (gamma + beta * np.sign(z * v)))
+
+
+@kernel
+def relaxed(z: float, dy: float, A: float, beta: float, gamma: float) -> float:
+    """`advance` for n = 1 where z keeps its sign: one flow, and no search for the crossing."""
+    direction = math.copysign(1.0, dy)
+    c = beta + gamma if direction * z >= 0.0 else beta - gamma
+    return direction * linear_flow(direction * z, A, c, abs(dy))[0]
 
 
 @kernel
@@ -141,35 +150,35 @@ def smooth_step(
 ) -> State:  # fmt: skip
     """Order 6 on one branch; F rises by dF over the step, a1 and r1 are y'' and z' at its begin."""
     y, v, z = state[:3]
-    q = h / 3.0
+    q = h * _THIRD
     v1 = v
     y2, v2, z2 = y + q * v1, v + q * a1, z + q * r1
-    a2, r2 = rates(F + dF / 3.0, y2, v2, z2, side, C, plant, curve)
-    q = h * 2.0 / 3.0
+    a2, r2 = rates(F + dF * _THIRD, y2, v2, z2, side, C, plant, curve)
+    q = h * _TWO_THIRDS
     y3, v3, z3 = y + q * v2, v + q * a2, z + q * r2
-    a3, r3 = rates(F + dF * 2.0 / 3.0, y3, v3, z3, side, C, plant, curve)
-    q = h / 12.0
+    a3, r3 = rates(F + dF * _TWO_THIRDS, y3, v3, z3, side, C, plant, curve)
+    q = h * (1.0 / 12.0)
     y4, v4, z4 = y + q * (v1 + 4.0 * v2 - v3), v + q * (a1 + 4.0 * a2 - a3), z + q * (r1 + 4.0 * r2 - r3)
-    a4, r4 = rates(F + dF / 3.0, y4, v4, z4, side, C, plant, curve)
-    q = h / 16.0
+    a4, r4 = rates(F + dF * _THIRD, y4, v4, z4, side, C, plant, curve)
+    q = h * (1.0 / 16.0)
     y5 = y + q * (18.0 * v2 - v1 - 3.0 * v3 - 6.0 * v4)
     v5 = v + q * (18.0 * a2 - a1 - 3.0 * a3 - 6.0 * a4)
     z5 = z + q * (18.0 * r2 - r1 - 3.0 * r3 - 6.0 * r4)
     a5, r5 = rates(F + dF * 0.5, y5, v5, z5, side, C, plant, curve)
-    q = h / 8.0
+    q = h * (1.0 / 8.0)
     y6 = y + q * (9.0 * v2 - 3.0 * v3 - 6.0 * v4 + 4.0 * v5)
     v6 = v + q * (9.0 * a2 - 3.0 * a3 - 6.0 * a4 + 4.0 * a5)
     z6 = z + q * (9.0 * r2 - 3.0 * r3 - 6.0 * r4 + 4.0 * r5)
     a6, r6 = rates(F + dF * 0.5, y6, v6, z6, side, C, plant, curve)
-    q = h / 44.0
+    q = h * (1.0 / 44.0)
     y7 = y + q * (9.0 * v1 - 36.0 * v2 + 63.0 * v3 + 72.0 * v4 - 64.0 * v6)
     v7 = v + q * (9.0 * a1 - 36.0 * a2 + 63.0 * a3 + 72.0 * a4 - 64.0 * a6)
     z7 = z + q * (9.0 * r1 - 36.0 * r2 + 63.0 * r3 + 72.0 * r4 - 64.0 * r6)
     a7, r7 = rates(F + dF, y7, v7, z7, side, C, plant, curve)
-    q = h / 120.0
+    q = h * (1.0 / 120.0)
     halfway = F + 0.5 * dF
     work = 11.0 * (F * v1 + (F + dF) * v7) - 32.0 * halfway * (v5 + v6)
-    work += 81.0 * ((F + dF * 2.0 / 3.0) * v3 + (F + dF / 3.0) * v4)
+    work += 81.0 * ((F + dF * _TWO_THIRDS) * v3 + (F + dF * _THIRD) * v4)
     damped = 11.0 * (v1 * v1 + v7 * v7) + 81.0 * (v3 * v3 + v4 * v4) - 32.0 * (v5 * v5 + v6 * v6)
     taken = 11.0 * (z * v1 + z7 * v7) + 81.0 * (z3 * v3 + z4 * v4) - 32.0 * (z5 * v5 + z6 * v6)
     return (
@@ -183,39 +192,29 @@ def smooth_step(
 
 
 @kernel
-def split(
-    state: State, F: float, slope: float, length: float, plant: Plant, curve: FloatArray, constants: FloatArray,
-    scratch: FloatArray,
-) -> State:  # fmt: skip
-    """Move on by `length` in smooth steps that end at reversals and crossings."""
-    A, beta, gamma, n = plant[5:]
-    trials = 0
-    while length > 0.0:
-        h = length
-        y, v, z = state[:3]
-        a, _ = rates(F, y, v, z, 1.0, 0.0, plant, curve)
-        forward, side, C = branch(state, a, slope, h, A, beta, gamma)
-        r = v * (A - C * power(side * z, n))
-        while True:
-            trial = smooth_step(state, F, slope * h, h, a, r, side, C, plant, curve)
-            trials += 1
-            y1, v1, z1 = trial[:3]
-            if trials > _MOST_TRIALS:
-                break
-            a1, r1 = rates(F + slope * h, y1, v1, z1, side, C, plant, curve)
-            shorter = dip(v, a, v1, a1, h)
-            if forward * v1 < -_REVERSAL * abs(v1 - v):
-                shorter = sign_change(v, a, v1, a1, h)
-            elif side * z1 < -_CROSSING * abs(z1 - z):
-                shorter = sign_change(z, r, z1, r1, h)
-            if not shorter < h:
-                break
-            h = shorter
-        z1 = advance(z, y1 - y, A, beta, gamma, n, constants, scratch)
-        state = (y1, v1, z1, trial[3], trial[4], trial[5])
-        F += slope * h
-        length = length - h if h < length else 0.0
-    return state
+def attempt(
+    state: State, F: float, slope: float, length: float, plant: Plant, curve: FloatArray
+) -> tuple[State, float, bool]:
+    """The longest smooth step up to `length`: state, length, and whether z kept its sign; z by the method itself."""
+    A, beta, gamma, n = plant[5:9]
+    y, v, z = state[:3]
+    h = length
+    a, _ = rates(F, y, v, z, 1.0, 0.0, plant, curve)
+    forward, side, C = branch(state, a, slope, h, A, beta, gamma)
+    r = v * (A - C * power(side * z, n))
+    for _ in range(_MOST_TRIALS):
+        trial = smooth_step(state, F, slope * h, h, a, r, side, C, plant, curve)
+        y1, v1, z1 = trial[:3]
+        a1, r1 = rates(F + slope * h, y1, v1, z1, side, C, plant, curve)
+        shorter = dip(v, a, v1, a1, h)
+        if forward * v1 < -_REVERSAL * abs(v1 - v):
+            shorter = sign_change(v, a, v1, a1, h)
+        elif side * z1 < -_CROSSING * abs(z1 - z):
+            shorter = sign_change(z, r, z1, r1, h)
+        if not shorter < h:
+            break
+        h = shorter
+    return trial, h, side * z >= 0.0 and side * z1 >= 0.0
 
 
 @kernel
@@ -238,7 +237,7 @@ def runge_kutta(state: State, F: float, slope: float, h: float, plant: Plant, cu
 @kernel
 def newmark(state: State, F: float, slope: float, h: float, plant: Plant, curve: FloatArray) -> State:
     """Constant average acceleration and the trapezoidal rule for z: Newton's method on (y', z) at the end."""
-    mass, damping, stiffness, offset, gain, _, beta, gamma, n = plant
+    mass, damping, stiffness, offset, gain, _, beta, gamma, n, _ = plant
     y, v, z = state[:3]
     a, _ = rates(F, y, v, z, 1.0, 0.0, plant, curve)
     r = v * memory_slope(z, v, plant)
@@ -277,7 +276,7 @@ def strang(
     constants: FloatArray, scratch: FloatArray,
 ) -> State:  # fmt: skip
     """Kick, flow, kick. `flow`, (2, 4), takes (y, y', F, its rise) over the step with the tangent at z = 0."""
-    mass, damping, stiffness, offset, gain, A, beta, gamma, n = plant
+    mass, damping, stiffness, offset, gain, A, beta, gamma, n, _ = plant
     y, v, z = state[:3]
     kick = 0.5 * h / mass
     v0 = v - kick * (spring(y, 0.0, offset, curve) + gain * (z - A * y))
@@ -305,7 +304,39 @@ def strang(
     )
 
 
-# ---------------------------------------------------------------------------------- path
+# ---------------------------------------------------------------------------------- paths
+
+
+@kernel
+def split_path(
+    substeps: int, held: bool, parameters: FloatArray, curve: FloatArray, sample_time: float, last_force: float,
+    force: FloatArray, state: FloatArray, out: FloatArray,
+) -> int:  # fmt: skip
+    """States at the samples of `force` into `out`, (n_samples, 6): the first sample that is not finite, or -1.
+
+    `state`, (6,), is that at `last_force`, one sample before; `parameters`, (9,), is the plant.
+    """
+    plant, current, constants, scratch = unpacked(parameters, state)
+    A, beta, gamma, n = plant[5:9]
+    for k in range(force.size):
+        rise = 0.0 if held else force[k] - last_force
+        slope = rise / sample_time
+        for j in range(substeps):
+            F, left = last_force + rise * j / substeps, sample_time / substeps
+            while left > 0.0:
+                y, z = current[0], current[2]
+                trial, h, same_side = attempt(current, F, slope, left, plant, curve)
+                if n == 1.0 and same_side:
+                    z = relaxed(z, trial[0] - y, A, beta, gamma)
+                else:
+                    z = advance(z, trial[0] - y, A, beta, gamma, n, constants, scratch)
+                current = (trial[0], trial[1], z, trial[3], trial[4], trial[5])
+                F += slope * h
+                left = left - h if h < left else 0.0
+        last_force = force[k]
+        if not stored(current, out[k]):
+            return k
+    return -1
 
 
 @kernel
@@ -313,34 +344,38 @@ def path(
     method: int, substeps: int, held: bool, parameters: FloatArray, curve: FloatArray, flow: FloatArray,
     sample_time: float, last_force: float, force: FloatArray, state: FloatArray, out: FloatArray,
 ) -> int:  # fmt: skip
-    """States at the samples of `force` into `out`, (n_samples, 6): the first sample that is not finite, or -1.
-
-    `state`, (6,), is that at `last_force`, one sample before; `parameters`, (9,), is the plant.
-    """
-    p, x = parameters, state
-    plant = (p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8])
-    current = (x[0], x[1], x[2], x[3], x[4], x[5])
-    constants, scratch = np.empty(N_CONSTANTS), np.empty(N_SCRATCH)
-    prepare(p[5], p[6], p[7], p[8], constants)
+    """As `split_path`, by the other methods."""
+    plant, current, constants, scratch = unpacked(parameters, state)
     h = sample_time / substeps
     for k in range(force.size):
         rise = 0.0 if held else force[k] - last_force
         slope = rise / sample_time
         for j in range(substeps):
             F = last_force + rise * j / substeps
-            if method == SPLIT:
-                current = split(current, F, slope, h, plant, curve, constants, scratch)
-            elif method == RUNGE_KUTTA:
+            if method == RUNGE_KUTTA:
                 current = runge_kutta(current, F, slope, h, plant, curve)
             elif method == NEWMARK:
                 current = newmark(current, F, slope, h, plant, curve)
             else:
                 current = strang(current, F, slope, h, plant, curve, flow, constants, scratch)
         last_force = force[k]
-        total = 0.0
-        for i in range(6):
-            out[k, i] = current[i]
-            total += current[i]
-        if not math.isfinite(total):
+        if not stored(current, out[k]):
             return k
     return -1
+
+
+@kernel
+def unpacked(parameters: FloatArray, state: FloatArray) -> tuple[Plant, State, FloatArray, FloatArray]:
+    """Plant and state as tuples, and the law's constants and scratch."""
+    p, x = parameters, state
+    constants = np.empty(N_CONSTANTS)
+    prepare(p[5], p[6], p[7], p[8], constants)
+    plant = (p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], 1.0 / p[0])
+    return plant, (x[0], x[1], x[2], x[3], x[4], x[5]), constants, np.empty(N_SCRATCH)
+
+
+@kernel
+def stored(state: State, row: FloatArray) -> bool:
+    """Write the state; whether it is finite."""
+    row[0], row[1], row[2], row[3], row[4], row[5] = state
+    return math.isfinite(state[0] + state[1] + state[2] + state[3] + state[4] + state[5])

@@ -19,6 +19,7 @@ The last never falls if -beta <= gamma <= beta. With A = 0 the memory stores not
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -266,7 +267,7 @@ class BoucWenOscillator:
         while state is not None and done < inputs.size:
             stop = min(done + _CHUNK, inputs.size)
             piece = states[done:stop]
-            lost = kernels.path(*steps, scale * state.u, scale * inputs[done:stop], np.array(state[1:]), piece)
+            lost = steps(scale * state.u, scale * inputs[done:stop], np.array(state[1:]), piece)
             if lost >= 0:
                 elapsed = (done + lost + 1 - first) * sample_time
                 raise SimulationError(
@@ -278,16 +279,18 @@ class BoucWenOscillator:
                 progress(done, inputs.size)
         return inputs, states
 
-    def _compiled(self, sample_time: float) -> tuple[int, int, bool, FloatArray, FloatArray, FloatArray, float]:
-        """What `kernels.path` takes first."""
+    def _compiled(self, sample_time: float) -> Callable[[float, FloatArray, FloatArray, FloatArray], int]:
+        """The kernel with everything but the input, the state before it, and the states to come."""
         law, (slope, *curve) = self.law, self._coefficients
-        stiffness, substeps = self.stiffness + slope, self._substeps(sample_time)
+        stiffness, substeps, held = self.stiffness + slope, self._substeps(sample_time), self.hold == "zoh"
         plant = [self.mass, self.damping, stiffness, law.offset, law.gain, law.A, law.beta, law.gamma, law.n]
-        flow = np.empty((0, 4))
+        if self.method == "split":
+            return partial(kernels.split_path, substeps, held, np.array(plant), np.array(curve), sample_time)
+        flow = np.zeros((2, 4))
         if self.method == "strang":
             flow = _linear_flow(self.mass, self.damping, stiffness + law.gain * law.A, sample_time / substeps)
-        held = self.hold == "zoh"
-        return METHODS[self.method], substeps, held, np.array(plant), np.array(curve), flow, sample_time
+        method = METHODS[self.method]
+        return partial(kernels.path, method, substeps, held, np.array(plant), np.array(curve), flow, sample_time)
 
 
 def _linear_flow(mass: float, damping: float, stiffness: float, h: float) -> FloatArray:
