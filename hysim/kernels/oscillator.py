@@ -17,7 +17,8 @@ C = gamma + beta sign(z y') in front of |z|^n; at them z'' jumps. Four methods:
 
 SPLIT looks for the events on the cubic through values and slopes at both ends of a trial step, and tries again
 with a step that ends there. A reversal may be missed by a share e = 1e-6 of the change of velocity: the turning
-point is then wrong by e^2. A crossing costs the order only inside the piece that is missed.
+point is then wrong by e^2. A crossing costs the order only inside the piece that is missed. Where
+the memory by the method is off the exact one, a law much sharper than the step, the step is halved.
 
 Each step also carries three integrals over time: of F y', of c y'^2 and of g z y'. The state is the tuple
 (y, y', z, integral of F y', of c y'^2, of g z y'); the plant is (m, c, k, offset, g, A, beta, gamma, n, 1 / m).
@@ -38,7 +39,8 @@ SPLIT, RUNGE_KUTTA, NEWMARK, STRANG = range(4)
 
 _REVERSAL = 1.0e-6  # share of the change of y' in a step by which its end may lie beyond a reversal
 _CROSSING = 1.0e-3  # likewise of z and a crossing
-_MOST_TRIALS = 60
+_MOST_TRIALS, _MOST_PIECES = 60, 1000  # of one piece between events, of pieces in a step
+_DISAGREEMENT = 1.0e-3  # share of z by which the method and the law may differ on it at the end of a piece
 _ROUNDING = 2.0**-50
 _THIRD, _TWO_THIRDS = 1.0 / 3.0, 2.0 / 3.0
 
@@ -193,16 +195,17 @@ def smooth_step(
 
 @kernel
 def attempt(
-    state: State, F: float, slope: float, length: float, plant: Plant, curve: FloatArray
+    state: State, F: float, slope: float, length: float, most_trials: int, plant: Plant, curve: FloatArray
 ) -> tuple[State, float, bool]:
     """The longest smooth step up to `length`: state, length, and whether z kept its sign; z by the method itself."""
     A, beta, gamma, n = plant[5:9]
     y, v, z = state[:3]
-    h = length
+    h = shorter = length
     a, _ = rates(F, y, v, z, 1.0, 0.0, plant, curve)
     forward, side, C = branch(state, a, slope, h, A, beta, gamma)
     r = v * (A - C * power(side * z, n))
-    for _ in range(_MOST_TRIALS):
+    for _ in range(most_trials):
+        h = shorter
         trial = smooth_step(state, F, slope * h, h, a, r, side, C, plant, curve)
         y1, v1, z1 = trial[:3]
         a1, r1 = rates(F + slope * h, y1, v1, z1, side, C, plant, curve)
@@ -213,7 +216,6 @@ def attempt(
             shorter = sign_change(z, r, z1, r1, h)
         if not shorter < h:
             break
-        h = shorter
     return trial, h, side * z >= 0.0 and side * z1 >= 0.0
 
 
@@ -323,16 +325,24 @@ def split_path(
         slope = rise / sample_time
         for j in range(substeps):
             F, left = last_force + rise * j / substeps, sample_time / substeps
-            while left > 0.0:
+            reach = left
+            for piece in range(_MOST_PIECES):
                 y, z = current[0], current[2]
-                trial, h, same_side = attempt(current, F, slope, left, plant, curve)
+                trials = _MOST_TRIALS if piece < _MOST_PIECES - 1 else 1
+                trial, h, same_side = attempt(current, F, slope, min(reach, left), trials, plant, curve)
                 if n == 1.0 and same_side:
                     z = relaxed(z, trial[0] - y, A, beta, gamma)
                 else:
                     z = advance(z, trial[0] - y, A, beta, gamma, n, constants, scratch)
+                if abs(z - trial[2]) > _DISAGREEMENT * (abs(z) + abs(current[2])) and trials > 1:
+                    reach = 0.5 * h
+                    continue
                 current = (trial[0], trial[1], z, trial[3], trial[4], trial[5])
+                if not h < left:
+                    break
+                reach *= 2.0
                 F += slope * h
-                left = left - h if h < left else 0.0
+                left -= h
         last_force = force[k]
         if not stored(current, out[k]):
             return k
