@@ -1,4 +1,4 @@
-/* The method "split" of hysim.kernels.oscillator for n = 1, line by line, as a yardstick of the compiled Python. */
+/* The method "split" of hysim.kernels.oscillator for n = 1 in plain C, as a yardstick. */
 #include <math.h>
 
 typedef struct { double mobility, damping, stiffness, A, beta, gamma; } Plant;
@@ -104,29 +104,36 @@ static State smooth_step(State x, double F, double dF, double h, double a1, doub
 }
 
 static State split(State x, double F, double slope, double length, const Plant *p) {
-    int trials = 0;
-    while (length > 0.0) {
-        double h = length, a = acceleration(F, x.y, x.v, x.z, p);
-        double ahead = x.v + 1e-6 * h * a;
+    double left = length, reach = length;
+    for (int piece = 0; piece < 1000; piece++) {
+        double h, shorter = reach < left ? reach : left, a = acceleration(F, x.y, x.v, x.z, p);
+        double ahead = x.v + 1e-6 * shorter * a;
         double forward = copysign(1.0, ahead != 0.0 ? ahead : slope);
-        ahead = x.z + 1e-3 * h * p->A * x.v;
+        ahead = x.z + 1e-3 * shorter * p->A * x.v;
         double side = copysign(1.0, ahead != 0.0 ? ahead : p->A * forward);
         double C = p->gamma + p->beta * forward * side, r = x.v * (p->A - C * side * x.z);
+        int trials = piece < 999 ? 60 : 1, last = trials == 1;
         State t;
-        for (;;) {
+        do {
+            h = shorter;
             t = smooth_step(x, F, slope * h, h, a, r, side, C, p);
-            if (++trials > 60) break;
             double a1 = acceleration(F + slope * h, t.y, t.v, t.z, p), r1 = t.v * (p->A - C * side * t.z);
-            double shorter = dip(x.v, a, t.v, a1, h);
+            shorter = dip(x.v, a, t.v, a1, h);
             if (forward * t.v < -1e-6 * fabs(t.v - x.v)) shorter = place(x.v, a, t.v, a1, h);
             else if (side * t.z < -1e-3 * fabs(t.z - x.z)) shorter = place(x.z, r, t.z, r1, h);
-            if (!(shorter < h)) break;
-            h = shorter;
+        } while (--trials > 0 && shorter < h);
+        int same_side = side * x.z >= 0.0 && side * t.z >= 0.0;
+        double z = same_side ? relaxed(x.z, t.y - x.y, p) : memory(x.z, t.y - x.y, p);
+        if (fabs(z - t.z) > 1e-3 * (fabs(z) + fabs(x.z)) && !last) {
+            reach = 0.5 * h;
+            continue;
         }
-        t.z = side * x.z >= 0.0 && side * t.z >= 0.0 ? relaxed(x.z, t.y - x.y, p) : memory(x.z, t.y - x.y, p);
         x = t;
+        x.z = z;
+        if (!(h < left)) break;
+        reach *= 2.0;
         F += slope * h;
-        length = h < length ? length - h : 0.0;
+        left -= h;
     }
     return x;
 }

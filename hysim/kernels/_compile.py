@@ -18,14 +18,19 @@ def kernel(function: F) -> F:
     return _compiled(function)
 
 
+def inlined_kernel(function: F) -> F:
+    """Compile `function` into its callers: for what takes or gives long tuples inside a hot loop."""
+    return _compiled(function, inline="always")
+
+
 def signed_kernel(signature: Any) -> Callable[[F], F]:
     """Compile a function for one signature at once: what a typed function pointer needs."""
     return lambda function: _compiled(function, signature)
 
 
-def _compiled(function: F, *signature: Any) -> F:
+def _compiled(function: F, *signature: Any, inline: str = "never") -> F:
     compiler: Any = numba.njit
-    options = {"nogil": True, "error_model": "numpy"}
+    options = {"nogil": True, "error_model": "numpy", "inline": inline}
     try:
         compiled: F = compiler(*signature, cache=True, **options)(function)
     except RuntimeError:  # numba found no writable folder for its cache

@@ -29,7 +29,7 @@ import math
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import kernel
+from hysim.kernels._compile import inlined_kernel, kernel
 from hysim.kernels.boucwen import N_CONSTANTS, N_SCRATCH, advance, linear_flow, polynomial, prepare
 
 State = tuple[float, float, float, float, float, float]
@@ -145,7 +145,7 @@ def branch(
     return forward, side, gamma + beta * forward * side
 
 
-@kernel
+@inlined_kernel
 def smooth_step(
     state: State, F: float, dF: float, h: float, a1: float, r1: float, side: float, C: float, plant: Plant,
     curve: FloatArray,
@@ -193,7 +193,7 @@ def smooth_step(
     )
 
 
-@kernel
+@inlined_kernel
 def attempt(
     state: State, F: float, slope: float, length: float, most_trials: int, plant: Plant, curve: FloatArray
 ) -> tuple[State, float, bool]:
