@@ -41,7 +41,7 @@ _REVERSAL = 1.0e-6  # share of the change of y' in a step by which its end may l
 _CROSSING = 1.0e-3  # likewise of z and a crossing
 _MOST_TRIALS, _MOST_PIECES = 60, 1000  # of one piece between events, of pieces in a step
 _DISAGREEMENT = 1.0e-3  # share of z by which the method and the law may differ on it at the end of a piece
-_ROUNDING = 2.0**-50
+_ROUNDING, _TINY = 2.0**-50, 1.0e-290
 _THIRD, _TWO_THIRDS = 1.0 / 3.0, 2.0 / 3.0
 
 
@@ -257,7 +257,7 @@ def newmark(state: State, F: float, slope: float, h: float, plant: Plant, curve:
         dv = (gain * excess - (imbalance - end) * J22) / (J11 * J22 - gain * J21)
         dz = -(excess + J21 * dv) / J22
         v1, z1 = v1 + dv, z1 + dz
-        moved = abs(dv) / (abs(v) + abs(v1)) + abs(dz) / (abs(z) + abs(z1)) if dv != 0.0 or dz != 0.0 else 0.0
+        moved = abs(dv) / (abs(v) + abs(v1) + _TINY) + abs(dz) / (abs(z) + abs(z1) + _TINY)
         if moved < _ROUNDING or not moved < last:
             break
         last = moved if moved < 1.0e-6 else math.inf
