@@ -201,6 +201,7 @@ def test_simulate_shows_every_signal():
     assert np.array_equal(sim.y, plant().response(noise(30), float(np.diff(t).mean())))
 
 
+@pytest.mark.filterwarnings("ignore:.*encountered:RuntimeWarning")  # NumPy's scalars warn where nothing is compiled
 @pytest.mark.parametrize("method", module.METHODS)
 def test_a_motion_without_bounds_names_the_time(method):
     falling = hs.BoucWenOscillator(mass=1.0, damping=0.0, stiffness=-1e4, law=hs.BoucWen(), method=method)
