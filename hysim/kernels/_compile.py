@@ -22,8 +22,8 @@ def kernel(function: F) -> F:
 
 
 def inlined(function: F) -> F:
-    """Compile a scalar function into each of its callers, which saves the time of a call and costs that of a copy."""
-    return _compiled(function, forceinline=True)
+    """Copy `function` into each of its callers, where it is compiled with them, and nowhere else."""
+    return _compiled(function, inline="always")
 
 
 def signed_kernel(signature: Any) -> Callable[[F], F]:

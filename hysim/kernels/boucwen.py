@@ -133,7 +133,39 @@ def prepare_side(A: float, c: float, n: float, side: FloatArray) -> None:
 
 
 @kernel
-def path(
+def linear_path(
+    A: float, beta: float, gamma: float, last_u: float, z: float, u: FloatArray, out: FloatArray
+) -> int:
+    """Memory of n = 1 at the samples of `u` from (last_u, z) into `out`: the first sample that is not finite, or -1."""
+    loading, unloading = beta + gamma, beta - gamma
+    for k in range(u.size):
+        du = u[k] - last_u
+        z = z if du == 0.0 else linear_advance(z, du, A, loading, unloading)
+        last_u = u[k]
+        out[k] = z
+        if not math.isfinite(z):
+            return k
+    return -1
+
+
+@kernel
+def quadratic_path(
+    A: float, beta: float, gamma: float, last_u: float, z: float, u: FloatArray, out: FloatArray
+) -> int:
+    """As `linear_path`, for n = 2."""
+    loading, unloading = beta + gamma, beta - gamma
+    for k in range(u.size):
+        du = u[k] - last_u
+        z = z if du == 0.0 else quadratic_advance(z, du, A, loading, unloading)
+        last_u = u[k]
+        out[k] = z
+        if not math.isfinite(z):
+            return k
+    return -1
+
+
+@kernel
+def power_path(
     A: float,
     beta: float,
     gamma: float,
@@ -144,36 +176,15 @@ def path(
     work: FloatArray,
     out: FloatArray,
 ) -> int:
-    """Memory at the samples of `u` from (last_u, z) into `out`: the first sample that is not finite, or -1.
-
-    `work` comes from `prepare`. The three loops are the same but for the function that they inline.
-    """
-    loading, unloading = beta + gamma, beta - gamma
+    """As `linear_path`, for other n; `work` comes from `prepare`."""
     charts = borrowed(work)
-    if n == 1.0:
-        for k in range(u.size):
-            du = u[k] - last_u
-            z = z if du == 0.0 else linear_advance(z, du, A, loading, unloading)
-            last_u = u[k]
-            out[k] = z
-            if not math.isfinite(z):
-                return k
-    elif n == 2.0:
-        for k in range(u.size):
-            du = u[k] - last_u
-            z = z if du == 0.0 else quadratic_advance(z, du, A, loading, unloading)
-            last_u = u[k]
-            out[k] = z
-            if not math.isfinite(z):
-                return k
-    else:
-        for k in range(u.size):
-            du = u[k] - last_u
-            z = z if du == 0.0 else power_advance(z, du, A, beta, gamma, n, charts)
-            last_u = u[k]
-            out[k] = z
-            if not math.isfinite(z):
-                return k
+    for k in range(u.size):
+        du = u[k] - last_u
+        z = z if du == 0.0 else power_advance(z, du, A, beta, gamma, n, charts)
+        last_u = u[k]
+        out[k] = z
+        if not math.isfinite(z):
+            return k
     return -1
 
 
@@ -190,9 +201,17 @@ def batch(parameters: FloatArray, output: FloatArray, u: FloatArray, out: FloatA
     for i in range(start, stop):
         A, beta, gamma, n, z0 = parameters[i]
         row = u[min(i, u.shape[0] - 1)]
-        prepare(A, beta, gamma, n, last_n, work)
-        last_n = n
-        if row.size and path(A, beta, gamma, n, row[0], z0, row, work, out[i]) >= 0:
+        if row.size == 0:
+            continue
+        if n == 1.0:
+            escaped = linear_path(A, beta, gamma, row[0], z0, row, out[i])
+        elif n == 2.0:
+            escaped = quadratic_path(A, beta, gamma, row[0], z0, row, out[i])
+        else:
+            prepare(A, beta, gamma, n, last_n, work)
+            last_n = n
+            escaped = power_path(A, beta, gamma, n, row[0], z0, row, work, out[i])
+        if escaped >= 0:
             out[i] = math.inf
             continue
         gain, offset = output[i, 0], output[i, 1]

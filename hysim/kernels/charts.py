@@ -167,7 +167,7 @@ def further(
     return change, length
 
 
-@inlined
+@kernel
 def in_chart(
     w: float, forwards: bool, side: int, n: float, length: float, work: FloatArray
 ) -> tuple[float, float, float]:

@@ -8,13 +8,13 @@ Horner's rule is a chain of 30 dependent operations; the tree below is one of 9.
 from collections.abc import Sequence
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import kernel
+from hysim.kernels._compile import inlined
 
 N_TERMS = 16
 _NOT_NEGATIVE = 0xFFFF  # says to the compiler that no index counts from the end: a third of the time otherwise
 
 
-@kernel
+@inlined
 def sum16(c: FloatArray | Sequence[float], first: int, x: float) -> float:
     """The polynomial with the coefficients ``c[first : first + 16]``."""
     k = first & _NOT_NEGATIVE
@@ -27,7 +27,7 @@ def sum16(c: FloatArray | Sequence[float], first: int, x: float) -> float:
     return (a + b * x4) + (d + e * x4) * (x4 * x4)
 
 
-@kernel
+@inlined
 def sum8(c: FloatArray | Sequence[float], first: int, x: float) -> float:
     """The polynomial of eight terms with the coefficients ``c[first : first + 8]``."""
     k = first & _NOT_NEGATIVE

@@ -431,10 +431,17 @@ class _BoucWenLaw(ABC):
         return (float(u[0]) if u.size else 0.0), self.z0
 
     def _memory(self, u: FloatArray, state: State) -> FloatArray:
-        z, work = np.empty(u.size), np.empty(N_WORK)
-        law = self.A, self.beta, self.gamma, self.n
-        kernels.prepare(*law, 0.0, work)
-        escaped = kernels.path(*law, float(state[0]), float(state[1]), u, work, z)
+        z = np.empty(u.size)
+        law = self.A, self.beta, self.gamma
+        start = float(state[0]), float(state[1])
+        if self.n == 1.0:
+            escaped = kernels.linear_path(*law, *start, u, z)
+        elif self.n == 2.0:
+            escaped = kernels.quadratic_path(*law, *start, u, z)
+        else:
+            work = np.empty(N_WORK)
+            kernels.prepare(*law, self.n, 0.0, work)
+            escaped = kernels.power_path(*law, self.n, *start, u, work, z)
         if escaped >= 0:
             raise SimulationError(
                 f"the memory escapes to infinity at sample {escaped} (u = {u[escaped]:g}): with beta + gamma = "
