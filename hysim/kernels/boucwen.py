@@ -22,8 +22,8 @@ import math
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import borrowed, inlined, kernel
-from hysim.kernels.charts import N_WORK, further, in_chart, power_flow, prepare_exponent
+from hysim.kernels._compile import borrowed, copied, kernel
+from hysim.kernels.charts import N_WORK, in_chart, power_flow, prepare_exponent
 from hysim.kernels.elementary import linear_advance, quadratic_advance
 
 # The first places of a law's workspace: last u and z, for `step`; then w*, 1/w* and |a|/w* loading, and unloading.
@@ -34,60 +34,35 @@ _EXTREME = 690.0  # of |log(A/c)| and of |log w*|: beyond it, one of the two ter
 # ---------------------------------------------------------------------------------- scalar functions
 
 
-@inlined
+@copied
 def power_advance(z: float, du: float, A: float, beta: float, gamma: float, n: float, work: FloatArray) -> float:
     """As `advance` for other n than 1 and 2."""
     sign = 1.0 if (z > 0.0 and du > 0.0) or (z < 0.0 and du < 0.0) or (z == 0.0 and A > 0.0) else -1.0
-    if sign > 0.0:
-        a, c, side = A, beta + gamma, _LOADING
-    else:
-        a, c, side = -A, beta - gamma, _UNLOADING
-    balance = work[side]
-    if balance > 0.0:
-        sigma = 0 if (a > 0.0) == (c > 0.0) else 1
-        change, left, end = in_chart(abs(z) * work[side + 1], a > 0.0, sigma, n, abs(du) * work[side + 2], work)
-        along: float = sign * (abs(z) + balance * change)
-        if left > 0.0:
-            along = leave_chart(abs(z), sign, A, beta, gamma, n, change, end, left, work)
-    else:
-        along = leave_chart(abs(z), sign, A, beta, gamma, n, 0.0, 0.0, abs(du), work)
+    w, left = abs(z), abs(du)
+    while True:  # a second time only from w = 0, on the other side, where w grows
+        forwards = (sign > 0.0) == (A > 0.0)
+        c, side = (beta + gamma, _LOADING) if sign > 0.0 else (beta - gamma, _UNLOADING)
+        balance = work[side]
+        if balance > 0.0:
+            place, left, change = w * work[side + 1], left * work[side + 2], 0.0
+            while True:
+                part, left, place = in_chart(place, forwards, 0 if forwards == (c > 0.0) else 1, n, left, work)
+                change += part
+                if left <= 0.0 or (place <= 0.0 and not forwards):
+                    break
+            change *= balance
+            if left > 0.0:
+                left /= work[side + 2]
+        else:
+            change, left = degenerate(w, sign * A, c, n, left)
+        if left <= 0.0:
+            break
+        sign, w = -sign, 0.0
+    along = sign * (w + change)
     return along if du > 0.0 else -along
 
 
-@kernel
-def leave_chart(
-    w: float,
-    sign: float,
-    A: float,
-    beta: float,
-    gamma: float,
-    n: float,
-    change: float,
-    end: float,
-    left: float,
-    work: FloatArray,
-) -> float:
-    """Memory along the input, from `w` on the side of `sign`, with the first chart (if there is one) behind.
-
-    It has brought a `change`, up to its `end`, with the length `left`, all in units of w*.
-    """
-    for _ in range(2):  # the second time from w = 0, on the other side, where w grows
-        a, c, side = sign * A, beta + sign * gamma, _LOADING if sign > 0.0 else _UNLOADING
-        balance = work[side]
-        if balance > 0.0:
-            change, left = further(change, end, a > 0.0, 0 if (a > 0.0) == (c > 0.0) else 1, n, left, work)
-            change, left = change * balance, left / work[side + 2]
-        else:
-            change, left = degenerate(w, a, c, n, left)
-        if left == 0.0:
-            break
-        sign, w, change, end = -sign, 0.0, 0.0, 0.0
-        rate = work[_LOADING + 2 if sign > 0.0 else _UNLOADING + 2]
-        left = left * rate if rate > 0.0 else left
-    return sign * (w + change)
-
-
-@kernel
+@copied
 def degenerate(w: float, a: float, c: float, n: float, length: float) -> tuple[float, float]:
     """Change of w, and length left over at w = 0, on w' = a - c w^n where one of the terms has vanished."""
     if a == 0.0 or (c != 0.0 and abs(a) < abs(c)):
@@ -120,7 +95,7 @@ def prepare(A: float, beta: float, gamma: float, n: float, last_n: float, work: 
         prepare_exponent(n, work)
 
 
-@kernel
+@copied
 def prepare_side(A: float, c: float, n: float, side: FloatArray) -> None:
     """Fill w*, 1/w* and |A|/w*; they are 0 where one of the terms vanishes, or w* is not a number of this size."""
     side[0] = side[1] = side[2] = 0.0
@@ -133,9 +108,7 @@ def prepare_side(A: float, c: float, n: float, side: FloatArray) -> None:
 
 
 @kernel
-def linear_path(
-    A: float, beta: float, gamma: float, last_u: float, z: float, u: FloatArray, out: FloatArray
-) -> int:
+def linear_path(A: float, beta: float, gamma: float, last_u: float, z: float, u: FloatArray, out: FloatArray) -> int:
     """Memory of n = 1 at the samples of `u` from (last_u, z) into `out`: the first sample that is not finite, or -1."""
     loading, unloading = beta + gamma, beta - gamma
     for k in range(u.size):
@@ -149,9 +122,7 @@ def linear_path(
 
 
 @kernel
-def quadratic_path(
-    A: float, beta: float, gamma: float, last_u: float, z: float, u: FloatArray, out: FloatArray
-) -> int:
+def quadratic_path(A: float, beta: float, gamma: float, last_u: float, z: float, u: FloatArray, out: FloatArray) -> int:
     """As `linear_path`, for n = 2."""
     loading, unloading = beta + gamma, beta - gamma
     for k in range(u.size):

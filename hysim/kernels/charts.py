@@ -25,7 +25,7 @@ which ones have been made before.
 import math
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import inlined, kernel
+from hysim.kernels._compile import copied, inlined, kernel
 from hysim.kernels.polynomials import N_TERMS, sum8, sum16
 
 _N_CELLS = 64
@@ -55,7 +55,7 @@ N_WORK = _SPARE + 2 * _N_TAYLOR
 # ---------------------------------------------------------------------------------- constants of an exponent
 
 
-@kernel
+@copied
 def prepare_exponent(n: float, work: FloatArray) -> None:
     """Fill `work`, shape (N_WORK,), from FREE on with what all charts of an exponent share, and forget its cells."""
     for k in range(8):
@@ -77,7 +77,7 @@ def prepare_exponent(n: float, work: FloatArray) -> None:
         work[_CELLS + i * _CELL + _CENTRE] = 0.0
 
 
-@kernel
+@copied
 def zero_back(n: float, v: FloatArray, power: FloatArray) -> None:
     """Fill v_1 to v_8 of w = T (1 + v_1 y + ...), with `power` for the coefficients of v^n."""
     power[0] = 1.0
@@ -89,7 +89,7 @@ def zero_back(n: float, v: FloatArray, power: FloatArray) -> None:
         power[k] = convolution / k
 
 
-@kernel
+@copied
 def saturation(n: float, there: FloatArray, back: FloatArray, spare: FloatArray) -> None:
     """Fill both series of the chart of saturation.
 
@@ -118,7 +118,7 @@ def saturation(n: float, there: FloatArray, back: FloatArray, spare: FloatArray)
         bracket[k] = total / k - n / scale * back[k - 1]
 
 
-@kernel
+@copied
 def edges(n: float, side: int, bottom: float, top: float, out: FloatArray) -> int:
     """Fill the edges of a line of cells, upwards from `bottom`, for sigma = 1 to `top`; the number of cells."""
     out[0] = bottom
@@ -152,26 +152,14 @@ def distance(w: float, n: float) -> float:
 # ---------------------------------------------------------------------------------- moving on the branch
 
 
-@kernel
-def further(
-    change: float, w: float, forwards: bool, side: int, n: float, length: float, work: FloatArray
-) -> tuple[float, float]:
-    """Through the charts from w over `length` in T, or up to w = 0: the change of w, and the length left over.
-
-    `side` is 0 for sigma = 1 and 1 for sigma = -1. The `change` so far is added. An escape is one of inf.
-    """
-    end = w
-    while length > 0.0 and (end > 0.0 or forwards):
-        part, length, end = in_chart(end, forwards, side, n, length, work)
-        change += part
-    return change, length
-
-
-@kernel
+@copied
 def in_chart(
     w: float, forwards: bool, side: int, n: float, length: float, work: FloatArray
 ) -> tuple[float, float, float]:
-    """As `further`, within one chart or up to its end, which is the third value if some length is left."""
+    """From w over `length` in T within one chart, or up to its end: the change of w, the length left over, the end.
+
+    `side` is 0 for sigma = 1 and 1 for sigma = -1. An escape is a change of inf. The end counts if a length is left.
+    """
     if w < work[_W_ZERO] or (w == work[_W_ZERO] and not forwards):
         return near_zero(w, forwards, side, n, length, work)
     if side == 0:
@@ -186,7 +174,7 @@ def in_chart(
     return change, left, w + change
 
 
-@inlined
+@copied
 def near_zero(
     w: float, forwards: bool, side: int, n: float, length: float, work: FloatArray
 ) -> tuple[float, float, float]:
@@ -203,7 +191,7 @@ def near_zero(
     return way + (beyond + target * y * sum8(work, _ZERO_BACK, y)), 0.0, w
 
 
-@inlined
+@copied
 def near_saturation(w: float, forwards: bool, n: float, length: float, work: FloatArray) -> tuple[float, float, float]:
     """As `in_chart` near w = 1 at sigma = 1; only the way backwards has an end."""
     scale = max(n, 1.0)
@@ -222,7 +210,7 @@ def near_saturation(w: float, forwards: bool, n: float, length: float, work: Flo
     return (e - s * sum16(work, _SATURATION_BACK, s)) / scale, 0.0, w
 
 
-@inlined
+@copied
 def along_cells(
     w: float, forwards: bool, side: int, last: int, n: float, length: float, work: FloatArray
 ) -> tuple[float, float, float]:
@@ -242,7 +230,7 @@ def along_cells(
         if left > 0.0:
             end = work[_EDGES + side * (_N_CELLS + 1) + (last + 1 if forwards else 0)]
             return end - w, left, end
-        cell = visit(i, side, n, work)
+        cell = (_CELLS + (side * _N_CELLS + i) * _CELL) & _NOT_NEGATIVE
         centre = work[cell + _CENTRE]
     work[_VISITED + side] = i
     r = s * sum16(work, cell + _BACK, s)
@@ -304,7 +292,7 @@ def make_cell(below: float, above: float, side: int, n: float, cell: FloatArray,
     cell[_LENGTH] = (cell[_ABOVE] - cell[_BELOW]) * centre
 
 
-@kernel
+@copied
 def cell_series(x: float, n: float, q: FloatArray, p: FloatArray, slope: FloatArray, power: FloatArray) -> None:
     """q_1 to q_16 of the integral of 1/(1 - x (1 + r)^n), and p_1 to p_16 of r(s) on dr/ds = 1 - x (1 + r)^n.
 
@@ -333,7 +321,7 @@ def cell_series(x: float, n: float, q: FloatArray, p: FloatArray, slope: FloatAr
 
 @kernel
 def far_step(w: float, forwards: bool, side: int, n: float, length: float, work: FloatArray) -> tuple[float, float]:
-    """As `further`, for a step of the flow about w, as long as its series serves."""
+    """As `in_chart`, for a step of the flow about w, as long as its series serves."""
     a = 1.0 if forwards else -1.0
     c = a if side == 0 else -a
     far = work[_W_FAR]

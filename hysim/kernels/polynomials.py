@@ -7,14 +7,17 @@ Horner's rule is a chain of 30 dependent operations; the tree below is one of 9.
 
 from collections.abc import Sequence
 
+from numba import float64, int64, types
+
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import inlined
+from hysim.kernels._compile import signed_inlined
 
 N_TERMS = 16
+_ARRAY, _TUPLE = types.Array(float64, 1, "C"), types.UniTuple(float64, N_TERMS)
 _NOT_NEGATIVE = 0xFFFF  # says to the compiler that no index counts from the end: a third of the time otherwise
 
 
-@inlined
+@signed_inlined(float64(_ARRAY, int64, float64), float64(_TUPLE, int64, float64))
 def sum16(c: FloatArray | Sequence[float], first: int, x: float) -> float:
     """The polynomial with the coefficients ``c[first : first + 16]``."""
     k = first & _NOT_NEGATIVE
@@ -27,7 +30,7 @@ def sum16(c: FloatArray | Sequence[float], first: int, x: float) -> float:
     return (a + b * x4) + (d + e * x4) * (x4 * x4)
 
 
-@inlined
+@signed_inlined(float64(_ARRAY, int64, float64))
 def sum8(c: FloatArray | Sequence[float], first: int, x: float) -> float:
     """The polynomial of eight terms with the coefficients ``c[first : first + 8]``."""
     k = first & _NOT_NEGATIVE
