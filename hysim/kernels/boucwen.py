@@ -22,7 +22,7 @@ import math
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import borrowed, copied, kernel
+from hysim.kernels._compile import borrowed, copied, inlined, kernel
 from hysim.kernels.charts import N_WORK, in_chart, power_flow, prepare_exponent
 from hysim.kernels.elementary import linear_advance, quadratic_advance
 
@@ -34,7 +34,7 @@ _EXTREME = 690.0  # of |log(A/c)| and of |log w*|: beyond it, one of the two ter
 # ---------------------------------------------------------------------------------- scalar functions
 
 
-@copied
+@inlined
 def power_advance(z: float, du: float, A: float, beta: float, gamma: float, n: float, work: FloatArray) -> float:
     """As `advance` for other n than 1 and 2."""
     sign = 1.0 if (z > 0.0 and du > 0.0) or (z < 0.0 and du < 0.0) or (z == 0.0 and A > 0.0) else -1.0
@@ -72,7 +72,7 @@ def degenerate(w: float, a: float, c: float, n: float, length: float) -> tuple[f
     return a * length, 0.0
 
 
-@kernel
+@copied
 def advance(z: float, du: float, A: float, beta: float, gamma: float, n: float, work: FloatArray) -> float:
     """Memory after the input has moved monotonically by `du`; `work` comes from `prepare`."""
     if du == 0.0:

@@ -20,7 +20,8 @@ import math
 
 from hysim._frozen import FloatArray
 from hysim.kernels import boucwen
-from hysim.kernels._compile import kernel
+from hysim.kernels._compile import borrowed, copied, kernel
+from hysim.kernels.elementary import power
 
 N_HEAD = 8
 N_OWN = 3
@@ -44,7 +45,7 @@ def derivative(u: float, coefficients: FloatArray) -> float:
     return total
 
 
-@kernel
+@copied
 def curvature_bound(reach: float, coefficients: FloatArray) -> float:
     """The most that |P''| can be for |u| <= `reach`."""
     total = 0.0
@@ -58,7 +59,7 @@ def memory_slope(z: float, direction: float, parameters: FloatArray) -> float:
     """Slope dz/du for an input that moves in `direction`, times the gain."""
     A, beta, gamma, n, gain = parameters[1], parameters[2], parameters[3], parameters[4], parameters[5]
     c = gamma + beta if direction * z > 0.0 else gamma - beta
-    return float(gain * (A - c * abs(z) ** n))
+    return float(gain * (A - c * power(abs(z), n)))
 
 
 @kernel
@@ -68,7 +69,7 @@ def slope(u: float, z: float, direction: float, parameters: FloatArray) -> float
     return float(parameters[0] * (derivative(u, coefficients) + memory_slope(z, direction, parameters)))
 
 
-@kernel
+@copied
 def rounding(y: float, u: float, z: float, parameters: FloatArray) -> float:
     """What one rounding of the terms of the output at (u, z) amounts to."""
     coefficients = parameters[N_HEAD : N_HEAD + int(parameters[7])]
@@ -76,7 +77,7 @@ def rounding(y: float, u: float, z: float, parameters: FloatArray) -> float:
     return float(_EPSILON * (abs(y) + terms))
 
 
-@kernel
+@copied
 def forward(u: float, z: float, target: float, parameters: FloatArray, memory: FloatArray) -> float:
     """Output after the input has moved from `u` to `target`; `memory` is then the law's state there."""
     memory[0], memory[1] = u, z
@@ -175,10 +176,11 @@ def step(parameters: FloatArray, state: FloatArray, y: float) -> float:
     parameters of `boucwen.step`). `state` is (last y, u and slope at the place that has no
     inverse, state of `boucwen.step`).
     """
+    if y == state[0]:
+        return float(state[N_OWN])
+    parameters, state = borrowed(parameters), borrowed(state)
     memory = state[N_OWN:]
     u, z = memory[0], memory[1]
-    if y == state[0]:
-        return float(u)
     upward = 1.0 if y > state[0] else -1.0
     coefficients = parameters[N_HEAD : N_HEAD + int(parameters[7])]
     gap = upward * (y - (parameters[6] + boucwen.polynomial(u, coefficients, 0) + parameters[5] * z))

@@ -292,7 +292,7 @@ def make_cell(below: float, above: float, side: int, n: float, cell: FloatArray,
     cell[_LENGTH] = (cell[_ABOVE] - cell[_BELOW]) * centre
 
 
-@copied
+@kernel
 def cell_series(x: float, n: float, q: FloatArray, p: FloatArray, slope: FloatArray, power: FloatArray) -> None:
     """q_1 to q_16 of the integral of 1/(1 - x (1 + r)^n), and p_1 to p_16 of r(s) on dr/ds = 1 - x (1 + r)^n.
 

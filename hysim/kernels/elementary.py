@@ -13,7 +13,7 @@ Where H changes its sign, the rest of the way is gone from H = 0 with the other 
 import math
 from fractions import Fraction
 
-from hysim.kernels._compile import kernel
+from hysim.kernels._compile import copied, kernel
 from hysim.kernels.polynomials import N_TERMS, sum16
 
 
@@ -31,6 +31,16 @@ _DECAY_REACH = 0.75  # the terms left out are below 3e-17 here
 _TANGENT_REACH = 0.2  # and below 5e-18 here
 _LARGEST_EXPONENT = 709.0
 _SMALL = 2.0**-54
+
+
+@copied
+def power(w: float, n: float) -> float:
+    """|w|^n, and its analytic continuation to w < 0 where n is 1 or 2."""
+    if n == 1.0:
+        return w
+    if n == 2.0:
+        return w * w
+    return float(abs(w) ** n)
 
 
 @kernel
@@ -62,7 +72,7 @@ def linear_flow(along: float, A: float, k: float, length: float) -> float:
     return along * decay if A == 0.0 else along + slope * ((1.0 - decay) / k)
 
 
-@kernel
+@copied
 def linear_travel(along: float, A: float, k: float) -> float:
     """Length from H to 0 on H' = A - k H."""
     x = k * along / A
@@ -99,7 +109,7 @@ def quadratic_tangent(A: float, k: float, length: float) -> float:
     return math.tan(x) / r if x < 0.5 * math.pi else math.inf
 
 
-@kernel
+@copied
 def quadratic_flow(along: float, A: float, k: float, tangent: float) -> float:
     """Value on H' = A - k H^2 where T is `tangent`, on this side of H = 0."""
     slope = A - k * along * along
@@ -113,7 +123,7 @@ def quadratic_flow(along: float, A: float, k: float, tangent: float) -> float:
     return along + slope * tangent / denominator
 
 
-@kernel
+@copied
 def quadratic_travel(along: float, A: float, k: float) -> float:
     """Length from H to 0 on H' = A - k H^2, the one at which T is -H/A."""
     tangent = -along / A

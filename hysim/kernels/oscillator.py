@@ -30,14 +30,11 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.kernels._compile import inlined, kernel
-from hysim.kernels.boucwen import advance, polynomial, prepare
-from hysim.kernels.charts import N_WORK
-from hysim.kernels.elementary import linear_flow
+from hysim.kernels.boucwen import advance, polynomial
+from hysim.kernels.elementary import linear_flow, power
 
 State = tuple[float, float, float, float, float, float]
 Plant = tuple[float, float, float, float, float, float, float, float, float, float]
-
-SPLIT, RUNGE_KUTTA, NEWMARK, STRANG = range(4)
 
 _REVERSAL = 1.0e-6  # share of the change of y' in a step by which its end may lie beyond a reversal
 _CROSSING = 1.0e-3  # likewise of z and a crossing
@@ -67,16 +64,6 @@ def tangent(y: float, stiffness: float, curve: FloatArray) -> float:
 
 
 @kernel
-def power(w: float, n: float) -> float:
-    """|w|^n, and its analytic continuation to w < 0 where n is 1 or 2."""
-    if n == 1.0:
-        return w
-    if n == 2.0:
-        return w * w
-    return float(abs(w) ** n)
-
-
-@kernel
 def rates(
     force: float, y: float, v: float, z: float, side: float, C: float, plant: Plant, curve: FloatArray
 ) -> tuple[float, float]:
@@ -90,7 +77,7 @@ def rates(
 def memory_slope(z: float, v: float, plant: Plant) -> float:
     """dz/dy at z on the way of v."""
     A, beta, gamma, n = plant[5:9]
-    return float(A - abs(z) ** n * (gamma + beta * np.sign(z * v)))
+    return float(A - power(abs(z), n) * (gamma + beta * np.sign(z * v)))
 
 
 @kernel
@@ -313,14 +300,15 @@ def strang(
 
 @kernel
 def split_path(
-    substeps: int, held: bool, parameters: FloatArray, curve: FloatArray, sample_time: float, last_force: float,
-    force: FloatArray, state: FloatArray, out: FloatArray,
+    substeps: int, held: bool, parameters: FloatArray, curve: FloatArray, work: FloatArray, sample_time: float,
+    last_force: float, force: FloatArray, state: FloatArray, out: FloatArray,
 ) -> int:  # fmt: skip
     """States at the samples of `force` into `out`, (n_samples, 6): the first sample that is not finite, or -1.
 
-    `state`, (6,), is that at `last_force`, one sample before; `parameters`, (9,), is the plant.
+    `state`, (6,), is that at `last_force`, one sample before; `parameters`, (9,), is the plant; `work` is the
+    law's (`hysim.kernels.boucwen.prepare`).
     """
-    plant, current, work = unpacked(parameters, state)
+    plant, current = unpacked(parameters, state)
     A, beta, gamma, n = plant[5:9]
     for k in range(force.size):
         rise = 0.0 if held else force[k] - last_force
@@ -352,24 +340,18 @@ def split_path(
 
 
 @kernel
-def path(
-    method: int, substeps: int, held: bool, parameters: FloatArray, curve: FloatArray, flow: FloatArray,
+def strang_path(
+    substeps: int, held: bool, parameters: FloatArray, curve: FloatArray, flow: FloatArray, work: FloatArray,
     sample_time: float, last_force: float, force: FloatArray, state: FloatArray, out: FloatArray,
 ) -> int:  # fmt: skip
-    """As `split_path`, by the other methods."""
-    plant, current, work = unpacked(parameters, state)
+    """As `split_path`, by Strang's splitting."""
+    plant, current = unpacked(parameters, state)
     h = sample_time / substeps
     for k in range(force.size):
         rise = 0.0 if held else force[k] - last_force
-        slope = rise / sample_time
         for j in range(substeps):
             F = last_force + rise * j / substeps
-            if method == RUNGE_KUTTA:
-                current = runge_kutta(current, F, slope, h, plant, curve)
-            elif method == NEWMARK:
-                current = newmark(current, F, slope, h, plant, curve)
-            else:
-                current = strang(current, F, slope, h, plant, curve, flow, work)
+            current = strang(current, F, rise / sample_time, h, plant, curve, flow, work)
         last_force = force[k]
         if not stored(current, out[k]):
             return k
@@ -377,13 +359,34 @@ def path(
 
 
 @kernel
-def unpacked(parameters: FloatArray, state: FloatArray) -> tuple[Plant, State, FloatArray]:
-    """Plant and state as tuples, and the law's workspace."""
+def whole_steps(
+    implicit: bool, substeps: int, held: bool, parameters: FloatArray, curve: FloatArray, sample_time: float,
+    last_force: float, force: FloatArray, state: FloatArray, out: FloatArray,
+) -> int:  # fmt: skip
+    """As `split_path`, by Newmark's method if `implicit`, else by that of Runge and Kutta."""
+    plant, current = unpacked(parameters, state)
+    h = sample_time / substeps
+    for k in range(force.size):
+        rise = 0.0 if held else force[k] - last_force
+        slope = rise / sample_time
+        for j in range(substeps):
+            F = last_force + rise * j / substeps
+            if implicit:
+                current = newmark(current, F, slope, h, plant, curve)
+            else:
+                current = runge_kutta(current, F, slope, h, plant, curve)
+        last_force = force[k]
+        if not stored(current, out[k]):
+            return k
+    return -1
+
+
+@kernel
+def unpacked(parameters: FloatArray, state: FloatArray) -> tuple[Plant, State]:
+    """Plant and state as tuples."""
     p, x = parameters, state
-    work = np.empty(N_WORK)
-    prepare(p[5], p[6], p[7], p[8], 0.0, work)
     plant = (p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], 1.0 / p[0])
-    return plant, (x[0], x[1], x[2], x[3], x[4], x[5]), work
+    return plant, (x[0], x[1], x[2], x[3], x[4], x[5])
 
 
 @kernel

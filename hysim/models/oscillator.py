@@ -24,20 +24,17 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import expm
 
 from hysim._frozen import FloatArray, read_only
 from hysim.errors import SimulationError
-from hysim.kernels import linear
 from hysim.kernels import oscillator as kernels
+from hysim.kernels.boucwen import prepare
+from hysim.kernels.charts import N_WORK
 from hysim.models.boucwen import BoucWen, PolynomialBoucWen
 from hysim.models.model import model
 
-METHODS = {
-    "split": kernels.SPLIT,
-    "runge-kutta": kernels.RUNGE_KUTTA,
-    "newmark": kernels.NEWMARK,
-    "strang": kernels.STRANG,
-}
+METHODS = ("split", "runge-kutta", "newmark", "strang")
 _ANGLE = 0.1  # largest phase of the mode in a default step: errors of 1e-7 of the output on the Noel-Schoukens system
 _CHUNK = 1 << 16
 
@@ -118,7 +115,7 @@ class BoucWenOscillator:
             raise ValueError(f"mass must be positive, got {self.mass}")
         if not isinstance(self.law, BoucWen | PolynomialBoucWen):
             raise TypeError(f"law must be a BoucWen or a PolynomialBoucWen, got {type(self.law).__name__}")
-        options = {"excitation": ("force", "base"), "hold": ("foh", "zoh"), "method": tuple(METHODS)}
+        options = {"excitation": ("force", "base"), "hold": ("foh", "zoh"), "method": METHODS}
         for name, allowed in options.items():
             if getattr(self, name) not in allowed:
                 raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {getattr(self, name)!r}")
@@ -284,20 +281,20 @@ class BoucWenOscillator:
         law, (slope, *curve) = self.law, self._coefficients
         stiffness, substeps, held = self.stiffness + slope, self._substeps(sample_time), self.hold == "zoh"
         plant = [self.mass, self.damping, stiffness, law.offset, law.gain, law.A, law.beta, law.gamma, law.n]
+        given = substeps, held, np.array(plant), np.array(curve)
+        if self.method in ("newmark", "runge-kutta"):
+            return partial(kernels.whole_steps, self.method == "newmark", *given, sample_time)
+        work = np.empty(N_WORK)
+        prepare(law.A, law.beta, law.gamma, law.n, 0.0, work)
         if self.method == "split":
-            return partial(kernels.split_path, substeps, held, np.array(plant), np.array(curve), sample_time)
-        flow = np.zeros((2, 4))
-        if self.method == "strang":
-            flow = _linear_flow(self.mass, self.damping, stiffness + law.gain * law.A, sample_time / substeps)
-        method = METHODS[self.method]
-        return partial(kernels.path, method, substeps, held, np.array(plant), np.array(curve), flow, sample_time)
+            return partial(kernels.split_path, *given, work, sample_time)
+        flow = _linear_flow(self.mass, self.damping, stiffness + law.gain * law.A, sample_time / substeps)
+        return partial(kernels.strang_path, *given, flow, work, sample_time)
 
 
 def _linear_flow(mass: float, damping: float, stiffness: float, h: float) -> FloatArray:
     """(y, y') after h from (y, y', F, rise of F), exactly for m y'' + c y' + k y = F, shape (2, 4)."""
-    generator = np.zeros((1, 4, 4))
-    generator[0, :2] = [[0.0, h, 0.0, 0.0], [-stiffness * h / mass, -damping * h / mass, h / mass, 0.0]]
-    generator[0, 2, 3] = 1.0
-    out = np.empty_like(generator)
-    linear.exponentials(generator, out)
-    return np.ascontiguousarray(out[0, :2])
+    generator = np.zeros((4, 4))
+    generator[:2] = [[0.0, h, 0.0, 0.0], [-stiffness * h / mass, -damping * h / mass, h / mass, 0.0]]
+    generator[2, 3] = 1.0
+    return np.ascontiguousarray(expm(generator)[:2])
