@@ -10,6 +10,9 @@ from hypothesis import strategies as st
 from strategies import EXPONENTS, short_inputs
 
 import hysim as hs
+from hysim.kernels import boucwen_inverse as kernels
+from hysim.kernels._compile import signed_kernel
+from hysim.kernels.controllers import CONTROLLER
 from hysim.kernels.stepping import drive
 
 CLOSE = 1e-11  # of the range, what is promised; a few roundings are what is measured
@@ -217,3 +220,40 @@ def test_the_inverse_does_not_mind_extra_samples(law, seed):
     fine = np.append((y[:-1, None] + np.diff(y)[:, None] * np.array([0.0, 0.3, 0.8])).ravel(), y[-1])
     coarse = law.inverse_response(y)
     assert law.inverse_response(fine)[::3] == pytest.approx(coarse, abs=1e-11 * max(1.0, np.ptp(coarse)))
+
+
+@signed_kernel(CONTROLLER.signature)
+def ahead(parameters, state, reference, measurement):
+    """The inverse as a controller that does not look at the measurement."""
+    state[0] = kernels.step(parameters, state[1:], reference)
+    return state[0]
+
+
+class Feedforward:
+    """The inverse of a law in front of it."""
+
+    def __init__(self, law):
+        self.inverse = law.inverse()
+
+    def compiled(self, sample_time, u0, y0):
+        _, parameters, state = self.inverse.compiled(u0=u0)
+        return ahead, parameters, np.concatenate([[u0], state])
+
+
+@pytest.mark.parametrize("law", [STACK, ASYMMETRIC], ids=["stack", "asymmetric"])
+def test_in_front_of_its_law_the_inverse_takes_the_hysteresis_away(law):
+    t = np.arange(300) / 100.0
+    reference = np.sin(3.0 * t) * np.exp(-t / 4.0)
+    run = hs.close_loop(law, Feedforward(law), t, reference)
+    # a sample late: the loop reads the displacement before it applies the voltage
+    assert np.abs(run.y[1:] - reference[:-1]).max() <= CLOSE * np.ptp(reference)
+    assert np.ptp(run.z) > 0.1
+
+
+def test_the_inverse_is_a_plant_of_its_own():
+    """A loop around the inverse asks for the displacement whose voltage is the reference: the law's response."""
+    t = np.arange(400) / 100.0
+    reference = np.sin(2.0 * t)
+    run = hs.close_loop(STACK.inverse(), hs.PID(ki=60.0), t, reference)
+    assert np.abs(run.error[-100:]).max() < 0.1  # an integrator's lag, 2/60 of the amplitude, and a sample
+    assert run.y[1:] == pytest.approx(STACK.inverse_response(np.append(0.0, run.u))[1:-1], abs=1e-13)

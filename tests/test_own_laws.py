@@ -77,6 +77,18 @@ def test_it_goes_through_the_loop_that_takes_every_law():
     assert np.array_equal(y, PLAY.response(U))
 
 
+def test_a_closed_loop_around_it_is_that_around_the_built_in_one():
+    mode = hs.TransferFunction(num=(1.0,), den=(1.0, 0.4, 1.0))
+    t = np.arange(200) / 20.0
+    own, built_in = (
+        hs.close_loop(hs.Actuator(hysteresis=law, vibration=mode), hs.PID(ki=0.4), t, 0.5 * np.sin(t))
+        for law in (DAHL, TWIN)
+    )
+    assert np.ptp(own.u) > 0.1
+    assert own.y == pytest.approx(built_in.y, rel=1e-12, abs=1e-14)
+    assert own.u == pytest.approx(built_in.u, rel=1e-12, abs=1e-14)
+
+
 def test_identify_recovers_dahls_parameters():
     rec = hs.Record(u=U, y=TWIN.response(U))
     start = hs.CustomLaw(step=dahl, parameters={"rate": 5.0, "limit": 3.0}, state={"z0": 0.1}, bounds=DAHL.bounds)
