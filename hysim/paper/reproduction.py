@@ -103,15 +103,15 @@ def _figures(computed: Findings) -> dict[str, Any]:
     vibrations = {"Eq. (4)": step_response(EQUATION_4, 80.0), "Eq. (6)": step_response(EQUATION_6, 80.0)}
     step_on = {case.plant: case for case in reversed(loops.steps)}
     return {
-        "figure3": figures.figure3(comparison.record),
+        "figure3": figures.input_and_output(comparison.record),
         "figure4": figures.figure4(comparison.record),
-        "figure5": figures.figure5(steps),
+        "figure5": figures.step_responses(steps, "s"),
         "loops": figures.model_loops(comparison),
         "widths": figures.model_widths(comparison),
         "residuals": figures.model_residuals(comparison),
         "discovery": figures.discovery_path(computed.study.discovery),
-        "figure9": figures.figure9(table2()),
-        "figure10": figures.figure10(vibrations),
+        "figure9": figures.input_and_output(table2()),
+        "figure10": figures.step_responses(vibrations, "samples"),
         "figure12": figures.step_figure(step_on["eq1"], 15.0, seconds=True),
         "figure13": figures.figure13([case for case in loops.squares if case.plant == "eq4"]),
         "figure14": figures.step_figure(step_on["eq4"], 60.0, seconds=False),
