@@ -187,9 +187,9 @@ print("matplotlib.pyplot" in sys.modules)
 def drawn(record, comparison):
     t = np.linspace(0.0, 20.0, 50)
     return {
-        "figure3": figures.figure3(record),
+        "figure3": figures.input_and_output(record),
         "figure4": figures.figure4(record),
-        "figure5": figures.figure5({"Eq. (1)": (t, np.tanh(t)), "Eqs. (7), (8)": (t, np.sin(t))}),
+        "figure5": figures.step_responses({"Eq. (1)": (t, np.tanh(t)), "Eqs. (7), (8)": (t, np.sin(t))}, "s"),
         "loops": figures.model_loops(comparison),
         "residuals": figures.model_residuals(comparison),
         "widths": figures.model_widths(comparison),
