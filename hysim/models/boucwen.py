@@ -342,7 +342,7 @@ class BoucWen(_BoucWenLaw):
 
 @model
 class PolynomialBoucWen(_BoucWenLaw):
-    """Bouc-Wen law beside a polynomial of the input, ``y = offset + c1 u + c2 u^2 + ... + gain z``.
+    """Bouc-Wen law beside a polynomial of the input, ``y = offset + sum c_k u^k + gain z``.
 
     Parameters
     ----------
