@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
 
-_MODULES = ("control", "datasets", "metrics", "plot", "signals")
+_MODULES = ("benchmarks", "control", "datasets", "metrics", "plot", "signals")
 _HOME = {
     "Record": "hysim.records",
     "load": "hysim.files",
@@ -31,7 +31,11 @@ _HOME = {
     "LoopMetrics": "hysim.metrics",
     "BoucWen": "hysim.models.boucwen",
     "PolynomialBoucWen": "hysim.models.boucwen",
+    "BoucWenInverse": "hysim.models.boucwen_inverse",
+    "LimitCycle": "hysim.models.limit_cycle",
     "Duhem": "hysim.models.duhem",
+    "CustomLaw": "hysim.models.custom",
+    "BoucWenOscillator": "hysim.models.oscillator",
     "TransferFunction": "hysim.models.transfer_function",
     "Actuator": "hysim.models.actuator",
     "Line": "hysim.models.static",
@@ -44,6 +48,7 @@ _HOME = {
 __all__ = ["__version__", *_MODULES, *_HOME]
 
 if TYPE_CHECKING:
+    from hysim import benchmarks as benchmarks
     from hysim import control as control
     from hysim import datasets as datasets
     from hysim import metrics as metrics
@@ -68,7 +73,11 @@ if TYPE_CHECKING:
     from hysim.models.actuator import Actuator as Actuator
     from hysim.models.boucwen import BoucWen as BoucWen
     from hysim.models.boucwen import PolynomialBoucWen as PolynomialBoucWen
+    from hysim.models.boucwen_inverse import BoucWenInverse as BoucWenInverse
+    from hysim.models.custom import CustomLaw as CustomLaw
     from hysim.models.duhem import Duhem as Duhem
+    from hysim.models.limit_cycle import LimitCycle as LimitCycle
+    from hysim.models.oscillator import BoucWenOscillator as BoucWenOscillator
     from hysim.models.static import Line as Line
     from hysim.models.static import SingleValued as SingleValued
     from hysim.models.storage import load_model as load_model

@@ -46,11 +46,12 @@ def simulate(
     Parameters
     ----------
     plant : model
-        A law such as `hysim.BoucWen`, whose output does not depend on time, or a `hysim.TransferFunction`.
+        A law such as `hysim.BoucWen`, whose output does not depend on time, or a plant with dynamics, such as
+        a `hysim.TransferFunction` or a `hysim.BoucWenOscillator`.
     t : array, shape (n,), or None
         Increasing times of the samples [s]; evenly spaced for a plant with dynamics. A law needs none.
     u : array, shape (n,)
-        Input. A law takes it as linear between the samples, a transfer function by its own `hold`.
+        Input. A law takes it as linear between the samples, a plant with dynamics by its own `hold`.
     units : mapping, optional
         Labels to carry along.
 
@@ -78,16 +79,17 @@ def simulate(
     times = None if t is None else read_only(t, "t", ndim=1)
     if needs_time(plant):
         sample_time = Record(u=inputs, y=np.zeros_like(inputs), t=times).sample_time
-        y = plant.response(inputs, sample_time)
+        signals_of = getattr(plant, "signals", None)
+        own = signals_of(inputs, sample_time) if signals_of else {"y": plant.response(inputs, sample_time)}
     else:
         if times is not None:
             Record(u=inputs, y=np.zeros_like(inputs), t=times)
-        y = plant.response(inputs)
-    z = plant.memory(inputs) if callable(getattr(plant, "memory", None)) else None
-    signals = {"t": times, "u": inputs, "y": y, "z": z}
+        own = {"y": plant.response(inputs)}
+    z = plant.memory(inputs) if callable(getattr(plant, "memory", None)) else own.get("z")
+    signals = {"t": times, "u": inputs, "z": z, **own}
     return Simulation(
         u=inputs,
-        y=y,
+        y=own["y"],
         t=times,
         z=z,
         signals={name: values for name, values in signals.items() if values is not None},

@@ -14,7 +14,8 @@ os.environ.setdefault("MPLBACKEND", "agg")
 import hypothesis  # noqa: E402  numba must not be imported before the cache folder is set
 import pytest  # noqa: E402
 
-hypothesis.settings.register_profile("hysim", deadline=None, derandomize=True, max_examples=60)
+uncompiled = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")  # a hundred times slower
+hypothesis.settings.register_profile("hysim", deadline=None, derandomize=True, max_examples=2 if uncompiled else 60)
 hypothesis.settings.load_profile("hysim")
 
 

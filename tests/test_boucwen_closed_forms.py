@@ -52,17 +52,17 @@ def test_steady_loop_is_the_closed_form(A, beta, gamma, n, X, peak, coercive, mi
 def test_energy_of_a_cycle_is_the_closed_form(A, beta, gamma, n, X, peak, coercive, middle, energy):
     law = hs.BoucWen(A=A, beta=beta, gamma=gamma, n=n)
     settled = law.advance(cycles(X, 60, [0.0]))[1]
-    # Gauss-Legendre over the branch's two smooth pieces; w du with the exact z is smooth inside each
+    # Gauss-Legendre over the branch's two smooth pieces. At z = 0 it has a branch point |u - coercive|^(n + 1):
+    # in s, with u - coercive proportional to s^4, that is a power of at least 8
     nodes, weights = np.polynomial.legendre.leggauss(60)
+    s = (nodes + 1) / 2
     total, state = 0.0, settled
-    for left, right in ((X, coercive), (coercive, -X)):
-        u = (left + right) / 2 + (right - left) / 2 * nodes
-        z, _ = law.advance(u, state)
-        _, state = law.advance([right], state)
-        total += (right - left) / 2 * float(weights @ z)
-    # odd symmetry: the other half of the cycle dissipates the same. 1e-12 is the quadrature's rounding;
-    # at n = 1.5 z(u) has a weak branch point where z = 0, which costs the quadrature three digits
-    assert 2 * total == pytest.approx(energy, rel=1e-9 if n == 1.5 else 1e-12)
+    for end, places, sign in ((X, s[::-1], -1), (-X, s, 1)):
+        u = coercive + (end - coercive) * places**4
+        z, state = law.advance(u, state)
+        total += sign * (end - coercive) / 2 * float((weights * 4 * places**3) @ z)
+    # odd symmetry: the other half of the cycle dissipates the same. 1e-12 is the quadrature's rounding
+    assert 2 * total == pytest.approx(energy, rel=1e-12)
 
 
 def test_symmetric_unit_loop_has_its_lambert_form():

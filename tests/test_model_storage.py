@@ -17,6 +17,7 @@ MODELS = [
     hs.PolynomialBoucWen(input_coefficients=(0.1, 1e-17, 3e300)),
     hs.Duhem.from_terms({"u'": 0.1, "|u'| u y": -2 / 3}, y0=0.7),
     hs.TransferFunction(num=(1 / 3,), den=(1.0, 2.0), delay=0.1, sample="end"),
+    hs.BoucWenOscillator(mass=1 / 3, damping=0.1, stiffness=1e-17, law=hs.BoucWen(n=1.7), substeps=3),
     hs.Line(offset=0.1, slope=1e-300),
     hs.SingleValued(u=[0.0, 0.1], y=[1 / 3, 2.0]),
     hs.Actuator(hysteresis=hs.BoucWen(n=1.7), vibration=hs.TransferFunction(num=(1.0,), den=(1.0, 0.1, 3.0))),

@@ -12,6 +12,7 @@ NUMBERS = [
     (hs.PolynomialBoucWen, {"input_coefficients": (1.0, 0.2)}, "input_coefficients"),
     (hs.Duhem, {"p": [[1.0]], "q": [[0.0, -1.0]]}, "q"),
     (hs.TransferFunction, {"num": (1.0,), "den": (1.0, 2.0)}, "den"),
+    (hs.BoucWenOscillator, {"mass": 2.0, "damping": 1.0, "stiffness": 3.0, "law": hs.BoucWen()}, "stiffness"),
     (hs.Line, {"slope": 2.0}, "slope"),
     (hs.SingleValued, {"u": [0.0, 1.0], "y": [0.0, 2.0]}, "y"),
 ]

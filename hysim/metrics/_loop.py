@@ -23,6 +23,9 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, frozen, read_only
 from hysim.metrics._cycles import ROUNDING, last_cycles
 
+TOLERANCE = 0.01
+"""Reversals of the input that are ignored by default, as a fraction of its span."""
+
 
 @frozen
 class LoopMetrics:
@@ -97,7 +100,7 @@ class LoopMetrics:
         return width if np.ndim(u) else float(width)
 
 
-def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, tolerance: float = 0.01) -> LoopMetrics:
+def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, tolerance: float = TOLERANCE) -> LoopMetrics:
     """Measure the loop of the last complete cycle, or the average loop of the last few.
 
     A cycle is three consecutive turning points of the input, the outer two within 5 % of the input's span of
@@ -141,7 +144,7 @@ def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, toleran
     found = last_cycles(inputs, cycles, tolerance)
     loadings = [_curve(inputs[cycle.loading], outputs[cycle.loading]) for cycle in found]
     unloadings = [_curve(inputs[cycle.unloading], outputs[cycle.unloading]) for cycle in found]
-    grid = _common_inputs([x for x, _ in loadings + unloadings])
+    grid = common_inputs([x for x, _ in loadings + unloadings])
     loading = _mean_curve(grid, loadings)
     unloading = _mean_curve(grid, unloadings)
     if cycles == 1:
@@ -152,7 +155,7 @@ def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, toleran
     width = unloading - loading
     magnitude = np.abs(width)
     span, stroke = float(np.ptp(path_u)), float(np.ptp(path_y))
-    area = _signed_area(path_u, path_y)
+    area = float(signed_area(path_u, path_y))
     max_width = float(magnitude.max())
     return LoopMetrics(
         max_width=max_width,
@@ -206,13 +209,20 @@ def width_rmse(a: LoopMetrics, b: LoopMetrics) -> float:
 
 
 def _curve(u: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    kept = settled(u)
+    return u[kept], y[kept]
+
+
+def settled(u: FloatArray) -> npt.NDArray[np.intp]:
+    """The samples of a branch in the order of their inputs, of several at one input the last."""
     order = np.argsort(u, kind="stable")
     x = u[order]
-    is_last = np.append(x[1:] > x[:-1], True)
-    return x[is_last], y[order][is_last]
+    kept: npt.NDArray[np.intp] = order[np.append(x[1:] > x[:-1], True)]
+    return kept
 
 
-def _common_inputs(inputs: list[FloatArray]) -> FloatArray:
+def common_inputs(inputs: list[FloatArray]) -> FloatArray:
+    """Every input of any branch, over their common range."""
     union = np.unique(np.concatenate(inputs))
     low, high = max(x[0] for x in inputs), min(x[-1] for x in inputs)
     common: FloatArray = union[(union >= low) & (union <= high)]
@@ -224,9 +234,10 @@ def _mean_curve(grid: FloatArray, curves: list[tuple[FloatArray, FloatArray]]) -
     return mean
 
 
-def _signed_area(u: FloatArray, y: FloatArray) -> float:
-    x, v = u - u.mean(), y - y.mean()
-    return float(np.sum(x * np.roll(v, -1) - np.roll(x, -1) * v)) / 2
+def signed_area(u: FloatArray, y: FloatArray) -> FloatArray:
+    """Shoelace formula for outputs of shape (n,) or (n_sets, n)."""
+    x, v = u - u.mean(), y - y.mean(axis=-1, keepdims=True)
+    return np.asarray(np.sum(x * np.roll(v, -1, axis=-1) - np.roll(x, -1) * v, axis=-1) / 2)
 
 
 def _orientation(area: float, rounding: float) -> Literal["counterclockwise", "clockwise", "none"]:

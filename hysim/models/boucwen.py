@@ -22,10 +22,14 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim._parallel import in_chunks
 from hysim.errors import SimulationError
 from hysim.kernels import boucwen as kernels
-from hysim.models import _boucwen_search
+from hysim.kernels.charts import N_WORK
+from hysim.models import _boucwen_conversions as conversions
+from hysim.models import _boucwen_facts, _boucwen_search, boucwen_inverse, limit_cycle
+from hysim.models._batch import Batch, Reduction
+from hysim.models.boucwen_inverse import BoucWenInverse, InverseState
+from hysim.models.limit_cycle import LimitCycle
 from hysim.models.model import CompiledLaw, model
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
@@ -99,6 +103,125 @@ class _BoucWenLaw(ABC):
         if self.A < 0.0 and unloading > 0.0:
             return "III" if loading >= 0.0 else "IV" if self.beta >= 0.0 else "none"
         return "V" if self.A == 0.0 and loading > 0.0 and unloading >= 0.0 else "none"
+
+    @property
+    def passive(self) -> bool:
+        """Whether the memory is a passive map from the velocity u' to z that is bounded for every input.
+
+        This is class I: A > 0, beta + gamma > 0 and beta >= gamma, that is, sigma >= 1/2 in normalised form.
+        """
+        return self.stability_class == "I"
+
+    @property
+    def saturation(self) -> float:
+        """What |z| tends to on a long stretch of the input, (A / (beta + gamma))^(1/n) for A > 0; inf if nothing."""
+        return _boucwen_facts.saturation(self.A, self.beta, self.gamma, self.n)
+
+    @property
+    def memory_bound(self) -> float:
+        """Bound of |z| for every input that begins with z0; inf if there is none."""
+        return _boucwen_facts.memory_bound(self.A, self.beta, self.gamma, self.n, self.z0, self.stability_class)
+
+    def limit_cycle(self, amplitude: float) -> LimitCycle:
+        """Steady loop of the memory between the inputs -amplitude and amplitude.
+
+        Parameters
+        ----------
+        amplitude : float
+            [unit of u].
+
+        Returns
+        -------
+        LimitCycle
+            Peak, coercive input, width at u = 0 and energy, to rounding; a law with beta > 0 approaches it
+            from every memory inside its bound.
+
+        Raises
+        ------
+        ValueError
+            If the amplitude is not positive, or A = 0.
+        SimulationError
+            If the memory escapes to infinity within one stroke.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> loop = hs.BoucWen(beta=0.5, gamma=0.5).limit_cycle(1.0)
+        >>> round(loop.peak, 12), round(loop.coercive, 12), round(loop.energy, 12)
+        (0.721535457239, 0.278464542761, 0.593244754991)
+        """
+        return limit_cycle.limit_cycle(self.A, self.beta, self.gamma, self.n, float(amplitude))
+
+    def tangent(self, direction: npt.ArrayLike, z: npt.ArrayLike, u: npt.ArrayLike = 0.0) -> FloatArray:
+        """Slope dy/du of the output at the memory `z`, for an input at `u` that moves in `direction`.
+
+        Parameters
+        ----------
+        direction : array
+            Velocity u' or its sign, not zero.
+        z, u : array
+            Memory and input, broadcast against the direction; only a polynomial's slope depends on u.
+
+        Returns
+        -------
+        array
+            [unit of y / unit of u].
+
+        Raises
+        ------
+        ValueError
+            If a direction is zero: the slope ahead and the one behind differ.
+        """
+        velocity, memory = np.asarray(direction, dtype=float), np.asarray(z, dtype=float)
+        if not np.all(velocity):
+            raise ValueError("direction must not be zero: an input that stands still has two slopes")
+        dz = self.A - np.abs(memory) ** self.n * (self.gamma + self.beta * np.sign(memory * np.sign(velocity)))
+        static = np.polynomial.polynomial.polyval(np.asarray(u, dtype=float), boucwen_inverse.derivative(self))
+        return np.asarray(static + self.gain * dz)
+
+    def slope_bounds(self, low: float = -np.inf, high: float = np.inf) -> tuple[float, float]:
+        """Bounds of the slope dy/du over every input between `low` and `high` that begins with z0.
+
+        Parameters
+        ----------
+        low, high : float
+            Range of the input [unit of u]; a law without polynomial does not depend on it.
+
+        Returns
+        -------
+        (float, float)
+            Infinite where the memory is not bounded and the slope neither. They are approached by inputs
+            that saturate the memory, so that they are sharp for a law without polynomial.
+
+        Examples
+        --------
+        A piezoelectric stack by Low and Guo: 1 - 0.56 is left of the slope just after a reversal.
+
+        >>> import hysim as hs
+        >>> law = hs.BoucWen(A=0.35, beta=0.02, gamma=0.005, feedthrough=1.0, gain=-1.0)
+        >>> [round(bound, 12) for bound in law.slope_bounds()]
+        [0.44, 1.0]
+        """
+        if not low <= high:
+            raise ValueError(f"low must not be above high, got {low} and {high}")
+        memory = _boucwen_facts.memory_slopes(self.A, self.beta, self.gamma, self.n, self.memory_bound)
+        scaled = sorted(self.gain * slope if self.gain else 0.0 for slope in memory)
+        static = _boucwen_facts.polynomial_range(boucwen_inverse.derivative(self), low, high)
+        with np.errstate(invalid="ignore"):
+            total = np.add(static, scaled)
+        lowest, highest = np.where(np.isnan(total), [-np.inf, np.inf], total).tolist()
+        return lowest, highest
+
+    def is_invertible(self, low: float = -np.inf, high: float = np.inf) -> bool:
+        """Whether the slope keeps its sign for every input between `low` and `high`: its bounds have one sign.
+
+        This is sufficient for an inverse, not necessary: on one record a law may do without, and
+        `inverse_response` looks at the record. For a piezoelectric stack by Low and Guo it reads
+        alpha max(1, 2 beta / (beta + gamma)) < 1. A bound of zero to rounding counts as zero.
+        """
+        bounds = self.slope_bounds(low, high)
+        rounding = 1e-14 * (abs(self.gain * self.A) + float(np.abs(boucwen_inverse.coefficients(self)).max()))
+        return bounds[0] > rounding or bounds[1] < -rounding
 
     def memory(self, u: npt.ArrayLike) -> FloatArray:
         """Memory z at the samples of an input that is linear between them.
@@ -174,16 +297,77 @@ class _BoucWenLaw(ABC):
     def compiled(self, u0: float = 0.0) -> CompiledLaw:
         """The law as compiled loops take it; the state is that of a first sample at the input `u0`."""
         scalars = self.scalars
-        constants = np.empty(kernels.N_CONSTANTS)
-        kernels.prepare(self.A, self.beta, self.gamma, self.n, constants)
-        head = [self.A, self.beta, self.gamma, self.n, self.gain, self.offset]
-        parameters = np.concatenate([head, constants, [scalars[name] for name in self.coefficient_names]])
-        state = np.concatenate([[u0, self.z0], np.zeros(kernels.N_SCRATCH)])
+        law = self.A, self.beta, self.gamma, self.n
+        parameters = np.array([*law, self.gain, self.offset, *(scalars[name] for name in self.coefficient_names)])
+        state = np.zeros(N_WORK)
+        kernels.prepare(*law, 0.0, state)
+        state[:2] = u0, self.z0
         return CompiledLaw(kernels.step, read_only(parameters, finite=False), state)
 
+    def inverse(self) -> BoucWenInverse:
+        """The law's inverse as an object, for loops that run sample by sample.
+
+        Returns
+        -------
+        BoucWenInverse
+            In the direction that the output has at u = 0, z = 0.
+
+        Raises
+        ------
+        ValueError
+            If the slope is zero there.
+        """
+        return boucwen_inverse.inverse(self)
+
+    def inverse_response(
+        self, y: npt.ArrayLike, u0: float | None = None, state: State | InverseState | None = None
+    ) -> FloatArray:
+        """Input that gives the output `y`, linear between the samples.
+
+        Parameters
+        ----------
+        y : array, shape (n_samples,)
+            Wanted output.
+        u0 : float, optional
+            Input at which the law rests, its memory at z0, before it moves to the first sample. By default
+            it rests at the first sample: the input that gives y[0] with the memory at z0, found from u = 0.
+        state : tuple of float, optional
+            Input and memory (and output) to continue from, in place of u0 and z0.
+
+        Returns
+        -------
+        array, shape (n_samples,)
+            Its `response` is y to rounding.
+
+        Raises
+        ------
+        SimulationError
+            If the slope dy/du does not keep its sign on the way, or the output does not reach a sample; the
+            message names the sample, the input and the slope there.
+        ValueError
+            If y is not finite or has not one axis, its first sample does not tell the first input (give u0),
+            or the slope is zero where the record begins.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> law = hs.BoucWen(A=0.35, beta=0.02, gamma=0.005, feedthrough=1.0, gain=-1.0)
+        >>> law.inverse_response(law.response([0.0, 30.0, 10.0])).round(9).tolist()
+        [0.0, 30.0, 10.0]
+        """
+        return boucwen_inverse.inverse_response(self, y, u0, state)
+
     @classmethod
-    def responses(cls, parameters: Parameters, u: npt.ArrayLike, *, workers: int | None = None) -> FloatArray:
-        """Outputs of many laws at once, on all cores.
+    def responses(
+        cls,
+        parameters: Parameters,
+        u: npt.ArrayLike,
+        *,
+        reduce: Reduction | None = None,
+        target: npt.ArrayLike | None = None,
+        workers: int | None = None,
+    ) -> FloatArray:
+        """Outputs of many laws at once, on all cores, or one number of each.
 
         Parameters
         ----------
@@ -191,29 +375,41 @@ class _BoucWenLaw(ABC):
             The constructor's names to one value for each set, shape (n_sets,), or to one for all.
         u : array, shape (n_samples,) or (n_sets, n_samples)
             One input for all sets, or one for each.
+        reduce : {"sse", "max_width", "area", "final"}, optional
+            Keep of each output only the sum of its squared differences from `target`, the measure of this
+            name of `loop_metrics` (last complete cycle), or the last sample. The outputs are never held
+            together: a million sets need no million rows.
+        target : array, shape (n_samples,)
+            With ``reduce="sse"`` what the outputs are compared with [unit of y].
         workers : int, optional
             Number of threads; by default one for each core. The result does not depend on it.
 
         Returns
         -------
-        array, shape (n_sets, n_samples)
-            Each row the same bits as `response`. A law whose memory escapes is a row of inf.
+        array, shape (n_sets, n_samples), or (n_sets,) with `reduce`
+            Each row the same bits as `response`. A law whose memory escapes is a row of inf, or inf.
 
         Raises
         ------
         TypeError
             If a name is not one of the constructor's.
         ValueError
-            If lengths do not fit, or a value is not one that the constructor takes.
+            If lengths do not fit, a value is not one that the constructor takes, or the input has no
+            complete cycle to measure.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> u = hs.signals.triangle(-1.0, 1.0, cycles=3, samples_per_cycle=40)
+        >>> hs.BoucWen.responses({"beta": [0.3, 0.5, 0.7]}, u, reduce="area").round(3).tolist()
+        [0.41, 0.595, 0.746]
         """
         sets = cls._to_scalars(parameters)
         template = cls._from_scalars({name: float(np.ravel(values)[0]) for name, values in sets.items()})
-        scalars, z, inputs = template._memories(sets, u, workers)
-        y = _output(
-            [scalars[name] for name in template.coefficient_names], scalars["gain"], scalars["offset"], inputs, z
-        )
-        y[~np.isfinite(z[:, -1])] = np.inf
-        return y
+        columns, inputs = template._columns(sets, u)
+        output = np.stack([columns[name] for name in ("gain", "offset", *template.coefficient_names)], axis=1)
+        laws = Batch(template._table(columns), read_only(output), inputs)
+        return laws.rows(workers) if reduce is None else laws.reduced(reduce, target, workers)
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box that `identify` searches; see `hysim.models._boucwen_search`."""
@@ -221,7 +417,9 @@ class _BoucWenLaw(ABC):
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns u, u^2, ..., z, 1, 0 of the output, shape (n_sets, n_samples, n_columns + 1)."""
-        z, inputs = self._memories(parameters, record.u, None)[1:]
+        columns, inputs = self._columns(parameters, record.u)
+        table = self._table(columns)
+        z = Batch(table, read_only(np.tile([1.0, 0.0], (len(table), 1))), inputs).rows(None)
         powers = [np.broadcast_to(inputs**k, z.shape) for k in range(1, len(self.coefficient_names) + 1)]
         return np.stack([*powers, z, np.ones_like(z), np.zeros_like(z)], axis=-1)
 
@@ -234,8 +432,16 @@ class _BoucWenLaw(ABC):
 
     def _memory(self, u: FloatArray, state: State) -> FloatArray:
         z = np.empty(u.size)
-        last_u, z0 = state
-        escaped = kernels.path(self.A, self.beta, self.gamma, self.n, float(last_u), float(z0), u, z)
+        law = self.A, self.beta, self.gamma
+        start = float(state[0]), float(state[1])
+        if self.n == 1.0:
+            escaped = kernels.linear_path(*law, *start, u, z)
+        elif self.n == 2.0:
+            escaped = kernels.quadratic_path(*law, *start, u, z)
+        else:
+            work = np.empty(N_WORK)
+            kernels.prepare(*law, self.n, 0.0, work)
+            escaped = kernels.power_path(*law, self.n, *start, u, work, z)
         if escaped >= 0:
             raise SimulationError(
                 f"the memory escapes to infinity at sample {escaped} (u = {u[escaped]:g}): with beta + gamma = "
@@ -244,10 +450,8 @@ class _BoucWenLaw(ABC):
             )
         return z
 
-    def _memories(
-        self, sets: Parameters, u: npt.ArrayLike, workers: int | None
-    ) -> tuple[dict[str, FloatArray], FloatArray, FloatArray]:
-        """Every scalar as a column over the sets (those not given are the law's own), memories, inputs."""
+    def _columns(self, sets: Parameters, u: npt.ArrayLike) -> tuple[dict[str, FloatArray], FloatArray]:
+        """Every scalar over the sets, shape (n_sets,) each (those not given are the law's own), and the inputs."""
         defaults = self.scalars
         if unknown := set(sets) - set(defaults):
             raise TypeError(
@@ -265,10 +469,11 @@ class _BoucWenLaw(ABC):
             raise ValueError(f"n must be positive, got {given['n'].min()}")
         columns = {name: np.full(n_sets, value) for name, value in defaults.items()}
         columns |= {name: np.broadcast_to(values, n_sets) for name, values in given.items()}
-        table = np.stack([columns[name] for name in MEMORY], axis=1)
-        z = np.empty((n_sets, inputs.shape[1]))
-        in_chunks(lambda start, stop: kernels.batch(table, inputs, z, start, stop), n_sets, workers=workers)
-        return {name: values[:, np.newaxis] for name, values in columns.items()}, z, inputs
+        return columns, inputs
+
+    @staticmethod
+    def _table(columns: Mapping[str, FloatArray]) -> FloatArray:
+        return read_only(np.stack([columns[name] for name in MEMORY], axis=1))
 
 
 def _output(
@@ -338,6 +543,215 @@ class BoucWen(_BoucWenLaw):
     def coefficient_names(self) -> tuple[str, ...]:
         """One name, of the feedthrough."""
         return ("feedthrough",)
+
+    @classmethod
+    def from_low_guo(cls, *, alpha: float, beta: float, gamma: float, d: float = 1.0, h0: float = 0.0) -> Self:
+        """The law of a piezoelectric stack by Low and Guo (1995), ``x = d u - h``.
+
+        Parameters
+        ----------
+        alpha, beta, gamma : float
+            ``h' = alpha d u' - beta |u'| h - gamma u' |h|``; alpha has no unit, the others [1 / unit of u].
+        d : float
+            Displacement per input without hysteresis [unit of x / unit of u].
+        h0 : float
+            Initial h [unit of x].
+
+        Returns
+        -------
+        BoucWen
+            Whose memory is h: A = alpha d, feedthrough = d, gain = -1, n = 1.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> law = hs.BoucWen.from_low_guo(alpha=0.35, beta=0.02, gamma=0.005)
+        >>> round(law.limit_cycle(30.0).peak, 12)
+        8.702046583872
+        """
+        return cls(**conversions.from_low_guo(alpha, beta, gamma, d, h0))
+
+    def to_low_guo(self) -> dict[str, float]:
+        """The arguments of `from_low_guo`; there is one set only.
+
+        Raises
+        ------
+        ValueError
+            If n is not 1, there is an offset, or feedthrough or gain is zero.
+        """
+        return conversions.to_low_guo(self)
+
+    @classmethod
+    def from_wen(
+        cls,
+        *,
+        alpha: float,
+        k: float,
+        A: float = 1.0,
+        beta: float,
+        gamma: float,
+        n: float,
+        D: float = 1.0,
+        z0: float = 0.0,
+    ) -> Self:
+        """The restoring force by Wen (1976), ``F = alpha k u + (1 - alpha) k D z``.
+
+        Parameters
+        ----------
+        alpha : float
+            Ratio of the stiffness after yielding to the one before it, for A = 1.
+        k : float
+            Stiffness [unit of F / unit of u].
+        A, beta, gamma, n : float
+            ``D z' = A u' - beta |u'| |z|^(n-1) z - gamma u' |z|^n``.
+        D : float
+            Yield displacement [unit of u], with a z that has no unit; 1 where z is a displacement.
+        z0 : float
+            Initial memory.
+
+        Returns
+        -------
+        BoucWen
+
+        Raises
+        ------
+        ValueError
+            If D is zero.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> force = hs.BoucWen.from_wen(alpha=0.1, k=20.0, beta=0.6, gamma=0.4, n=1.5, D=0.5)
+        >>> force.response([0.0, 10.0]).round(6).tolist()
+        [0.0, 29.0]
+        """
+        return cls(**conversions.from_wen(alpha, k, A, beta, gamma, n, D, z0))
+
+    def to_wen(self) -> dict[str, float]:
+        """The arguments of `from_wen`, of all sets with this response the one with A = D = 1.
+
+        Raises
+        ------
+        ValueError
+            If there is an offset, A = 0, or no stiffness at z = 0.
+        """
+        return conversions.to_wen(self)
+
+    @classmethod
+    def from_normalized(cls, *, k_x: float, k_w: float, rho: float, sigma: float, n: float, w0: float = 0.0) -> Self:
+        """The normalised law of Ikhouane and Rodellar (2007), ``F = k_x u + k_w w``.
+
+        Parameters
+        ----------
+        k_x, k_w : float
+            Weights of the input and of the memory.
+        rho, sigma, n : float
+            ``w' = rho (u' - sigma |u'| |w|^(n-1) w + (sigma - 1) u' |w|^n)``; w saturates at 1.
+        w0 : float
+            Initial memory.
+
+        Returns
+        -------
+        BoucWen
+            Whose memory is w: A = rho, beta = rho sigma, gamma = rho (1 - sigma).
+        """
+        return cls(**conversions.from_normalized(k_x, k_w, rho, sigma, n, w0))
+
+    def to_normalized(self) -> dict[str, float]:
+        """The arguments of `from_normalized`; there is one set only.
+
+        Raises
+        ------
+        ValueError
+            If beta + gamma <= 0 or A <= 0, for which nothing saturates at 1, or there is an offset.
+        """
+        return conversions.to_normalized(self)
+
+    @classmethod
+    def from_noel_schoukens(
+        cls, *, alpha: float, beta: float, gamma: float, delta: float, nu: float, z0: float = 0.0
+    ) -> Self:
+        """The force of the system-identification benchmark of Noel and Schoukens (2016), ``y = z``.
+
+        Parameters
+        ----------
+        alpha : float
+            Stiffness of the memory [unit of z / unit of u].
+        beta, gamma, delta, nu : float
+            ``z' = alpha u' - beta (gamma |u'| |z|^(nu-1) z + delta u' |z|^nu)``. Our beta is their beta
+            gamma, our gamma their beta delta. Mass, damping and stiffness belong to the oscillator.
+        z0 : float
+            Initial memory.
+
+        Returns
+        -------
+        BoucWen
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> law = hs.BoucWen.from_noel_schoukens(alpha=5e4, beta=1e3, gamma=0.8, delta=-1.1, nu=1.0)
+        >>> law.stability_class, round(law.limit_cycle(1e-3).peak, 9)
+        ('none', 77.756980989)
+        """
+        return cls(**conversions.from_noel_schoukens(alpha, beta, gamma, delta, nu, z0))
+
+    def to_noel_schoukens(self) -> dict[str, float]:
+        """The arguments of `from_noel_schoukens`, of all sets with this response the one with beta = 1.
+
+        Raises
+        ------
+        ValueError
+            If there is a feedthrough or an offset, or the gain is zero.
+        """
+        return conversions.to_noel_schoukens(self)
+
+    @classmethod
+    def from_opensees(
+        cls,
+        *,
+        alpha: float,
+        ko: float,
+        n: float,
+        gamma: float,
+        beta: float,
+        Ao: float = 1.0,
+        deltaA: float = 0.0,
+        deltaNu: float = 0.0,
+        deltaEta: float = 0.0,
+    ) -> Self:
+        """The material ``uniaxialMaterial BoucWen`` of OpenSees, ``alpha ko u + (1 - alpha) ko z``.
+
+        Parameters
+        ----------
+        alpha, ko : float
+            Ratio of the stiffness after yielding to the one before it, and that one.
+        n, gamma, beta, Ao : float
+            ``z' = u' (Ao - |z|^n (gamma + beta sign(u' z)))``.
+        deltaA, deltaNu, deltaEta : float
+            Rates of degradation: a law without it takes zeros only.
+
+        Returns
+        -------
+        BoucWen
+
+        Raises
+        ------
+        ValueError
+            If the material degrades.
+        """
+        degradation = {"deltaA": deltaA, "deltaNu": deltaNu, "deltaEta": deltaEta}
+        return cls(**conversions.from_opensees(alpha, ko, n, gamma, beta, Ao, degradation))
+
+    def to_opensees(self) -> dict[str, float]:
+        """The arguments of `from_opensees`, of all sets with this response the one with Ao = 1.
+
+        Raises
+        ------
+        ValueError
+            If there is an offset or an initial memory, A = 0, or no stiffness at z = 0.
+        """
+        return conversions.to_opensees(self)
 
 
 @model

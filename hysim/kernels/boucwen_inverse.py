@@ -1,0 +1,192 @@
+"""The inverse of the Bouc-Wen law: the input that takes the output to a given value.
+
+    y(u) = offset + P(u) + gain z(u),    dy/du = P'(u) + gain (A - |z|^n (gamma + beta sign(z du)))
+
+From one sample of the output to the next the input moves monotonically, along one branch of the law. The
+forward step (`hysim.kernels.boucwen.step`) and the slope above are exact there, so the input is the root of
+a scalar equation, found by Newton's method inside a bracket that closes on it. The residual is that of the
+output itself, not of its increment: nothing drifts, and the law's response to these inputs is the given
+output to rounding.
+
+The slope must have one sign, `rising` = 1 or -1, all along the way, and at its beginning in the other
+direction too, or the output would not tell which way the input went. On one side of z = 0 the memory's slope
+changes monotonically; with a linear P the ends of the stretch and the crossing of z = 0 therefore decide.
+With a polynomial a bound on P'' decides where it can, and a few points in between where it cannot.
+
+Layers: scalar functions, then `step` in the form in which loops take it; a path is `stepping.drive`.
+"""
+
+import math
+
+from hysim._frozen import FloatArray
+from hysim.kernels import boucwen
+from hysim.kernels._compile import kernel
+
+N_HEAD = 8
+N_OWN = 3
+MAX_STEPS = 400
+
+_EPSILON = 2.0**-52
+_ROUNDINGS = 16.0  # of the forward step, which may keep the residual from zero where the bracket has closed
+_FLAT = 1e-12  # of the slope ahead: what rounding makes of no slope at all on the way back
+_POINTS = 16  # looked at along a stretch that the bound on P'' leaves open
+
+
+# ---------------------------------------------------------------------------------- scalar functions
+
+
+@kernel
+def derivative(u: float, coefficients: FloatArray) -> float:
+    """c1 + 2 c2 u + 3 c3 u^2 + ..."""
+    total = 0.0
+    for k in range(coefficients.size - 1, -1, -1):
+        total = total * u + (k + 1.0) * coefficients[k]
+    return total
+
+
+@kernel
+def curvature_bound(reach: float, coefficients: FloatArray) -> float:
+    """The most that |P''| can be for |u| <= `reach`."""
+    total = 0.0
+    for k in range(coefficients.size - 1, 0, -1):
+        total = total * reach + (k + 1.0) * k * abs(coefficients[k])
+    return total
+
+
+@kernel
+def memory_slope(z: float, direction: float, parameters: FloatArray) -> float:
+    """Slope dz/du for an input that moves in `direction`, times the gain."""
+    A, beta, gamma, n, gain = parameters[1], parameters[2], parameters[3], parameters[4], parameters[5]
+    c = gamma + beta if direction * z > 0.0 else gamma - beta
+    return float(gain * (A - c * abs(z) ** n))
+
+
+@kernel
+def slope(u: float, z: float, direction: float, parameters: FloatArray) -> float:
+    """Slope dy/du for an input that moves in `direction`, counted positive where the output moves with `rising`."""
+    coefficients = parameters[N_HEAD : N_HEAD + int(parameters[7])]
+    return float(parameters[0] * (derivative(u, coefficients) + memory_slope(z, direction, parameters)))
+
+
+@kernel
+def rounding(y: float, u: float, z: float, parameters: FloatArray) -> float:
+    """What one rounding of the terms of the output at (u, z) amounts to."""
+    coefficients = parameters[N_HEAD : N_HEAD + int(parameters[7])]
+    terms = abs(parameters[5] * z) + abs(parameters[6]) + abs(u * derivative(u, coefficients))
+    return float(_EPSILON * (abs(y) + terms))
+
+
+@kernel
+def forward(u: float, z: float, target: float, parameters: FloatArray, memory: FloatArray) -> float:
+    """Output after the input has moved from `u` to `target`; `memory` is then the law's state there."""
+    memory[0], memory[1] = u, z
+    return boucwen.step(parameters[N_HEAD + int(parameters[7]) :], memory, target)
+
+
+@kernel
+def lowest_slope(u: float, z: float, end: float, z_end: float, direction: float, parameters: FloatArray) -> float:
+    """A lower bound of `slope` on the way from (u, z) to (end, z_end), the lowest slope itself if P is linear."""
+    coefficients = parameters[N_HEAD : N_HEAD + int(parameters[7])]
+    rising = parameters[0]
+    memory = min(
+        rising * memory_slope(z, direction, parameters),
+        rising * memory_slope(z_end, direction, parameters),
+    )
+    if z * z_end < 0.0:
+        memory = min(memory, rising * memory_slope(0.0, direction, parameters))
+    at_ends = rising * (derivative(u, coefficients) + derivative(end, coefficients))
+    bend = curvature_bound(max(abs(u), abs(end)), coefficients) * abs(end - u)
+    return float(memory + 0.5 * (at_ends - bend))
+
+
+@kernel
+def monotone(u: float, z: float, direction: float, parameters: FloatArray, state: FloatArray) -> bool:
+    """Whether the slope is positive from (u, z) to where the law's state stands; else the place goes into `state`."""
+    memory = state[N_OWN:]
+    end, z_end = memory[0], memory[1]
+    if lowest_slope(u, z, end, z_end, direction, parameters) > 0.0:
+        return True
+    for k in range(_POINTS + 1):
+        point = u + (end - u) * (k / _POINTS)
+        forward(u, z, point, parameters, memory)
+        steepness = slope(point, memory[1], direction, parameters)
+        if not steepness > 0.0:
+            state[1], state[2] = point, parameters[0] * steepness
+            return False
+    memory[0], memory[1] = end, z_end
+    return bool(parameters[7] > 1.0)
+
+
+@kernel
+def solve(
+    u: float, z: float, y: float, direction: float, gap: float, parameters: FloatArray, state: FloatArray
+) -> bool:
+    """Move the law's state in `direction` from (u, z), `gap` short of `y`, to where the output is `y`.
+
+    Returns whether it was reached; the last place on the way goes into `state`.
+    """
+    memory = state[N_OWN:]
+    upward = parameters[0] * direction
+    steepness, back = slope(u, z, direction, parameters), slope(u, z, -direction, parameters)
+    state[1], state[2] = u, parameters[0] * min(steepness, back)
+    if not (steepness > 0.0 and back > -_FLAT * steepness):
+        return False
+    at_start = rounding(y, u, z, parameters)
+    behind, beyond = u, direction * math.inf
+    before_last = last = math.inf
+    target = u + direction * gap / steepness
+    for _ in range(MAX_STEPS):
+        if math.isinf(target):
+            return False
+        error = upward * (forward(u, z, target, parameters, memory) - y)
+        steepness = slope(target, memory[1], direction, parameters)
+        noise = max(at_start, rounding(y, target, memory[1], parameters))
+        if abs(error) <= noise < math.inf:
+            return True
+        if error < 0.0 and steepness > 0.0:
+            behind = target
+        else:
+            beyond = target
+        if not error >= 0.0:
+            state[1], state[2] = target, parameters[0] * steepness
+        move = -error / steepness if steepness > 0.0 else math.nan
+        trial = target + direction * move
+        inside = direction * behind <= direction * trial <= direction * beyond
+        if not inside or (not math.isinf(beyond) and abs(move) > 0.5 * before_last):
+            trial = 0.5 * (behind + beyond)
+            move = abs(trial - target)
+        if trial in (behind, beyond, target):
+            return bool(
+                abs(error) < math.inf and abs(error) <= _ROUNDINGS * (noise + _EPSILON * abs(target) * steepness)
+            )
+        before_last, last = last, abs(move)
+        target = trial
+    return False
+
+
+# ---------------------------------------------------------------------------------- one sample at a time
+
+
+@kernel
+def step(parameters: FloatArray, state: FloatArray, y: float) -> float:
+    """Input at the next output `y`, or nan where the law has no inverse; the state then stays where it is.
+
+    `parameters` is (rising, A, beta, gamma, n, gain, offset, number of coefficients, c1, c2, ...,
+    parameters of `boucwen.step`). `state` is (last y, u and slope at the place that has no
+    inverse, state of `boucwen.step`).
+    """
+    memory = state[N_OWN:]
+    u, z = memory[0], memory[1]
+    if y == state[0]:
+        return float(u)
+    upward = 1.0 if y > state[0] else -1.0
+    coefficients = parameters[N_HEAD : N_HEAD + int(parameters[7])]
+    gap = upward * (y - (parameters[6] + boucwen.polynomial(u, coefficients, 0) + parameters[5] * z))
+    direction = parameters[0] * upward
+    if not gap <= 0.0 and not (
+        solve(u, z, y, direction, gap, parameters, state) and monotone(u, z, direction, parameters, state)
+    ):
+        memory[0], memory[1] = u, z
+        return math.nan
+    state[0] = y
+    return float(memory[0])

@@ -1,0 +1,126 @@
+"""The Bouc-Wen law along a monotone input, where it is elementary: n = 1 and n = 2.
+
+In the frame that points along the input (H = z sign(du), L = |du|) each side of H = 0 obeys
+
+    n = 1    H' = A - k H,      H + (A - k H) T,                     T = (1 - exp(-k L)) / k
+    n = 2    H' = A - k H^2,    H + (A - k H^2) T / (1 + k H T),     T = tanh(r L) / r,  r^2 = A k
+
+(tan for A k < 0). T does not depend on H, so that the samples of a path wait for each other for a few
+operations only. Near L = 0 it is a power series, elsewhere one exponential; both are good to 2e-16.
+Where H changes its sign, the rest of the way is gone from H = 0 with the other k. An escape is `inf`.
+"""
+
+import math
+from fractions import Fraction
+
+from hysim.kernels._compile import kernel
+from hysim.kernels.polynomials import N_TERMS, sum16
+
+
+def _tangent_series() -> tuple[float, ...]:
+    """Coefficients of tanh(sqrt(y)) / sqrt(y) in powers of y, from T' = 1 - T^2."""
+    c = [Fraction(1)]
+    for k in range(1, N_TERMS):
+        c.append(-sum((c[j] * c[k - 1 - j] for j in range(k)), Fraction(0)) / (2 * k + 1))
+    return tuple(float(value) for value in c)
+
+
+_DECAY = tuple((-1.0) ** k / math.factorial(k + 1) for k in range(N_TERMS))  # of (1 - exp(-x)) / x
+_TANGENT = _tangent_series()
+_DECAY_REACH = 0.75  # the terms left out are below 3e-17 here
+_TANGENT_REACH = 0.2  # and below 5e-18 here
+_LARGEST_EXPONENT = 709.0
+_SMALL = 2.0**-54
+
+
+@kernel
+def linear_advance(z: float, du: float, A: float, loading: float, unloading: float) -> float:
+    """Memory of n = 1 after the input has moved by `du`; `loading` is beta + gamma, `unloading` beta - gamma."""
+    length = abs(du)
+    along = z if du > 0.0 else -z
+    is_loading = along > 0.0 or (along == 0.0 and A > 0.0)
+    k = loading if is_loading else unloading
+    after = linear_flow(along, A, k, length)
+    if (along > 0.0 and after < 0.0) or (along < 0.0 and after > 0.0):
+        left = max(0.0, length - linear_travel(along, A, k))
+        after = linear_flow(0.0, A, unloading if is_loading else loading, left)
+    return after if du > 0.0 else -after
+
+
+@kernel
+def linear_flow(along: float, A: float, k: float, length: float) -> float:
+    """Value after `length` on H' = A - k H."""
+    x = k * length
+    slope = A - k * along
+    if abs(x) <= _DECAY_REACH:
+        if A == 0.0:
+            return along * math.exp(-x)
+        return along + slope * (length * sum16(_DECAY, 0, x))
+    if x < -_LARGEST_EXPONENT:
+        return along if slope == 0.0 else math.copysign(math.inf, slope)
+    decay = math.exp(-x)
+    return along * decay if A == 0.0 else along + slope * ((1.0 - decay) / k)
+
+
+@kernel
+def linear_travel(along: float, A: float, k: float) -> float:
+    """Length from H to 0 on H' = A - k H."""
+    x = k * along / A
+    return -along / A if abs(x) < _SMALL else math.log1p(-x) / k
+
+
+@kernel
+def quadratic_advance(z: float, du: float, A: float, loading: float, unloading: float) -> float:
+    """Memory of n = 2 after the input has moved by `du`, as `linear_advance`."""
+    length = abs(du)
+    along = z if du > 0.0 else -z
+    is_loading = along > 0.0 or (along == 0.0 and A > 0.0)
+    k = loading if is_loading else -unloading
+    tangent = quadratic_tangent(A, k, length)
+    after = quadratic_flow(along, A, k, tangent)
+    if (along < 0.0 and tangent * A >= -along) or (along > 0.0 and tangent * A <= -along):
+        left = length - quadratic_travel(along, A, k)
+        if left >= 0.0:  # not so at a saturation, where T = -H/A may hold to rounding
+            after = A * quadratic_tangent(A, -unloading if is_loading else loading, left)
+    return after if du > 0.0 else -after
+
+
+@kernel
+def quadratic_tangent(A: float, k: float, length: float) -> float:
+    """tanh(r L) / r, or tan(r L) / r, which is `inf` from its pole on."""
+    y = A * k * length * length
+    if abs(y) <= _TANGENT_REACH:
+        return length * sum16(_TANGENT, 0, y)
+    r = math.sqrt(abs(A * k))
+    x = r * length
+    if y > 0.0:
+        decay = math.exp(-2.0 * x)
+        return (1.0 - decay) / ((1.0 + decay) * r)
+    return math.tan(x) / r if x < 0.5 * math.pi else math.inf
+
+
+@kernel
+def quadratic_flow(along: float, A: float, k: float, tangent: float) -> float:
+    """Value on H' = A - k H^2 where T is `tangent`, on this side of H = 0."""
+    slope = A - k * along * along
+    if slope == 0.0:
+        return along
+    if tangent == math.inf:
+        return math.copysign(math.inf, slope)
+    denominator = 1.0 + k * along * tangent
+    if denominator <= 0.0:
+        return math.copysign(math.inf, slope)
+    return along + slope * tangent / denominator
+
+
+@kernel
+def quadratic_travel(along: float, A: float, k: float) -> float:
+    """Length from H to 0 on H' = A - k H^2, the one at which T is -H/A."""
+    tangent = -along / A
+    r = math.sqrt(abs(A * k))
+    q = r * tangent
+    if q < 1.0e-9:
+        return tangent
+    if A * k < 0.0:
+        return math.atan(q) / r
+    return math.atanh(q) / r if q < 1.0 else math.inf

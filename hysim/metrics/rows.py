@@ -1,0 +1,46 @@
+"""Measures of many loops that share their input, to the same definitions and in the same arithmetic as `loop_metrics`.
+
+The input fixes the cycle, the order of its samples and the weights of the interpolation; they are found
+once. See `hysim.metrics._loop` for the definitions.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.metrics._cycles import last_cycles
+from hysim.metrics._loop import TOLERANCE, common_inputs, settled, signed_area
+
+
+@dataclass(frozen=True)
+class LoopRows:
+    """Loops over the last complete cycle of the input `u`, shape (n_samples,); outputs are (n_sets, n_samples)."""
+
+    u: FloatArray
+
+    def max_width(self, y: FloatArray) -> FloatArray:
+        """Largest magnitude of the width of each row, shape (n_sets,)."""
+        cycle = last_cycles(self.u, 1, TOLERANCE)[0]
+        branches = [(part, settled(self.u[part])) for part in (cycle.unloading, cycle.loading)]
+        inputs = [self.u[part][kept] for part, kept in branches]
+        grid = common_inputs(inputs)
+        outputs = [
+            _interpolated(grid, x, y[:, part][:, kept]) for x, (part, kept) in zip(inputs, branches, strict=True)
+        ]
+        widths: FloatArray = np.abs(outputs[0] - outputs[1]).max(axis=1)
+        return widths
+
+    def area(self, y: FloatArray) -> FloatArray:
+        """Enclosed area of each row, shape (n_sets,)."""
+        path = last_cycles(self.u, 1, TOLERANCE)[0].path
+        return np.abs(signed_area(self.u[path], np.ascontiguousarray(y[:, path])))
+
+
+def _interpolated(grid: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
+    """`numpy.interp` of rows."""
+    below = np.clip(np.searchsorted(x, grid, side="right") - 1, 0, x.size - 1)
+    above = np.minimum(below + 1, x.size - 1)
+    spans = np.where(above > below, x[above] - x[below], 1.0)
+    values: FloatArray = (y[:, above] - y[:, below]) / spans * (grid - x[below]) + y[:, below]
+    return values

@@ -1,0 +1,303 @@
+"""A mass on a linear and a hysteretic spring.
+
+    m y'' + c y' + k y + law(y) = u              a force u
+    m y'' + c y' + k y + law(y) = -m u           a base with the acceleration u; y is relative to the base
+
+y is the displacement and the law's own input, a positive force of the spring pulls towards y = 0. The input is
+linear between its samples, or held. A plant with memory inside the equation of motion has no closed form: it is
+integrated (`hysim.kernels.oscillator`), by default with steps that end where y' or z changes sign.
+
+Energy, for the Bouc-Wen law's force p(y) + gain z (A not 0), after Erlicher and Point (2004):
+
+    work of the input = stored + lost in damping + lost in hysteresis
+    stored            = m y'^2 / 2 + k y^2 / 2 + integral of p dy + gain z^2 / (2 A),  counted from the start
+    loss by damping   = integral of c y'^2 dt
+    loss by hysteresis= integral of gain z (dy - dz / A)
+
+The last never falls if -beta <= gamma <= beta. With A = 0 the memory stores nothing.
+"""
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, read_only
+from hysim.errors import SimulationError
+from hysim.kernels import linear
+from hysim.kernels import oscillator as kernels
+from hysim.models.boucwen import BoucWen, PolynomialBoucWen
+from hysim.models.model import model
+
+METHODS = {
+    "split": kernels.SPLIT,
+    "runge-kutta": kernels.RUNGE_KUTTA,
+    "newmark": kernels.NEWMARK,
+    "strang": kernels.STRANG,
+}
+_ANGLE = 0.1  # largest phase of the mode in a default step: errors of 1e-7 of the output on the Noel-Schoukens system
+_CHUNK = 1 << 16
+
+
+class OscillatorState(NamedTuple):
+    """Where a simulation stands: last input, motion, memory, and the energies so far."""
+
+    u: float
+    y: float
+    velocity: float
+    z: float
+    input_work: float = 0.0
+    damping_loss: float = 0.0
+    memory_work: float = 0.0
+
+
+@model
+class BoucWenOscillator:
+    """Mass on a linear and a Bouc-Wen spring, ``m y'' + c y' + k y + law(y) = u``.
+
+    Parameters
+    ----------
+    mass : float
+        Positive [kg].
+    damping : float
+        Viscous, c [N s/m].
+    stiffness : float
+        Of the linear spring, k [N/m].
+    law : BoucWen or PolynomialBoucWen
+        Force of the hysteretic spring [N] for the displacement y [m]; its z0 is the memory at the start.
+    excitation : {"force", "base"}
+        Whether u is a force [N], or the acceleration of the base [m/s^2]; y is then relative to the base.
+    hold : {"foh", "zoh"}
+        Whether the input is linear between samples, or held.
+    method : {"split", "runge-kutta", "newmark", "strang"}
+        Steps of order 6 that end at reversals, with the exact memory; the classical Runge-Kutta method;
+        Newmark's constant average acceleration with the trapezoidal rule for z; Strang's splitting.
+    substeps : int, optional
+        Steps between two samples, the one control of accuracy. By default as few as turn the phase of the
+        mode, whose stiffness is that of all springs at the start, by at most 0.1 rad each. Twice as many show
+        what is left of the error.
+    initial_state : (float, float)
+        Displacement [m] and velocity [m/s] at the first sample; empty for rest.
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite, the mass is not positive, an option is unknown, or substeps is below 1.
+    TypeError
+        If the law is not one of the two, or substeps is not a whole number.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import hysim as hs
+    >>> law = hs.BoucWen(A=5e4, beta=800.0, gamma=-1100.0)
+    >>> plant = hs.BoucWenOscillator(mass=2.0, damping=10.0, stiffness=5e4, law=law)
+    >>> t = np.arange(751) / 750
+    >>> sim = hs.simulate(plant, t, 40 * np.sin(2 * np.pi * 30 * t))
+    >>> f"{sim.y.max():.4e} m, {sim.signals['hysteresis_loss'][-1]:.4f} J"
+    '1.0838e-03 m, 0.8678 J'
+    """
+
+    mass: float
+    damping: float
+    stiffness: float
+    law: BoucWen | PolynomialBoucWen
+    excitation: str = "force"
+    hold: str = "foh"
+    method: str = "split"
+    substeps: int | None = None
+    initial_state: tuple[float, ...] = ()
+
+    dynamic: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        if self.mass <= 0.0:
+            raise ValueError(f"mass must be positive, got {self.mass}")
+        if not isinstance(self.law, BoucWen | PolynomialBoucWen):
+            raise TypeError(f"law must be a BoucWen or a PolynomialBoucWen, got {type(self.law).__name__}")
+        options = {"excitation": ("force", "base"), "hold": ("foh", "zoh"), "method": tuple(METHODS)}
+        for name, allowed in options.items():
+            if getattr(self, name) not in allowed:
+                raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {getattr(self, name)!r}")
+        if self.substeps is not None and (isinstance(self.substeps, bool) or not isinstance(self.substeps, int)):
+            raise TypeError(f"substeps must be a whole number or None, got {self.substeps!r}")
+        if self.substeps is not None and self.substeps < 1:
+            raise ValueError(f"substeps must be at least 1, got {self.substeps}")
+        if len(self.initial_state) not in (0, 2):
+            raise ValueError(f"initial_state must be empty or hold 2 numbers, got {len(self.initial_state)}")
+
+    @property
+    def natural_frequency(self) -> float:
+        """Of small motions about y = 0, z = 0, undamped [rad/s]; that of the size of a negative stiffness."""
+        return math.sqrt(abs(self.stiffness + self._coefficients[0] + self.law.gain * self.law.A) / self.mass)
+
+    def response(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
+        """Displacement at the samples of `u`.
+
+        Parameters
+        ----------
+        u : array, shape (n,) [N, or m/s^2]
+            Input; the first sample finds the initial state.
+        sample_time : float
+            Time between two samples [s].
+
+        Returns
+        -------
+        array, shape (n,) [m]
+
+        Raises
+        ------
+        SimulationError
+            If the motion leaves the finite numbers; it names the time.
+        ValueError
+            If u is not finite or has not one axis, or the sample time is not positive.
+        """
+        return self._states(u, sample_time, None, None)[1][:, 0].copy()
+
+    def signals(self, u: npt.ArrayLike, sample_time: float) -> dict[str, FloatArray]:
+        """Every signal at the samples of `u`, by name.
+
+        Parameters
+        ----------
+        u, sample_time
+            As in `response`.
+
+        Returns
+        -------
+        dict
+            ``"y"`` [m], ``"velocity"`` [m/s], ``"z"``, ``"restoring_force"`` k y + law(y) [N], and the energies
+            since the start [J] ``"input_work"``, ``"damping_loss"``, ``"hysteresis_loss"``, ``"stored"``: the
+            first is the sum of the others, up to the error of the method. Each has shape (n,).
+
+        Raises
+        ------
+        SimulationError, ValueError
+            As `response`.
+        """
+        return self.advance(u, sample_time)[0]
+
+    def advance(
+        self,
+        u: npt.ArrayLike,
+        sample_time: float,
+        state: OscillatorState | None = None,
+        *,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> tuple[dict[str, FloatArray], OscillatorState]:
+        """Signals at the samples of `u`, continued from `state`, and the state after the last sample.
+
+        Parameters
+        ----------
+        u, sample_time
+            As in `response`; the input goes on from the state's, one sample before the first.
+        state : OscillatorState, optional
+            By default the initial state, which the first sample then finds.
+        progress : callable, optional
+            Called as ``progress(done, total)`` now and then.
+
+        Returns
+        -------
+        signals : dict
+            As from `signals`; the same bits as from one uncut input.
+        state : OscillatorState
+            To continue from.
+
+        Raises
+        ------
+        SimulationError, ValueError
+            As `response`.
+        """
+        inputs, states = self._states(u, sample_time, state, progress)
+        y, velocity, z, input_work, damping_loss, memory_work = states.T.copy()
+        law, start = self.law, self._start(0.0)
+        recoverable = law.gain / law.A if law.A else 0.0
+        in_memory = 0.5 * recoverable * (z - start.z) * (z + start.z)
+        slope, *curve = self._coefficients
+        elastic_force = np.polynomial.Polynomial([law.offset, self.stiffness + slope, *curve])
+        potential = elastic_force.integ()
+        stored = 0.5 * self.mass * (velocity**2 - start.velocity**2) + in_memory + potential(y) - potential(start.y)
+        signals = {
+            "y": y,
+            "velocity": velocity,
+            "z": z,
+            "restoring_force": elastic_force(y) + law.gain * z,
+            "input_work": input_work,
+            "damping_loss": damping_loss,
+            "hysteresis_loss": memory_work - in_memory,
+            "stored": stored,
+        }
+        return signals, OscillatorState(inputs[-1], *states[-1]) if inputs.size else state or start
+
+    @property
+    def _coefficients(self) -> tuple[float, ...]:
+        """Of y, y^2, ... in the law's output."""
+        law = self.law
+        return law.input_coefficients if isinstance(law, PolynomialBoucWen) else (law.feedthrough,)
+
+    def _start(self, u: float) -> OscillatorState:
+        y, velocity = self.initial_state or (0.0, 0.0)
+        return OscillatorState(u, y, velocity, self.law.z0)
+
+    def _substeps(self, sample_time: float) -> int:
+        if self.substeps is not None:
+            return self.substeps
+        return max(1, math.ceil(max(self.natural_frequency, abs(self.damping) / self.mass) * sample_time / _ANGLE))
+
+    def _states(
+        self,
+        u: npt.ArrayLike,
+        sample_time: float,
+        state: OscillatorState | None,
+        progress: Callable[[int, int], None] | None,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Inputs, and what the kernel carries at their samples, shape (n, 6)."""
+        inputs = read_only(u, "u", ndim=1)
+        if not 0.0 < sample_time < math.inf:
+            raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
+        states, done = np.empty((inputs.size, 6)), 0
+        if state is None and inputs.size:
+            state, done = self._start(float(inputs[0])), 1
+            states[0] = state[1:]
+        scale = 1.0 if self.excitation == "force" else -self.mass
+        steps = self._compiled(float(sample_time))
+        first = done
+        while state is not None and done < inputs.size:
+            stop = min(done + _CHUNK, inputs.size)
+            piece = states[done:stop]
+            lost = steps(scale * state.u, scale * inputs[done:stop], np.array(state[1:]), piece)
+            if lost >= 0:
+                elapsed = (done + lost + 1 - first) * sample_time
+                raise SimulationError(
+                    f"the motion leaves the finite numbers within {elapsed:.6g} s from the start, at sample "
+                    f"{done + lost}: the plant is unstable, or the method needs more substeps"
+                )
+            state, done = OscillatorState(float(inputs[stop - 1]), *piece[-1].tolist()), stop
+            if progress is not None:
+                progress(done, inputs.size)
+        return inputs, states
+
+    def _compiled(self, sample_time: float) -> Callable[[float, FloatArray, FloatArray, FloatArray], int]:
+        """The kernel with everything but the input, the state before it, and the states to come."""
+        law, (slope, *curve) = self.law, self._coefficients
+        stiffness, substeps, held = self.stiffness + slope, self._substeps(sample_time), self.hold == "zoh"
+        plant = [self.mass, self.damping, stiffness, law.offset, law.gain, law.A, law.beta, law.gamma, law.n]
+        if self.method == "split":
+            return partial(kernels.split_path, substeps, held, np.array(plant), np.array(curve), sample_time)
+        flow = np.zeros((2, 4))
+        if self.method == "strang":
+            flow = _linear_flow(self.mass, self.damping, stiffness + law.gain * law.A, sample_time / substeps)
+        method = METHODS[self.method]
+        return partial(kernels.path, method, substeps, held, np.array(plant), np.array(curve), flow, sample_time)
+
+
+def _linear_flow(mass: float, damping: float, stiffness: float, h: float) -> FloatArray:
+    """(y, y') after h from (y, y', F, rise of F), exactly for m y'' + c y' + k y = F, shape (2, 4)."""
+    generator = np.zeros((1, 4, 4))
+    generator[0, :2] = [[0.0, h, 0.0, 0.0], [-stiffness * h / mass, -damping * h / mass, h / mass, 0.0]]
+    generator[0, 2, 3] = 1.0
+    out = np.empty_like(generator)
+    linear.exponentials(generator, out)
+    return np.ascontiguousarray(out[0, :2])

@@ -1,0 +1,219 @@
+"""The inverse of a law gives back the input, and the law gives back the output, to rounding."""
+
+import pickle
+
+import numba
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from strategies import EXPONENTS, short_inputs
+
+import hysim as hs
+from hysim.kernels.stepping import drive
+
+CLOSE = 1e-11  # of the range, what is promised; a few roundings are what is measured
+STACK = hs.BoucWen(A=0.35, beta=0.02, gamma=0.005, feedthrough=1.0, gain=-1.0)
+ASYMMETRIC = hs.PolynomialBoucWen(A=0.4, beta=0.3, gamma=0.1, n=1.4, gain=-0.5, input_coefficients=(1.0, 0.1, 0.05))
+
+
+@st.composite
+def invertible_laws(draw) -> hs.BoucWen:
+    """Laws whose slope is between 1e-3 and 1 times its largest for every input, rising or falling."""
+    loading = draw(st.floats(0.05, 5.0))
+    unloading = draw(st.floats(-loading, 5.0))
+    law = hs.BoucWen(
+        A=draw(st.floats(0.2, 3.0)),
+        beta=(loading + unloading) / 2,
+        gamma=(loading - unloading) / 2,
+        n=draw(EXPONENTS),
+        gain=draw(st.sampled_from([-1.0, 1.0])) * draw(st.floats(0.1, 2.0)),
+        offset=draw(st.floats(-1.0, 1.0)),
+    )
+    low, high = law.slope_bounds()
+    flattest = draw(st.sampled_from([1e-3, 0.03, 0.5]))
+    feedthrough = (flattest * high - low) / (1.0 - flattest)  # then low is `flattest` times high
+    assert hs.BoucWen(A=law.A, beta=law.beta, gamma=law.gamma, n=law.n, gain=law.gain, feedthrough=feedthrough)
+    turned = draw(st.sampled_from([-1.0, 1.0]))
+    scalars = law.scalars | {"feedthrough": turned * feedthrough, "gain": turned * law.gain}
+    return hs.BoucWen(**scalars)
+
+
+def walk(rng: np.random.Generator, n_samples: int) -> np.ndarray:
+    """Small steps, large ones, and plateaus."""
+    steps = rng.normal(size=n_samples) * rng.choice([0.0, 1e-12, 1e-3, 0.1, 1.0], size=n_samples)
+    return np.cumsum(steps) - steps.sum() / 2
+
+
+@settings(max_examples=2 if numba.config.DISABLE_JIT else 20)
+@given(invertible_laws(), st.integers(0, 2**32))
+def test_both_ways_on_10000_samples(law, seed):
+    u = walk(np.random.default_rng(seed), 100 if numba.config.DISABLE_JIT else 10_000)
+    y = law.response(u)
+    found = law.inverse_response(y)
+    assert np.abs(law.response(found) - y).max() <= CLOSE * np.ptp(y)
+    assert np.abs(found - u).max() <= CLOSE * np.ptp(u)
+    still = np.diff(y) == 0.0
+    assert still.sum() > 0.1 * u.size
+    assert (np.diff(found)[still] == 0.0).all()
+
+
+@given(short_inputs(), st.sampled_from([STACK, ASYMMETRIC]))
+def test_short_records_of_a_stack(u, law):
+    found = law.inverse_response(law.response(u))
+    assert found == pytest.approx(u, abs=1e-13)  # roundings of numbers of order one
+
+
+@given(invertible_laws(), short_inputs(), st.data())
+def test_cut_and_continue_gives_the_same_bits(law, u, data):
+    y = law.response(u)
+    cut = data.draw(st.integers(1, y.size))
+    inverse = law.inverse()
+    head, state = inverse.advance(y[:cut])
+    tail, end = inverse.advance(y[cut:], state)
+    whole, whole_end = inverse.advance(y)
+    assert np.array_equal(np.concatenate([head, tail]), whole)
+    assert np.array_equal(law.inverse_response(y), whole)
+    assert np.array_equal(inverse.response(y), whole)
+    assert end == whole_end
+    assert np.array_equal(law.inverse_response(y[cut:], state=state), tail)
+
+
+@given(invertible_laws(), short_inputs())
+def test_one_sample_at_a_time_in_a_compiled_loop(law, u):
+    y = law.response(u)
+    compiled = law.inverse().compiled(y[0])
+    found = np.empty(y.size)
+    assert drive(compiled.step, compiled.parameters, compiled.state, y, found) == -1
+    assert np.array_equal(found, law.inverse_response(y))
+    inverse, state, single = law.inverse(), None, []
+    for sample in y:
+        value, state = inverse.advance(sample, state)
+        single.append(float(value))
+    assert single == found.tolist()
+
+
+def test_a_memory_alone_needs_its_first_input():
+    """y = z says nothing about the input at which it begins."""
+    law = hs.BoucWen(A=1.0, beta=0.6, gamma=0.4, n=1.5, z0=0.2)
+    u = 3.0 + np.sin(np.linspace(0.0, 7.0, 200))
+    y = law.response(u)
+    assert law.inverse_response(y, u0=3.0) == pytest.approx(u, abs=1e-12)  # slopes are above 0.05 here
+    assert law.inverse_response(y[1:], state=(3.0, 0.2)) == pytest.approx(u[1:], abs=1e-12)
+    with pytest.raises(ValueError, match="give u0"):
+        law.inverse_response(y)
+
+
+def test_from_rest_at_an_input_the_first_sample_is_reached():
+    found = STACK.inverse_response([5.0, 5.0, 2.0], u0=0.0)
+    assert STACK.response(np.append(0.0, found))[1:] == pytest.approx([5.0, 5.0, 2.0], abs=1e-14)
+    assert found[0] == found[1]
+
+
+def test_laws_whose_memory_grows_without_bound():
+    """beta + gamma < 0: the inverse stays on this side of the escape."""
+    for n in (1.0, 1.5, 3.0):
+        law = hs.BoucWen(beta=0.2, gamma=-0.9, n=n, feedthrough=0.1)
+        y = 5.0 * np.sin(np.linspace(0.0, 9.0, 300)) * np.linspace(0.0, 1.0, 300)
+        found = law.inverse_response(y)
+        assert law.response(found) == pytest.approx(y, abs=1e-10)  # 1e-11 of the range
+        # in one stride, past which Newton's first guess escapes; near the escape the slope is up to 1e9
+        assert law.response(np.append(0.0, law.inverse_response([1e3], u0=0.0)))[1] == pytest.approx(1e3, rel=1e-9)
+
+
+def test_other_branches_of_a_polynomial():
+    law = hs.PolynomialBoucWen(A=0.1, beta=0.3, gamma=0.1, gain=-0.5, input_coefficients=(1.0, -0.5))  # turns at 0.95
+    rising, falling = np.linspace(-1.0, 0.5, 50), np.linspace(3.0, 2.0, 50)
+    assert law.inverse_response(law.response(rising)) == pytest.approx(rising, abs=1e-13)
+    assert law.inverse_response(law.response(falling), u0=3.0) == pytest.approx(falling, abs=1e-13)
+    with pytest.raises(hs.SimulationError, match="sample"):
+        law.inverse_response(law.response(np.linspace(0.0, 2.0, 60)))
+
+
+def test_a_polynomial_that_turns_twice_between_two_samples_is_refused():
+    law = hs.PolynomialBoucWen(A=1.0, beta=0.5, gamma=0.5, gain=0.01, input_coefficients=(1.0, -1.5, 0.55))
+    u = np.array([0.0, 2.5])
+    with pytest.raises(hs.SimulationError, match="sample 1"):
+        law.inverse_response(law.response(u))
+
+
+@pytest.mark.parametrize("n", [1.0, 1.5, 2.0, 6.0])
+def test_a_slope_that_is_not_positive_is_refused_with_its_place(n):
+    """Rising is fine up to where the memory bends the output down; the place is between the samples."""
+    law = hs.BoucWen(A=1.0, beta=0.6, gamma=0.4, n=n, feedthrough=-0.5)
+    u = np.linspace(0.0, 0.49, 20)  # it turns where w^n = 1/2, at u of 0.53 or more
+    y = law.response(u)
+    assert law.inverse_response(y) == pytest.approx(u, abs=1e-13)
+    with pytest.raises(hs.SimulationError, match=r"sample 20 \(y = 2\): at u = .* slope is -?\d"):
+        law.inverse_response(np.append(y, 2.0))
+
+
+def test_the_slope_just_after_a_reversal_is_looked_at():
+    law = hs.BoucWen(A=0.9, beta=0.5, gamma=0.1, feedthrough=1.0, gain=-1.0)  # 1 - 1.5 at worst
+    for u in ([0.0, 8.0, 7.9], [0.0, 8.0, 9.0]):  # where both ways raise the output, neither can be told
+        with pytest.raises(hs.SimulationError, match=r"sample 2 .*u = 8 its slope is -0\.\d+, not positive"):
+            law.inverse_response(law.response(u))
+    assert not law.is_invertible()
+
+
+def test_what_cannot_be_reached_is_refused():
+    law = hs.BoucWen(A=1.0, beta=0.6, gamma=0.4)
+    with pytest.raises(hs.SimulationError, match=r"sample 1 \(y = 1\.5\)"):
+        law.inverse_response([0.5, 1.5], u0=0.0)
+    compiled = law.inverse().compiled(u0=0.0)
+    assert np.isnan(compiled.step(compiled.parameters, compiled.state, 1.5))
+    # and the state has not moved: the next output is reached as if nothing had been
+    again = compiled.step(compiled.parameters, compiled.state, 0.5)
+    assert again == law.inverse_response([0.5], u0=0.0)[0]
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "message"),
+    [
+        (lambda: STACK.inverse_response([0.0, np.nan]), ValueError, "y must be finite, got nan at index 1"),
+        (lambda: STACK.inverse_response([[0.0]]), ValueError, "1 axis"),
+        (lambda: STACK.inverse_response([0.0], u0=0.0, state=(0.0, 0.0)), ValueError, "not both"),
+        (lambda: hs.BoucWen(feedthrough=-1.0).inverse(), ValueError, "slope is zero"),
+        (lambda: ASYMMETRIC.inverse().advance([[1.0]]), ValueError, "shape"),
+    ],
+)
+def test_wrong_arguments_are_named(call, error, message):
+    with pytest.raises(error, match=message):
+        call()
+
+
+def test_a_turned_polynomial_has_no_first_input():
+    law = hs.PolynomialBoucWen(A=0.1, gain=0.1, input_coefficients=(1.0, 1.0))  # turns at u = -0.5, y = -0.25
+    with pytest.raises(hs.SimulationError, match="give u0"):
+        law.inverse_response([-0.3])
+
+
+def test_nothing_in_nothing_out():
+    assert STACK.inverse_response([]).size == 0
+    assert STACK.inverse().advance([])[1] is None
+    assert STACK.inverse().advance([], (1.0, 0.2, 0.8))[1] == (1.0, 0.2, 0.8)
+
+
+def test_the_inverse_is_a_value():
+    inverse = STACK.inverse()
+    assert inverse == pickle.loads(pickle.dumps(inverse))
+    assert hash(inverse) == hash(STACK.inverse())
+    assert inverse != ASYMMETRIC.inverse()
+    assert inverse.increasing
+    assert not hs.BoucWen(gain=-1.0).inverse().increasing
+
+
+def test_the_inverse_is_a_law_for_simulate():
+    u = np.linspace(0.0, 30.0, 20)
+    sim = hs.simulate(STACK.inverse(), None, STACK.response(u))
+    assert sim.y == pytest.approx(u, abs=1e-12)
+
+
+@given(invertible_laws(), st.integers(0, 1000))
+def test_the_inverse_does_not_mind_extra_samples(law, seed):
+    """Rate independence of the inverse: samples put in between on the way do not change the others."""
+    assume(law.slope_bounds()[0] * law.slope_bounds()[1] > 0.0)
+    y = law.response(walk(np.random.default_rng(seed), 30))
+    fine = np.append((y[:-1, None] + np.diff(y)[:, None] * np.array([0.0, 0.3, 0.8])).ravel(), y[-1])
+    coarse = law.inverse_response(y)
+    assert law.inverse_response(fine)[::3] == pytest.approx(coarse, abs=1e-11 * max(1.0, np.ptp(coarse)))

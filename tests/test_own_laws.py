@@ -1,0 +1,155 @@
+"""A scalar function of the user's is a law like the others: for response, simulate, identify and loops."""
+
+import math
+import pickle
+
+import numba
+import numpy as np
+import pytest
+
+import hysim as hs
+from hysim.kernels.stepping import drive
+
+
+def dahl(parameters, state, u):
+    """Dahl's friction, dz/du = rate (1 - sign(du) z / limit): Bouc-Wen with n = 1, gamma = 0."""
+    rate, limit = parameters[0], parameters[1]
+    du = u - state[0]
+    end = math.copysign(limit, du)
+    state[1] = end + (state[1] - end) * math.exp(-rate * abs(du) / limit)
+    state[0] = u
+    return state[1]
+
+
+def play(parameters, state, u):
+    """Backlash of half width r, beside a line."""
+    gain, r, slope = parameters
+    state[1] = max(u - r, min(u + r, state[1]))
+    state[0] = u
+    return gain * state[1] + slope * u
+
+
+def logarithm(parameters, state, u):
+    """Lost for u < 0."""
+    state[0] = u
+    return math.log(u) * parameters[0]
+
+
+DAHL = hs.CustomLaw(
+    step=dahl,
+    parameters={"rate": 1.5, "limit": 0.8},
+    state={"z0": 0.1},
+    bounds={"rate": (0.1, 10.0), "limit": (0.1, 10.0)},
+)
+PLAY = hs.CustomLaw(
+    step=play,
+    parameters={"gain": 2.0, "r": 0.25, "slope": 0.5},
+    state={"w0": 0.0},
+    bounds={"r": (0.0, 1.0)},
+    linear=("gain", "slope"),
+)
+TWIN = hs.BoucWen(A=1.5, beta=1.5 / 0.8, gamma=0.0, z0=0.1)
+U = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=60) * np.linspace(1.0, 0.4, 121)
+
+
+def test_dahls_law_is_the_built_in_one():
+    assert DAHL.response(U) == pytest.approx(TWIN.response(U), abs=1e-14)  # rounding of numbers of order one
+    sim = hs.simulate(DAHL, None, U)
+    assert np.array_equal(sim.y, DAHL.response(U))
+
+
+def test_a_compiled_function_and_a_plain_one_are_the_same_law():
+    jitted = hs.CustomLaw(step=numba.njit(dahl), parameters=DAHL.parameters, state=DAHL.state)
+    assert np.array_equal(jitted.response(U), DAHL.response(U))
+
+
+def test_cut_and_continue_gives_the_same_bits():
+    head, state = DAHL.advance(U[:50])
+    tail, end = DAHL.advance(U[50:], state)
+    assert np.array_equal(np.concatenate([head, tail]), DAHL.response(U))
+    assert end == (U[-1], DAHL.response(U)[-1])
+
+
+def test_it_goes_through_the_loop_that_takes_every_law():
+    compiled = PLAY.compiled(U[0])
+    y = np.empty(U.size)
+    assert drive(compiled.step, compiled.parameters, compiled.state, U, y) == -1
+    assert np.array_equal(y, PLAY.response(U))
+
+
+def test_identify_recovers_dahls_parameters():
+    rec = hs.Record(u=U, y=TWIN.response(U))
+    start = hs.CustomLaw(step=dahl, parameters={"rate": 5.0, "limit": 3.0}, state={"z0": 0.1}, bounds=DAHL.bounds)
+    fit = hs.identify(start, rec)
+    assert fit.free_names == ("rate", "limit")
+    assert fit.estimates == pytest.approx({"rate": 1.5, "limit": 0.8, "z0": 0.1}, rel=1e-7)
+    assert fit.model.response(U) == pytest.approx(rec.y, abs=1e-7)
+
+
+def test_linear_parameters_are_solved_for_and_initial_values_can_be_free():
+    rec = hs.Record(u=U, y=PLAY.response(U))
+    fit = hs.identify(PLAY, rec, bounds={"w0": (-1.0, 1.0)})
+    assert fit.free_names == ("gain", "r", "slope", "w0")
+    assert {name: fit.estimates[name] for name in ("gain", "r", "slope")} == pytest.approx(
+        {"gain": 2.0, "r": 0.25, "slope": 0.5}, rel=1e-6
+    )
+    assert fit.fit_percent > 99.999
+    rest = hs.identify(PLAY, rec, fixed={"r": 0.25}, initial="rest")
+    assert rest.free_names == ("gain", "slope")
+    assert rest.estimates["gain"] == pytest.approx(2.0, rel=1e-12)
+
+
+def test_it_is_compared_with_the_others():
+    u = hs.signals.triangle(-1.0, 1.0, cycles=3, samples_per_cycle=60)
+    rec = hs.Record(u=u, y=TWIN.response(u))
+    table = hs.compare({"own": DAHL, "line": hs.Line}, rec)
+    assert "own" in table.to_text()
+
+
+def test_it_is_a_value():
+    assert pickle.loads(pickle.dumps(DAHL)) == DAHL
+    assert hash(DAHL) == hash(pickle.loads(pickle.dumps(DAHL)))
+    assert PLAY.assemble({"r": 0.25}) == PLAY
+    assert PLAY.assemble({"r": 0.5}) != PLAY
+
+
+def test_a_lost_law_names_the_sample():
+    law = hs.CustomLaw(step=logarithm, parameters={"gain": 1.0})
+    if numba.config.DISABLE_JIT:  # Python's own logarithm raises instead of nan
+        return
+    with pytest.raises(hs.SimulationError, match=r"sample 1 \(u = -1\)"):
+        law.response([1.0, -1.0])
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "message"),
+    [
+        (lambda: hs.CustomLaw(step=lambda u: u, parameters={"a": 1.0}), TypeError, r"takes \(u\)"),
+        (lambda: hs.CustomLaw(step="dahl", parameters={"a": 1.0}), TypeError, "must be a function"),
+        (lambda: hs.CustomLaw(step=dahl), ValueError, "at least one parameter"),
+        (lambda: hs.CustomLaw(step=dahl, parameters={"a": np.nan}), ValueError, "a'] must be finite"),
+        (lambda: hs.CustomLaw(step=dahl, parameters={"a": "b"}), TypeError, "a'] must be numbers"),
+        (
+            lambda: hs.CustomLaw(step=dahl, parameters={"a": 1.0}, state={"a": 1.0}),
+            ValueError,
+            "'a' names a parameter and",
+        ),
+        (lambda: hs.CustomLaw(step=dahl, parameters={"a": 1.0}, linear=("b",)), ValueError, "linear names 'b'"),
+        (lambda: hs.CustomLaw(step=dahl, parameters={"a": 1.0}, bounds={"b": (0, 1)}), ValueError, "bounds names 'b'"),
+        (lambda: DAHL.advance([0.0], (0.0,)), ValueError, "must hold 2 numbers, got 1"),
+        (lambda: hs.identify(DAHL, hs.Record(u=U, y=U), free=("z0",)), ValueError, "'z0' is to be free, but has no"),
+        (lambda: hs.identify(DAHL, hs.Record(u=U, y=U), bounds={"rate": (1.0, np.inf)}), ValueError, "must be finite"),
+    ],
+)
+def test_wrong_arguments_are_named(call, error, message):
+    with pytest.raises(error, match=message):
+        call()
+
+
+@pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
+@pytest.mark.parametrize(
+    "step", [lambda parameters, state, u: "text", lambda parameters, state, u: sorted(u), lambda p, s, u: s.missing]
+)
+def test_what_does_not_compile_is_refused_with_the_reason(step):
+    with pytest.raises(TypeError, match="does not compile as step"):
+        hs.CustomLaw(step=step, parameters={"a": 1.0})
