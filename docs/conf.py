@@ -1,5 +1,6 @@
 """Sphinx settings: everything is read from the package and from committed results; nothing is fetched."""
 
+import json
 import sys
 from pathlib import Path
 
@@ -50,6 +51,7 @@ def shown(experiments: dict[str, str]) -> str:
 
 
 myst_substitutions = {
+    "results": {path.parent.name: json.loads(path.read_text()) for path in RESULTS.glob("*/result.json")},
     "accuracy_against_cost": shown(
         {
             "work_precision": "Error against time, of hysim and of the tools that people use, measured in one run "
