@@ -57,4 +57,4 @@ def _first_line(module: ModuleType) -> str:
 
 
 def _summary(names: Iterable[str]) -> str:
-    return ".. autosummary::\n   :toctree: .\n\n" + "".join(f"   {name}\n" for name in names)
+    return ".. autosummary::\n   :toctree: .\n   :nosignatures:\n\n" + "".join(f"   {name}\n" for name in names)
