@@ -31,6 +31,8 @@ def write_reference(folder: Path) -> None:
     folder.mkdir(exist_ok=True)
     page, text = folder / "index.rst", "\n".join(parts)
     if not page.exists() or page.read_text() != text:  # an unchanged page is not built anew
+        for old in folder.glob("*.rst"):  # of names that are no more
+            old.unlink()
         page.write_text(text)
 
 
