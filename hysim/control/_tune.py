@@ -55,7 +55,7 @@ class Tuning:
     objective : float
         Its value, in units of the reference's span.
     max_sensitivity : float
-        Largest |1 / (1 + L)| at either slope of the law.
+        Largest ``|1 / (1 + L)|`` at either slope of the law.
     gain_margin, phase_margin : float
         Factor and angle [degrees] by which the loop at its largest slope may change before it is unstable.
     trials : array, shape (n, 6)
@@ -104,7 +104,7 @@ def tune(
         Lowest and highest voltage. Of a list of such pairs, or None for no limits, the loop is simulated
         within each, so that one PID serves all; the one returned has the first.
     max_sensitivity : float
-        Bound on max |1 / (1 + L)|, above one: the smaller, the more the plant may differ from its model.
+        Bound on max ``|1 / (1 + L)|``, above one: the smaller, the more the plant may differ from its model.
     transient : float
         Time at the begin that does not count [s]: what a periodic reference needs to become steady.
     u0 : float
@@ -206,7 +206,7 @@ class _Search:
         )
 
     def sensitivity(self, pid: PID) -> float:
-        """Largest |1 / (1 + L)| at either slope of the law; infinite if the loop is unstable there."""
+        """Largest ``|1 / (1 + L)|`` at either slope of the law; infinite if the loop is unstable there."""
         return max(self.linear.max_sensitivity(pid, slope) for slope in self.slopes)
 
     def cost(self, x: FloatArray) -> float:

@@ -155,6 +155,15 @@ def vibration_reduction(
 def reduction_percent(before: float, after: float) -> float:
     """100 (1 - after / before) %; nan if there was nothing before.
 
+    Parameters
+    ----------
+    before, after : float
+        A measure of the open and of the closed loop, in one unit.
+
+    Returns
+    -------
+    float
+
     Examples
     --------
     >>> reduction_percent(4.0, 1.0)
