@@ -50,8 +50,19 @@ def shown(experiments: dict[str, str]) -> str:
     raise FileNotFoundError(f"no figure of {', '.join(experiments)} in {RESULTS}")
 
 
+def ratios() -> str:
+    """The ratios that `work_precision` judges, as a table."""
+    rows = json.loads((RESULTS / "work_precision" / "result.json").read_text())["ratios"]
+    lines = [
+        f"| {row['what']} | {format(row['error'], '.0e') if 'error' in row else ''} | {row['median']:.3g} "
+        f"({row['median_q1']:.3g} to {row['median_q3']:.3g}) |"
+        for row in rows
+    ]
+    return "\n".join(["| | error | ratio |", "|---|---|---|", *lines])
+
+
 myst_substitutions = {
-    "results": {path.parent.name: json.loads(path.read_text()) for path in RESULTS.glob("*/result.json")},
+    "ratios": ratios(),
     "accuracy_against_cost": shown(
         {
             "work_precision": "Error against time, of hysim and of the tools that people use, measured in one run "
