@@ -106,6 +106,17 @@ def growth(most_samples: int, most_sets: int, repeats: int) -> list[Row]:
     return rows
 
 
+def slopes(rows: list[Row]) -> dict[str, float]:
+    """Slopes of log time over log size, by least squares over the sizes beside which a call's own cost is small."""
+    fits = {}
+    for kind, least in (("samples", 1e4), ("sets", 1e3)):
+        for exponents in ("1", "1.5"):
+            chosen = [line for line in rows if (line["kind"], line["n"]) == (kind, exponents) and line[kind] >= least]
+            sizes, seconds = (np.log([line[name] for line in chosen]) for name in (kind, "seconds"))
+            fits[f"{kind}, n = {exponents}"] = float(np.polyfit(sizes, seconds, 1)[0])
+    return fits
+
+
 def main(smoke: bool = False) -> list[Row]:
     """Measure, and unless it is a smoke run write table, figure and JSON."""
     rows = throughput(500, 1) + growth(1000, 10, 1) if smoke else throughput(100_000, 7) + growth(10**7, 10**6, 5)
@@ -121,7 +132,7 @@ def write(rows: list[Row]) -> None:
         writer = csv.DictWriter(file, rows[0].keys(), lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
-    (RESULTS / "result.json").write_text(json.dumps({"rows": rows}, indent=2) + "\n")
+    (RESULTS / "result.json").write_text(json.dumps({"slopes": slopes(rows), "rows": rows}, indent=2) + "\n")
     with house_style():
         save_svg(draw(rows), RESULTS / "figure.svg", name="batch")
 
@@ -143,9 +154,12 @@ def draw(rows: list[Row]) -> Figure:
 
 
 if __name__ == "__main__":
-    for line in main():
+    lines = main()
+    for line in lines:
         print(
             f"{line['kind']:8} n = {line['n']:10} {line['sets']:>8} sets x {line['samples']:>8} samples"
             f" {line['million_samples_per_second']:8.1f} million samples a second"
             f" +- {100 * float(line['spread']) / float(line['seconds']):.0f} %, {line['times_exp']:.1f} times np.exp"
         )
+    for name, slope in slopes(lines).items():
+        print(f"slope of log time over log size, {name}: {slope:.2f}")

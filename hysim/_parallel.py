@@ -67,8 +67,10 @@ def second_process() -> Iterator[Executor]:
     pool = ProcessPoolExecutor(1, mp_context=forked, initializer=signal.signal, initargs=ignore)
     try:
         yield pool
-    finally:
+    except BaseException:
         pool.shutdown(wait=False, cancel_futures=True)
+        raise
+    pool.shutdown()
 
 
 class _AtOnce(Executor):

@@ -48,6 +48,8 @@ def test_stdout_holds_the_table_and_stderr_the_progress(reproduction):
     _, out, err = reproduction
     assert "0.232 um wide at 35 V" in out
     assert all(name in out for name in MODELS)
+    assert re.search(r"\d+ claims: \d+ reproduced, ", out)
+    assert re.search(r"hysteresis-90-bouc-wen: 9\d\.\d % where the paper says 90 %, reproduced", out)
     assert err.count("\n") == len(MODELS) + 3
 
 

@@ -561,3 +561,14 @@ def test_the_three_figures_come_from_one_loop_within_limits():
 def test_loops_that_are_missing_make_no_claim():
     assert headline_claims({}) == ()
     assert headline_claims({"hysteresis": [{"plant": "eq1", "lag_reduction_percent": None}]}) == ()
+
+
+def test_a_fragile_loop_does_not_count_but_is_told():
+    fragile = {**loops()["hysteresis"][0], "plant": "eq1", "lag_reduction_percent": 95.0}
+    control = loops()
+    control["hysteresis"] = [*control["hysteresis"], fragile | {"conditions": {"max_sensitivity": 17.6}}]
+    claim = headline(control)["hysteresis-90-eq1"]
+    assert claim.verdict == NO
+    assert "maximum sensitivity of 18 reaches 95.0 %" in claim.note
+    control["hysteresis"][-1] = fragile | {"conditions": {"max_sensitivity": 2.0}}
+    assert headline(control)["hysteresis-90-eq1"].verdict == YES

@@ -1,5 +1,6 @@
 """Pictures show the numbers of their results, on the Axes that they are given, in the same bytes each time."""
 
+import dataclasses
 import math
 import re
 import subprocess
@@ -187,9 +188,9 @@ print("matplotlib.pyplot" in sys.modules)
 def drawn(record, comparison):
     t = np.linspace(0.0, 20.0, 50)
     return {
-        "figure3": figures.figure3(record),
+        "figure3": figures.input_and_output(record),
         "figure4": figures.figure4(record),
-        "figure5": figures.figure5({"Eq. (1)": (t, np.tanh(t)), "Eqs. (7), (8)": (t, np.sin(t))}),
+        "figure5": figures.step_responses({"Eq. (1)": (t, np.tanh(t)), "Eqs. (7), (8)": (t, np.sin(t))}, "s"),
         "loops": figures.model_loops(comparison),
         "residuals": figures.model_residuals(comparison),
         "widths": figures.model_widths(comparison),
@@ -256,3 +257,15 @@ def test_save_svg_names_the_picture_like_its_file(tmp_path, record):
     assert (tmp_path / "loop.svg").read_text(encoding="utf-8") == hs.plot.to_svg(figure, name="loop")
     with pytest.raises(ValueError, match="a letter followed by"):
         hs.plot.to_svg(figure, name="4 loops")
+
+
+def test_a_response_shows_the_measurement_where_it_differs():
+    lag, t = hs.TransferFunction(num=(1.0,), den=(1.0, 1.0)), np.arange(0.0, 2.0, 0.1)
+    run = hs.close_loop(lag, hs.PID(kp=2.0), t, np.ones(t.size), units={"t": "s", "y": "um"})
+    ax = hs.plot.response(run, hs.plot.figure().add_subplot())
+    assert [line.get_label() for line in ax.get_lines()] == ["reference", "displacement"]
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("Time [s]", "Displacement [µm]")
+    noisy = dataclasses.replace(run, measurement=run.y + 0.1)
+    lines = hs.plot.response(noisy, hs.plot.figure().add_subplot()).get_lines()
+    assert [line.get_label() for line in lines] == ["reference", "displacement", "measurement"]
+    assert np.array_equal(lines[2].get_ydata(), run.y + 0.1)

@@ -2,7 +2,12 @@
 
 import argparse
 import sys
-from typing import Any
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from hysim.paper.claims import Claim
 
 SUCCESS, NOT_CONVERGED = 0, 1
 
@@ -38,8 +43,19 @@ def run(options: argparse.Namespace) -> int:
         for region, best in fit.regions.items():
             print(f"{name}: the best {region} law fits {best.fit_percent:.2f} %")
     print(f"sindy: {study.discovery.equation}  ({study.discovery.verdict})")
+    for line in _verdicts(done.findings.claims):
+        print(line)
     print(f"report: {done.folder / 'report.html'}")
     return SUCCESS if all(fit.success for fit in study.fits.values()) else NOT_CONVERGED
+
+
+def _verdicts(claims: "Sequence[Claim]") -> Iterator[str]:
+    """How many claims have each verdict, and what became of the two headline figures."""
+    counts = Counter(claim.verdict for claim in claims)
+    yield f"{len(claims)} claims: " + ", ".join(f"{number} {verdict}" for verdict, number in counts.most_common())
+    for claim in claims:
+        if claim.id.startswith(("hysteresis-90", "vibration-97")):
+            yield f"{claim.id}: {claim.recomputed:.1f} % where the paper says {claim.printed:g} %, {claim.verdict}"
 
 
 def _progress(done: int, total: int, what: str) -> None:

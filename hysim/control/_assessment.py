@@ -6,6 +6,7 @@ together; square waves over their last period.
 """
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,8 @@ from hysim.control._drive import secant_gain, without_memory
 from hysim.control._loop import ClosedLoop, Controller, as_actuator, close_loop
 from hysim.metrics import LoopMetrics, VibrationReduction, loop_metrics, reduction_percent, rmse, vibration_reduction
 from hysim.models.actuator import Actuator
+
+_FEWEST = 10  # samples of which a step is measured
 
 
 @frozen
@@ -151,7 +154,7 @@ def assess_hysteresis(
     (True, True)
     """
     actuator = as_actuator(plant)
-    samples = round(period / sample_time)
+    samples = _whole("a period", period, sample_time)
     reference = signals.triangle(low, high, cycles=cycles, samples_per_cycle=samples)
     last = slice(-samples - 1, None)
     cycle = reference[last]
@@ -272,26 +275,38 @@ def assess_square_wave(
     True
     """
     actuator = as_actuator(plant)
-    half = round(0.5 * period / sample_time)
-    if abs(half - 0.5 * period / sample_time) > 1e-6 * half or not high > low:
-        raise ValueError(f"a half period must be whole samples and high above low, got {0.5 * period / sample_time:g}")
+    if not high > low:
+        raise ValueError(f"high must be above low, got low {low} and high {high}")
+    half = _whole("a half period", 0.5 * period, sample_time)
     reference = np.tile(np.repeat([low, high], half), periods)
     t = sample_time * np.arange(reference.size)
     gain = secant_gain(actuator, np.array([low, high]))
     closed = close_loop(actuator, controller, t, reference)
     open_y = _held(actuator, reference / gain, sample_time, 0.0)
     last, last_half = slice(-2 * half, None), slice(-half, None)
-    step = vibration_reduction(t[last_half], open_y[last_half], closed.y[last_half], decay_rate=_decay_rate(actuator))
-    is_long = half * sample_time >= step.open.t98 + 5.0 * _vibration_period(actuator)
+    step = None
+    if half >= _FEWEST:
+        halves = t[last_half], open_y[last_half], closed.y[last_half]
+        found = vibration_reduction(*halves, decay_rate=_decay_rate(actuator))
+        if half * sample_time >= found.open.t98 + 5.0 * _vibration_period(actuator):
+            step = found
     return SquareWaveAssessment(
         open_tracking_rms=rmse(reference[last], open_y[last]),
         tracking_rms=rmse(reference[last], closed.y[last]),
         open_peak_excess_percent=_peak_excess(open_y[last], low, high),
         peak_excess_percent=_peak_excess(closed.y[last], low, high),
-        reduction=step if is_long else None,
+        reduction=step,
         open_y=open_y,
         closed=closed,
     )
+
+
+def _whole(what: str, duration: float, sample_time: float) -> int:
+    """Number of samples in a duration."""
+    samples = round(duration / sample_time)
+    if samples < 1 or abs(samples - duration / sample_time) > 1e-6 * samples:
+        raise ValueError(f"{what} must be a whole number of samples, got {duration / sample_time:g}")
+    return samples
 
 
 def _width(reference: FloatArray, y: FloatArray) -> float:
@@ -301,9 +316,8 @@ def _width(reference: FloatArray, y: FloatArray) -> float:
 
 def _held(actuator: Actuator, u: FloatArray, sample_time: float, u0: float) -> FloatArray:
     """Displacements just before each voltage, as a loop measures them, from rest at `u0`."""
-    y = actuator.response(np.append(u0, u), sample_time)
-    at_end = actuator.vibration is None or actuator.vibration.sample == "end"
-    return y[:-1] if at_end else y[1:]
+    at_end = None if actuator.vibration is None else replace(actuator.vibration, sample="end")
+    return replace(actuator, vibration=at_end).response(np.append(u0, u), sample_time)[:-1]
 
 
 def _resting_displacement(actuator: Actuator, u0: float) -> float:

@@ -12,7 +12,11 @@ from hysim._frozen import FloatArray
 from hysim.models.actuator import Actuator
 from hysim.models.static import Line
 
-_ITERATIONS = 50
+_ITERATIONS = 60
+_CONVERGED = 1e-12  # of the gain
+_ACCEPTED = 1e-9  # where rounding keeps it from that
+_PERIODS = 96  # at most, until a driven cycle is steady
+_STEADY = 1e-12  # of the stroke
 
 
 def secant_gain(actuator: Actuator, cycle: FloatArray, sample_time: float | None = None) -> float:
@@ -29,31 +33,36 @@ def secant_gain(actuator: Actuator, cycle: FloatArray, sample_time: float | None
     span = float(np.ptp(cycle))
     if actuator.hysteresis is None and sample_time is None:
         return _usable(_dc_gain(actuator))
-    gain = _usable(_dc_gain(actuator) * _slope(actuator, 1.0))
+    gain, change = _usable(_dc_gain(actuator) * _slope(actuator, 1.0)), math.inf
     for _ in range(_ITERATIONS):
         y = steady_cycle(actuator, cycle / gain, sample_time)
         following = _usable(math.copysign(float(np.ptp(y)), gain) / (span / abs(gain)))
-        if abs(following - gain) <= 1e-12 * abs(gain):
-            return following
-        gain = following
+        change, gain = abs(following / gain - 1.0), following
+        if change <= _CONVERGED:
+            break
+    if change > _ACCEPTED:
+        raise ValueError(f"no voltage drives the plant along the reference: its secant gain wanders about {gain:g}")
     return gain
 
 
 def steady_cycle(actuator: Actuator, u: FloatArray, sample_time: float | None) -> FloatArray:
-    """The displacement over the last of three periods of the voltage `u`."""
-    voltage = np.tile(u, 3)
-    if sample_time is None:
-        level = voltage if actuator.hysteresis is None else actuator.hysteresis.response(voltage)
-        return np.asarray(_dc_gain(actuator) * level[-u.size :])
-    return actuator.response(voltage, sample_time)[-u.size :]
+    """The displacement over a period of the voltage `u`, once it repeats."""
+    periods = 3
+    while True:
+        y = _driven(actuator, np.tile(u, periods), sample_time)
+        last, before = y[-u.size :], y[-2 * u.size : -u.size]
+        if periods >= _PERIODS or np.abs(last - before).max() <= _STEADY * max(float(np.ptp(last)), 1e-300):
+            return last
+        periods *= 2
 
 
 def without_memory(actuator: Actuator, u: FloatArray) -> Actuator:
     """The actuator with its law replaced by a line of its secant gain over the steady cycle of `u`."""
     if actuator.hysteresis is None:
         return actuator
-    level = Actuator(hysteresis=actuator.hysteresis).response(np.tile(u, 3))[-u.size :]
-    slope = float(np.ptp(level)) / float(np.ptp(u))
+    level = steady_cycle(Actuator(hysteresis=actuator.hysteresis), u, None)
+    rises = float(np.diff(level) @ np.diff(u))
+    slope = math.copysign(float(np.ptp(level)) / float(np.ptp(u)), rises)
     offset = 0.5 * float(level.max() + level.min()) - slope * 0.5 * float(u.max() + u.min())
     return Actuator(hysteresis=Line(offset=offset, slope=slope), vibration=actuator.vibration)
 
@@ -62,11 +71,16 @@ def slopes(actuator: Actuator, u: FloatArray) -> tuple[float, float]:
     """The least and the largest slope of the law along the steady cycle of `u`; one without a law."""
     if actuator.hysteresis is None:
         return 1.0, 1.0
-    voltage = np.tile(u, 3)
-    level = Actuator(hysteresis=actuator.hysteresis).response(voltage)
-    moves = np.diff(voltage[-u.size - 1 :])
-    local = np.diff(level[-u.size - 1 :])[moves != 0.0] / moves[moves != 0.0]
+    level = steady_cycle(Actuator(hysteresis=actuator.hysteresis), u, None)
+    moves = np.diff(u, append=u[0])
+    local = np.diff(level, append=level[0])[moves != 0.0] / moves[moves != 0.0]
     return float(local.min()), float(local.max())
+
+
+def _driven(actuator: Actuator, u: FloatArray, sample_time: float | None) -> FloatArray:
+    if sample_time is not None:
+        return actuator.response(u, sample_time)
+    return np.asarray(_dc_gain(actuator) * (u if actuator.hysteresis is None else actuator.hysteresis.response(u)))
 
 
 def _slope(actuator: Actuator, rise: float) -> float:

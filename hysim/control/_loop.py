@@ -1,5 +1,6 @@
 """The verb `close_loop`: a sampled controller around a continuous actuator."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import field
 from typing import Any, NamedTuple, Protocol
@@ -12,7 +13,7 @@ from hysim._parallel import Progress
 from hysim.control._pid import CompiledController
 from hysim.errors import SimulationError
 from hysim.kernels import loop as kernels
-from hysim.models.actuator import Actuator
+from hysim.models.actuator import Actuator, is_law
 from hysim.models.transfer_function import TransferFunction
 from hysim.records import Record
 
@@ -114,6 +115,8 @@ def close_loop(
     (1.0, 0.01)
     """
     actuator = as_actuator(plant)
+    if not callable(getattr(controller, "compiled", None)) or callable(getattr(controller, "response", None)):
+        raise TypeError(f"controller must be a PID or the like, got {type(controller).__name__}")
     r, times = read_only(reference, "reference", ndim=1), read_only(t, "t", ndim=1)
     sample_time = Record(u=r, y=r, t=times).sample_time
     signals = RestingPlant(actuator, sample_time, u0).run(controller, r, progress)
@@ -147,6 +150,8 @@ class RestingPlant:
     """An actuator at rest at the voltage `u0`, sampled: every loop that is run starts from here."""
 
     def __init__(self, actuator: Actuator, sample_time: float, u0: float) -> None:
+        if not math.isfinite(u0):
+            raise ValueError(f"u0 must be finite, got {u0}")
         self.sample_time, self.u0 = sample_time, u0
         self._law = actuator.compiled(u0)
         self._stage = actuator.sampled(sample_time)
@@ -184,7 +189,7 @@ def as_actuator(plant: Any) -> Actuator:
         return plant
     if isinstance(plant, TransferFunction):
         return Actuator(vibration=plant)
-    if callable(getattr(plant, "compiled", None)):
+    if is_law(plant):
         return Actuator(hysteresis=plant)
     raise TypeError(f"plant must be an Actuator, a law or a TransferFunction, got {type(plant).__name__}")
 

@@ -57,7 +57,7 @@ class LinearLoop:
         return self.plant * pid.frequency_response(self.frequencies, self.sample_time)
 
     def max_sensitivity(self, pid: PID, slope: float = 1.0) -> float:
-        """Largest |1 / (1 + L)| with a law of this slope; infinite if the loop is unstable."""
+        """Largest ``|1 / (1 + L)|`` with a law of this slope; infinite if the loop is unstable."""
         if not self.is_stable(pid, slope):
             return math.inf
         return float(np.max(1.0 / np.abs(1.0 + slope * self.response(pid))))

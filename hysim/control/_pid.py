@@ -157,7 +157,7 @@ class PID:
         Raises
         ------
         ValueError
-            If lengths differ, a value is not finite, or the sample time is not positive.
+            If lengths differ, a value is not finite, the sample time is not positive, or the state is none.
 
         Examples
         --------
@@ -170,7 +170,9 @@ class PID:
         if r.size != y.size:
             raise ValueError(f"reference and measurement must have equal lengths, got {r.size} and {y.size}")
         begin = self.start(y=float(y[0]) if y.size else 0.0) if state is None else state
-        moving = np.array(begin, dtype=float)
+        moving = np.array(read_only(begin, "state", ndim=1))
+        if moving.size != 4:
+            raise ValueError(f"state must hold 4 numbers, as `start` gives them, got {moving.size}")
         command, u = np.empty((2, r.size))
         step, parameters, _ = self.compiled(sample_time)
         kernels.replay(step, parameters, moving, r, y, command, u)
@@ -213,6 +215,5 @@ class PID:
         """h / T_t, at most one."""
         if self.ki == 0.0:
             return 0.0
-        given = self.tracking_time
-        squared = self.kd / self.ki if self.kd else (self.kp / self.ki) ** 2
-        return sample_time / max(sample_time, math.sqrt(abs(squared)) if given is None else given)
+        usual = math.sqrt(abs(self.kd / self.ki)) if self.kd else abs(self.kp / self.ki)
+        return sample_time / max(sample_time, usual if self.tracking_time is None else self.tracking_time)

@@ -1,5 +1,6 @@
 """The verb `to_control`: plants and controllers as systems of python-control."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,8 @@ def to_control(plant: Any, sample_time: float | None = None) -> Any:
     TypeError
         If there is no linear system.
     ValueError
-        If a plant with a dead time is to stay continuous, or a pure derivative is.
+        If a plant with a dead time is to stay continuous, or a pure derivative is, or the sample time is not
+        positive.
 
     Examples
     --------
@@ -39,11 +41,13 @@ def to_control(plant: Any, sample_time: float | None = None) -> Any:
     >>> round(float((loop / (1 + loop)).dcgain()), 3)
     0.8
     """
+    if sample_time is not None and not 0.0 < sample_time < math.inf:
+        raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
     if isinstance(plant, PID):
         return _pid(plant, sample_time)
     actuator = as_actuator(plant)
     if actuator.hysteresis is not None:
-        raise TypeError(f"a {type(actuator.hysteresis).__name__} is not linear")
+        raise TypeError(f"a linear system holds no law, got {type(actuator.hysteresis).__name__}")
     return _continuous(actuator.vibration) if sample_time is None else _discrete(actuator, sample_time)
 
 

@@ -15,7 +15,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -55,14 +55,14 @@ class Tuning:
     objective : float
         Its value, in units of the reference's span.
     max_sensitivity : float
-        Largest |1 / (1 + L)| at either slope of the law.
+        Largest ``|1 / (1 + L)|`` at either slope of the law.
     gain_margin, phase_margin : float
         Factor and angle [degrees] by which the loop at its largest slope may change before it is unstable.
     trials : array, shape (n, 6)
         The trade-off it chose from, a row for each simulated PID: kp, ki, kd, setpoint weight, maximum
         sensitivity, objective (inf where the loop is unstable).
     success : bool
-        Whether the bound on the sensitivity holds.
+        Whether a PID within the bound on the sensitivity was found.
     message : str
         What was searched.
     """
@@ -104,7 +104,7 @@ def tune(
         Lowest and highest voltage. Of a list of such pairs, or None for no limits, the loop is simulated
         within each, so that one PID serves all; the one returned has the first.
     max_sensitivity : float
-        Bound on max |1 / (1 + L)|, above one: the smaller, the more the plant may differ from its model.
+        Bound on max ``|1 / (1 + L)|``, above one: the smaller, the more the plant may differ from its model.
     transient : float
         Time at the begin that does not count [s]: what a periodic reference needs to become steady.
     u0 : float
@@ -134,9 +134,9 @@ def tune(
         raise ValueError(f"max_sensitivity must be above one, got {max_sensitivity}")
     search = _Search(plant, t, reference, OBJECTIVES[objective], limits, max_sensitivity, transient, u0)
     starts = sorted(search.starts(), key=search.cost)[:_STARTS]
-    ends = [minimize(search.cost, start, method="Nelder-Mead", options=_SEARCHED) for start in starts]
-    best = min(ends, key=lambda end: float(end.fun))
-    return search.result(best.x)
+    for start in starts:
+        minimize(search.cost, start, method="Nelder-Mead", options=_SEARCHED)
+    return search.result()
 
 
 _SEARCHED = {"maxfev": _EVALUATIONS, "xatol": 1e-3, "fatol": 1e-7}
@@ -160,6 +160,8 @@ class _Search:
         self.reference = read_only(reference, "reference", ndim=1)
         self.h = Record(u=self.reference, y=self.reference, t=read_only(t, "t")).sample_time
         self.plant = RestingPlant(actuator, self.h, u0)
+        if not 0.0 <= transient < self.h * (self.reference.size - 1):
+            raise ValueError(f"transient must lie within the record, from 0 on, got {transient}")
         self.counted = slice(math.ceil(transient / self.h), None)
         self.objective, self.bound = objective, max_sensitivity
         self.limits = _each(limits)
@@ -172,7 +174,7 @@ class _Search:
         self.slopes = sorted({low, high})
         self.secant = self.gain if actuator.vibration is None else self.gain / actuator.vibration.dc_gain
         self.linear = LinearLoop(actuator, self.h)
-        self.trials: list[list[float]] = []
+        self.trials: list[Trial] = []
 
     def starts(self) -> list[FloatArray]:
         """The linear rule's PIDs that are stable, those far beyond the bound left out where there are others."""
@@ -204,15 +206,15 @@ class _Search:
         )
 
     def sensitivity(self, pid: PID) -> float:
-        """Largest |1 / (1 + L)| at either slope of the law; infinite if the loop is unstable there."""
+        """Largest ``|1 / (1 + L)|`` at either slope of the law; infinite if the loop is unstable there."""
         return max(self.linear.max_sensitivity(pid, slope) for slope in self.slopes)
 
     def cost(self, x: FloatArray) -> float:
         """The objective, and a barrier beyond the bound on the sensitivity."""
         pid = self.pid(x)
-        sensitivity, value = self.sensitivity(pid), self.value(pid)
-        self.trials.append([pid.kp, pid.ki, pid.kd, pid.setpoint_weight, sensitivity, value])
-        return value * (1.0 + _BARRIER * max(0.0, sensitivity / self.bound - 1.0))
+        trial = Trial(pid, self.sensitivity(pid), self.value(pid))
+        self.trials.append(trial)
+        return trial.value * (1.0 + _BARRIER * max(0.0, trial.sensitivity / self.bound - 1.0))
 
     def value(self, pid: PID) -> float:
         """The objective of the simulated loop within the limits where it is larger; infinite if it is lost."""
@@ -221,24 +223,44 @@ class _Search:
             return math.inf
         return max(self.objective((self.reference - signals.y)[self.counted] / self.span) for signals in runs)
 
-    def result(self, x: FloatArray) -> Tuning:
-        """The PID at the end of the search, with its margins by python-control."""
+    def result(self) -> Tuning:
+        """The best PID within the bound, or the most robust one if there is none, with its margins."""
+        within = [trial for trial in self.trials if trial.sensitivity <= self.bound]
+        least = min(trial.sensitivity for trial in self.trials)
+        choice = within or [trial for trial in self.trials if trial.sensitivity == least]
+        best = min(choice, key=lambda trial: trial.value)
+        gain_margin, phase_margin = self.margins(best.pid)
+        return Tuning(
+            controller=best.pid,
+            objective=best.value,
+            max_sensitivity=best.sensitivity,
+            gain_margin=gain_margin,
+            phase_margin=phase_margin,
+            trials=np.array([trial.row() for trial in self.trials]),
+            success=bool(within) and math.isfinite(best.value),
+            message=f"{len(self.trials)} loops simulated; sensitivity {best.sensitivity:.2f} of {self.bound:g} allowed",
+        )
+
+    def margins(self, pid: PID) -> tuple[float, float]:
+        """Gain and phase margin at the steepest slope, by python-control; it does not look at z = -1 itself."""
         import control
 
-        pid = self.pid(x)
-        loop = control.frd(self.slopes[-1] * self.linear.response(pid), self.linear.frequencies)
-        gain_margin, phase_margin = control.margin(loop)[:2]
-        sensitivity = self.sensitivity(pid)
-        return Tuning(
-            controller=pid,
-            objective=self.value(pid),
-            max_sensitivity=sensitivity,
-            gain_margin=float(gain_margin),
-            phase_margin=float(phase_margin),
-            trials=np.array(self.trials),
-            success=sensitivity <= 1.01 * self.bound,
-            message=f"{len(self.trials)} loops simulated; sensitivity {sensitivity:.2f} of {self.bound:g} allowed",
-        )
+        loop = max(self.slopes, key=abs) * self.linear.response(pid)
+        gain_margin, phase_margin = control.margin(control.frd(loop, self.linear.frequencies))[:2]
+        at_nyquist = -1.0 / loop[-1].real if loop[-1].real < 0.0 else math.inf
+        return min(float(gain_margin), at_nyquist), float(phase_margin)
+
+
+class Trial(NamedTuple):
+    """One simulated loop."""
+
+    pid: PID
+    sensitivity: float
+    value: float
+
+    def row(self) -> list[float]:
+        """As `Tuning.trials` holds it."""
+        return [self.pid.kp, self.pid.ki, self.pid.kd, self.pid.setpoint_weight, self.sensitivity, self.value]
 
 
 def _each(limits: Any) -> tuple[Limits, ...]:

@@ -20,6 +20,15 @@ from hysim._frozen import FloatArray, read_only
 def rmse(y: npt.ArrayLike, y_model: npt.ArrayLike) -> float:
     """Root mean square of y - y_model [unit of y].
 
+    Parameters
+    ----------
+    y, y_model : array, shape (N,)
+        Measured and modelled output [unit of y].
+
+    Returns
+    -------
+    float
+
     Raises
     ------
     ValueError
@@ -35,6 +44,15 @@ def rmse(y: npt.ArrayLike, y_model: npt.ArrayLike) -> float:
 
 def nrmse(y: npt.ArrayLike, y_model: npt.ArrayLike) -> float:
     """Root mean square error over the range of y: rmse / (max y - min y); nan for a constant y.
+
+    Parameters
+    ----------
+    y, y_model : array, shape (N,)
+        Measured and modelled output [unit of y].
+
+    Returns
+    -------
+    float
 
     Raises
     ------
@@ -55,6 +73,15 @@ def fit_percent(y: npt.ArrayLike, y_model: npt.ArrayLike) -> float:
     """Fit 100 (1 - ||y - y_model|| / ||y - mean(y)||) [%]; nan for a constant y.
 
     100 is a perfect model, 0 is as good as the mean of y, and a worse one is negative.
+
+    Parameters
+    ----------
+    y, y_model : array, shape (N,)
+        Measured and modelled output [unit of y].
+
+    Returns
+    -------
+    float
 
     Raises
     ------
@@ -84,6 +111,10 @@ def fpe(residual: npt.ArrayLike, n_parameters: int) -> float:
     n_parameters : int
         Number d of fitted parameters.
 
+    Returns
+    -------
+    float
+
     Raises
     ------
     ValueError
@@ -101,9 +132,23 @@ def fpe(residual: npt.ArrayLike, n_parameters: int) -> float:
 def aic(residual: npt.ArrayLike, n_parameters: int) -> float:
     """Akaike's information criterion N ln V + 2 d; nan where d >= N, -inf where the residual is zero.
 
-    Parameters and errors are those of `fpe`.
-
     Source: H. Akaike, IEEE Trans. Autom. Control 19 (1974) 716, without the constant that all models share.
+
+    Parameters
+    ----------
+    residual : array, shape (N,)
+        Measured minus model [unit of y].
+    n_parameters : int
+        Number d of fitted parameters.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ValueError
+        If there is no sample, a value is not finite or `n_parameters` is negative.
 
     Examples
     --------
@@ -117,9 +162,23 @@ def aic(residual: npt.ArrayLike, n_parameters: int) -> float:
 def bic(residual: npt.ArrayLike, n_parameters: int) -> float:
     """Bayesian information criterion N ln V + d ln N; nan where d >= N, -inf where the residual is zero.
 
-    Parameters and errors are those of `fpe`.
-
     Source: G. Schwarz, Ann. Statist. 6 (1978) 461, without the constant that all models share.
+
+    Parameters
+    ----------
+    residual : array, shape (N,)
+        Measured minus model [unit of y].
+    n_parameters : int
+        Number d of fitted parameters.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ValueError
+        If there is no sample, a value is not finite or `n_parameters` is negative.
 
     Examples
     --------

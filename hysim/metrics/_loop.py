@@ -81,7 +81,8 @@ class LoopMetrics:
 
         Parameters
         ----------
-        u : float or array, any shape [unit of u]
+        u : float or array, any shape
+            Inputs [unit of u].
 
         Returns
         -------
@@ -176,6 +177,15 @@ def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, toleran
 
 def width_rmse(a: LoopMetrics, b: LoopMetrics) -> float:
     """Root mean square difference of the signed widths, at the inputs of `a` that `b` reaches [unit of y].
+
+    Parameters
+    ----------
+    a, b : LoopMetrics
+        Two loops over the same input.
+
+    Returns
+    -------
+    float
 
     Raises
     ------

@@ -155,6 +155,15 @@ def vibration_reduction(
 def reduction_percent(before: float, after: float) -> float:
     """100 (1 - after / before) %; nan if there was nothing before.
 
+    Parameters
+    ----------
+    before, after : float
+        A measure of the open and of the closed loop, in one unit.
+
+    Returns
+    -------
+    float
+
     Examples
     --------
     >>> reduction_percent(4.0, 1.0)
@@ -181,10 +190,7 @@ def _first_crossing(t: FloatArray, eta: FloatArray, level: float) -> float:
 
 
 def _settling_time(t: FloatArray, eta: FloatArray) -> float:
-    outside = np.flatnonzero(~(np.abs(eta - 1.0) <= SETTLED))
-    if not outside.size:
-        return 0.0
-    last = int(outside[-1])
+    last = int(np.flatnonzero(~(np.abs(eta - 1.0) <= SETTLED))[-1])  # the first sample at the latest, where eta is 0
     if last + 1 >= t.size - t.size // 10:
         return math.nan
     return _crossing(t, eta, last + 1, 1.0 + math.copysign(SETTLED, eta[last] - 1.0))

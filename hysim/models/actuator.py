@@ -11,10 +11,15 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim.models.model import CompiledLaw, model
+from hysim.models.model import CompiledLaw, model, needs_time
 from hysim.models.sampled import THROUGH, SampledStage, sampled
 from hysim.models.static import Line
 from hysim.models.transfer_function import TransferFunction
+
+
+def is_law(value: Any) -> bool:
+    """Whether a value answers to an input and can be stepped in a loop."""
+    return all(callable(getattr(value, name, None)) for name in ("response", "compiled")) and not needs_time(value)
 
 
 @model
@@ -49,7 +54,7 @@ class Actuator:
     vibration: TransferFunction | None = None
 
     def __post_init__(self) -> None:
-        if self.hysteresis is not None and not callable(getattr(self.hysteresis, "compiled", None)):
+        if self.hysteresis is not None and not is_law(self.hysteresis):
             raise TypeError(
                 f"hysteresis must be a law that a loop can step, such as BoucWen, got {type(self.hysteresis).__name__}"
             )

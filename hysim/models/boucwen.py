@@ -114,12 +114,12 @@ class _BoucWenLaw(ABC):
 
     @property
     def saturation(self) -> float:
-        """What |z| tends to on a long stretch of the input, (A / (beta + gamma))^(1/n) for A > 0; inf if nothing."""
+        """What ``|z|`` tends to on a long way of the input, (A / (beta + gamma))^(1/n) for A > 0; inf if nothing."""
         return _boucwen_facts.saturation(self.A, self.beta, self.gamma, self.n)
 
     @property
     def memory_bound(self) -> float:
-        """Bound of |z| for every input that begins with z0; inf if there is none."""
+        """Bound of ``|z|`` for every input that begins with z0; inf if there is none."""
         return _boucwen_facts.memory_bound(self.A, self.beta, self.gamma, self.n, self.z0, self.stability_class)
 
     def limit_cycle(self, amplitude: float) -> LimitCycle:
@@ -756,7 +756,7 @@ class BoucWen(_BoucWenLaw):
 
 @model
 class PolynomialBoucWen(_BoucWenLaw):
-    """Bouc-Wen law beside a polynomial of the input, ``y = offset + c1 u + c2 u^2 + ... + gain z``.
+    """Bouc-Wen law beside a polynomial of the input, ``y = offset + sum c_k u^k + gain z``.
 
     Parameters
     ----------

@@ -92,7 +92,7 @@ class Duhem:
 
     @property
     def terms(self) -> dict[str, float]:
-        """Coefficients that are not zero by term, all of u' before those of |u'|, each by degree."""
+        """Coefficients that are not zero by term, all of ``u'`` before those of ``|u'|``, each by degree."""
         found = {
             Term(rectified, int(i + j), int(j)): float(part[i, j])
             for rectified, part in ((False, self.p), (True, self.q))

@@ -10,7 +10,7 @@ from hysim.control import PID, ClosedLoop
 from hysim.metrics import VibrationReduction
 from hysim.models.transfer_function import TransferFunction
 from hysim.paper import markup
-from hysim.paper.claims import VERDICTS, Claim
+from hysim.paper.claims import MAX_SENSITIVITY, VERDICTS, Claim
 from hysim.paper.dwell import DwellWidth
 from hysim.paper.equations import EQUATION_4, EQUATION_6
 from hysim.paper.loops import ABOUT_34_V, SUPPLY, HysteresisCase, Loops, SquareCase, StepCase
@@ -279,7 +279,6 @@ def _which_definition(loops: Loops) -> str:
     )
 
 
-_STURDY = 2.02  # largest maximum sensitivity of the loops that were tuned
 _MICRO = re.compile(r"\bum\b")
 _PLANTS = {"bouc-wen+eq7": "Bouc-Wen and (7)", "eq1": "(1)", "eq4": "(4)", "eq6": "(6)"}
 _MEASURES = ("overshoot", "residual rms", "settling time")
@@ -405,7 +404,7 @@ def _best_of_each(cases: Sequence[HysteresisCase]) -> list[HysteresisCase]:
     """Of each plant within limits, the best that is robust, and the best that is not if there is one."""
     best: dict[tuple[str, bool], HysteresisCase] = {}
     for case in cases:
-        key = case.plant, case.max_sensitivity <= _STURDY
+        key = case.plant, case.max_sensitivity <= MAX_SENSITIVITY
         if case.limits and (key not in best or _reduction(case) > _reduction(best[key])):
             best[key] = case
     return list(best.values())

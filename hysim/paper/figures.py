@@ -21,8 +21,8 @@ _SECONDS = {"t": "s", "y": "um"}
 
 
 @plot.house_style()
-def figure3(record: Record) -> plot.Figure:
-    """Displacement and voltage against time."""
+def input_and_output(record: Record) -> plot.Figure:
+    """Displacement and voltage against time: the paper's Figures 3 and 9."""
     canvas = plot.figure(height=4.2)
     plot.history(record, plot.panels(canvas, 2))
     return canvas
@@ -40,10 +40,10 @@ def figure4(record: Record) -> plot.Figure:
 
 
 @plot.house_style()
-def figure5(responses: Mapping[str, tuple[FloatArray, FloatArray]]) -> plot.Figure:
-    """Responses to a step of one volt, as times [s] and displacements [um] by name."""
+def step_responses(responses: Mapping[str, tuple[FloatArray, FloatArray]], time_unit: str) -> plot.Figure:
+    """Responses to a step of one volt, as times and displacements [um] by name: the paper's Figures 5 and 10."""
     canvas = plot.figure(height=3.6)
-    ax = plot.traces(responses, canvas.add_subplot(), units={"t": "s"})
+    ax = plot.traces(responses, canvas.add_subplot(), units={"t": time_unit})
     ax.set_ylabel("Displacement per volt [µm/V]")
     return canvas
 
@@ -77,21 +77,6 @@ def discovery_path(discovery: Discovery) -> plot.Figure:
     """What each number of terms buys."""
     canvas = plot.figure(height=4.4)
     plot.selection(discovery, plot.panels(canvas, 2))
-    return canvas
-
-
-@plot.house_style()
-def figure9(record: Record) -> plot.Figure:
-    """Table 2: displacement and voltage against time."""
-    return figure3(record)
-
-
-@plot.house_style()
-def figure10(responses: Mapping[str, tuple[FloatArray, FloatArray]]) -> plot.Figure:
-    """Responses to a step of one volt, as times [samples] and displacements [um] by name."""
-    canvas = plot.figure(height=3.6)
-    ax = plot.traces(responses, canvas.add_subplot(), units={"t": "samples"})
-    ax.set_ylabel("Displacement per volt [µm/V]")
     return canvas
 
 

@@ -1,17 +1,20 @@
 """Everything that `reproduce` computes, before any of it is written."""
 
+from collections.abc import Mapping
 from concurrent.futures import Future
 from typing import Any
 
 from hysim._frozen import frozen
 from hysim._parallel import second_process
 from hysim.models.actuator import Actuator
-from hysim.paper.approximations import approximations
+from hysim.models.transfer_function import TransferFunction
+from hysim.paper.approximations import Approximation, approximations
 from hysim.paper.claims import Claim, claims
 from hysim.paper.dwell import DwellWidth, dwell_widths
-from hysim.paper.equations import EQUATION_1
+from hysim.paper.equations import EQUATION_1, EQUATION_4, EQUATION_6, Characteristics, characteristics
 from hysim.paper.loops import DYNAMICS_7, Loops, control_measures, loops
 from hysim.paper.reidentification import Reidentification, reidentify
+from hysim.paper.state_space import EQUATIONS_7_8, EQUATIONS_13_14
 from hysim.paper.study import Progress, Study, asymmetric_law, study
 
 
@@ -31,8 +34,10 @@ class Findings:
         Loop width against dwell.
     claims : tuple of Claim
         Every claim with its verdict.
-    similarity : float
-        Fit of (7)'s step response to that of (1) [%].
+    approximations : tuple of Approximation
+        (7) as an estimate of (1), and (6) of (4).
+    equations : mapping
+        The transfer functions by their equations' numbers, and what they are like.
     """
 
     study: Study
@@ -40,7 +45,8 @@ class Findings:
     loops: Loops
     dwell: tuple[DwellWidth, ...]
     claims: tuple[Claim, ...]
-    similarity: float
+    approximations: tuple[Approximation, ...]
+    equations: Mapping[str, Characteristics]
 
 
 def find(*, quick: bool = False, progress: Progress | None = None) -> Findings:
@@ -80,8 +86,19 @@ def find(*, quick: bool = False, progress: Progress | None = None) -> Findings:
             Actuator(hysteresis=law, vibration=DYNAMICS_7),
         ),
         claims=claims(models, control_measures(closed)),
-        similarity=approximations()[0].fit_percent,
+        approximations=approximations(),
+        equations={name: characteristics(model) for name, model in _transfer_functions().items()},
     )
+
+
+def _transfer_functions() -> dict[str, TransferFunction]:
+    return {
+        "(1)": EQUATION_1,
+        "(7), (8)": EQUATIONS_7_8.transfer_function,
+        "(4)": EQUATION_4,
+        "(6)": EQUATION_6,
+        "(13), (14)": EQUATIONS_13_14.transfer_function,
+    }
 
 
 class _Steps:

@@ -1,7 +1,7 @@
 """The report: one self-contained page, figures inline, no script, nothing loaded from elsewhere."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from string import Template
@@ -18,7 +18,7 @@ from hysim.paper.control_chapters import (
 )
 from hysim.paper.equations import EQUATION_1, EQUATION_7
 from hysim.paper.findings import Findings
-from hysim.paper.markup import complex_number, equation, figure, number, paragraph, ratio, table
+from hysim.paper.markup import complex_number, equation, figure, heading, number, paragraph, ratio, table
 from hysim.paper.study import Study
 
 TITLE = "A piezo stack's 52 points, reproduced"
@@ -168,10 +168,43 @@ def _linear(findings: Findings, drawn: Drawn) -> str:
             "The paper's Figure 5, regenerated: response to a step of one volt of Equation (1) and of the second-order "
             f"model (7), (8), G(s) = {ratio(EQUATION_7.num, EQUATION_7.den)}. In words, the paper's shows an actual "
             "and an estimated response, called similar; these two overshoot alike and fit each other to "
-            f"{findings.similarity:.0f} %.",
+            f"{findings.approximations[0].fit_percent:.0f} %.",
         )
+        + _equations(findings)
         + identification_section(findings.reidentification, drawn)
     )
+
+
+def _equations(findings: Findings) -> str:
+    header = [
+        "equation", "poles", "zeros", "static gain [µm/V]", "natural frequencies", "damping ratios", "overshoot [%]",
+    ]  # fmt: skip
+    rows = [
+        [
+            name, _roots(found.poles), _roots(found.zeros), f"{found.dc_gain:.5f}",
+            _distinct(found.natural_frequencies), _distinct(found.damping_ratios), f"{found.overshoot_percent:.1f}",
+        ]
+        for name, found in findings.equations.items()
+    ]  # fmt: skip
+    pairs = [
+        f"{pair.name} fits the step response of {pair.of} to {pair.fit_percent:.0f} %; a second-order model with the "
+        f"final value, the overshoot and the peak time of {pair.of} would fit it to {pair.matched_fit_percent:.0f} %."
+        for pair in findings.approximations
+    ]
+    return (
+        heading("The transfer functions")
+        + paragraph("As printed, in the paper's own units of time; of each pair of conjugate poles one is shown.")
+        + table(header, rows)
+        + paragraph(f"{' '.join(pairs)} (13) prints 2.430 where (6) has 0.243, and so is another plant.")
+    )
+
+
+def _roots(values: Sequence[complex]) -> str:
+    return ", ".join(complex_number(value) for value in values if value.imag >= 0.0) or "–"
+
+
+def _distinct(values: Sequence[float]) -> str:
+    return ", ".join(dict.fromkeys(f"{value:.4g}" for value in values))
 
 
 def _bouc_wen(study: Study) -> str:

@@ -9,7 +9,7 @@ import io
 import json
 import math
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,10 @@ import numpy as np
 
 from hysim._atomic import write_text
 from hysim._frozen import frozen
+from hysim._parallel import second_process
+from hysim.comparison import Comparison
 from hysim.datasets import table2
+from hysim.discovery import Discovery
 from hysim.paper import figures
 from hysim.paper.dwell import dwell_measures
 from hysim.paper.equations import EQUATION_1, EQUATION_4, EQUATION_6, EQUATION_7, step_response
@@ -25,7 +28,7 @@ from hysim.paper.findings import Findings, find
 from hysim.paper.loops import control_measures
 from hysim.paper.report import report_page
 from hysim.paper.study import Progress, model_measures
-from hysim.plot import to_svg
+from hysim.plot import Figure, to_svg
 
 _CLAIM = ("id", "where", "statement", "printed", "recomputed", "unit", "verdict", "method", "note")
 
@@ -87,7 +90,10 @@ def reproduce(
 
 def contents(computed: Findings) -> dict[str, str]:
     """Every file's text by its name relative to the folder."""
-    drawn = {name: to_svg(figure, name=name) for name, figure in _figures(computed).items()}
+    with second_process() as beside:
+        of_models = beside.submit(_model_drawings, computed.study.comparison, computed.study.discovery)
+        drawn = _paper_drawings(computed)
+        drawn |= of_models.result()
     summary = _summary(computed)
     return {
         **{f"figures/{name}.svg": svg for name, svg in drawn.items()},
@@ -97,27 +103,40 @@ def contents(computed: Findings) -> dict[str, str]:
     }
 
 
-def _figures(computed: Findings) -> dict[str, Any]:
-    comparison, loops = computed.study.comparison, computed.loops
+def _model_drawings(comparison: Comparison, discovery: Discovery) -> dict[str, str]:
+    return _as_svg(
+        {
+            "figure3": figures.input_and_output(comparison.record),
+            "figure4": figures.figure4(comparison.record),
+            "loops": figures.model_loops(comparison),
+            "widths": figures.model_widths(comparison),
+            "residuals": figures.model_residuals(comparison),
+            "discovery": figures.discovery_path(discovery),
+        }
+    )
+
+
+def _paper_drawings(computed: Findings) -> dict[str, str]:
+    loops = computed.loops
     steps = {"Eq. (1)": step_response(EQUATION_1), "Eqs. (7), (8)": step_response(EQUATION_7)}
     vibrations = {"Eq. (4)": step_response(EQUATION_4, 80.0), "Eq. (6)": step_response(EQUATION_6, 80.0)}
     step_on = {case.plant: case for case in reversed(loops.steps)}
-    return {
-        "figure3": figures.figure3(comparison.record),
-        "figure4": figures.figure4(comparison.record),
-        "figure5": figures.figure5(steps),
-        "loops": figures.model_loops(comparison),
-        "widths": figures.model_widths(comparison),
-        "residuals": figures.model_residuals(comparison),
-        "discovery": figures.discovery_path(computed.study.discovery),
-        "figure9": figures.figure9(table2()),
-        "figure10": figures.figure10(vibrations),
-        "figure12": figures.step_figure(step_on["eq1"], 15.0, seconds=True),
-        "figure13": figures.figure13([case for case in loops.squares if case.plant == "eq4"]),
-        "figure14": figures.step_figure(step_on["eq4"], 60.0, seconds=False),
-        "hysteresis": figures.hysteresis_figure(loops.hysteresis[0]),
-        "dwell": figures.dwell_figure(computed.dwell),
-    }
+    return _as_svg(
+        {
+            "figure5": figures.step_responses(steps, "s"),
+            "figure9": figures.input_and_output(table2()),
+            "figure10": figures.step_responses(vibrations, "samples"),
+            "figure12": figures.step_figure(step_on["eq1"], 15.0, seconds=True),
+            "figure13": figures.figure13([case for case in loops.squares if case.plant == "eq4"]),
+            "figure14": figures.step_figure(step_on["eq4"], 60.0, seconds=False),
+            "hysteresis": figures.hysteresis_figure(loops.hysteresis[0]),
+            "dwell": figures.dwell_figure(computed.dwell),
+        }
+    )
+
+
+def _as_svg(drawings: Mapping[str, Figure]) -> dict[str, str]:
+    return {name: to_svg(figure, name=name) for name, figure in drawings.items()}
 
 
 def _summary(computed: Findings) -> dict[str, Any]:

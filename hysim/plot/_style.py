@@ -82,7 +82,16 @@ def house_style() -> Iterator[None]:
 
 
 def figure(width: float = WIDTH, height: float = 4.0) -> Figure:
-    """An empty figure, `width` by `height` [in], made without pyplot.
+    """An empty figure, made without pyplot.
+
+    Parameters
+    ----------
+    width, height : float
+        Its size [in].
+
+    Returns
+    -------
+    Figure
 
     Examples
     --------

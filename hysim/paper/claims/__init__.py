@@ -12,7 +12,7 @@ from hysim.paper.approximations import approximations
 from hysim.paper.claims._claim import Claim, Verdict
 from hysim.paper.claims._controller import controller_claims
 from hysim.paper.claims._experiment import experiment_claims
-from hysim.paper.claims._headline import headline_claims
+from hysim.paper.claims._headline import MAX_SENSITIVITY, headline_claims
 from hysim.paper.claims._hysteresis import hysteresis_claims
 from hysim.paper.claims._introduction import introduction
 from hysim.paper.claims._state_space import state_space_claims
@@ -21,7 +21,7 @@ from hysim.paper.claims._vibration import vibration_claims
 from hysim.paper.reidentification import information, time_units
 from hysim.paper.study import Study
 
-__all__ = ["VERDICTS", "Claim", "Verdict", "claims"]
+__all__ = ["MAX_SENSITIVITY", "VERDICTS", "Claim", "Verdict", "claims"]
 
 VERDICTS: tuple[Verdict, ...] = ("reproduced", "not reproduced", "inconsistent in print", "not checkable")
 

@@ -20,8 +20,8 @@ VIBRATION_MEASURES = {
     "residual-rms": "residual_rms_reduction_percent",
     "settling-time": "settling_time_reduction_percent",
 }
-MAX_SENSITIVITY = 2.02
-"""Of a loop that counts: 2, and what a search leaves above its bound."""
+MAX_SENSITIVITY = 2.0
+"""Of a loop that counts."""
 _WHERE = "Abstract and section 4"
 
 
@@ -114,7 +114,7 @@ def _reached(id: str, statement: str, text: str, value: float, loop: Loop, metho
 def _best(loops: Iterable[Loop], plant: str, keys: tuple[str, ...]) -> tuple[float, Loop] | None:
     """The loop on this plant whose least figure is the greatest, and that figure; loops within limits go first.
 
-    A loop counts only with a maximum sensitivity of 2, the most that is commonly allowed.
+    A loop counts only with a maximum sensitivity of at most 2, as is commonly asked.
     """
     of_plant = [loop for loop in loops if loop.get("plant") == plant and _sensitivity(loop) <= MAX_SENSITIVITY]
     scored = [(min(_number(loop.get(key)) for key in keys), loop) for loop in of_plant if _complete(loop, keys)]

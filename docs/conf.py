@@ -1,0 +1,76 @@
+"""Sphinx settings: everything is read from the package and from committed results; nothing is fetched."""
+
+import json
+import sys
+from pathlib import Path
+
+import hysim
+
+HERE = Path(__file__).parent
+RESULTS = HERE.parent / "experiments" / "results"
+sys.path.insert(0, str(HERE))
+
+from front_door import write_reference  # noqa: E402  from beside this file
+
+project = "hysim"
+version = release = hysim.__version__
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc"]
+exclude_patterns = ["_build"]
+templates_path = ["_templates"]
+default_role = "py:obj"
+smartquotes = False  # u' is a derivative
+
+html_theme = "furo"
+html_title = f"hysim {version}"
+html_copy_source = False
+html_show_copyright = False
+html_static_path = ["_static"]
+html_css_files = ["page.css"]
+
+autosummary_generate = True
+autodoc_typehints = "none"  # the docstrings say types with shapes and units
+numpydoc_show_class_members = False  # the class template lists them, inherited ones too
+numpydoc_xref_param_type = False
+# Every check of a docstring but those for sections that only some names need, and for layout that is ours:
+# "[V]" alone may describe a parameter, and "As in the constructor." several without their types.
+_LEFT_OUT = ("ES01", "EX01", "GL01", "GL02", "GL08", "PR04", "PR08", "PR09", "RT03", "SA01", "SS05", "YD01")
+numpydoc_validation_checks = {"all", *_LEFT_OUT}
+# Without a Parameters section a docstring says in its sentences what goes in and comes out; with one it says all.
+numpydoc_validation_overrides = {check: [r"\A(?![\s\S]*Parameters\n *---)"] for check in ("PR01", "RT01")}
+
+myst_enable_extensions = ["substitution", "deflist"]
+myst_heading_anchors = 3
+
+
+def shown(experiments: dict[str, str]) -> str:
+    """The figure of the first of these experiments that has committed one, above what it shows."""
+    for name, caption in experiments.items():
+        if (RESULTS / name / "figure.svg").exists():
+            return f"![{caption}](../experiments/results/{name}/figure.svg)\n\n*{caption}*"
+    raise FileNotFoundError(f"no figure of {', '.join(experiments)} in {RESULTS}")
+
+
+def ratios() -> str:
+    """The ratios that `work_precision` judges, as a table."""
+    rows = json.loads((RESULTS / "work_precision" / "result.json").read_text())["ratios"]
+    lines = [
+        f"| {row['what']} | {format(row['error'], '.0e') if 'error' in row else ''} | {row['median']:.3g} "
+        f"({row['median_q1']:.3g} to {row['median_q3']:.3g}) |"
+        for row in rows
+    ]
+    return "\n".join(["| | error | ratio |", "|---|---|---|", *lines])
+
+
+myst_substitutions = {
+    "ratios": ratios(),
+    "accuracy_against_cost": shown(
+        {
+            "work_precision": "Error against time, of hysim and of the tools that people use, measured in one run "
+            "(`experiments/results/work_precision`).",
+            "exact_step": "Error of the memory against time a sample, of hysim and of the integrators that scripts "
+            "use (`experiments/results/exact_step`).",
+        }
+    ),
+}
+
+write_reference(HERE / "reference")

@@ -1,0 +1,1 @@
+"""What the experiment `work_precision` measures, one problem a module, and how it measures."""

@@ -1,0 +1,78 @@
+"""One way to solve a problem, and how it is timed: in turns with hysim's own, on a machine that others use too."""
+
+import ctypes
+import importlib
+import shutil
+import statistics
+import subprocess
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+
+Run = Callable[[], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """A method at one setting; `smooth` if it is given the input's formula, not its samples."""
+
+    tool: str
+    method: str
+    setting: str
+    run: Run
+    smooth: bool = False
+
+
+def steps(count: int) -> str:
+    """The setting of a method of fixed steps."""
+    return f"{count} step{'s' if count > 1 else ''} a sample"
+
+
+def clock(run: Run) -> float:
+    """Time of a call [s]; of a short one the median of several."""
+    times: list[float] = []
+    while not times or (sum(times) < 5e-3 and len(times) < 15):
+        begin = time.perf_counter()
+        run()
+        times.append(time.perf_counter() - begin)
+    return statistics.median(times)
+
+
+def in_turns(run: Run, own: Run, least: int = 3, most: int = 21) -> np.ndarray:
+    """Times [s] of both, shape (repeats, 2), until `most` repeats or, after `least`, 3 s; no call is the first."""
+    turns: list[tuple[float, float]] = []
+    while len(turns) < least or (len(turns) < most and sum(map(sum, turns)) < 3.0):
+        turns.append((clock(run), clock(own)))
+    return np.array(turns)
+
+
+def quartiles(values: np.ndarray) -> list[float]:
+    """First quartile, median, third quartile."""
+    return [float(value) for value in np.quantile(values, [0.25, 0.5, 0.75])]
+
+
+@cache
+def peer(name: str) -> ModuleType | None:
+    """A module of the extra `bench`, or None and a printed line."""
+    try:
+        return importlib.import_module(name)
+    except (ImportError, OSError, RuntimeError):  # the last from OpenSeesPy, where its libraries are missing
+        print(f"{name.partition('.')[0]} cannot be imported (extra bench): left out")
+        return None
+
+
+def compiled_c(source: Path, folder: Path) -> ctypes.CDLL | None:
+    """A C source compiled for this machine, or None and a printed line where there is no compiler."""
+    compiler = shutil.which("gcc") or shutil.which("cc")
+    if compiler is None:
+        print(f"no C compiler: {source.name} is left out")
+        return None
+    library = folder / source.with_suffix(".so").name
+    command = [compiler, "-O3", "-march=native", "-shared", "-fPIC", "-o", str(library), str(source), "-lm"]
+    subprocess.run(command, check=True)
+    return ctypes.CDLL(str(library))

@@ -1,0 +1,160 @@
+"""An actuator is its law, then its linear dynamics, exact under the hold; it begins at rest."""
+
+import copy
+import dataclasses
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import bounded_laws, short_inputs
+
+import hysim as hs
+from hysim.kernels.stepping import drive
+from hysim.models.sampled import THROUGH, sampled
+
+MODE = hs.TransferFunction(num=(0.3, 1.0), den=(1.0, 0.4, 2.0), delay=0.13)
+LAW = hs.BoucWen(n=1.5, gain=0.5, feedthrough=1.0, offset=0.2)
+EXACT = 1e-12  # two hundred steps of a stable plant with outputs of order one
+
+
+@given(bounded_laws(), short_inputs())
+def test_an_actuator_without_dynamics_is_its_law(law, u):
+    assert np.array_equal(hs.Actuator(hysteresis=law).response(u), law.response(u))
+    assert np.array_equal(hs.Actuator(hysteresis=law).memory(u), law.memory(u))
+
+
+@given(short_inputs())
+def test_an_actuator_without_a_law_is_its_dynamics_about_the_first_voltage(u):
+    y = hs.Actuator(vibration=MODE).response(u, 0.1)
+    expected = MODE.dc_gain * u[0] + MODE.response(u - u[0], 0.1)
+    assert y == pytest.approx(expected, abs=EXACT)
+    assert hs.Actuator(vibration=MODE).memory(u) is None
+
+
+@given(bounded_laws(), short_inputs())
+def test_the_chain_is_the_law_held_into_the_dynamics(law, u):
+    """A long rest at the law's first output leaves nothing of a start from zero."""
+    level = law.response(u)
+    rest = 400  # decays as exp(-0.2 0.25 400) = 2e-9
+    long = MODE.response(np.concatenate([np.full(rest, level[0]), level]), 0.25)[rest:]
+    chain = hs.Actuator(hysteresis=law, vibration=MODE).response(u, 0.25)
+    assert chain == pytest.approx(long, abs=1e-8 * (1.0 + abs(level[0])))
+
+
+@given(bounded_laws(), st.floats(-0.4, 0.4), st.sampled_from(["start", "end"]))
+def test_a_constant_voltage_finds_the_actuator_at_rest(law, u0, sample):
+    plant = dataclasses.replace(MODE, sample=sample)
+    y = hs.Actuator(hysteresis=law, vibration=plant).response(np.full(30, u0), 0.1)
+    assert y == pytest.approx(np.full(30, MODE.dc_gain * law.response([u0])[0]), abs=EXACT)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.04, 0.1, 0.27])
+@pytest.mark.parametrize(
+    ("num", "den"),
+    [((2.0,), (1.0, 0.5)), ((0.3, 1.0), (1.0, 0.4, 2.0)), ((1.0, 2.0, 3.0), (2.0, 0.5, 4.0)), ((3.0,), (2.0,))],
+)
+def test_the_sampled_stage_is_the_response_just_before_each_sample(num, den, delay):
+    plant = hs.TransferFunction(num=num, den=den, delay=delay, sample="end")
+    stage = sampled(plant, 0.1)
+    v = np.random.default_rng(0).standard_normal(200)
+    x, y = np.zeros(len(den) - 1), np.empty(201)
+    past = np.concatenate([np.zeros(stage.lag + 1), v])  # past[k + lag + 1] is v_k
+    for k in range(201):
+        older = past[k]
+        y[k] = stage.C @ x + stage.D * older
+        if k < 200:
+            x = stage.A @ x + stage.B_old * older + stage.B_new * past[k + 1]
+    assert y[1:] == pytest.approx(plant.response(v, 0.1), abs=EXACT * 10)  # outputs up to 10
+    assert y[0] == 0.0
+    if len(den) > 1:
+        settled = stage.A @ stage.rest + stage.B_old + stage.B_new
+        assert settled == pytest.approx(stage.rest, abs=EXACT)
+        assert stage.C @ stage.rest + stage.D == pytest.approx(plant.dc_gain, rel=EXACT)
+
+
+def test_no_vibration_is_no_stage():
+    assert hs.Actuator(hysteresis=LAW).sampled(0.1) is THROUGH
+    assert hs.Actuator().response([1.0, -2.0]).tolist() == [1.0, -2.0]
+    assert hs.Actuator(vibration=MODE).response([], 0.1).size == 0
+    assert not hs.Actuator(hysteresis=LAW).dynamic
+    assert hs.Actuator(vibration=MODE).dynamic
+
+
+def test_an_integrator_has_no_state_of_rest():
+    integrator = hs.TransferFunction(num=(1.0,), den=(1.0, 0.0))
+    assert np.isinf(sampled(integrator, 0.1).rest).any()
+    assert hs.Actuator(vibration=integrator).response([0.0, 1.0, 1.0], 0.5).tolist() == [0.0, 0.0, 0.5]
+    with pytest.raises(ValueError, match="integrates: it cannot rest at the law's first output 1"):
+        hs.Actuator(vibration=integrator).response([1.0, 1.0], 0.5)
+
+
+@given(short_inputs(), st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(-1.0, 1.0))
+def test_a_line_steps_as_it_responds(u, offset, slope, u0):
+    line = hs.Line(offset=offset, slope=slope)
+    step, parameters, state = line.compiled(u0)
+    y = np.empty(u.size)
+    assert drive(step, parameters, state, u, y) == -1
+    assert np.array_equal(y, line.response(u))
+
+
+def test_simulate_takes_an_actuator():
+    actuator = hs.Actuator(hysteresis=LAW, vibration=MODE)
+    u = np.sin(np.arange(20.0))
+    sim = hs.simulate(actuator, 0.1 * np.arange(20), u)
+    assert sim.y == pytest.approx(actuator.response(u, 0.1), abs=EXACT)
+    assert np.array_equal(sim.z, LAW.memory(u))
+    with pytest.raises(ValueError, match="time"):
+        hs.simulate(actuator, None, u)
+
+
+@pytest.mark.parametrize(
+    "actuator",
+    [
+        hs.Actuator(),
+        hs.Actuator(hysteresis=LAW),
+        hs.Actuator(vibration=MODE),
+        hs.Actuator(hysteresis=LAW, vibration=MODE),
+    ],
+    ids=["nothing", "law", "mode", "both"],
+)
+def test_an_actuator_is_a_value_and_comes_back_from_its_file(actuator, tmp_path):
+    hs.save(actuator, tmp_path / "actuator.json")
+    twins = [hs.load_model(tmp_path / "actuator.json"), copy.deepcopy(actuator), pickle.loads(pickle.dumps(actuator))]
+    for twin in twins:
+        assert twin == actuator
+        assert hash(twin) == hash(actuator)
+    assert actuator != hs.Actuator(hysteresis=hs.Line())
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        actuator.hysteresis = None
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "message"),
+    [
+        (lambda: hs.Actuator(hysteresis=3.0), TypeError, "hysteresis must be a law .* got float"),
+        (lambda: hs.Actuator(hysteresis=MODE), TypeError, "hysteresis must be a law .* got TransferFunction"),
+        (lambda: hs.Actuator(vibration=LAW), TypeError, "vibration must be a TransferFunction, got BoucWen"),
+        (lambda: hs.Actuator(vibration=dataclasses.replace(MODE, hold="foh")), ValueError, 'hold must be "zoh"'),
+        (
+            lambda: hs.Actuator(vibration=dataclasses.replace(MODE, initial_state=(0.0, 1.0))),
+            ValueError,
+            "must not hold an initial state",
+        ),
+        (lambda: hs.Actuator(LAW), TypeError, "positional"),
+        (lambda: hs.Actuator(creep=LAW), TypeError, "creep"),
+        (lambda: hs.Actuator(vibration=MODE).response([0.0, 1.0]), ValueError, "needs sample_time"),
+        (lambda: hs.Actuator(vibration=MODE).response([0.0, 1.0], 0.0), ValueError, "sample_time must be positive"),
+        (lambda: hs.Actuator().response([0.0, np.nan]), ValueError, "u must be finite, got nan at index 1"),
+        (lambda: hs.Actuator().response([[0.0]]), ValueError, "u must have 1 axis"),
+    ],
+)
+def test_wrong_arguments_are_named(call, error, message):
+    with pytest.raises(error, match=message):
+        call()
+
+
+def test_a_controller_is_no_law():
+    with pytest.raises(TypeError, match="hysteresis must be a law"):
+        hs.Actuator(hysteresis=hs.PID(kp=1.0))

@@ -1,0 +1,338 @@
+"""What the assessments say is what can be counted from the two loops they hold."""
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import hysim as hs
+from hysim.control import assess_hysteresis, assess_square_wave, assess_step
+from hysim.control._drive import secant_gain, slopes, steady_cycle, without_memory
+from hysim.metrics import vibration_reduction
+
+LAG = hs.TransferFunction(num=(1.0,), den=(1.0, 1.0))
+MODE = hs.TransferFunction(num=(2.0,), den=(1.0, 0.4, 1.0))
+PROPER = hs.TransferFunction(num=(0.5, 1.0), den=(1.0, 1.0))
+LAW = hs.BoucWen(beta=0.5, gamma=0.3, gain=0.5, feedthrough=1.0)
+NEGATIVE = replace(LAW, gain=-0.5, feedthrough=-1.0)
+TRIANGLE = {"low": 0.0, "high": 1.0, "period": 10.0, "sample_time": 0.05}
+WAVE = {"low": 0.0, "high": 1.0, "period": 60.0, "sample_time": 0.05, "periods": 3}
+
+
+@given(st.floats(0.2, 3.0), st.floats(0.0, 1.5), st.floats(-0.5, 0.5), st.floats(0.1, 5.0), st.booleans())
+def test_the_secant_gain_is_a_fixed_point(A, beta, gamma, span, turned):
+    """The steady cycle of the voltage reference / gain has the stroke of the reference: its span."""
+    sign = -1.0 if turned else 1.0
+    law = hs.BoucWen(A=A, beta=beta, gamma=gamma * beta, gain=0.5 * sign, feedthrough=sign)
+    cycle = hs.signals.triangle(0.0, span, cycles=1, samples_per_cycle=40)
+    actuator = hs.Actuator(hysteresis=law)
+    gain = secant_gain(actuator, cycle, 0.1)
+    assert math.copysign(1.0, gain) == sign
+    assert np.ptp(steady_cycle(actuator, cycle / gain, 0.1)) == pytest.approx(
+        span, rel=1e-11
+    )  # it stops when it moves by less than 1e-12
+    quasi_static = secant_gain(hs.Actuator(hysteresis=law, vibration=MODE), cycle)
+    scaled = secant_gain(hs.Actuator(hysteresis=law), cycle / MODE.dc_gain)
+    assert quasi_static == pytest.approx(MODE.dc_gain * scaled, rel=1e-11)
+
+
+def test_the_secant_gain_of_a_line_is_its_slope_and_of_a_plant_its_dc_gain():
+    cycle = hs.signals.triangle(0.0, 2.0, cycles=1, samples_per_cycle=40)
+    assert secant_gain(hs.Actuator(hysteresis=hs.Line(offset=3.0, slope=-0.7)), cycle, 0.1) == pytest.approx(-0.7)
+    assert secant_gain(hs.Actuator(vibration=replace(MODE, num=(-2.0,))), cycle) == -2.0
+    assert secant_gain(hs.Actuator(vibration=MODE), cycle, 100.0) == pytest.approx(2.0)  # so slow that it is static
+
+
+def test_slopes_bracket_the_secant_gain():
+    cycle = hs.signals.triangle(0.0, 1.0, cycles=1, samples_per_cycle=200)
+    low, high = slopes(hs.Actuator(hysteresis=LAW), cycle)
+    # feedthrough + gain times what is left of A = 1 at most
+    assert 1.0 < low < secant_gain(hs.Actuator(hysteresis=LAW), cycle) < high <= 1.5 + 0.5
+    assert slopes(hs.Actuator(vibration=MODE), cycle) == (1.0, 1.0)
+
+
+def test_the_line_without_memory_passes_through_the_ends_of_the_loop():
+    u = hs.signals.triangle(-1.0, 2.0, cycles=1, samples_per_cycle=60)
+    line = without_memory(hs.Actuator(hysteresis=LAW, vibration=MODE), u)
+    y = steady_cycle(hs.Actuator(hysteresis=LAW), u, None)
+    ends = line.hysteresis.response([-1.0, 2.0])
+    assert ends == pytest.approx([y.min(), y.max()], abs=1e-12)
+    assert line.vibration == MODE
+
+
+def test_the_line_without_memory_of_a_falling_law_falls():
+    u = hs.signals.triangle(-1.0, 2.0, cycles=1, samples_per_cycle=60)
+    y = steady_cycle(hs.Actuator(hysteresis=NEGATIVE), u, None)
+    ends = without_memory(hs.Actuator(hysteresis=NEGATIVE), u).hysteresis.response([-1.0, 2.0])
+    assert ends == pytest.approx([y.max(), y.min()], abs=1e-12)
+
+
+def test_a_law_of_negative_gain_is_assessed_as_its_mirror_image():
+    plain = assess_hysteresis(LAW, hs.PID(ki=4.0), **TRIANGLE)
+    turned = assess_hysteresis(NEGATIVE, hs.PID(ki=-4.0), **TRIANGLE)
+    for name in ("hysteresis_reduction_percent", "lag_width", "open_lag_width", "closed_width", "tracking_rms"):
+        assert getattr(turned, name) == pytest.approx(getattr(plain, name), rel=1e-9), name
+
+
+def width(reference, y):
+    """Largest difference of the two branches of one cycle from its lowest point, at the same reference."""
+    half = reference.size // 2
+    return float(np.abs(y[half:][::-1] - y[: half + 1]).max())
+
+
+@pytest.mark.parametrize("plant", [LAW, hs.Actuator(hysteresis=LAW, vibration=MODE)], ids=["law", "chain"])
+def test_a_hysteresis_assessment_is_counted_by_hand(plant):
+    pid = hs.PID(ki=0.3)
+    found = assess_hysteresis(plant, pid, **TRIANGLE)
+    reference = hs.signals.triangle(0.0, 1.0, cycles=10, samples_per_cycle=200)
+    t = 0.05 * np.arange(2001)
+    run = hs.close_loop(plant, pid, t, reference)
+    assert found.closed.y.tolist() == run.y.tolist()
+    open_y = hs.close_loop(plant, feedforward(1.0 / found.secant_gain), t, reference).y
+    assert found.open_y == pytest.approx(open_y, abs=1e-12)
+    assert np.array_equal(found.open_u, reference / found.secant_gain)
+    last = slice(-201, None)
+    before, after = open_y[last], run.y[last]
+    assert found.open_width == pytest.approx(width(reference[last], before))
+    assert found.closed_width == pytest.approx(width(reference[last], after))
+    relative = (found.closed_width / np.ptp(after)) / (found.open_width / np.ptp(before))
+    assert found.hysteresis_reduction_percent == pytest.approx(100.0 * (1.0 - relative))
+    assert math.isnan(found.lag_reduction_percent)
+    assert found.tracking_rms == pytest.approx(np.sqrt(np.mean((reference[last] - after) ** 2)))
+    assert found.closure_gap == pytest.approx(after[-1] - after[0], abs=1e-15)
+    line = without_memory(hs.Actuator(hysteresis=LAW), reference[last] / found.secant_gain).hysteresis
+    straight = hs.Actuator(hysteresis=line, vibration=getattr(plant, "vibration", None))
+    lagging = hs.close_loop(straight, pid, t, reference).y[last]
+    assert found.lag_width == pytest.approx(width(reference[last], lagging))
+
+
+class _Feedforward:
+    """Applies gain times reference, whatever is measured: what a PID with a setpoint weight does without feedback."""
+
+    def __init__(self, gain):
+        self.gain = gain
+
+    def compiled(self, sample_time, u0, y0):
+        from hysim.kernels.controllers import pid
+
+        # kp (b r - y) needs kp -> 0 with kp b = gain: 2^-900 of y is nothing beside it
+        tiny = 2.0**-900
+        return pid, np.array([tiny, 0.0, 0.0, 0.0, self.gain / tiny, 0.0, -np.inf, np.inf, 0.0]), np.zeros(4)
+
+
+def feedforward(gain):
+    return _Feedforward(gain)
+
+
+def test_the_open_loop_has_the_stroke_of_the_reference():
+    found = assess_hysteresis(LAW, hs.PID(ki=0.3), **TRIANGLE)
+    assert np.ptp(found.open_y[-201:]) == pytest.approx(1.0, rel=1e-3)  # ten cycles are nearly steady
+    assert np.ptp(found.open_u) == pytest.approx(1.0 / found.secant_gain)
+
+
+@pytest.mark.parametrize("plant", [LAG, MODE, hs.Actuator(vibration=MODE)], ids=["lag", "mode", "actuator"])
+def test_the_loop_of_a_linear_plant_is_lag(plant):
+    found = assess_hysteresis(plant, hs.PID(kp=0.2, ki=0.1), **TRIANGLE)
+    assert found.lag_width == found.closed_width
+    assert found.open_lag_width == found.open_width
+    assert math.isnan(found.hysteresis_reduction_percent)
+    assert math.isfinite(found.lag_reduction_percent)
+
+
+def test_a_larger_integral_gain_leaves_less_hysteresis():
+    slow = TRIANGLE | {"period": 1000.0, "sample_time": 0.5}  # so that the lag, 0.003 / ki, is below the hysteresis
+    found = [assess_hysteresis(LAW, hs.PID(ki=ki), **slow) for ki in (0.25, 0.5, 1.0)]
+    for weaker, stronger in itertools.pairwise(found):
+        assert stronger.hysteresis_reduction_percent > weaker.hysteresis_reduction_percent
+        assert stronger.tracking_rms < weaker.tracking_rms
+        assert stronger.lag_width < weaker.lag_width
+        assert stronger.open_width == weaker.open_width
+    assert found[-1].hysteresis_reduction_percent > 0.0
+
+
+def test_a_step_assessment_is_the_reduction_of_its_two_loops():
+    chain = hs.Actuator(hysteresis=LAW, vibration=MODE)
+    pid = hs.PID(kp=0.1, ki=0.05)
+    found = assess_step(chain, pid, step=0.5, duration=80.0, sample_time=0.05, u0=0.2)
+    rest = MODE.dc_gain * LAW.response([0.2])[0]
+    run = hs.close_loop(chain, pid, 0.05 * np.arange(1601), np.full(1601, rest + 0.5), u0=0.2)
+    assert found.closed.y.tolist() == run.y.tolist()
+    assert found.closed.y[0] == pytest.approx(rest, abs=1e-12)
+    assert found.open_y[0] == pytest.approx(rest, abs=1e-12)
+    voltage = (found.open_y[-1] / MODE.dc_gain, LAW.response([0.2, 0.2 + 0.5 / gain_of(chain, rest)])[-1])
+    assert voltage[0] == pytest.approx(voltage[1], abs=1e-5)  # exp(-0.2 80) of the step is left
+    # damping ratio 0.2 times frequency 1
+    again = vibration_reduction(0.05 * np.arange(1601), found.open_y, run.y, decay_rate=0.2)
+    assert found.reduction.open == again.open
+    assert found.reduction.overshoot_reduction_percent == again.overshoot_reduction_percent
+    residuals = (found.reduction.residual_rms_reduction_percent, again.residual_rms_reduction_percent)
+    assert residuals[0] == pytest.approx(residuals[1], abs=0.1)  # a sample at the window's end may come or go
+
+
+def gain_of(chain, rest):
+    return secant_gain(chain, np.array([rest, rest + 0.5]))
+
+
+def test_what_a_step_does_not_have_is_nan():
+    law = assess_step(LAW, hs.PID(ki=2.0), step=0.5, duration=10.0, sample_time=0.05).reduction
+    assert math.isnan(law.overshoot_reduction_percent)
+    assert math.isnan(law.residual_rms_reduction_percent)
+    assert math.isfinite(law.settling_time_reduction_percent)
+    lag = assess_step(LAG, hs.PID(ki=0.2), step=0.5, duration=50.0, sample_time=0.05).reduction
+    assert math.isnan(lag.overshoot_reduction_percent)
+    assert math.isnan(lag.residual_rms_reduction_percent)  # no vibration, no window
+    short = assess_step(MODE, hs.PID(ki=0.02), step=0.5, duration=30.0, sample_time=0.05).reduction
+    assert math.isnan(short.residual_rms_reduction_percent)  # 2 ln(50) / 0.2 is 39 s
+    still = assess_step(MODE, hs.PID(ki=0.02), step=0.0, duration=30.0, sample_time=0.05).reduction
+    assert math.isnan(still.overshoot_reduction_percent)
+    assert math.isnan(still.open.t98)
+
+
+def test_the_sign_of_the_plant_and_of_the_step_do_not_matter():
+    steps = {"duration": 60.0, "sample_time": 0.05}
+    plain = assess_step(MODE, hs.PID(kp=0.1, ki=0.1), step=1.0, **steps)
+    turned = assess_step(replace(MODE, num=(-2.0,)), hs.PID(kp=-0.1, ki=-0.1), step=1.0, **steps)
+    down = assess_step(MODE, hs.PID(kp=0.1, ki=0.1), step=-1.0, **steps)
+    for other in (turned, down):
+        for name in ("overshoot", "residual_rms", "settling_time"):
+            figure = f"{name}_reduction_percent"
+            assert getattr(other.reduction, figure) == pytest.approx(getattr(plain.reduction, figure), rel=1e-9), name
+
+
+def test_a_square_wave_is_measured_over_its_last_period():
+    pid = hs.PID(kp=0.05, ki=0.1)
+    found = assess_square_wave(MODE, pid, **WAVE)
+    reference = np.tile(np.repeat([0.0, 1.0], 600), 3)
+    t = 0.05 * np.arange(3600)
+    closed = hs.close_loop(MODE, pid, t, reference).y
+    opened = hs.close_loop(MODE, feedforward(0.5), t, reference).y
+    assert found.closed.y.tolist() == closed.tolist()
+    assert found.open_y == pytest.approx(opened, abs=1e-12)
+    for rms, excess, y in (
+        (found.open_tracking_rms, found.open_peak_excess_percent, opened),
+        (found.tracking_rms, found.peak_excess_percent, closed),
+    ):
+        assert rms == pytest.approx(np.sqrt(np.mean((reference - y)[-1200:] ** 2)), abs=1e-12)
+        assert excess == pytest.approx(100.0 * max(y[-1200:].max() - 1.0, -y[-1200:].min(), 0.0), abs=1e-9)
+    # zeta = 0.2: what is left after 30 s is exp(-6) at most, on either side of the step
+    overshoot = 100.0 * math.exp(-math.pi * 0.2 / math.sqrt(1.0 - 0.04))
+    assert found.open_peak_excess_percent == pytest.approx(overshoot, abs=100.0 * math.exp(-6.0))
+    assert found.reduction is None  # a half period of 30 s is shorter than t98 and five periods of 6.4 s
+
+
+def test_a_square_waves_steps_are_judged_where_its_half_periods_are_long_enough():
+    pid, period = hs.PID(kp=0.05, ki=0.1), 2.0 * math.pi / math.sqrt(1.0 - 0.04)
+    found = assess_square_wave(MODE, pid, **WAVE | {"period": 120.0})
+    assert found.reduction.open.t98 + 5.0 * period < 60.0
+    half = slice(-1200, None)
+    again = vibration_reduction(found.closed.t[half], found.open_y[half], found.closed.y[half], decay_rate=0.2)
+    assert found.reduction.overshoot_reduction_percent == again.overshoot_reduction_percent
+    assert found.reduction.closed == again.closed
+    t98 = found.reduction.open.t98
+    border = 2.0 * (t98 + 5.0 * period)  # the rule, from both sides, where t98 moves by less than a sample
+    edges = [0.1 * round((border + shift) / 0.1) for shift in (-0.5, 0.5)]
+    rules = [assess_square_wave(MODE, pid, **WAVE | {"period": edge}).reduction for edge in edges]
+    assert rules[0] is None
+    assert rules[1] is not None
+
+
+def test_a_plant_without_vibration_has_no_period_to_wait_for():
+    found = assess_square_wave(LAG, hs.PID(kp=3.0, ki=3.0), **WAVE)
+    assert found.reduction is not None
+    assert math.isnan(found.reduction.residual_rms_reduction_percent)
+    assert found.reduction.settling_time_reduction_percent > 0.0
+    assert found.open_peak_excess_percent == 0.0
+    assert found.peak_excess_percent < 1.0  # the sampled controller's zero cancels the pole but for the sample time
+    assert found.tracking_rms < found.open_tracking_rms
+
+
+def test_a_half_period_in_which_the_open_loop_does_not_arrive_has_no_step():
+    slow = hs.TransferFunction(num=(1.0,), den=(1.0, 0.02, 1.0))
+    assert assess_square_wave(slow, hs.PID(ki=0.01), **WAVE | {"period": 6.0}).reduction is None
+
+
+def test_a_half_period_of_a_few_samples_has_no_step():
+    found = assess_square_wave(LAG, hs.PID(ki=0.1), low=0.0, high=1.0, period=0.5, sample_time=0.05, periods=3)
+    assert found.reduction is None
+
+
+@pytest.mark.parametrize(
+    "assess",
+    [
+        lambda plant: assess_hysteresis(plant, feedforward(1.0), **TRIANGLE),
+        lambda plant: assess_step(plant, feedforward(1.0), step=1.0, duration=10.0, sample_time=0.05),
+        lambda plant: assess_square_wave(plant, feedforward(1.0), **WAVE),
+    ],
+    ids=["hysteresis", "step", "square wave"],
+)
+@pytest.mark.parametrize("sample", ["end", "start"])
+def test_the_open_loop_is_read_when_the_closed_one_is(assess, sample):
+    """A controller that does not look at the plant, of the secant gain one: its loop is the open loop."""
+    found = assess(replace(PROPER, sample=sample))
+    if "secant_gain" in dir(found):
+        gain = found.secant_gain
+        t, reference = found.closed.t, found.closed.reference
+        closed = hs.close_loop(PROPER, feedforward(1.0 / gain), t, reference).y
+    else:
+        closed = found.closed.y
+    assert found.open_y == pytest.approx(closed, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "message"),
+    [
+        (lambda: assess_hysteresis(3, hs.PID(), **TRIANGLE), TypeError, "got int"),
+        (
+            lambda: assess_hysteresis(LAW, hs.PID(), **TRIANGLE | {"high": -1.0}),
+            ValueError,
+            "high must be above low, .* got low 0.0 and high -1.0",
+        ),
+        (
+            lambda: assess_hysteresis(LAW, hs.PID(), **TRIANGLE | {"sample_time": 0.4}),
+            ValueError,
+            "samples_per_cycle must be even, .* got 25",
+        ),
+        (lambda: assess_hysteresis(LAW, hs.PID(), **TRIANGLE, cycles=0), ValueError, "at least 1, got 0"),
+        (
+            lambda: assess_hysteresis(hs.Line(slope=0.0), hs.PID(), **TRIANGLE),
+            ValueError,
+            "gain is 0.0: there is no voltage",
+        ),
+        (
+            lambda: assess_step(hs.TransferFunction(num=(1.0,), den=(1.0, 0.0)), hs.PID(), step=1.0, duration=9.0,
+                                sample_time=0.1),
+            ValueError,
+            "gain is inf",
+        ),
+        (lambda: assess_square_wave(LAG, hs.PID(), **WAVE | {"period": 1.03}), ValueError, "whole number of samples"),
+        (lambda: assess_square_wave(LAG, hs.PID(), **WAVE | {"high": 0.0}), ValueError, "high (must be )?above low"),
+    ],
+)  # fmt: skip
+def test_wrong_arguments_are_named(call, error, message):
+    with pytest.raises(error, match=message):
+        call()
+
+
+def test_a_wave_upside_down_is_told_so():
+    with pytest.raises(ValueError, match=r"high must be above low.* got .*1.* and .*0"):
+        assess_square_wave(LAG, hs.PID(), **WAVE | {"low": 1.0, "high": 0.0})
+
+
+def test_a_triangle_that_is_not_whole_samples_is_refused():
+    with pytest.raises(ValueError, match="period"):
+        assess_hysteresis(LAG, hs.PID(ki=1.0), **TRIANGLE | {"period": 10.02})
+
+
+def test_an_unstable_loop_is_an_error_in_every_assessment():
+    pid = hs.PID(kp=-40.0)
+    for call in (
+        lambda: assess_hysteresis(LAW, pid, **TRIANGLE),
+        lambda: assess_step(LAG, pid, step=1.0, duration=300.0, sample_time=0.05),
+        lambda: assess_square_wave(LAG, pid, **WAVE),
+    ):
+        with pytest.raises(hs.SimulationError, match="t = "):
+            call()
