@@ -47,3 +47,16 @@ def test_the_readme_quotes_the_exact_step():
     assert max(own) < 1e-15
     assert all(0.5e-4 < row["error"] < 2e-4 for row in lsoda)
     assert f"{least} to {most} times as long".replace(",", " ") in readme
+
+
+def test_the_readme_quotes_the_batch_and_the_first_call():
+    folder = EXPERIMENTS[0].parent
+    batch, start = (
+        json.loads((folder / "results" / name / "result.json").read_text())["rows"] for name in ("batch", "cold_start")
+    )
+    speed = {row["n"]: row["million_samples_per_second"] for row in batch if row["kind"] == "rows"}
+    readme = " ".join((folder.parent / "README.md").read_text().split())
+    assert f"run at {speed['1']:.0f} million samples a second for n = 1, {speed['64 values']:.0f} million" in readme
+    assert f"{speed['all differ']:.1f} million where all differ" in readme
+    assert f"compiles for up to {max(row['empty'] for row in start):.0f} s" in readme
+    assert f"it takes at most {max(row['full'] for row in start):.1f} s" in readme
