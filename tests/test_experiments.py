@@ -60,3 +60,18 @@ def test_the_readme_quotes_the_batch_and_the_first_call():
     assert f"{speed['all differ']:.1f} million where all differ" in readme
     assert f"compiles for up to {max(row['empty'] for row in start):.0f} s" in readme
     assert f"it takes at most {max(row['full'] for row in start):.1f} s" in readme
+
+
+def test_the_readme_quotes_the_work_and_the_precision():
+    folder = EXPERIMENTS[0].parent
+    rows = json.loads((folder / "results" / "work_precision" / "result.json").read_text())["ratios"]
+    readme = " ".join((folder.parent / "README.md").read_text().split())
+
+    def ratio(*words):
+        (found,) = [row["median"] for row in rows if all(word in row["what"] for word in words)]
+        return found
+
+    assert f"the law is {round(ratio('n = 1:', 'LSODA, compiled, rtol'), -1):.0f} times as fast" in readme
+    assert f"and {ratio('n = 1:', 'OpenSees'):.0f} times as fast as OpenSees" in readme
+    assert f"`odeint` takes {ratio('oscillator', 'odeint'):.0f} times as long" in readme
+    assert f"and diffrax {ratio('oscillator', 'diffrax'):.0f} times" in readme
