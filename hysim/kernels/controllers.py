@@ -20,13 +20,13 @@ from hysim.kernels.stepping import CONSTANTS, VECTOR
 
 CONTROLLER = types.FunctionType(float64(CONSTANTS, VECTOR, float64, float64))
 
-N_PID = 9
-"""(kp, ki h, kd / (T_f + h), T_f / (T_f + h), b, c, lowest u, highest u, h / T_t)."""
-
 
 @signed_kernel(float64(CONSTANTS, VECTOR, float64, float64))
 def pid(parameters: FloatArray, state: FloatArray, reference: float, measurement: float) -> float:
-    """The PID's voltage; `state` is (v, I, D, c r - y) and moves along."""
+    """The PID's voltage; `state` is (v, I, D, c r - y) and moves along.
+
+    `parameters` is (kp, ki h, kd / (T_f + h), T_f / (T_f + h), b, c, lowest u, highest u, h / T_t).
+    """
     seen = parameters[5] * reference - measurement
     derivative = parameters[3] * state[2] + parameters[2] * (seen - state[3])
     command = parameters[0] * (parameters[4] * reference - measurement) + state[1] + derivative

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from hysim.control import PID, ClosedLoop
+from hysim.control import PID
 from hysim.metrics import VibrationReduction
 from hysim.models.transfer_function import TransferFunction
 from hysim.paper import markup
@@ -375,11 +375,6 @@ def _gains(cases: Sequence[HysteresisCase] | Sequence[StepCase]) -> str:
         "plant", "Kp [V/µm]", "Ti", "Td", "derivative filter", "setpoint weight", "maximum sensitivity", "loops tried",
     ]  # fmt: skip
     return markup.table(header, rows)
-
-
-def _without_limits(run: ClosedLoop) -> PID:
-    pid: PID = run.conditions["controller"]
-    return replace(pid, limits=None)
 
 
 def _pid(pid: PID) -> list[str]:
