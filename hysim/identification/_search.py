@@ -44,7 +44,8 @@ def optima(problem: Projection, *, seed: int, progress: Progress | None = None) 
     if not space.coordinates:
         return [polish(problem, np.empty(0))]
     share = min(1.0, _LONG / len(problem.record))
-    candidates = np.concatenate([space.starts, _uniform(space, max(256, round(N_SCREENED * share)), seed)])
+    screened = max(256, round(N_SCREENED * share)) if space.screened is None else space.screened
+    candidates = np.concatenate([space.starts, _uniform(space, screened, seed)])
     n_starts = max(16, round(N_DESCENDING * share))
     starts = _apart(space, candidates, problem.costs(candidates), _APART, n_starts, len(space.starts))
     reached, cost = descend(problem, starts)
@@ -132,7 +133,7 @@ def _uniform(space: SearchSpace, n: int, seed: int) -> FloatArray:
     from scipy.stats import qmc
 
     sequence = qmc.Sobol(space.lower.size, rng=np.random.default_rng(seed))
-    unit = sequence.random_base2(math.ceil(math.log2(n)))[:n]
+    unit = sequence.random_base2(math.ceil(math.log2(max(n, 1))))[:n]
     return np.asarray(space.lower + unit * (space.upper - space.lower))
 
 

@@ -44,6 +44,11 @@ class SearchSpace:
         Name to the box (lower, upper) of a part of the space that has a meaning of its own.
     bounds : mapping
         The user's bounds on linear parameters, name to (lower, upper).
+    state : tuple of str
+        Parameters, searched or linear, that describe the state at the first sample. Of several records each
+        has its own.
+    screened : int, optional
+        Random points that a search should try beside the starts, where one evaluation is dear; 0 for none.
     """
 
     coordinates: tuple[str, ...]
@@ -58,6 +63,8 @@ class SearchSpace:
     redundant: tuple[tuple[str, ...], ...] = ()
     regions: Mapping[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    state: tuple[str, ...] = ()
+    screened: int | None = None
 
 
 @dataclass(frozen=True)
