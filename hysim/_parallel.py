@@ -13,7 +13,10 @@ import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any
+
+_most: ContextVar[int | None] = ContextVar("most threads", default=None)
 
 Progress = Callable[[int, int], None]
 """Called as ``progress(done, total)``."""
@@ -38,9 +41,8 @@ def in_chunks(work: Callable[[int, int], None], n_items: int, *, workers: int | 
     minimum : int
         Fewest items that are worth a thread.
     """
-    if workers is not None and workers < 1:
-        raise ValueError(f"workers must be at least 1, got {workers}")
-    n_chunks = max(1, min(workers or cores(), n_items // minimum))
+    _check(workers)
+    n_chunks = max(1, min(workers or _most.get() or cores(), n_items // minimum))
     edges = [n_items * k // n_chunks for k in range(n_chunks + 1)]
     own, *others = itertools.pairwise(edges)
     if not others:
@@ -51,6 +53,22 @@ def in_chunks(work: Callable[[int, int], None], n_items: int, *, workers: int | 
         work(*own)
         for chunk in running:
             chunk.result()
+
+
+@contextmanager
+def at_most(workers: int | None) -> Iterator[None]:
+    """Let `in_chunks`, called in this thread without a number of its own, use so many threads; None for all cores."""
+    _check(workers)
+    token = _most.set(workers or _most.get())
+    try:
+        yield
+    finally:
+        _most.reset(token)
+
+
+def _check(workers: int | None) -> None:
+    if workers is not None and workers < 1:
+        raise ValueError(f"workers must be at least 1, got {workers}")
 
 
 @contextmanager

@@ -196,5 +196,7 @@ def test_the_search_space_begins_at_the_law_and_goes_back_to_it():
 def test_at_rest_the_law_starts_at_zero():
     record = hs.Record(u=PATH, y=GENERAL.response(PATH))
     assert GENERAL.search_space(record, Freedom(initial="rest")).held == {"y0": 0.0}
-    with pytest.raises(ValueError, match='initial must be "free" or "rest"'):
-        GENERAL.search_space(record, Freedom(initial="periodic"))
+    with pytest.raises(ValueError, match='initial must be "free", "rest" or "periodic"'):
+        GENERAL.search_space(record, Freedom(initial="warm"))
+    with pytest.raises(ValueError, match="no steady cycle"):
+        hs.identify(GENERAL, record, initial="periodic")

@@ -221,7 +221,7 @@ def test_what_is_free_follows_the_structure_and_the_arguments():
     one = structure.search_space(record, Freedom(free=("x0[1]",), fixed={"num[1]": 2.0}, bounds={"num[0]": (0.0, 1.0)}))
     assert one.linear == ("num[0]", "x0[1]")
     assert dict(one.bounds) == {"num[0]": (0.0, 1.0)}
-    with pytest.raises(ValueError, match='"free" or "rest"'):
+    with pytest.raises(ValueError, match='"free", "rest" or "periodic"'):
         structure.search_space(record, Freedom(initial="warm"))
 
 

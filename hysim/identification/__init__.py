@@ -5,6 +5,7 @@ the model's family declares (`SearchSpace`). Nothing here knows a family.
 """
 
 from hysim.identification._identify import identify
-from hysim.identification._result import Candidate, Identification
+from hysim.identification._profile import Profile
+from hysim.identification._result import Candidate, Identification, Width
 
-__all__ = ["Candidate", "Identification", "identify"]
+__all__ = ["Candidate", "Identification", "Profile", "Width", "identify"]

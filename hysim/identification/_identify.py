@@ -1,8 +1,8 @@
 """The verb `identify`: declare, search, describe."""
 
 import inspect
-from collections.abc import Mapping
-from dataclasses import MISSING, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -10,56 +10,77 @@ import numpy.typing as npt
 
 from hysim import metrics
 from hysim._frozen import FloatArray
-from hysim._parallel import Progress
-from hysim.identification._projection import Projection
-from hysim.identification._result import Candidate, Identification
-from hysim.identification._search import Optimum, descend, optima
-from hysim.identification._uncertainty import covariance
+from hysim._parallel import Progress, at_most
+from hysim.identification._descent import Descent
+from hysim.identification._diagnostics import loop_widths, whiteness, width_stderr
+from hysim.identification._noise import Gaussian, Noise, Quantised, Robust
+from hysim.identification._problem import Problem, problem
+from hysim.identification._profile import Profile, profiles, threshold
+from hysim.identification._resampling import bootstrap, left_out_rmse
+from hysim.identification._result import Candidate, Identification, Width
+from hysim.identification._search import optima, polish
+from hysim.identification._uncertainty import Uncertainty, uncertainty
 from hysim.identification.folds import folds
 from hysim.models.search_space import Freedom, Identifiable
 from hysim.records import Record
 
-_AT_FOLD = 4  # a fold of the cross-validation begins from this many of the best optima
-_FOLD_TOLERANCE = 1e-7
-_SAMPLES_AT_ONCE = 1_000_000  # of all folds that descend together, to bound the memory
+LEVEL = 0.95
+TAILS = (0.025, 0.975)
+N_BOOTSTRAP = 500
+_SAME = 1e-6  # relative difference of two costs that are the same
+_PERFECT = 1e-14  # smallest sigma, in units of the output's size
 
 
 def identify(
     model_or_class: Any,
-    record: Record,
+    record_or_records: Record | Sequence[Record],
     *,
     fixed: Mapping[str, float] | None = None,
-    free: tuple[str, ...] = (),
+    free: Sequence[str] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
-    initial: str | None = None,
+    initial: str | Sequence[str] | None = None,
+    noise: str = "gaussian",
+    intervals: str = "linear",
     cross_validate: str | int | None = None,
     seed: int = 0,
+    workers: int | None = None,
     progress: Progress | None = None,
 ) -> Identification:
-    """Identify a model's parameters on a record, by its error in free run.
+    """Identify a model's parameters on one or several records, by its error in free run.
 
     Parameters
     ----------
     model_or_class : model, model class or structure
         `hysim.BoucWen`, `hysim.TransferFunction.structure(poles=4, zeros=1)`, ... A class gives its
         defaults as one start of the search, an instance its values.
-    record : Record
-        Input and output, and for models with dynamics the time.
+    record_or_records : Record or sequence of Record
+        Input and output, and for models with dynamics the time. Several records share all parameters but
+        those of the state at the first sample: where it is free, each has its own, ``z0[0]``, ``z0[1]``, ...
     fixed : mapping, optional
         Parameters that are not free, and their values.
-    free : tuple of str, optional
+    free : sequence of str, optional
         Names to take out of the set that is held by default. Of each redundant group one is held, for
         Bouc-Wen ``A = 1``, since only A times gain can be told.
     bounds : mapping, optional
         Name to (lower, upper), in place of the family's own box.
-    initial : {"free", "rest"}, optional
-        Whether the state at the first sample is identified, or rest; by default as the family has it (free
-        for a memory, as the structure says for a transfer function).
-    cross_validate : {None, "loo"} or int, optional
-        ``"loo"`` leaves one output sample out at a time, an int that many blocks of samples; the input is
-        kept. Fills `Identification.cv_rmse`.
+    initial : {"free", "rest", "periodic"}, or one of them for each record, optional
+        Whether the state at the first sample is identified, is rest, or is that of a steady cycle (the
+        record repeats itself); by default as the family has it (free for a memory, as the structure says
+        for a transfer function).
+    noise : {"gaussian", "quantised", "robust"}
+        What the output is disturbed by: normal noise; normal noise before a sensor that rounds to multiples
+        of `Record.resolution`, so that each output is an interval; or Student's t with 4 degrees of freedom,
+        for records with outliers. The likelihood of the last two begins at the optima of the first.
+    intervals : {"linear", "profile", "bootstrap"}
+        How `Identification.intervals`, at 95 %, are found: from the standard errors, by the profile of the
+        likelihood, or from 500 records drawn anew.
+    cross_validate : {None, "loo", "records"} or int, optional
+        ``"loo"`` leaves one output sample out at a time, an int that many blocks of samples, ``"records"``
+        one record; the input is kept. Fills `Identification.cv_rmse`.
     seed : int
-        Of the starts of the search.
+        Of the starts of the search, and of what is drawn. The optimum does not depend on it.
+    workers : int, optional
+        Number of threads; by default one for each core.
     progress : callable, optional
         Called as ``progress(done, total)``.
 
@@ -70,7 +91,8 @@ def identify(
     Raises
     ------
     ValueError
-        If a name is unknown, the record is too short for the parameters, or its input is constant.
+        If a name or an option is unknown, the record is too short for the parameters, its input is constant, or
+        it has no resolution for quantised noise.
     TypeError
         If the first argument is not something that can be identified.
 
@@ -83,21 +105,37 @@ def identify(
     >>> round(fit.estimates["beta"], 6), round(fit.estimates["gain"], 6)
     (0.7, 2.0)
     """
-    family = _family(model_or_class)
-    if not isinstance(record, Record):
-        raise TypeError(f"identify takes a Record, got {type(record).__name__}: hs.Record(u=u, y=y)")
-    space = family.search_space(record, Freedom(fixed or {}, tuple(free), bounds or {}, initial))
-    if len(record) < len(space.names):
-        raise ValueError(f"{len(record)} samples cannot tell {len(space.names)} parameters: fix some of them")
-    left_out = [] if cross_validate is None else folds(cross_validate, len(record), name="cross_validate")
-    problem = Projection(family, space, record)
-    found = optima(problem, seed=seed, progress=progress)
-    if not found:
-        raise ValueError("no law in the box stays finite on this record: check its units, or give bounds")
-    result = _describe(problem, found)
-    return replace(
-        result, regions=_regions(problem, found[0], seed), cv_rmse=_cross_validated(problem, found, left_out)
-    )
+    family, records = _family(model_or_class), _records(record_or_records)
+    if intervals not in ("linear", "profile", "bootstrap"):
+        raise ValueError(f'intervals must be "linear", "profile" or "bootstrap", got {intervals!r}')
+    with at_most(workers):
+        whole = problem(family, records, Freedom(fixed or {}, tuple(free), bounds or {}), initial)
+        if whole.y.size < len(whole.space.names):
+            raise ValueError(
+                f"{whole.y.size} samples cannot tell {len(whole.space.names)} parameters: fix some of them"
+            )
+        left_out = _left_out(cross_validate, whole)
+        search = _Search(whole, _density(noise, records, whole.y), noise, seed)
+        found = search.found(progress)
+        if not found:
+            raise ValueError("no law in the box stays finite on this record: check its units, or give bounds")
+        result, found = search.described(found, intervals)
+        thetas = np.array([optimum.theta for optimum in found])
+        return replace(
+            result,
+            regions=search.regions(found[0]),
+            cv_rmse=left_out_rmse(whole, search.noise, thetas, left_out),
+        )
+
+
+def _records(given: Record | Sequence[Record]) -> tuple[Record, ...]:
+    records = (given,) if isinstance(given, Record) else given
+    if not isinstance(records, Sequence) or not all(isinstance(record, Record) for record in records):
+        what = type(given).__name__
+        raise TypeError(f"identify takes a Record or several of them, got {what}: hs.Record(u=u, y=y)")
+    if not records:
+        raise ValueError("there is no record to identify from")
+    return tuple(records)
 
 
 def _family(model_or_class: Any) -> Identifiable:
@@ -117,101 +155,261 @@ def _family(model_or_class: Any) -> Identifiable:
     return family  # type: ignore[no-any-return]
 
 
-def _regions(problem: Projection, best: Optimum, seed: int) -> dict[str, Candidate]:
-    """The best candidate inside each named region that the optimum is not in."""
-    space = problem.space
-    candidates: dict[str, Candidate] = {}
-    for name, (lower, upper) in space.regions.items():
-        if np.all(best.x >= lower) and np.all(best.x <= upper):
-            continue
-        box = replace(space, lower=lower, upper=upper, starts=np.clip(space.starts, lower, upper), regions={})
-        inside = replace(problem, space=box)
-        if found := optima(inside, seed=seed):
-            candidates[name] = _candidate(inside, found[0])
-    return candidates
+def _density(noise: str, records: Sequence[Record], y: FloatArray) -> Noise:
+    floor = _PERFECT * (float(np.abs(y).max()) or 1.0)
+    if noise == "gaussian":
+        return Gaussian(floor)
+    if noise == "robust":
+        return Robust(floor)
+    if noise != "quantised":
+        raise ValueError(f'noise must be "gaussian", "quantised" or "robust", got {noise!r}')
+    quanta = {record.resolution for record in records}
+    if len(quanta) != 1 or None in quanta:
+        raise ValueError("quantised noise needs the sensor's quantum, the same for all records: Record(resolution=...)")
+    return Quantised(float(quanta.pop() or 0.0))
 
 
-def _estimates(problem: Projection, x: FloatArray) -> dict[str, float]:
-    space = problem.space
-    linear = problem.solve(x[np.newaxis])[0][0]
-    searched = {name: float(values[0]) for name, values in space.parameters(x[np.newaxis]).items()}
-    return searched | dict(space.held) | dict(zip(space.linear, linear.tolist(), strict=True))
+def _left_out(cross_validate: str | int | None, whole: Problem) -> list[npt.NDArray[np.intp]]:
+    if cross_validate is None:
+        return []
+    if cross_validate == "records":
+        if len(whole.parts) < 2:
+            raise ValueError('cross_validate="records" needs at least 2 records')
+        return np.split(np.arange(whole.y.size), whole.cuts[1:-1])
+    return folds(cross_validate, whole.y.size, name="cross_validate")
 
 
-def _candidate(problem: Projection, optimum: Optimum) -> Candidate:
-    estimates = _estimates(problem, optimum.x)
-    y = problem.record.y
-    return Candidate(
-        model=problem.family.assemble(estimates),
-        estimates=estimates,
-        fit_percent=metrics.fit_percent(y, y - problem.residual(optimum.x)),
-        rmse=float(np.sqrt(optimum.cost / y.size)),
-    )
+@dataclass(frozen=True)
+class _Optimum:
+    """A local optimum: theta (n_theta,), minus the log-likelihood, sigma, and whether the search converged."""
+
+    theta: FloatArray
+    loss: float
+    sigma: float
+    converged: bool
 
 
-def _describe(problem: Projection, found: list[Optimum]) -> Identification:
-    best = found[0]
-    names, n = problem.space.names, len(problem.record)
-    residual = problem.residual(best.x)
-    spread, reasons = covariance(problem, best.x, residual)
-    chosen = _candidate(problem, best)
-    rivals = tuple(
-        _candidate(problem, other) for other in found[1:] if _indistinct(other.cost, best.cost, n, len(names))
-    )
-    if rivals:
-        reasons.append(
-            f"{len(rivals)} other optimum within the noise"
-            if len(rivals) == 1
-            else f"{len(rivals)} other optima within the noise"
+@dataclass(frozen=True)
+class _Search:
+    """One problem with its noise."""
+
+    problem: Problem
+    noise: Noise
+    noise_name: str
+    seed: int
+
+    @property
+    def descent(self) -> Descent:
+        return Descent(self.problem, self.noise, self.problem.y[np.newaxis], np.ones((1, self.problem.y.size)))
+
+    def found(self, progress: Progress | None = None) -> list[_Optimum]:
+        """Distinct optima, best first: those of the sum of squares, and for other noise what they descend to."""
+        return self._likely(optima(self.problem, seed=self.seed, progress=progress))
+
+    def _likely(self, squares: Sequence[Any]) -> list[_Optimum]:
+        if not squares:
+            return []
+        x = np.array([optimum.x for optimum in squares])
+        theta = np.concatenate([x, self.problem.solve(x)[0]], axis=1)
+        steps = 0 if isinstance(self.noise, Gaussian) else 200
+        reached = self.descent.run(theta, tolerance=1e-9, steps=steps)
+        ranked = np.argsort(reached.loss, kind="stable")
+        found: list[_Optimum] = []
+        for k in ranked[np.isfinite(reached.loss[ranked])].tolist():
+            if not found or reached.loss[k] - found[-1].loss > 0.5 * self.problem.y.size * _SAME:
+                found.append(
+                    _Optimum(reached.theta[k], float(reached.loss[k]), float(reached.sigma[k]), squares[k].converged)
+                )
+        return found
+
+    def regions(self, best: _Optimum) -> dict[str, Candidate]:
+        """The best candidate inside each named region that the optimum is not in."""
+        space, candidates = self.problem.space, {}
+        x = best.theta[: len(space.coordinates)]
+        for name, (lower, upper) in space.regions.items():
+            if np.all(x >= lower) and np.all(x <= upper):
+                continue
+            box = replace(space, lower=lower, upper=upper, starts=np.clip(space.starts, lower, upper), regions={})
+            inside = replace(self, problem=replace(self.problem, space=box))
+            if found := inside.found():
+                candidates[name] = inside.candidate(found[0].theta)
+        return candidates
+
+    def candidate(self, theta: FloatArray) -> Candidate:
+        """The model at `theta`, and how well it fits."""
+        whole, n_x = self.problem, len(self.problem.space.coordinates)
+        estimates = whole.estimates(theta[:n_x], theta[n_x:])
+        residual = self.residual(theta)
+        return Candidate(
+            model=whole.family.assemble(estimates),
+            estimates=estimates | dict(zip(whole.space.names, self.named(theta), strict=True)),
+            fit_percent=metrics.fit_percent(whole.y, whole.y - residual),
+            rmse=float(np.sqrt(np.mean(residual**2))),
         )
-    message = "converged" if best.converged else "the search did not converge"
-    return Identification(
-        model=chosen.model,
-        estimates=chosen.estimates,
-        stderr=dict(zip(names, np.sqrt(np.diag(spread)).tolist(), strict=True)),
-        covariance=spread,
-        free_names=names,
-        n_parameters=len(names),
-        fit_percent=chosen.fit_percent,
-        rmse=chosen.rmse,
-        fpe=metrics.fpe(residual, len(names)),
-        aic=metrics.aic(residual, len(names)),
-        bic=metrics.bic(residual, len(names)),
-        residual=residual,
-        success=best.converged,
-        message="; ".join([message, *reasons]),
-        rivals=rivals,
-    )
+
+    def residual(self, theta: FloatArray) -> FloatArray:
+        """Measured minus model."""
+        return np.asarray(self.problem.y - self.descent.outputs(theta[np.newaxis])[0])
+
+    def named(self, theta: FloatArray) -> list[float]:
+        """The free parameters, in the order of their names."""
+        n_x = len(self.problem.space.coordinates)
+        return np.ravel(self.problem.named(theta[np.newaxis, :n_x], theta[np.newaxis, n_x:])).tolist()
+
+    def described(self, found: list[_Optimum], intervals: str) -> tuple[Identification, list[_Optimum]]:
+        """The result at the best optimum; a better one that its profiles meet takes its place."""
+        known = self._uncertainty(found[0])
+        curves: dict[str, Profile] = {}
+        if intervals == "profile":
+            curves, better = self._profiles(found, known)
+            if better is not None:
+                n_x = len(self.problem.space.coordinates)
+                found = self._likely([polish(self.problem, better[:n_x])]) + found
+                found = sorted(found, key=lambda optimum: optimum.loss)
+                known = self._uncertainty(found[0])
+                curves, _ = self._profiles(found, known)
+        return self._described(found, known, intervals, curves), found
+
+    def _uncertainty(self, best: _Optimum) -> Uncertainty:
+        residual, sigma = self.residual(best.theta)[np.newaxis], np.full((1, 1), best.sigma)
+        return uncertainty(self.problem, best.theta, self.noise.terms(residual, sigma).curvature[0])
+
+    def _profiles(self, found: list[_Optimum], known: Uncertainty) -> tuple[dict[str, Profile], FloatArray | None]:
+        n_samples, n_names = self.problem.y.size, len(self.problem.space.names)
+        if n_samples <= n_names:
+            return {}, None
+        limit = threshold(n_samples, n_names, LEVEL)
+        inside = [optimum for optimum in found if 2.0 * (optimum.loss - found[0].loss) < limit]
+        thetas, losses = np.array([each.theta for each in inside]), np.array([each.loss for each in inside])
+        return profiles(self.descent, thetas, losses, known.covariance, known.with_names, limit)
+
+    def _described(
+        self, found: list[_Optimum], known: Uncertainty, intervals: str, curves: Mapping[str, Profile]
+    ) -> Identification:
+        from scipy.stats import chi2
+
+        best, whole = found[0], self.problem
+        names = whole.space.names
+        residual, chosen = self.residual(best.theta), self.candidate(best.theta)
+        limit = float(chi2.ppf(LEVEL, len(names))) if names else 0.0
+        rivals = tuple(self.candidate(each.theta) for each in found[1:] if 2.0 * (each.loss - best.loss) < limit)
+        stderr = np.sqrt(np.diag(known.covariance))
+        draws = self._draws(best, residual) if intervals == "bootstrap" else np.empty((0, best.theta.size))
+        spans = self._intervals(intervals, chosen.estimates, stderr, curves, draws)
+        first = whole.parts[0].record
+        x, linear = np.split(best.theta, [len(whole.space.coordinates)])
+        models = tuple(whole.family.assemble(whole.estimates(x, linear, k)) for k in range(len(whole.parts)))
+        notes = whole.family.notes(first, chosen.model) if hasattr(whole.family, "notes") else ()
+        return Identification(
+            model=chosen.model,
+            models=models,
+            estimates=chosen.estimates,
+            stderr=dict(zip(names, stderr.tolist(), strict=True)),
+            intervals=spans,
+            interval_method=intervals,
+            profiles=curves,
+            covariance=known.covariance,
+            condition=known.condition,
+            redundant=known.redundant,
+            free_names=names,
+            n_parameters=len(names),
+            fit_percent=chosen.fit_percent,
+            rmse=chosen.rmse,
+            fpe=metrics.fpe(residual, len(names)),
+            aic=metrics.aic(residual, len(names)),
+            bic=metrics.bic(residual, len(names)),
+            noise=self.noise_name,
+            sigma=best.sigma,
+            log_likelihood=-best.loss,
+            least_squares=self._least_squares(),
+            residual=residual,
+            resolution=first.resolution,
+            response_stderr=known.output,
+            loop_width=self._width(best.theta, known, draws),
+            whiteness=whiteness(residual, len(names)),
+            success=best.converged,
+            message="; ".join(_phrases(best.converged, whole, known, rivals, curves, notes)),
+            rivals=rivals,
+            seed=self.seed,
+        )
+
+    def _least_squares(self) -> Candidate | None:
+        """The optimum of the sum of squares, beside that of another likelihood."""
+        if isinstance(self.noise, Gaussian):
+            return None
+        plain = replace(self, noise=Gaussian(_PERFECT * (float(np.abs(self.problem.y).max()) or 1.0)))
+        return plain.candidate(plain.found()[0].theta)
+
+    def _draws(self, best: _Optimum, residual: FloatArray) -> FloatArray:
+        """Theta as it could have come out, (n_draws, n_theta)."""
+        if residual.size <= len(self.problem.space.names):
+            return np.empty((0, best.theta.size))
+        return bootstrap(self.problem, self.noise, best.theta, residual, best.sigma, draws=N_BOOTSTRAP, seed=self.seed)
+
+    def _intervals(
+        self,
+        intervals: str,
+        estimates: Mapping[str, float],
+        stderr: FloatArray,
+        curves: Mapping[str, Profile],
+        draws: FloatArray,
+    ) -> dict[str, tuple[float, float]]:
+        space, n_x = self.problem.space, len(self.problem.space.coordinates)
+        unknown = dict.fromkeys(space.names, (np.nan, np.nan))
+        if intervals == "profile":
+            return unknown | {name: (curve.lower, curve.upper) for name, curve in curves.items()}
+        if intervals == "bootstrap":
+            if not len(draws):
+                return unknown
+            ends = np.quantile(self.problem.named(draws[:, :n_x], draws[:, n_x:]), TAILS, axis=0)
+            told = np.isfinite(stderr)
+            return unknown | {
+                name: (float(ends[0, k]), float(ends[1, k])) for k, name in enumerate(space.names) if told[k]
+            }
+        reach = stderr * self._quantile()
+        return {
+            name: (estimates[name] - float(each), estimates[name] + float(each))
+            for name, each in zip(space.names, reach, strict=True)
+        }
+
+    def _quantile(self) -> float:
+        """Of Student's distribution with the degrees of freedom that are left."""
+        from scipy.stats import t
+
+        freedom = self.problem.y.size - len(self.problem.space.names)
+        return float(t.ppf(TAILS[1], freedom)) if freedom > 0 else float("nan")
+
+    def _width(self, theta: FloatArray, known: Uncertainty, draws: FloatArray) -> Width | None:
+        """The loop's largest width with its band; None where the first record has no loop."""
+        value = loop_widths(self.descent, theta[np.newaxis])
+        if not value.size:
+            return None
+        width = float(value[0])
+        if len(draws):
+            lower, upper = np.quantile(loop_widths(self.descent, draws), TAILS).tolist()
+        else:
+            reach = self._quantile() * width_stderr(self.descent, theta, known.of_theta)
+            lower, upper = width - reach, width + reach
+        return Width(value=width, lower=lower, upper=upper)
 
 
-def _indistinct(cost: float, best: float, n_samples: int, n_parameters: int) -> bool:
-    """Whether the likelihood ratio N ln(V / V_best) is inside the 95 % region of the optimum."""
-    from scipy.stats import chi2
-
-    if best == 0.0:
-        return cost == 0.0
-    return bool(n_samples * np.log(cost / best) < chi2.ppf(0.95, n_parameters))
-
-
-def _cross_validated(problem: Projection, found: list[Optimum], left_out: list[npt.NDArray[np.intp]]) -> float:
-    """Rmse of the left-out samples: every fold descends from the best optima of the whole record."""
-    if not left_out:
-        return float("nan")
-    at_once = max(1, _SAMPLES_AT_ONCE // (_AT_FOLD * len(problem.record)))
-    groups = [left_out[k : k + at_once] for k in range(0, len(left_out), at_once)]
-    return float(np.sqrt(np.mean(np.concatenate([_left_out_errors(problem, found, group) for group in groups]) ** 2)))
-
-
-def _left_out_errors(problem: Projection, found: list[Optimum], left_out: list[npt.NDArray[np.intp]]) -> FloatArray:
-    """Errors of the samples that each of some folds leaves out, one fold after the other."""
-    starts = np.array([optimum.x for optimum in found[:_AT_FOLD]])
-    weights = np.ones((len(left_out), len(problem.record)))
-    for fold, samples in enumerate(left_out):
-        weights[fold, samples] = 0.0
-    each = np.repeat(weights, len(starts), axis=0)
-    reached, costs = descend(problem, np.tile(starts, (len(left_out), 1)), each, tolerance=_FOLD_TOLERANCE)
-    best = np.arange(len(left_out)) * len(starts) + costs.reshape(len(left_out), -1).argmin(axis=1)
-    linear = problem.solve(reached[best], weights)[0]
-    columns, fixed_part = problem.split(problem.space.parameters(reached[best]))
-    errors = problem.record.y - fixed_part - (columns @ linear[..., np.newaxis])[..., 0]
-    return np.asarray(errors[weights == 0.0])
+def _phrases(
+    converged: bool,
+    whole: Problem,
+    known: Uncertainty,
+    rivals: Sequence[Candidate],
+    curves: Mapping[str, Profile],
+    notes: Sequence[str],
+) -> list[str]:
+    """How the search ended, and what the data cannot tell."""
+    phrases = ["converged" if converged else "the search did not converge", *known.reasons]
+    inputs = [part.record.u for part in whole.parts]
+    if all((np.diff(u) >= 0.0).all() or (np.diff(u) <= 0.0).all() for u in inputs):
+        phrases.append("the input never turns back: nothing shows what unloading does")
+    for name, curve in curves.items():
+        if any(curve.at_box):
+            phrases.append(f"the interval of {name} ends at the box")
+    if rivals:
+        what = "optimum" if len(rivals) == 1 else "optima"
+        phrases.append(f"{len(rivals)} other {what} within the noise")
+    return [*phrases, *notes]

@@ -1,10 +1,16 @@
 """What `identify` returns."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import field
-from typing import Any
+from typing import Any, Self
 
+import numpy as np
+
+import hysim
 from hysim._frozen import FloatArray, frozen
+from hysim.identification import _json
+from hysim.identification._profile import Profile
 
 
 @frozen
@@ -30,20 +36,41 @@ class Candidate:
 
 
 @frozen
+class Width:
+    """The largest width of a loop, and the interval at 95 % that the parameters' uncertainty leaves [unit of y]."""
+
+    value: float
+    lower: float
+    upper: float
+
+
+@frozen
 class Identification:
-    """Parameters of a model, identified on a record.
+    """Parameters of a model, identified on one or several records.
 
     Parameters
     ----------
     model : model
-        The identified model.
+        The identified model; of several records as the first begins.
+    models : tuple of model
+        One for each record: they differ in the state at the first sample.
     estimates : mapping
         Every parameter by name, the held ones included.
     stderr : mapping
         Standard error of each free parameter by the linearised model; nan where the data cannot tell,
         with the reason in `message`.
+    intervals : mapping
+        Name to (lower, upper) at 95 %; nan where the data cannot tell.
+    interval_method : {"linear", "profile", "bootstrap"}
+        How they were found.
+    profiles : mapping
+        Name to the profile of the likelihood, where it was computed.
     covariance : array, shape (n_parameters, n_parameters)
         Of the free parameters, in the order of `free_names`.
+    condition : float
+        Condition number of the Jacobian whose columns have length one.
+    redundant : tuple of tuples of str
+        Groups of parameters that the data cannot tell apart.
     free_names : tuple of str
         The parameters that were identified.
     n_parameters : int
@@ -52,8 +79,24 @@ class Identification:
         100 (1 - ||residual|| / ||y - mean(y)||), and the residual's root mean square [unit of y].
     fpe, aic, bic : float
         V (1 + d/N) / (1 - d/N), N ln V + 2 d, N ln V + d ln N, with V the mean squared residual.
+    noise : {"gaussian", "quantised", "robust"}
+        The density whose likelihood is at its largest.
+    sigma : float
+        Its scale, the most likely one [unit of y].
+    log_likelihood : float
+        Without the constants; see `hysim.identification._noise`.
+    least_squares : Candidate or None
+        The optimum of the sum of squares, where the noise is not Gaussian.
     residual : array, shape (n,)
-        Measured minus model [unit of y].
+        Measured minus model, one record after the other [unit of y].
+    resolution : float or None
+        Quantum of the sensor [unit of y].
+    response_stderr : array, shape (n,)
+        Standard error of the model's output [unit of y].
+    loop_width : Width or None
+        The largest width of the first record's loop with its band; None if the record has no complete cycle.
+    whiteness : float
+        Probability of residuals at least as correlated if they were white (Ljung and Box); nan if unknown.
     success : bool
         Whether the search converged.
     message : str
@@ -66,12 +109,20 @@ class Identification:
         where the optimum lies outside.
     cv_rmse : float
         Cross-validated rmse [unit of y]; nan if it was not asked for.
+    seed : int
+        Of the starts of the search.
     """
 
     model: Any
+    models: tuple[Any, ...]
     estimates: Mapping[str, float]
     stderr: Mapping[str, float]
+    intervals: Mapping[str, tuple[float, float]]
+    interval_method: str
+    profiles: Mapping[str, Profile]
     covariance: FloatArray
+    condition: float
+    redundant: tuple[tuple[str, ...], ...]
     free_names: tuple[str, ...]
     n_parameters: int
     fit_percent: float
@@ -79,12 +130,33 @@ class Identification:
     fpe: float
     aic: float
     bic: float
+    noise: str
+    sigma: float
+    log_likelihood: float
+    least_squares: Candidate | None
     residual: FloatArray
+    resolution: float | None
+    response_stderr: FloatArray
+    loop_width: Width | None
+    whiteness: float
     success: bool
     message: str
     rivals: tuple[Candidate, ...] = ()
     regions: Mapping[str, Candidate] = field(default_factory=dict)
     cv_rmse: float = float("nan")
+    seed: int = 0
+
+    @property
+    def correlation(self) -> FloatArray:
+        """Correlation of the free parameters, shape (n_parameters, n_parameters); nan where it is unknown."""
+        scale = np.sqrt(np.diag(self.covariance))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(self.covariance / np.outer(scale, scale))
+
+    @property
+    def residual_quanta(self) -> FloatArray | None:
+        """The residual in quanta of the sensor, shape (n,); None where no resolution is known."""
+        return None if self.resolution is None else self.residual / self.resolution
 
     def summary(self) -> str:
         """The result in a few lines."""
@@ -93,8 +165,57 @@ class Identification:
             f"{family}: fit {self.fit_percent:.2f} %, rmse {self.rmse:.4g}, FPE {self.fpe:.4g}, "
             f"BIC {self.bic:.1f}, {self.n_parameters} parameters from {self.residual.size} samples"
         ]
-        lines += [f"  {name} = {self.estimates[name]:.6g} +- {self.stderr[name]:.2g}" for name in self.free_names]
+        lines += [self._line(name) for name in self.free_names]
         held = [f"{name} = {value:g}" for name, value in self.estimates.items() if name not in self.free_names]
         lines += [f"  held: {', '.join(held)}"] if held else []
+        lines += [f"  residual: {self._residual_in_words()}"]
+        if self.loop_width is not None:
+            width = self.loop_width
+            lines.append(f"  loop width {width.value:.4g}  [{width.lower:.4g}, {width.upper:.4g}]")
+        if not np.isnan(self.cv_rmse):
+            lines.append(f"  cross-validated rmse {self.cv_rmse:.4g}")
         lines += [f"  best {name}: fit {best.fit_percent:.2f} %" for name, best in self.regions.items()]
         return "\n".join([*lines, f"  {self.message}"])
+
+    def _line(self, name: str) -> str:
+        lower, upper = self.intervals[name]
+        return f"  {name} = {self.estimates[name]:.6g} +- {self.stderr[name]:.2g}  [{lower:.5g}, {upper:.5g}]"
+
+    def _residual_in_words(self) -> str:
+        largest = float(np.abs(self.residual).max())
+        words = [f"largest {largest:.4g}"]
+        if self.resolution is not None:
+            words = [f"largest {largest / self.resolution:.2f} quanta, rms {self.rmse / self.resolution:.2f}"]
+        if self.noise != "gaussian":
+            words.append(f"{self.noise} noise of sigma {self.sigma:.4g}")
+        if not np.isnan(self.whiteness):
+            words.append(f"white with probability {self.whiteness:.2g}")
+        return ", ".join(words)
+
+    def to_json(self) -> str:
+        """The whole result as JSON, with the version of hysim; `from_json` gives it back, every number to the bit.
+
+        Raises
+        ------
+        TypeError
+            If the model is not of one of hysim's families.
+        """
+        document = {"hysim": hysim.__version__, "identification": _json.to_plain(self)}
+        return json.dumps(document, indent=2, allow_nan=False) + "\n"
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """A result that `to_json` wrote.
+
+        Raises
+        ------
+        ValueError
+            If the text does not hold one.
+        """
+        try:
+            found = _json.from_plain(json.loads(text)["identification"], (cls, Candidate, Width, Profile))
+        except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+            raise ValueError(f"this is not an identification of hysim: {type(error).__name__}: {error}") from None
+        if not isinstance(found, cls):
+            raise ValueError(f"this is not an identification of hysim, but {type(found).__name__}")
+        return found

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim._parallel import Progress
-from hysim.identification._projection import Projection
+from hysim.identification._problem import Problem
 from hysim.models.search_space import SearchSpace
 
 N_SCREENED = 4096
@@ -24,6 +24,7 @@ _LONG = 512  # samples beyond which fewer points are tried: each costs more, and
 _APART = 0.05  # distance of two starts, in units of the box, under which the better one stands for both
 _SAME = 0.01  # likewise of two points after the descent
 _STUCK = 1e8  # damping beyond which no step can help
+_GAIN = 1e-5
 _TOLERANCE = 1e-10
 _FLAT = 1e-15
 
@@ -38,17 +39,17 @@ class Optimum(NamedTuple):
     converged: bool
 
 
-def optima(problem: Projection, *, seed: int, progress: Progress | None = None) -> list[Optimum]:
+def optima(problem: Problem, *, seed: int, progress: Progress | None = None) -> list[Optimum]:
     """Distinct local optima of `problem`, best first; empty if nothing in the box stays finite."""
     space = problem.space
     if not space.coordinates:
         return [polish(problem, np.empty(0))]
-    share = min(1.0, _LONG / len(problem.record))
+    share = min(1.0, _LONG / problem.y.size)
     screened = max(256, round(N_SCREENED * share)) if space.screened is None else space.screened
     candidates = np.concatenate([space.starts, _uniform(space, screened, seed)])
     n_starts = max(16, round(N_DESCENDING * share))
     starts = _apart(space, candidates, problem.costs(candidates), _APART, n_starts, len(space.starts))
-    reached, cost = descend(problem, starts)
+    reached, cost = _descend(problem, starts)
     found = []
     best = _apart(space, reached, cost, _SAME, N_POLISHED)
     for done, start in enumerate(best):
@@ -58,34 +59,31 @@ def optima(problem: Projection, *, seed: int, progress: Progress | None = None) 
     return _distinct(found)
 
 
-def descend(
-    problem: Projection, x: FloatArray, weights: FloatArray | None = None, *, tolerance: float = 1e-5
-) -> tuple[FloatArray, FloatArray]:
+def _descend(problem: Problem, x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Points (n, n_x) after projected Levenberg-Marquardt steps from `x` (n, n_x), and their sums of squares.
 
-    A point rests when a step lowers its sum by less than the share `tolerance`, and all after `N_STEPS`.
+    A point rests when a step lowers its sum by less than the share `_GAIN`, and all after `N_STEPS`.
     """
     x = x.copy()
     lower, upper = problem.space.lower, problem.space.upper
     damping = np.full(len(x), 1e-2)
-    residual = problem.solve(x, weights)[1]
+    residual = problem.solve(x)[1]
     cost = np.sum(residual**2, axis=1)
     moving = np.flatnonzero(np.isfinite(cost))
     for _ in range(N_STEPS if x.shape[1] else 0):
         if not moving.size:
             break
-        shares = None if weights is None else weights[moving]
-        slopes = (upper - lower) * problem.rough_jacobians(x[moving], residual[moving], shares)
+        slopes = (upper - lower) * problem.rough_jacobians(x[moving], residual[moving])
         step = _damped_step(slopes, residual[moving], damping[moving], x[moving] <= lower, x[moving] >= upper)
         trial = np.clip(x[moving] + step * (upper - lower), lower, upper)
-        trial_residual = problem.solve(trial, shares)[1]
+        trial_residual = problem.solve(trial)[1]
         trial_cost = np.sum(trial_residual**2, axis=1)
         better = trial_cost < cost[moving]
         gained = 1.0 - np.divide(trial_cost, cost[moving], out=np.zeros_like(cost[moving]), where=better)
         won = moving[better]
         x[won], residual[won], cost[won] = trial[better], trial_residual[better], trial_cost[better]
         damping[moving] *= np.where(better, 0.2, 5.0)
-        moving = moving[(gained >= tolerance) & (damping[moving] <= _STUCK)]
+        moving = moving[(gained >= _GAIN) & (damping[moving] <= _STUCK)]
     return x, cost
 
 
@@ -105,7 +103,7 @@ def _damped_step(
     return np.asarray(np.linalg.solve(damped, -np.where(held, 0.0, gradient)[..., np.newaxis])[..., 0])
 
 
-def polish(problem: Projection, start: FloatArray) -> Optimum:
+def polish(problem: Problem, start: FloatArray) -> Optimum:
     """The local optimum that is reached from `start`."""
     from scipy.optimize import least_squares
 
@@ -113,7 +111,7 @@ def polish(problem: Projection, start: FloatArray) -> Optimum:
     if not start.size:
         return Optimum(start, float(np.sum(problem.residual(start) ** 2)), True)
     width = space.upper - space.lower
-    scale = float(np.linalg.norm(problem.record.y - problem.record.y.mean())) or 1.0  # makes gtol free of units
+    scale = float(np.linalg.norm(problem.y - problem.y.mean())) or 1.0  # makes gtol free of units
     result = least_squares(
         lambda x: problem.residual(x) / scale,
         np.clip(start, space.lower + 1e-9 * width, space.upper - 1e-9 * width),

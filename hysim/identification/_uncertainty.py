@@ -1,71 +1,111 @@
 """Standard errors by the linearised model, and what the data cannot tell.
 
-At the optimum the residual is linear in all free parameters p = (searched, linear). With J = dy/dx in the
-search's coordinates and the columns of the linear parameters, and G the Jacobian of the way back to the
-user's parameters, the covariance is
+With J = dm/dtheta at the optimum, theta the searched coordinates and the linear parameters, W the curvature of the
+loss in the model's output (1/sigma^2 for normal noise), and G = d(the user's parameters)/d(theta),
 
-    cov = s^2 G (J^T J)^-1 G^T,   s^2 = ||residual||^2 / (N - d).
+    cov = N / (N - d) G (J^T W J)^-1 G^T.
 
-A coordinate at a side of its box is taken as known; it and a direction along which the output does not
-change have no standard error.
+A coordinate at a side of its box is taken as known; it and a direction along which the output does not change have
+no standard error. The condition number is that of W^(1/2) J with columns of length one.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.identification._projection import Projection
+from hysim.identification._descent import named_slopes
+from hysim.identification._problem import Problem
 
 _SINGULAR = 1e-7  # below this share of the largest, a direction of the scaled Jacobian is not identifiable
 _AT_SIDE = 1e-6  # in units of the box
+_TAKES_PART = 0.05  # share of a parameter in a direction, of the largest share in it, to be named
 
 
-def covariance(problem: Projection, x: FloatArray, residual: FloatArray) -> tuple[FloatArray, list[str]]:
-    """Covariance in the order of `space.names`, nan where it is unknown, and the reasons in words."""
-    space = problem.space
-    freedom = residual.size - len(space.names)
-    unknown = np.full((len(space.names), len(space.names)), np.nan)
-    if freedom <= 0:
-        return unknown, [f"no standard errors: {residual.size} samples for {len(space.names)} parameters"]
-    jacobian, way_back = _jacobians(problem, x)
-    if not np.isfinite(jacobian).all():
-        return unknown, ["no standard errors: the output is not finite beside the optimum"]
+@dataclass(frozen=True)
+class Uncertainty:
+    """What is known of the parameters at an optimum."""
+
+    covariance: FloatArray  # (n_names, n_names), nan where it is unknown
+    of_theta: FloatArray  # (n_theta, n_theta), zero along what is not known
+    with_names: FloatArray  # (n_theta, n_names), of theta with the parameters
+    output: FloatArray  # (n_samples,), standard error of the model's output
+    condition: float
+    redundant: tuple[tuple[str, ...], ...]
+    reasons: tuple[str, ...]
+
+
+def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> Uncertainty:
+    """The covariance at `theta` (n_theta,) for the curvature of the loss (n_samples,)."""
+    space, n_samples = problem.space, problem.y.size
+    n_names = len(space.names)
+    if n_samples <= n_names:
+        return _unknown(problem, theta, f"no standard errors: {n_samples} samples for {n_names} parameters")
+    slopes, way_back = output_slopes(problem, theta), named_slopes(problem, theta[np.newaxis])[0]
+    if not np.isfinite(slopes).all():
+        return _unknown(problem, theta, "no standard errors: the output is not finite beside the optimum")
+    x = theta[: len(space.coordinates)]
     margin = _AT_SIDE * (space.upper - space.lower)
     at_side = (x - space.lower < margin) | (space.upper - x < margin)
     reasons = [f"{name} is at a side of its box" for name, side in zip(space.coordinates, at_side, strict=True) if side]
     known = np.concatenate([at_side, np.zeros(len(space.linear), dtype=bool)])
-    jacobian[:, known], way_back[:, known] = 0.0, 0.0
-    norms = np.linalg.norm(jacobian, axis=0)
+    scaled, way_back = np.where(known, 0.0, slopes) * np.sqrt(curvature)[:, np.newaxis], np.where(known, 0.0, way_back)
+    norms = np.linalg.norm(scaled, axis=0)
     norms[norms == 0.0] = 1.0
-    _, singular, right = np.linalg.svd(jacobian / norms, full_matrices=False)
+    _, singular, right = np.linalg.svd(scaled / norms, full_matrices=False)
     told = singular > _SINGULAR * singular[0]
+    factor = np.sqrt(n_samples / (n_samples - n_names))
+    spread = factor * (right[told].T / singular[told]) / norms[:, np.newaxis]
     directions = way_back / norms @ right.T
-    spread = directions[:, told] / singular[told]
-    result = float(residual @ residual) / freedom * spread @ spread.T
-    blind = np.abs(directions[:, ~told]).max(axis=1, initial=0.0)
+    covariance = (way_back @ spread) @ (way_back @ spread).T
     size = np.abs(directions).max(axis=1)
-    lost = blind > 1e-3 * size
-    if lost.any():
-        reasons.append(f"the data cannot tell {', '.join(np.array(space.names)[lost])} apart")
-    nowhere = lost | (size == 0.0)
-    result[nowhere], result[:, nowhere] = np.nan, np.nan
-    return result, reasons
+    blind = np.flatnonzero(~told & (np.abs(right[:, ~known]).max(axis=1, initial=0.0) > 0.5 / np.sqrt(known.size)))
+    redundant = tuple(_named(space.names, directions[:, k], size) for k in blind)
+    redundant = tuple(dict.fromkeys(names for names in redundant if names))
+    reasons += [_in_words(names, space.redundant) for names in redundant]
+    lost = (np.abs(directions[:, ~told]).max(axis=1, initial=0.0) > 1e-3 * size) | (size == 0.0)
+    covariance[lost], covariance[:, lost] = np.nan, np.nan
+    free = singular[: np.count_nonzero(~known)]
+    condition = float(free[0] / free[-1]) if free.size and free[-1] > 0.0 else np.inf
+    output = np.linalg.norm(slopes @ spread, axis=1)
+    together = spread @ (way_back @ spread).T
+    return Uncertainty(covariance, spread @ spread.T, together, output, condition, redundant, tuple(reasons))
 
 
-def _jacobians(problem: Projection, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """dy/d(searched, linear), and d(user's names)/d(searched, linear)."""
-    space = problem.space
-    linear = problem.solve(x[np.newaxis])[0][0]
-    ahead, behind, steps = (values[0] for values in problem.neighbours(x[np.newaxis]))
-    points = np.concatenate([ahead, behind, x[np.newaxis]])
-    parameters = space.parameters(points)
-    columns, fixed_part = problem.split(parameters)
+def output_slopes(problem: Problem, theta: FloatArray) -> FloatArray:
+    """dm/dtheta, (n_samples, n_theta), by central differences."""
+    n_x = len(problem.space.coordinates)
+    x, linear = theta[np.newaxis, :n_x], theta[n_x:]
+    ahead, behind, steps = (values[0] for values in problem.neighbours(x))
+    columns, fixed_part = problem.split(np.concatenate([ahead, behind, x]))
     outputs = columns @ linear + fixed_part
-    n_x, n_names = x.size, len(space.names)
-    way_back = np.zeros((n_names, n_x + len(space.linear)))
-    for row, name in enumerate(space.names):
-        if name in space.linear:
-            way_back[row, n_x + space.linear.index(name)] = 1.0
-        else:
-            values = parameters[name]
-            way_back[row, :n_x] = (values[:n_x] - values[n_x : 2 * n_x]) / steps
-    return np.column_stack([(outputs[:n_x] - outputs[n_x : 2 * n_x]).T / steps, columns[-1]]), way_back
+    with np.errstate(invalid="ignore"):
+        return np.column_stack([(outputs[:n_x] - outputs[n_x : 2 * n_x]).T / steps, columns[-1]])
+
+
+def _unknown(problem: Problem, theta: FloatArray, reason: str) -> Uncertainty:
+    n_names, n_theta = len(problem.space.names), theta.size
+    return Uncertainty(
+        covariance=np.full((n_names, n_names), np.nan),
+        of_theta=np.zeros((n_theta, n_theta)),
+        with_names=np.zeros((n_theta, n_names)),
+        output=np.full(problem.y.size, np.nan),
+        condition=np.nan,
+        redundant=(),
+        reasons=(reason,),
+    )
+
+
+def _named(names: tuple[str, ...], direction: FloatArray, size: FloatArray) -> tuple[str, ...]:
+    """The parameters that move along a direction, each measured by its largest move along any."""
+    share = np.abs(direction) / np.where(size == 0.0, 1.0, size)
+    return tuple(np.array(names)[share > _TAKES_PART * max(share.max(initial=0.0), 1e-12)].tolist())
+
+
+def _in_words(names: tuple[str, ...], groups: tuple[tuple[str, ...], ...]) -> str:
+    if len(names) == 1:
+        return f"the data cannot tell {names[0]}"
+    for group in groups:
+        if set(group) <= set(names):
+            return f"the data cannot tell {' and '.join(group)} apart, only their product: fix one of them"
+    return f"the data cannot tell {', '.join(names)} apart"

@@ -77,6 +77,7 @@ def search_space(
         redundant=REDUNDANT,
         regions={"admissible": (quadrant, upper)} if set(_PAIR) <= set(box) else {},
         bounds={name: pair for name, pair in bounds.items() if name in columns},
+        state=("z0",),
     )
 
 

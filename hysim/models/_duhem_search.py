@@ -59,6 +59,7 @@ def search_space(
         linear=(),
         held=held,
         parameters=parameters,
+        state=("y0",),
     )
 
 

@@ -212,6 +212,7 @@ class CustomLaw:
             held=held,
             parameters=decode,
             bounds={name: pair for name, pair in limits.items() if name in self.linear},
+            state=tuple(self.state),
         )
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:

@@ -77,10 +77,10 @@ class Freedom:
     initial: str | None = None
 
     def starts_at_rest(self, default: str = "free") -> bool:
-        """Whether the initial state is held at rest, where the user says nothing by the family's default."""
-        if self.initial not in (None, "free", "rest"):
-            raise ValueError(f'initial must be "free" or "rest", got {self.initial!r}')
-        return (self.initial or default) == "rest"
+        """Whether the initial state is not free, where the user says nothing by the family's default."""
+        if self.initial not in (None, "free", "rest", "periodic"):
+            raise ValueError(f'initial must be "free", "rest" or "periodic", got {self.initial!r}')
+        return (self.initial or default) != "free"
 
     def held(
         self,
@@ -133,7 +133,12 @@ ALL_FREE = Freedom()
 
 
 class Identifiable(Protocol):
-    """What `identify` takes: a model class, a model as the start, or a structure."""
+    """What `identify` takes: a model class, a model as the start, or a structure.
+
+    A family may offer two methods more: ``steady(parameters, record)``, the parameters of the state at the first
+    sample of a record that repeats itself, by name, and ``notes(record, model)``, what a user should know of the
+    identified model, as a tuple of phrases.
+    """
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """Declare the box for `record`."""

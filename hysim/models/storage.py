@@ -46,9 +46,9 @@ def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None
     ...     hs.load_model(f"{folder}/line.json")
     Line(offset=0.0, slope=0.1)
     """
-    if not _is_model(model):
+    if not is_model(model):
         raise TypeError(f"save takes a model of hysim, got {type(model).__name__}")
-    document = {"hysim": hysim.__version__, **_plain(model), "units": dict(units or {})}
+    document = {"hysim": hysim.__version__, **to_document(model), "units": dict(units or {})}
     write_text(path, json.dumps(document, indent=2, allow_nan=False) + "\n")
 
 
@@ -71,25 +71,27 @@ def load_model(path: str | Path) -> Any:
     OSError
         If it cannot be read.
     """
-    for module in _MODULES:
-        importlib.import_module(f"hysim.models.{module}")
     try:
         document = json.loads(Path(path).read_text(encoding="utf-8"))
         head = {"family": document["family"], "parameters": {**document["parameters"]}}
     except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise ValueError(f"{path} does not hold a model of hysim: {type(error).__name__}: {error}") from None
-    return _model(head, path)
+    return from_document(head, path)
 
 
-def _model(document: Mapping[str, Any], path: str | Path) -> Any:
-    """The model of a family with its parameters, models among them."""
+def from_document(document: Mapping[str, Any], path: str | Path) -> Any:
+    """The model of a family with its parameters, models among them; `path` is what the messages call its place."""
+    for module in _MODULES:
+        importlib.import_module(f"hysim.models.{module}")
     family, given = str(document["family"]), document["parameters"]
     if family in hysim.__all__:
         getattr(hysim, family)  # loads its module, which enters the families that live elsewhere
     if family not in FAMILIES:
         raise ValueError(f"{path} holds a model of the family {family!r}; there are {', '.join(sorted(FAMILIES))}")
     try:
-        parameters = {name: _model(value, path) if _is_nested(value) else value for name, value in given.items()}
+        parameters = {
+            name: from_document(value, path) if is_document(value) else value for name, value in given.items()
+        }
         loaded = FAMILIES[family](**parameters)
     except (AttributeError, TypeError, ValueError) as error:
         raise ValueError(f"{path} does not hold a {family}: {error}") from None
@@ -98,16 +100,19 @@ def _model(document: Mapping[str, Any], path: str | Path) -> Any:
     return loaded
 
 
-def _is_model(value: Any) -> bool:
+def is_model(value: Any) -> bool:
+    """Whether a value is a model of a known family."""
     return FAMILIES.get(type(value).__name__) is type(value)
 
 
-def _is_nested(value: Any) -> bool:
+def is_document(value: Any) -> bool:
+    """Whether a value read from JSON is what `to_document` makes of a model."""
     return isinstance(value, dict) and value.keys() == {"family", "parameters"}
 
 
-def _plain(value: Any) -> Any:
-    if _is_model(value):
-        parameters = {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
+def to_document(value: Any) -> Any:
+    """The plain form of a model, or of a value inside one."""
+    if is_model(value):
+        parameters = {field.name: to_document(getattr(value, field.name)) for field in fields(value)}
         return {"family": type(value).__name__, "parameters": parameters}
     return value.tolist() if isinstance(value, np.ndarray) else list(value) if isinstance(value, tuple) else value

@@ -248,6 +248,7 @@ class TransferFunctionStructure:
             held=held,
             parameters=lambda x: self._denominators(np.atleast_2d(x), sample_time),
             bounds=limits,
+            state=self.columns[self.zeros + 1 :],
         )
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:

@@ -1,0 +1,242 @@
+"""Many sets of parameters descend together: all of a problem's parameters, any noise, a constraint if wanted.
+
+A set is theta = (x, b), coordinates and linear parameters. With J = dm/dtheta, the slopes g and curvatures W >= 0 of
+the loss in the model's output m, and the best sigma for the residuals at hand, a step d solves the weighted regression
+
+    minimise  1/2 || W^(1/2) J d + W^(-1/2) g ||^2 + damping || D d ||^2,
+
+D the norms of the columns of x (Levenberg, Marquardt; the loss is linear in no other way in b, whose part of the
+step is not damped). A constraint "this parameter has that value" is kept by eliminating one coordinate, the pivot,
+from the step, and by bringing the pivot back onto the constraint after it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray
+from hysim.identification._noise import Noise
+from hysim.identification._problem import Problem
+
+Flags = npt.NDArray[np.bool_]
+
+N_STEPS = 60
+_STUCK = 1e7  # damping beyond which no step can help
+_FLOOR = 1e-9  # damping of everything, in norms of columns: a column without effect keeps its place
+_RESTORING = 12
+_ON_CONSTRAINT = 1e-11  # relative error of the constrained value
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """In each set the parameter `place` of `space.names` has the value `value`; both (n_sets,)."""
+
+    place: npt.NDArray[np.intp]
+    value: FloatArray
+
+    def of(self, sets: Flags | npt.NDArray[np.intp]) -> "Constraint":
+        """The constraint of some of the sets."""
+        return Constraint(self.place[sets], self.value[sets])
+
+
+@dataclass(frozen=True)
+class Reached:
+    """Where the sets have come to: theta (n_sets, n_theta), minus the log-likelihood and sigma, (n_sets,)."""
+
+    theta: FloatArray
+    loss: FloatArray
+    sigma: FloatArray
+
+
+@dataclass(frozen=True)
+class Descent:
+    """What does not change on the way: targets and weights are (n_sets, n_samples), or (1, n_samples) for all."""
+
+    problem: Problem
+    noise: Noise
+    targets: FloatArray
+    weights: FloatArray
+
+    def run(
+        self, theta: FloatArray, *, constraint: Constraint | None = None, tolerance: float = 1e-5, steps: int = N_STEPS
+    ) -> Reached:
+        """Descend from `theta` (n_sets, n_theta) until a step lowers the loss by less than `tolerance`."""
+        theta = np.clip(theta, *self.box())
+        n_sets = len(theta)
+        targets, weights = (np.broadcast_to(each, (n_sets, each.shape[1])) for each in (self.targets, self.weights))
+        if constraint is not None:
+            theta = self._restored(theta, constraint, self._pivots(theta, constraint)[0])
+        outputs = self.outputs(theta)
+        loss, sigma = self._loss(targets - outputs, weights)
+        if constraint is not None:
+            loss[~self._kept(theta, constraint)] = np.inf
+        damping = np.full(n_sets, 1e-3)
+        moving = np.flatnonzero(np.isfinite(loss))
+        for _ in range(steps):
+            if not moving.size:
+                break
+            bound = None if constraint is None else constraint.of(moving)
+            residual = targets[moving] - outputs[moving]
+            trial = self._step(theta[moving], outputs[moving], residual, weights[moving], sigma[moving],
+                               damping[moving], bound)  # fmt: skip
+            trial_outputs = self.outputs(trial)
+            trial_loss, trial_sigma = self._loss(targets[moving] - trial_outputs, weights[moving])
+            if bound is not None:
+                trial_loss[~self._kept(trial, bound)] = np.inf
+            better = trial_loss < loss[moving]
+            gained = np.where(better, loss[moving] - trial_loss, 0.0)
+            won = moving[better]
+            theta[won], outputs[won] = trial[better], trial_outputs[better]
+            loss[won], sigma[won] = trial_loss[better], trial_sigma[better]
+            damping[moving] *= np.where(better, 0.1, 10.0)
+            stays = better & (gained < tolerance) | (damping[moving] > _STUCK)
+            moving = moving[~stays]
+        return Reached(theta, loss, sigma[:, 0])
+
+    def outputs(self, theta: FloatArray) -> FloatArray:
+        """The model's outputs at `theta`, (n_sets, n_samples)."""
+        n_x = len(self.problem.space.coordinates)
+        columns, fixed_part = self.problem.split(theta[:, :n_x])
+        with np.errstate(over="ignore", invalid="ignore"):
+            return fixed_part + (columns @ theta[:, n_x:, np.newaxis])[..., 0]
+
+    def _loss(self, residual: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Minus the log-likelihood (n_sets,), and the best sigma (n_sets, 1); a set that is not finite is inf."""
+        lost: Flags = np.logical_not((np.abs(residual) < 1e150).all(axis=1))
+        residual = np.where(lost[:, np.newaxis], 0.0, residual)
+        sigma = self.noise.scale(residual, weights)
+        loss = np.sum(weights * self.noise.terms(residual, sigma).loss, axis=1)
+        loss[lost] = np.inf
+        return loss, sigma
+
+    def slopes(self, theta: FloatArray, outputs: FloatArray | None = None) -> FloatArray:
+        """dm/dtheta, (n_sets, n_samples, n_theta), by one-sided differences in x."""
+        n_sets, n_x = len(theta), len(self.problem.space.coordinates)
+        outputs = self.outputs(theta) if outputs is None else outputs
+        x, linear = theta[:, :n_x], theta[:, n_x:]
+        columns = self.problem.split(x)[0]
+        if not n_x:
+            return columns
+        ends, steps = self.problem.beside(x)
+        ahead = np.concatenate([ends, np.broadcast_to(linear[:, np.newaxis], (n_sets, n_x, linear.shape[1]))], axis=2)
+        moved = self.outputs(ahead.reshape(n_sets * n_x, -1)).reshape(n_sets, n_x, -1)
+        with np.errstate(over="ignore", invalid="ignore"):
+            by_x = (moved - outputs[:, np.newaxis]) / steps[..., np.newaxis]
+        by_x[~np.isfinite(by_x)] = 0.0
+        return np.concatenate([by_x.transpose(0, 2, 1), columns], axis=2)
+
+    def _step(
+        self,
+        theta: FloatArray,
+        outputs: FloatArray,
+        residual: FloatArray,
+        weights: FloatArray,
+        sigma: FloatArray,
+        damping: FloatArray,
+        constraint: Constraint | None,
+    ) -> FloatArray:
+        """The next trial."""
+        _, slope, curvature = self.noise.terms(residual, sigma)
+        root = np.sqrt(weights * np.maximum(curvature, 1e-12 / sigma**2))
+        J = root[..., np.newaxis] * self.slopes(theta, outputs)
+        goal = -weights * slope / np.where(root > 0.0, root, 1.0)
+        lower, upper = self.box()
+        frozen = np.zeros(theta.shape, dtype=bool)
+        pivot, shares = (None, None) if constraint is None else self._pivots(theta, constraint)
+        for _ in range(2):  # a second time with what would leave the box held at its side
+            step = _regression(np.where(frozen[:, np.newaxis], 0.0, J), goal, damping, len(
+                self.problem.space.coordinates), pivot, shares)  # fmt: skip
+            leaving = ((theta <= lower) & (step < 0.0)) | ((theta >= upper) & (step > 0.0))
+            if pivot is not None:
+                leaving[np.arange(len(theta)), pivot] = False
+            if not (leaving & ~frozen).any():
+                break
+            frozen |= leaving
+        trial = np.clip(theta + np.where(frozen, 0.0, step), lower, upper)
+        return trial if constraint is None or pivot is None else self._restored(trial, constraint, pivot)
+
+    def box(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper bounds of theta."""
+        space, linear = self.problem.space, self.problem.linear_box()
+        return np.concatenate([space.lower, linear[0]]), np.concatenate([space.upper, linear[1]])
+
+    def _named(self, theta: FloatArray, place: npt.NDArray[np.intp]) -> FloatArray:
+        n_x = len(self.problem.space.coordinates)
+        return self.problem.named(theta[:, :n_x], theta[:, n_x:])[np.arange(len(theta)), place]
+
+    def _pivots(self, theta: FloatArray, constraint: Constraint) -> tuple[npt.NDArray[np.intp], FloatArray]:
+        """The element of theta that each constraint is solved for, and d theta_pivot / d theta_others on it."""
+        by_theta = named_slopes(self.problem, theta)[np.arange(len(theta)), constraint.place]
+        space = self.problem.space
+        weight = np.concatenate([space.upper - space.lower, np.ones(len(space.linear))])
+        pivot = np.argmax(np.abs(by_theta) * weight, axis=1)
+        slope = by_theta[np.arange(len(theta)), pivot]
+        shares = -by_theta / np.where(slope == 0.0, 1.0, slope)[:, np.newaxis]
+        shares[np.arange(len(theta)), pivot] = 0.0
+        return pivot, shares
+
+    def _restored(self, theta: FloatArray, constraint: Constraint, pivot: npt.NDArray[np.intp]) -> FloatArray:
+        """Move the pivot onto the constraint by the secant method, inside the box."""
+        theta, rows = theta.copy(), np.arange(len(theta))
+        lower, upper = (side[pivot] for side in self.box())
+        short = constraint.value - self._named(theta, constraint.place)
+        slope = named_slopes(self.problem, theta)[rows, constraint.place, pivot]
+        for _ in range(_RESTORING):
+            if (np.abs(short) <= _ON_CONSTRAINT * np.abs(constraint.value)).all():
+                break
+            before = theta[rows, pivot]
+            moved = before + short / np.where(slope == 0.0, np.inf, slope)
+            theta[rows, pivot] = np.clip(moved, lower, upper)
+            left = constraint.value - self._named(theta, constraint.place)
+            went = theta[rows, pivot] - before
+            slope = np.where(went == 0.0, slope, (short - left) / np.where(went == 0.0, 1.0, went))
+            short = left
+        return theta
+
+    def _kept(self, theta: FloatArray, constraint: Constraint) -> Flags:
+        short = np.abs(constraint.value - self._named(theta, constraint.place))
+        return np.asarray(short <= 1e3 * _ON_CONSTRAINT * np.abs(constraint.value))
+
+
+def named_slopes(problem: Problem, theta: FloatArray) -> FloatArray:
+    """d(the user's parameters)/d(theta), (n_sets, n_names, n_theta), by central differences."""
+    space, n_x = problem.space, len(problem.space.coordinates)
+    x, linear = theta[:, :n_x], theta[:, n_x:]
+    slopes = np.zeros((len(theta), len(space.names), theta.shape[1]))
+    for place, name in enumerate(space.linear):
+        slopes[:, space.names.index(name), n_x + place] = 1.0
+    if n_x:
+        ahead, behind, steps = problem.neighbours(x)
+        repeated = np.repeat(linear, n_x, axis=0)
+        ends = [problem.named(end.reshape(-1, n_x), repeated).reshape(len(x), n_x, -1) for end in (ahead, behind)]
+        slopes[:, :, :n_x] = ((ends[0] - ends[1]) / steps[..., np.newaxis]).transpose(0, 2, 1)
+    return slopes
+
+
+def _regression(
+    J: FloatArray,
+    goal: FloatArray,
+    damping: FloatArray,
+    n_x: int,
+    pivot: npt.NDArray[np.intp] | None,
+    shares: FloatArray | None,
+) -> FloatArray:
+    """Damped least squares steps (n_sets, n_theta); with a pivot, on the constraint."""
+    if pivot is not None and shares is not None:
+        rows = np.arange(len(J))
+        column = J[rows, :, pivot]
+        J = J + column[..., np.newaxis] * shares[:, np.newaxis]
+        J[rows, :, pivot] = 0.0
+    norms = np.linalg.norm(J, axis=1)
+    norms[norms == 0.0] = 1.0
+    strength = np.full(J.shape[::2], _FLOOR)
+    strength[:, :n_x] += np.sqrt(damping)[:, np.newaxis]
+    below = strength[..., np.newaxis] * np.eye(J.shape[2])
+    stacked = np.concatenate([J / norms[:, np.newaxis], below], axis=1)
+    Q, R = np.linalg.qr(stacked)
+    projected = Q[:, : goal.shape[1]].transpose(0, 2, 1) @ goal[..., np.newaxis]
+    step = np.linalg.solve(R, projected)[..., 0] / norms
+    if pivot is not None and shares is not None:
+        step[rows, pivot] = np.sum(shares * step, axis=1)
+    return np.asarray(step)

@@ -1,0 +1,55 @@
+"""What the residual says of the model, and how uncertain the loop width is."""
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.identification._descent import Descent
+from hysim.metrics.rows import LoopRows
+
+_STEP = 1e-3  # of a difference, in standard errors: the place of the largest width may move
+_MOST_LAGS = 20
+
+
+def whiteness(residual: FloatArray, n_parameters: int) -> float:
+    """Probability of residuals at least as correlated as these if they were white (Ljung and Box 1978).
+
+    Q = N (N + 2) sum over lags k of r_k^2 / (N - k), against chi^2 with as many degrees of freedom as lags; the lags
+    are a fifth of the samples and at most 20. nan where they are too few or all equal.
+    """
+    from scipy.stats import chi2
+
+    n = residual.size
+    lags = min(_MOST_LAGS, n // 5)
+    centred = residual - residual.mean()
+    power = float(centred @ centred)
+    if lags < 2 or power == 0.0 or n <= n_parameters:
+        return float("nan")
+    correlation = np.array([centred[k:] @ centred[:-k] for k in range(1, lags + 1)]) / power
+    statistic = n * (n + 2) * np.sum(correlation**2 / (n - np.arange(1, lags + 1)))
+    return float(chi2.sf(statistic, lags))
+
+
+def loop_widths(descent: Descent, theta: FloatArray) -> FloatArray:
+    """Largest width of the loop of the first record for each theta, (n_sets,); empty where it has no loop."""
+    record = descent.problem.parts[0].record
+    outputs = descent.outputs(theta)[:, : len(record)]
+    finite = outputs[np.isfinite(outputs).all(axis=1)]
+    try:
+        return LoopRows(record.u).max_width(finite)
+    except ValueError:  # there is no complete cycle
+        return np.empty(0)
+
+
+def width_stderr(descent: Descent, theta: FloatArray, of_theta: FloatArray) -> float:
+    """Standard error of the largest width, by the linearised model; nan where there is no loop."""
+    lower, upper = descent.box()
+    scale = np.sqrt(np.maximum(np.diag(of_theta), 0.0))
+    steps = np.diag(np.where(scale > 0.0, _STEP * scale, 0.0))
+    ends = [np.clip(theta + sign * steps, lower, upper) for sign in (1.0, -1.0)]
+    widths = [loop_widths(descent, end) for end in ends]
+    distance = np.diag(ends[0] - ends[1])
+    if any(each.size != theta.size for each in widths):
+        return float("nan")
+    moving = distance > 0.0
+    slope = np.where(moving, (widths[0] - widths[1]) / np.where(moving, distance, 1.0), 0.0)
+    return float(np.sqrt(np.maximum(slope @ of_theta @ slope, 0.0)))

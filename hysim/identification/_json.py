@@ -1,0 +1,56 @@
+"""Results to plain JSON values and back: nan is null, an infinity its name, a model its family and parameters."""
+
+import math
+import types
+import typing
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from hysim.models import storage
+
+_INFINITE = ("inf", "-inf")
+
+
+def to_plain(value: Any) -> Any:
+    """A value as JSON takes it."""
+    if storage.is_model(value):
+        return storage.to_document(value)
+    if is_dataclass(value) and not isinstance(value, type):
+        contents = {field.name: to_plain(getattr(value, field.name)) for field in fields(value)}
+        return {"result": type(value).__name__, "fields": contents}
+    if isinstance(value, Mapping):
+        return {name: to_plain(each) for name, each in value.items()}
+    if isinstance(value, np.ndarray):
+        return to_plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [to_plain(each) for each in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else str(value)
+    if value is None or isinstance(value, (str, bool, int, float)):
+        return value
+    raise TypeError(f"{type(value).__name__} has no form in JSON")
+
+
+def from_plain(value: Any, kinds: Sequence[type]) -> Any:
+    """What `to_plain` wrote, of results that are one of `kinds`."""
+    if isinstance(value, dict) and value.keys() == {"result", "fields"}:
+        kind = {each.__name__: each for each in kinds}[value["result"]]
+        hints = typing.get_type_hints(kind)
+        given = {name: _field(each, hints[name], kinds) for name, each in value["fields"].items()}
+        return kind(**given)
+    if storage.is_document(value):
+        return storage.from_document(value, "the text")
+    if isinstance(value, dict):
+        return {name: from_plain(each, kinds) for name, each in value.items()}
+    if isinstance(value, list):
+        return tuple(from_plain(each, kinds) for each in value)
+    return math.nan if value is None else float(value) if value in _INFINITE else value
+
+
+def _field(value: Any, hint: Any, kinds: Sequence[type]) -> Any:
+    """One field: null is None where the field may be None, else nan."""
+    optional = typing.get_origin(hint) in (types.UnionType, typing.Union) and type(None) in typing.get_args(hint)
+    return None if value is None and optional else from_plain(value, kinds)

@@ -1,0 +1,133 @@
+"""What the measured output is believed to be: the model's, disturbed by one of three densities of scale sigma.
+
+    gaussian    y = m + sigma e,  e normal:        -ln p = r^2 / (2 sigma^2) + ln sigma,   r = y - m
+    quantised   y is the nearest multiple of q:    -ln p = -ln [Phi((r + q/2) / sigma) - Phi((r - q/2) / sigma)]
+    robust      e of Student's t, nu = 4:          -ln p = (nu + 1)/2 ln(1 + r^2 / (nu sigma^2)) + ln sigma
+
+Constants are left out of the first and the last. For given residuals the best sigma is found first, so that only
+the model's parameters are left to search. A density gives, for each sample, -ln p, its slope in m, and a curvature
+in m that is not negative: with these a descent is a sequence of weighted regressions. Many sets at once: residuals
+are (n_sets, n_samples), sigma is (n_sets, 1).
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+
+_FREEDOM = 4.0  # of Student's t: a compromise between efficiency on normal noise and indifference to outliers
+_FINEST = 0.01  # smallest sigma of quantised data, in quanta: below, the likelihood does not change any more
+_LOG_ROOT_2PI = 0.5 * np.log(2.0 * np.pi)
+
+
+class Terms(NamedTuple):
+    """Of each sample: -ln p, its slope and its curvature in the model's output, (n_sets, n_samples)."""
+
+    loss: FloatArray
+    slope: FloatArray
+    curvature: FloatArray
+
+
+class Noise(Protocol):
+    """One of the densities."""
+
+    def scale(self, residual: FloatArray, weights: FloatArray) -> FloatArray:
+        """The most likely sigma, (n_sets, 1)."""
+        ...
+
+    def terms(self, residual: FloatArray, sigma: FloatArray) -> Terms:
+        """The loss of each sample, with slope and curvature."""
+        ...
+
+    def draw(self, y: FloatArray, sigma: float, rng: np.random.Generator) -> FloatArray:
+        """Outputs as they could have been measured, of the shape of the model's outputs `y`."""
+        ...
+
+
+@dataclass(frozen=True)
+class Gaussian:
+    """Normal noise. `floor` keeps sigma off zero where a model is perfect [unit of y]."""
+
+    floor: float
+
+    def scale(self, residual: FloatArray, weights: FloatArray) -> FloatArray:
+        mean_square = np.sum(weights * residual**2, axis=1, keepdims=True) / weights.sum(axis=1, keepdims=True)
+        return np.asarray(np.maximum(np.sqrt(mean_square), self.floor))
+
+    def terms(self, residual: FloatArray, sigma: FloatArray) -> Terms:
+        normal = residual / sigma
+        return Terms(0.5 * normal**2 + np.log(sigma), -normal / sigma, np.broadcast_to(sigma**-2.0, residual.shape))
+
+    def draw(self, y: FloatArray, sigma: float, rng: np.random.Generator) -> FloatArray:
+        return y + sigma * rng.standard_normal(y.shape)
+
+
+@dataclass(frozen=True)
+class Robust:
+    """Student's t, for records with outliers."""
+
+    floor: float
+
+    def scale(self, residual: FloatArray, weights: FloatArray) -> FloatArray:
+        total = weights.sum(axis=1, keepdims=True)
+        square = np.sum(weights * residual**2, axis=1, keepdims=True) / total
+        for _ in range(30):  # expectation and maximisation, which contracts by about a half each time
+            square = np.maximum(square, self.floor**2)
+            trust = (_FREEDOM + 1.0) / (_FREEDOM + residual**2 / square)
+            square = np.sum(weights * trust * residual**2, axis=1, keepdims=True) / total
+        return np.asarray(np.maximum(np.sqrt(square), self.floor))
+
+    def terms(self, residual: FloatArray, sigma: FloatArray) -> Terms:
+        square = (residual / sigma) ** 2
+        trust = (_FREEDOM + 1.0) / (_FREEDOM + square) / sigma**2
+        loss = 0.5 * (_FREEDOM + 1.0) * np.log1p(square / _FREEDOM) + np.log(sigma)
+        return Terms(loss, -trust * residual, trust)
+
+    def draw(self, y: FloatArray, sigma: float, rng: np.random.Generator) -> FloatArray:
+        return y + sigma * rng.standard_t(_FREEDOM, y.shape)
+
+
+@dataclass(frozen=True)
+class Quantised:
+    """Normal noise before a sensor that rounds to multiples of `quantum` [unit of y]."""
+
+    quantum: float
+
+    def scale(self, residual: FloatArray, weights: FloatArray) -> FloatArray:
+        """By bisection on ln sigma: ln p is concave in 1 / sigma, so that its slope changes sign but once."""
+        widest = np.sqrt(np.sum(weights * residual**2, axis=1, keepdims=True) / weights.sum(axis=1, keepdims=True))
+        low = np.full((len(residual), 1), np.log(_FINEST * self.quantum))
+        high = np.log(widest + self.quantum)
+        for _ in range(26):
+            middle = 0.5 * (low + high)
+            falls = np.sum(weights * self._scale_slope(residual, np.exp(middle)), axis=1, keepdims=True) < 0.0
+            low, high = np.where(falls, middle, low), np.where(falls, high, middle)
+        return np.asarray(np.exp(0.5 * (low + high)))
+
+    def terms(self, residual: FloatArray, sigma: FloatArray) -> Terms:
+        near, far, log_p, near_share, far_share = self._interval(residual, sigma)
+        slope = (near_share - far_share) / sigma
+        curvature = slope**2 + (far * far_share - near * near_share) / sigma**2
+        return Terms(-log_p, np.sign(residual) * -slope, np.maximum(curvature, 0.0))
+
+    def draw(self, y: FloatArray, sigma: float, rng: np.random.Generator) -> FloatArray:
+        return self.quantum * np.round((y + sigma * rng.standard_normal(y.shape)) / self.quantum)
+
+    def _scale_slope(self, residual: FloatArray, sigma: FloatArray) -> FloatArray:
+        near, far, _, near_share, far_share = self._interval(residual, sigma)
+        return far * far_share - near * near_share
+
+    def _interval(self, residual: FloatArray, sigma: FloatArray) -> tuple[FloatArray, ...]:
+        """Ends of the interval in sigma, mirrored to the upper side; ln P; and the density at the ends over P."""
+        from scipy.special import log_ndtr
+
+        size = np.abs(residual)
+        near, far = (size - 0.5 * self.quantum) / sigma, (size + 0.5 * self.quantum) / sigma
+        above_near, above_far = log_ndtr(-near), log_ndtr(-far)
+        log_p = above_near + np.log1p(-np.exp(np.minimum(above_far - above_near, -1e-16)))
+        most = np.abs(near) + sigma / self.quantum + 1.0  # bound of a share, for residuals beyond all digits
+        shares = [np.minimum(np.exp(np.minimum(-0.5 * end**2 - _LOG_ROOT_2PI - log_p, 700.0)), most)
+                  for end in (near, far)]  # fmt: skip
+        return near, far, log_p, *shares

@@ -1,0 +1,293 @@
+"""One family on one or several records: an output that is affine in some parameters, and what is fitted to it.
+
+The family's coordinates x are searched in a box. For given x the output is affine in the linear parameters b,
+
+    y(x, b) = C(x) b + e(x),
+
+and the best b is a regression, b(x) = C(x)^+ (y - e(x)); what is left to minimise is the norm of the projected
+residual r(x) = y - e(x) - C(x) b(x) (Golub and Pereyra 1973). Several records follow each other: they share all
+parameters but those of the state at the first sample, of which each record has its own, named ``z0[0]``,
+``z0[1]``, ... Everything is evaluated for many x at once.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray
+from hysim.models.search_space import Freedom, Identifiable, Parameters, SearchSpace
+from hysim.records import Record
+
+_CHUNK = 200_000  # samples that are evaluated at once, to bound the memory
+_LARGEST = 1e150  # beyond it squares overflow: such a set counts as one that has escaped
+_RANK = 1e-11  # singular values of the normalised columns below this are taken as zero
+_DIFFERENCE = 1e-6  # step of a central difference in units of the box: truncation and rounding both ~1e-10
+
+STATES = ("free", "rest", "periodic")
+
+
+@dataclass(frozen=True)
+class Part:
+    """One record, and where the family's own coordinates and linear parameters stand among those of all records."""
+
+    record: Record
+    coordinates: npt.NDArray[np.intp]  # -1 for a coordinate of the state that this record does not have
+    linear: npt.NDArray[np.intp]
+    periodic: bool
+    names: Mapping[str, str]  # the family's names of the state to those of the problem
+
+
+@dataclass(frozen=True)
+class Problem:
+    """The least-squares problem of one family. `space` is that of all records, `own` the family's for one."""
+
+    family: Identifiable
+    space: SearchSpace
+    own: SearchSpace
+    parts: tuple[Part, ...]
+
+    @cached_property
+    def y(self) -> FloatArray:
+        """All measured outputs, one record after the other."""
+        return np.concatenate([part.record.y for part in self.parts])
+
+    @cached_property
+    def cuts(self) -> list[int]:
+        """Where each record begins, and the number of samples."""
+        return [0, *np.cumsum([len(part.record) for part in self.parts]).tolist()]
+
+    def solve(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Linear parameters (n_sets, n_linear) and residuals (n_sets, n_samples) at the coordinates `x`.
+
+        A set that leaves the finite numbers has residuals of inf.
+        """
+        linear, residuals = zip(*[self._solve(x[part]) for part in self._chunks(len(x))], strict=True)
+        return np.concatenate(linear), np.concatenate(residuals)
+
+    def costs(self, x: FloatArray) -> FloatArray:
+        """Sums of squares (n_sets,), without holding the residuals of all sets at once."""
+        return np.concatenate([np.sum(self._solve(x[part])[1] ** 2, axis=1) for part in self._chunks(len(x))])
+
+    def _chunks(self, n_sets: int) -> list[slice]:
+        size = max(1, _CHUNK // self.y.size)
+        return [slice(k, k + size) for k in range(0, n_sets, size)]
+
+    def _solve(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        columns, fixed_part = self.split(x)
+        target = self.y - fixed_part
+        broken = ~((np.abs(columns) < _LARGEST).all(axis=(1, 2)) & (np.abs(target) < _LARGEST).all(axis=1))
+        columns[broken], target[broken] = 0.0, 0.0
+        linear = self._regress(columns, target)
+        residual = target - (columns @ linear[..., np.newaxis])[..., 0]
+        residual[broken] = np.inf
+        return linear, residual
+
+    def split(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Columns (n_sets, n_samples, n_linear) of the free linear parameters, and the output without them."""
+        n_linear = len(self.space.linear)
+        columns = np.zeros((len(x), self.y.size, n_linear))
+        fixed_part = np.empty((len(x), self.y.size))
+        for k, part in enumerate(self.parts):
+            samples = slice(self.cuts[k], self.cuts[k + 1])
+            with np.errstate(over="ignore", invalid="ignore"):
+                regressors = self.family.regressors(self.parameters(x, k), part.record)
+                fixed_part[:, samples] = regressors[..., -1]
+                for place, name in enumerate(self.own.columns):
+                    if name in self.own.held:
+                        fixed_part[:, samples] += self.own.held[name] * regressors[..., place]
+            places = [place for place, name in enumerate(self.own.columns) if name in self.own.linear]
+            for place, column in zip(places, part.linear.tolist(), strict=True):
+                if column >= 0:
+                    columns[:, samples, column] = regressors[..., place]
+        return columns, fixed_part
+
+    def parameters(self, x: FloatArray, k: int = 0) -> dict[str, FloatArray]:
+        """The family's parameters, (n_sets,) each, for the record `k`; those that are linear are left out."""
+        part = self.parts[k]
+        parameters = self._decoded(x, part)
+        return _steady(self.family, parameters, part.record) if part.periodic else parameters
+
+    def _decoded(self, x: FloatArray, part: Part) -> dict[str, FloatArray]:
+        present = part.coordinates >= 0
+        if present.all():
+            return self.own.parameters(x[:, part.coordinates])
+        own = np.where(present, x[:, part.coordinates], self.own.lower)
+        resting = {self.own.coordinates[place]: np.zeros(len(x)) for place in np.flatnonzero(~present)}
+        return self.own.parameters(own) | resting
+
+    def named(self, x: FloatArray, linear: FloatArray) -> FloatArray:
+        """The user's free parameters, shape (n_sets, n_names), in the order of `space.names`."""
+        known = dict(zip(self.space.linear, linear.T, strict=True))
+        for part in self.parts:
+            known |= {part.names.get(name, name): values for name, values in self._decoded(x, part).items()}
+        return np.stack([np.broadcast_to(known[name], len(x)) for name in self.space.names], axis=1)
+
+    def estimates(self, x: FloatArray, linear: FloatArray, k: int = 0) -> dict[str, float]:
+        """Every parameter of the family by name at one point, as the record `k` has it."""
+        searched = {name: float(np.ravel(values)[0]) for name, values in self.parameters(x[np.newaxis], k).items()}
+        found = [float(linear[column]) if column >= 0 else 0.0 for column in self.parts[k].linear.tolist()]
+        state = {name: searched[name] for name in self.own.state if name in searched}
+        return searched | dict(self.own.held) | dict(zip(self.own.linear, found, strict=True)) | state
+
+    def residual(self, x: FloatArray) -> FloatArray:
+        """Projected residual (n_samples,) at one point (n_x,)."""
+        return np.asarray(self.solve(x[np.newaxis])[1][0])
+
+    def jacobian(self, x: FloatArray) -> FloatArray:
+        """Jacobian (n_samples, n_x) of the projected residual at one point, by central differences inside the box."""
+        ahead, behind, steps = self.neighbours(x[np.newaxis])
+        with np.errstate(invalid="ignore"):
+            return np.asarray(((self.solve(ahead[0])[1] - self.solve(behind[0])[1]) / steps[0][:, np.newaxis]).T)
+
+    def rough_jacobians(self, x: FloatArray, residual: FloatArray) -> FloatArray:
+        """Jacobians (n_sets, n_samples, n_x) by one-sided differences, at half the cost: good enough to descend by."""
+        ends, steps = self.beside(x)
+        with np.errstate(invalid="ignore"):
+            moved = self.solve(ends.reshape(-1, x.shape[1]))[1].reshape(*ends.shape[:2], -1)
+            return np.asarray(((moved - residual[:, np.newaxis]) / steps[..., np.newaxis]).transpose(0, 2, 1))
+
+    def beside(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Points (n_sets, n_x, n_x) a small step from each `x` along each coordinate, inside the box, and the steps."""
+        ahead, behind, _ = self.neighbours(x)
+        ends = np.where((x == self.space.upper)[..., np.newaxis], behind, ahead)
+        return ends, np.einsum("sii->si", ends - x[:, np.newaxis])
+
+    def neighbours(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Points a small step ahead of and behind each `x` (n_sets, n_x) along each coordinate, and their distance."""
+        step = np.diag(_DIFFERENCE * (self.space.upper - self.space.lower))
+        ahead = np.minimum(x[:, np.newaxis] + step, self.space.upper)
+        behind = np.maximum(x[:, np.newaxis] - step, self.space.lower)
+        return ahead, behind, np.einsum("sii->si", ahead - behind)
+
+    def _regress(self, columns: FloatArray, target: FloatArray) -> FloatArray:
+        norms = np.linalg.norm(columns, axis=1)
+        norms[norms == 0.0] = 1.0
+        normalised = columns / norms[:, np.newaxis, :]
+        if self.space.bounds:
+            return self._bounded(normalised, target, norms)
+        left, singular, right = np.linalg.svd(normalised, full_matrices=False)
+        inverse = np.where(singular > _RANK, 1.0 / np.maximum(singular, _RANK), 0.0)
+        projected = inverse[..., np.newaxis] * (left.transpose(0, 2, 1) @ target[..., np.newaxis])
+        return np.asarray((right.transpose(0, 2, 1) @ projected)[..., 0] / norms)
+
+    def _bounded(self, columns: FloatArray, target: FloatArray, norms: FloatArray) -> FloatArray:
+        from scipy.optimize import lsq_linear
+
+        lower, upper = self.linear_box()
+        solutions = [
+            lsq_linear(one, goal, bounds=(lower * norm, upper * norm), method="bvls").x / norm
+            for one, goal, norm in zip(columns, target, norms, strict=True)
+        ]
+        return np.array(solutions).reshape(len(columns), lower.size)
+
+    def linear_box(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper bounds of the free linear parameters."""
+        limits = [self.space.bounds.get(name, (-np.inf, np.inf)) for name in self.space.linear]
+        lower, upper = np.array(limits).reshape(-1, 2).T
+        return lower, upper
+
+
+def problem(
+    family: Identifiable, records: Sequence[Record], freedom: Freedom, initial: str | Sequence[str] | None
+) -> Problem:
+    """Put the records of one family together.
+
+    Raises
+    ------
+    ValueError
+        If `initial` is unknown or not one for each record, the family has no steady cycle, or as the family's
+        `search_space`.
+    """
+    kinds = _kinds(initial, len(records))
+    whole = None if kinds[0] is None else "free" if "free" in kinds else "rest"
+    own = family.search_space(_joined(records), replace(freedom, initial=whole))
+    if "periodic" in kinds and own.state and not hasattr(family, "steady"):
+        raise ValueError(f'{own.state[0]} has no steady cycle that could be computed: use initial="free"')
+    if len(records) == 1:
+        every = np.arange(len(own.coordinates)), np.arange(len(own.linear))
+        return Problem(family, own, own, (Part(records[0], *every, kinds[0] == "periodic", {}),))
+    return _together(family, own, records, kinds)
+
+
+def _kinds(initial: str | Sequence[str] | None, n: int) -> list[str | None]:
+    """What is known of the state at the first sample of each record; None where the family's default holds."""
+    kinds: list[str | None] = [initial] * n if initial is None or isinstance(initial, str) else list(initial)
+    if len(kinds) != n:
+        raise ValueError(f"initial must be one word, or one for each of the {n} records, got {initial!r}")
+    for kind in kinds:
+        if kind not in (STATES if initial is not None else (None,)):
+            raise ValueError(f'initial must be "free", "rest" or "periodic", got {kind!r}')
+    return kinds
+
+
+def _joined(records: Sequence[Record]) -> Record:
+    """All records as one, from which the family scales its box."""
+    if len(records) == 1:
+        return records[0]
+    u, y = (np.concatenate([getattr(record, name) for record in records]) for name in ("u", "y"))
+    times: FloatArray | None = None
+    if all(record.t is not None for record in records):
+        steps = [record.sample_time for record in records]
+        if np.ptp(steps) > 1e-6 * min(steps):
+            raise ValueError(f"records must have one sample time, got {min(steps)} to {max(steps)}: resample first")
+        times = steps[0] * np.arange(u.size, dtype=float)
+    return Record(u=u, y=y, t=times, units=records[0].units, resolution=records[0].resolution)
+
+
+def _together(
+    family: Identifiable, own: SearchSpace, records: Sequence[Record], kinds: Sequence[str | None]
+) -> Problem:
+    """Records that share all but their states."""
+    states = [name for name in own.state if name not in own.held]
+    if foreign := [name for name in states if name not in (*own.coordinates, *own.linear)]:
+        raise ValueError(f'{foreign[0]} is not free record by record: use initial="rest" or "periodic"')
+    with_own = [k for k, kind in enumerate(kinds) if kind in (None, "free")] if states else []
+    places = [[k for k, name in enumerate(own.coordinates) if (name in states) is state] for state in (False, True)]
+    order = [(place, None) for place in places[0]] + [(place, k) for k in with_own for place in places[1]]
+    linear: list[tuple[str, int | None]] = [(name, None) for name in own.linear if name not in states]
+    linear += [(name, k) for k in with_own for name in own.linear if name in states]
+
+    def box(values: FloatArray) -> FloatArray:
+        return values[..., [place for place, _ in order]]
+
+    parts = tuple(
+        Part(
+            record=record,
+            coordinates=np.array([_place(order, k, place) for place in range(len(own.coordinates))], dtype=np.intp),
+            linear=np.array([_place(linear, k, name) for name in own.linear], dtype=np.intp),
+            periodic=kinds[k] == "periodic",
+            names={name: f"{name}[{k}]" for name in states} if k in with_own else {},
+        )
+        for k, record in enumerate(records)
+    )
+    free_states = tuple(f"{name}[{k}]" for k in with_own for name in states)
+    space = replace(
+        own,
+        coordinates=tuple(_called(own.coordinates[place], k) for place, k in order),
+        lower=box(own.lower),
+        upper=box(own.upper),
+        starts=box(own.starts) if own.starts.size else np.empty((len(own.starts), len(order))),
+        names=(*(name for name in own.names if name not in states), *free_states),
+        linear=tuple(_called(name, k) for name, k in linear),
+        regions={name: (box(lower), box(upper)) for name, (lower, upper) in own.regions.items()},
+        bounds={_called(name, k): own.bounds[name] for name, k in linear if name in own.bounds},
+        state=free_states,
+    )
+    return Problem(family, space, own, parts)
+
+
+def _called(name: str, k: int | None) -> str:
+    return name if k is None else f"{name}[{k}]"
+
+
+def _place(order: Sequence[tuple[Any, int | None]], k: int, key: Any) -> int:
+    """Where something shared, or of the record `k`, stands in the order; -1 where the record has none."""
+    return next((place for place, (other, owner) in enumerate(order) if other == key and owner in (None, k)), -1)
+
+
+def _steady(family: Any, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
+    return {**parameters, **family.steady(parameters, record)} if hasattr(family, "steady") else dict(parameters)

@@ -1,0 +1,220 @@
+"""Confidence intervals by the likelihood's profile.
+
+The profile of a parameter p at a value v is the best the others can do with p = v,
+
+    D(v) = 2 (min over theta with p(theta) = v of loss - min of loss).
+
+The interval holds the values with D(v) <= N ln(1 + t^2 / (N - d)), t the quantile of Student's distribution with
+N - d degrees of freedom: for a model that is linear in its parameters and normal noise this is the exact interval.
+Its ends are found by the secant method on sqrt(D), which is nearly straight, all ends of all parameters at once; an
+interval that reaches a side of the box ends there. Where other optima lie inside the interval their profiles count
+too.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, frozen
+from hysim.identification._descent import Constraint, Descent
+
+_ENOUGH = 0.01  # of sqrt(D) at the end of an interval
+_ROUNDS = 30
+_FARTHEST = 4.0  # growth of a step that does not reach the end yet
+_CLOSE = 1e-3  # two values this close, in standard errors, are one
+_FLAT = 1e-4  # of the loss: a descent that gains less rests
+_BETTER = 0.02  # of the deviance: below minus this, an optimum is another
+
+
+@frozen
+class Profile:
+    """The likelihood's profile of one parameter.
+
+    Parameters
+    ----------
+    lower, upper : float
+        Interval at 95 %; infinite where the profile stays inside the limit.
+    at_box : (bool, bool)
+        Whether the box ends it.
+    values, deviance : array, shape (n_points,)
+        Where the profile was computed, and how much twice the logarithm of the likelihood falls there.
+    limit : float
+        Deviance at the ends of the interval.
+    """
+
+    lower: float
+    upper: float
+    at_box: tuple[bool, bool]
+    values: FloatArray
+    deviance: FloatArray
+    limit: float
+
+
+def threshold(n_samples: int, n_parameters: int, level: float) -> float:
+    """Deviance at the end of an interval."""
+    from scipy.stats import t
+
+    freedom = n_samples - n_parameters
+    quantile = t.ppf(0.5 * (1.0 + level), freedom)
+    return float(n_samples * np.log1p(quantile**2 / freedom))
+
+
+class _Ends:
+    """The two ends of the intervals of some parameters around some optima, on the way.
+
+    Of each end: the outermost value that is known to be inside, the innermost one outside (nan if none is), the
+    roots of the deviance there, and theta inside with its slope along the profile.
+    """
+
+    def __init__(self, values: FloatArray, root: FloatArray, theta: FloatArray, slope: FloatArray) -> None:
+        self.inside, self.r_inside = values.copy(), root.copy()
+        self.origin, self.r_origin = values.copy(), root.copy()
+        self.outside, self.r_outside = np.full(values.size, np.nan), np.full(values.size, np.inf)
+        self.theta, self.slope = theta.copy(), slope.copy()
+        self.found = np.full(values.size, np.nan)
+        self.doubtful = np.zeros(values.size, dtype=bool)  # whether the outer value was reached from farther away
+
+    def move_in(self, which: npt.NDArray[np.intp], values: FloatArray, root: FloatArray, theta: FloatArray) -> None:
+        """Inner values, farther out than the ones before."""
+        gone, whole = values - self.inside[which], values - self.origin[which]
+        slope = (theta - self.theta[which]) / gone[:, np.newaxis]
+        far = np.abs(gone) > 0.1 * np.abs(whole)  # of neighbours the difference is that of how far each descended
+        self.slope[which[far]] = slope[far]
+        self.inside[which], self.r_inside[which], self.theta[which] = values, root, theta
+        self.doubtful[which] = np.isfinite(self.outside[which]) & (self.outside[which] != values)
+        self.outside[which] = np.where(self.doubtful[which], self.outside[which], np.nan)
+
+    def move_out(self, which: npt.NDArray[np.intp], values: FloatArray, root: FloatArray) -> None:
+        """Outer values, reached from the inner ones."""
+        self.outside[which], self.r_outside[which], self.doubtful[which] = values, root, False
+
+
+def profiles(
+    descent: Descent,
+    optima: FloatArray,
+    losses: FloatArray,
+    covariance: FloatArray,
+    spread: FloatArray,
+    limit: float,
+) -> tuple[dict[str, Profile], FloatArray | None]:
+    """Profiles of all parameters whose standard error is known, and a better optimum if one was met on the way.
+
+    Parameters
+    ----------
+    descent : Descent
+        With the targets of one record.
+    optima, losses : array, shape (n_optima, n_theta), (n_optima,)
+        The best first; the others are those inside the limit.
+    covariance, spread : array
+        Of the parameters, (n_names, n_names), and of theta with them, (n_theta, n_names).
+    limit : float
+        Deviance at the end of an interval.
+    """
+    problem, n_x = descent.problem, len(descent.problem.space.coordinates)
+    variance = np.diag(covariance)
+    known = np.flatnonzero(np.isfinite(variance) & (variance > 0.0))
+    if not known.size:
+        return {}, None
+    grid = np.meshgrid(known, [-1.0, 1.0], np.arange(len(optima)), indexing="ij")
+    place, start = grid[0].ravel(), grid[2].ravel()
+    side: FloatArray = grid[1].ravel().astype(float)
+    values = problem.named(optima[:, :n_x], optima[:, n_x:])[start, place]
+    stderr, root = np.sqrt(variance[place]), float(np.sqrt(limit))
+    deviance = 2.0 * np.maximum(losses[start] - losses[0], 0.0)
+    slope = (spread[:, place] / variance[place]).T
+    ends = _Ends(values, np.sqrt(deviance), optima[start], slope)
+    points = [(place, values, deviance)]
+    step = stderr * np.maximum(root - ends.r_inside, 0.2 * root)
+    trial = values + side * step
+    active = np.arange(place.size)
+    better: tuple[float, FloatArray] | None = None
+    for _ in range(_ROUNDS):
+        if not active.size:
+            break
+        at = trial[active]
+        guess = ends.theta[active] + (at - ends.inside[active])[:, np.newaxis] * ends.slope[active]
+        reached = descent.run(guess, constraint=Constraint(place[active], at), tolerance=_FLAT)
+        deviance = 2.0 * (reached.loss - losses[0])
+        lowest = int(np.argmin(deviance))
+        if deviance[lowest] < -_BETTER and (better is None or deviance[lowest] < better[0]):
+            better = float(deviance[lowest]), reached.theta[lowest]
+        finite = np.isfinite(deviance)
+        points.append((place[active][finite], at[finite], deviance[finite]))
+        r = np.sqrt(np.maximum(deviance, 0.0))
+        inner = r <= root
+        won, lost = active[inner], active[~inner]
+        ends.move_in(won, at[inner], r[inner], reached.theta[inner])
+        ends.move_out(lost, at[~inner], r[~inner])
+        close = np.abs(r - root) <= _ENOUGH * root
+        ends.found[active[close]] = at[close]
+        gap = np.abs(ends.outside[active] - ends.inside[active])
+        step[won] = _farther(ends, won, step[won], root)
+        trial[active] = _next(ends, active, side, step, root)
+        active = active[~close & (ends.doubtful[active] | ~(gap <= _CLOSE * stderr[active]))]
+    at_box = np.isnan(ends.found) & np.isfinite(ends.outside) & ~np.isfinite(ends.r_outside)
+    open_ended = np.where(np.isnan(ends.outside), side * np.inf, ends.inside)
+    end = np.where(np.isnan(ends.found), open_ended, ends.found)
+    return _gathered(problem.space.names, place, side, end, at_box, points, limit), None if better is None else better[
+        1
+    ]
+
+
+def _next(ends: _Ends, active: npt.NDArray[np.intp], side: FloatArray, step: FloatArray, root: float) -> FloatArray:
+    """The next value of each end: on the secant between inside and outside, well inside the gap, or farther out.
+
+    What was outside as seen from farther away is tried again from nearer by, where the slope says that it is inside.
+    """
+    inside, outside = ends.inside[active], ends.outside[active]
+    r_in, r_out = ends.r_inside[active], ends.r_outside[active]
+    share = np.where(np.isfinite(r_out), (root - r_in) / np.where(np.isfinite(r_out), r_out - r_in, 1.0), 0.5)
+    between = inside + np.clip(share, 0.1, 0.9) * (outside - inside)
+    ahead = inside + side[active] * step[active]
+    again = ends.doubtful[active] & ((outside - ahead) * side[active] <= 0.0)
+    return np.where(np.isnan(outside), ahead, np.where(again, outside, between))
+
+
+def _farther(ends: _Ends, won: npt.NDArray[np.intp], step: FloatArray, root: float) -> FloatArray:
+    """How far to go from an inner end that does not have an outer one yet."""
+    gone, risen = np.abs(ends.inside - ends.origin)[won], (ends.r_inside - ends.r_origin)[won]
+    straight = 1.1 * (root - ends.r_inside[won]) * gone / np.where(risen > 0.0, risen, np.inf)
+    return np.where(risen > 0.0, np.clip(straight, 0.1 * step, _FARTHEST * step), _FARTHEST * step)
+
+
+def _gathered(
+    names: tuple[str, ...],
+    place: npt.NDArray[np.intp],
+    side: FloatArray,
+    end: FloatArray,
+    at_box: npt.NDArray[np.bool_],
+    points: list[tuple[npt.NDArray[np.intp], FloatArray, FloatArray]],
+    limit: float,
+) -> dict[str, Profile]:
+    places, visited, deviance = (np.concatenate(parts) for parts in zip(*points, strict=True))
+    result = {}
+    for k in np.unique(place).tolist():
+        low, high = (np.flatnonzero((place == k) & (side == sign)) for sign in (-1.0, 1.0))
+        lowest, highest = low[np.argmin(end[low])], high[np.argmax(end[high])]
+        mine = places == k
+        order = _outline(visited[mine], deviance[mine])
+        result[names[k]] = Profile(
+            lower=float(end[lowest]),
+            upper=float(end[highest]),
+            at_box=(bool(at_box[lowest]), bool(at_box[highest])),
+            values=visited[mine][order],
+            deviance=deviance[mine][order],
+            limit=limit,
+        )
+    return result
+
+
+def _outline(values: FloatArray, deviance: FloatArray) -> npt.NDArray[np.intp]:
+    """Points of the profile in order of their values, without those that a point farther out lies below."""
+    centre = values[np.argmin(deviance)]
+    kept: list[int] = []
+    for sign in (-1.0, 1.0):
+        lowest = np.inf
+        for k in np.lexsort((deviance, -sign * values)).tolist():
+            if sign * (values[k] - centre) >= 0.0 and deviance[k] < lowest:
+                lowest = deviance[k]
+                kept.append(k)
+    chosen = np.unique(kept)
+    return chosen[np.argsort(values[chosen], kind="stable")]

@@ -1,0 +1,72 @@
+"""The same search on other data: samples left out, and records drawn from the model.
+
+Both begin at the optima of the whole record and descend for all sets at once.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray
+from hysim.identification._descent import Descent
+from hysim.identification._noise import Gaussian, Noise
+from hysim.identification._problem import Problem
+
+_AT_FOLD = 4  # a fold of the cross-validation begins from this many of the best optima
+_SAMPLES_AT_ONCE = 1_000_000  # of all sets that descend together, to bound the memory
+_TOLERANCE = 1e-9
+
+
+def left_out_rmse(
+    problem: Problem, noise: Noise, optima: FloatArray, left_out: Sequence[npt.NDArray[np.intp]]
+) -> float:
+    """Rmse of samples that each fold leaves out of the fit; nan without a fold."""
+    if not left_out:
+        return float("nan")
+    starts = optima[:_AT_FOLD]
+    at_once = max(1, _SAMPLES_AT_ONCE // (len(starts) * problem.y.size))
+    groups = [left_out[k : k + at_once] for k in range(0, len(left_out), at_once)]
+    errors = np.concatenate([_left_out_errors(problem, noise, starts, group) for group in groups])
+    return float(np.sqrt(np.mean(errors**2)))
+
+
+def _left_out_errors(
+    problem: Problem, noise: Noise, starts: FloatArray, left_out: Sequence[npt.NDArray[np.intp]]
+) -> FloatArray:
+    """Errors of the samples that each of some folds leaves out, one fold after the other."""
+    weights = np.ones((len(left_out), problem.y.size))
+    for fold, samples in enumerate(left_out):
+        weights[fold, samples] = 0.0
+    descent = Descent(problem, noise, problem.y[np.newaxis], np.repeat(weights, len(starts), axis=0))
+    reached = descent.run(np.tile(starts, (len(left_out), 1)), tolerance=_TOLERANCE)
+    best = np.arange(len(left_out)) * len(starts) + reached.loss.reshape(len(left_out), -1).argmin(axis=1)
+    errors = problem.y - descent.outputs(reached.theta[best])
+    return np.asarray(errors[weights == 0.0])
+
+
+def bootstrap(
+    problem: Problem, noise: Noise, theta: FloatArray, residual: FloatArray, sigma: float, *, draws: int, seed: int
+) -> FloatArray:
+    """Theta (draws, n_theta) of records that are drawn anew.
+
+    With normal noise the residuals are drawn, enlarged by sqrt(N / (N - d)) for what the fit took from them; with
+    the other densities the noise is drawn from them, and a quantised record is rounded again.
+    """
+    rng = np.random.default_rng(seed)
+    y_model = np.broadcast_to(problem.y - residual, (draws, residual.size))
+    freedom = residual.size - len(problem.space.names)
+    if isinstance(noise, Gaussian):
+        enlarged = (residual - residual.mean()) * np.sqrt(residual.size / freedom)
+        targets = y_model + rng.choice(enlarged, (draws, residual.size))
+    else:
+        targets = noise.draw(y_model, sigma * np.sqrt(residual.size / freedom), rng)
+    at_once = max(1, _SAMPLES_AT_ONCE // problem.y.size)
+    weights = np.ones((1, residual.size))
+    found = [
+        Descent(problem, noise, targets[k : k + at_once], weights).run(
+            np.tile(theta, (len(targets[k : k + at_once]), 1))
+        )
+        for k in range(0, draws, at_once)
+    ]
+    return np.concatenate([reached.theta[np.isfinite(reached.loss)] for reached in found])
