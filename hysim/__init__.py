@@ -30,7 +30,7 @@ _HOME = {
     "loop_metrics": "hysim.metrics",
     "LoopMetrics": "hysim.metrics",
     "BoucWen": "hysim.models.boucwen",
-    "PolynomialBoucWen": "hysim.models.boucwen",
+    "PolynomialBoucWen": "hysim.models.polynomial_boucwen",
     "BoucWenInverse": "hysim.models.boucwen_inverse",
     "LimitCycle": "hysim.models.limit_cycle",
     "Duhem": "hysim.models.duhem",
@@ -72,12 +72,12 @@ if TYPE_CHECKING:
     from hysim.metrics import loop_metrics as loop_metrics
     from hysim.models.actuator import Actuator as Actuator
     from hysim.models.boucwen import BoucWen as BoucWen
-    from hysim.models.boucwen import PolynomialBoucWen as PolynomialBoucWen
     from hysim.models.boucwen_inverse import BoucWenInverse as BoucWenInverse
     from hysim.models.custom import CustomLaw as CustomLaw
     from hysim.models.duhem import Duhem as Duhem
     from hysim.models.limit_cycle import LimitCycle as LimitCycle
     from hysim.models.oscillator import BoucWenOscillator as BoucWenOscillator
+    from hysim.models.polynomial_boucwen import PolynomialBoucWen as PolynomialBoucWen
     from hysim.models.static import Line as Line
     from hysim.models.static import SingleValued as SingleValued
     from hysim.models.storage import load_model as load_model

@@ -31,8 +31,9 @@ from hysim.errors import SimulationError
 from hysim.kernels import oscillator as kernels
 from hysim.kernels.boucwen import prepare
 from hysim.kernels.charts import N_WORK
-from hysim.models.boucwen import BoucWen, PolynomialBoucWen
+from hysim.models.boucwen import BoucWen
 from hysim.models.model import model
+from hysim.models.polynomial_boucwen import PolynomialBoucWen
 
 METHODS = ("split", "runge-kutta", "newmark", "strang")
 _ANGLE = 0.1  # largest phase of the mode in a default step: errors of 1e-7 of the output on the Noel-Schoukens system

@@ -1,8 +1,11 @@
 """Pieces of the report's markup: text that is escaped, tables that scroll, figures with captions."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
+
+Drawn = Mapping[str, str]
+"""Name of a figure to its SVG."""
 
 
 def ratio(num: Sequence[float], den: Sequence[float]) -> str:

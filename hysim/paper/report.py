@@ -1,7 +1,7 @@
 """The report: one self-contained page, figures inline, no script, nothing loaded from elsewhere."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from html import escape
 from importlib.resources import files
 from string import Template
@@ -9,22 +9,15 @@ from typing import NamedTuple
 
 from hysim.identification import Identification
 from hysim.metrics import loop_metrics
-from hysim.paper.control_chapters import (
-    claims_chapter,
-    control_chapter,
-    definitions,
-    dwell_chapter,
-    identification_section,
-)
+from hysim.paper.claim_blocks import claims_chapter
+from hysim.paper.control_chapters import control_chapter, definitions
 from hysim.paper.equations import EQUATION_1, EQUATION_7
 from hysim.paper.findings import Findings
-from hysim.paper.markup import complex_number, equation, figure, heading, number, paragraph, ratio, table
+from hysim.paper.linear_sections import dwell_chapter, identification_section
+from hysim.paper.markup import Drawn, complex_number, equation, figure, heading, number, paragraph, ratio, table
 from hysim.paper.study import Study
 
 TITLE = "A piezo stack's 52 points, reproduced"
-
-Drawn = Mapping[str, str]
-"""Name of a figure to its SVG."""
 
 
 class Chapter(NamedTuple):

@@ -9,7 +9,8 @@ from hysim.comparison import Comparison, compare
 from hysim.datasets import table1
 from hysim.discovery import Discovery, discover
 from hysim.identification import Identification, identify
-from hysim.models.boucwen import BoucWen, PolynomialBoucWen
+from hysim.models.boucwen import BoucWen
+from hysim.models.polynomial_boucwen import PolynomialBoucWen
 from hysim.models.static import Line, SingleValued
 from hysim.models.transfer_function import TransferFunction
 from hysim.paper.best_dwell import PrintedModel, printed_model
