@@ -25,6 +25,7 @@ N_STEPS = 60
 _STUCK = 1e7  # damping beyond which no step can help
 _FLOOR = 1e-9  # damping of everything, in norms of columns: a column without effect keeps its place
 _RESTORING = 12
+_PASSES = 4
 _ON_CONSTRAINT = 1e-11  # relative error of the constrained value
 
 
@@ -42,28 +43,35 @@ class Constraint:
 
 @dataclass(frozen=True)
 class Reached:
-    """Where the sets have come to: theta (n_sets, n_theta), minus the log-likelihood and sigma, (n_sets,)."""
+    """Where the sets have come to: theta (n_sets, n_theta); minus the log-likelihood, sigma, and whether it rests."""
 
     theta: FloatArray
     loss: FloatArray
     sigma: FloatArray
+    at_rest: Flags
 
 
 @dataclass(frozen=True)
 class Descent:
-    """What does not change on the way: targets and weights are (n_sets, n_samples), or (1, n_samples) for all."""
+    """What does not change on the way: targets and weights are (n_sets, n_samples), or (1, n_samples) for all.
+
+    The slopes in x are central differences where the end has to be exact, else one-sided ones at half the cost.
+    `projected` solves for b anew after each step, which leads farther from a poor start; it is for sums of squares.
+    """
 
     problem: Problem
     noise: Noise
     targets: FloatArray
     weights: FloatArray
+    central: bool = False
+    projected: bool = False
 
     def run(
         self, theta: FloatArray, *, constraint: Constraint | None = None, tolerance: float = 1e-5, steps: int = N_STEPS
     ) -> Reached:
         """Descend from `theta` (n_sets, n_theta) until a step lowers the loss by less than `tolerance`."""
         theta = np.clip(theta, *self.box())
-        n_sets = len(theta)
+        n_sets, n_x = len(theta), len(self.problem.space.coordinates)
         targets, weights = (np.broadcast_to(each, (n_sets, each.shape[1])) for each in (self.targets, self.weights))
         if constraint is not None:
             theta = self._restored(theta, constraint, self._pivots(theta, constraint)[0])
@@ -80,6 +88,8 @@ class Descent:
             residual = targets[moving] - outputs[moving]
             trial = self._step(theta[moving], outputs[moving], residual, weights[moving], sigma[moving],
                                damping[moving], bound)  # fmt: skip
+            if self.projected:
+                trial[:, n_x:] = self.problem.solve(trial[:, :n_x])[0]
             trial_outputs = self.outputs(trial)
             trial_loss, trial_sigma = self._loss(targets[moving] - trial_outputs, weights[moving])
             if bound is not None:
@@ -92,7 +102,7 @@ class Descent:
             damping[moving] *= np.where(better, 0.1, 10.0)
             stays = better & (gained < tolerance) | (damping[moving] > _STUCK)
             moving = moving[~stays]
-        return Reached(theta, loss, sigma[:, 0])
+        return Reached(theta, loss, sigma[:, 0], ~np.isin(np.arange(n_sets), moving))
 
     def outputs(self, theta: FloatArray) -> FloatArray:
         """The model's outputs at `theta`, (n_sets, n_samples)."""
@@ -111,20 +121,29 @@ class Descent:
         return loss, sigma
 
     def slopes(self, theta: FloatArray, outputs: FloatArray | None = None) -> FloatArray:
-        """dm/dtheta, (n_sets, n_samples, n_theta), by one-sided differences in x."""
-        n_sets, n_x = len(theta), len(self.problem.space.coordinates)
+        """dm/dtheta, (n_sets, n_samples, n_theta)."""
+        n_x = len(self.problem.space.coordinates)
         outputs = self.outputs(theta) if outputs is None else outputs
         x, linear = theta[:, :n_x], theta[:, n_x:]
         columns = self.problem.split(x)[0]
         if not n_x:
             return columns
-        ends, steps = self.problem.beside(x)
-        ahead = np.concatenate([ends, np.broadcast_to(linear[:, np.newaxis], (n_sets, n_x, linear.shape[1]))], axis=2)
-        moved = self.outputs(ahead.reshape(n_sets * n_x, -1)).reshape(n_sets, n_x, -1)
+        if self.central:
+            ahead, behind, steps = self.problem.neighbours(x)
+            begin = self._at(behind, linear)
+        else:
+            ahead, steps = self.problem.beside(x)
+            begin = outputs[:, np.newaxis]
         with np.errstate(over="ignore", invalid="ignore"):
-            by_x = (moved - outputs[:, np.newaxis]) / steps[..., np.newaxis]
+            by_x = (self._at(ahead, linear) - begin) / steps[..., np.newaxis]
         by_x[~np.isfinite(by_x)] = 0.0
         return np.concatenate([by_x.transpose(0, 2, 1), columns], axis=2)
+
+    def _at(self, ends: FloatArray, linear: FloatArray) -> FloatArray:
+        """Outputs (n_sets, n_x, n_samples) at coordinates (n_sets, n_x, n_x) beside those of each set."""
+        repeated = np.broadcast_to(linear[:, np.newaxis], (*ends.shape[:2], linear.shape[1]))
+        theta = np.concatenate([ends, repeated], axis=2)
+        return self.outputs(theta.reshape(-1, theta.shape[2])).reshape(*ends.shape[:2], -1)
 
     def _step(
         self,
@@ -142,19 +161,30 @@ class Descent:
         J = root[..., np.newaxis] * self.slopes(theta, outputs)
         goal = -weights * slope / np.where(root > 0.0, root, 1.0)
         lower, upper = self.box()
-        frozen = np.zeros(theta.shape, dtype=bool)
         pivot, shares = (None, None) if constraint is None else self._pivots(theta, constraint)
-        for _ in range(2):  # a second time with what would leave the box held at its side
-            step = _regression(np.where(frozen[:, np.newaxis], 0.0, J), goal, damping, len(
-                self.problem.space.coordinates), pivot, shares)  # fmt: skip
-            leaving = ((theta <= lower) & (step < 0.0)) | ((theta >= upper) & (step > 0.0))
+        rows = np.arange(len(theta))
+        if pivot is not None and shares is not None:
+            J = J + J[rows, :, pivot][..., np.newaxis] * shares[:, np.newaxis]
+            J[rows, :, pivot] = 0.0
+        held = np.zeros(theta.shape, dtype=bool)
+        step = np.zeros(theta.shape)
+        for _ in range(_PASSES):  # what would leave the box goes to its side, and the others make the best of it
+            left = goal - (J @ np.where(held, step, 0.0)[..., np.newaxis])[..., 0]
+            moved = _regression(
+                np.where(held[:, np.newaxis], 0.0, J), left, damping, len(self.problem.space.coordinates)
+            )
+            step = np.where(held, step, moved)
+            beyond = ((theta + step < lower) | (theta + step > upper)) & ~held
             if pivot is not None:
-                leaving[np.arange(len(theta)), pivot] = False
-            if not (leaving & ~frozen).any():
+                beyond[rows, pivot] = False
+            if not beyond.any():
                 break
-            frozen |= leaving
-        trial = np.clip(theta + np.where(frozen, 0.0, step), lower, upper)
-        return trial if constraint is None or pivot is None else self._restored(trial, constraint, pivot)
+            step = np.clip(step, lower - theta, upper - theta)
+            held |= beyond
+        if pivot is None or shares is None or constraint is None:
+            return np.clip(theta + step, lower, upper)
+        step[rows, pivot] = np.sum(shares * step, axis=1)
+        return self._restored(np.clip(theta + step, lower, upper), constraint, pivot)
 
     def box(self) -> tuple[FloatArray, FloatArray]:
         """Lower and upper bounds of theta."""
@@ -214,29 +244,13 @@ def named_slopes(problem: Problem, theta: FloatArray) -> FloatArray:
     return slopes
 
 
-def _regression(
-    J: FloatArray,
-    goal: FloatArray,
-    damping: FloatArray,
-    n_x: int,
-    pivot: npt.NDArray[np.intp] | None,
-    shares: FloatArray | None,
-) -> FloatArray:
-    """Damped least squares steps (n_sets, n_theta); with a pivot, on the constraint."""
-    if pivot is not None and shares is not None:
-        rows = np.arange(len(J))
-        column = J[rows, :, pivot]
-        J = J + column[..., np.newaxis] * shares[:, np.newaxis]
-        J[rows, :, pivot] = 0.0
+def _regression(J: FloatArray, goal: FloatArray, damping: FloatArray, n_x: int) -> FloatArray:
+    """Least squares steps (n_sets, n_theta), damped in the first `n_x` elements."""
     norms = np.linalg.norm(J, axis=1)
     norms[norms == 0.0] = 1.0
     strength = np.full(J.shape[::2], _FLOOR)
     strength[:, :n_x] += np.sqrt(damping)[:, np.newaxis]
     below = strength[..., np.newaxis] * np.eye(J.shape[2])
-    stacked = np.concatenate([J / norms[:, np.newaxis], below], axis=1)
-    Q, R = np.linalg.qr(stacked)
+    Q, R = np.linalg.qr(np.concatenate([J / norms[:, np.newaxis], below], axis=1))
     projected = Q[:, : goal.shape[1]].transpose(0, 2, 1) @ goal[..., np.newaxis]
-    step = np.linalg.solve(R, projected)[..., 0] / norms
-    if pivot is not None and shares is not None:
-        step[rows, pivot] = np.sum(shares * step, axis=1)
-    return np.asarray(step)
+    return np.asarray(np.linalg.solve(R, projected)[..., 0] / norms)

@@ -18,7 +18,7 @@ from hysim.identification._problem import Problem, problem
 from hysim.identification._profile import Profile, profiles, threshold
 from hysim.identification._resampling import bootstrap, left_out_rmse
 from hysim.identification._result import Candidate, Identification, Width
-from hysim.identification._search import optima, polish
+from hysim.identification._search import PERFECT, optima, polish
 from hysim.identification._uncertainty import Uncertainty, uncertainty
 from hysim.identification.folds import folds
 from hysim.models.search_space import Freedom, Identifiable
@@ -28,7 +28,7 @@ LEVEL = 0.95
 TAILS = (0.025, 0.975)
 N_BOOTSTRAP = 500
 _SAME = 1e-6  # relative difference of two costs that are the same
-_PERFECT = 1e-14  # smallest sigma, in units of the output's size
+_EXACT = 100.0  # smallest sigmas: below, nothing is left to explain
 
 
 def identify(
@@ -156,7 +156,7 @@ def _family(model_or_class: Any) -> Identifiable:
 
 
 def _density(noise: str, records: Sequence[Record], y: FloatArray) -> Noise:
-    floor = _PERFECT * (float(np.abs(y).max()) or 1.0)
+    floor = PERFECT * (float(np.abs(y).max()) or 1.0)
     if noise == "gaussian":
         return Gaussian(floor)
     if noise == "robust":
@@ -199,6 +199,11 @@ class _Search:
     seed: int
 
     @property
+    def scale(self) -> float:
+        """Size of the outputs [unit of y]."""
+        return float(np.abs(self.problem.y).max()) or 1.0
+
+    @property
     def descent(self) -> Descent:
         return Descent(self.problem, self.noise, self.problem.y[np.newaxis], np.ones((1, self.problem.y.size)))
 
@@ -216,7 +221,8 @@ class _Search:
         ranked = np.argsort(reached.loss, kind="stable")
         found: list[_Optimum] = []
         for k in ranked[np.isfinite(reached.loss[ranked])].tolist():
-            if not found or reached.loss[k] - found[-1].loss > 0.5 * self.problem.y.size * _SAME:
+            perfect = bool(found) and found[0].sigma <= _EXACT * PERFECT * self.scale
+            if not found or (not perfect and reached.loss[k] - found[-1].loss > 0.5 * self.problem.y.size * _SAME):
                 found.append(
                     _Optimum(reached.theta[k], float(reached.loss[k]), float(reached.sigma[k]), squares[k].converged)
                 )
@@ -238,11 +244,13 @@ class _Search:
     def candidate(self, theta: FloatArray) -> Candidate:
         """The model at `theta`, and how well it fits."""
         whole, n_x = self.problem, len(self.problem.space.coordinates)
-        estimates = whole.estimates(theta[:n_x], theta[n_x:])
+        parameters = whole.estimates(theta[:n_x], theta[n_x:])
         residual = self.residual(theta)
+        own = () if len(whole.parts) == 1 else [name for name in whole.own.state if name not in whole.own.held]
+        shared = {name: value for name, value in parameters.items() if name not in own}
         return Candidate(
-            model=whole.family.assemble(estimates),
-            estimates=estimates | dict(zip(whole.space.names, self.named(theta), strict=True)),
+            model=whole.family.assemble(parameters),
+            estimates=shared | dict(zip(whole.space.names, self.named(theta), strict=True)),
             fit_percent=metrics.fit_percent(whole.y, whole.y - residual),
             rmse=float(np.sqrt(np.mean(residual**2))),
         )
@@ -264,7 +272,7 @@ class _Search:
             curves, better = self._profiles(found, known)
             if better is not None:
                 n_x = len(self.problem.space.coordinates)
-                found = self._likely([polish(self.problem, better[:n_x])]) + found
+                found = self._likely(polish(self.problem, better[np.newaxis, :n_x], self.scale)) + found
                 found = sorted(found, key=lambda optimum: optimum.loss)
                 known = self._uncertainty(found[0])
                 curves, _ = self._profiles(found, known)
@@ -337,7 +345,7 @@ class _Search:
         """The optimum of the sum of squares, beside that of another likelihood."""
         if isinstance(self.noise, Gaussian):
             return None
-        plain = replace(self, noise=Gaussian(_PERFECT * (float(np.abs(self.problem.y).max()) or 1.0)))
+        plain = replace(self, noise=Gaussian(PERFECT * self.scale))
         return plain.candidate(plain.found()[0].theta)
 
     def _draws(self, best: _Optimum, residual: FloatArray) -> FloatArray:

@@ -93,12 +93,17 @@ class Problem:
         fixed_part = np.empty((len(x), self.y.size))
         for k, part in enumerate(self.parts):
             samples = slice(self.cuts[k], self.cuts[k + 1])
+            parameters = self.parameters(x, k)
+            lost = [~np.isfinite(parameters[name]) for name in self.own.state if part.periodic]
+            parameters |= {name: np.nan_to_num(parameters[name]) for name in self.own.state if part.periodic}
             with np.errstate(over="ignore", invalid="ignore"):
-                regressors = self.family.regressors(self.parameters(x, k), part.record)
+                regressors = self.family.regressors(parameters, part.record)
                 fixed_part[:, samples] = regressors[..., -1]
                 for place, name in enumerate(self.own.columns):
                     if name in self.own.held:
                         fixed_part[:, samples] += self.own.held[name] * regressors[..., place]
+            for escaped in lost:  # there is no steady cycle
+                fixed_part[escaped, samples] = np.inf
             places = [place for place, name in enumerate(self.own.columns) if name in self.own.linear]
             for place, column in zip(places, part.linear.tolist(), strict=True):
                 if column >= 0:
@@ -132,23 +137,6 @@ class Problem:
         found = [float(linear[column]) if column >= 0 else 0.0 for column in self.parts[k].linear.tolist()]
         state = {name: searched[name] for name in self.own.state if name in searched}
         return searched | dict(self.own.held) | dict(zip(self.own.linear, found, strict=True)) | state
-
-    def residual(self, x: FloatArray) -> FloatArray:
-        """Projected residual (n_samples,) at one point (n_x,)."""
-        return np.asarray(self.solve(x[np.newaxis])[1][0])
-
-    def jacobian(self, x: FloatArray) -> FloatArray:
-        """Jacobian (n_samples, n_x) of the projected residual at one point, by central differences inside the box."""
-        ahead, behind, steps = self.neighbours(x[np.newaxis])
-        with np.errstate(invalid="ignore"):
-            return np.asarray(((self.solve(ahead[0])[1] - self.solve(behind[0])[1]) / steps[0][:, np.newaxis]).T)
-
-    def rough_jacobians(self, x: FloatArray, residual: FloatArray) -> FloatArray:
-        """Jacobians (n_sets, n_samples, n_x) by one-sided differences, at half the cost: good enough to descend by."""
-        ends, steps = self.beside(x)
-        with np.errstate(invalid="ignore"):
-            moved = self.solve(ends.reshape(-1, x.shape[1]))[1].reshape(*ends.shape[:2], -1)
-            return np.asarray(((moved - residual[:, np.newaxis]) / steps[..., np.newaxis]).transpose(0, 2, 1))
 
     def beside(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Points (n_sets, n_x, n_x) a small step from each `x` along each coordinate, inside the box, and the steps."""

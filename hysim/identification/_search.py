@@ -2,17 +2,18 @@
 
 A scrambled Sobol sequence covers the box. Its best points that lie apart from each other, and the family's
 own starts, descend by projected Levenberg-Marquardt steps, all of them in one batch. The distinct optima
-that come out best are polished one by one by SciPy's trust-region method.
+that come out best descend on all parameters at once to the end.
 """
 
 import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim._parallel import Progress
+from hysim.identification._descent import Descent, Reached
+from hysim.identification._noise import Gaussian
 from hysim.identification._problem import Problem
 from hysim.models.search_space import SearchSpace
 
@@ -20,15 +21,13 @@ N_SCREENED = 4096
 N_DESCENDING = 64
 N_STEPS = 40
 N_POLISHED = 8
+N_POLISHING = 200
 _LONG = 512  # samples beyond which fewer points are tried: each costs more, and longer records have fewer optima
 _APART = 0.05  # distance of two starts, in units of the box, under which the better one stands for both
 _SAME = 0.01  # likewise of two points after the descent
-_STUCK = 1e8  # damping beyond which no step can help
-_GAIN = 1e-5
-_TOLERANCE = 1e-10
-_FLAT = 1e-15
-
-Flags = npt.NDArray[np.bool_]
+_GAIN = 1e-5  # share of the sum of squares: a descent that gains less rests
+_TOLERANCE = 1e-7  # of the log-likelihood: a polish that gains less rests
+PERFECT = 1e-14  # smallest sigma, in units of the output's size
 
 
 class Optimum(NamedTuple):
@@ -42,88 +41,43 @@ class Optimum(NamedTuple):
 def optima(problem: Problem, *, seed: int, progress: Progress | None = None) -> list[Optimum]:
     """Distinct local optima of `problem`, best first; empty if nothing in the box stays finite."""
     space = problem.space
+    scale = float(np.abs(problem.y).max()) or 1.0
     if not space.coordinates:
-        return [polish(problem, np.empty(0))]
+        return polish(problem, np.empty((1, 0)), scale)
     share = min(1.0, _LONG / problem.y.size)
     screened = max(256, round(N_SCREENED * share)) if space.screened is None else space.screened
     candidates = np.concatenate([space.starts, _uniform(space, screened, seed)])
     n_starts = max(16, round(N_DESCENDING * share))
     starts = _apart(space, candidates, problem.costs(candidates), _APART, n_starts, len(space.starts))
-    reached, cost = _descend(problem, starts)
-    found = []
-    best = _apart(space, reached, cost, _SAME, N_POLISHED)
-    for done, start in enumerate(best):
-        found.append(polish(problem, start))
-        if progress is not None:
-            progress(done + 1, len(best))
+    reached = _descended(problem, starts, scale, exact=False)
+    x, cost = reached.theta[:, : space.lower.size], reached.loss
+    best = _apart(space, x, cost, _SAME, N_POLISHED)
+    if progress is not None:
+        progress(1, 2)
+    found = polish(problem, best, scale) if len(best) else []
+    if progress is not None:
+        progress(2, 2)
     return _distinct(found)
 
 
-def _descend(problem: Problem, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Points (n, n_x) after projected Levenberg-Marquardt steps from `x` (n, n_x), and their sums of squares.
-
-    A point rests when a step lowers its sum by less than the share `_GAIN`, and all after `N_STEPS`.
-    """
-    x = x.copy()
-    lower, upper = problem.space.lower, problem.space.upper
-    damping = np.full(len(x), 1e-2)
-    residual = problem.solve(x)[1]
-    cost = np.sum(residual**2, axis=1)
-    moving = np.flatnonzero(np.isfinite(cost))
-    for _ in range(N_STEPS if x.shape[1] else 0):
-        if not moving.size:
-            break
-        slopes = (upper - lower) * problem.rough_jacobians(x[moving], residual[moving])
-        step = _damped_step(slopes, residual[moving], damping[moving], x[moving] <= lower, x[moving] >= upper)
-        trial = np.clip(x[moving] + step * (upper - lower), lower, upper)
-        trial_residual = problem.solve(trial)[1]
-        trial_cost = np.sum(trial_residual**2, axis=1)
-        better = trial_cost < cost[moving]
-        gained = 1.0 - np.divide(trial_cost, cost[moving], out=np.zeros_like(cost[moving]), where=better)
-        won = moving[better]
-        x[won], residual[won], cost[won] = trial[better], trial_residual[better], trial_cost[better]
-        damping[moving] *= np.where(better, 0.2, 5.0)
-        moving = moving[(gained >= _GAIN) & (damping[moving] <= _STUCK)]
-    return x, cost
+def polish(problem: Problem, starts: FloatArray, scale: float) -> list[Optimum]:
+    """The local optima that are reached from `starts` (n, n_x); `scale` is that of the outputs [unit of y]."""
+    reached = _descended(problem, starts, scale, exact=True)
+    x = reached.theta[:, : starts.shape[1]]
+    costs = problem.costs(x)
+    return [
+        Optimum(x[k], float(costs[k]), bool(reached.at_rest[k])) for k in np.flatnonzero(np.isfinite(costs)).tolist()
+    ]
 
 
-def _damped_step(
-    slopes: FloatArray, residual: FloatArray, damping: FloatArray, at_lower: Flags, at_upper: Flags
-) -> FloatArray:
-    """Steps (n, n_x) that solve (J^T J + damping diag(J^T J)) step = -J^T r; none leads out of the box at a side."""
-    slopes = np.nan_to_num(slopes, posinf=0.0, neginf=0.0)
-    gradient = np.einsum("snk,sn->sk", slopes, residual)
-    held = (at_lower & (gradient > 0.0)) | (at_upper & (gradient < 0.0))
-    slopes = np.where(held[:, np.newaxis], 0.0, slopes)
-    normal = slopes.transpose(0, 2, 1) @ slopes
-    diagonal = np.einsum("sii->si", normal)
-    # a coordinate without slope keeps its place instead of making the matrix singular
-    floor = np.where(diagonal > 0.0, 1e-12 * diagonal.max(axis=1, keepdims=True), 1.0)
-    damped = normal + (damping[:, np.newaxis] * diagonal + floor)[..., np.newaxis] * np.eye(diagonal.shape[1])
-    return np.asarray(np.linalg.solve(damped, -np.where(held, 0.0, gradient)[..., np.newaxis])[..., 0])
-
-
-def polish(problem: Problem, start: FloatArray) -> Optimum:
-    """The local optimum that is reached from `start`."""
-    from scipy.optimize import least_squares
-
-    space = problem.space
-    if not start.size:
-        return Optimum(start, float(np.sum(problem.residual(start) ** 2)), True)
-    width = space.upper - space.lower
-    scale = float(np.linalg.norm(problem.y - problem.y.mean())) or 1.0  # makes gtol free of units
-    result = least_squares(
-        lambda x: problem.residual(x) / scale,
-        np.clip(start, space.lower + 1e-9 * width, space.upper - 1e-9 * width),
-        jac=lambda x: problem.jacobian(x) / scale,
-        bounds=(space.lower, space.upper),
-        x_scale=width,
-        ftol=_TOLERANCE,
-        xtol=_TOLERANCE,
-        gtol=_FLAT,
-        max_nfev=200,
-    )
-    return Optimum(result.x, 2.0 * float(result.cost) * scale**2, result.status > 0)
+def _descended(problem: Problem, starts: FloatArray, scale: float, *, exact: bool) -> Reached:
+    """Where the points `starts` (n, n_x) descend to, on the way or at the end."""
+    theta = np.concatenate([starts, problem.solve(starts)[0]], axis=1)
+    noise, everything = Gaussian(floor=PERFECT * scale), np.ones((1, problem.y.size))
+    projected = not problem.space.bounds
+    descent = Descent(problem, noise, problem.y[np.newaxis], everything, central=exact, projected=projected)
+    gain, steps = (_TOLERANCE, N_POLISHING) if exact else (0.5 * problem.y.size * _GAIN, N_STEPS)
+    return descent.run(theta, tolerance=gain, steps=steps)
 
 
 def _uniform(space: SearchSpace, n: int, seed: int) -> FloatArray:

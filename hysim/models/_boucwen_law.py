@@ -36,6 +36,8 @@ State = tuple[float, float]
 
 MEMORY = ("A", "beta", "gamma", "n", "z0")
 
+_PASSES = 40
+
 
 class BoucWenLaw(ABC):
     """The memory, and an output that is a polynomial of u plus gain z.
@@ -419,6 +421,39 @@ class BoucWenLaw(ABC):
         z = Batch(table, read_only(np.tile([1.0, 0.0], (len(table), 1))), inputs).rows(None)
         powers = [np.broadcast_to(inputs**k, z.shape) for k in range(1, len(self.coefficient_names) + 1)]
         return np.stack([*powers, z, np.ones_like(z), np.zeros_like(z)], axis=-1)
+
+    def steady(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
+        """Memory z0, (n_sets,), with which a record that repeats itself ends as it began; nan where it escapes.
+
+        One pass through the record contracts the memory, the more the more beta dissipates; its fixed point is
+        found by the secant method.
+        """
+        columns, inputs = self._columns({**parameters, "z0": 0.0}, np.append(record.u, record.u[0]))
+        memory = self._table(columns).copy()
+        only_memory = read_only(np.tile([1.0, 0.0], (len(memory), 1)))
+
+        def passed(z0: FloatArray) -> FloatArray:
+            memory[:, MEMORY.index("z0")] = z0
+            return Batch(read_only(memory), only_memory, inputs).reduced("final", None, None)
+
+        before, z0 = np.zeros(len(memory)), passed(np.zeros(len(memory)))
+        drift_before = z0 - before
+        for _ in range(_PASSES):
+            with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+                drift = np.where(np.isfinite(z0), passed(np.nan_to_num(z0, posinf=0.0, neginf=0.0)) - z0, np.nan)
+                if not (np.abs(drift) > 1e-15 * np.abs(z0)).any():
+                    break
+                secant = z0 - drift * (z0 - before) / (drift - drift_before)
+            before, drift_before, z0 = z0, drift, np.where(np.isfinite(secant), secant, z0 + drift)
+        return {"z0": z0}
+
+    def notes(self, record: Record, model: "BoucWenLaw") -> tuple[str, ...]:
+        """What the identified law promises for other inputs."""
+        if model.admissible and model.stability_class == "I":
+            return ("the law is of stability class I and passive",)
+        kind = model.stability_class
+        bounded = f"of stability class {kind}" if kind != "none" else "of no stability class: other inputs may escape"
+        return (f"the law is {bounded}" + ("" if model.admissible else ", and may create energy"),)
 
     def assemble(self, parameters: Mapping[str, float]) -> Self:
         """The law with these parameters, one number for each name."""
