@@ -21,6 +21,23 @@ def parse(cell: str, decimal: str) -> float | None:
         return None
 
 
+def table(lines: list[str], places: list[int], delimiter: str, decimal: str) -> FloatArray | None:
+    """Columns of lines that hold plain finite numbers there, shape (n_columns, n_lines); None if some do not."""
+    if decimal == ",":
+        if delimiter == "," or any("." in line for line in lines):
+            return None
+        lines = [line.replace(",", ".") for line in lines]
+    if any("_" in line or '"' in line for line in lines):
+        return None
+    try:
+        values = np.loadtxt(
+            lines, delimiter=None if delimiter == " " else delimiter, usecols=places, comments=None, ndmin=2
+        )
+    except ValueError:
+        return None
+    return np.ascontiguousarray(values.T) if np.isfinite(values).all() else None
+
+
 def numbers(cells: list[str], lines: list[int], label: str, decimal: str) -> FloatArray:
     """The numbers of a column, nan where one is missing.
 

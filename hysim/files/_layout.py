@@ -37,12 +37,17 @@ class Column(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """The columns of a file, how their numbers are written, and the samples: lines, and cells of each."""
+    """The columns of a file, how its cells are parted and its numbers written, and the samples' lines."""
 
     columns: list[Column]
+    delimiter: str
     decimal: str
-    lines: list[int]
-    rows: list[list[str]]
+    numbers: list[int]
+    lines: list[str]
+
+    def rows(self) -> list[list[str]]:
+        """The cells of each sample."""
+        return _split_all(self.lines, self.numbers, self.delimiter)
 
 
 def layout(text: str, delimiter: str | None, decimal: str | None) -> Layout:
@@ -59,26 +64,37 @@ def layout(text: str, delimiter: str | None, decimal: str | None) -> Layout:
         raise ValueError("the file is empty, there is no header and no sample")
     lines = [every[k - 1] for k in numbers]
     delimiter, decimal = _signs(lines, delimiter, decimal)
-    rows = _split_all(lines, numbers, delimiter, quoted='"' in text)
-    width = _most_common([len(row) for row in _spread(rows)])
-    header, units = _heads(rows, numbers, width, decimal)
+    top = _split_all(lines[:2], numbers, delimiter)
+    below = _split_all(_spread(lines[1:]), _spread(numbers[1:]), delimiter)
+    width = _most_common([len(row) for row in [top[0], *below]])
+    header, units = _heads(top, [row for row in below if len(row) == width], numbers[0], width, decimal)
     first = header + units
-    if first == len(rows):
+    if first == len(lines):
         raise ValueError("there is a header, but no sample")
     if header:
-        names = _words(lines[0]) if delimiter == " " else rows[0]
+        names = _words(lines[0]) if delimiter == " " else top[0]
     else:
         names = _commented(every[: numbers[0] - 1], delimiter, width, decimal) or [str(k) for k in range(width)]
     if len(names) != width:
         raise ValueError(f"line {numbers[0]} names {len(names)} columns, most lines below have {width} cells")
     columns = [_column(place, label) for place, label in enumerate(names)]
     if units:
-        columns = [c._replace(unit=c.unit or _unit(cell)) for c, cell in zip(columns, rows[1], strict=True)]
-    rows, numbers = rows[first:], numbers[first:]
-    if {len(row) for row in rows} != {len(columns)}:
-        k = next(k for k, row in enumerate(rows) if len(row) != len(columns))
-        raise ValueError(_uneven(numbers[k], len(columns), len(rows[k]), delimiter))
-    return Layout(columns, decimal, numbers, rows)
+        columns = [c._replace(unit=c.unit or _unit(cell)) for c, cell in zip(columns, top[1], strict=True)]
+    found = Layout(columns, delimiter, decimal, numbers[first:], lines[first:])
+    widths = _widths(found)
+    if set(widths) != {width}:
+        k = next(k for k, cells in enumerate(widths) if cells != width)
+        raise ValueError(_uneven(found.numbers[k], width, widths[k], delimiter))
+    return found
+
+
+def _widths(found: Layout) -> list[int]:
+    """The number of cells of each sample."""
+    if any('"' in line for line in found.lines):
+        return [len(row) for row in found.rows()]
+    if found.delimiter == " ":
+        return [len(line.split()) for line in found.lines]
+    return [line.count(found.delimiter) + 1 for line in found.lines]
 
 
 def _signs(lines: list[str], delimiter: str | None, decimal: str | None) -> tuple[str, str]:
@@ -110,10 +126,10 @@ def _score(lines: list[str], delimiter: str, decimal: str) -> float:
     return sum(len(row) == width for row in rows) / len(rows) * plain / len(cells)
 
 
-def _split_all(lines: list[str], numbers: list[int], delimiter: str, *, quoted: bool) -> list[list[str]]:
-    if quoted:
+def _split_all(lines: list[str], numbers: list[int], delimiter: str) -> list[list[str]]:
+    if any('"' in line for line in lines):
         rows = []
-        for line, number in zip(lines, numbers, strict=True):
+        for line, number in zip(lines, numbers, strict=False):
             try:
                 rows.append(_split(line, delimiter, strict=True))
             except csv.Error as error:
@@ -146,9 +162,8 @@ def _words(line: str) -> list[str]:
     )
 
 
-def _heads(rows: list[list[str]], lines: list[int], width: int, decimal: str) -> tuple[bool, bool]:
+def _heads(rows: list[list[str]], below: list[list[str]], line: int, width: int, decimal: str) -> tuple[bool, bool]:
     """Whether the first line is a header, and whether the second one holds units."""
-    below = [row for row in _spread(rows[1:]) if len(row) == width]
     kinds = [[_kind(row[place], decimal) for row in below] for place in range(width)]
     numeric = [place for place, found in enumerate(kinds) if found.count("number") >= max(1, found.count("text"))]
     if not numeric:  # nothing below to compare with
@@ -156,14 +171,14 @@ def _heads(rows: list[list[str]], lines: list[int], width: int, decimal: str) ->
         return "text" in kinds_above or "number" not in kinds_above, False
     found = [
         {place: _kind(cell, decimal) for place, cell in enumerate(row) if len(row) != width or place in numeric}
-        for row in rows[:2]
+        for row in rows
     ]
     header = "text" in found[0].values()
     if header and "number" in found[0].values():
         texts = [place for place, kind in found[0].items() if kind == "text"]
         counts = [place for place, kind in found[0].items() if kind == "number"]
         raise ValueError(
-            f"line {lines[0]} is half a header: column {counts[0]} holds the number {rows[0][counts[0]]!r}, column "
+            f"line {line} is half a header: column {counts[0]} holds the number {rows[0][counts[0]]!r}, column "
             f"{texts[0]} the text {rows[0][texts[0]]!r}; name every column, or begin the line with #"
         )
     return header, header and len(rows[1]) == width and set(found[1].values()) == {"text"}

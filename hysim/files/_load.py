@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
-from hysim.files._cells import numbers
-from hysim.files._layout import DECIMALS, Column, layout
+from hysim.files._cells import numbers, table
+from hysim.files._layout import DECIMALS, Column, Layout, layout
 from hysim.files._text import Source, read
 from hysim.records import Record
 
@@ -130,11 +130,10 @@ def load(
     source, text = read(path, encoding)
     wanted = {"u": u, "y": y} if t is None else {"u": u, "y": y, "t": t}
     try:
-        columns, sign, lines, rows = layout(text, delimiter, decimal)
-        chosen = {signal: _column(columns, key) for signal, key in wanted.items()}
-        values = np.stack(
-            [numbers([row[place] for row in rows], lines, label, sign) for place, label, _ in chosen.values()]
-        )
+        found = layout(text, delimiter, decimal)
+        lines = found.numbers
+        chosen = {signal: _column(found.columns, key) for signal, key in wanted.items()}
+        values = _values(found, list(chosen.values()))
         is_gap = np.asarray(np.isnan(values).any(axis=0))
         if on_missing == "error" and is_gap.any():
             raise ValueError(_gap(lines, list(chosen.values()), values))
@@ -166,6 +165,15 @@ def _column(header: list[Column], key: str | int) -> Column:
         raise ValueError(f"{len(found)} columns are called {key!r}: choose one of the numbers {places}")
     there = ", ".join(column.label for column in header)
     raise ValueError(f"no column {key!r}, the columns are: {there}")
+
+
+def _values(found: Layout, columns: list[Column]) -> FloatArray:
+    """The numbers of the columns, shape (n_columns, n_samples), nan where one is missing."""
+    quick = table(found.lines, [column.place for column in columns], found.delimiter, found.decimal)
+    if quick is not None:
+        return quick
+    rows = found.rows()
+    return np.stack([numbers([row[c.place] for row in rows], found.numbers, c.label, found.decimal) for c in columns])
 
 
 def _gap(lines: list[int], columns: list[Column], values: FloatArray) -> str:
