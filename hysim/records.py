@@ -3,13 +3,19 @@
 The sample axis is axis 0. A record never changes; a slice of it carries its units, resolution and name.
 """
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import field
 from typing import Self
 
 import numpy as np
+import numpy.typing as npt
 
+from hysim._cycles import TOLERANCE, complete_cycles, turns
 from hysim._frozen import FloatArray, checked
+
+_MOST_SAMPLES = 100_000_000  # of a resampled record: 2.4 GB
+_ROUNDING = 1e-9  # of a number of steps
 
 
 @checked
@@ -107,3 +113,132 @@ class Record:
                 f"the time must be evenly spaced, got steps from {steps.min()} to {steps.max()}: resample first"
             )
         return mean
+
+    def reversals(self, tolerance: float = 0.0) -> npt.NDArray[np.intp]:
+        """Samples at which the input turns.
+
+        Of a plateau the middle sample is taken, of two in the middle the first. The record's ends are no
+        reversals.
+
+        Parameters
+        ----------
+        tolerance : float
+            Retreats of the input up to this fraction of its span are ignored, as in `hysim.loop_metrics`: noise.
+
+        Returns
+        -------
+        array of int, shape (n_reversals,)
+            Increasing places.
+
+        Raises
+        ------
+        ValueError
+            If the tolerance is not from 0 to below 0.5.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> rec = hs.Record(u=[0, 2, 2, 2, 1.9, 2, 0, 1], y=[0, 0, 0, 0, 0, 0, 0, 0])
+        >>> rec.reversals().tolist(), rec.reversals(tolerance=0.1).tolist()
+        ([2, 4, 5, 6], [3, 6])
+        """
+        middles = [(first + last) // 2 for first, last in turns(self.u, tolerance).plateaus[1:-1]]
+        return np.array(middles, dtype=np.intp)
+
+    def branches(self, tolerance: float = 0.0) -> tuple[Self, ...]:
+        """The stretches on which the input runs one way, in the order of time.
+
+        A plateau between two branches is divided in its middle; a sample in the very middle, and a reversal
+        without a plateau, belongs to both. An input that stands still has no branch.
+
+        Parameters
+        ----------
+        tolerance : float
+            Retreats up to this fraction of the input's span do not end a branch. What comes before the first
+            extreme, and after the last one, by less than that is left out.
+
+        Returns
+        -------
+        tuple of Record
+
+        Raises
+        ------
+        ValueError
+            If the tolerance is not from 0 to below 0.5.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> [branch.u.tolist() for branch in hs.Record(u=[0, 1, 2, 2, 0], y=[0, 1, 2, 2, 1]).branches()]
+        [[0.0, 1.0, 2.0], [2.0, 0.0]]
+        """
+        return tuple(self[samples] for samples in turns(self.u, tolerance).branches)
+
+    def cycles(self, tolerance: float = TOLERANCE) -> tuple[Self, ...]:
+        """The complete cycles of the input, in the order of time.
+
+        A cycle goes from one extreme of the record to the other and back, each within 5 % of the input's span,
+        as `hysim.loop_metrics` has it: the last one is what that measures. Cycles are counted from the end and
+        share no branch, so that the initial rise of a record falls away.
+
+        Parameters
+        ----------
+        tolerance : float
+            Retreats up to this fraction of the input's span are ignored.
+
+        Returns
+        -------
+        tuple of Record
+            Empty where there is no complete cycle.
+
+        Raises
+        ------
+        ValueError
+            If the tolerance is not from 0 to below 0.5.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> u = hs.signals.triangle(0.0, 1.0, cycles=3, samples_per_cycle=4)
+        >>> [cycle.u.tolist() for cycle in hs.Record(u=u, y=u).cycles()][0]
+        [0.0, 0.5, 1.0, 0.5, 0.0]
+        """
+        return tuple(self[cycle.path] for cycle in reversed(complete_cycles(self.u, tolerance)))
+
+    def resample(self, sample_time: float) -> Self:
+        """The record at even times from its first one on, by straight lines between the samples.
+
+        Input and output are both taken as linear between their samples, and what lies after the last whole step
+        is left out. An extreme of the input between two new samples is cut off, and with it what a law would
+        remember of it: choose a step well below the time between reversals. A held input becomes one with ramps.
+
+        Parameters
+        ----------
+        sample_time : float
+            Time between two samples [``units["t"]``].
+
+        Returns
+        -------
+        Record
+
+        Raises
+        ------
+        ValueError
+            If the record has no time, or the step is not positive, longer than the record, or so short that more
+            than 1e8 samples would result.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> rec = hs.Record(t=[0, 1, 3], u=[0, 1, 3], y=[0, 2, 0])
+        >>> rec.resample(1.0).y.tolist()
+        [0.0, 2.0, 1.0, 0.0]
+        """
+        if self.t is None:
+            raise ValueError("the record has no time to resample: give t")
+        span = float(self.t[-1] - self.t[0])
+        if not span / _MOST_SAMPLES <= sample_time <= span * (1 + _ROUNDING):
+            raise ValueError(f"sample_time must be from {span / _MOST_SAMPLES:g} to {span:g}, got {sample_time}")
+        t = self.t[0] + sample_time * np.arange(int(span / sample_time * (1 + _ROUNDING)) + 1)
+        u, y = (np.interp(t, self.t, values) for values in (self.u, self.y))
+        return dataclasses.replace(self, t=t, u=u, y=y)

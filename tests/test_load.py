@@ -3,6 +3,8 @@
 import io
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import hysim as hs
 
@@ -112,9 +114,15 @@ def test_time_may_begin_again_after_a_gap():
         ("\n# nothing\n", "the file is empty"),
         ("u,y\n", "no sample"),
         ("u,z\n0,1\n", "no column 'y', the columns are: u, z"),
-        ("u,y,y\n0,1,2\n", "2 columns are called 'y'"),
+        ("u,y,y\n0,1,2\n", "2 columns are called 'y': choose one of the numbers 1, 2"),
         ("u,y\n0,1\n2,high\n", "line 3, column 'y': expected a finite number, got 'high'"),
-        ("u;y\n0;1\n2;3,5\n", r"line 3, column 'y': .* got '3,5' \(write decimals with a point\)"),
+        ("u;y\n0.5;1\n2;3,5\n", r"line 3, column 'y': .* got '3,5' \(give decimal=\",\""),
+        ("u;y\n0,5;1\n2,5;1.234,5\n", r"line 3, column 'y': .* got '1.234,5' \(give decimal=\".\""),
+        ("u,y\n0,1\nx,2\n3,4\n", "line 3, column 'u': expected a finite number, got 'x'"),
+        ("0,x\n1,2\n3,4\n", "line 1 is half a header: column 0 holds the number '0', column 1 the text 'x'"),
+        ("u,v\n1,2,3\n4,5,6\n", "line 1 names 2 columns, most lines below have 3 cells"),
+        ("0,1\n2;3\n4,5\n", r"line 2: expected 2 cells, got 1 \(parted by comma\); mend the line"),
+        ('u,y\n"0,1\n2,3\n', "line 2: a quoted cell is not closed"),
         ("u,y\n0,1\n1_0,3\n", "line 3, column 'u': expected a finite number, got '1_0'"),
         ("u,y\n0,1\n# note\n-inf,3\n", "line 4, column 'u': expected a finite number, got '-inf'"),
         ("u,y\n0,1\n2,3,4\n", "line 3: expected 2 cells, got 3"),
@@ -134,10 +142,114 @@ def test_a_number_beyond_the_columns_is_refused():
             load("0,1\n2,3\n", u=number, y=1)
 
 
-@pytest.mark.parametrize("content", [b"\x89PNG\r\n\x1a\n\xff", "u,y\n0,1\n".encode("utf-16")], ids=["image", "utf-16"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-32"])
+def test_a_byte_order_mark_says_the_encoding(tmp_path, encoding):
+    path = write(tmp_path, "u [\u00b5m],y\r\n0,1\r\n2,3\r\n".encode(encoding))
+    rec = hs.load(path, u="u", y="y")
+    assert (rec.y.tolist(), rec.units["u"]) == ([1, 3], "\u00b5m")
+    with path.open("rb") as stream:
+        assert hs.load(stream, u="u", y="y") == rec
+
+
+def test_an_encoding_can_be_said(tmp_path):
+    path = write(tmp_path, "u [\u00b5m],y\n0,1\n2,3\n".encode("latin-1"))
+    assert hs.load(path, u="u", y="y", encoding="latin-1").units["u"] == "\u00b5m"
+    with pytest.raises(ValueError, match=r'loop\.csv is not a UTF-8 text file: .* encoding="latin-1"'):
+        hs.load(path, u="u", y="y")
+    with pytest.raises(ValueError, match=r"loop\.csv: encoding must be one that Python knows, got 'latin-99'"):
+        hs.load(path, u="u", y="y", encoding="latin-99")
+
+
+@pytest.mark.parametrize("content", [b"\x89PNG\r\n\x1a\n\xff", b"\xff\xfe0"], ids=["image", "half a character"])
 def test_a_file_that_is_no_text_is_refused_by_name(tmp_path, content):
-    with pytest.raises(ValueError, match=r"loop\.csv is not a UTF-8 text file"):
+    with pytest.raises(ValueError, match=r"loop\.csv is not a UTF-\d+ text file"):
         hs.load(write(tmp_path, content), u="u", y="y")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "u;y\n0;1\n0,5;2\n1e1;-,25\n",
+        "u\ty\n0,0\t1,0\n0,5\t2,0\n10,0\t-0,25\n",
+        "u y\n0,0 1,0\n0,5 2,0\n10,0 -0,25\n",
+        'u,y\n"0,0","1,0"\n"0,5","2,0"\n"10,0","-0,25"\n',
+        "u, y\n0, 1\n0.5, 2\n10, -.25\n",
+        "u; y; at\n0; 1; 9:00, up\n0.5; 2; 9:01, up\n10; -.25; 9:02, down\n",
+        "at,u,y\n2020-01-01 10:00:00,0,1\n2020-01-01 10:00:01,0.5,2\n2020-01-01 10:00:02,10,-0.25\n",
+    ],
+    ids=["semicolon", "tab", "blank", "quoted", "comma and blank", "commas in a text", "dates"],
+)
+def test_delimiter_and_decimal_sign_are_those_that_give_numbers(text):
+    rec = load(text)
+    assert (rec.u.tolist(), rec.y.tolist()) == ([0, 0.5, 10], [1, 2, -0.25])
+
+
+def test_a_decimal_comma_far_down_the_file_is_seen_or_can_be_said():
+    far = "u;y\n" + "".join(f"{k};{k}\n" for k in range(1000)) + "1000;0,5\n"
+    assert load(far, decimal=",").y[-1] == 0.5
+    with pytest.raises(ValueError, match=r"line 1002, column 'y': .* \(give decimal=\",\""):
+        load(far, decimal=".")
+    often = "u;y\n" + "".join(f"{k};{k}\n" for k in range(500)) + "".join(f"{k};0,5\n" for k in range(500, 1000))
+    assert load(often).y[-1] == 0.5
+    with pytest.raises(ValueError, match="both parted by ','"):
+        load("u,y\n0,1\n2,3\n", delimiter=",", decimal=",")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "u,y,note\n[V],(um),\n0,1,up\n2,3,\n",
+        "u;y\nV;um\n0,5;1\n2;3\n",
+        "u [V],y\nkV,um\n0,1\n2,3\n",
+        "# made by hand\n# u [V], y [um]\n0,1\n2,3\n",
+        "% u [V] y [um]\n0 1\n2 3\n",
+        '"u (V)","y (um)"\n0,1\n2,3\n',
+    ],
+    ids=["line of units", "two rows", "header before units", "savetxt", "matlab", "quoted"],
+)
+def test_units_are_found_in_the_header_below_it_or_in_a_comment(text):
+    assert dict(load(text).units) == {"u": "V", "y": "um"}
+
+
+def test_a_text_beside_the_numbers_does_not_make_the_first_sample_a_header():
+    assert load("0,1,up\n2,3,up\n1,2,down\n", u=0, y=1).u.tolist() == [0, 2, 1]
+
+
+def test_a_line_end_is_that_of_any_machine():
+    assert load("u,y\r0,1\r2,3\r").u.tolist() == load("u,y\r\n0,1\n2,3").u.tolist() == [0, 2]
+
+
+CELLS = st.sampled_from(
+    ["0", "1.5", "-2", "3,5", "nan", "", "inf", "x", '"', '"4"', "#", "1_0", "1e999", "u", " ", "\u00b2"]
+)
+SIGNS = st.sampled_from([",", ";", "\t", " ", ", "])
+LINES = st.builds(lambda sign, cells: sign.join(cells), SIGNS, st.lists(CELLS, max_size=4))
+TEXTS = st.one_of(
+    st.builds("\n".join, st.lists(LINES, max_size=8)),
+    st.builds(lambda sign, rows: "\n".join(map(sign.join, rows)), SIGNS, st.lists(st.tuples(CELLS, CELLS), max_size=8)),
+    st.text(max_size=60),
+)
+
+
+@given(TEXTS, st.sampled_from(["error", "drop", "split"]), st.sampled_from([0, 1, "u"]))
+def test_any_text_is_a_record_or_one_line_of_error(text, on_missing, y):
+    try:
+        loaded = load(text, u=0, y=y, on_missing=on_missing)
+    except ValueError as error:
+        message = str(error)
+    else:
+        message = "stream"
+        assert all(isinstance(rec, hs.Record) for rec in (loaded if on_missing == "split" else [loaded]))
+    assert message.startswith("stream")
+    assert "\n" not in message
+
+
+@given(st.lists(st.tuples(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6)), min_size=2), SIGNS, st.sampled_from(".,"))
+def test_what_is_written_is_read_to_the_bit(samples, sign, point):
+    delimiter = ";" if sign.strip() == point else sign
+    rows = [delimiter.join(repr(value).replace(".", point) for value in sample) for sample in samples]
+    rec = load("\n".join(["u" + delimiter + "y", *rows]), decimal=point)
+    assert list(zip(rec.u.tolist(), rec.y.tolist(), strict=True)) == samples
 
 
 def test_errors_name_the_file(tmp_path):
@@ -152,8 +264,8 @@ def test_wrong_arguments_are_refused():
         load(LOOP, on_missing="skip")
     with pytest.raises(ValueError, match="one character, got ', '"):
         load(LOOP, delimiter=", ")
-    with pytest.raises(TypeError, match="open the file as text"):
-        hs.load(io.BytesIO(b"u,y\n"), u="u", y="y")
+    with pytest.raises(ValueError, match=r'decimal must be "\." or ",", got "\'"'):
+        load(LOOP, decimal="'")
 
 
 def test_a_stream_is_read_from_where_it_stands(tmp_path):

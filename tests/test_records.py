@@ -7,8 +7,12 @@ import pickle
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import hysim as hs
+
+WALKS = st.lists(st.integers(-5, 5), min_size=2, max_size=40).map(lambda u: hs.Record(u=u, y=range(len(u))))
 
 
 def record(**changes):
@@ -97,3 +101,77 @@ def test_the_sample_time_is_that_of_an_even_record():
 def test_what_is_no_record_is_refused_with_its_place(changes, error, message):
     with pytest.raises(error, match=message):
         record(**changes)
+
+
+@given(WALKS)
+def test_branches_are_monotone_and_cover_the_record(rec):
+    branches = rec.branches()
+    for branch in branches:
+        steps = np.diff(branch.u)
+        assert (steps >= 0).all() or (steps <= 0).all()
+    seen = sorted({int(k) for branch in branches for k in branch.y})
+    assert seen == (list(range(len(rec))) if np.ptp(rec.u) else [])
+    assert len(rec.reversals()) == max(0, len(branches) - 1)
+
+
+@given(WALKS)
+def test_reversals_are_where_the_slope_changes_its_sign(rec):
+    slopes = [step for step in np.sign(np.diff(rec.u)) if step]
+    turning = [k for k in range(1, len(slopes)) if slopes[k] != slopes[k - 1]]
+    assert len(rec.reversals()) == len(turning)
+    for k in rec.reversals():
+        left, right = rec.u[:k][rec.u[:k] != rec.u[k]], rec.u[k:][rec.u[k:] != rec.u[k]]
+        assert (left[-1] - rec.u[k]) * (right[0] - rec.u[k]) > 0
+
+
+@pytest.mark.parametrize(
+    ("u", "places"),
+    [
+        ([0, 1, 0], [1]),
+        ([0, 1, 1, 0], [1]),
+        ([0, 1, 1, 1, 0], [2]),
+        ([0, 0, 1, 2, 2], []),
+        ([3, 3, 3], []),
+        ([0, 1, 0.99, 1, 2, 0], [1, 2, 4]),
+    ],
+)
+def test_a_plateau_turns_at_its_middle(u, places):
+    assert hs.Record(u=u, y=u).reversals().tolist() == places
+
+
+def test_wiggles_below_the_tolerance_are_no_reversals():
+    u = hs.signals.triangle(0.0, 1.0, cycles=3, samples_per_cycle=40)
+    noisy = hs.Record(u=u + 0.03 * (-1.0) ** np.arange(u.size), y=u)
+    assert len(noisy.reversals()) > 10
+    assert len(noisy.reversals(tolerance=0.1)) == 5
+    assert len(noisy.branches(tolerance=0.1)) == 6
+    with pytest.raises(ValueError, match=r"tolerance .* got 0\.5"):
+        noisy.reversals(tolerance=0.5)
+
+
+def test_cycles_are_those_that_loop_metrics_measures():
+    u = hs.signals.triangle(0.0, 1.0, cycles=4, samples_per_cycle=40)[7:]
+    rec = hs.Record(u=u, y=hs.BoucWen(beta=2.0).response(u), units={"u": "V"}, name="loop")
+    cycles = rec.cycles()
+    assert [len(cycle) for cycle in cycles] == [41, 41, 41]
+    assert {(cycle.name, cycle.units["u"]) for cycle in cycles} == {("loop", "V")}
+    assert hs.loop_metrics(cycles[-1].u, cycles[-1].y) == hs.loop_metrics(rec.u, rec.y)
+    assert hs.Record(u=[0, 1, 2], y=[0, 1, 2]).cycles() == hs.Record(u=[1, 1], y=[0, 1]).cycles() == ()
+
+
+def test_an_uneven_record_is_resampled_along_straight_lines():
+    rec = record(t=[0.0, 0.1, 0.2, 0.5])
+    even = rec.resample(0.1)
+    assert even.sample_time == pytest.approx(0.1, rel=1e-12)  # a mean of rounded differences
+    assert even.u == pytest.approx([0, 1, 2, 5 / 3, 4 / 3, 1], abs=1e-15)  # rounding of the times
+    assert (even.units, even.resolution, even.name) == (rec.units, rec.resolution, rec.name)
+    assert record().resample(record().sample_time).u == pytest.approx(record().u, abs=1e-14)
+    assert rec.resample(0.2).t.tolist() == [0.0, 0.2, 0.4]  # what lies after the last whole step is left out
+
+
+@pytest.mark.parametrize("step", [0.0, -1.0, 0.31, 1e-12, math.nan, math.inf])
+def test_a_step_that_does_not_fit_the_record_is_refused(step):
+    with pytest.raises(ValueError, match="sample_time must be from"):
+        record().resample(step)
+    with pytest.raises(ValueError, match="no time to resample"):
+        record(t=None).resample(0.1)

@@ -20,11 +20,8 @@ from typing import Literal, overload
 import numpy as np
 import numpy.typing as npt
 
+from hysim._cycles import ROUNDING, TOLERANCE, last_cycles
 from hysim._frozen import FloatArray, frozen, read_only
-from hysim.metrics._cycles import ROUNDING, last_cycles
-
-TOLERANCE = 0.01
-"""Reversals of the input that are ignored by default, as a fraction of its span."""
 
 
 @frozen

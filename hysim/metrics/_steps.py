@@ -17,8 +17,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from hysim._cycles import ROUNDING
 from hysim._frozen import FloatArray, frozen, read_only
-from hysim.metrics._cycles import ROUNDING
 
 SETTLED = 0.02
 """How near to its final value a response has settled."""

@@ -46,10 +46,15 @@ def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None
     ...     hs.load_model(f"{folder}/line.json")
     Line(offset=0.0, slope=0.1)
     """
+    write_text(path, to_json(model, units=units))
+
+
+def to_json(model: Any, *, units: Mapping[str, str] | None = None) -> str:
+    """What `save` writes, as a string."""
     if not is_model(model):
         raise TypeError(f"save takes a model of hysim, got {type(model).__name__}")
     document = {"hysim": hysim.__version__, **to_document(model), "units": dict(units or {})}
-    write_text(path, json.dumps(document, indent=2, allow_nan=False) + "\n")
+    return json.dumps(document, indent=2, allow_nan=False) + "\n"
 
 
 def load_model(path: str | Path) -> Any:
@@ -71,12 +76,18 @@ def load_model(path: str | Path) -> Any:
     OSError
         If it cannot be read.
     """
+    return from_json(Path(path).read_bytes(), path)[0]
+
+
+def from_json(text: str | bytes, source: str | Path) -> tuple[Any, dict[str, str]]:
+    """The model that `to_json` wrote, and the units; errors call the text by the name of its `source`."""
     try:
-        document = json.loads(Path(path).read_text(encoding="utf-8"))
+        document = json.loads(text)
         head = {"family": document["family"], "parameters": {**document["parameters"]}}
-    except (KeyError, TypeError, ValueError, RecursionError) as error:
-        raise ValueError(f"{path} does not hold a model of hysim: {type(error).__name__}: {error}") from None
-    return from_document(head, path)
+        units = {str(name): str(unit) for name, unit in document.get("units", {}).items()}
+    except (AttributeError, KeyError, TypeError, ValueError, RecursionError) as error:
+        raise ValueError(f"{source} does not hold a model of hysim: {type(error).__name__}: {error}") from None
+    return from_document(head, source), units
 
 
 def from_document(document: Mapping[str, Any], path: str | Path) -> Any:

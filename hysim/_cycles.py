@@ -1,8 +1,9 @@
-"""The complete cycles of an input.
+"""The turning points of an input, the branches between them, and its complete cycles.
 
 The input turns where it retreats from an extreme by more than a threshold; the record's ends count as turning
-points. Three consecutive turning points are a complete cycle if the outer two lie near one extreme of the
-record and the middle one near the other. A plateau at a turning point is divided in its middle.
+points. A branch runs from one turning point to the next. Three consecutive turning points are a complete cycle if
+the outer two lie near one extreme of the record and the middle one near the other. A plateau at a turning point is
+divided in its middle, half to each branch; a sample in the very middle belongs to both.
 """
 
 from typing import NamedTuple
@@ -18,6 +19,10 @@ ROUNDING = 1e-12
 """What counts as equal, as a fraction of the span or the stroke."""
 
 
+TOLERANCE = 0.01
+"""Reversals of the input that are ignored by default, as a fraction of its span."""
+
+
 class Cycle(NamedTuple):
     """The samples of a cycle's branches, and those of both in the order of time."""
 
@@ -26,37 +31,59 @@ class Cycle(NamedTuple):
     path: slice
 
 
+class Turns(NamedTuple):
+    """First and last sample of each turning point, and the branches between them."""
+
+    plateaus: list[tuple[int, int]]
+    branches: list[slice]
+
+
 def last_cycles(u: FloatArray, cycles: int, tolerance: float) -> list[Cycle]:
     """The last complete cycles that share no branch, the latest first."""
     if cycles < 1:
         raise ValueError(f"cycles must be at least 1, got {cycles}")
-    if not 0 <= tolerance < 0.5:
-        raise ValueError(f"tolerance is a fraction of the input's span from 0 to below 0.5, got {tolerance}")
-    low, high = u.min(), u.max()
-    plateaus = _turning_points(u, tolerance * (high - low))
+    found = complete_cycles(u, tolerance)
+    if len(found) < cycles:
+        plateaus = turns(u, tolerance).plateaus
+        raise ValueError(_too_few(cycles, len(found), u[[first for first, _ in plateaus]]))
+    return found[:cycles]
+
+
+def complete_cycles(u: FloatArray, tolerance: float) -> list[Cycle]:
+    """Every complete cycle that shares no branch with a later one, the latest first."""
+    plateaus, branches = turns(u, tolerance)
     levels = u[[first for first, _ in plateaus]]
+    low, high = u.min(), u.max()
     near = NEAR * (high - low)
     side = (levels >= high - near).astype(int) - (levels <= low + near)
 
-    begins: list[int] = []
+    found = []
     k = side.size - 1
     while k >= 2:
         if side[k] == side[k - 2] == -side[k - 1] != 0:
-            begins.append(k - 2)
+            halves = branches[k - 2], branches[k - 1]
+            loading, unloading = halves if side[k] < 0 else halves[::-1]
+            found.append(Cycle(loading, unloading, slice(halves[0].start, halves[1].stop)))
             k -= 2
         else:
             k -= 1
-    if len(begins) < cycles:
-        raise ValueError(_too_few(cycles, len(begins), levels))
-
-    starts = [plateaus[0][0], *((first + last + 1) // 2 for first, last in plateaus[1:])]
-    stops = [*((first + last) // 2 + 1 for first, last in plateaus[:-1]), plateaus[-1][1] + 1]
-    found = []
-    for k in begins[:cycles]:
-        halves = slice(starts[k], stops[k + 1]), slice(starts[k + 1], stops[k + 2])
-        loading, unloading = halves if side[k] < 0 else halves[::-1]
-        found.append(Cycle(loading, unloading, slice(starts[k], stops[k + 2])))
     return found
+
+
+def turns(u: FloatArray, tolerance: float) -> Turns:
+    """The turning points, where retreats of up to `tolerance` times the input's span are none, and the branches.
+
+    Raises
+    ------
+    ValueError
+        If the tolerance is not from 0 to below 0.5.
+    """
+    if not 0 <= tolerance < 0.5:
+        raise ValueError(f"tolerance is a fraction of the input's span from 0 to below 0.5, got {tolerance}")
+    plateaus = _turning_points(u, tolerance * float(np.ptp(u)))
+    starts = [plateaus[0][0], *((first + last + 1) // 2 for first, last in plateaus[1:-1])]
+    stops = [*((first + last) // 2 + 1 for first, last in plateaus[1:-1]), plateaus[-1][1] + 1]
+    return Turns(plateaus, [slice(*ends) for ends in zip(starts, stops, strict=True)] if len(plateaus) > 1 else [])
 
 
 def _too_few(asked: int, found: int, levels: FloatArray) -> str:

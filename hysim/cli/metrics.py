@@ -1,0 +1,65 @@
+"""`hysim metrics`: the width, area and orientation of a measured loop."""
+
+import argparse
+import dataclasses
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from hysim.cli import outputs, records
+
+if TYPE_CHECKING:
+    from hysim.metrics import LoopMetrics
+
+
+def add_to(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "metrics",
+        help="measure the loop in a file of your own",
+        description="Measure the loop of the input's last complete cycle, or the average loop of the last few.",
+    )
+    records.add_to(parser)
+    parser.add_argument("--cycles", metavar="N", type=int, default=1, help="last cycles to average (default: 1)")
+    parser.add_argument(
+        "--tolerance",
+        metavar="FRACTION",
+        type=float,
+        help="of the input's span: reversals smaller than that are noise (default: 0.01)",
+    )
+    parser.add_argument("--json", action="store_true", help="print them as JSON")
+    parser.set_defaults(command=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Measure and print."""
+    from hysim.metrics import loop_metrics
+
+    record = records.read(options)
+    tolerance = {} if options.tolerance is None else {"tolerance": options.tolerance}
+    loop = loop_metrics(record.u, record.y, cycles=options.cycles, **tolerance)
+    text = outputs.to_json(_document(loop, record.units)) if options.json else "\n".join(_lines(loop, record.units))
+    outputs.write({records.STANDARD: text.rstrip("\n") + "\n"})
+    return 0
+
+
+def _document(loop: "LoopMetrics", units: Mapping[str, str]) -> dict[str, Any]:
+    values = {field.name: getattr(loop, field.name) for field in dataclasses.fields(loop)}
+    return {name: value for name, value in values.items() if isinstance(value, (float, int, str))} | {"units": units}
+
+
+def _lines(loop: "LoopMetrics", units: Mapping[str, str]) -> Iterator[str]:
+    u, y = (units.get(signal, "") for signal in ("u", "y"))
+    at = f"{loop.max_width_at:.6g} {u}".rstrip()
+    values = {
+        "max width": f"{loop.max_width:.4g} {y}".rstrip() + f" at {at}",
+        "mean width": f"{loop.mean_width:.4g} {y}",
+        "width at mid span": f"{loop.mid_width:.4g} {y}",
+        "relative width": f"{100 * loop.relative_width:.2f} % of the stroke",
+        "stroke": f"{loop.stroke:.4g} {y}",
+        "area": f"{loop.area:.4g} {y} {u}" if u and y else f"{loop.area:.4g}",
+        "orientation": loop.orientation,
+        "closure gap": f"{loop.closure_gap:.4g} {y}",
+        "cycles": f"{loop.n_cycles}",
+    }
+    width = max(map(len, values))
+    yield from (f"{name:<{width}}  {value.rstrip()}" for name, value in values.items())

@@ -1,0 +1,38 @@
+"""`hysim simulate`: a model in a file, driven by an input in a file."""
+
+import argparse
+from typing import Any
+
+from hysim.cli import models, outputs, records
+
+
+def add_to(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "simulate",
+        help="drive a model with the input in a file of your own",
+        description="Simulate a model in free run, and write its signals as comma-separated columns: t if there is "
+        "a time, u, y, the memory z of a law, and what else a plant has.",
+    )
+    parser.add_argument("model", metavar="MODEL.json", help="as identify writes it, or - for the standard input")
+    records.add_to(parser, output=False)
+    parser.add_argument("--out", metavar="OUT.csv", default=records.STANDARD, help="default: the standard output")
+    parser.add_argument("--plot", metavar="LOOP.svg", help="draw the loop")
+    parser.set_defaults(command=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Simulate and write."""
+    outputs.check(options.out, pictures=[options.plot])
+    if options.model == options.file == records.STANDARD:
+        raise ValueError("the standard input holds the model or the record, not both")
+    model, units = models.read(options.model)
+    record = records.read(options)
+    known = units | {signal: unit for signal, unit in record.units.items() if signal != "y"} | dict(options.unit)
+    run = models.simulated(model, record, known)
+    columns = {name: run.signals[name] for name in ("t", "u", "y", "z") if name in run.signals}
+    texts = {options.out: outputs.to_csv(columns | dict(run.signals), known)}
+    if options.plot:
+        texts[options.plot] = outputs.loop_svg(run)
+    outputs.write(texts)
+    return 0

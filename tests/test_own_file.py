@@ -1,0 +1,252 @@
+"""A file of one's own goes from record to model and picture by command line alone, or ends in one line."""
+
+import dataclasses
+import io
+import json
+import re
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import hysim as hs
+from hysim.cli import main, models, outputs
+
+LAW = hs.BoucWen(beta=0.03, gamma=0.02, gain=0.01, feedthrough=0.015)
+COLUMNS = ["--u", "voltage", "--y", "displacement"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A record that the project has not seen, with decimal commas, and the law behind it."""
+    folder = tmp_path_factory.mktemp("own")
+    u = hs.signals.triangle(0.0, 100.0, cycles=2, samples_per_cycle=40)
+    samples = zip(u.tolist(), LAW.response(u).tolist(), strict=True)
+    rows = [f"{k / 10};{a};{b!r}".replace(".", ",") for k, (a, b) in enumerate(samples)]
+    (folder / "loop.csv").write_text("\n".join(["time;voltage;displacement", "s;V;um", *rows]))
+    hs.save(LAW, folder / "law.json", units={"y": "um"})
+    return folder
+
+
+@pytest.fixture
+def run(folder, monkeypatch, capsys):
+    """Run a command in that folder: exit code, standard output, standard error."""
+    monkeypatch.chdir(folder)
+
+    def command(*arguments, stdin=None):
+        if stdin is not None:
+            monkeypatch.setattr("sys.stdin", io.StringIO(stdin))
+        try:
+            code = main([*map(str, arguments)])
+        except SystemExit as exit_:
+            code = exit_.code
+        return code, *capsys.readouterr()
+
+    return command
+
+
+def test_a_record_goes_from_file_to_model_to_simulation_to_picture(run, folder, tmp_path):
+    model, loop = tmp_path / "fit.json", tmp_path / "fit.svg"
+    code, out, err = run(
+        "identify", "loop.csv", *COLUMNS, "--model", "bouc-wen", "--fix", "n=1", "--bounds", "beta=0:2",
+        "--initial", "rest", "--out", model, "--plot", loop,
+    )  # fmt: skip
+    assert (code, err) == (0, "")
+    assert out.startswith("BoucWen: fit 100.00 %")
+    fitted = hs.load_model(model)
+    assert fitted.beta == pytest.approx(LAW.beta, rel=1e-4)  # the search stops at a relative cost
+    assert json.loads(model.read_text())["units"] == {"u": "V", "y": "um"}
+
+    code, out, _ = run("simulate", model, "loop.csv", "--u", "voltage", "--t", "time", "--plot", tmp_path / "sim.svg")
+    assert code == 0
+    assert out.splitlines()[0] == "t [s],u [V],y [um],z"
+    again = hs.load(io.StringIO(out), u="u", y="y", t="t")
+    assert np.array_equal(again.y, fitted.response(again.u))
+
+    code, out, _ = run("plot", "loop.csv", *COLUMNS, "--model", model, "--out", tmp_path / "both.svg")
+    assert (code, out) == (0, "")
+    assert (tmp_path / "both.svg").read_bytes() == loop.read_bytes()
+    text = "".join(ET.parse(loop).getroot().itertext())
+    assert "Voltage [V]" in text
+    assert "Displacement [µm]" in text
+    assert {path.name for path in tmp_path.iterdir()} == {"fit.json", "fit.svg", "sim.svg", "both.svg"}
+
+
+def test_metrics_have_units_and_are_those_of_loop_metrics(run, folder):
+    code, out, _ = run("metrics", "loop.csv", *COLUMNS)
+    loop = hs.loop_metrics(*(getattr(hs.load(folder / "loop.csv", u=1, y=2), name) for name in "uy"))
+    assert code == 0
+    assert f"max width          {loop.max_width:.4g} um at {loop.max_width_at:.6g} V" in out
+    assert f"area               {loop.area:.4g} um V" in out
+    document = json.loads(run("metrics", "loop.csv", *COLUMNS, "--json", "--unit", "y=nm")[1])
+    assert document["area"] == loop.area
+    assert document["units"] == {"u": "V", "y": "nm"}
+
+
+def test_numbers_that_do_not_exist_are_null(run):
+    constant = "u,y\n0,1\n1,1\n0,1\n"
+    code, out, _ = run("metrics", "-", "--u", "u", "--y", "y", "--json", stdin=constant)
+    assert code == 0
+    assert json.loads(out)["relative_width"] is None
+    code, out, _ = run("identify", "loop.csv", *COLUMNS, "--model", "line", "--json")
+    assert json.loads(out)["cv_rmse"] is None
+    assert json.loads(out)["family"] == "Line"
+
+
+def test_standard_streams_join_the_commands(run, folder):
+    _, model, _ = run("identify", "loop.csv", *COLUMNS, "--model", "line", "--out", "-")
+    assert json.loads(model)["family"] == "Line"
+    _, table, _ = run("simulate", "-", "loop.csv", "--u", "voltage", stdin=model)
+    assert table.startswith("u [V],y [um]\n")
+    code, picture, _ = run("plot", "-", "--u", "u", "--y", "y", "--model", "law.json", "--out", "-", stdin=table)
+    assert code == 0
+    assert picture.startswith("<svg")
+    assert picture == run("plot", "-", "--u", "u", "--y", "y", "--model", "law.json", "--out", "-", stdin=table)[1]
+
+
+def test_time_can_be_a_step_a_column_or_brought_to_even_steps(run, tmp_path):
+    lag = tmp_path / "lag.json"
+    hs.save(hs.TransferFunction(num=(2.0,), den=(1.0, 1.0), hold="foh"), lag)
+    numbers = ("simulate", lag, "-", "--u", "u")
+    code, out, _ = run(*numbers, "--sample-time", 0.5, stdin="u\n1\n1\n1\n")
+    assert (code, out.splitlines()[0], len(out.splitlines())) == (0, "t,u,y", 4)
+    uneven = "t,u\n0,1\n1,1\n3,1\n"
+    code, _, err = run(*numbers, "--t", "t", stdin=uneven)
+    assert code == 2
+    assert "evenly spaced" in err
+    assert len(run(*numbers, "--t", "t", "--sample-time", 0.5, stdin=uneven)[1].splitlines()) == 8
+    assert run(*numbers, "--sample-time", 0, stdin="u\n1\n1\n")[0] == 2
+
+
+def test_a_structure_takes_its_own_options_and_no_other_family_does(run):
+    structure = ["--model", "transfer-function", "--poles", 1, "--zeros", 0, "--hold", "foh"]
+    code, out, _ = run("identify", "loop.csv", *COLUMNS, "--t", "time", *structure)
+    assert code == 0
+    assert out.startswith("TransferFunction: fit")
+    code, _, err = run("identify", "loop.csv", *COLUMNS, "--model", "line", "--poles", 1)
+    assert (code, err) == (2, "hysim: error: --poles is no option of the model line\n")
+    code, _, err = run("identify", "loop.csv", *COLUMNS, "--model", "transfer-function", "--poles", 1)
+    assert (code, err) == (2, "hysim: error: the model transfer-function needs --zeros\n")
+
+
+@pytest.mark.parametrize("name", models.FAMILIES)
+def test_every_name_of_a_model_stands_for_something_that_can_be_identified(name):
+    family = getattr(hs, models.FAMILIES[name])
+    assert callable(getattr(family, "structure" if name in models.STRUCTURES else "search_space"))
+
+
+def test_a_search_that_does_not_converge_exits_with_1(run, monkeypatch):
+    fit = hs.identify(hs.Line, hs.datasets.table1())
+    unfinished = dataclasses.replace(fit, success=False)
+    monkeypatch.setattr("hysim.identification.identify", lambda *_, **__: unfinished)
+    assert run("identify", "loop.csv", *COLUMNS, "--model", "line")[0] == 1
+
+
+def test_progress_is_shown_on_a_terminal_only(monkeypatch):
+    class Terminal(io.StringIO):
+        def isatty(self):
+            return True
+
+    monkeypatch.setattr("sys.stderr", io.StringIO())
+    assert outputs.progress() is None
+    monkeypatch.setattr("sys.stderr", terminal := Terminal())
+    show = outputs.progress()
+    show(1, 2)
+    show(2, 2)
+    assert terminal.getvalue() == "\r1/2\r2/2\n"
+
+
+CORPUS = {
+    "empty": (b"", "the file is empty"),
+    "binary": (bytes(range(256)), "not a UTF-8 text file"),
+    "zero bytes": (b"u,y\n0,\0\n", "not a text file"),
+    "truncated": (b"u,y\n0,1\n1,2\n2", "line 4: expected 2 cells, got 1"),
+    "mixed delimiters": (b"u,y\n0,1\n1;2\n2,3\n", "line 3: expected 2 cells, got 1"),
+    "nan": (b"u,y\n0,1\n1,nan\n2,3\n", "line 3, column 'y': the value is missing"),
+    "infinite": (b"u,y\n0,1\n1,inf\n2,3\n", "line 3, column 'y': expected a finite number, got 'inf'"),
+    "text": (b"u,y\n0,1\n1,high\n2,3\n", "line 3, column 'y': expected a finite number, got 'high'"),
+    "duplicate columns": (b"u,y,y\n0,1,1\n1,2,2\n", "2 columns are called 'y'"),
+    "unknown column": (b"u,x\n0,1\n1,2\n", "no column 'y', the columns are: u, x"),
+    "one row": (b"u,y\n0,1\n", "at least 2 samples, there are 1"),
+    "wrong encoding": ("u,y [µm]\n0,1\n".encode("latin-1"), 'encoding="latin-1"'),
+    "constant input": (b"u,y\n1,0\n1,1\n1,2\n1,3\n", "the input is constant"),
+}
+
+
+@pytest.mark.parametrize("name", CORPUS)
+@pytest.mark.parametrize("command", ["identify", "metrics"])
+def test_a_bad_file_is_one_line_and_exit_2_and_nothing_is_written(run, tmp_path, name, command):
+    content, message = CORPUS[name]
+    (tmp_path / "bad.csv").write_bytes(content)
+    more = ["--model", "line", "--out", tmp_path / "out.json"] if command == "identify" else []
+    code, out, err = run(command, tmp_path / "bad.csv", "--u", "u", "--y", "y", *more)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith("hysim: error: ")
+    assert message in err
+    assert [path.name for path in tmp_path.iterdir()] == ["bad.csv"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["identify", "loop.csv", *COLUMNS, "--model", "lin"], "invalid choice: 'lin'"),
+        (["identify", "loop.csv", *COLUMNS, "--model", "line", "--fix", "n"], "expected NAME=VALUE with numbers"),
+        (["identify", "loop.csv", *COLUMNS, "--model", "line", "--bounds", "n=1"], "expected NAME=LOW:HIGH"),
+        (["identify", "loop.csv", *COLUMNS, "--model", "line", "--fix", "n=1"], "names 'n'; the parameters are"),
+        (["identify", "loop.csv", *COLUMNS, "--model", "line", "--cross-validate", "x"], "expected loo or a number"),
+        (["identify", "loop.csv", *COLUMNS, "--model", "line", "--json", "--out", "-"], "two results would go to the"),
+        (["identify", "loop.csv", *COLUMNS, "--model", "line", "--out", "a.svg", "--plot", "a.svg"], "to one file"),
+        (["metrics", "none.csv", *COLUMNS], "none.csv: No such file"),
+        (["metrics", ".", *COLUMNS], "Is a directory"),
+        (["metrics", "loop.csv", *COLUMNS, "--unit", "x=V"], "expected t=, u= or y="),
+        (["plot", "loop.csv", *COLUMNS, "--out", "loop.png"], "call the file .svg, got loop.png"),
+        (["plot", "loop.csv", *COLUMNS, "--out", "none/loop.svg"], "its folder does not exist"),
+        (["plot", "-", *COLUMNS, "--model", "-", "--out", "-"], "not both"),
+        (["simulate", "-", "-", "--u", "u"], "not both"),
+        (["simulate", "loop.csv", "loop.csv", "--u", "voltage"], "loop.csv does not hold a model of hysim"),
+        (["simulate", "pid.json", "loop.csv", "--u", "voltage"], "a PID has no response"),
+    ],
+)
+def test_a_wrong_argument_is_one_line_and_exit_2(run, folder, arguments, message):
+    hs.save(hs.PID(kp=1.0), folder / "pid.json")
+    code, out, err = run(*arguments)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert re.match(r"hysim( \w+)?: error: ", err)
+    assert message in err
+
+
+@pytest.mark.parametrize("command", ["identify", "metrics", "simulate", "plot"])
+def test_help_names_every_option_of_a_record(run, command):
+    code, out, _ = run(command, "--help")
+    assert code == 0
+    for option in ("--u", "--t", "--sample-time", "--delimiter", "--decimal", "--on-missing", "--resolution", "--unit"):
+        assert option in out
+
+
+WORDS = st.sampled_from(["0", "1", "2", "-1", "nan", "u", "x", "1e999", "", '"'])
+
+
+@given(st.lists(st.lists(WORDS, min_size=2, max_size=2).map(",".join), max_size=8).map("\n".join), st.booleans())
+def test_any_file_ends_in_an_exit_code_and_at_most_one_line_of_error(text, has_model):
+    arguments = ["identify", "--model", "line"] if has_model else ["metrics"]
+    out, err = io.StringIO(), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch:
+        for name, stream in (("stdin", io.StringIO(text)), ("stdout", out), ("stderr", err)):
+            patch.setattr(f"sys.{name}", stream)
+        code = main([*arguments, "-", "--u", "0", "--y", "1"])
+    assert code in (0, 1, 2)
+    assert (err.getvalue().count("\n"), bool(out.getvalue())) == ((1, False) if code == 2 else (0, True))
+
+
+def test_the_commands_of_the_documentation_run_in_order(run, folder):
+    page = (Path(__file__).parent.parent / "docs" / "command_line.md").read_text()
+    for block in re.findall(r"^```shell\n(.*?)^```", page, flags=re.MULTILINE | re.DOTALL):
+        for line in block.splitlines():
+            piped = None
+            for command in line.split(" | "):
+                code, piped, err = run(*command.split()[1:], stdin=piped)
+                assert (code, err) == (0, ""), command
+    assert {"law.json", "fit.svg", "simulated.csv", "both.svg"} <= {path.name for path in folder.iterdir()}
