@@ -39,6 +39,8 @@ _NODES = 40  # on each: the nearest pole of w^n is pi/n away in the angle, which
 class LimitCycle:
     """Steady loop of the memory between the inputs -amplitude and amplitude.
 
+    Of a sum of plays or stops it is the loop of the output about its offset.
+
     Parameters
     ----------
     amplitude : float
