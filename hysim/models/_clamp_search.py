@@ -9,14 +9,15 @@ One-signed weights (the default) are those of the classical operator, of one den
 threshold zero turn the loop the way in which the record's own runs. Least squares without it fit noise by
 weights of alternating sign, and such a law may have no inverse.
 
-The memory of many plays is as many unknowns, which no record can tell. With ``initial="free"`` it is the
-one that a single former turning point leaves behind:
+The memory of many plays is as many unknowns, which no record can tell. With ``initial="rest"``, the default of
+a bank, the plays stand at zero before the first sample. With ``"free"`` the memory is the one that a single
+former turning point leaves behind:
 
     z_i = sign(turn) max(|turn| - r_i, 0)        the way from rest at zero to `turn`, then to the first sample
 
 It holds every record that begins at rest or at a turning point of its cycle, or in a cycle about zero;
-any other steady cycle is ``initial="periodic"``: the positions that the record itself leaves behind. With
-``"rest"`` the plays stand at zero. A single element has its z0, searched where the first input allows it to be.
+any other steady cycle is ``"periodic"``: the positions that the record itself leaves behind. A single element
+has its z0, searched where the first input allows it to be.
 """
 
 from collections.abc import Mapping
@@ -31,7 +32,7 @@ from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
 TURN = "turn"
-_LEVELS = 17  # of the former turning point, from which the search begins
+_LEVELS = 9  # of the former turning point, from which the search begins
 _SHORTEST = 1e-3  # threshold of a single element, in half spans
 _STARTS = (0.1, 0.3, 0.6)
 
@@ -65,7 +66,7 @@ class ClampStructure:
         names, columns = self._names("thresholds", thresholds.size), self._columns(thresholds.size)
         first = float(record.u[0])
         defaults = {**dict(zip(names, thresholds.tolist(), strict=True)), **dict.fromkeys(columns, 0.0), TURN: first}
-        given = freedom.held(defaults, at_rest=(TURN,) if is_settled(freedom) else ())
+        given = freedom.held(defaults, at_rest=(TURN,) if is_settled(freedom, default="rest") else ())
         held = {name: defaults[name] for name in names if name not in freedom.free} | given
         limits = freedom.limits(defaults, held)
         box = dict(zip(names, _gaps(thresholds), strict=True)) | {TURN: (first - 2.0 * half, first + 2.0 * half)}
@@ -200,9 +201,9 @@ def single_space(defaults: Mapping[str, float], record: Record, freedom: Freedom
     )
 
 
-def is_settled(freedom: Freedom) -> bool:
+def is_settled(freedom: Freedom, default: str = "free") -> bool:
     """Whether the initial memory is not searched: it is at rest, or `steady` finds it."""
-    return freedom.initial == "periodic" or freedom.starts_at_rest()
+    return freedom.initial == "periodic" or freedom.starts_at_rest(default)
 
 
 def half_span(record: Record) -> float:

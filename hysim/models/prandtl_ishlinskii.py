@@ -107,7 +107,7 @@ class PrandtlIshlinskii(ClampLaw):
         Examples
         --------
         >>> import hysim as hs
-        >>> fit = hs.identify(hs.PrandtlIshlinskii.structure(plays=4), hs.datasets.table1(), initial="rest")
+        >>> fit = hs.identify(hs.PrandtlIshlinskii.structure(plays=4), hs.datasets.table1())
         >>> fit.n_parameters, round(fit.fit_percent, 1)
         (5, 93.5)
         """
