@@ -34,6 +34,11 @@ _HOME = {
     "BoucWenInverse": "hysim.models.boucwen_inverse",
     "LimitCycle": "hysim.models.limit_cycle",
     "Duhem": "hysim.models.duhem",
+    "PrandtlIshlinskii": "hysim.models.prandtl_ishlinskii",
+    "Play": "hysim.models.play",
+    "Stop": "hysim.models.play",
+    "MaxwellSlip": "hysim.models.maxwell_slip",
+    "Dahl": "hysim.models.dahl",
     "CustomLaw": "hysim.models.custom",
     "BoucWenOscillator": "hysim.models.oscillator",
     "TransferFunction": "hysim.models.transfer_function",
@@ -74,10 +79,15 @@ if TYPE_CHECKING:
     from hysim.models.boucwen import BoucWen as BoucWen
     from hysim.models.boucwen_inverse import BoucWenInverse as BoucWenInverse
     from hysim.models.custom import CustomLaw as CustomLaw
+    from hysim.models.dahl import Dahl as Dahl
     from hysim.models.duhem import Duhem as Duhem
     from hysim.models.limit_cycle import LimitCycle as LimitCycle
+    from hysim.models.maxwell_slip import MaxwellSlip as MaxwellSlip
     from hysim.models.oscillator import BoucWenOscillator as BoucWenOscillator
+    from hysim.models.play import Play as Play
+    from hysim.models.play import Stop as Stop
     from hysim.models.polynomial_boucwen import PolynomialBoucWen as PolynomialBoucWen
+    from hysim.models.prandtl_ishlinskii import PrandtlIshlinskii as PrandtlIshlinskii
     from hysim.models.static import Line as Line
     from hysim.models.static import SingleValued as SingleValued
     from hysim.models.storage import load_model as load_model

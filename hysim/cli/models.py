@@ -12,6 +12,9 @@ FAMILIES = {
     "bouc-wen": "BoucWen",
     "polynomial-bouc-wen": "PolynomialBoucWen",
     "transfer-function": "TransferFunction",
+    "prandtl-ishlinskii": "PrandtlIshlinskii",
+    "maxwell-slip": "MaxwellSlip",
+    "dahl": "Dahl",
     "line": "Line",
     "single-valued": "SingleValued",
 }

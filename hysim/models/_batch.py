@@ -1,15 +1,14 @@
-"""Many Bouc-Wen laws at once, and what is kept of each: its row, or one number of it.
+"""Many laws at once, and what is kept of each: its row, or one number of it.
 
-The laws are computed in blocks that stay in the cache, each on one thread, in the order of n, because
-neighbours of equal n share their charts (`hysim.kernels.charts`). A reduction sees a block and forgets it,
-so that a million sets need no million rows.
+The laws are computed in blocks that stay in the cache, each on one thread. A reduction sees a block and
+forgets it, so that a million sets need no million rows.
 
     sse               sum (y - target)^2
     max_width, area   of the last complete cycle, as `hysim.metrics.loop_metrics` has them
     final             the last output
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -17,30 +16,39 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
 from hysim._parallel import in_chunks
-from hysim.kernels import boucwen as kernels
 from hysim.metrics.rows import LoopRows
 
 Reduction = Literal["sse", "max_width", "area", "final"]
 REDUCTIONS = ("sse", "max_width", "area", "final")
 
+Sets = slice | npt.NDArray[np.intp]
+"""Which of the sets: a stretch of them, or their places."""
+
 _BLOCK = 32_768  # samples: a quarter of a megabyte
 
 
 class Batch(NamedTuple):
-    """Laws and their inputs (1 or n_sets, n_samples).
+    """Laws by what computes them, and their inputs (1 or n_sets, n_samples).
 
-    `memory`, shape (n_sets, 5), is A, beta, gamma, n, z0; `output`, (n_sets, 2 + degree), is gain, offset, c1, c2, ...
+    `compute(sets, u, y)` fills `y`, shape (n, n_samples), with the outputs of n sets for the inputs `u`, shape
+    (1 or n, n_samples); a law that escapes is a row of inf. `order`, shape (n_sets,), is the order in which
+    neighbours share work; None is that of the sets.
     """
 
-    memory: FloatArray
-    output: FloatArray
+    compute: Callable[[Sets, FloatArray, FloatArray], None]
+    n_sets: int
     u: FloatArray
+    order: npt.NDArray[np.intp] | None = None
 
     def rows(self, workers: int | None) -> FloatArray:
         """Outputs, shape (n_sets, n_samples); inf where a law escapes."""
-        y = np.empty((len(self.memory), self.u.shape[1]))
-        if (np.diff(self.memory[:, 3]) >= 0.0).all():
-            in_chunks(lambda start, stop: kernels.batch(*self, y, start, stop), len(y), workers=workers)
+        y = np.empty((self.n_sets, self.u.shape[1]))
+
+        def work(start: int, stop: int) -> None:
+            self.compute(slice(start, stop), self._inputs(slice(start, stop)), y[start:stop])
+
+        if self.order is None:
+            in_chunks(work, self.n_sets, workers=workers)
         else:
             self._in_blocks(y.__setitem__, workers)
         return y
@@ -48,9 +56,9 @@ class Batch(NamedTuple):
     def reduced(self, reduce: Reduction, target: npt.ArrayLike | None, workers: int | None) -> FloatArray:
         """One number for each set, shape (n_sets,); inf where a law escapes."""
         measure = self._measure(reduce, target)
-        result = np.empty(len(self.memory))
+        result = np.empty(self.n_sets)
 
-        def keep(sets: npt.NDArray[np.intp], y: FloatArray) -> None:
+        def keep(sets: Sets, y: FloatArray) -> None:
             with np.errstate(invalid="ignore", over="ignore"):  # a row of inf has a measure of nan
                 values = measure(sets, y)
             result[sets] = np.where(np.isposinf(y).all(axis=1), np.inf, values)
@@ -58,9 +66,7 @@ class Batch(NamedTuple):
         self._in_blocks(keep, workers)
         return result
 
-    def _measure(
-        self, reduce: Reduction, target: npt.ArrayLike | None
-    ) -> Callable[[npt.NDArray[np.intp], FloatArray], FloatArray]:
+    def _measure(self, reduce: Reduction, target: npt.ArrayLike | None) -> Callable[[Sets, FloatArray], FloatArray]:
         if reduce not in REDUCTIONS:
             raise ValueError(f"reduce must be one of {', '.join(REDUCTIONS)} or None, got {reduce!r}")
         if (reduce == "sse") != (target is not None):
@@ -79,24 +85,34 @@ class Batch(NamedTuple):
             shared = LoopRows(self.u[0])
             return lambda _, y: of_loop(shared, y)
         return lambda sets, y: np.concatenate(
-            [of_loop(LoopRows(self.u[k]), row[np.newaxis]) for k, row in zip(sets, y, strict=True)]
+            [of_loop(LoopRows(u), row[np.newaxis]) for u, row in zip(self.u[sets], y, strict=True)]
         )
 
-    def _in_blocks(self, keep: Callable[[npt.NDArray[np.intp], FloatArray], None], workers: int | None) -> None:
-        """Call `keep(sets, y)` for blocks of sets of neighbouring n."""
-        order = np.argsort(self.memory[:, 3], kind="stable")
+    def _in_blocks(self, keep: Callable[[Sets, FloatArray], None], workers: int | None) -> None:
+        """Call `keep(sets, y)` for blocks of sets that stand together in the order."""
         n_samples = self.u.shape[1]
         size = max(1, _BLOCK // max(1, n_samples))
 
         def work(start: int, stop: int) -> None:
             y = np.empty((min(size, stop - start), n_samples))
-            for first in range(start, stop, size):
-                sets = order[first : min(first + size, stop)]
-                u = self.u if len(self.u) == 1 else self.u[sets]
-                part = y[: sets.size]
-                kernels.batch(
-                    read_only(self.memory[sets]), read_only(self.output[sets]), read_only(u), part, 0, sets.size
-                )
+            for block in _blocks(start, stop, size):
+                sets = block if self.order is None else self.order[block]
+                part = y[: block.stop - block.start]
+                self.compute(sets, self._inputs(sets), part)
                 keep(sets, part)
 
-        in_chunks(work, order.size, workers=workers)
+        in_chunks(work, self.n_sets, workers=workers)
+
+    def _inputs(self, sets: Sets) -> FloatArray:
+        return self.u if len(self.u) == 1 else part_of(self.u, sets)
+
+
+def part_of(table: FloatArray, sets: Sets) -> FloatArray:
+    """Rows of a read-only table, read-only as kernels take them."""
+    rows = table[sets]
+    rows.setflags(write=False)
+    return rows
+
+
+def _blocks(start: int, stop: int, size: int) -> Iterator[slice]:
+    return (slice(first, min(first + size, stop)) for first in range(start, stop, size))

@@ -24,7 +24,8 @@ from hysim.errors import SimulationError
 from hysim.kernels import boucwen as kernels
 from hysim.kernels.charts import N_WORK
 from hysim.models import _boucwen_facts, _boucwen_search, boucwen_inverse, limit_cycle
-from hysim.models._batch import Batch, Reduction
+from hysim.models._batch import Reduction
+from hysim.models._boucwen_batch import batch
 from hysim.models.boucwen_inverse import BoucWenInverse, InverseState
 from hysim.models.limit_cycle import LimitCycle
 from hysim.models.model import CompiledLaw
@@ -407,7 +408,7 @@ class BoucWenLaw(ABC):
         template = cls._from_scalars({name: float(np.ravel(values)[0]) for name, values in sets.items()})
         columns, inputs = template._columns(sets, u)
         output = np.stack([columns[name] for name in ("gain", "offset", *template.coefficient_names)], axis=1)
-        laws = Batch(template._table(columns), read_only(output), inputs)
+        laws = batch(template._table(columns), read_only(output), inputs)
         return laws.rows(workers) if reduce is None else laws.reduced(reduce, target, workers)
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
@@ -418,7 +419,7 @@ class BoucWenLaw(ABC):
         """Columns u, u^2, ..., z, 1, 0 of the output, shape (n_sets, n_samples, n_columns + 1)."""
         columns, inputs = self._columns(parameters, record.u)
         table = self._table(columns)
-        z = Batch(table, read_only(np.tile([1.0, 0.0], (len(table), 1))), inputs).rows(None)
+        z = batch(table, read_only(np.tile([1.0, 0.0], (len(table), 1))), inputs).rows(None)
         powers = [np.broadcast_to(inputs**k, z.shape) for k in range(1, len(self.coefficient_names) + 1)]
         return np.stack([*powers, z, np.ones_like(z), np.zeros_like(z)], axis=-1)
 
@@ -434,7 +435,7 @@ class BoucWenLaw(ABC):
 
         def passed(z0: FloatArray) -> FloatArray:
             memory[:, MEMORY.index("z0")] = z0
-            return Batch(read_only(memory), only_memory, inputs).reduced("final", None, None)
+            return batch(read_only(memory), only_memory, inputs).reduced("final", None, None)
 
         before, z0 = np.zeros(len(memory)), passed(np.zeros(len(memory)))
         drift_before = z0 - before

@@ -16,7 +16,10 @@ import hysim
 from hysim._atomic import write_text
 from hysim.models.model import FAMILIES
 
-_MODULES = ("actuator", "boucwen", "duhem", "oscillator", "polynomial_boucwen", "static", "transfer_function")
+_MODULES = (
+    *("actuator", "boucwen", "dahl", "duhem", "maxwell_slip", "oscillator", "play", "polynomial_boucwen"),
+    *("prandtl_ishlinskii", "static", "transfer_function"),
+)
 
 
 def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None) -> None:

@@ -1,0 +1,94 @@
+"""Sums of plays and of stops along an input, exactly.
+
+A play of threshold r is a position z that the input pushes from either side, a clamp:
+
+    z_k = min(max(z_(k-1), u_k - r), u_k + r)
+
+For an input that is monotone between its samples this is the whole operator. The stop of the same threshold
+is what is left of the input, u - z. All laws of this family are one sum of such elements,
+
+    y = offset + feedthrough u + sum_i w_i (through u + (1 - 2 through) z_i)
+
+over plays with through = 0, over stops with through = 1. The plays do not know of each other: at each sample
+the clamps are taken side by side, then the terms are added in their order, from the first to the last.
+
+`output` is (through, offset, feedthrough). A position z changes in place.
+"""
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.kernels._compile import inlined, kernel
+
+N_OUTPUT = 3
+
+
+@inlined
+def clamp(z: float, u: float, r: float) -> float:
+    """Position of a play of threshold `r` that stood at `z`, once the input is `u`."""
+    return min(max(z, u - r), u + r)
+
+
+@kernel
+def positions(thresholds: FloatArray, z: FloatArray, u: FloatArray, out: FloatArray) -> None:
+    """Positions of all plays at the samples of `u` into `out`, shape (n_samples, n_plays)."""
+    for k in range(u.size):
+        for i in range(thresholds.size):
+            z[i] = clamp(z[i], u[k], thresholds[i])
+            out[k, i] = z[i]
+
+
+@kernel
+def path(
+    thresholds: FloatArray,
+    weights: FloatArray,
+    output: FloatArray,
+    z: FloatArray,
+    terms: FloatArray,
+    u: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Output of one law at the samples of `u` into `out`; `terms` has room for one number for each play."""
+    through, offset, feedthrough = output[0], output[1], output[2]
+    sign = 1.0 - 2.0 * through
+    for k in range(u.size):
+        for i in range(thresholds.size):  # by itself, so that it is done for several plays at once
+            z[i] = clamp(z[i], u[k], thresholds[i])
+            terms[i] = weights[i] * (through * u[k] + sign * z[i])
+        total = offset + feedthrough * u[k]
+        for i in range(thresholds.size):
+            total += terms[i]
+        out[k] = total
+
+
+@kernel
+def batch(
+    thresholds: FloatArray, weights: FloatArray, output: FloatArray, z0: FloatArray, u: FloatArray, out: FloatArray
+) -> None:
+    """Outputs of many laws into `out`, shape (n_sets, n_samples).
+
+    `thresholds`, `weights` and `z0` are (n_sets, n_plays), `output` is (n_sets, 3), `u` is (1, n_samples) or
+    (n_sets, n_samples).
+    """
+    z, terms = np.empty(z0.shape[1]), np.empty(z0.shape[1])
+    for i in range(out.shape[0]):
+        for j in range(z.size):
+            z[j] = z0[i, j]
+        path(thresholds[i], weights[i], output[i], z, terms, u[min(i, u.shape[0] - 1)], out[i])
+
+
+@kernel
+def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
+    """Output at the next input `u`; `state` is the last u and the positions, and moves along.
+
+    `parameters` is (through, offset, feedthrough, thresholds, weights).
+    """
+    n_plays = state.size - 1
+    through = parameters[0]
+    total = parameters[1] + parameters[2] * u
+    for i in range(n_plays):
+        z = clamp(state[1 + i], u, parameters[N_OUTPUT + i])
+        state[1 + i] = z
+        total += parameters[N_OUTPUT + n_plays + i] * (through * u + (1.0 - 2.0 * through) * z)
+    state[0] = u
+    return float(total)

@@ -1,0 +1,253 @@
+"""What is searched of a law of plays or stops.
+
+The output is affine in the weights, the feedthrough and the offset. A bank has its thresholds given: where a
+record says nothing else, they are spread evenly over half the span of the input, the way that a cycle can move.
+A threshold that the user frees is searched between the middles of the gaps to its neighbours, so that their
+order stays. The threshold of a single element is searched on all of that way.
+
+One-signed weights (the default) are those of the classical operator, of one density: all elements past the
+threshold zero turn the loop the way in which the record's own runs. Least squares without it fit noise by
+weights of alternating sign, and such a law may have no inverse.
+
+The memory of many plays is as many unknowns, which no record can tell. With ``initial="rest"``, the default of
+a bank, the plays stand at zero before the first sample. With ``"free"`` the memory is the one that a single
+former turning point leaves behind:
+
+    z_i = sign(turn) max(|turn| - r_i, 0)        the way from rest at zero to `turn`, then to the first sample
+
+It holds every record that begins at rest or at a turning point of its cycle, or in a cycle about zero;
+any other steady cycle is ``"periodic"``: the positions that the record itself leaves behind. A single element
+has its z0, searched where the first input allows it to be.
+"""
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from hysim._frozen import FloatArray, checked
+from hysim.models._clamps import ClampLaw, check_elements, end_positions, positions
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.records import Record
+
+TURN = "turn"
+_LEVELS = 9  # of the former turning point, from which the search begins
+_SHORTEST = 1e-3  # threshold of a single element, in half spans
+_STARTS = (0.1, 0.3, 0.6)
+
+
+@checked
+class ClampStructure:
+    """A bank of plays or stops to be identified; see `PrandtlIshlinskii.structure`."""
+
+    law: type[ClampLaw]
+    thresholds: tuple[float, ...] = ()
+    plays: int = 10
+    one_signed: bool = True
+
+    def __post_init__(self) -> None:
+        if isinstance(self.plays, bool) or not isinstance(self.plays, int):
+            raise TypeError(f"plays must be an int, got {self.plays!r}")
+        if self.plays < 1:
+            raise ValueError(f"plays must be at least 1, got {self.plays}")
+        check_elements(self.law, *[np.atleast_2d(self.thresholds)] * 3)
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """Thresholds and memory as coordinates where they are free; the rest is linear.
+
+        Raises
+        ------
+        ValueError
+            If the input is constant, `initial` is unknown, or a name or a bound does not fit.
+        """
+        half = half_span(record)
+        thresholds = self._thresholds(half)
+        names, columns = self._names("thresholds", thresholds.size), self._columns(thresholds.size)
+        first = float(record.u[0])
+        defaults = {**dict(zip(names, thresholds.tolist(), strict=True)), **dict.fromkeys(columns, 0.0), TURN: first}
+        given = freedom.held(defaults, at_rest=(TURN,) if is_settled(freedom, default="rest") else ())
+        held = {name: defaults[name] for name in names if name not in freedom.free} | given
+        limits = freedom.limits(defaults, held)
+        box = dict(zip(names, _gaps(thresholds), strict=True)) | {TURN: (first - 2.0 * half, first + 2.0 * half)}
+        box = {name: limits.get(name, pair) for name, pair in box.items() if name not in held}
+        lower, upper = (np.array([pair[side] for pair in box.values()]) / half for side in (0, 1))
+        constants = {name: value for name, value in held.items() if name not in columns}
+
+        def parameters(x: FloatArray) -> dict[str, FloatArray]:
+            sets = np.atleast_2d(x)
+            fixed = {name: np.full(len(sets), value) for name, value in constants.items()}
+            return fixed | dict(zip(box, half * sets.T, strict=True))
+
+        linear = tuple(name for name in columns if name not in held)
+        signs = self._signs(record, dict(zip(self._names("weights", thresholds.size), thresholds, strict=True)))
+        own = {name: pair for name, pair in limits.items() if name in columns}
+        return SearchSpace(
+            coordinates=tuple(box),
+            lower=lower,
+            upper=upper,
+            starts=_starts({name: defaults[name] / half for name in box}, lower, upper),
+            names=tuple(name for name in defaults if name not in held),
+            columns=columns,
+            linear=linear,
+            held=held,
+            parameters=parameters,
+            bounds={name: pair for name, pair in signs.items() if name in linear} | own,
+            state=(TURN,),
+            screened=0 if set(box) <= {TURN} else 256,
+        )
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """One column for each element, the input where there is a feedthrough, 1 and 0."""
+        thresholds, z0 = self._elements(parameters)
+        z = positions(thresholds, z0, record.u)
+        elements: FloatArray = record.u[:, np.newaxis] - z if self.law.stops else z
+        ones = np.ones((*z.shape[:2], 1))
+        static = [record.u[:, np.newaxis] * ones] if _has_feedthrough(self.law) else []
+        return np.concatenate([elements, *static, ones, np.zeros_like(ones)], axis=-1)
+
+    def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
+        """The parameters with the positions of the steady cycle of which `record` is one period or more.
+
+        One run through the record wipes out what was before it.
+        """
+        thresholds, z0 = self._elements(parameters)
+        z = end_positions(thresholds, z0, record.u)
+        shape = np.broadcast_shapes(*map(np.shape, parameters.values()))
+        columns = (column.reshape(shape)[()] for column in z.T)
+        return {**parameters} | dict(zip(self._names("z0", z.shape[1]), columns, strict=True))
+
+    def assemble(self, parameters: Mapping[str, float]) -> ClampLaw:
+        """The law with these parameters, one number for each name."""
+        thresholds, z0 = self._elements(parameters)
+        law: Any = self.law
+        weights = [parameters[name] for name in self._names("weights", thresholds.shape[1])]
+        others = {name: parameters[name] for name in ("feedthrough", "offset") if name in parameters}
+        tuples = {law.thresholds_name: thresholds[0], law.weights_name: weights, "z0": z0[0]}
+        return law(**tuples, **others)  # type: ignore[no-any-return]
+
+    def _thresholds(self, half: float) -> FloatArray:
+        """Those given, or in even steps: from zero for plays; for stops, which are nothing there, up to the end."""
+        if self.thresholds:
+            return np.array(self.thresholds)
+        steps = np.arange(self.plays) + float(self.law.stops)
+        return np.asarray(half * steps / (self.plays + float(self.law.stops)))
+
+    def _names(self, what: str, count: int) -> tuple[str, ...]:
+        own = {"thresholds": self.law.thresholds_name, "weights": self.law.weights_name}
+        return tuple(f"{own.get(what, what)}[{k}]" for k in range(count))
+
+    def _columns(self, count: int) -> tuple[str, ...]:
+        static = ("feedthrough",) if _has_feedthrough(self.law) else ()
+        return (*self._names("weights", count), *static, "offset")
+
+    def _elements(self, parameters: Parameters) -> tuple[FloatArray, FloatArray]:
+        """Thresholds and initial positions, shape (n_sets, n_plays) each."""
+        count = sum(name.startswith(f"{self.law.thresholds_name}[") for name in parameters)
+        n_sets = max((np.size(value) for value in parameters.values()), default=1)
+
+        def table(what: str) -> FloatArray:
+            columns = [np.broadcast_to(np.ravel(parameters[name]), n_sets) for name in self._names(what, count)]
+            return np.stack(columns, axis=1)
+
+        thresholds = table("thresholds")
+        return thresholds, table("z0") if "z0[0]" in parameters else _after(parameters.get(TURN, 0.0), thresholds)
+
+    def _signs(self, record: Record, thresholds: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+        """Bounds at zero of the weights that turn the loop."""
+        if not self.one_signed:
+            return {}
+        side = (0.0, np.inf) if self.law.stops == _runs_clockwise(record) else (-np.inf, 0.0)
+        return {name: side for name, threshold in thresholds.items() if threshold > 0.0}
+
+
+def single_space(defaults: Mapping[str, float], record: Record, freedom: Freedom) -> SearchSpace:
+    """Declare threshold and z0 of a single play or stop as coordinates; gain and offset are linear.
+
+    Raises
+    ------
+    ValueError
+        If the input is constant, `initial` is unknown, or a name or a bound does not fit.
+    """
+    half, first = half_span(record), float(record.u[0])
+    held = freedom.held(defaults, at_rest=("z0",) if is_settled(freedom) else ())
+    limits = freedom.limits(defaults, held)
+    box = {"threshold": (_SHORTEST * half, 1.5 * half), "z0": (first - half, first + half)} | limits
+    free = [name for name in ("threshold", "z0") if name not in held]
+    lower, upper = (np.array([box[name][side] for name in free]) / half for side in (0, 1))
+    columns = ("gain", "offset")
+    constants = {name: value for name, value in held.items() if name not in columns}
+
+    def parameters(x: FloatArray) -> dict[str, FloatArray]:
+        sets = np.atleast_2d(x)
+        fixed = {name: np.full(len(sets), value) for name, value in constants.items()}
+        return fixed | dict(zip(free, half * sets.T, strict=True))
+
+    starts = [{"threshold": share, "z0": first / half} for share in _STARTS]
+    starts.append({name: defaults[name] / half for name in ("threshold", "z0")})
+    return SearchSpace(
+        coordinates=tuple(free),
+        lower=lower,
+        upper=upper,
+        starts=np.clip([[start[name] for name in free] for start in starts], lower, upper),
+        names=tuple(name for name in defaults if name not in held),
+        columns=columns,
+        linear=tuple(name for name in columns if name not in held),
+        held=held,
+        parameters=parameters,
+        bounds={name: pair for name, pair in limits.items() if name in columns},
+        state=("z0",),
+        screened=256,
+    )
+
+
+def is_settled(freedom: Freedom, default: str = "free") -> bool:
+    """Whether the initial memory is not searched: it is at rest, or `steady` finds it."""
+    return freedom.initial == "periodic" or freedom.starts_at_rest(default)
+
+
+def half_span(record: Record) -> float:
+    """Half the span of the input: the largest threshold of which a cycle can tell.
+
+    Raises
+    ------
+    ValueError
+        If the input is constant.
+    """
+    span = float(np.ptp(record.u))
+    if span == 0.0:
+        raise ValueError("the input is constant: nothing can be identified from it")
+    return 0.5 * span
+
+
+def _after(turn: Any, thresholds: FloatArray) -> FloatArray:
+    """Positions (n_sets, n_plays) after the way from rest at zero to `turn`, shape (n_sets,)."""
+    level = np.ravel(turn)[:, np.newaxis]
+    return np.asarray(np.sign(level) * np.maximum(np.abs(level) - thresholds, 0.0))
+
+
+def _gaps(thresholds: FloatArray) -> list[tuple[float, float]]:
+    """For each threshold the middles of the gaps to its neighbours; zero below the first."""
+    order = np.argsort(thresholds, kind="stable")
+    middles = 0.5 * (thresholds[order][1:] + thresholds[order][:-1])
+    last = 1.5 * float(thresholds.max(initial=0.0)) or 1.0
+    edges = np.concatenate([[0.0], middles, [last]])
+    gaps = np.empty((thresholds.size, 2))
+    gaps[order] = np.stack([edges[:-1], edges[1:]], axis=1)
+    return [(lower, upper) for lower, upper in gaps.tolist()]
+
+
+def _starts(point: Mapping[str, float], lower: FloatArray, upper: FloatArray) -> FloatArray:
+    """The thresholds as they are given, with every level of the former turning point."""
+    levels = np.linspace(-2.0, 2.0, _LEVELS) if TURN in point else np.zeros(1)
+    rows = [[value + level * (name == TURN) for name, value in point.items()] for level in levels]
+    return np.clip(np.reshape(rows, (len(rows), len(point))), lower, upper)
+
+
+def _runs_clockwise(record: Record) -> bool:
+    """Whether the path of the record, closed by its chord, encloses more area clockwise."""
+    return bool(np.dot(record.u, np.roll(record.y, -1)) < np.dot(np.roll(record.u, -1), record.y))
+
+
+def _has_feedthrough(law: type) -> bool:
+    return any(field.name == "feedthrough" for field in fields(law))
