@@ -1,4 +1,4 @@
-"""Many Bouc-Wen laws at once, and what is kept of each: its row, or one number of it.
+"""Many laws at once, and what is kept of each: its row, or one number of it.
 
 The laws are computed in blocks that stay in the cache, each on one thread, in the order of n, because
 neighbours of equal n share their charts (`hysim.kernels.charts`). A reduction sees a block and forgets it,
@@ -17,11 +17,13 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
 from hysim._parallel import in_chunks
-from hysim.kernels import boucwen as kernels
 from hysim.metrics.rows import LoopRows
 
 Reduction = Literal["sse", "max_width", "area", "final"]
 REDUCTIONS = ("sse", "max_width", "area", "final")
+
+Kernel = Callable[[FloatArray, FloatArray, FloatArray, FloatArray, int, int], None]
+"""Outputs of laws: called with memory, output, u as `Batch` holds them, where the outputs go, start and stop."""
 
 _BLOCK = 32_768  # samples: a quarter of a megabyte
 
@@ -29,18 +31,20 @@ _BLOCK = 32_768  # samples: a quarter of a megabyte
 class Batch(NamedTuple):
     """Laws and their inputs (1 or n_sets, n_samples).
 
-    `memory`, shape (n_sets, 5), is A, beta, gamma, n, z0; `output`, (n_sets, 2 + degree), is gain, offset, c1, c2, ...
+    `memory`, shape (n_sets, n_memory), is A, beta, gamma, n, ..., z0; `output`, (n_sets, 2 + degree), is gain,
+    offset, c1, c2, ...
     """
 
     memory: FloatArray
     output: FloatArray
     u: FloatArray
+    kernel: Kernel
 
     def rows(self, workers: int | None) -> FloatArray:
         """Outputs, shape (n_sets, n_samples); inf where a law escapes."""
         y = np.empty((len(self.memory), self.u.shape[1]))
         if (np.diff(self.memory[:, 3]) >= 0.0).all():
-            in_chunks(lambda start, stop: kernels.batch(*self, y, start, stop), len(y), workers=workers)
+            in_chunks(lambda start, stop: self.kernel(*self[:3], y, start, stop), len(y), workers=workers)
         else:
             self._in_blocks(y.__setitem__, workers)
         return y
@@ -94,7 +98,7 @@ class Batch(NamedTuple):
                 sets = order[first : min(first + size, stop)]
                 u = self.u if len(self.u) == 1 else self.u[sets]
                 part = y[: sets.size]
-                kernels.batch(
+                self.kernel(
                     read_only(self.memory[sets]), read_only(self.output[sets]), read_only(u), part, 0, sets.size
                 )
                 keep(sets, part)

@@ -29,6 +29,7 @@ from scipy.optimize import brentq
 
 from hysim._frozen import FloatArray, frozen, read_only
 from hysim.errors import SimulationError
+from hysim.kernels import boucwen as kernels
 from hysim.models._batch import Batch
 
 _PANELS = 32  # on either half; the innermost, where w^n is not analytic, weighs 2^-32 to a power above 1
@@ -121,7 +122,7 @@ def _from_rest(A: float, c: float, n: float, lengths: FloatArray) -> FloatArray:
     memory_itself = read_only(np.tile([1.0, 0.0], (lengths.size, 1)))
     u = read_only(np.stack([np.zeros(lengths.size), lengths], axis=1))
     with np.errstate(all="ignore"):  # an escape overflows, and uncompiled kernels would warn of it
-        return Batch(laws, memory_itself, u).rows(workers=1)[:, 1]
+        return Batch(laws, memory_itself, u, kernels.batch).rows(workers=1)[:, 1]
 
 
 @functools.cache
