@@ -10,6 +10,8 @@ import hysim as hs
 NUMBERS = [
     (hs.BoucWen, {"beta": 0.7}, "beta"),
     (hs.PolynomialBoucWen, {"input_coefficients": (1.0, 0.2)}, "input_coefficients"),
+    (hs.ZhuWangBoucWen, {"delta": 0.2}, "delta"),
+    (hs.GeneralizedBoucWen, {"b4": 0.2}, "b4"),
     (hs.Duhem, {"p": [[1.0]], "q": [[0.0, -1.0]]}, "q"),
     (hs.TransferFunction, {"num": (1.0,), "den": (1.0, 2.0)}, "den"),
     (hs.BoucWenOscillator, {"mass": 2.0, "damping": 1.0, "stiffness": 3.0, "law": hs.BoucWen()}, "stiffness"),

@@ -40,10 +40,11 @@ _RAMP_REACH = 0.75  # the terms left out are below 1e-18 here
 _LARGEST_EXPONENT = 709.0
 _LARGEST = 1.7976931348623157e308
 _SMALL = 2.0**-54
-_N_LAST = 3  # terms that must be rounding where a series ends: of a symmetric one every other term is zero
+_N_LAST = 3  # terms that are rounding where a series ends: of a symmetric one every other term is zero
 _GROWTH = 16.0  # of the length tried, over the last one that served
 _RETREAT = 2.0**-10  # of a length at which a term overflows
 _MAX_NEWTON = 100
+_MAX_HALVES = 60  # to the last bit of the place of an extremum
 
 
 @kernel
@@ -99,7 +100,7 @@ def linear_side(w: float, a: float, d: float, c: float, length: float) -> tuple[
     slope = a - c * w
     falls = slope < 0.0 or (slope == 0.0 and d < 0.0)
     low, high = 0.0, length
-    if falls and not a + d * length - c * after <= 0.0:
+    if falls and a + d * length > c * after:
         high = min(length, linear_turn(slope, d, c))
     elif not falls and after < 0.0:
         low = min(length, linear_turn(slope, d, c))
@@ -160,17 +161,17 @@ def power_side(
         landing = free_landing(w, forcing, d)
         if landing <= left and abs(c) * w**n * landing <= negligible:
             return 0.0, done + landing
-        fraction = series(w, forcing, d, c, n, h, terms)
+        last, fraction = series(w, forcing, d, c, n, h, terms)
         if fraction == 0.0:
             if not math.isfinite(terms[1, 1]):
                 return math.inf, length
             h *= _RETREAT
             continue
-        slope = forcing - c * w**n
-        zero = first_zero(terms, fraction, slope)
-        if zero > 0.0:
-            return 0.0, min(length, done + h * zero)
-        w = value(terms, fraction)
+        w, slope = place(terms, last, fraction)
+        if w <= 0.0 or (terms[1, 1] < 0.0 and slope > 0.0):
+            zero = first_zero(terms, last, fraction)
+            if zero > 0.0:
+                return 0.0, min(length, done + h * zero)
         if not w < _LARGEST:
             return math.inf, length
         taken = h * fraction
@@ -208,54 +209,57 @@ def free_landing(w: float, a: float, d: float) -> float:
 
 
 @kernel
-def series(w: float, a: float, d: float, c: float, n: float, h: float, terms: FloatArray) -> float:
-    """Fill row 1 of `terms` with w(h x) and row 0 with w^n; the fraction of h that the series serve."""
+def series(w: float, a: float, d: float, c: float, n: float, h: float, terms: FloatArray) -> tuple[int, float]:
+    """Fill row 1 of `terms` with w(h x) and row 0 with w^n: the index of the last term, the fraction of h they serve.
+
+    They end where _N_LAST of them in a row are rounding, or with N_TERMS.
+    """
     terms[1, 0], terms[0, 0] = w, w**n
+    size, small = w, 0
     for k in range(N_TERMS):
         forcing = a if k == 0 else d * h if k == 1 else 0.0
-        terms[1, k + 1] = h * (forcing - c * terms[0, k]) / (k + 1.0)
-        convolution = 0.0
+        term = h * (forcing - c * terms[0, k]) / (k + 1.0)
+        terms[1, k + 1] = term
+        size += abs(term) if k < 2 else 0.0
+        small = small + 1 if abs(term) <= _SMALL * size else 0
+        if small == _N_LAST:
+            return k + 1, 1.0
+        convolution, weight = 0.0, -(k + 1.0)
         for j in range(1, k + 2):
-            convolution += (j * (n + 1.0) - (k + 1.0)) * terms[1, j] * terms[0, k + 1 - j]
+            weight += n + 1.0
+            convolution += weight * terms[1, j] * terms[0, k + 1 - j]
         terms[0, k + 1] = convolution / ((k + 1.0) * w)
-    return reach(terms, _N_LAST)
+    return N_TERMS, reach(terms, _N_LAST)
 
 
 @kernel
-def value(terms: FloatArray, x: float) -> float:
-    """w at the place x of a series."""
-    total = 0.0
-    for k in range(N_TERMS, -1, -1):
-        total = total * x + terms[1, k]
-    return total
+def place(terms: FloatArray, last: int, x: float) -> tuple[float, float]:
+    """w and dw/dx at the place x of a series."""
+    w, slope = 0.0, 0.0
+    for k in range(last, -1, -1):
+        slope = slope * x + w
+        w = w * x + terms[1, k]
+    return w, slope
 
 
 @kernel
-def derivative(terms: FloatArray, x: float) -> float:
-    """dw/dx at the place x of a series."""
-    total = 0.0
-    for k in range(N_TERMS, 0, -1):
-        total = total * x + k * terms[1, k]
-    return total
-
-
-@kernel
-def first_zero(terms: FloatArray, end: float, slope: float) -> float:
+def first_zero(terms: FloatArray, last: int, end: float) -> float:
     """The first place up to `end` at which the series of w is zero, or 0 if there is none."""
     low, high = 0.0, end
-    if slope < 0.0 and derivative(terms, end) > 0.0:
+    if terms[1, 1] < 0.0 and place(terms, last, end)[1] > 0.0:
         below = 0.0
-        for _ in range(60):
+        for _ in range(_MAX_HALVES):
             middle = 0.5 * (below + high)
-            below, high = (middle, high) if derivative(terms, middle) < 0.0 else (below, middle)
-    if not value(terms, high) <= 0.0:
-        return 0.0
+            below, high = (middle, high) if place(terms, last, middle)[1] < 0.0 else (below, middle)
     x = high
+    value, slope = place(terms, last, x)
+    if not value <= 0.0:
+        return 0.0
     for _ in range(_MAX_NEWTON):
-        here = value(terms, x)
-        low, high = (x, high) if here >= 0.0 else (low, x)
-        trial = newton(low, high, x, here, derivative(terms, x))
-        if here == 0.0 or abs(trial - x) <= _SMALL * x:
+        low, high = (x, high) if value >= 0.0 else (low, x)
+        trial = newton(low, high, x, value, slope)
+        if value == 0.0 or abs(trial - x) <= _SMALL * x:
             break
         x = trial
+        value, slope = place(terms, last, x)
     return x

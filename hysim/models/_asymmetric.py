@@ -19,6 +19,7 @@ from hysim.models._batch import Kernel
 from hysim.models._memory_law import State
 from hysim.models._polynomial_input import PolynomialInput
 from hysim.models.model import CompiledLaw
+from hysim.models.polynomial_boucwen import PolynomialBoucWen
 
 _MEMORY_ITSELF = np.array([[1.0, 0.0]])  # gain and offset with which the output is z
 
@@ -53,14 +54,15 @@ class SteppedLaw(PolynomialInput):
         y : array, shape (n_samples,)
             Wanted output.
         u0 : float, optional
-            Input at which the law rests, its memory at z0, before it moves to the first sample; by default 0.
+            Input at which the law rests, its memory at z0, before it moves to the first sample. By default it
+            rests at the first sample: the input that gives y[0] with the memory at z0, found from u = 0.
         state : (float, float), optional
             Input and memory to continue from, in place of u0 and z0.
 
         Returns
         -------
         array, shape (n_samples,)
-            Its `response`, continued from the same rest, is y to rounding. A sample costs some ten steps of the law.
+            Its `response` is y to rounding. A sample costs some twenty steps of the law, outside compiled code.
 
         Raises
         ------
@@ -68,13 +70,25 @@ class SteppedLaw(PolynomialInput):
             If the slope dy/du does not keep its sign on the way, or the output does not reach a sample; the
             message names the sample and the input.
         ValueError
-            If y is not finite or has not one axis, both u0 and state are given, or the slope is zero where the
-            record begins.
+            If y is not finite or has not one axis, both u0 and state are given, its first sample does not tell
+            the first input (give u0), or the slope is zero where the record begins.
         """
         if state is not None and u0 is not None:
             raise ValueError("give u0 or state, not both: the state has its own input")
+        outputs = read_only(y, "y", ndim=1)
+        if state is None and u0 is None and outputs.size:
+            static = PolynomialBoucWen(
+                A=0.0,
+                beta=0.0,
+                gamma=0.0,
+                gain=self.gain,
+                offset=self.offset,
+                z0=self.z0,
+                input_coefficients=self.input_coefficients,
+            )
+            u0 = float(static.inverse_response(outputs[:1])[0])
         start = (float(u0 or 0.0), self.z0) if state is None else state
-        return _numeric_inverse.inverse_response(self, read_only(y, "y", ndim=1), start)
+        return _numeric_inverse.inverse_response(self, outputs, start)
 
     def _compiled(self, output: FloatArray, start: State) -> CompiledLaw:
         memory = np.array([[getattr(self, name) for name in self.memory_names]])

@@ -73,6 +73,7 @@ def search_space(
     box = {name: limits.get(name, _cut(name, signs.get(name))) for name in chart.coordinates}
     box |= {"n": (float(np.log(box["n"][0])), float(np.log(box["n"][1])))} if "n" in box else {}
     lower, upper = (np.array([pair[side] for pair in box.values()]) for side in (0, 1))
+    extended = bool({"delta", *_FURTHER} & set(defaults))  # what is admissible for such a law is not known
     quadrant = np.array([max(low, 0.0) if name in _PAIR else low for name, (low, _) in box.items()])
     return SearchSpace(
         coordinates=chart.coordinates,
@@ -85,7 +86,7 @@ def search_space(
         held=held,
         parameters=chart.decode,
         redundant=REDUNDANT,
-        regions={"admissible": (quadrant, upper)} if set(_PAIR) <= set(box) else {},
+        regions={"admissible": (quadrant, upper)} if set(_PAIR) <= set(box) and not extended else {},
         bounds={name: pair for name, pair in bounds.items() if name in columns},
     )
 

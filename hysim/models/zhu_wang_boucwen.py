@@ -3,15 +3,16 @@
     dz/du = A - |z|^n (gamma + beta sgn(z du)) + delta u sgn(du)
     y = offset + c1 u + c2 u^2 + ... + gain z
 
-The last term is the slope's own share of the input: where u > 0 it steepens the rising branch and flattens
-the falling one for a positive delta, and the other way round where u < 0, so that the loop is not symmetric
-about its centre. n = 1 is evaluated in closed form, other n by power series to 1e-12 of the range
-(`hysim.kernels.zhu_wang`).
+The last term steepens the way up and flattens the way down where delta u > 0, and the other way round where
+delta u < 0. It is odd: reflected in (u, z) = (0, 0) the law is the same, so that a loop about u = 0 stays point
+symmetric, and one on the voltages of a piezoelectric actuator, which are not centred, does not. n = 1 is
+evaluated in closed form, other n by power series to 1e-12 of the range (`hysim.kernels.zhu_wang`).
 
-Source: W. Zhu and D.-H. Wang, Sensors and Actuators A 181 (2012). In the rates there the term is commonly
-printed as ``delta u sgn(u')``, beside terms in u'. As a share of z' that has no factor ``|u'|``, and the
-loop would depend on the rate of the input. The form here has the factor, ``delta u |u'|``: it does not depend
-on the rate, and has the same loops as the printed one under a triangle of unit slope.
+Source: W. Zhu and D.-H. Wang, Sensors and Actuators A 181 (2012), whose paper we know from others' accounts: these
+write the rate z' with the term ``delta u sgn(u')``, which has no factor of the speed and so makes the loop
+depend on it. The form here is the term of dz/du, that is, ``delta u |u'|`` in z'. With the factor ``|u'|`` the
+printed term would be ``delta u u'``, in dz/du a term delta u without sign: the law for an input
+u + delta u^2 / (2 A) in the first term alone.
 """
 
 from typing import ClassVar
@@ -39,8 +40,8 @@ class ZhuWangBoucWen(SteppedLaw):
     A, beta, gamma, n, gain, offset, z0 : float
         As in `BoucWen`.
     delta : float
-        Asymmetry of the branches [unit of z / (unit of u)^2]; zero is the Bouc-Wen law. Its sign depends on where
-        u = 0 lies: an offset of the input is not the same law.
+        What the slope of z gains on the way up, and loses on the way down, for each unit of u
+        [unit of z / (unit of u)^2]; zero is the Bouc-Wen law. An input that is shifted has another loop.
     input_coefficients : sequence of float
         (c1, c2, ...) [unit of y / (unit of u)^k]; c1 is the feedthrough. Their number is the degree that
         `identify` fits.
@@ -60,7 +61,7 @@ class ZhuWangBoucWen(SteppedLaw):
     >>> import hysim as hs
     >>> law = hs.ZhuWangBoucWen(beta=0.5, gamma=0.5, delta=0.3)
     >>> law.response([0.0, 1.0, 0.0, 1.0]).round(6).tolist()
-    [0.0, 0.742485, -0.291879, 0.710331]
+    [0.0, 0.742484, -0.101879, 0.70305]
     """
 
     A: float = 1.0
