@@ -31,6 +31,8 @@ _HOME = {
     "LoopMetrics": "hysim.metrics",
     "BoucWen": "hysim.models.boucwen",
     "PolynomialBoucWen": "hysim.models.polynomial_boucwen",
+    "ZhuWangBoucWen": "hysim.models.zhu_wang_boucwen",
+    "GeneralizedBoucWen": "hysim.models.generalized_boucwen",
     "BoucWenInverse": "hysim.models.boucwen_inverse",
     "LimitCycle": "hysim.models.limit_cycle",
     "Duhem": "hysim.models.duhem",
@@ -81,6 +83,7 @@ if TYPE_CHECKING:
     from hysim.models.custom import CustomLaw as CustomLaw
     from hysim.models.dahl import Dahl as Dahl
     from hysim.models.duhem import Duhem as Duhem
+    from hysim.models.generalized_boucwen import GeneralizedBoucWen as GeneralizedBoucWen
     from hysim.models.limit_cycle import LimitCycle as LimitCycle
     from hysim.models.maxwell_slip import MaxwellSlip as MaxwellSlip
     from hysim.models.oscillator import BoucWenOscillator as BoucWenOscillator
@@ -93,6 +96,7 @@ if TYPE_CHECKING:
     from hysim.models.storage import load_model as load_model
     from hysim.models.storage import save as save
     from hysim.models.transfer_function import TransferFunction as TransferFunction
+    from hysim.models.zhu_wang_boucwen import ZhuWangBoucWen as ZhuWangBoucWen
     from hysim.records import Record as Record
     from hysim.simulation import Simulation as Simulation
     from hysim.simulation import simulate as simulate

@@ -10,6 +10,8 @@ import hysim as hs
 NUMBERS = [
     (hs.BoucWen, {"beta": 0.7}, "beta"),
     (hs.PolynomialBoucWen, {"input_coefficients": (1.0, 0.2)}, "input_coefficients"),
+    (hs.ZhuWangBoucWen, {"delta": 0.2}, "delta"),
+    (hs.GeneralizedBoucWen, {"b4": 0.2}, "b4"),
     (hs.Duhem, {"p": [[1.0]], "q": [[0.0, -1.0]]}, "q"),
     (hs.PrandtlIshlinskii, {"thresholds": (0.0, 0.5), "weights": (1.0, 2.0)}, "weights"),
     (hs.Play, {"threshold": 0.5}, "threshold"),

@@ -166,9 +166,11 @@ class Problem:
         from scipy.optimize import lsq_linear
 
         lower, upper = self.linear_box()
+        left, square = np.linalg.qr(columns)  # the same problem with as many equations as unknowns
+        short = (left.transpose(0, 2, 1) @ target[..., np.newaxis])[..., 0]
         solutions = [
             lsq_linear(one, goal, bounds=(lower * norm, upper * norm), method="bvls").x / norm
-            for one, goal, norm in zip(columns, target, norms, strict=True)
+            for one, goal, norm in zip(square, short, norms, strict=True)
         ]
         return np.array(solutions).reshape(len(columns), lower.size)
 

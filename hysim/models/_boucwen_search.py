@@ -12,7 +12,9 @@ for every n,
     l = k (1 + |k|)^(n - 1),    k = sinh(c)
 
 The box is |k| <= 40 for both, n in [0.5, 10] on a log scale, z0/Z in [-1, 1], and open for the
-parameters in which the output is affine. A parameter that the user bounds is its own coordinate,
+parameters in which the output is affine. The further shape coefficients b2 to b6 of the generalised law
+have the coordinates of beta; the forcing delta of Zhu and Wang is measured by what it adds to |A| where |u|
+is largest, in [-5, 5]. A parameter that the user bounds is its own coordinate,
 between these bounds; bounds from or to zero and infinity cut the box at zero.
 """
 
@@ -26,7 +28,8 @@ from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record
 
 REDUNDANT = (("A", "gain"),)
-_MEMORY = ("A", "beta", "gamma", "n", "z0")
+_FURTHER = ("b2", "b3", "b4", "b5", "b6")
+_MEMORY = ("A", "beta", "gamma", "n", "delta", *_FURTHER, "z0")
 _PAIR = ("loading", "unloading")
 _KNEE = float(np.arcsinh(40.0))
 _BOX = {
@@ -36,6 +39,8 @@ _BOX = {
     "beta": (-_KNEE, _KNEE),
     "gamma": (-_KNEE, _KNEE),
     "n": (0.5, 10.0),
+    "delta": (-5.0, 5.0),
+    **dict.fromkeys(_FURTHER, (-_KNEE, _KNEE)),
     "z0": (-1.0, 1.0),
 }
 
@@ -45,15 +50,20 @@ def search_space(
     columns: tuple[str, ...],
     record: Record,
     freedom: Freedom,
+    *,
+    alike: tuple[tuple[str, ...], ...] = (),
 ) -> SearchSpace:
     """Declare the coordinates, their box and the way back to the user's parameters for one record.
+
+    Of each group in `alike` the record can tell only the sum, so that one of it is held.
 
     Raises
     ------
     ValueError
         If the input is constant, `initial` is unknown, or a name or a bound does not fit.
     """
-    held = freedom.held(defaults, redundant=REDUNDANT, at_rest=("z0",) if freedom.starts_at_rest() else ())
+    at_rest = ("z0",) if freedom.starts_at_rest() else ()
+    held = freedom.held(defaults, redundant=(*REDUNDANT, *alike), at_rest=at_rest)
     bounds = freedom.limits(defaults, held)
     if "n" in bounds and not (bounds["n"][0] >= 0.0 and (bounds["n"][0] > 0.0 or np.isinf(bounds["n"][1]))):
         raise ValueError(f"bounds of 'n' must be positive, got {bounds['n']}")
@@ -63,6 +73,7 @@ def search_space(
     box = {name: limits.get(name, _cut(name, signs.get(name))) for name in chart.coordinates}
     box |= {"n": (float(np.log(box["n"][0])), float(np.log(box["n"][1])))} if "n" in box else {}
     lower, upper = (np.array([pair[side] for pair in box.values()]) for side in (0, 1))
+    extended = bool({"delta", *_FURTHER} & set(defaults))  # what is admissible for such a law is not known
     quadrant = np.array([max(low, 0.0) if name in _PAIR else low for name, (low, _) in box.items()])
     return SearchSpace(
         coordinates=chart.coordinates,
@@ -75,7 +86,7 @@ def search_space(
         held=held,
         parameters=chart.decode,
         redundant=REDUNDANT,
-        regions={"admissible": (quadrant, upper)} if set(_PAIR) <= set(box) else {},
+        regions={"admissible": (quadrant, upper)} if set(_PAIR) <= set(box) and not extended else {},
         bounds={name: pair for name, pair in bounds.items() if name in columns},
         state=("z0",),
     )
@@ -99,23 +110,26 @@ class _Chart:
     values: Mapping[str, float]  # every parameter, where it is not free
     limits: Mapping[str, tuple[float, float]]  # parameters that are their own coordinates
     span: float
+    reach: float  # of |u|
     slope: float  # what A is measured in
 
     def decode(self, x: FloatArray) -> dict[str, FloatArray]:
         """Parameters of the memory, each (n_sets,), from coordinates (n_sets, n_x)."""
         raw = dict(zip(self.coordinates, np.atleast_2d(x).T, strict=True))
-        held = {name: np.full(np.atleast_2d(x).shape[0], self.values[name]) for name in _MEMORY}
+        held = {name: np.full(np.atleast_2d(x).shape[0], self.values[name]) for name in _MEMORY if name in self.values}
         A = raw["A"] * (1.0 if "A" in self.limits else self.slope) if "A" in raw else held["A"]
         n = np.exp(raw["n"]) if "n" in raw else held["n"]
         unit = self._unit(A, n)
         parameters = held | {"A": A, "n": n}
-        shape = {name: _shape(raw[name], n) * unit for name in ("loading", "unloading", "beta", "gamma") if name in raw}
-        if "loading" in shape:
-            parameters["beta"] = 0.5 * (shape["loading"] + shape["unloading"])
-            parameters["gamma"] = 0.5 * (shape["loading"] - shape["unloading"])
-        scaled = shape | ({"z0": raw["z0"] * self._slope(A) * self.span} if "z0" in raw else {})
-        parameters |= {name: scaled[name] for name in ("beta", "gamma", "z0") if name in scaled}
-        return parameters | {name: raw[name] for name in self.limits if name in ("beta", "gamma", "z0")}
+        shapes = (*_PAIR, "beta", "gamma", *_FURTHER)
+        scaled = {name: _shape(raw[name], n) * unit for name in shapes if name in raw}
+        if "loading" in scaled:
+            parameters["beta"] = 0.5 * (scaled["loading"] + scaled["unloading"])
+            parameters["gamma"] = 0.5 * (scaled["loading"] - scaled["unloading"])
+        scaled |= {"z0": raw["z0"] * self._slope(A) * self.span} if "z0" in raw else {}
+        scaled |= {"delta": raw["delta"] * self._slope(A) / self.reach} if "delta" in raw else {}
+        parameters |= {name: values for name, values in scaled.items() if name not in _PAIR}
+        return parameters | {name: raw[name] for name in self.limits if name not in ("A", "n")}
 
     def encode(self, parameters: Mapping[str, float]) -> FloatArray:
         """Coordinates (n_x,) of one set of parameters."""
@@ -127,6 +141,8 @@ class _Chart:
             "unloading": _knee((beta - gamma) / unit, n),
             "beta": _knee(beta / unit, n),
             "gamma": _knee(gamma / unit, n),
+            **{name: _knee(parameters[name] / unit, n) for name in _FURTHER if name in parameters},
+            "delta": parameters.get("delta", 0.0) * self.reach / self._slope(A),
             "z0": parameters["z0"] / (self._slope(A) * self.span),
         }
         scaled |= {name: parameters[name] for name in self.limits if name in scaled}
@@ -170,11 +186,13 @@ def _chart(
         raise ValueError("the input is constant: nothing can be identified from it")
     paired = {"beta", "gamma"} <= free and not {"beta", "gamma"} & (limits.keys() | signed)
     shapes = _PAIR if paired else ("beta", "gamma")
-    coordinates = [name for name in ("A", *shapes, "n", "z0") if name in free or (paired and name in _PAIR)]
+    order = ("A", *shapes, "n", "delta", *_FURTHER, "z0")
+    coordinates = [name for name in order if name in free or (paired and name in _PAIR)]
     return _Chart(
         coordinates=tuple(coordinates),
         values=values,
         limits=limits,
         span=span,
+        reach=float(np.abs(record.u).max()),
         slope=float(np.ptp(record.y)) / (abs(values["gain"]) or 1.0) / span or 1.0,
     )

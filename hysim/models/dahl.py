@@ -18,7 +18,8 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray
 from hysim.models._batch import Reduction
 from hysim.models._clamp_search import is_settled
-from hysim.models.boucwen import BoucWen, State
+from hysim.models._memory_law import State
+from hysim.models.boucwen import BoucWen
 from hysim.models.boucwen_inverse import BoucWenInverse, InverseState
 from hysim.models.limit_cycle import LimitCycle
 from hysim.models.model import CompiledLaw, model

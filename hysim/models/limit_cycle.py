@@ -29,7 +29,8 @@ from scipy.optimize import brentq
 
 from hysim._frozen import FloatArray, frozen, read_only
 from hysim.errors import SimulationError
-from hysim.models._boucwen_batch import batch
+from hysim.kernels import boucwen as kernels
+from hysim.models._memory_batch import batch
 
 _PANELS = 32  # on either half; the innermost, where w^n is not analytic, weighs 2^-32 to a power above 1
 _NODES = 40  # on each: the nearest pole of w^n is pi/n away in the angle, which n = 20 needs them for
@@ -38,8 +39,6 @@ _NODES = 40  # on each: the nearest pole of w^n is pi/n away in the angle, which
 @frozen
 class LimitCycle:
     """Steady loop of the memory between the inputs -amplitude and amplitude.
-
-    Of a sum of plays or stops it is the loop of the output about its offset.
 
     Parameters
     ----------
@@ -123,7 +122,7 @@ def _from_rest(A: float, c: float, n: float, lengths: FloatArray) -> FloatArray:
     memory_itself = read_only(np.tile([1.0, 0.0], (lengths.size, 1)))
     u = read_only(np.stack([np.zeros(lengths.size), lengths], axis=1))
     with np.errstate(all="ignore"):  # an escape overflows, and uncompiled kernels would warn of it
-        return batch(laws, memory_itself, u).rows(workers=1)[:, 1]
+        return batch(laws, memory_itself, u, kernels.batch).rows(workers=1)[:, 1]
 
 
 @functools.cache

@@ -8,19 +8,13 @@ What follows from the equations is in `hysim.models._boucwen_law`.
 Source: the polynomial input for asymmetric piezoelectric loops after Wang, Chen and Bai 2015.
 """
 
-from collections.abc import Mapping
-from typing import Self
-
-import numpy as np
-import numpy.typing as npt
-
 from hysim.models._boucwen_law import BoucWenLaw
+from hysim.models._polynomial_input import PolynomialInput
 from hysim.models.model import model
-from hysim.models.search_space import Parameters
 
 
 @model
-class PolynomialBoucWen(BoucWenLaw):
+class PolynomialBoucWen(PolynomialInput, BoucWenLaw):
     """Bouc-Wen law beside a polynomial of the input, ``y = offset + sum c_k u^k + gain z``.
 
     Parameters
@@ -52,20 +46,3 @@ class PolynomialBoucWen(BoucWenLaw):
     offset: float = 0.0
     z0: float = 0.0
     input_coefficients: tuple[float, ...] = (0.0, 0.0)
-
-    @property
-    def coefficient_names(self) -> tuple[str, ...]:
-        """One name for each input coefficient."""
-        return tuple(f"input_coefficients[{k}]" for k in range(len(self.input_coefficients)))
-
-    @classmethod
-    def _from_scalars(cls, scalars: Mapping[str, float]) -> Self:
-        plain = {name: value for name, value in scalars.items() if not name.startswith("input_coefficients[")}
-        degree = len(scalars) - len(plain)
-        return cls(**plain, input_coefficients=tuple(scalars[f"input_coefficients[{k}]"] for k in range(degree)))
-
-    @classmethod
-    def _to_scalars(cls, parameters: Parameters) -> dict[str, npt.ArrayLike]:
-        scalars = dict(parameters)
-        coefficients = np.atleast_2d(np.asarray(scalars.pop("input_coefficients", cls.input_coefficients), float))
-        return scalars | {f"input_coefficients[{k}]": column for k, column in enumerate(coefficients.T)}

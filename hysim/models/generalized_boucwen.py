@@ -1,0 +1,109 @@
+"""The generalised Bouc-Wen law of Song and Der Kiureghian.
+
+    dz/du = A - |z|^n psi
+    psi = gamma + beta sgn(u' z) + b2 sgn(u' u) + b3 sgn(z u) + b4 sgn(u') + b5 sgn(z) + b6 sgn(u)
+    y = offset + c1 u + c2 u^2 + ... + gain z
+
+psi is one number in each of the six sectors that the signs of u', z and u make of a loop in the (u, z) plane,
+so each sector can be bent by itself. It is evaluated exactly for every n (`hysim.kernels.generalized`).
+
+Source: J. Song and A. Der Kiureghian, J. Eng. Mech. 132 (2006). Their beta_1 is our beta. Their psi has no
+constant gamma; with it the Bouc-Wen law is the special case b2 = ... = b6 = 0.
+"""
+
+from typing import ClassVar
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.kernels import generalized as kernels
+from hysim.kernels.stepping import Step
+from hysim.models import _boucwen_search
+from hysim.models._asymmetric import SteppedLaw
+from hysim.models.model import model
+from hysim.models.search_space import ALL_FREE, Freedom, SearchSpace
+from hysim.records import Record
+
+_ONE_SIDED = (("b6", "gamma"), ("b3", "b5"), ("b2", "b4"))
+"""Where u keeps its sign, the terms of a pair are the same to a sign."""
+
+
+@model
+class GeneralizedBoucWen(SteppedLaw):
+    """Bouc-Wen law with a shape for each sector of the loop, after Song and Der Kiureghian (2006).
+
+    ``dz/du = A - |z|^n psi`` with ``psi = gamma + beta sgn(u' z) + b2 sgn(u' u) + b3 sgn(z u) + b4 sgn(u') +
+    b5 sgn(z) + b6 sgn(u)``, and ``y = offset + sum c_k u^k + gain z``
+
+    Parameters
+    ----------
+    A, beta, gamma, n, gain, offset, z0 : float
+        As in `BoucWen`; beta is their beta_1, and theirs has no gamma.
+    b2, b3, b4, b5, b6 : float
+        Their beta_2 to beta_6 [unit of z^(1-n) / unit of u]. The loop is symmetric about its centre if b4, b5
+        and b6 are zero.
+    input_coefficients : sequence of float
+        (c1, c2, ...) [unit of y / (unit of u)^k]; c1 is the feedthrough. Their number is the degree that
+        `identify` fits.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is not finite, n is not positive, or there is no coefficient.
+
+    Notes
+    -----
+    Exact for every n. On an input that keeps its sign only the sums gamma + b6, b3 + b5 and b2 + b4 can be told
+    (differences for a negative one): `identify` then holds b6, b3 and b2. No class of stability is known for the
+    general case.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> law = hs.GeneralizedBoucWen(beta=0.5, gamma=0.3, b4=0.1, b5=-0.2)
+    >>> law.response([0.0, 1.0, 0.0, 1.0]).round(6).tolist()
+    [0.0, 0.719164, -0.325835, 0.534028]
+    """
+
+    A: float = 1.0
+    beta: float = 0.5
+    gamma: float = 0.5
+    n: float = 1.0
+    b2: float = 0.0
+    b3: float = 0.0
+    b4: float = 0.0
+    b5: float = 0.0
+    b6: float = 0.0
+    gain: float = 1.0
+    offset: float = 0.0
+    z0: float = 0.0
+    input_coefficients: tuple[float, ...] = (0.0,)
+
+    memory_names: ClassVar[tuple[str, ...]] = ("A", "beta", "gamma", "n", "b2", "b3", "b4", "b5", "b6", "z0")
+    state_size: ClassVar[int] = kernels.N_STATE
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """The box that `identify` searches; see `hysim.models._boucwen_search`."""
+        one_sided = bool((record.u >= 0.0).all() or (record.u <= 0.0).all())
+        alike = _ONE_SIDED if one_sided else ()
+        return _boucwen_search.search_space(self.scalars, self.columns, record, freedom, alike=alike)
+
+    @property
+    def _step(self) -> Step:
+        return kernels.step
+
+    @staticmethod
+    def _step_parameters(memory: FloatArray, output: FloatArray) -> FloatArray:
+        A, beta, gamma, n, b2, b3, b4, b5, b6, _ = memory.T
+        laws = []
+        for direction in (-1.0, 1.0):
+            for side in (-1.0, 1.0):
+                both = direction * side
+                own = gamma + both * b2 + direction * b4 + side * b6
+                laws += [np.stack([A, beta + both * b3 + direction * b5, own, n], axis=1), output]
+        return np.concatenate(laws, axis=1)
+
+    def _memory_slope(self, direction: FloatArray, z: FloatArray, u: FloatArray) -> FloatArray:
+        s, e, side = direction, np.sign(z), np.sign(u)
+        symmetric = self.gamma + self.beta * s * e + self.b2 * s * side + self.b3 * e * side
+        return np.asarray(self.A - np.abs(z) ** self.n * (symmetric + self.b4 * s + self.b5 * e + self.b6 * side))
