@@ -132,8 +132,10 @@ class TransferFunction:
             monic = np.array(self.den)[np.newaxis, 1:] / self.den[0]
             numerator = np.concatenate([np.zeros(self.order + 1 - len(self.num)), self.num]) / self.den[0]
             coefficients = np.concatenate([numerator, self.initial_state or np.zeros(self.order)])
-            columns = affine_columns(monic, inputs, float(sample_time), self.delay, self.hold, self.sample)
-            used = coefficients != 0.0  # a state that overflows does not matter where it is not seen
+            columns = affine_columns(
+                monic, inputs, float(sample_time), self.delay, hold=self.hold, sample=self.sample
+            )
+            used = np.flatnonzero(coefficients)  # a state that overflows does not matter where it is not seen
             y = np.asarray(columns[0][:, used] @ coefficients[used])
         if not np.isfinite(y).all():
             k = int(np.argmin(np.isfinite(y)))
@@ -253,8 +255,9 @@ class TransferFunctionStructure:
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns of the numerator and of the initial state, and zero, (n_sets, n_samples, n_columns + 1)."""
         monic = np.stack([np.atleast_1d(parameters[name]) for name in self.denominator], axis=1)
-        columns = affine_columns(monic, record.u, record.sample_time, 0.0, self.hold, self.sample)
-        return np.concatenate([columns[..., self.poles - self.zeros :], np.zeros_like(columns[..., :1])], axis=-1)
+        return affine_columns(
+            monic, record.u, record.sample_time, zeros=self.zeros, hold=self.hold, sample=self.sample
+        )
 
     def assemble(self, parameters: Mapping[str, float]) -> TransferFunction:
         """The transfer function with these parameters."""
