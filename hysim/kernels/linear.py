@@ -91,8 +91,11 @@ def columns(
     x, free, moved = np.zeros(n), np.zeros(n), np.empty(n)
     whole = np.empty((n, n))
     for i in range(n_sets):
-        part, lag = parts[i], lags[i]
-        multiply(A[i, 1], A[i, 0], whole)
+        part, lag, own = parts[i], lags[i], out[i]
+        cut_A, cut_B0, cut_B1 = A[i, 0], B0[i, 0], B1[i, 0]
+        full_A, full_B0, full_B1 = A[i, 1], B0[i, 1], B1[i, 1]
+        den, powers = scaled[i], back[i]
+        multiply(full_A, cut_A, whole)
         x[:] = 0.0
         free[:] = 0.0
         free[:1] = 1.0
@@ -101,18 +104,19 @@ def columns(
             cut = level[before] + (1.0 - part) * rise[before]
             end = level[now] + (1.0 - part) * rise[now]
             if not at_end:
-                _write(x, free, cut if part > 0.0 else level[now], scaled[i], back[i], first, out[i, k])
+                _write(x, free, cut if part > 0.0 else level[now], den, powers, first, own, k)
             if part > 0.0:
-                _advance(A[i, 0], B0[i, 0], B1[i, 0], cut, level[before] + rise[before], x, moved)
-            _advance(A[i, 1], B0[i, 1], B1[i, 1], level[now], end, x, moved)
+                _advance(cut_A, cut_B0, cut_B1, cut, level[before] + rise[before], x, moved)
+            _advance(full_A, full_B0, full_B1, level[now], end, x, moved)
             for column in range(n):
                 total = 0.0
                 for row in range(n):
                     total += free[row] * whole[row, column]
                 moved[column] = total
-            free[:] = moved
+            for column in range(n):
+                free[column] = moved[column]
             if at_end:
-                _write(x, free, end, scaled[i], back[i], first, out[i, k])
+                _write(x, free, end, den, powers, first, own, k)
 
 
 @inlined
@@ -125,21 +129,29 @@ def _advance(
         for column in range(len(x)):
             total += A[row, column] * x[column]
         moved[row] = total
-    x[:] = moved
+    for row in range(len(x)):
+        x[row] = moved[row]
 
 
 @inlined
 def _write(
-    x: FloatArray, free: FloatArray, through: float, scaled: FloatArray, back: FloatArray, first: int, row: FloatArray
+    x: FloatArray,
+    free: FloatArray,
+    through: float,
+    den: FloatArray,
+    powers: FloatArray,
+    first: int,
+    out: FloatArray,
+    k: int,
 ) -> None:
-    """One sample: s^j / den(s) u for the powers j from n - `first` down, the free responses, and zero."""
+    """Sample k: s^j / den(s) u for the powers j from n - `first` down, the free responses, and zero."""
     n = len(x)
     if first == 0:
         for j in range(n):
-            through -= scaled[j] * x[n - 1 - j]
-        row[0] = through
+            through -= den[j] * x[n - 1 - j]
+        out[k, 0] = through
     for j in range(max(first, 1), n + 1):
-        row[j - first] = x[n - j] * back[j]
+        out[k, j - first] = x[n - j] * powers[j]
     for j in range(n):
-        row[n + 1 - first + j] = free[j] * back[j]
-    row[-1] = 0.0
+        out[k, n + 1 - first + j] = free[j] * powers[j]
+    out[k, 2 * n + 1 - first] = 0.0
