@@ -239,3 +239,33 @@ def test_a_denominator_cannot_be_fixed():
         hs.identify(
             hs.TransferFunction.structure(poles=2, zeros=0), hs.datasets.table1(), bounds={"den[2]": (0.0, 1.0)}
         )
+
+
+def rao_garnier(snr, seed):
+    """The stiff plant of Rao and Garnier under a binary input held for 0.2 s, with noise; and its clean output."""
+    true = hs.TransferFunction(num=(-6400.0, 1600.0), den=(1.0, 5.0, 408.0, 416.0, 1600.0))
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], 60), 20)
+    clean = true.response(u, 0.01)
+    noise = rng.standard_normal(u.size) * np.sqrt(np.var(clean) / snr)
+    return hs.Record(u=u, y=clean + noise, t=0.01 * np.arange(u.size)), clean, true
+
+
+def test_regressions_start_a_long_search_where_it_ends():
+    record, _, true = rao_garnier(np.inf, 0)
+    space = hs.TransferFunction.structure(poles=4, zeros=1).search_space(record)
+    assert space.screened == 0
+    for k in range(len(space.starts)):
+        den = [values[0] for values in space.parameters(space.starts[k : k + 1]).values()]
+        # the output is filtered as if it were linear between samples, 0.2 rad of the fast mode apart
+        assert den == pytest.approx(true.den[1:], rel=0.02)
+
+
+def test_a_stiff_plant_is_found_in_noise():
+    """Beside the bound: six parameters leave sqrt(6/N) = 7.1 % of the noise's rms in the output."""
+    structure = hs.TransferFunction.structure(poles=4, zeros=1)
+    for snr, seed in ((10.0, 1), (1.0, 2)):
+        record, clean, _ = rao_garnier(snr, seed)
+        fit = hs.identify(structure, record)
+        error = np.linalg.norm(clean - fit.model.response(record.u, 0.01)) / np.linalg.norm(clean - clean.mean())
+        assert error < 2.0 * np.sqrt(6 / len(record) / snr)  # chi of 6 degrees is above twice its rms in 5 of 1e4

@@ -1,4 +1,4 @@
-"""States of a linear plant under an input that is linear on each piece of a step.
+"""Outputs of linear plants under an input that is linear on each piece of a step.
 
     x <- A x + B0 v + B1 v',    v and v' the input at the begin and the end of the piece
 
@@ -13,9 +13,12 @@ one (C. Van Loan, IEEE Trans. Automat. Control 23, 1978).
 import math
 
 import numpy as np
+import numpy.typing as npt
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import kernel
+from hysim.kernels._compile import inlined, kernel
+
+Indices = npt.NDArray[np.int64]
 
 _N_TERMS = 15  # 0.5^16 / 16! is below the rounding of one
 
@@ -61,43 +64,94 @@ def multiply(left: FloatArray, right: FloatArray, out: FloatArray) -> None:
 
 
 @kernel
-def states(
-    A: FloatArray, B0: FloatArray, B1: FloatArray, begin: FloatArray, end: FloatArray, x0: FloatArray, out: FloatArray
+def columns(
+    A: FloatArray,
+    B0: FloatArray,
+    B1: FloatArray,
+    level: FloatArray,
+    rise: FloatArray,
+    lags: Indices,
+    parts: FloatArray,
+    scaled: FloatArray,
+    back: FloatArray,
+    at_end: bool,
+    out: FloatArray,
 ) -> None:
-    """States at the begin of every step and after the last, of many plants.
+    """Outputs of many plants for a one in each coefficient of the numerator and in each initial state, and zero.
 
-    `A` is (n_sets, n_pieces, n, n), `B0` and `B1` (n_sets, n_pieces, n), `begin` and `end` (n_steps, n_pieces),
-    `x0` (n_sets, n), `out` (n_sets, n_steps + 1, n).
+    `A` is (n_sets, 2, n, n), `B0` and `B1` (n_sets, 2, n): over the `parts` (n_sets,) of a step in which the
+    stretch of the input before the last still acts, and over the rest of it. `level` and `rise`
+    (n_samples + 1,) hold each stretch's begin and rise, a zero before the first; they act `lags` (n_sets,) whole
+    steps late. `scaled` (n_sets, n) is den in the scaled time, `back` (n_sets, n + 1) the way back to seconds.
+    `out` is (n_sets, n_samples, n_numerator + n + 1), with the lowest powers of the numerator.
     """
-    n_sets, n_pieces, n = B0.shape
-    previous = np.empty(n)
+    n_sets, n_samples, width = out.shape
+    n = scaled.shape[1]
+    first = 2 * n + 2 - width  # power n - first is the numerator's highest
+    x, free, moved = np.zeros(n), np.zeros(n), np.empty(n)
+    whole = np.empty((n, n))
     for i in range(n_sets):
-        out[i, 0] = x0[i]
-        for k in range(begin.shape[0]):
-            target = out[i, k + 1]
-            target[:] = out[i, k]
-            for piece in range(n_pieces):
-                previous[:] = target
-                for row in range(n):
-                    total = B0[i, piece, row] * begin[k, piece] + B1[i, piece, row] * end[k, piece]
-                    for column in range(n):
-                        total += A[i, piece, row, column] * previous[column]
-                    target[row] = total
-
-
-@kernel
-def free_responses(step: FloatArray, out: FloatArray) -> None:
-    """First rows of the powers of each plant's step matrix.
-
-    `step` is (n_sets, n, n), `out` (n_sets, n_samples, n): the first state at every sample, from a one in each.
-    """
-    n_sets, n_samples, n = out.shape
-    for i in range(n_sets):
-        out[i, 0] = 0.0
-        out[i, 0, :1] = 1.0
-        for k in range(1, n_samples):
+        part, lag, own = parts[i], lags[i], out[i]
+        cut_A, cut_B0, cut_B1 = A[i, 0], B0[i, 0], B1[i, 0]
+        full_A, full_B0, full_B1 = A[i, 1], B0[i, 1], B1[i, 1]
+        den, powers = scaled[i], back[i]
+        multiply(full_A, cut_A, whole)
+        x[:] = 0.0
+        free[:] = 0.0
+        free[:1] = 1.0
+        for k in range(n_samples):
+            before, now = max(0, k - lag), max(0, k + 1 - lag)
+            cut = level[before] + (1.0 - part) * rise[before]
+            end = level[now] + (1.0 - part) * rise[now]
+            if not at_end:
+                _write(x, free, cut if part > 0.0 else level[now], den, powers, first, own, k)
+            if part > 0.0:
+                _advance(cut_A, cut_B0, cut_B1, cut, level[before] + rise[before], x, moved)
+            _advance(full_A, full_B0, full_B1, level[now], end, x, moved)
             for column in range(n):
                 total = 0.0
                 for row in range(n):
-                    total += out[i, k - 1, row] * step[i, row, column]
-                out[i, k, column] = total
+                    total += free[row] * whole[row, column]
+                moved[column] = total
+            for column in range(n):
+                free[column] = moved[column]
+            if at_end:
+                _write(x, free, end, den, powers, first, own, k)
+
+
+@inlined
+def _advance(
+    A: FloatArray, B0: FloatArray, B1: FloatArray, begin: float, end: float, x: FloatArray, moved: FloatArray
+) -> None:
+    """One piece of a step."""
+    for row in range(len(x)):
+        total = B0[row] * begin + B1[row] * end
+        for column in range(len(x)):
+            total += A[row, column] * x[column]
+        moved[row] = total
+    for row in range(len(x)):
+        x[row] = moved[row]
+
+
+@inlined
+def _write(
+    x: FloatArray,
+    free: FloatArray,
+    through: float,
+    den: FloatArray,
+    powers: FloatArray,
+    first: int,
+    out: FloatArray,
+    k: int,
+) -> None:
+    """Sample k: s^j / den(s) u for the powers j from n - `first` down, the free responses, and zero."""
+    n = len(x)
+    if first == 0:
+        for j in range(n):
+            through -= den[j] * x[n - 1 - j]
+        out[k, 0] = through
+    for j in range(max(first, 1), n + 1):
+        out[k, j - first] = x[n - j] * powers[j]
+    for j in range(n):
+        out[k, n + 1 - first + j] = free[j] * powers[j]
+    out[k, 2 * n + 1 - first] = 0.0

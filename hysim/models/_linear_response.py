@@ -7,32 +7,48 @@ coefficients of den at most one. The steps between samples are exact (`hysim.ker
 import numpy as np
 
 from hysim._frozen import FloatArray
+from hysim._parallel import in_chunks
 from hysim.kernels import linear as kernels
+
+_SAMPLES_PER_THREAD = 20_000  # a millisecond: fewer are not worth a thread
 
 
 def affine_columns(
-    monic: FloatArray, u: FloatArray, sample_time: float, delay: float, hold: str, sample: str
+    monic: FloatArray,
+    u: FloatArray,
+    sample_time: float,
+    delay: float | FloatArray = 0.0,
+    *,
+    zeros: int | None = None,
+    hold: str = "zoh",
+    sample: str = "start",
 ) -> FloatArray:
-    """What the output is affine in: b_0 ... b_n of the numerator, then the initial state, (n_sets, N, 2 n + 1).
+    """What the output is affine in: the numerator, highest power first, the initial state, and zero.
 
-    `monic` (n_sets, n) holds the denominators without their leading one, in seconds.
+    `monic` (n_sets, n) holds the denominators without their leading one, in seconds; a numerator of the degree
+    `zeros` (by default n) makes (n_sets, n_samples, zeros + n + 2). The delay is one number, or one for each set.
     """
     n_sets, n = monic.shape
-    late = min(delay / sample_time, float(u.size))
-    begin, end, lengths = _pieces(u, late, hold)
+    out = np.empty((n_sets, u.size, n + 2 + (n if zeros is None else zeros)))
     with np.errstate(all="ignore"):
         F, rate, scaled = scaled_companion(monic, sample_time)
-        A, B0, B1 = transitions(F, rate * sample_time * lengths)
-        forced, free = np.empty((2, n_sets, u.size + 1, n))
-        kernels.states(A, B0, B1, begin, end, np.zeros((n_sets, n)), forced)
-        kernels.free_responses(A[:, 0] if lengths.size == 1 else A[:, 1] @ A[:, 0], free)
-        at = slice(1, None) if sample == "end" else slice(0, -1)
-        x = forced[:, at, ::-1]
-        through = end[:, -1] if sample == "end" else begin[:, 0]
-        feedthrough = through - (x @ scaled[..., np.newaxis])[..., 0]
-        back = rate[:, np.newaxis] ** -np.arange(1, n + 1)
-        from_state = free[:, at] * back * rate[..., np.newaxis]
-        return np.concatenate([feedthrough[..., np.newaxis], x * back, from_state], axis=-1)
+        late = np.minimum(np.broadcast_to(delay, n_sets) / sample_time, float(u.size))
+        lags, parts = np.floor(late).astype(np.int64), late % 1.0
+        A, B0, B1 = transitions(F, rate * sample_time * np.stack([parts, 1.0 - parts], axis=1))
+        back = rate ** -np.arange(n + 1.0)
+    level = np.append(0.0, u)
+    rise = np.append(0.0, np.diff(u, append=u[-1:])) if hold == "foh" else np.zeros_like(level)
+
+    def work(start: int, stop: int) -> None:
+        each = slice(start, stop)
+        kernels.columns(
+            *(A[each], B0[each], B1[each], level, rise, lags[each], parts[each], scaled[each], back[each]),
+            sample == "end",
+            out[each],
+        )
+
+    in_chunks(work, n_sets, minimum=1 + _SAMPLES_PER_THREAD // u.size)
+    return out
 
 
 def scaled_companion(monic: FloatArray, sample_time: float) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -58,19 +74,3 @@ def transitions(F: FloatArray, spans: FloatArray) -> tuple[FloatArray, FloatArra
     kernels.exponentials(generators.reshape(-1, n + 2, n + 2), exponentials.reshape(-1, n + 2, n + 2))
     held, rising = exponentials[..., :n, n], exponentials[..., :n, n + 1]
     return np.ascontiguousarray(exponentials[..., :n, :n]), held - rising, np.ascontiguousarray(rising)
-
-
-def _pieces(u: FloatArray, late: float, hold: str) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The input `late` samples later, by pieces: at their begin and end, (n_steps, n_pieces), and their lengths.
-
-    A step holds the end of one of the input's stretches between samples, and the begin of the next.
-    """
-    whole, part = divmod(late, 1.0)
-    before = np.zeros(int(whole) + 1)
-    level = np.concatenate([before, u])
-    rise = np.concatenate([before, np.diff(u, append=u[-1:]) if hold == "foh" else np.zeros_like(u)])
-    ends = [(0, 1.0 - part, 1.0), (1, 0.0, 1.0 - part)] if part > 0.0 else [(1, 0.0, 1.0)]
-    stretches = [(level[k : k + u.size], rise[k : k + u.size], start, stop) for k, start, stop in ends]
-    begin = np.stack([value + start * slope for value, slope, start, _ in stretches], axis=1)
-    end = np.stack([value + stop * slope for value, slope, _, stop in stretches], axis=1)
-    return begin, end, np.array([stop - start for _, start, stop in ends])

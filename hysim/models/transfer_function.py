@@ -22,12 +22,17 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, checked, read_only
 from hysim.errors import SimulationError
 from hysim.models._linear_response import affine_columns
+from hysim.models._transfer_function_starts import refined_denominators, sections
 from hysim.models.model import model
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
 FREQUENCY = (0.1, np.pi)  # box of a section's frequency: rad over the whole record, rad per sample
 DAMPING = (1e-3, 30.0)  # box of its damping ratio; two real poles above 1
+_LONG = 1000  # samples from which the starts from the record are relied upon
+_AGREED = 0.02  # of the box: starts from different cutoffs this close to their median are one optimum
+_MAJORITY = 3  # of them are enough to search no further
+_SCREENED = 64  # random points beside starts that differ
 
 
 @model
@@ -132,8 +137,8 @@ class TransferFunction:
             monic = np.array(self.den)[np.newaxis, 1:] / self.den[0]
             numerator = np.concatenate([np.zeros(self.order + 1 - len(self.num)), self.num]) / self.den[0]
             coefficients = np.concatenate([numerator, self.initial_state or np.zeros(self.order)])
-            columns = affine_columns(monic, inputs, float(sample_time), self.delay, self.hold, self.sample)
-            used = coefficients != 0.0  # a state that overflows does not matter where it is not seen
+            columns = affine_columns(monic, inputs, float(sample_time), self.delay, hold=self.hold, sample=self.sample)
+            used = np.flatnonzero(coefficients)  # a state that overflows does not matter where it is not seen
             y = np.asarray(columns[0][:, used] @ coefficients[used])
         if not np.isfinite(y).all():
             k = int(np.argmin(np.isfinite(y)))
@@ -237,11 +242,15 @@ class TransferFunctionStructure:
             coordinates.append("log rate")
             box.append((low, high))
         lower, upper = np.array(box).T
+        starts = self._starts(record, lower, upper, at_rest=bool(at_rest))
+        middle = np.median(starts, axis=0) if len(starts) else lower
+        agreed = np.sum((np.abs(starts - middle) < _AGREED * (upper - lower)).all(axis=1)) >= _MAJORITY
         return SearchSpace(
             coordinates=tuple(coordinates),
             lower=lower,
             upper=upper,
-            starts=np.empty((0, len(box))),
+            starts=starts,
+            screened=None if len(record) < _LONG else 0 if agreed else _SCREENED,
             names=tuple(name for name in names if name not in held),
             columns=self.columns,
             linear=tuple(name for name in self.columns if name not in held),
@@ -254,8 +263,7 @@ class TransferFunctionStructure:
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns of the numerator and of the initial state, and zero, (n_sets, n_samples, n_columns + 1)."""
         monic = np.stack([np.atleast_1d(parameters[name]) for name in self.denominator], axis=1)
-        columns = affine_columns(monic, record.u, record.sample_time, 0.0, self.hold, self.sample)
-        return np.concatenate([columns[..., self.poles - self.zeros :], np.zeros_like(columns[..., :1])], axis=-1)
+        return affine_columns(monic, record.u, record.sample_time, zeros=self.zeros, hold=self.hold, sample=self.sample)
 
     def assemble(self, parameters: Mapping[str, float]) -> TransferFunction:
         """The transfer function with these parameters."""
@@ -267,6 +275,15 @@ class TransferFunctionStructure:
             sample=self.sample,
             initial_state=initial_state if any(initial_state) else (),
         )
+
+    def _starts(self, record: Record, lower: FloatArray, upper: FloatArray, *, at_rest: bool) -> FloatArray:
+        """What regressions find on a long record; on a short one the search covers the box by itself."""
+        if len(record) < _LONG:
+            return np.empty((0, lower.size))
+        options = {"hold": self.hold, "sample": self.sample}
+        found = refined_denominators(record, self.poles, self.zeros, at_rest=at_rest, **options)
+        starts = [np.clip(sections(roots, record.sample_time), lower, upper) for roots in found]
+        return np.array(starts).reshape(-1, lower.size)
 
     def _denominators(self, x: FloatArray, sample_time: float) -> dict[str, FloatArray]:
         product = np.ones((len(x), 1))
