@@ -18,7 +18,7 @@ from hysim.identification._problem import Problem, problem
 from hysim.identification._profile import Profile, profiles, threshold
 from hysim.identification._resampling import bootstrap, left_out_rmse
 from hysim.identification._result import Candidate, Identification, Width
-from hysim.identification._search import PERFECT, optima, polish
+from hysim.identification._search import PERFECT, Optimum, optima, polish
 from hysim.identification._uncertainty import Uncertainty, uncertainty
 from hysim.identification.folds import folds
 from hysim.models.search_space import Freedom, Identifiable
@@ -115,11 +115,15 @@ def identify(
                 f"{whole.y.size} samples cannot tell {len(whole.space.names)} parameters: fix some of them"
             )
         left_out = _left_out(cross_validate, whole)
-        search = _Search(whole, _density(noise, records, whole.y), noise, seed)
-        found = search.found(progress)
-        if not found:
+        density = _density(noise, whole)
+        squares = optima(whole, seed=seed, progress=progress)
+        if not squares:
             raise ValueError("no law in the box stays finite on this record: check its units, or give bounds")
-        result, found = search.described(found, intervals)
+        if isinstance(density, Quantised):
+            density = density.at_least(squares[0].cost, whole.y.size - len(whole.space.names))
+        search = _Search(whole, density, noise, seed)
+        found = search.likely(squares)
+        result, found = search.described(found, intervals, squares[0].x)
         thetas = np.array([optimum.theta for optimum in found])
         return replace(
             result,
@@ -155,15 +159,15 @@ def _family(model_or_class: Any) -> Identifiable:
     return family  # type: ignore[no-any-return]
 
 
-def _density(noise: str, records: Sequence[Record], y: FloatArray) -> Noise:
-    floor = PERFECT * (float(np.abs(y).max()) or 1.0)
+def _density(noise: str, whole: Problem) -> Noise:
+    floor = PERFECT * (float(np.abs(whole.y).max()) or 1.0)
     if noise == "gaussian":
         return Gaussian(floor)
     if noise == "robust":
         return Robust(floor)
     if noise != "quantised":
         raise ValueError(f'noise must be "gaussian", "quantised" or "robust", got {noise!r}')
-    quanta = {record.resolution for record in records}
+    quanta = {part.record.resolution for part in whole.parts}
     if len(quanta) != 1 or None in quanta:
         raise ValueError("quantised noise needs the sensor's quantum, the same for all records: Record(resolution=...)")
     return Quantised(float(quanta.pop() or 0.0))
@@ -207,13 +211,8 @@ class _Search:
     def descent(self) -> Descent:
         return Descent(self.problem, self.noise, self.problem.y[np.newaxis], np.ones((1, self.problem.y.size)))
 
-    def found(self, progress: Progress | None = None) -> list[_Optimum]:
+    def likely(self, squares: Sequence[Optimum]) -> list[_Optimum]:
         """Distinct optima, best first: those of the sum of squares, and for other noise what they descend to."""
-        return self._likely(optima(self.problem, seed=self.seed, progress=progress))
-
-    def _likely(self, squares: Sequence[Any]) -> list[_Optimum]:
-        if not squares:
-            return []
         x = np.array([optimum.x for optimum in squares])
         theta = np.concatenate([x, self.problem.solve(x)[0]], axis=1)
         steps = 0 if isinstance(self.noise, Gaussian) else 200
@@ -237,8 +236,8 @@ class _Search:
                 continue
             box = replace(space, lower=lower, upper=upper, starts=np.clip(space.starts, lower, upper), regions={})
             inside = replace(self, problem=replace(self.problem, space=box))
-            if found := inside.found():
-                candidates[name] = inside.candidate(found[0].theta)
+            if squares := optima(inside.problem, seed=self.seed):
+                candidates[name] = inside.candidate(inside.likely(squares)[0].theta)
         return candidates
 
     def candidate(self, theta: FloatArray) -> Candidate:
@@ -264,19 +263,28 @@ class _Search:
         n_x = len(self.problem.space.coordinates)
         return np.ravel(self.problem.named(theta[np.newaxis, :n_x], theta[np.newaxis, n_x:])).tolist()
 
-    def described(self, found: list[_Optimum], intervals: str) -> tuple[Identification, list[_Optimum]]:
-        """The result at the best optimum; a better one that its profiles meet takes its place."""
+    def described(
+        self, found: list[_Optimum], intervals: str, least_squares: FloatArray
+    ) -> tuple[Identification, list[_Optimum]]:
+        """The result at the best optimum; a better one that its profiles meet takes its place.
+
+        `least_squares` are the coordinates of the least sum of squares.
+        """
         known = self._uncertainty(found[0])
         curves: dict[str, Profile] = {}
         if intervals == "profile":
             curves, better = self._profiles(found, known)
             if better is not None:
                 n_x = len(self.problem.space.coordinates)
-                found = self._likely(polish(self.problem, better[np.newaxis, :n_x], self.scale)) + found
+                found = self.likely(polish(self.problem, better[np.newaxis, :n_x], self.scale)) + found
                 found = sorted(found, key=lambda optimum: optimum.loss)
                 known = self._uncertainty(found[0])
                 curves, _ = self._profiles(found, known)
-        return self._described(found, known, intervals, curves), found
+        result = self._described(found, known, intervals, curves)
+        if isinstance(self.noise, Gaussian):
+            return result, found
+        theta = np.concatenate([least_squares, self.problem.solve(least_squares[np.newaxis])[0][0]])
+        return replace(result, least_squares=self.candidate(theta)), found
 
     def _uncertainty(self, best: _Optimum) -> Uncertainty:
         residual, sigma = self.residual(best.theta)[np.newaxis], np.full((1, 1), best.sigma)
@@ -329,7 +337,7 @@ class _Search:
             noise=self.noise_name,
             sigma=best.sigma,
             log_likelihood=-best.loss,
-            least_squares=self._least_squares(),
+            least_squares=None,
             residual=residual,
             resolution=first.resolution,
             response_stderr=known.output,
@@ -340,13 +348,6 @@ class _Search:
             rivals=rivals,
             seed=self.seed,
         )
-
-    def _least_squares(self) -> Candidate | None:
-        """The optimum of the sum of squares, beside that of another likelihood."""
-        if isinstance(self.noise, Gaussian):
-            return None
-        plain = replace(self, noise=Gaussian(PERFECT * self.scale))
-        return plain.candidate(plain.found()[0].theta)
 
     def _draws(self, best: _Optimum, residual: FloatArray) -> FloatArray:
         """Theta as it could have come out, (n_draws, n_theta)."""

@@ -91,15 +91,26 @@ class Robust:
 
 @dataclass(frozen=True)
 class Quantised:
-    """Normal noise before a sensor that rounds to multiples of `quantum` [unit of y]."""
+    """Normal noise before a sensor that rounds to multiples of `quantum`; sigma is at least `floor` [unit of y].
+
+    The most likely sigma is too small, the more the fewer samples there are for each parameter, and intervals that
+    rest on it are too short. The mean squared residual s^2 on N - d degrees of freedom is not: without the variance of
+    rounding (Sheppard) it leaves sigma^2 = s^2 - quantum^2 / 12.
+    """
 
     quantum: float
+    floor: float = 0.0
+
+    def at_least(self, sum_of_squares: float, freedom: int) -> "Quantised":
+        """With the floor that the least sum of squares on so many degrees of freedom leaves."""
+        variance = sum_of_squares / max(freedom, 1) - self.quantum**2 / 12.0
+        return Quantised(self.quantum, float(np.sqrt(max(variance, 0.0))))
 
     def scale(self, residual: FloatArray, weights: FloatArray) -> FloatArray:
         """By bisection on ln sigma: ln p is concave in 1 / sigma, so that its slope changes sign but once."""
         widest = np.sqrt(np.sum(weights * residual**2, axis=1, keepdims=True) / weights.sum(axis=1, keepdims=True))
-        low = np.full((len(residual), 1), np.log(_FINEST * self.quantum))
-        high = np.log(widest + self.quantum)
+        low = np.full((len(residual), 1), np.log(max(self.floor, _FINEST * self.quantum)))
+        high = np.maximum(np.log(widest + self.quantum), low)
         for _ in range(26):
             middle = 0.5 * (low + high)
             falls = np.sum(weights * self._scale_slope(residual, np.exp(middle)), axis=1, keepdims=True) < 0.0

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from hysim.plot._comparisons import loops, residuals, widths
 from hysim.plot._discoveries import selection
+from hysim.plot._identifications import identification
 from hysim.plot._records import history, loop, response, traces
 from hysim.plot._style import figure, house_style, panels
 from hysim.plot._svg import save_svg, to_svg
@@ -20,6 +21,7 @@ __all__ = [
     "figure",
     "history",
     "house_style",
+    "identification",
     "loop",
     "loops",
     "panels",

@@ -105,14 +105,16 @@ def figure(width: float = WIDTH, height: float = 4.0) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def panels(canvas: Figure, n: int, *, columns: int = 1, sharey: bool = False) -> AxesArray:
+def panels(canvas: Figure, n: int, *, columns: int = 1, sharex: bool = True, sharey: bool = False) -> AxesArray:
     """Add `n` Axes row by row to a figure, over one input axis, and label what they share on the outer ones."""
     rows = math.ceil(n / columns)
     made = np.empty(n, dtype=object)
     for k in range(n):
         first = made[0] if k else None
-        made[k] = canvas.add_subplot(rows, columns, k + 1, sharex=first, sharey=first if sharey else None)
-        if k < (rows - 1) * columns:
+        made[k] = canvas.add_subplot(
+            rows, columns, k + 1, sharex=first if sharex else None, sharey=first if sharey else None
+        )
+        if sharex and k < (rows - 1) * columns:
             made[k].tick_params(labelbottom=columns > 1)
             made[k].xaxis.label.set_visible(False)
         if sharey and k % columns:
@@ -131,7 +133,13 @@ def one(ax: Axes | None, height: float = 4.0) -> Iterator[Axes]:
 
 @contextmanager
 def several(
-    axes: Sequence[Axes] | AxesArray | None, n: int, height: float, *, columns: int = 1, sharey: bool = False
+    axes: Sequence[Axes] | AxesArray | None,
+    n: int,
+    height: float,
+    *,
+    columns: int = 1,
+    sharex: bool = True,
+    sharey: bool = False,
 ) -> Iterator[AxesArray]:
     """The first `n` of the given Axes; or new ones in rows of `height` [in], and the house style meanwhile."""
     if axes is not None:
@@ -144,7 +152,7 @@ def several(
 
     with house_style():
         canvas = plt.figure(figsize=(WIDTH, height * math.ceil(n / columns)), layout="constrained")
-        yield panels(canvas, n, columns=columns, sharey=sharey)
+        yield panels(canvas, n, columns=columns, sharex=sharex, sharey=sharey)
 
 
 def line(k: int) -> dict[str, Any]:
