@@ -22,7 +22,7 @@ import math
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import borrowed, copied, inlined, kernel
+from hysim.kernels._compile import borrowed, inlined, inner, kernel
 from hysim.kernels.charts import N_WORK, in_chart, power_flow, prepare_exponent
 from hysim.kernels.elementary import linear_advance, quadratic_advance
 
@@ -62,7 +62,7 @@ def power_advance(z: float, du: float, A: float, beta: float, gamma: float, n: f
     return along if du > 0.0 else -along
 
 
-@copied
+@inner
 def degenerate(w: float, a: float, c: float, n: float, length: float) -> tuple[float, float]:
     """Change of w, and length left over at w = 0, on w' = a - c w^n where one of the terms has vanished."""
     if a == 0.0 or (c != 0.0 and abs(a) < abs(c)):
@@ -72,7 +72,7 @@ def degenerate(w: float, a: float, c: float, n: float, length: float) -> tuple[f
     return a * length, 0.0
 
 
-@copied
+@inlined
 def advance(z: float, du: float, A: float, beta: float, gamma: float, n: float, work: FloatArray) -> float:
     """Memory after the input has moved monotonically by `du`; `work` comes from `prepare`."""
     if du == 0.0:
@@ -95,7 +95,7 @@ def prepare(A: float, beta: float, gamma: float, n: float, last_n: float, work: 
         prepare_exponent(n, work)
 
 
-@copied
+@inner
 def prepare_side(A: float, c: float, n: float, side: FloatArray) -> None:
     """Fill w*, 1/w* and |A|/w*; they are 0 where one of the terms vanishes, or w* is not a number of this size."""
     side[0] = side[1] = side[2] = 0.0
@@ -209,7 +209,7 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     return float(parameters[5] + polynomial(u, parameters, 6) + parameters[4] * z)
 
 
-@kernel
+@inner
 def polynomial(u: float, coefficients: FloatArray, first: int) -> float:
     """c1 u + c2 u^2 + ..., with c1 at `first`."""
     total = 0.0
