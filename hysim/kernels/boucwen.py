@@ -25,6 +25,7 @@ from hysim._frozen import FloatArray
 from hysim.kernels._compile import borrowed, inlined, inner, kernel
 from hysim.kernels.charts import N_WORK, in_chart, power_flow, prepare_exponent
 from hysim.kernels.elementary import linear_advance, quadratic_advance
+from hysim.kernels.lanes import N_LANES, N_ROWS, fellows, linear_rows
 
 # The first places of a law's workspace: last u and z, for `step`; then w*, 1/w* and |a|/w* loading, and unloading.
 _LOADING, _UNLOADING = 2, 5
@@ -167,14 +168,20 @@ def batch(parameters: FloatArray, output: FloatArray, u: FloatArray, out: FloatA
     columns gain, offset, c1, c2, ...; `u` is (1, n_samples) or (n_sets, n_samples); `out` is
     (n_sets, n_samples). A law that escapes is a row of inf. Neighbours of equal n share their charts.
     """
-    work = np.empty(N_WORK)
-    last_n = 0.0
+    if u.shape[1] == 0:
+        return
+    work, lanes = np.empty(N_WORK), np.empty((N_ROWS, N_LANES))
+    last_n, side_by_side = 0.0, start
     for i in range(start, stop):
         A, beta, gamma, n, z0 = parameters[i]
         row = u[min(i, u.shape[0] - 1)]
-        if row.size == 0:
-            continue
-        if n == 1.0:
+        if n == 1.0 and u.shape[0] == 1:
+            if i >= side_by_side:
+                count = fellows(parameters, i, stop)
+                linear_rows(parameters, i, count, row, lanes, out)
+                side_by_side = i + count
+            escaped = -1 if math.isfinite(out[i, row.size - 1]) else row.size
+        elif n == 1.0:
             escaped = linear_path(A, beta, gamma, row[0], z0, row, out[i])
         elif n == 2.0:
             escaped = quadratic_path(A, beta, gamma, row[0], z0, row, out[i])

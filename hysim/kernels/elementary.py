@@ -27,7 +27,7 @@ def _tangent_series() -> tuple[float, ...]:
 
 _DECAY = tuple((-1.0) ** k / math.factorial(k + 1) for k in range(N_TERMS))  # of (1 - exp(-x)) / x
 _TANGENT = _tangent_series()
-_DECAY_REACH = 0.75  # the terms left out are below 3e-17 here
+DECAY_REACH = 0.75  # the terms left out are below 3e-17 here
 _TANGENT_REACH = 0.2  # and below 5e-18 here
 _LARGEST_EXPONENT = 709.0
 _SMALL = 2.0**-54
@@ -61,15 +61,19 @@ def linear_advance(z: float, du: float, A: float, loading: float, unloading: flo
 def linear_flow(along: float, A: float, k: float, length: float) -> float:
     """Value after `length` on H' = A - k H."""
     x = k * length
+    if abs(x) <= DECAY_REACH:
+        return along * math.exp(-x) if A == 0.0 else short_flow(along, A, k, length)
     slope = A - k * along
-    if abs(x) <= _DECAY_REACH:
-        if A == 0.0:
-            return along * math.exp(-x)
-        return along + slope * (length * sum16(_DECAY, 0, x))
     if x < -_LARGEST_EXPONENT:
         return along if slope == 0.0 else math.copysign(math.inf, slope)
     decay = math.exp(-x)
     return along * decay if A == 0.0 else along + slope * ((1.0 - decay) / k)
+
+
+@inlined
+def short_flow(along: float, A: float, k: float, length: float) -> float:
+    """As `linear_flow`, for |k| length up to DECAY_REACH and A other than 0."""
+    return along + (A - k * along) * (length * sum16(_DECAY, 0, k * length))
 
 
 @inlined
