@@ -78,9 +78,11 @@ def short_flow(along: float, A: float, k: float, length: float) -> float:
 
 @inlined
 def linear_travel(along: float, A: float, k: float) -> float:
-    """Length from H to 0 on H' = A - k H."""
+    """Length from H to 0 on H' = A - k H; H beyond A/k does not get there, unless by rounding."""
     x = k * along / A
-    return -along / A if abs(x) < _SMALL else math.log1p(-x) / k
+    if abs(x) < _SMALL:
+        return -along / A
+    return math.log1p(-x) / k if x < 1.0 else math.inf
 
 
 @inner

@@ -63,7 +63,7 @@ def advance_all(
         is_long = abs(k * length) > DECAY_REACH
         after = short_flow(along, slope, k, 0.0 if is_long else length)
         crosses = ((along > 0.0) & (after < 0.0)) | ((along < 0.0) & (after > 0.0))
-        fails = crosses | is_long | (slope == 0.0)
+        fails = (crosses | is_long | (slope == 0.0)) & (abs(before) < math.inf)
         n_anew += 1 if fails else 0
         anew[j] = before if fails else math.nan
         z[j] = direction * after
