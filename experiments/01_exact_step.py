@@ -4,9 +4,8 @@ One two-tone input, linear between its samples, n = 1, 1.5 and 2. The errors are
 of the closed forms (mpmath), in units of the memory's range; the times are medians over repeats in one run.
 """
 
-import csv
-import json
 import statistics
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -16,7 +15,10 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import hysim as hs
-from hysim.plot import Figure, figure, house_style, save_svg
+from hysim.plot import Figure, figure
+
+sys.path.insert(0, str(Path(__file__).parent))
+from results_folder import write_results
 
 RESULTS = Path(__file__).parent / "results" / "exact_step"
 BETA, GAMMA = 0.6, 0.3
@@ -141,15 +143,7 @@ def main(smoke: bool = False) -> list[dict[str, float | str]]:
 
 def write(rows: list[dict[str, float | str]], n_samples: int) -> None:
     """Table, figure and JSON."""
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    with (RESULTS / "table.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, rows[0].keys(), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-    result = {"samples": n_samples, "beta": BETA, "gamma": GAMMA, "rows": rows}
-    (RESULTS / "result.json").write_text(json.dumps(result, indent=2) + "\n")
-    with house_style():
-        save_svg(draw(rows), RESULTS / "figure.svg", name="exact_step")
+    write_results(RESULTS, rows, draw, {"samples": n_samples, "beta": BETA, "gamma": GAMMA})
 
 
 def draw(rows: list[dict[str, float | str]]) -> Figure:

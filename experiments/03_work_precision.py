@@ -11,7 +11,6 @@ quotients within a turn. Peers come with the extra `bench`; those that cannot be
 grows with samples and with sets is asked in `04_batch.py`.
 """
 
-import csv
 import json
 import sys
 import tempfile
@@ -20,11 +19,12 @@ from pathlib import Path
 
 import numpy as np
 
-from hysim.plot import Figure, figure, house_style, save_svg
+from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
 from peers import driven, oscillator
 from peers.contest import Contestant, Run, in_turns, quartiles
+from results_folder import write_results
 
 RESULTS = Path(__file__).parent / "results" / "work_precision"
 ENOUGH = 1e-6  # the oscillator's error at which methods are compared
@@ -166,16 +166,8 @@ def main(smoke: bool = False) -> list[Row]:
 
 def write(rows: list[Row], asked: list[Ratio], reference: dict[str, float | None]) -> None:
     """Table, figure and JSON."""
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    with (RESULTS / "table.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, rows[0].keys(), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
     problem = {"driven_samples": 20_001, "beta": driven.BETA, "gamma": driven.GAMMA, "oscillator_samples": 751}
-    result = {**problem, "reference": reference, "ratios": asked, "rows": rows}
-    (RESULTS / "result.json").write_text(json.dumps(result, indent=2, allow_nan=False) + "\n")
-    with house_style():
-        save_svg(draw(rows), RESULTS / "figure.svg", name="work_precision")
+    write_results(RESULTS, rows, draw, {**problem, "reference": reference, "ratios": asked})
 
 
 LOOKS = {  # tool: marker, fill, line, colour; each told apart without its colour

@@ -6,9 +6,8 @@ from 1 to 1e6 laws, whose rows are never held together. Times are medians over r
 between the quartiles; beside them that of `np.exp` on as many numbers.
 """
 
-import csv
-import json
 import statistics
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -16,7 +15,10 @@ from pathlib import Path
 import numpy as np
 
 import hysim as hs
-from hysim.plot import Figure, figure, house_style, save_svg
+from hysim.plot import Figure, figure
+
+sys.path.insert(0, str(Path(__file__).parent))
+from results_folder import write_results
 
 RESULTS = Path(__file__).parent / "results" / "batch"
 Row = dict[str, float | str]
@@ -121,20 +123,8 @@ def main(smoke: bool = False) -> list[Row]:
     """Measure, and unless it is a smoke run write table, figure and JSON."""
     rows = throughput(500, 1) + growth(1000, 10, 1) if smoke else throughput(100_000, 7) + growth(10**7, 10**6, 5)
     if not smoke:
-        write(rows)
+        write_results(RESULTS, rows, draw, {"slopes": slopes(rows)})
     return rows
-
-
-def write(rows: list[Row]) -> None:
-    """Table, figure and JSON."""
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    with (RESULTS / "table.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, rows[0].keys(), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-    (RESULTS / "result.json").write_text(json.dumps({"slopes": slopes(rows), "rows": rows}, indent=2) + "\n")
-    with house_style():
-        save_svg(draw(rows), RESULTS / "figure.svg", name="batch")
 
 
 def draw(rows: list[Row]) -> Figure:

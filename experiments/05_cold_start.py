@@ -4,15 +4,16 @@ numba compiles a function when it is first called and keeps the code in a folder
 processor, of one call on 200 samples, without the import of numpy, scipy and numba.
 """
 
-import csv
-import json
 import os
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-from hysim.plot import Figure, figure, house_style, save_svg
+from hysim.plot import Figure, figure
+
+sys.path.insert(0, str(Path(__file__).parent))
+from results_folder import write_results
 
 RESULTS = Path(__file__).parent / "results" / "cold_start"
 Row = dict[str, float | str]
@@ -58,20 +59,8 @@ def main(smoke: bool = False) -> list[Row]:
             row: Row = {"function": name, "empty": first_call(call, cache)}
             rows.append(row | {"full": first_call(call, cache)})
     if not smoke:
-        write(rows)
+        write_results(RESULTS, rows, draw, {})
     return rows
-
-
-def write(rows: list[Row]) -> None:
-    """Table, figure and JSON."""
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    with (RESULTS / "table.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, rows[0].keys(), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-    (RESULTS / "result.json").write_text(json.dumps({"rows": rows}, indent=2) + "\n")
-    with house_style():
-        save_svg(draw(rows), RESULTS / "figure.svg", name="cold_start")
 
 
 def draw(rows: list[Row]) -> Figure:

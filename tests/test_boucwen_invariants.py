@@ -52,6 +52,30 @@ def test_batch_is_the_path_to_the_bit(laws, u, own_inputs):
         assert np.array_equal(rows[k], law.response(inputs[k] if own_inputs else u))
 
 
+@pytest.mark.parametrize("scale", [0.05, 1.0, 30.0, 900.0])
+@pytest.mark.parametrize("n_sets", [1, 63, 64, 200])
+@np.errstate(over="ignore", invalid="ignore")  # an escape, where nothing is compiled
+def test_laws_side_by_side_have_the_bits_of_each_alone(n_sets, scale):
+    """Short and long ways, crossings, samples that repeat, A of either sign and zero, escapes: lanes part and meet."""
+    rng = np.random.default_rng(n_sets)
+    u = scale * np.cumsum(rng.choice([-1.0, -0.3, 0.0, 1e-9, 0.7, 1.0], 60))
+    parameters = {
+        "A": rng.choice([-1.0, 0.0, 0.4, 2.0], n_sets),
+        "beta": rng.uniform(-0.5, 1.5, n_sets),
+        "gamma": rng.uniform(-1.0, 1.0, n_sets),
+        "gain": rng.uniform(-1.0, 1.0, n_sets),
+        "z0": rng.choice([-0.5, 0.0, 0.5], n_sets),
+    }
+    rows = hs.BoucWen.responses(parameters, u, workers=1)
+    for k, row in enumerate(rows):
+        law = hs.BoucWen(**{name: float(values[k]) for name, values in parameters.items()})
+        try:
+            alone = law.response(u)
+        except hs.SimulationError:
+            alone = np.full(u.size, np.inf)
+        assert row.tobytes() == alone.tobytes()
+
+
 @given(bounded_laws(), short_inputs())
 def test_stepping_one_sample_at_a_time_gives_the_same_bits(law, u):
     compiled = law.compiled(u0=u[0])

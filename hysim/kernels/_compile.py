@@ -15,20 +15,22 @@ from numba.extending import intrinsic
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+_NO_ENTRY = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
 
 def kernel(function: F) -> F:
     """Compile `function` at its first call with each combination of argument types."""
     return _compiled(function)
 
 
+def inner(function: F) -> F:
+    """As `kernel`, for a function that only kernels call: it has no entry from Python, which takes long to compile."""
+    return _compiled(function, **_NO_ENTRY)
+
+
 def inlined(function: F) -> F:
-    """Compile a function into each of its callers, which saves the time of a call and costs that of a copy."""
-    return _compiled(function, forceinline=True)
-
-
-def copied(function: F) -> F:
-    """Copy the text of a function into its caller, if there is but one: it is not compiled by itself."""
-    return _compiled(function, inline="always")
+    """As `inner`, compiled into each of its callers, which saves the time of a call and costs that of a copy."""
+    return _compiled(function, forceinline=True, **_NO_ENTRY)
 
 
 def signed_kernel(*signatures: Any) -> Callable[[F], F]:
@@ -38,7 +40,7 @@ def signed_kernel(*signatures: Any) -> Callable[[F], F]:
 
 def signed_inlined(*signatures: Any) -> Callable[[F], F]:
     """As `inlined` for these signatures only; otherwise each constant among the arguments makes one of its own."""
-    return lambda function: _compiled(function, list(signatures), forceinline=True)
+    return lambda function: _compiled(function, list(signatures), forceinline=True, **_NO_ENTRY)
 
 
 def _compiled(function: F, *signature: Any, **others: Any) -> F:

@@ -22,9 +22,10 @@ import math
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import borrowed, copied, inlined, kernel
+from hysim.kernels._compile import borrowed, inlined, inner, kernel
 from hysim.kernels.charts import N_WORK, in_chart, power_flow, prepare_exponent
 from hysim.kernels.elementary import linear_advance, quadratic_advance
+from hysim.kernels.lanes import N_LANES, N_ROWS, fellows, linear_rows
 
 # The first places of a law's workspace: last u and z, for `step`; then w*, 1/w* and |a|/w* loading, and unloading.
 _LOADING, _UNLOADING = 2, 5
@@ -62,7 +63,7 @@ def power_advance(z: float, du: float, A: float, beta: float, gamma: float, n: f
     return along if du > 0.0 else -along
 
 
-@copied
+@inner
 def degenerate(w: float, a: float, c: float, n: float, length: float) -> tuple[float, float]:
     """Change of w, and length left over at w = 0, on w' = a - c w^n where one of the terms has vanished."""
     if a == 0.0 or (c != 0.0 and abs(a) < abs(c)):
@@ -72,7 +73,7 @@ def degenerate(w: float, a: float, c: float, n: float, length: float) -> tuple[f
     return a * length, 0.0
 
 
-@copied
+@inlined
 def advance(z: float, du: float, A: float, beta: float, gamma: float, n: float, work: FloatArray) -> float:
     """Memory after the input has moved monotonically by `du`; `work` comes from `prepare`."""
     if du == 0.0:
@@ -95,7 +96,7 @@ def prepare(A: float, beta: float, gamma: float, n: float, last_n: float, work: 
         prepare_exponent(n, work)
 
 
-@copied
+@inner
 def prepare_side(A: float, c: float, n: float, side: FloatArray) -> None:
     """Fill w*, 1/w* and |A|/w*; they are 0 where one of the terms vanishes, or w* is not a number of this size."""
     side[0] = side[1] = side[2] = 0.0
@@ -167,14 +168,20 @@ def batch(parameters: FloatArray, output: FloatArray, u: FloatArray, out: FloatA
     columns gain, offset, c1, c2, ...; `u` is (1, n_samples) or (n_sets, n_samples); `out` is
     (n_sets, n_samples). A law that escapes is a row of inf. Neighbours of equal n share their charts.
     """
-    work = np.empty(N_WORK)
-    last_n = 0.0
+    if u.shape[1] == 0:
+        return
+    work, lanes = np.empty(N_WORK), np.empty((N_ROWS, N_LANES))
+    last_n, side_by_side = 0.0, start
     for i in range(start, stop):
         A, beta, gamma, n, z0 = parameters[i]
         row = u[min(i, u.shape[0] - 1)]
-        if row.size == 0:
-            continue
-        if n == 1.0:
+        if n == 1.0 and u.shape[0] == 1:
+            if i >= side_by_side:
+                count = fellows(parameters, i, stop)
+                linear_rows(parameters, i, count, row, lanes, out)
+                side_by_side = i + count
+            escaped = -1 if math.isfinite(out[i, row.size - 1]) else row.size
+        elif n == 1.0:
             escaped = linear_path(A, beta, gamma, row[0], z0, row, out[i])
         elif n == 2.0:
             escaped = quadratic_path(A, beta, gamma, row[0], z0, row, out[i])
@@ -209,7 +216,7 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     return float(parameters[5] + polynomial(u, parameters, 6) + parameters[4] * z)
 
 
-@kernel
+@inner
 def polynomial(u: float, coefficients: FloatArray, first: int) -> float:
     """c1 u + c2 u^2 + ..., with c1 at `first`."""
     total = 0.0

@@ -20,7 +20,7 @@ import math
 
 from hysim._frozen import FloatArray
 from hysim.kernels import boucwen
-from hysim.kernels._compile import borrowed, copied, kernel
+from hysim.kernels._compile import borrowed, inner, kernel
 from hysim.kernels.elementary import power
 
 N_HEAD = 8
@@ -36,7 +36,7 @@ _POINTS = 16  # looked at along a stretch that the bound on P'' leaves open
 # ---------------------------------------------------------------------------------- scalar functions
 
 
-@kernel
+@inner
 def derivative(u: float, coefficients: FloatArray) -> float:
     """c1 + 2 c2 u + 3 c3 u^2 + ..."""
     total = 0.0
@@ -45,7 +45,7 @@ def derivative(u: float, coefficients: FloatArray) -> float:
     return total
 
 
-@copied
+@inner
 def curvature_bound(reach: float, coefficients: FloatArray) -> float:
     """The most that |P''| can be for |u| <= `reach`."""
     total = 0.0
@@ -54,7 +54,7 @@ def curvature_bound(reach: float, coefficients: FloatArray) -> float:
     return total
 
 
-@kernel
+@inner
 def memory_slope(z: float, direction: float, parameters: FloatArray) -> float:
     """Slope dz/du for an input that moves in `direction`, times the gain."""
     A, beta, gamma, n, gain = parameters[1], parameters[2], parameters[3], parameters[4], parameters[5]
@@ -62,14 +62,14 @@ def memory_slope(z: float, direction: float, parameters: FloatArray) -> float:
     return float(gain * (A - c * power(abs(z), n)))
 
 
-@kernel
+@inner
 def slope(u: float, z: float, direction: float, parameters: FloatArray) -> float:
     """Slope dy/du for an input that moves in `direction`, counted positive where the output moves with `rising`."""
     coefficients = parameters[N_HEAD : N_HEAD + int(parameters[7])]
     return float(parameters[0] * (derivative(u, coefficients) + memory_slope(z, direction, parameters)))
 
 
-@copied
+@inner
 def rounding(y: float, u: float, z: float, parameters: FloatArray) -> float:
     """What one rounding of the terms of the output at (u, z) amounts to."""
     coefficients = parameters[N_HEAD : N_HEAD + int(parameters[7])]
@@ -77,14 +77,14 @@ def rounding(y: float, u: float, z: float, parameters: FloatArray) -> float:
     return float(_EPSILON * (abs(y) + terms))
 
 
-@copied
+@inner
 def forward(u: float, z: float, target: float, parameters: FloatArray, memory: FloatArray) -> float:
     """Output after the input has moved from `u` to `target`; `memory` is then the law's state there."""
     memory[0], memory[1] = u, z
     return boucwen.step(parameters[N_HEAD + int(parameters[7]) :], memory, target)
 
 
-@kernel
+@inner
 def lowest_slope(u: float, z: float, end: float, z_end: float, direction: float, parameters: FloatArray) -> float:
     """A lower bound of `slope` on the way from (u, z) to (end, z_end), the lowest slope itself if P is linear."""
     coefficients = parameters[N_HEAD : N_HEAD + int(parameters[7])]
@@ -100,7 +100,7 @@ def lowest_slope(u: float, z: float, end: float, z_end: float, direction: float,
     return float(memory + 0.5 * (at_ends - bend))
 
 
-@kernel
+@inner
 def monotone(u: float, z: float, direction: float, parameters: FloatArray, state: FloatArray) -> bool:
     """Whether the slope is positive from (u, z) to where the law's state stands; else the place goes into `state`."""
     memory = state[N_OWN:]
@@ -118,7 +118,7 @@ def monotone(u: float, z: float, direction: float, parameters: FloatArray, state
     return bool(parameters[7] > 1.0)
 
 
-@kernel
+@inner
 def solve(
     u: float, z: float, y: float, direction: float, gap: float, parameters: FloatArray, state: FloatArray
 ) -> bool:

@@ -25,7 +25,7 @@ which ones have been made before.
 import math
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import copied, inlined, kernel
+from hysim.kernels._compile import inlined, inner
 from hysim.kernels.polynomials import N_TERMS, sum8, sum16
 
 _N_CELLS = 64
@@ -55,7 +55,7 @@ N_WORK = _SPARE + 2 * _N_TAYLOR
 # ---------------------------------------------------------------------------------- constants of an exponent
 
 
-@copied
+@inner
 def prepare_exponent(n: float, work: FloatArray) -> None:
     """Fill `work`, shape (N_WORK,), from FREE on with what all charts of an exponent share, and forget its cells."""
     for k in range(8):
@@ -77,7 +77,7 @@ def prepare_exponent(n: float, work: FloatArray) -> None:
         work[_CELLS + i * _CELL + _CENTRE] = 0.0
 
 
-@copied
+@inner
 def zero_back(n: float, v: FloatArray, power: FloatArray) -> None:
     """Fill v_1 to v_8 of w = T (1 + v_1 y + ...), with `power` for the coefficients of v^n."""
     power[0] = 1.0
@@ -89,7 +89,7 @@ def zero_back(n: float, v: FloatArray, power: FloatArray) -> None:
         power[k] = convolution / k
 
 
-@copied
+@inner
 def saturation(n: float, there: FloatArray, back: FloatArray, spare: FloatArray) -> None:
     """Fill both series of the chart of saturation.
 
@@ -118,7 +118,7 @@ def saturation(n: float, there: FloatArray, back: FloatArray, spare: FloatArray)
         bracket[k] = total / k - n / scale * back[k - 1]
 
 
-@copied
+@inner
 def edges(n: float, side: int, bottom: float, top: float, out: FloatArray) -> int:
     """Fill the edges of a line of cells, upwards from `bottom`, for sigma = 1 to `top`; the number of cells."""
     out[0] = bottom
@@ -136,7 +136,7 @@ def edges(n: float, side: int, bottom: float, top: float, out: FloatArray) -> in
     return _N_CELLS
 
 
-@kernel
+@inner
 def distance(w: float, n: float) -> float:
     """Distance from w at which, at sigma = 1, the series about it end: zero, or the nearest root of w^n = 1.
 
@@ -152,7 +152,7 @@ def distance(w: float, n: float) -> float:
 # ---------------------------------------------------------------------------------- moving on the branch
 
 
-@copied
+@inlined
 def in_chart(
     w: float, forwards: bool, side: int, n: float, length: float, work: FloatArray
 ) -> tuple[float, float, float]:
@@ -174,7 +174,7 @@ def in_chart(
     return change, left, w + change
 
 
-@copied
+@inlined
 def near_zero(
     w: float, forwards: bool, side: int, n: float, length: float, work: FloatArray
 ) -> tuple[float, float, float]:
@@ -191,7 +191,7 @@ def near_zero(
     return way + (beyond + target * y * sum8(work, _ZERO_BACK, y)), 0.0, w
 
 
-@copied
+@inlined
 def near_saturation(w: float, forwards: bool, n: float, length: float, work: FloatArray) -> tuple[float, float, float]:
     """As `in_chart` near w = 1 at sigma = 1; only the way backwards has an end."""
     scale = max(n, 1.0)
@@ -210,7 +210,7 @@ def near_saturation(w: float, forwards: bool, n: float, length: float, work: Flo
     return (e - s * sum16(work, _SATURATION_BACK, s)) / scale, 0.0, w
 
 
-@copied
+@inlined
 def along_cells(
     w: float, forwards: bool, side: int, last: int, n: float, length: float, work: FloatArray
 ) -> tuple[float, float, float]:
@@ -239,7 +239,7 @@ def along_cells(
     return (centre - start) + (r * centre - begin * start), 0.0, w
 
 
-@kernel
+@inner
 def find(w: float, forwards: bool, side: int, i: int, work: FloatArray) -> int:
     """The cell from which a way from w begins, sought from the cell `i`."""
     edge = _EDGES + side * (_N_CELLS + 1)
@@ -250,7 +250,7 @@ def find(w: float, forwards: bool, side: int, i: int, work: FloatArray) -> int:
     return i
 
 
-@kernel
+@inner
 def walk(
     i: int, s: float, forwards: bool, side: int, last: int, n: float, work: FloatArray
 ) -> tuple[int, float, float]:
@@ -278,7 +278,7 @@ def visit(i: int, side: int, n: float, work: FloatArray) -> int:
     return cell
 
 
-@kernel
+@inner
 def make_cell(below: float, above: float, side: int, n: float, cell: FloatArray, spare: FloatArray) -> None:
     """Both series about the middle of a cell."""
     centre = 0.5 * (below + above)
@@ -292,7 +292,7 @@ def make_cell(below: float, above: float, side: int, n: float, cell: FloatArray,
     cell[_LENGTH] = (cell[_ABOVE] - cell[_BELOW]) * centre
 
 
-@kernel
+@inner
 def cell_series(x: float, n: float, q: FloatArray, p: FloatArray, slope: FloatArray, power: FloatArray) -> None:
     """q_1 to q_16 of the integral of 1/(1 - x (1 + r)^n), and p_1 to p_16 of r(s) on dr/ds = 1 - x (1 + r)^n.
 
@@ -319,7 +319,7 @@ def cell_series(x: float, n: float, q: FloatArray, p: FloatArray, slope: FloatAr
 # ---------------------------------------------------------------------------------- far from saturation
 
 
-@kernel
+@inner
 def far_step(w: float, forwards: bool, side: int, n: float, length: float, work: FloatArray) -> tuple[float, float]:
     """As `in_chart`, for a step of the flow about w, as long as its series serves."""
     a = 1.0 if forwards else -1.0
@@ -335,7 +335,7 @@ def far_step(w: float, forwards: bool, side: int, n: float, length: float, work:
     return taylor_change(w, power, a, c, n, h, work[_SPARE:]), length - h
 
 
-@kernel
+@inner
 def taylor_change(w: float, power: float, a: float, c: float, n: float, h: float, spare: FloatArray) -> float:
     """Change after `h` on w' = a - c w^n by the Taylor series about w > 0.
 
@@ -357,7 +357,7 @@ def taylor_change(w: float, power: float, a: float, c: float, n: float, h: float
     return float(total)
 
 
-@kernel
+@inner
 def power_flow(w: float, c: float, n: float, length: float) -> float:
     """Flow of w' = -c w^n, for n other than 1."""
     if w == 0.0 or c == 0.0:

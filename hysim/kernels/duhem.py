@@ -25,7 +25,7 @@ import math
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import kernel
+from hysim.kernels._compile import inner, kernel
 
 N_TERMS = 24
 MAX_STEPS = 20_000
@@ -39,7 +39,7 @@ _RETREAT = 2.0**-10  # of a length at which a term overflows
 # ---------------------------------------------------------------------------------- scalar functions
 
 
-@kernel
+@inner
 def expand(f: FloatArray, u: float, h: float, local: FloatArray) -> None:
     """Fill `local`, of the shape of `f`, with the coefficients of f(u + h x, y) in powers of x and y."""
     rows, columns = f.shape
@@ -70,7 +70,7 @@ def coefficient(local: FloatArray, powers: FloatArray, k: int) -> float:
     return total
 
 
-@kernel
+@inner
 def series(local: FloatArray, y: float, h: float, powers: FloatArray) -> int:
     """Fill row 1 of `powers` with the terms of y(x) until they have died out, N_TERMS after the first at most.
 
@@ -90,7 +90,7 @@ def series(local: FloatArray, y: float, h: float, powers: FloatArray) -> int:
     return -1
 
 
-@kernel
+@inner
 def reach(powers: FloatArray, n_last: int) -> float:
     """Fraction of the step at which the last `n_last` terms have died out beside one of the first three."""
     fraction = 1.0
@@ -106,7 +106,7 @@ def reach(powers: FloatArray, n_last: int) -> float:
     return fraction
 
 
-@kernel
+@inner
 def advance(u: float, y: float, du: float, f: FloatArray, bound: float, local: FloatArray, powers: FloatArray) -> float:
     """Output after the input has moved monotonically from `u` by `du` along dy/du = f(u, y).
 

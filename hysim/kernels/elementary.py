@@ -13,7 +13,7 @@ Where H changes its sign, the rest of the way is gone from H = 0 with the other 
 import math
 from fractions import Fraction
 
-from hysim.kernels._compile import copied, kernel
+from hysim.kernels._compile import inlined, inner
 from hysim.kernels.polynomials import N_TERMS, sum16
 
 
@@ -27,13 +27,13 @@ def _tangent_series() -> tuple[float, ...]:
 
 _DECAY = tuple((-1.0) ** k / math.factorial(k + 1) for k in range(N_TERMS))  # of (1 - exp(-x)) / x
 _TANGENT = _tangent_series()
-_DECAY_REACH = 0.75  # the terms left out are below 3e-17 here
+DECAY_REACH = 0.75  # the terms left out are below 3e-17 here
 _TANGENT_REACH = 0.2  # and below 5e-18 here
 _LARGEST_EXPONENT = 709.0
 _SMALL = 2.0**-54
 
 
-@copied
+@inlined
 def power(w: float, n: float) -> float:
     """|w|^n, and its analytic continuation to w < 0 where n is 1 or 2."""
     if n == 1.0:
@@ -43,7 +43,7 @@ def power(w: float, n: float) -> float:
     return float(abs(w) ** n)
 
 
-@kernel
+@inner
 def linear_advance(z: float, du: float, A: float, loading: float, unloading: float) -> float:
     """Memory of n = 1 after the input has moved by `du`; `loading` is beta + gamma, `unloading` beta - gamma."""
     length = abs(du)
@@ -57,29 +57,35 @@ def linear_advance(z: float, du: float, A: float, loading: float, unloading: flo
     return after if du > 0.0 else -after
 
 
-@kernel
+@inner
 def linear_flow(along: float, A: float, k: float, length: float) -> float:
     """Value after `length` on H' = A - k H."""
     x = k * length
+    if abs(x) <= DECAY_REACH:
+        return along * math.exp(-x) if A == 0.0 else short_flow(along, A, k, length)
     slope = A - k * along
-    if abs(x) <= _DECAY_REACH:
-        if A == 0.0:
-            return along * math.exp(-x)
-        return along + slope * (length * sum16(_DECAY, 0, x))
     if x < -_LARGEST_EXPONENT:
         return along if slope == 0.0 else math.copysign(math.inf, slope)
     decay = math.exp(-x)
     return along * decay if A == 0.0 else along + slope * ((1.0 - decay) / k)
 
 
-@copied
+@inlined
+def short_flow(along: float, A: float, k: float, length: float) -> float:
+    """As `linear_flow`, for |k| length up to DECAY_REACH and A other than 0."""
+    return along + (A - k * along) * (length * sum16(_DECAY, 0, k * length))
+
+
+@inlined
 def linear_travel(along: float, A: float, k: float) -> float:
-    """Length from H to 0 on H' = A - k H."""
+    """Length from H to 0 on H' = A - k H; H beyond A/k does not get there, unless by rounding."""
     x = k * along / A
-    return -along / A if abs(x) < _SMALL else math.log1p(-x) / k
+    if abs(x) < _SMALL:
+        return -along / A
+    return math.log1p(-x) / k if x < 1.0 else math.inf
 
 
-@kernel
+@inner
 def quadratic_advance(z: float, du: float, A: float, loading: float, unloading: float) -> float:
     """Memory of n = 2 after the input has moved by `du`, as `linear_advance`."""
     length = abs(du)
@@ -95,7 +101,7 @@ def quadratic_advance(z: float, du: float, A: float, loading: float, unloading: 
     return after if du > 0.0 else -after
 
 
-@kernel
+@inner
 def quadratic_tangent(A: float, k: float, length: float) -> float:
     """tanh(r L) / r, or tan(r L) / r, which is `inf` from its pole on."""
     y = A * k * length * length
@@ -109,7 +115,7 @@ def quadratic_tangent(A: float, k: float, length: float) -> float:
     return math.tan(x) / r if x < 0.5 * math.pi else math.inf
 
 
-@copied
+@inlined
 def quadratic_flow(along: float, A: float, k: float, tangent: float) -> float:
     """Value on H' = A - k H^2 where T is `tangent`, on this side of H = 0."""
     slope = A - k * along * along
@@ -123,7 +129,7 @@ def quadratic_flow(along: float, A: float, k: float, tangent: float) -> float:
     return along + slope * tangent / denominator
 
 
-@copied
+@inlined
 def quadratic_travel(along: float, A: float, k: float) -> float:
     """Length from H to 0 on H' = A - k H^2, the one at which T is -H/A."""
     tangent = -along / A

@@ -29,7 +29,7 @@ import math
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import inlined, kernel
+from hysim.kernels._compile import inlined, inner, kernel
 from hysim.kernels.boucwen import advance, polynomial
 from hysim.kernels.elementary import linear_flow, power
 
@@ -47,14 +47,14 @@ _THIRD, _TWO_THIRDS = 1.0 / 3.0, 2.0 / 3.0
 # ---------------------------------------------------------------------------------- scalar functions
 
 
-@kernel
+@inner
 def spring(y: float, stiffness: float, offset: float, curve: FloatArray) -> float:
     """Force of the part without memory; `curve` holds the coefficients of y^2, y^3, ..."""
     force = offset + stiffness * y
     return force + y * polynomial(y, curve, 0) if curve.size > 0 else force
 
 
-@kernel
+@inner
 def tangent(y: float, stiffness: float, curve: FloatArray) -> float:
     """Derivative of `spring`."""
     total = 0.0
@@ -63,7 +63,7 @@ def tangent(y: float, stiffness: float, curve: FloatArray) -> float:
     return stiffness + total
 
 
-@kernel
+@inner
 def rates(
     force: float, y: float, v: float, z: float, side: float, C: float, plant: Plant, curve: FloatArray
 ) -> tuple[float, float]:
@@ -73,14 +73,14 @@ def rates(
     return acceleration, v * (A - C * power(side * z, n))
 
 
-@kernel
+@inner
 def memory_slope(z: float, v: float, plant: Plant) -> float:
     """dz/dy at z on the way of v."""
     A, beta, gamma, n = plant[5:9]
     return float(A - power(abs(z), n) * (gamma + beta * np.sign(z * v)))
 
 
-@kernel
+@inner
 def relaxed(z: float, dy: float, A: float, beta: float, gamma: float) -> float:
     """`advance` for n = 1 where z keeps its sign: one flow, and no search for the crossing."""
     direction = math.copysign(1.0, dy)
@@ -122,7 +122,7 @@ def dip(v0: float, a0: float, v1: float, a1: float, length: float) -> float:
     return s * length
 
 
-@kernel
+@inner
 def branch(
     state: State, acceleration: float, slope: float, h: float, A: float, beta: float, gamma: float
 ) -> tuple[float, float, float]:
@@ -208,7 +208,7 @@ def attempt(
     return trial, h, side * z >= 0.0 and side * z1 >= 0.0
 
 
-@kernel
+@inner
 def runge_kutta(state: State, F: float, slope: float, h: float, plant: Plant, curve: FloatArray) -> State:
     """The classical method of order 4 over one step, whatever happens inside it."""
     y, v, z = state[:3]
@@ -225,7 +225,7 @@ def runge_kutta(state: State, F: float, slope: float, h: float, plant: Plant, cu
     return y + dy, v + dv, z + dz, state[3] + work, state[4] + plant[1] * damped, state[5] + plant[4] * taken
 
 
-@kernel
+@inner
 def newmark(state: State, F: float, slope: float, h: float, plant: Plant, curve: FloatArray) -> State:
     """Constant average acceleration and the trapezoidal rule for z: Newton's method on (y', z) at the end."""
     mass, damping, stiffness, offset, gain, _, beta, gamma, n, _ = plant
@@ -261,7 +261,7 @@ def newmark(state: State, F: float, slope: float, h: float, plant: Plant, curve:
     )
 
 
-@kernel
+@inner
 def strang(
     state: State, F: float, slope: float, h: float, plant: Plant, curve: FloatArray, flow: FloatArray,
     work: FloatArray,
@@ -381,7 +381,7 @@ def whole_steps(
     return -1
 
 
-@kernel
+@inner
 def unpacked(parameters: FloatArray, state: FloatArray) -> tuple[Plant, State]:
     """Plant and state as tuples."""
     p, x = parameters, state
@@ -389,7 +389,7 @@ def unpacked(parameters: FloatArray, state: FloatArray) -> tuple[Plant, State]:
     return plant, (x[0], x[1], x[2], x[3], x[4], x[5])
 
 
-@kernel
+@inner
 def stored(state: State, row: FloatArray) -> bool:
     """Write the state; whether it is finite."""
     row[0], row[1], row[2], row[3], row[4], row[5] = state
