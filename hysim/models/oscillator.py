@@ -38,6 +38,8 @@ from hysim.models.polynomial_boucwen import PolynomialBoucWen
 METHODS = ("split", "runge-kutta", "newmark", "strang")
 _ANGLE = 0.1  # largest phase of the mode in a default step: errors of 1e-7 of the output on the Noel-Schoukens system
 _CHUNK = 1 << 16
+_SETTLING_CHUNK = 1 << 13
+_MOST_PERIODS = 1000
 
 
 class OscillatorState(NamedTuple):
@@ -154,6 +156,64 @@ class BoucWenOscillator:
             If u is not finite or has not one axis, or the sample time is not positive.
         """
         return self._states(u, sample_time, None, None)[1][:, 0].copy()
+
+    def periodic_response(self, u: npt.ArrayLike, sample_time: float, *, tolerance: float = 1e-10) -> FloatArray:
+        """Displacement in the steady state under an input that repeats itself.
+
+        The period is gone through from the initial state again and again, until a state comes back to what it was
+        one period before; what follows is then as it was, too.
+
+        Parameters
+        ----------
+        u : array, shape (n,) [N, or m/s^2]
+            One period; its last sample is followed by its first.
+        sample_time : float
+            Time between two samples [s].
+        tolerance : float
+            Largest change of a state from period to period, as a share of the largest value met.
+
+        Returns
+        -------
+        array, shape (n,) [m]
+
+        Raises
+        ------
+        SimulationError
+            If the motion leaves the finite numbers, or has not settled within 1000 periods.
+        ValueError
+            As `response`, or if u is empty or the tolerance is not positive.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import hysim as hs
+        >>> plant = hs.benchmarks.noel_schoukens_plant()
+        >>> u = 40 * np.sin(2 * np.pi * np.arange(500) / 500)
+        >>> y = plant.periodic_response(u, 1 / 15000)
+        >>> bool(abs(plant.response(np.tile(u, 100), 1 / 15000)[-500:] - y).max() < 1e-9 * y.max())
+        True
+        """
+        inputs = read_only(u, "u", ndim=1)
+        if not inputs.size:
+            raise ValueError("u must hold one period, got no samples")
+        if not tolerance > 0.0:
+            raise ValueError(f"tolerance must be positive, got {tolerance}")
+        state = self._start(float(inputs[-1]))
+        motion, largest = np.full((inputs.size, 3), np.nan), np.zeros(3)
+        for _ in range(_MOST_PERIODS):
+            for begin in range(0, inputs.size, _SETTLING_CHUNK):
+                piece = slice(begin, begin + _SETTLING_CHUNK)
+                try:
+                    found = self._states(inputs[piece], sample_time, state, None)[1]
+                except SimulationError:
+                    raise SimulationError("the motion leaves the finite numbers before it is steady") from None
+                state = OscillatorState(float(inputs[piece][-1]), *found[-1].tolist())
+                change = np.abs(found[-1, :3] - motion[piece][-1])
+                motion[piece] = found[:, :3]
+                largest = np.maximum(largest, np.abs(found[-1, :3]))
+                if np.all(change <= tolerance * largest):
+                    return motion[:, 0].copy()
+        raise SimulationError(f"the motion has not settled within {_MOST_PERIODS} periods")
 
     def signals(self, u: npt.ArrayLike, sample_time: float) -> dict[str, FloatArray]:
         """Every signal at the samples of `u`, by name.
