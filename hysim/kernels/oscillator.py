@@ -229,9 +229,9 @@ def runge_kutta(state: State, F: float, slope: float, h: float, plant: Plant, cu
 @kernel
 def newmark(state: State, F: float, slope: float, h: float, plant: Plant, curve: FloatArray) -> State:
     """Constant average acceleration and the trapezoidal rule for z: Newton's method on (y', z) at the end."""
-    mass, damping, stiffness, offset, gain, A, beta, gamma, n, _ = plant
+    mass, damping, stiffness, offset, gain, A, beta, gamma, n, mobility = plant
     y, v, z = state[:3]
-    a, _ = rates(F, y, v, z, 1.0, 0.0, plant, curve)
+    a = (F - damping * v - spring(y, stiffness, offset, curve) - gain * z) * mobility
     r = v * memory_slope(z, v, plant)
     end = F + slope * h
     half, inertia = 0.5 * h, 2.0 * mass / h
