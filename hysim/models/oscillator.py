@@ -18,9 +18,9 @@ The last never falls if -beta <= gamma <= beta. With A = 0 the memory stores not
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -34,6 +34,9 @@ from hysim.kernels.charts import N_WORK
 from hysim.models.boucwen import BoucWen
 from hysim.models.model import model
 from hysim.models.polynomial_boucwen import PolynomialBoucWen
+
+if TYPE_CHECKING:
+    from hysim.models.oscillator_structure import OscillatorStructure
 
 METHODS = ("split", "runge-kutta", "newmark", "strang")
 _ANGLE = 0.1  # largest phase of the mode in a default step: errors of 1e-7 of the output on the Noel-Schoukens system
@@ -288,6 +291,77 @@ class BoucWenOscillator:
             "stored": stored,
         }
         return signals, OscillatorState(inputs[-1], *states[-1]) if inputs.size else state or start
+
+    @staticmethod
+    def structure(
+        *,
+        method: str = "split",
+        oversampling: int = 4,
+        decimation: Sequence[int] = (),
+        initial: str = "rest",
+        period: int | None = None,
+        hold: str = "foh",
+        excitation: str = "force",
+    ) -> "OscillatorStructure":
+        """What `hysim.identify` takes: how the record of an oscillator with a Bouc-Wen law was made.
+
+        Its parameters are ``mass, damping, stiffness, A, beta, gamma, n``, all free by default. Under a base's
+        acceleration only the ratios of the first four can be told, and ``mass = 1`` is held.
+
+        Parameters
+        ----------
+        method : str
+            As in the constructor; ``"newmark"`` is that of the Noel-Schoukens benchmark.
+        oversampling : int
+            Steps of the method between two samples of the record.
+        decimation : sequence of int
+            Factors of the filters that brought the output from the rate of the steps to that of the record, one
+            after the other: each a 31-tap Hamming low-pass with the cutoff at half of the new rate, without delay.
+            Empty where the output was sampled without filter; otherwise they multiply to `oversampling`.
+        initial : {"rest", "periodic"}
+            Whether the record begins at rest, or is steady under an input that repeats itself.
+        period : int, optional
+            Samples of a period, with ``initial="periodic"``. Every sample of the record is compared with the one
+            period that is simulated, whose input is the mean of the periods.
+        hold : {"foh", "zoh", "band-limited"}
+            Whether the input between samples is linear, held, or for a periodic one the sum of the lines below
+            half the record's rate.
+        excitation : {"force", "base"}
+            As in the constructor.
+
+        Returns
+        -------
+        OscillatorStructure
+
+        Raises
+        ------
+        ValueError, TypeError
+            If an option is unknown, a number is not whole and positive, or the options do not fit each other.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import hysim as hs
+        >>> law = hs.BoucWen(A=5e4, beta=800.0, gamma=-300.0)
+        >>> plant = hs.BoucWenOscillator(mass=2.0, damping=10.0, stiffness=5e4, law=law)
+        >>> t = np.arange(300) / 750
+        >>> u = 60 * np.sin(2 * np.pi * (20 + 40 * t) * t)
+        >>> rec = hs.Record(u=u, y=hs.simulate(plant, t, u).y, t=t)
+        >>> fit = hs.identify(hs.BoucWenOscillator.structure(), rec, fixed={"n": 1.0})
+        >>> round(fit.estimates["mass"], 4), round(fit.estimates["gamma"], 1)
+        (2.0, -300.0)
+        """
+        from hysim.models.oscillator_structure import OscillatorStructure
+
+        return OscillatorStructure(
+            method=method,
+            oversampling=oversampling,
+            decimation=tuple(decimation),
+            initial=initial,
+            period=period,
+            hold=hold,
+            excitation=excitation,
+        )
 
     @property
     def _coefficients(self) -> tuple[float, ...]:
