@@ -194,7 +194,7 @@ def test_a_record_that_cannot_be_identified_is_refused(rec, given, message):
 
 
 def test_a_force_taken_for_an_acceleration_is_refused():
-    with pytest.raises(ValueError, match="not that of a mass on springs: .*check the sign of u and y"):
+    with pytest.raises(ValueError, match=r"not that of a mass on springs: .*check the sign of u and y"):
         hs.identify(structure(excitation="base"), from_rest())
 
 
