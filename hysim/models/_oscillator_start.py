@@ -11,7 +11,8 @@ the same equation without w, D its last result. A periodic record is averaged ov
 spectrum, another in time from rest. What is left to search is (b, g, n), which costs no simulation of the plant.
 """
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,7 @@ from hysim.models.search_space import SearchSpace
 
 _ROUNDS = 20  # of the linear fit: it settles in five to ten
 _DAMPING = (1e-3, 2.0)  # damping ratio of D
+_FREQUENCIES = 8  # tried where no linear plant is near
 _SCREENED = 256
 _IMPROVED = 3  # of the screened points
 _APART, _SAME = 0.1, 0.03  # distances in units of the box: of points to be improved, and of what becomes of them
@@ -52,51 +54,79 @@ Filter = Callable[[FloatArray, int], FloatArray]
 """Signals (..., n_samples) and a power k to s^k / D(s) of them, shape (..., n_compared)."""
 
 
-def linear_plant(motion: Motion) -> Linear:
-    """Mass, damping and stiffness of the linear plant nearest to the record.
+def start(motion: Motion, laws: SearchSpace, wanted: int) -> tuple[Linear, list[dict[str, float]]]:
+    """The nearest linear plant, and the best sets of mass, damping, stiffness, A, beta, gamma, n.
+
+    `laws` is the box of the laws with A = 1 along `motion.y`. A law that yields and drifts may be near no linear
+    plant; the one of small motions, found with filters of several frequencies, then stands in for it.
 
     Raises
     ------
     ValueError
         If no plant with a positive mass and stiffness is near.
     """
+    plant = _linear_plant(motion)
+    if plant is not None:
+        return plant, [found for _, found in _starts(motion, plant, laws, wanted)]
+    frequencies = np.geomspace(4.0 / motion.y.size, 1.0, _FREQUENCIES) / motion.sample_time
+    tried = [each for w in frequencies for each in _starts(motion, Linear(1.0, 0.2 * w, w**2), laws, 1)]
+    if not tried:
+        raise ValueError(
+            "the record is not that of a mass on springs: no plant with a positive mass is near; check the sign of u "
+            "and y, the time, and excitation="
+        )
+    best = min(tried, key=lambda each: each[0])[1]
+    plant = _checked(best["mass"], best["damping"], best["stiffness"] + best["A"])
+    return plant, [found for _, found in _starts(motion, plant, laws, wanted)] or [best]
+
+
+def _linear_plant(motion: Motion) -> Linear | None:
+    """The linear plant nearest to the record; None if its mass or stiffness is not positive."""
     frequency = _resonance(motion)
     plant = Linear(1.0, 0.2 * frequency, frequency**2)
     for _ in range(_ROUNDS):
         filtered = _filter(motion, plant)
         columns = np.stack([filtered(motion.y, power) for power in (2, 1, 0)], axis=1)
-        size = np.linalg.norm(columns, axis=0)
-        mass, damping, stiffness = np.linalg.lstsq(columns / size, filtered(motion.force, 0), rcond=None)[0] / size
+        mass, damping, stiffness = _regression(columns, filtered(motion.force, 0))
         if not (mass > 0.0 and stiffness > 0.0):
-            raise ValueError(
-                "the record is not that of a mass on springs: the nearest linear plant has the mass "
-                f"{mass:.3g} and the stiffness {stiffness:.3g}; check the sign of u and y, the time, and excitation="
-            )
-        critical = 2.0 * np.sqrt(mass * stiffness)
-        plant = Linear(mass, float(np.clip(damping, _DAMPING[0] * critical, _DAMPING[1] * critical)), stiffness)
+            return None
+        plant = _checked(mass, damping, stiffness)
     return plant
 
 
-def starts(motion: Motion, plant: Linear, laws: SearchSpace, wanted: int) -> list[dict[str, float]]:
-    """The best sets of mass, damping, stiffness, A, beta, gamma, n, in the order of the equation's error.
+def _checked(mass: float, damping: float, stiffness: float) -> Linear:
+    """The plant with a damping ratio that a filter can have."""
+    critical = 2.0 * math.sqrt(mass * stiffness)
+    return Linear(mass, min(max(damping, _DAMPING[0] * critical), _DAMPING[1] * critical), stiffness)
 
-    `laws` is the box of the laws with A = 1 along `motion.y`.
-    """
+
+def _regression(columns: FloatArray, target: FloatArray) -> list[float]:
+    size = np.linalg.norm(columns, axis=0)
+    solution: list[float] = (np.linalg.lstsq(columns / size, target, rcond=None)[0] / size).tolist()
+    return solution
+
+
+def _starts(motion: Motion, plant: Linear, laws: SearchSpace, wanted: int) -> list[tuple[float, dict[str, float]]]:
+    """The best sets with the share of the force that each leaves unexplained, in the order of these."""
     from scipy.optimize import minimize
 
     equation = _Equation(motion, plant, laws)
 
     def error(x: FloatArray) -> float:
-        return float(equation.errors(np.clip(x, laws.lower, laws.upper)[np.newaxis])[0] / equation.scale)
+        return float(equation.errors(np.clip(x, laws.lower, laws.upper)[np.newaxis])[0])
 
     points = np.concatenate([laws.starts, _spread(laws)])
     chosen = _apart(laws, points, equation.errors(points), _APART)[:_IMPROVED]
-    options = {"xatol": 3e-3, "fatol": 1e-5, "maxfev": 100}
+    options = {"xatol": 3e-3, "fatol": 1e-5 * equation.linear_error, "maxfev": 100}
     reached = [minimize(error, points[k], method="Nelder-Mead", options=options) for k in chosen]
     ends = np.clip([each.x for each in reached], laws.lower, laws.upper).reshape(-1, laws.lower.size)
-    best = ends[_apart(laws, ends, np.array([each.fun for each in reached]), _SAME)]
-    sets = [equation.parameters(x) for x in best]
-    return [each for each in sets if each["A"] > 0.0 and each["mass"] > 0.0][:wanted]
+    errors = np.array([each.fun for each in reached])
+    sets = [(float(errors[k]), equation.parameters(ends[k])) for k in _apart(laws, ends, errors, _SAME)]
+    return [each for each in sets if _is_a_plant(each[1])][:wanted]
+
+
+def _is_a_plant(values: Mapping[str, float]) -> bool:
+    return values["mass"] > 0.0 and values["A"] > 0.0 and values["stiffness"] + values["A"] > 0.0
 
 
 class _Equation:
@@ -109,7 +139,8 @@ class _Equation:
         self.basis = np.linalg.qr(self.known)[0]
         self.target = self.filtered(motion.force, 0)
         self.left = self.target - self.basis @ (self.basis.T @ self.target)
-        self.scale = float(self.left @ self.left) or 1.0
+        self.size = float(self.target @ self.target)
+        self.linear_error = float(self.left @ self.left) / self.size or 1.0
 
     def memories(self, x: FloatArray) -> FloatArray:
         """Filtered memories (n_sets, n_compared) of the laws at the coordinates x."""
@@ -129,18 +160,17 @@ class _Equation:
             return self.filtered(w, 0)
 
     def errors(self, x: FloatArray) -> FloatArray:
-        """Sum of squares (n_sets,) that the best mass, damping, stiffness and A leave of the equation."""
+        """Share of the force's sum of squares that the best mass, damping, stiffness and A leave, (n_sets,)."""
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             w = self.memories(x)
             w = w - (w @ self.basis) @ self.basis.T
-            errors = self.scale - (w @ self.left) ** 2 / np.sum(w**2, axis=1)
+            errors = self.linear_error - (w @ self.left) ** 2 / np.sum(w**2, axis=1) / self.size
         return np.where(np.isfinite(errors), errors, np.inf)
 
     def parameters(self, x: FloatArray) -> dict[str, float]:
         """The user's parameters at one point (n_x,)."""
         columns = np.column_stack([self.known, self.memories(x[np.newaxis])[0]])
-        size = np.linalg.norm(columns, axis=0)
-        mass, damping, stiffness, A = (np.linalg.lstsq(columns / size, self.target, rcond=None)[0] / size).tolist()
+        mass, damping, stiffness, A = _regression(columns, self.target)
         law = {name: float(value[0]) for name, value in self.laws.parameters(x[np.newaxis]).items()}
         unit = abs(A) ** (1.0 - law["n"]) if A else 1.0  # z = A w
         shape = {"beta": law["beta"] * unit, "gamma": law["gamma"] * unit, "n": law["n"]}

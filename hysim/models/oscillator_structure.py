@@ -18,7 +18,7 @@ from hysim._frozen import FloatArray, checked
 from hysim._parallel import in_chunks
 from hysim.errors import SimulationError
 from hysim.models import _boucwen_search
-from hysim.models._oscillator_start import Linear, Motion, linear_plant, starts
+from hysim.models._oscillator_start import Linear, Motion, start
 from hysim.models.boucwen import BoucWen
 from hysim.models.oscillator import METHODS, BoucWenOscillator
 from hysim.models.resampling import HALF_FILTER, decimated, interpolated
@@ -90,8 +90,8 @@ class OscillatorStructure:
         redundant = (_SCALED,) if self.excitation == "base" else ()
         held = freedom.held(dict.fromkeys(NAMES, 1.0), redundant=redundant)
         limits = freedom.limits(dict.fromkeys(NAMES, 1.0), held)
-        linear = linear_plant(motion)
-        found = starts(motion, linear, _unit_laws(motion.y, held, limits), _STARTS) or [_without_memory(linear)]
+        linear, found = start(motion, _unit_laws(motion.y, held, limits), _STARTS)
+        found = found or [_without_memory(linear)]
         factor = _factor(found[0], held) if redundant else 1.0
         found, linear = [_scaled(each, factor) for each in found], Linear(*(factor * value for value in linear))
         box = _Box(held, _limits(linear, held, limits), Record(u=motion.y, y=linear.stiffness * motion.y))
