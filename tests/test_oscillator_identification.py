@@ -94,6 +94,19 @@ def test_where_a_base_shakes_the_mass_is_held_and_the_ratios_come_back():
     assert fit.estimates["beta"] == pytest.approx(800.0, rel=1e-6)
 
 
+@needs_compiled
+def test_a_spring_that_yields_and_drifts_is_near_no_linear_plant_and_yet_found():
+    """Yield at 10 mm, motions of 40 mm rms; the linear plant would have a negative mass."""
+    law = hs.BoucWen(A=9e4, beta=60.0, gamma=40.0)
+    yielding = hs.BoucWenOscillator(mass=2.0, damping=10.0, stiffness=8e3, law=law, substeps=4)
+    white = np.random.default_rng(0).standard_normal(304)
+    u = 1500.0 * np.convolve(white, np.ones(5) / 5.0, mode="valid")
+    t = 3.0 * STEP * np.arange(300)
+    fit = hs.identify(structure(), hs.Record(u=u, y=yielding.response(u, t[1]), t=t), fixed={"n": 1.0})
+    for name, value in {"mass": 2.0, "damping": 10.0, "stiffness": 8e3, "A": 9e4, "beta": 60.0, "gamma": 40.0}.items():
+        assert fit.estimates[name] == pytest.approx(value, rel=1e-6)
+
+
 def test_fixed_parameters_stay_and_bounds_hold():
     rec, free = from_rest(), Freedom(fixed={"mass": 2.0, "n": 1.0}, bounds={"A": (1e4, 4e4), "damping": (0.0, np.inf)})
     space = structure().search_space(rec, free)

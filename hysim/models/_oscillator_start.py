@@ -55,29 +55,39 @@ Filter = Callable[[FloatArray, int], FloatArray]
 
 
 def start(motion: Motion, laws: SearchSpace, wanted: int) -> tuple[Linear, list[dict[str, float]]]:
-    """The nearest linear plant, and the best sets of mass, damping, stiffness, A, beta, gamma, n.
+    """The plant of small motions, and the best sets of mass, damping, stiffness, A, beta, gamma, n.
 
-    `laws` is the box of the laws with A = 1 along `motion.y`. A law that yields and drifts may be near no linear
-    plant; the one of small motions, found with filters of several frequencies, then stands in for it.
+    `laws` is the box of the laws with A = 1 along `motion.y`. Where no law is found the plant is the nearest linear
+    one. A law that yields and drifts may be near no linear plant: filters of several frequencies are tried then.
 
     Raises
     ------
     ValueError
         If no plant with a positive mass and stiffness is near.
     """
-    plant = _linear_plant(motion)
-    if plant is not None:
-        return plant, [found for _, found in _starts(motion, plant, laws, wanted)]
-    frequencies = np.geomspace(4.0 / motion.y.size, 1.0, _FREQUENCIES) / motion.sample_time
-    tried = [each for w in frequencies for each in _starts(motion, Linear(1.0, 0.2 * w, w**2), laws, 1)]
-    if not tried:
+    nearest = _linear_plant(motion)
+    found = _starts(motion, nearest, laws, wanted) if nearest else _starts_from_afar(motion, laws, wanted)
+    sets = [each for _, each in found]
+    if sets:
+        return _small_motions(sets[0]), sets
+    if nearest is None:
         raise ValueError(
             "the record is not that of a mass on springs: no plant with a positive mass is near; check the sign of u "
             "and y, the time, and excitation="
         )
-    best = min(tried, key=lambda each: each[0])[1]
-    plant = _checked(best["mass"], best["damping"], best["stiffness"] + best["A"])
-    return plant, [found for _, found in _starts(motion, plant, laws, wanted)] or [best]
+    return nearest, sets
+
+
+def _starts_from_afar(motion: Motion, laws: SearchSpace, wanted: int) -> list[tuple[float, dict[str, float]]]:
+    """As `_starts`, with the filter that the best set asks for which is found with any filter."""
+    frequencies = np.geomspace(4.0 / motion.y.size, 1.0, _FREQUENCIES) / motion.sample_time
+    tried = [each for w in frequencies for each in _starts(motion, Linear(1.0, 0.2 * w, w**2), laws, 1)]
+    best = sorted(tried, key=lambda each: each[0])[:1]
+    return [again for _, each in best for again in _starts(motion, _small_motions(each), laws, wanted)] or best
+
+
+def _small_motions(values: Mapping[str, float]) -> Linear:
+    return _checked(values["mass"], values["damping"], values["stiffness"] + values["A"])
 
 
 def _linear_plant(motion: Motion) -> Linear | None:

@@ -38,9 +38,9 @@ _REPEATS = 0.1  # share of the input's rms by which a period may differ from the
 class OscillatorStructure:
     """An oscillator to be identified; see `BoucWenOscillator.structure`.
 
-    The box reaches from a tenth of the mass of the nearest linear plant to ten times that mass, from no damping to
-    twice the critical one, and to ten times its stiffness for both springs; that of the law is the one of
-    `hysim.BoucWen`, with the displacement as its input and A not negative.
+    The box reaches from a tenth of the mass that the search begins with to ten times that mass, from no damping to
+    twice the critical one, and to ten times the stiffness of small motions for both springs; that of the law is the
+    one of `hysim.BoucWen`, with the displacement as its input and A not negative.
     """
 
     method: str = "split"
@@ -76,7 +76,7 @@ class OscillatorStructure:
             raise ValueError('hold="band-limited" needs initial="periodic": an input is interpolated by its spectrum')
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box around the nearest linear plant, and where the equation of motion says to begin.
+        """The box around the plant of small motions, and where the equation of motion says to begin.
 
         Raises
         ------
@@ -190,7 +190,7 @@ class _Box(NamedTuple):
 
     held: Mapping[str, float]
     limits: Mapping[str, tuple[float, float]]
-    spring: Record  # displacement and force of the linear plant's spring, which scale the law
+    spring: Record  # displacement and force of a linear spring, which scale the law
 
     @property
     def plant(self) -> tuple[str, ...]:
