@@ -61,8 +61,40 @@ def ratios() -> str:
     return "\n".join(["| | error | ratio |", "|---|---|---|", *lines])
 
 
+def benchmark() -> str:
+    """Test errors of the published methods and of hysim, from `benchmark_bouc_wen`, as a table."""
+    result = json.loads((RESULTS / "benchmark_bouc_wen" / "result.json").read_text())
+    lines = [
+        f"| {row['method']} | {row['multisine']:.2e} | {format(row['sweep'], '.2e') if 'sweep' in row else ''} | "
+        f"{format(row['seconds'], '.1f') if 'seconds' in row else ''} |"
+        for row in [*result["published"], *result["summary"]]
+    ]
+    return "\n".join(["| | multisine [m] | sweep [m] | time [s] |", "|---|---|---|---|", *lines])
+
+
+def benchmark_errors() -> str:
+    """Errors of the parameters in percent, beside those of the published white-box fit, as a table."""
+    result = json.loads((RESULTS / "benchmark_bouc_wen" / "result.json").read_text())
+    asked, published = result["asked"]["error_percent"], result["white_box"]["error_percent"]
+    lines = []
+    for name in asked:
+        own = [f"{row[f'{name}_error_percent']:.3f} ({row[f'{name}_stderr_percent']:.3f})" for row in result["summary"]]
+        lines.append(f"| {name} | {' | '.join(own)} | {published[name]:g} |")
+    heads = [row["method"] for row in result["summary"]]
+    first = f"| error (standard error) [%] | {' | '.join(heads)} | {result['white_box']['method']} |"
+    return "\n".join([first, "|---" * (len(heads) + 2) + "|", *lines])
+
+
 myst_substitutions = {
     "ratios": ratios(),
+    "benchmark": benchmark(),
+    "benchmark_errors": benchmark_errors(),
+    "benchmark_figure": shown(
+        {
+            "benchmark_bouc_wen": "Root mean square error on the clean test data "
+            "(`experiments/results/benchmark_bouc_wen`)."
+        }
+    ),
     "accuracy_against_cost": shown(
         {
             "work_precision": "Error against time, of hysim and of the tools that people use, measured in one run "

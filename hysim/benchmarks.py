@@ -19,14 +19,15 @@ An exact integration at 15 kHz differs from it by 1e-7 m (multisine) and 2e-6 m 
 
 import math
 import operator
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import firwin
 
 from hysim._frozen import FloatArray, read_only
 from hysim.models.boucwen import BoucWen
 from hysim.models.oscillator import BoucWenOscillator
+from hysim.models.resampling import decimated, interpolated
 from hysim.records import Record
 
 SAMPLE_RATE = 750.0
@@ -38,7 +39,6 @@ LINES.setflags(write=False)
 _OVERSAMPLING = 20
 _STAGES = {"multisine": (2, 2, 5), "sweep": (20,)}
 _LEVELS = {"multisine": 50.0, "sweep": 40.0}
-_HALF_FILTER = 15
 _UNITS = {"t": "s", "u": "N", "y": "m"}
 
 
@@ -130,14 +130,16 @@ def noel_schoukens(
     kept = slice(lead, lead + n_samples)
     return Record(
         u=force[::_OVERSAMPLING][kept],
-        y=_decimated(y, kind)[kept],
+        y=decimated(y, _STAGES[kind])[kept],
         t=np.arange(n_samples) / SAMPLE_RATE,
         units=_UNITS,
         name=f"Noel-Schoukens {kind}",
     )
 
 
-def simulate_official(u: npt.ArrayLike, *, kind: str = "multisine") -> FloatArray:
+def simulate_official(
+    u: npt.ArrayLike, *, kind: str = "multisine", plant: BoucWenOscillator | None = None
+) -> FloatArray:
     """Output that the benchmark publishes for one of its inputs, to 1e-12 m.
 
     Parameters
@@ -147,6 +149,9 @@ def simulate_official(u: npt.ArrayLike, *, kind: str = "multisine") -> FloatArra
     kind : {"multisine", "sweep"}
         The multisine is taken as periodic: of three periods from rest the second is kept. The sweep is taken
         from its formula, which its published samples meet to 1e-10.
+    plant : BoucWenOscillator, optional
+        Another plant, such as an identified one, to be simulated by the same recipe: its own method and number
+        of steps are not looked at.
 
     Returns
     -------
@@ -179,9 +184,10 @@ def simulate_official(u: npt.ArrayLike, *, kind: str = "multisine") -> FloatArra
     else:
         if inputs.size < 32 or inputs.size % 2:
             raise ValueError(f"u must hold one period, an even number of samples from 32 on, got {inputs.size}")
-        force, begin = np.tile(_interpolated(inputs), 3), inputs.size
-    y = noel_schoukens_plant().response(force, 1.0 / (SAMPLE_RATE * _OVERSAMPLING))
-    return _decimated(y, kind)[begin : begin + inputs.size]
+        force, begin = np.tile(interpolated(inputs, _OVERSAMPLING), 3), inputs.size
+    recipe = replace(plant or noel_schoukens_plant(), method="newmark", substeps=1)
+    y = recipe.response(force, 1.0 / (SAMPLE_RATE * _OVERSAMPLING))
+    return decimated(y, _STAGES[kind])[begin : begin + inputs.size]
 
 
 def _check_kind(kind: str) -> None:
@@ -203,28 +209,8 @@ def _unit_sweep(n_samples: int) -> FloatArray:
     return np.asarray(np.sin(2.0 * np.pi * (18.0 * t + t**2 / 12.0)))
 
 
-def _interpolated(period: FloatArray) -> FloatArray:
-    """One period at 20 times the rate; the line at half the old rate is shared by both of its signs."""
-    spectrum = np.fft.rfft(period)
-    spectrum[-1] *= 0.5
-    return np.asarray(np.fft.irfft(spectrum, _OVERSAMPLING * period.size) * _OVERSAMPLING)
-
-
 def _band_limited_noise(n_samples: int, rng: np.random.Generator) -> FloatArray:
     """Noise at 15 kHz, white to 375 Hz, root mean square 1, independent from period to period."""
     length = PERIOD if n_samples % (_OVERSAMPLING * PERIOD) == 0 else n_samples // _OVERSAMPLING
     blocks = rng.standard_normal((n_samples // (_OVERSAMPLING * length), length))
-    return np.concatenate([_interpolated(block) for block in blocks])
-
-
-def _decimated(y: FloatArray, kind: str) -> FloatArray:
-    for factor in _STAGES[kind]:
-        y = _filtered(y, factor)[::factor]
-    return y
-
-
-def _filtered(y: FloatArray, factor: int) -> FloatArray:
-    """Low-pass with cutoff 1/factor of the half rate, without delay, ends continued by point reflection."""
-    taps = firwin(2 * _HALF_FILTER + 1, 1.0 / factor)
-    before, after = 2.0 * y[0] - y[_HALF_FILTER:0:-1], 2.0 * y[-1] - y[-2 : -2 - _HALF_FILTER : -1]
-    return np.asarray(np.convolve(np.concatenate([before, y, after]), taps, mode="valid"))
+    return np.concatenate([interpolated(block, _OVERSAMPLING) for block in blocks])

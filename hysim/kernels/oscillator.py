@@ -40,7 +40,8 @@ _REVERSAL = 1.0e-6  # share of the change of y' in a step by which its end may l
 _CROSSING = 1.0e-3  # likewise of z and a crossing
 _MOST_TRIALS, _MOST_PIECES = 60, 1000  # of one piece between events, of pieces in a step
 _DISAGREEMENT = 1.0e-3  # share of z by which the method and the law may differ on it at the end of a piece
-_ROUNDING, _TINY = 2.0**-50, 1.0e-290
+_CONVERGED = 1.0e-9  # share by which Newton's method moves when the next move would be below rounding
+_TINY = 1.0e-290
 _THIRD, _TWO_THIRDS = 1.0 / 3.0, 2.0 / 3.0
 
 
@@ -228,26 +229,28 @@ def runge_kutta(state: State, F: float, slope: float, h: float, plant: Plant, cu
 @inner
 def newmark(state: State, F: float, slope: float, h: float, plant: Plant, curve: FloatArray) -> State:
     """Constant average acceleration and the trapezoidal rule for z: Newton's method on (y', z) at the end."""
-    mass, damping, stiffness, offset, gain, _, beta, gamma, n, _ = plant
+    mass, damping, stiffness, offset, gain, A, beta, gamma, n, mobility = plant
     y, v, z = state[:3]
-    a, _ = rates(F, y, v, z, 1.0, 0.0, plant, curve)
+    a = (F - damping * v - spring(y, stiffness, offset, curve) - gain * z) * mobility
     r = v * memory_slope(z, v, plant)
     end = F + slope * h
+    half, inertia = 0.5 * h, 2.0 * mass / h
     v1, z1 = v + h * a, z + h * r
     last = math.inf
     for _ in range(50):
-        y1 = y + 0.5 * h * (v + v1)
-        S = memory_slope(z1, v1, plant)
-        imbalance = mass * (2.0 * (v1 - v) / h - a) + damping * v1 + spring(y1, stiffness, offset, curve) + gain * z1
-        excess = z1 - z - 0.5 * h * (r + v1 * S)
-        bend = n * abs(z1) ** (n - 1.0) * (gamma * np.sign(z1) + beta * np.sign(v1)) if z1 != 0.0 else 0.0
-        J11 = 2.0 * mass / h + damping + 0.5 * h * tangent(y1, stiffness, curve)
-        J21, J22 = -0.5 * h * S, 1.0 + 0.5 * h * v1 * bend
+        y1 = y + half * (v + v1)
+        sharp = 1.0 if n == 1.0 else abs(z1) ** (n - 1.0) if z1 != 0.0 else 0.0
+        turn = gamma * math.copysign(1.0, z1) + beta * math.copysign(1.0, v1)  # C sign(z)
+        S = A - sharp * z1 * turn
+        imbalance = inertia * (v1 - v) - mass * a + damping * v1 + spring(y1, stiffness, offset, curve) + gain * z1
+        excess = z1 - z - half * (r + v1 * S)
+        J11 = inertia + damping + half * tangent(y1, stiffness, curve)
+        J21, J22 = -half * S, 1.0 + half * v1 * n * sharp * turn
         dv = (gain * excess - (imbalance - end) * J22) / (J11 * J22 - gain * J21)
         dz = -(excess + J21 * dv) / J22
         v1, z1 = v1 + dv, z1 + dz
-        moved = abs(dv) / (abs(v) + abs(v1) + _TINY) + abs(dz) / (abs(z) + abs(z1) + _TINY)
-        if moved < _ROUNDING or not moved < last:
+        moved = max(abs(dv) / (abs(v) + abs(v1) + _TINY), abs(dz) / (abs(z) + abs(z1) + _TINY))
+        if moved < _CONVERGED or not moved < last:
             break
         last = moved if moved < 1.0e-6 else math.inf
     dy = 0.5 * h * (v + v1)

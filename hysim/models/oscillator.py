@@ -18,9 +18,9 @@ The last never falls if -beta <= gamma <= beta. With A = 0 the memory stores not
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -35,9 +35,14 @@ from hysim.models.boucwen import BoucWen
 from hysim.models.model import model
 from hysim.models.polynomial_boucwen import PolynomialBoucWen
 
+if TYPE_CHECKING:
+    from hysim.models.oscillator_structure import OscillatorStructure
+
 METHODS = ("split", "runge-kutta", "newmark", "strang")
 _ANGLE = 0.1  # largest phase of the mode in a default step: errors of 1e-7 of the output on the Noel-Schoukens system
 _CHUNK = 1 << 16
+_SETTLING_CHUNK = 1 << 13
+_MOST_PERIODS = 1000
 
 
 class OscillatorState(NamedTuple):
@@ -155,6 +160,64 @@ class BoucWenOscillator:
         """
         return self._states(u, sample_time, None, None)[1][:, 0].copy()
 
+    def periodic_response(self, u: npt.ArrayLike, sample_time: float, *, tolerance: float = 1e-10) -> FloatArray:
+        """Displacement in the steady state under an input that repeats itself.
+
+        The period is gone through from the initial state again and again, until a state comes back to what it was
+        one period before; what follows is then as it was, too.
+
+        Parameters
+        ----------
+        u : array, shape (n,) [N, or m/s^2]
+            One period; its last sample is followed by its first.
+        sample_time : float
+            Time between two samples [s].
+        tolerance : float
+            Largest change of a state from period to period, as a share of the largest value met.
+
+        Returns
+        -------
+        array, shape (n,) [m]
+
+        Raises
+        ------
+        SimulationError
+            If the motion leaves the finite numbers, or has not settled within 1000 periods.
+        ValueError
+            As `response`, or if u is empty or the tolerance is not positive.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import hysim as hs
+        >>> plant = hs.benchmarks.noel_schoukens_plant()
+        >>> u = 40 * np.sin(2 * np.pi * np.arange(500) / 500)
+        >>> y = plant.periodic_response(u, 1 / 15000)
+        >>> bool(abs(plant.response(np.tile(u, 100), 1 / 15000)[-500:] - y).max() < 1e-9 * y.max())
+        True
+        """
+        inputs = read_only(u, "u", ndim=1)
+        if not inputs.size:
+            raise ValueError("u must hold one period, got no samples")
+        if not tolerance > 0.0:
+            raise ValueError(f"tolerance must be positive, got {tolerance}")
+        state = self._start(float(inputs[-1]))
+        motion, largest = np.full((inputs.size, 3), np.nan), np.zeros(3)
+        for _ in range(_MOST_PERIODS):
+            for begin in range(0, inputs.size, _SETTLING_CHUNK):
+                piece = slice(begin, begin + _SETTLING_CHUNK)
+                try:
+                    found = self._states(inputs[piece], sample_time, state, None)[1]
+                except SimulationError:
+                    raise SimulationError("the motion leaves the finite numbers before it is steady") from None
+                state = OscillatorState(float(inputs[piece][-1]), *found[-1].tolist())
+                change = np.abs(found[-1, :3] - motion[piece][-1])
+                motion[piece] = found[:, :3]
+                largest = np.maximum(largest, np.abs(found[-1, :3]))
+                if np.all(change <= tolerance * largest):
+                    return motion[:, 0].copy()
+        raise SimulationError(f"the motion has not settled within {_MOST_PERIODS} periods")
+
     def signals(self, u: npt.ArrayLike, sample_time: float) -> dict[str, FloatArray]:
         """Every signal at the samples of `u`, by name.
 
@@ -228,6 +291,77 @@ class BoucWenOscillator:
             "stored": stored,
         }
         return signals, OscillatorState(inputs[-1], *states[-1]) if inputs.size else state or start
+
+    @staticmethod
+    def structure(
+        *,
+        method: str = "split",
+        oversampling: int = 4,
+        decimation: Sequence[int] = (),
+        initial: str = "rest",
+        period: int | None = None,
+        hold: str = "foh",
+        excitation: str = "force",
+    ) -> "OscillatorStructure":
+        """What `hysim.identify` takes: how the record of an oscillator with a Bouc-Wen law was made.
+
+        Its parameters are ``mass, damping, stiffness, A, beta, gamma, n``, all free by default. Under a base's
+        acceleration only the ratios of the first four can be told, and ``mass = 1`` is held.
+
+        Parameters
+        ----------
+        method : str
+            As in the constructor; ``"newmark"`` is that of the Noel-Schoukens benchmark.
+        oversampling : int
+            Steps of the method between two samples of the record.
+        decimation : sequence of int
+            Factors of the filters that brought the output from the rate of the steps to that of the record, one
+            after the other: each a 31-tap Hamming low-pass with the cutoff at half of the new rate, without delay.
+            Empty where the output was sampled without filter; otherwise they multiply to `oversampling`.
+        initial : {"rest", "periodic"}
+            Whether the record begins at rest, or is steady under an input that repeats itself.
+        period : int, optional
+            Samples of a period, with ``initial="periodic"``. Every sample of the record is compared with the one
+            period that is simulated, whose input is the mean of the periods.
+        hold : {"foh", "zoh", "band-limited"}
+            Whether the input between samples is linear, held, or for a periodic one the sum of the lines below
+            half the record's rate.
+        excitation : {"force", "base"}
+            As in the constructor.
+
+        Returns
+        -------
+        OscillatorStructure
+
+        Raises
+        ------
+        ValueError, TypeError
+            If an option is unknown, a number is not whole and positive, or the options do not fit each other.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import hysim as hs
+        >>> law = hs.BoucWen(A=5e4, beta=800.0, gamma=-300.0)
+        >>> plant = hs.BoucWenOscillator(mass=2.0, damping=10.0, stiffness=5e4, law=law)
+        >>> t = np.arange(300) / 750
+        >>> u = 60 * np.sin(2 * np.pi * (20 + 40 * t) * t)
+        >>> rec = hs.Record(u=u, y=hs.simulate(plant, t, u).y, t=t)
+        >>> fit = hs.identify(hs.BoucWenOscillator.structure(), rec, fixed={"n": 1.0})
+        >>> round(fit.estimates["mass"], 4), round(fit.estimates["gamma"], 1)
+        (2.0, -300.0)
+        """
+        from hysim.models.oscillator_structure import OscillatorStructure
+
+        return OscillatorStructure(
+            method=method,
+            oversampling=oversampling,
+            decimation=tuple(decimation),
+            initial=initial,
+            period=period,
+            hold=hold,
+            excitation=excitation,
+        )
 
     @property
     def _coefficients(self) -> tuple[float, ...]:

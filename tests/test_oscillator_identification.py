@@ -1,0 +1,223 @@
+"""The oscillator's parameters come back from its input and output alone."""
+
+import os
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import hysim as hs
+from hysim.models.resampling import decimated, interpolated
+from hysim.models.search_space import Freedom
+
+COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
+needs_compiled = pytest.mark.skipif(not COMPILED, reason="millions of steps, which only compiled code does in time")
+
+TRUTH = {"mass": 2.0, "damping": 10.0, "stiffness": 5e4, "A": 5e4, "beta": 800.0, "gamma": -300.0, "n": 1.0}
+STEP = 1.0 / 750.0
+structure = hs.BoucWenOscillator.structure
+BENCHMARK = structure(
+    method="newmark", oversampling=20, decimation=(2, 2, 5), initial="periodic", period=8192, hold="band-limited"
+)
+
+
+def plant(**options) -> hs.BoucWenOscillator:
+    law = hs.BoucWen(**{name: TRUTH[name] for name in ("A", "beta", "gamma", "n")})
+    return hs.BoucWenOscillator(mass=2.0, damping=10.0, stiffness=5e4, law=law, **options)
+
+
+def sines(n_samples: int, seed: int = 0) -> np.ndarray:
+    """One period of lines up to 80 Hz, random phases."""
+    lines = np.arange(1, int(80.0 * n_samples * STEP) + 1)
+    spectrum = np.zeros(n_samples // 2 + 1, dtype=complex)
+    spectrum[lines] = np.exp(2j * np.pi * np.random.default_rng(seed).random(lines.size))
+    period = np.fft.irfft(spectrum)
+    return 40.0 * period / period.std()
+
+
+def record(u: np.ndarray, y: np.ndarray) -> hs.Record:
+    return hs.Record(u=u, y=y, t=STEP * np.arange(u.size))
+
+
+def from_rest(n_samples: int = 256 if COMPILED else 96, **options) -> hs.Record:
+    u = sines(n_samples)
+    u = u - u[0]
+    return record(u, plant(substeps=4, **options).response(u, STEP))
+
+
+def steady(periods: int = 2, n_samples: int = 128 if COMPILED else 64) -> hs.Record:
+    u = sines(n_samples)
+    y = plant(substeps=4).periodic_response(u, STEP)
+    return record(np.tile(u, periods), np.tile(y, periods))
+
+
+def worst(fit: hs.Identification) -> float:
+    return max(abs(fit.estimates[name] / TRUTH[name] - 1.0) for name in fit.free_names)
+
+
+@pytest.mark.parametrize("made", ["from rest", pytest.param("steady", marks=needs_compiled)])
+def test_all_seven_parameters_come_back_without_a_guess(made):
+    rec = from_rest() if made == "from rest" else steady()
+    given = {} if made == "from rest" else {"initial": "periodic", "period": len(rec) // 2}
+    fit = hs.identify(structure(**given), rec)
+    assert fit.success
+    assert fit.free_names == tuple(TRUTH)
+    assert worst(fit) < 1e-6  # the search ends when a step lowers the sum of squares by less than 1e-10 of it
+
+
+@needs_compiled
+def test_the_benchmarks_recipe_gives_its_records():
+    rec = hs.benchmarks.noel_schoukens(seed=4, periods=2)
+    true = {**TRUTH, "gamma": -1100.0}
+    output = BENCHMARK.regressors({name: np.array([value]) for name, value in true.items()}, rec)
+    assert output.shape == (1, len(rec), 1)
+    assert np.abs(output[0, :, 0] - rec.y).max() < 1e-13  # 1e-10 of the output: how steady a state must be
+
+
+@needs_compiled
+def test_the_noisy_benchmark_comes_back_within_its_standard_errors():
+    rec = hs.benchmarks.noel_schoukens(seed=3, periods=2, noise=8e-6)
+    fit = hs.identify(BENCHMARK, rec, fixed={"n": 1.0})
+    for name, value in {**TRUTH, "gamma": -1100.0}.items():
+        assert abs(fit.estimates[name] - value) <= 4.0 * fit.stderr.get(name, 0.0)  # one in 3 000 is farther off
+    test = hs.benchmarks.noel_schoukens(seed=1000, periods=1)
+    error = hs.benchmarks.simulate_official(test.u, plant=fit.model) - test.y
+    assert np.sqrt(np.mean(error**2)) < 3e-7  # sqrt(6 parameters / 16 384 samples) of the noise is 1.4e-7
+
+
+def test_where_a_base_shakes_the_mass_is_held_and_the_ratios_come_back():
+    fit = hs.identify(structure(excitation="base"), from_rest(excitation="base"), fixed={"n": 1.0})
+    assert "mass" not in fit.free_names
+    assert fit.estimates["mass"] == 1.0
+    for name in ("damping", "stiffness", "A"):
+        assert fit.estimates[name] == pytest.approx(TRUTH[name] / 2.0, rel=1e-6)
+    assert fit.estimates["beta"] == pytest.approx(800.0, rel=1e-6)
+
+
+@needs_compiled
+def test_a_spring_that_yields_and_drifts_is_near_no_linear_plant_and_yet_found():
+    """Yield at 10 mm, motions of 40 mm rms; the linear plant would have a negative mass."""
+    law = hs.BoucWen(A=9e4, beta=60.0, gamma=40.0)
+    yielding = hs.BoucWenOscillator(mass=2.0, damping=10.0, stiffness=8e3, law=law, substeps=4)
+    white = np.random.default_rng(0).standard_normal(304)
+    u = 1500.0 * np.convolve(white, np.ones(5) / 5.0, mode="valid")
+    t = 3.0 * STEP * np.arange(300)
+    fit = hs.identify(structure(), hs.Record(u=u, y=yielding.response(u, t[1]), t=t), fixed={"n": 1.0})
+    for name, value in {"mass": 2.0, "damping": 10.0, "stiffness": 8e3, "A": 9e4, "beta": 60.0, "gamma": 40.0}.items():
+        assert fit.estimates[name] == pytest.approx(value, rel=1e-6)
+
+
+def test_fixed_parameters_stay_and_bounds_hold():
+    rec, free = from_rest(), Freedom(fixed={"mass": 2.0, "n": 1.0}, bounds={"A": (1e4, 4e4), "damping": (0.0, np.inf)})
+    space = structure().search_space(rec, free)
+    assert space.names == ("damping", "stiffness", "A", "beta", "gamma")
+    place = space.coordinates.index("A")
+    assert (space.lower[place], space.upper[place]) == (1e4, 4e4)
+    assert np.all((space.starts >= space.lower) & (space.starts <= space.upper))
+    found = space.parameters(space.starts)
+    assert np.all(found["mass"] == 2.0)
+    assert np.all(found["A"] <= 4e4)
+
+
+@pytest.mark.filterwarnings("ignore:.*encountered:RuntimeWarning")  # NumPy's scalars warn where nothing is compiled
+def test_a_plant_that_escapes_is_a_row_of_inf_and_the_others_go_on():
+    rec = from_rest()
+    sets = {name: np.array([value, value]) for name, value in TRUTH.items()} | {"stiffness": np.array([5e4, -1e9])}
+    rows = structure().regressors(sets, rec)[..., 0]
+    assert np.abs(rows[0] - rec.y).max() < 1e-12 * rec.y.max()  # the steps' ends are rounded otherwise
+    assert np.isinf(rows[1]).all()
+
+
+@pytest.mark.parametrize("method", ["split", "newmark", "runge-kutta"])
+def test_the_steady_state_is_where_a_long_simulation_ends(method):
+    u = sines(64)
+    periods = 60 if COMPILED else 12  # five seconds, in which a linear plant of this damping forgets to 3e-6
+    stepper = plant(method=method, substeps=3)
+    y = stepper.periodic_response(u, STEP)
+    long = stepper.response(np.tile(u, periods), STEP)[-64:]
+    assert np.abs(y - long).max() < (1e-8 if COMPILED else 1e-2) * y.std()
+    again = stepper.periodic_response(np.roll(u, -20), STEP)
+    assert np.abs(again - np.roll(y, -20)).max() < 1e-8 * y.std()  # the tolerance is 1e-10 from period to period
+
+
+def test_without_damping_the_steady_state_is_refused():
+    elastic = replace(plant(), damping=0.0, law=hs.BoucWen(A=5e4, beta=0.0, gamma=0.0))
+    with pytest.raises(hs.SimulationError, match="has not settled within 1000 periods"):
+        elastic.periodic_response([1.0, -1.0], STEP)
+
+
+def test_a_band_limited_period_is_interpolated_exactly():
+    coarse, fine = (np.arange(32 * k) / k for k in (1, 5))
+    assert np.abs(interpolated(np.cos(0.7 + np.pi * coarse / 4), 5) - np.cos(0.7 + np.pi * fine / 4)).max() < 1e-14
+
+
+def test_a_period_is_decimated_as_the_middle_of_many():
+    y = interpolated(sines(64), 20)
+    tiled = decimated(np.tile(y, 5), (2, 2, 5))
+    assert np.abs(decimated(y, (2, 2, 5), periodic=True) - tiled[128:192]).max() < 1e-13
+
+
+def test_decimation_is_the_filter_at_every_rth_sample():
+    """Against the convolution written out, at lengths that do and do not divide."""
+    from scipy.signal import firwin
+
+    for n in (100, 101, 103):
+        y = np.random.default_rng(n).standard_normal(n)
+        around = np.concatenate([2 * y[0] - y[15:0:-1], y, 2 * y[-1] - y[-2:-17:-1]])
+        plain = np.convolve(around, firwin(31, 0.25), mode="valid")[::4]
+        assert np.abs(decimated(y, (4,)) - plain).max() < 1e-14
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "message"),
+    [
+        ({"method": "euler"}, ValueError, "method must be one of split"),
+        ({"hold": "cubic"}, ValueError, "hold must be one of"),
+        ({"excitation": "ground"}, ValueError, "excitation must be one of"),
+        ({"initial": "free"}, ValueError, "initial must be one of rest, periodic"),
+        ({"oversampling": 0}, ValueError, "must be at least 1, got 0"),
+        ({"oversampling": 2.5}, TypeError, "must be whole numbers, got 2.5"),
+        ({"oversampling": 20, "decimation": (2, 5)}, ValueError, "must multiply to the oversampling 20"),
+        ({"initial": "periodic"}, ValueError, "takes a period in samples"),
+        ({"period": 100}, ValueError, "takes a period in samples"),
+        ({"hold": "band-limited"}, ValueError, "interpolated by its spectrum"),
+    ],
+)
+def test_a_structure_that_does_not_fit_is_refused(given, error, message):
+    with pytest.raises(error, match=message):
+        structure(**given)
+
+
+U, T = sines(96), STEP * np.arange(96)
+
+
+@pytest.mark.parametrize(
+    ("rec", "given", "message"),
+    [
+        (hs.Record(u=U, y=U), {}, "the record has no time"),
+        (hs.Record(u=np.ones(96), y=U, t=T), {}, "the input is constant"),
+        (hs.Record(u=U, y=np.ones(96), t=T), {}, "the output is constant"),
+        (hs.Record(u=U[:20], y=U[:20], t=T[:20]), {}, "more than 30 samples, got 20"),
+        (hs.Record(u=U, y=U, t=T), {"initial": "periodic", "period": 100}, "less than a period of 100"),
+        (hs.Record(u=U, y=U, t=T), {"initial": "periodic", "period": 40}, "does not repeat itself every 40 samples"),
+    ],
+)
+def test_a_record_that_cannot_be_identified_is_refused(rec, given, message):
+    with pytest.raises(ValueError, match=message):
+        hs.identify(structure(**given), rec)
+
+
+def test_a_force_taken_for_an_acceleration_is_refused():
+    with pytest.raises(ValueError, match=r"not that of a mass on springs: .*check the sign of u and y"):
+        hs.identify(structure(excitation="base"), from_rest())
+
+
+def test_the_structure_knows_how_the_record_begins():
+    with pytest.raises(ValueError, match="the structure says how the record begins"):
+        hs.identify(structure(), from_rest(), initial="free")
+
+
+@pytest.mark.parametrize(("u", "tolerance", "message"), [([], 1e-9, "one period"), ([1.0], 0.0, "tolerance must be")])
+def test_a_period_that_is_none_is_refused(u, tolerance, message):
+    with pytest.raises(ValueError, match=message):
+        plant().periodic_response(u, STEP, tolerance=tolerance)
