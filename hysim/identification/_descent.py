@@ -55,7 +55,6 @@ class Reached:
 class Descent:
     """What does not change on the way: targets and weights are (n_sets, n_samples), or (1, n_samples) for all.
 
-    The slopes in x are central differences where the end has to be exact, else one-sided ones at half the cost.
     `projected` solves for b anew after each step, which leads farther from a poor start; it is for sums of squares.
     """
 
@@ -63,7 +62,6 @@ class Descent:
     noise: Noise
     targets: FloatArray
     weights: FloatArray
-    central: bool = False
     projected: bool = False
 
     def run(
@@ -71,34 +69,36 @@ class Descent:
     ) -> Reached:
         """Descend from `theta` (n_sets, n_theta) until a step lowers the loss by less than `tolerance`."""
         theta = np.clip(theta, *self.box())
-        n_sets, n_x = len(theta), len(self.problem.space.coordinates)
+        n_sets = len(theta)
         targets, weights = (np.broadcast_to(each, (n_sets, each.shape[1])) for each in (self.targets, self.weights))
         if constraint is not None:
             theta = self._restored(theta, constraint, self._pivots(theta, constraint)[0])
-        outputs = self.outputs(theta)
+        outputs, columns = self._evaluated(theta)
         loss, sigma = self._loss(targets - outputs, weights)
         if constraint is not None:
             loss[~self._kept(theta, constraint)] = np.inf
         damping = np.full(n_sets, 1e-3)
         moving = np.flatnonzero(np.isfinite(loss))
+        slopes, stale = np.zeros((n_sets, targets.shape[1], theta.shape[1])), np.ones(n_sets, dtype=bool)
         for _ in range(steps):
             if not moving.size:
                 break
+            fresh = moving[stale[moving]]
+            if fresh.size:
+                slopes[fresh], stale[fresh] = self._slopes(theta[fresh], outputs[fresh], columns[fresh]), False
             bound = None if constraint is None else constraint.of(moving)
             residual = targets[moving] - outputs[moving]
-            trial = self._step(theta[moving], outputs[moving], residual, weights[moving], sigma[moving],
+            trial = self._step(theta[moving], slopes[moving], residual, weights[moving], sigma[moving],
                                damping[moving], bound)  # fmt: skip
-            if self.projected:
-                trial[:, n_x:] = self.problem.solve(trial[:, :n_x])[0]
-            trial_outputs = self.outputs(trial)
+            trial_outputs, trial_columns = self._evaluated(trial)
             trial_loss, trial_sigma = self._loss(targets[moving] - trial_outputs, weights[moving])
             if bound is not None:
                 trial_loss[~self._kept(trial, bound)] = np.inf
             better = trial_loss < loss[moving]
             gained = np.where(better, loss[moving] - trial_loss, 0.0)
             won = moving[better]
-            theta[won], outputs[won] = trial[better], trial_outputs[better]
-            loss[won], sigma[won] = trial_loss[better], trial_sigma[better]
+            theta[won], outputs[won], columns[won] = trial[better], trial_outputs[better], trial_columns[better]
+            loss[won], sigma[won], stale[won] = trial_loss[better], trial_sigma[better], True
             damping[moving] *= np.where(better, 0.1, 10.0)
             stays = better & (gained < tolerance) | (damping[moving] > _STUCK)
             moving = moving[~stays]
@@ -107,9 +107,16 @@ class Descent:
     def outputs(self, theta: FloatArray) -> FloatArray:
         """The model's outputs at `theta`, (n_sets, n_samples)."""
         n_x = len(self.problem.space.coordinates)
+        return self.problem.model(theta[:, :n_x], theta[:, n_x:])
+
+    def _evaluated(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Outputs and columns at `theta`, whose linear part is changed in place to the best where it is projected."""
+        n_x = len(self.problem.space.coordinates)
         columns, fixed_part = self.problem.split(theta[:, :n_x])
+        if self.projected:
+            theta[:, n_x:] = self.problem.regression(columns, self.problem.y - fixed_part)[0]
         with np.errstate(over="ignore", invalid="ignore"):
-            return fixed_part + (columns @ theta[:, n_x:, np.newaxis])[..., 0]
+            return fixed_part + (columns @ theta[:, n_x:, np.newaxis])[..., 0], columns
 
     def _loss(self, residual: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Minus the log-likelihood (n_sets,), and the best sigma (n_sets, 1); a set that is not finite is inf."""
@@ -120,35 +127,22 @@ class Descent:
         loss[lost] = np.inf
         return loss, sigma
 
-    def slopes(self, theta: FloatArray, outputs: FloatArray | None = None) -> FloatArray:
-        """dm/dtheta, (n_sets, n_samples, n_theta)."""
-        n_x = len(self.problem.space.coordinates)
-        outputs = self.outputs(theta) if outputs is None else outputs
-        x, linear = theta[:, :n_x], theta[:, n_x:]
-        columns = self.problem.split(x)[0]
+    def _slopes(self, theta: FloatArray, outputs: FloatArray, columns: FloatArray) -> FloatArray:
+        """dm/dtheta, (n_sets, n_samples, n_theta), by one-sided differences in x: exact enough to descend by."""
+        n_sets, n_x = len(theta), len(self.problem.space.coordinates)
         if not n_x:
             return columns
-        if self.central:
-            ahead, behind, steps = self.problem.neighbours(x)
-            begin = self._at(behind, linear)
-        else:
-            ahead, steps = self.problem.beside(x)
-            begin = outputs[:, np.newaxis]
+        ends, steps = self.problem.beside(theta[:, :n_x])
+        moved = self.problem.model(ends.reshape(-1, n_x), np.repeat(theta[:, n_x:], n_x, axis=0))
         with np.errstate(over="ignore", invalid="ignore"):
-            by_x = (self._at(ahead, linear) - begin) / steps[..., np.newaxis]
+            by_x = (moved.reshape(n_sets, n_x, -1) - outputs[:, np.newaxis]) / steps[..., np.newaxis]
         by_x[~np.isfinite(by_x)] = 0.0
         return np.concatenate([by_x.transpose(0, 2, 1), columns], axis=2)
-
-    def _at(self, ends: FloatArray, linear: FloatArray) -> FloatArray:
-        """Outputs (n_sets, n_x, n_samples) at coordinates (n_sets, n_x, n_x) beside those of each set."""
-        repeated = np.broadcast_to(linear[:, np.newaxis], (*ends.shape[:2], linear.shape[1]))
-        theta = np.concatenate([ends, repeated], axis=2)
-        return self.outputs(theta.reshape(-1, theta.shape[2])).reshape(*ends.shape[:2], -1)
 
     def _step(
         self,
         theta: FloatArray,
-        outputs: FloatArray,
+        slopes: FloatArray,
         residual: FloatArray,
         weights: FloatArray,
         sigma: FloatArray,
@@ -158,7 +152,7 @@ class Descent:
         """The next trial."""
         _, slope, curvature = self.noise.terms(residual, sigma)
         root = np.sqrt(weights * np.maximum(curvature, 1e-12 / sigma**2))
-        J = root[..., np.newaxis] * self.slopes(theta, outputs)
+        J = root[..., np.newaxis] * slopes
         goal = -weights * slope / np.where(root > 0.0, root, 1.0)
         lower, upper = self.box()
         pivot, shares = (None, None) if constraint is None else self._pivots(theta, constraint)

@@ -78,13 +78,28 @@ class Problem:
 
     def _solve(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         columns, fixed_part = self.split(x)
-        target = self.y - fixed_part
+        return self.regression(columns, self.y - fixed_part)
+
+    def regression(self, columns: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Linear parameters and residuals as `solve` gives them, for given columns.
+
+        What is not finite in the columns and in the target is set to zero in place.
+        """
         broken = ~((np.abs(columns) < _LARGEST).all(axis=(1, 2)) & (np.abs(target) < _LARGEST).all(axis=1))
         columns[broken], target[broken] = 0.0, 0.0
         linear = self._regress(columns, target)
         residual = target - (columns @ linear[..., np.newaxis])[..., 0]
         residual[broken] = np.inf
         return linear, residual
+
+    def model(self, x: FloatArray, linear: FloatArray) -> FloatArray:
+        """Outputs (n_sets, n_samples), without holding the columns of all sets at once."""
+        outputs = np.empty((len(x), self.y.size))
+        for sets in self._chunks(len(x)):
+            columns, fixed_part = self.split(x[sets])
+            with np.errstate(over="ignore", invalid="ignore"):
+                outputs[sets] = fixed_part + (columns @ linear[sets, :, np.newaxis])[..., 0]
+        return outputs
 
     def split(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Columns (n_sets, n_samples, n_linear) of the free linear parameters, and the output without them."""
@@ -98,6 +113,8 @@ class Problem:
             parameters |= {name: np.nan_to_num(parameters[name]) for name in self.own.state if part.periodic}
             with np.errstate(over="ignore", invalid="ignore"):
                 regressors = self.family.regressors(parameters, part.record)
+                if regressors.shape[-1] != len(self.own.columns) + 1:
+                    raise ValueError("this model has other parameters for each record: identify it on one at a time")
                 fixed_part[:, samples] = regressors[..., -1]
                 for place, name in enumerate(self.own.columns):
                     if name in self.own.held:
@@ -194,7 +211,8 @@ def problem(
     """
     kinds = _kinds(initial, len(records))
     whole = None if kinds[0] is None else "free" if "free" in kinds else "rest"
-    own = family.search_space(_joined(records), replace(freedom, initial=whole))
+    widest = max(records, key=lambda record: (float(np.ptp(record.u)), len(record)))  # it scales the box
+    own = family.search_space(widest, replace(freedom, initial=whole))
     if "periodic" in kinds and own.state and not hasattr(family, "steady"):
         raise ValueError(f'{own.state[0]} has no steady cycle that could be computed: use initial="free"')
     if len(records) == 1:
@@ -212,20 +230,6 @@ def _kinds(initial: str | Sequence[str] | None, n: int) -> list[str | None]:
         if kind not in (STATES if initial is not None else (None,)):
             raise ValueError(f'initial must be "free", "rest" or "periodic", got {kind!r}')
     return kinds
-
-
-def _joined(records: Sequence[Record]) -> Record:
-    """All records as one, from which the family scales its box."""
-    if len(records) == 1:
-        return records[0]
-    u, y = (np.concatenate([getattr(record, name) for record in records]) for name in ("u", "y"))
-    times: FloatArray | None = None
-    if all(record.t is not None for record in records):
-        steps = [record.sample_time for record in records]
-        if np.ptp(steps) > 1e-6 * min(steps):
-            raise ValueError(f"records must have one sample time, got {min(steps)} to {max(steps)}: resample first")
-        times = steps[0] * np.arange(u.size, dtype=float)
-    return Record(u=u, y=y, t=times, units=records[0].units, resolution=records[0].resolution)
 
 
 def _together(

@@ -26,7 +26,7 @@ _LONG = 512  # samples beyond which fewer points are tried: each costs more, and
 _APART = 0.05  # distance of two starts, in units of the box, under which the better one stands for both
 _SAME = 0.01  # likewise of two points after the descent
 _GAIN = 1e-5  # share of the sum of squares: a descent that gains less rests
-_TOLERANCE = 1e-7  # of the log-likelihood: a polish that gains less rests
+_TOLERANCE = 2e-8  # likewise of a polish
 PERFECT = 1e-14  # smallest sigma, in units of the output's size
 
 
@@ -75,9 +75,9 @@ def _descended(problem: Problem, starts: FloatArray, scale: float, *, exact: boo
     theta = np.concatenate([starts, problem.solve(starts)[0]], axis=1)
     noise, everything = Gaussian(floor=PERFECT * scale), np.ones((1, problem.y.size))
     projected = not problem.space.bounds
-    descent = Descent(problem, noise, problem.y[np.newaxis], everything, central=exact, projected=projected)
-    gain, steps = (_TOLERANCE, N_POLISHING) if exact else (0.5 * problem.y.size * _GAIN, N_STEPS)
-    return descent.run(theta, tolerance=gain, steps=steps)
+    descent = Descent(problem, noise, problem.y[np.newaxis], everything, projected=projected)
+    gain, steps = (_TOLERANCE, N_POLISHING) if exact else (_GAIN, N_STEPS)
+    return descent.run(theta, tolerance=0.5 * problem.y.size * gain, steps=steps)
 
 
 def _uniform(space: SearchSpace, n: int, seed: int) -> FloatArray:

@@ -11,7 +11,7 @@ from hysim.identification import Identification
 from hysim.plot._style import GUIDE, MEASURED, POINTS, AxesArray, label, line, printed, several
 from hysim.records import Record
 
-_MEASURED: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 3.8, "markeredgewidth": 0.8, "color": POINTS}
+_MEASURED: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 3.8, "color": POINTS}
 
 
 def identification(
