@@ -192,11 +192,11 @@ def test_a_bad_file_is_one_line_and_exit_2_and_nothing_is_written(run, tmp_path,
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["identify", "loop.csv", *COLUMNS, "--model", "lin"], "invalid choice: 'lin'"),
+        (["identify", "loop.csv", *COLUMNS, "--model", "lin"], "there is no model 'lin'"),
         (["identify", "loop.csv", *COLUMNS, "--model", "line", "--fix", "n"], "expected NAME=VALUE with numbers"),
         (["identify", "loop.csv", *COLUMNS, "--model", "line", "--bounds", "n=1"], "expected NAME=LOW:HIGH"),
         (["identify", "loop.csv", *COLUMNS, "--model", "line", "--fix", "n=1"], "names 'n'; the parameters are"),
-        (["identify", "loop.csv", *COLUMNS, "--model", "line", "--cross-validate", "x"], "expected loo or a number"),
+        (["identify", "loop.csv", *COLUMNS, "--model", "line", "--cross-validate", "x"], "expected loo, cycles or a number"),
         (["identify", "loop.csv", *COLUMNS, "--model", "line", "--json", "--out", "-"], "two results would go to the"),
         (["identify", "loop.csv", *COLUMNS, "--model", "line", "--out", "a.svg", "--plot", "a.svg"], "to one file"),
         (["metrics", "none.csv", *COLUMNS], "none.csv: No such file"),

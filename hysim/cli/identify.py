@@ -31,10 +31,25 @@ def add_to(commands: Any) -> None:
         "--bounds", metavar="NAME=LOW:HIGH", type=_bounds, action="append", default=[], help="limits: beta=0:2"
     )
     parser.add_argument(
-        "--initial", choices=("rest", "free"), help="state at the first sample; else as the family says"
+        "--initial", choices=("free", "rest", "periodic"), help="state at the first sample; else as the family says"
     )
     parser.add_argument(
-        "--cross-validate", metavar="loo|K", type=_folds, help="leave one sample out at a time, or one of K blocks"
+        "--noise",
+        choices=("gaussian", "quantised", "robust"),
+        default="gaussian",
+        help="what disturbs the output; quantised needs --resolution (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--intervals",
+        choices=("linear", "profile", "bootstrap"),
+        default="linear",
+        help="how the intervals at 95 %% are found (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--cross-validate",
+        metavar="loo|cycles|K",
+        type=_folds,
+        help="leave one sample out at a time, one cycle, or one of K blocks",
     )
     parser.add_argument("--seed", type=int, default=0, help="of the random starts (default: %(default)s)")
     parser.add_argument("--out", metavar="MODEL.json", help="write the model, - for the standard output")
@@ -57,6 +72,8 @@ def run(options: argparse.Namespace) -> int:
         free=tuple(options.free),
         bounds=dict(options.bounds),
         initial=options.initial,
+        noise=options.noise,
+        intervals=options.intervals,
         cross_validate=options.cross_validate,
         seed=options.seed,
         progress=outputs.progress(),
@@ -72,8 +89,8 @@ def run(options: argparse.Namespace) -> int:
 
 def _document(fit: "Identification") -> dict[str, Any]:
     names = (
-        "estimates", "stderr", "free_names", "n_parameters", "fit_percent", "rmse", "cv_rmse", "fpe", "aic", "bic",
-        "success", "message",
+        "estimates", "stderr", "intervals", "interval_method", "free_names", "n_parameters", "noise", "sigma",
+        "fit_percent", "rmse", "cv_rmse", "fpe", "aic", "bic", "whiteness", "seed", "success", "message",
     )  # fmt: skip
     return {"family": type(fit.model).__name__, **{name: getattr(fit, name) for name in names}}
 
@@ -97,6 +114,6 @@ def _number(value: str, text: str, form: str) -> float:
 
 
 def _folds(text: str) -> str | int:
-    if text != "loo" and not text.isdigit():
-        raise argparse.ArgumentTypeError(f"expected loo or a number of blocks, got {text!r}")
-    return text if text == "loo" else int(text)
+    if text not in ("loo", "cycles") and not text.isdigit():
+        raise argparse.ArgumentTypeError(f"expected loo, cycles or a number of blocks, got {text!r}")
+    return int(text) if text.isdigit() else text

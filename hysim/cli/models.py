@@ -11,6 +11,8 @@ from hysim.cli.records import STANDARD
 FAMILIES = {
     "bouc-wen": "BoucWen",
     "polynomial-bouc-wen": "PolynomialBoucWen",
+    "zhu-wang": "ZhuWangBoucWen",
+    "generalized-bouc-wen": "GeneralizedBoucWen",
     "transfer-function": "TransferFunction",
     "prandtl-ishlinskii": "PrandtlIshlinskii",
     "maxwell-slip": "MaxwellSlip",
@@ -28,7 +30,12 @@ _REQUIRED = ("poles", "zeros")
 
 def add_to(parser: argparse.ArgumentParser) -> None:
     """Add the choice of a family and the options of its structure."""
-    parser.add_argument("--model", metavar="NAME", required=True, choices=FAMILIES, help=", ".join(FAMILIES))
+    parser.add_argument(
+        "--model",
+        metavar="NAME|MODEL.json",
+        required=True,
+        help=f"{', '.join(FAMILIES)}; or a file with the model to begin from",
+    )
     group = parser.add_argument_group("transfer function")
     group.add_argument("--poles", metavar="N", type=int, help="number of poles")
     group.add_argument("--zeros", metavar="N", type=int, help="number of zeros, at most that of the poles")
@@ -42,8 +49,10 @@ def family(options: argparse.Namespace) -> Any:
     Raises
     ------
     ValueError
-        If an option belongs to another family, or one that this family needs is missing.
+        If there is no such family, an option belongs to another one, or one that this family needs is missing.
     """
+    if options.model not in FAMILIES and Path(options.model).suffix != ".json":
+        raise ValueError(f"there is no model {options.model!r}: give a .json file or one of {', '.join(FAMILIES)}")
     own = STRUCTURES.get(options.model, ())
     given = {name: getattr(options, name) for names in STRUCTURES.values() for name in names}
     for name, value in given.items():
@@ -51,6 +60,8 @@ def family(options: argparse.Namespace) -> Any:
             raise ValueError(f"--{name} is no option of the model {options.model}")
         if value is None and name in own and name in _REQUIRED:
             raise ValueError(f"the model {options.model} needs --{name}")
+    if options.model not in FAMILIES:
+        return read(options.model)[0]
     model = getattr(hysim, FAMILIES[options.model])
     return model.structure(**{name: value for name, value in given.items() if value is not None}) if own else model
 

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim import metrics
+from hysim._cycles import TOLERANCE
 from hysim._frozen import FloatArray
 from hysim._parallel import Progress, at_most
 from hysim.identification._descent import Descent
@@ -74,9 +75,9 @@ def identify(
     intervals : {"linear", "profile", "bootstrap"}
         How `Identification.intervals`, at 95 %, are found: from the standard errors, by the profile of the
         likelihood, or from 500 records drawn anew.
-    cross_validate : {None, "loo", "records"} or int, optional
-        ``"loo"`` leaves one output sample out at a time, an int that many blocks of samples, ``"records"``
-        one record; the input is kept. Fills `Identification.cv_rmse`.
+    cross_validate : {None, "loo", "cycles", "records"} or int, optional
+        ``"loo"`` leaves one output sample out at a time, an int one of that many blocks of samples, ``"cycles"``
+        a cycle of the input, ``"records"`` a record; the input is kept. Fills `Identification.cv_rmse`.
     seed : int
         Of the starts of the search, and of what is drawn. The optimum does not depend on it.
     workers : int, optional
@@ -180,7 +181,20 @@ def _left_out(cross_validate: str | int | None, whole: Problem) -> list[npt.NDAr
         if len(whole.parts) < 2:
             raise ValueError('cross_validate="records" needs at least 2 records')
         return np.split(np.arange(whole.y.size), whole.cuts[1:-1])
+    if cross_validate == "cycles":
+        return _cycles(whole)
     return folds(cross_validate, whole.y.size, name="cross_validate")
+
+
+def _cycles(whole: Problem) -> list[npt.NDArray[np.intp]]:
+    """The samples between every second turning point of each record's input."""
+    ends = [
+        begin + part.record.reversals(TOLERANCE)[1::2] for part, begin in zip(whole.parts, whole.cuts, strict=False)
+    ]
+    cuts = np.unique(np.concatenate([whole.cuts[1:-1], *ends])).astype(int)
+    if not cuts.size:
+        raise ValueError('cross_validate="cycles" needs at least 2 cycles of the input')
+    return np.split(np.arange(whole.y.size), cuts)
 
 
 @dataclass(frozen=True)

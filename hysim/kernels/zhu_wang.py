@@ -150,6 +150,8 @@ def power_side(
     done, h = 0.0, length
     for _ in range(MAX_STEPS):
         left, forcing = length - done, a + d * done
+        if escapes(w, abs(a) + abs(d) * length, c, n, left):
+            return math.inf, length
         if w == 0.0:
             way = min(left, free_way(forcing, d, abs(c), n, negligible))
             w = way * (forcing + 0.5 * d * way)
@@ -180,6 +182,15 @@ def power_side(
         done += taken
         h = min(length - done, _GROWTH * taken)
     return math.nan, length
+
+
+@kernel
+def escapes(w: float, forcing: float, c: float, n: float, length: float) -> bool:
+    """Whether w is sure to reach infinity: -c w^n, which only grows, is twice any forcing, and half of it is enough."""
+    if c >= 0.0 or n <= 1.0:
+        return False
+    growth = -c * w**n
+    return growth > 2.0 * forcing and 2.0 * w < (n - 1.0) * growth * length
 
 
 @kernel
