@@ -85,7 +85,27 @@ def benchmark_errors() -> str:
     return "\n".join([first, "|---" * (len(heads) + 2) + "|", *lines])
 
 
+def table1_models() -> str:
+    """The variants on Table 1, from `table1_models`, as a table."""
+    rows = json.loads((RESULTS / "table1_models" / "result.json").read_text())["rows"]
+    lines = [
+        f"| {row['model']} | {row['parameters']} | {row['fit_percent']:.2f} | "
+        f"{'' if row['loo_rmse'] is None else format(row['loo_rmse'], '.4f')} | {row['largest_residual_pixels']:.2f} | "
+        f"{row['max_width']:.3f} | {row['max_width_at']:g} | {row['bic']:.1f} | {'yes' if row['as_asked'] else ''} |"
+        for row in rows
+    ]
+    head = "| model | parameters | fit [%] | leave-one-out rmse | largest residual | width | at [V] | BIC | as asked |"
+    return "\n".join([head, "|---" * 9 + "|", *lines])
+
+
 myst_substitutions = {
+    "table1_models": table1_models(),
+    "recovery_figure": shown(
+        {
+            "recovery": "Share of the 95 % intervals that hold the truth, over random laws "
+            "(`experiments/results/recovery`)."
+        }
+    ),
     "ratios": ratios(),
     "benchmark": benchmark(),
     "benchmark_errors": benchmark_errors(),

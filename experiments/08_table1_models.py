@@ -104,7 +104,10 @@ def intervals(start: Any, fixed: dict[str, float]) -> dict[str, Any]:
         found[noise] = {
             "fit_percent": fit.fit_percent,
             "sigma": fit.sigma,
-            "estimates": {name: [fit.estimates[name], *fit.intervals[name]] for name in fit.free_names},
+            "estimates": {
+                name: [value if np.isfinite(value) else None for value in (fit.estimates[name], *fit.intervals[name])]
+                for name in fit.free_names
+            },
         }
     return found
 
@@ -144,8 +147,9 @@ def show(rows: list[Row], seeds: dict[str, Any], tables: dict[str, Any], close: 
     )
     for noise, table in tables.items():
         print(f"{noise} noise, fit {table['fit_percent']:.3f} %, sigma {table['sigma']:.4f} um")
-        for name, (value, lower, upper) in table["estimates"].items():
-            print(f"  {name:<22} {value:.5g}  [{lower:.5g}, {upper:.5g}]")
+        for name, (value, *ends) in table["estimates"].items():
+            lower, upper = ("open" if end is None else f"{end:.5g}" for end in ends)
+            print(f"  {name:<22} {value:.5g}  [{lower}, {upper}]")
     print(f"the data prefer {rows[0]['model']}; hardly told from it: {', '.join(close[1:]) or 'none'}")
 
 

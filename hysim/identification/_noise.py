@@ -18,7 +18,7 @@ import numpy as np
 from hysim._frozen import FloatArray
 
 _FREEDOM = 4.0  # of Student's t: a compromise between efficiency on normal noise and indifference to outliers
-_FINEST = 0.01  # smallest sigma of quantised data, in quanta: below, the likelihood does not change any more
+_FINEST = 0.1  # smallest sigma of rounded data, in quanta: with less noise intervals are on the safe side
 _LOG_ROOT_2PI = 0.5 * np.log(2.0 * np.pi)
 
 
