@@ -361,6 +361,12 @@ def test_two_rates_or_steps_that_settle_show_a_lag():
         assert sum("one rate" in note for note in structure.notes(record, lag)) == count
 
 
+def test_a_step_has_no_note():
+    lag, t = hs.TransferFunction(num=(1.0,), den=(0.3, 1.0)), 0.05 * np.arange(80)
+    record = hs.Record(u=np.ones(80), y=lag.response(np.ones(80), 0.05), t=t)
+    assert hs.TransferFunction.structure(poles=1, zeros=0).notes(record, lag) == ()
+
+
 def test_a_static_record_needs_no_plant():
     u = hs.signals.triangle(0.0, 1.0, cycles=2, samples_per_cycle=40)
     record = hs.Record(u=u, y=2.0 * u + 0.01 * np.random.default_rng(0).standard_normal(u.size), t=0.1 * np.arange(81))
