@@ -17,6 +17,8 @@ _HOME = {
     "Simulation": "hysim.simulation",
     "identify": "hysim.identification",
     "Identification": "hysim.identification",
+    "select": "hysim.identification",
+    "Selection": "hysim.identification",
     "discover": "hysim.discovery",
     "Discovery": "hysim.discovery",
     "PID": "hysim.control",
@@ -74,7 +76,9 @@ if TYPE_CHECKING:
     from hysim.errors import SimulationError as SimulationError
     from hysim.files import load as load
     from hysim.identification import Identification as Identification
+    from hysim.identification import Selection as Selection
     from hysim.identification import identify as identify
+    from hysim.identification import select as select
     from hysim.metrics import LoopMetrics as LoopMetrics
     from hysim.metrics import loop_metrics as loop_metrics
     from hysim.models.actuator import Actuator as Actuator

@@ -75,3 +75,13 @@ def test_the_readme_quotes_the_work_and_the_precision():
     assert f"and {ratio('n = 1:', 'OpenSees'):.0f} times as fast as OpenSees" in readme
     assert f"`odeint` takes {ratio('oscillator', 'odeint'):.0f} times as long" in readme
     assert f"and diffrax {ratio('oscillator', 'diffrax'):.0f} times" in readme
+
+
+def test_transfer_functions_come_as_near_as_the_noise_allows():
+    folder = EXPERIMENTS[0].parent
+    clean, *noisy = json.loads((folder / "results" / "transfer_functions" / "result.json").read_text())["rows"]
+    assert clean["median_fit"] > clean["asked_fit"]
+    for row in noisy:
+        assert abs(row["median_fit"] - row["bound_median_fit"]) < 0.25 * (100.0 - row["bound_median_fit"])
+        # four sampling errors of a standard deviation from 200 draws
+        assert 0.8 < row["lowest_spread_over_stderr"] <= row["highest_spread_over_stderr"] < 1.2

@@ -269,3 +269,105 @@ def test_a_stiff_plant_is_found_in_noise():
         fit = hs.identify(structure, record)
         error = np.linalg.norm(clean - fit.model.response(record.u, 0.01)) / np.linalg.norm(clean - clean.mean())
         assert error < 2.0 * np.sqrt(6 / len(record) / snr)  # chi of 6 degrees is above twice its rms in 5 of 1e4
+
+
+def late_record(delay, n, seed=0):
+    """A resonant plant, late, under white noise held for 0.1 s, without noise."""
+    true = hs.TransferFunction(num=(1.0, 6.0), den=(1.0, 2.0, 9.0), delay=delay)
+    u = np.random.default_rng(seed).standard_normal(n)
+    return hs.Record(u=u, y=true.response(u, 0.1), t=0.1 * np.arange(n)), true
+
+
+@pytest.mark.parametrize(("n", "delay"), [(80, 0.437), (1000, 3.762)])
+def test_a_delay_between_two_samples_is_found(n, delay):
+    """On a short record by the search alone, on a long one from the peak of the impulse response."""
+    record, true = late_record(delay, n)
+    fit = hs.identify(hs.TransferFunction.structure(poles=2, zeros=1, delay="free"), record)
+    assert fit.estimates["delay"] == pytest.approx(delay, abs=1e-9)  # rounding, through a descent to 1e-7
+    assert fit.model.den == pytest.approx(true.den, rel=1e-7)
+    assert fit.model.num == pytest.approx(true.num, rel=1e-7)
+    assert fit.model.delay == fit.estimates["delay"]
+    assert "delay" in fit.stderr
+
+
+def test_the_delay_is_free_bounded_or_fixed_as_any_parameter():
+    record, _ = late_record(0.437, 80)
+    free = hs.TransferFunction.structure(poles=2, zeros=1, delay="free")
+    space = free.search_space(record)
+    assert (space.lower[-1], space.upper[-1]) == pytest.approx((0.0, 80 / 4))  # samples: a quarter of the record
+    assert space.names[2] == space.coordinates[-1] == "delay"
+    bounded = free.search_space(record, Freedom(bounds={"delay": (0.2, 0.5)}))
+    assert (bounded.lower[-1], bounded.upper[-1]) == pytest.approx((2.0, 5.0))
+    assert not bounded.bounds
+    fixed = hs.identify(free, record, fixed={"delay": 0.437})
+    known = hs.identify(hs.TransferFunction.structure(poles=2, zeros=1, delay=0.437), record)
+    assert fixed.model == known.model
+    assert fixed.estimates["delay"] == 0.437
+    assert known.free_names == fixed.free_names == ("den[1]", "den[2]", "num[0]", "num[1]")
+    for wrong in ({"fixed": {"delay": -1.0}}, {"bounds": {"delay": (-1.0, 1.0)}}, {"bounds": {"delay": (0.0, np.inf)}}):
+        with pytest.raises(ValueError, match="delay must not be negative"):
+            hs.identify(free, record, **wrong)
+    with pytest.raises(ValueError, match="delay"):
+        hs.TransferFunction.structure(poles=2, zeros=1, delay="late")
+    with pytest.raises(ValueError, match="negative"):
+        hs.TransferFunction.structure(poles=2, zeros=1, delay=-1.0)
+
+
+def test_regressors_with_unlike_delays_are_those_of_each():
+    record, _ = late_record(0.437, 80)
+    structure = hs.TransferFunction.structure(poles=2, zeros=2, delay="free", initial="free")
+    sets = {"den[1]": [1.0, 2.0, 0.3], "den[2]": [9.0, 4.0, 1.0], "delay": [0.0, 0.25, 1e9]}
+    columns = structure.regressors({name: np.array(values) for name, values in sets.items()}, record)
+    linear = [0.3, -0.2, 1.0, 0.5, -0.4]
+    for k in range(3):
+        one = {name: values[k] for name, values in sets.items()}
+        assert (structure.regressors(one, record)[0] == columns[k]).all()
+        plant = structure.assemble(one | dict(zip(structure.columns, linear, strict=True)))
+        assert columns[k] @ [*linear, 1.0] == pytest.approx(plant.response(record.u, 0.1), rel=1e-12)  # sums in order
+
+
+def test_standard_errors_are_those_of_many_draws():
+    true = hs.TransferFunction(num=(9.0,), den=(1.0, 2.0, 9.0))
+    u = np.repeat(np.random.default_rng(5).choice([-1.0, 1.0], 250), 4)
+    clean, t = true.response(u, 0.1), 0.1 * np.arange(u.size)
+    structure = hs.TransferFunction.structure(poles=2, zeros=0)
+    found, stderr = [], []
+    for seed in range(30):
+        y = clean + 0.3 * np.random.default_rng(seed).standard_normal(u.size)
+        fit = hs.identify(structure, hs.Record(u=u, y=y, t=t))
+        found.append([fit.estimates[name] for name in fit.free_names])
+        stderr.append([fit.stderr[name] for name in fit.free_names])
+    ratio = np.std(found, axis=0, ddof=1) / np.sqrt(np.mean(np.square(stderr), axis=0))
+    assert ratio == pytest.approx(1.0, abs=4 / np.sqrt(2 * 30))  # four sampling errors of a standard deviation
+
+
+def test_a_fit_to_table_1_says_what_the_record_cannot_show():
+    message = hs.identify(hs.TransferFunction.structure(poles=4, zeros=1), hs.datasets.table1(dwell=1.0)).message
+    assert "a single-valued curve of u fits 89.9 %: as well as this model within the noise" in message
+    assert "the record holds one rate only: lag and hysteresis cannot be told apart" in message
+
+
+def test_a_record_that_shows_the_dynamics_has_no_note():
+    record, _, _ = rao_garnier(1.0, 0)
+    assert hs.identify(hs.TransferFunction.structure(poles=2, zeros=1), record).message == "converged"
+
+
+def test_two_rates_or_steps_that_settle_show_a_lag():
+    slow, fast = (hs.signals.triangle(0.0, 1.0, cycles=1, samples_per_cycle=n) for n in (100, 20))
+    settling = hs.signals.staircase(0.0, 1.0, 0.1, cycles=2, samples_per_step=6)
+    lag, structure = hs.TransferFunction(num=(1.0,), den=(0.3, 1.0)), hs.TransferFunction.structure(poles=1, zeros=0)
+    for u, count in ((np.tile(slow[:-1], 2), 1), (np.append(slow, fast), 0), (settling, 0)):
+        record = hs.Record(u=u, y=lag.response(u, 0.02), t=0.02 * np.arange(u.size))
+        assert sum("one rate" in note for note in structure.notes(record, lag)) == count
+
+
+def test_a_step_has_no_note():
+    lag, t = hs.TransferFunction(num=(1.0,), den=(0.3, 1.0)), 0.05 * np.arange(80)
+    record = hs.Record(u=np.ones(80), y=lag.response(np.ones(80), 0.05), t=t)
+    assert hs.TransferFunction.structure(poles=1, zeros=0).notes(record, lag) == ()
+
+
+def test_a_static_record_needs_no_plant():
+    u = hs.signals.triangle(0.0, 1.0, cycles=2, samples_per_cycle=40)
+    record = hs.Record(u=u, y=2.0 * u + 0.01 * np.random.default_rng(0).standard_normal(u.size), t=0.1 * np.arange(81))
+    assert "a single-valued curve of u" in hs.identify(hs.TransferFunction.structure(poles=1, zeros=1), record).message

@@ -1,4 +1,4 @@
-"""Parameters from records: `identify` and its result.
+"""Parameters from records: `identify` and its result, and `select` among several candidates.
 
 The model is simulated in free run, and the sum of squared output residuals is minimised over the box that
 the model's family declares (`SearchSpace`). Nothing here knows a family.
@@ -7,5 +7,6 @@ the model's family declares (`SearchSpace`). Nothing here knows a family.
 from hysim.identification._identify import identify
 from hysim.identification._profile import Profile
 from hysim.identification._result import Candidate, Identification, Width
+from hysim.identification._select import Selection, select
 
-__all__ = ["Candidate", "Identification", "Profile", "Width", "identify"]
+__all__ = ["Candidate", "Identification", "Profile", "Selection", "Width", "identify", "select"]

@@ -10,10 +10,10 @@ taken as the start, each output must be explained by the step before, and is one
 
 With den monic the output is affine in the numerator and in the initial state, which is the free response
 and its derivatives at the begin of the first hold, (y, y', ..., y^(n-1)): the state of the observability
-form.
+form. The delay, where it is not known, is searched beside the denominator.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -22,13 +22,15 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, checked, read_only
 from hysim.errors import SimulationError
 from hysim.models._linear_response import affine_columns
-from hysim.models._transfer_function_starts import refined_denominators, sections
+from hysim.models._transfer_function_notes import notes
+from hysim.models._transfer_function_starts import Guess, guesses, likely_delays, sections
 from hysim.models.model import model
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
 FREQUENCY = (0.1, np.pi)  # box of a section's frequency: rad over the whole record, rad per sample
 DAMPING = (1e-3, 30.0)  # box of its damping ratio; two real poles above 1
+LATEST = 0.25  # of the record: the largest delay that is searched
 _LONG = 1000  # samples from which the starts from the record are relied upon
 _AGREED = 0.02  # of the box: starts from different cutoffs this close to their median are one optimum
 _MAJORITY = 3  # of them are enough to search no further
@@ -147,7 +149,14 @@ class TransferFunction:
 
     @classmethod
     def structure(
-        cls, *, poles: int, zeros: int, hold: str = "zoh", sample: str = "start", initial: str = "rest"
+        cls,
+        *,
+        poles: int,
+        zeros: int,
+        delay: float | str = 0.0,
+        hold: str = "zoh",
+        sample: str = "start",
+        initial: str = "rest",
     ) -> "TransferFunctionStructure":
         """What `hysim.identify` takes: numbers of poles and zeros, and how the record was sampled.
 
@@ -155,6 +164,9 @@ class TransferFunction:
         ----------
         poles, zeros : int
             Their numbers, zeros <= poles.
+        delay : float or "free"
+            The dead time [s]. ``"free"`` has it identified, from 0 to a quarter of the record unless
+            ``bounds={"delay": (lower, upper)}`` says otherwise; it need not be a whole number of samples.
         hold, sample : str
             As in the constructor.
         initial : {"rest", "free"}
@@ -176,7 +188,66 @@ class TransferFunction:
         >>> fit.n_parameters, round(fit.fit_percent, 1)
         (6, 91.5)
         """
-        return TransferFunctionStructure(poles=poles, zeros=zeros, hold=hold, sample=sample, initial=initial)
+        if isinstance(delay, str) and delay != "free":
+            raise ValueError(f'delay must be a number of seconds or "free", got {delay!r}')
+        return TransferFunctionStructure(
+            poles=poles,
+            zeros=zeros,
+            delay=None if isinstance(delay, str) else delay,
+            hold=hold,
+            sample=sample,
+            initial=initial,
+        )
+
+    @classmethod
+    def structures(
+        cls,
+        *,
+        poles: Iterable[int] = range(1, 6),
+        zeros: Iterable[int] | None = None,
+        delays: Iterable[float | str] = (0.0,),
+        hold: str = "zoh",
+        sample: str = "start",
+        initial: str = "rest",
+    ) -> dict[str, "TransferFunctionStructure"]:
+        """Candidates for `hysim.select`: every combination of the numbers and delays.
+
+        Parameters
+        ----------
+        poles : iterable of int
+            Numbers of poles.
+        zeros : iterable of int, optional
+            Numbers of zeros, of which those below the number of poles are taken; by default all of them.
+        delays : iterable of float or "free"
+            As in `structure` [s].
+        hold, sample, initial : str
+            As in `structure`.
+
+        Returns
+        -------
+        dict
+            Name to structure, ``"2 poles, 1 zero"`` and so on.
+
+        Raises
+        ------
+        ValueError, TypeError
+            As `structure`.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> list(hs.TransferFunction.structures(poles=(1, 2), delays=(0.0, "free")))[1:3]
+        ['1 pole, 0 zeros, free delay', '2 poles, 0 zeros']
+        """
+        numbers, late = None if zeros is None else set(zeros), tuple(delays)
+        found = [
+            cls.structure(poles=n, zeros=m, delay=delay, hold=hold, sample=sample, initial=initial)
+            for n in poles
+            for m in range(n)
+            if numbers is None or m in numbers
+            for delay in late
+        ]
+        return {str(structure): structure for structure in found}
 
 
 @checked
@@ -187,10 +258,12 @@ class TransferFunctionStructure:
     odd number of poles) on log scales, which are stable by construction: omega from 0.1 rad over the whole
     record to the Nyquist rate, zeta from 0.001 to 30, so that real poles may lie at both ends. Resonances
     above the Nyquist rate are left out: samples cannot tell them from those below, and they fit noise.
+    A free delay, which is None here, is searched in samples from 0 to a quarter of the record.
     """
 
     poles: int
     zeros: int
+    delay: float | None = 0.0
     hold: str = "zoh"
     sample: str = "start"
     initial: str = "rest"
@@ -200,9 +273,18 @@ class TransferFunctionStructure:
         if self.initial not in ("rest", "free"):
             raise ValueError(f'initial must be "rest" or "free", got {self.initial!r}')
         if not all(isinstance(number, int) for number in (self.poles, self.zeros)):
-            raise TypeError(f"numbers of poles and zeros must be int, got {self}")
+            raise TypeError(f"numbers of poles and zeros must be int, got {self!r}")
         if not 0 <= self.zeros <= self.poles or self.poles < 1:
-            raise ValueError(f"there must be at least one pole, and no more zeros than poles, got {self}")
+            raise ValueError(f"there must be at least one pole, and no more zeros than poles, got {self!r}")
+        if self.delay is not None and self.delay < 0.0:
+            raise ValueError(f"delay must not be negative, got {self.delay}")
+
+    def __str__(self) -> str:
+        poles, zeros = (
+            f"{n} {what}{'' if n == 1 else 's'}" for n, what in ((self.poles, "pole"), (self.zeros, "zero"))
+        )
+        late = ", free delay" if self.delay is None else f", delay {self.delay:g} s" if self.delay else ""
+        return f"{poles}, {zeros}{late}"
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -211,22 +293,27 @@ class TransferFunctionStructure:
 
     @property
     def denominator(self) -> tuple[str, ...]:
-        """The names that are searched; ``den[0]`` is one."""
+        """The denominator's names, which are searched; ``den[0]`` is one."""
         return tuple(f"den[{k}]" for k in range(1, self.poles + 1))
 
+    @property
+    def free_delay(self) -> tuple[str, ...]:
+        """The delay's name where it is searched."""
+        return ("delay",) if self.delay is None else ()
+
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box of the sections.
+        """The box of the sections, and of the delay where it is free.
 
         Raises
         ------
         ValueError
-            If the record has no even time or no input, `initial` or a name is unknown, or a coefficient of
-            the denominator is fixed or bounded.
+            If the record has no even time or no input, `initial` or a name is unknown, a coefficient of the
+            denominator is fixed or bounded, or a delay is negative.
         """
         sample_time = record.sample_time
         if np.ptp(record.u) == 0.0 and record.u[0] == 0.0:
             raise ValueError("the input is zero throughout: nothing can be identified from it")
-        names = (*self.denominator, *self.columns)
+        names = (*self.denominator, *self.free_delay, *self.columns)
         defaults = dict.fromkeys(names, 0.0)
         for name in (*freedom.fixed, *freedom.bounds):
             if name in self.denominator:
@@ -234,6 +321,10 @@ class TransferFunctionStructure:
         at_rest = self.columns[self.zeros + 1 :] if freedom.starts_at_rest(self.initial) else ()
         held = freedom.held(defaults, at_rest=at_rest)
         limits = freedom.limits(defaults, held)
+        known_delay = held.get("delay", self.delay)
+        earliest, latest = limits.pop("delay", (0.0, LATEST * len(record) * sample_time))
+        if min(earliest, known_delay or 0.0) < 0.0 or not latest < np.inf:
+            raise ValueError(f"a delay must not be negative or infinite, got {known_delay or (earliest, latest)}")
         pairs = self.poles // 2
         low, high = np.log(FREQUENCY[0] / len(record)), np.log(FREQUENCY[1])
         coordinates = [f"{what}[{k}]" for k in range(pairs) for what in ("log frequency", "log damping")]
@@ -241,10 +332,11 @@ class TransferFunctionStructure:
         if self.poles % 2:
             coordinates.append("log rate")
             box.append((low, high))
+        if known_delay is None:
+            coordinates.append("delay")
+            box.append((earliest / sample_time, latest / sample_time))
         lower, upper = np.array(box).T
-        starts = self._starts(record, lower, upper, at_rest=bool(at_rest))
-        middle = np.median(starts, axis=0) if len(starts) else lower
-        agreed = np.sum((np.abs(starts - middle) < _AGREED * (upper - lower)).all(axis=1)) >= _MAJORITY
+        starts, agreed = self._starts(record, lower, upper, known_delay, at_rest=bool(at_rest))
         return SearchSpace(
             coordinates=tuple(coordinates),
             lower=lower,
@@ -255,7 +347,7 @@ class TransferFunctionStructure:
             columns=self.columns,
             linear=tuple(name for name in self.columns if name not in held),
             held=held,
-            parameters=lambda x: self._denominators(np.atleast_2d(x), sample_time),
+            parameters=lambda x: self._searched(np.atleast_2d(x), sample_time, known_delay),
             bounds=limits,
             state=self.columns[self.zeros + 1 :],
         )
@@ -263,7 +355,9 @@ class TransferFunctionStructure:
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns of the numerator and of the initial state, and zero, (n_sets, n_samples, n_columns + 1)."""
         monic = np.stack([np.atleast_1d(parameters[name]) for name in self.denominator], axis=1)
-        return affine_columns(monic, record.u, record.sample_time, zeros=self.zeros, hold=self.hold, sample=self.sample)
+        delay = parameters["delay"] if self.delay is None else self.delay
+        options = {"hold": self.hold, "sample": self.sample}
+        return affine_columns(monic, record.u, record.sample_time, delay, zeros=self.zeros, **options)
 
     def assemble(self, parameters: Mapping[str, float]) -> TransferFunction:
         """The transfer function with these parameters."""
@@ -271,28 +365,51 @@ class TransferFunctionStructure:
         return TransferFunction(
             num=tuple(parameters[f"num[{k}]"] for k in range(self.zeros + 1)),
             den=(1.0, *(parameters[name] for name in self.denominator)),
+            delay=parameters["delay"] if self.delay is None else self.delay,
             hold=self.hold,
             sample=self.sample,
             initial_state=initial_state if any(initial_state) else (),
         )
 
-    def _starts(self, record: Record, lower: FloatArray, upper: FloatArray, *, at_rest: bool) -> FloatArray:
-        """What regressions find on a long record; on a short one the search covers the box by itself."""
-        if len(record) < _LONG:
-            return np.empty((0, lower.size))
-        options = {"hold": self.hold, "sample": self.sample}
-        found = refined_denominators(record, self.poles, self.zeros, at_rest=at_rest, **options)
-        starts = [np.clip(sections(roots, record.sample_time), lower, upper) for roots in found]
-        return np.array(starts).reshape(-1, lower.size)
+    def notes(self, record: Record, model: TransferFunction) -> tuple[str, ...]:
+        """Whether a curve without memory fits as well, and whether the record shows more than one rate."""
+        n_parameters = self.poles + self.zeros + 1 + len(self.free_delay)
+        return notes(record, model.response(record.u, record.sample_time), n_parameters)
 
-    def _denominators(self, x: FloatArray, sample_time: float) -> dict[str, FloatArray]:
+    def _starts(
+        self, record: Record, lower: FloatArray, upper: FloatArray, delay: float | None, *, at_rest: bool
+    ) -> tuple[FloatArray, bool]:
+        """What regressions find on a long record, and whether that is enough; a short one is covered by the search.
+
+        With one delay they have to agree; the best of several delays need not.
+        """
+        if len(record) < _LONG:
+            return np.empty((0, lower.size)), False
+        h = record.sample_time
+        delays = likely_delays(record, lower[-1] * h, upper[-1] * h) if delay is None else [delay]
+        options = {"hold": self.hold, "sample": self.sample}
+        found = guesses(record, self.poles, self.zeros, delays, at_rest=at_rest, **options)
+        starts = np.array([self._coordinates(each, h)[: lower.size] for each in found]).reshape(-1, lower.size)
+        starts = np.clip(starts, lower, upper)
+        if delay is None or len(starts) < _MAJORITY:
+            return starts, len(starts) >= _MAJORITY
+        apart = np.abs(starts - np.median(starts, axis=0))
+        return starts, bool(np.sum((apart < _AGREED * (upper - lower)).all(axis=1)) >= _MAJORITY)
+
+    def _coordinates(self, guess: Guess, sample_time: float) -> FloatArray:
+        return np.append(sections(guess.poles, sample_time), guess.delay / sample_time)
+
+    def _searched(self, x: FloatArray, sample_time: float, delay: float | None) -> dict[str, FloatArray]:
+        """The denominators, and the delay where it is not the structure's own."""
         product = np.ones((len(x), 1))
         for k in range(self.poles // 2):
             frequency, damping = np.exp(x[:, 2 * k]), np.exp(x[:, 2 * k + 1])
             product = _times(product, [np.ones(len(x)), 2.0 * damping * frequency, frequency**2])
         if self.poles % 2:
-            product = _times(product, [np.ones(len(x)), np.exp(x[:, -1])])
-        return {name: product[:, k] / sample_time**k for k, name in enumerate(self.denominator, 1)}
+            product = _times(product, [np.ones(len(x)), np.exp(x[:, self.poles - 1])])
+        found = {name: product[:, k] / sample_time**k for k, name in enumerate(self.denominator, 1)}
+        late = x[:, -1] * sample_time if delay is None else np.full(len(x), delay)
+        return found | dict.fromkeys(self.free_delay, late)
 
 
 def _check_options(hold: str, sample: str) -> None:

@@ -1,0 +1,152 @@
+"""The verb `select`: which of several candidates the data prefer.
+
+Each is identified on the same records, and they are ranked by a criterion that charges for parameters, the least
+first. With V the mean squared residual of N samples and d parameters these are
+
+    BIC = N ln V + d ln N,    AIC = N ln V + 2 d,    FPE = V (1 + d/N) / (1 - d/N),
+
+or the cross-validated rmse. Without noise V is rounding, and none of the first three means anything.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from hysim._frozen import frozen
+from hysim._parallel import Progress
+from hysim.identification._identify import identify
+from hysim.identification._result import Identification
+from hysim.records import Record
+
+CRITERIA = ("bic", "aic", "fpe", "cv_rmse")
+
+
+@frozen
+class Selection:
+    """Candidates that were identified on the same records, ranked.
+
+    Parameters
+    ----------
+    criterion : {"bic", "aic", "fpe", "cv_rmse"}
+        What they are ranked by.
+    name : str
+        The best one's name.
+    fits : mapping
+        Name to `Identification`, the best first.
+    """
+
+    criterion: str
+    name: str
+    fits: Mapping[str, Identification]
+
+    @property
+    def best(self) -> Identification:
+        """The fit of the best candidate."""
+        return self.fits[self.name]
+
+    def to_text(self) -> str:
+        """The table for a terminal, the best first."""
+        header = ["candidate", "parameters", "fit [%]", "rmse", self.criterion]
+        rows = [
+            [
+                name,
+                str(fit.n_parameters),
+                f"{fit.fit_percent:.2f}",
+                f"{fit.rmse:.4g}",
+                f"{getattr(fit, self.criterion):.6g}",
+            ]
+            for name, fit in self.fits.items()
+        ]
+        widths = [max(map(len, column)) for column in zip(header, *rows, strict=True)]
+        lines = [
+            "  ".join([cells[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(cells[1:], widths[1:], strict=True))])
+            for cells in [header, *rows]
+        ]
+        return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])
+
+
+def select(
+    candidates: Mapping[str, Any] | Sequence[Any],
+    record_or_records: Record | Sequence[Record],
+    *,
+    criterion: str = "bic",
+    initial: str | Sequence[str] | None = None,
+    noise: str = "gaussian",
+    cross_validate: str | int | None = None,
+    seed: int = 0,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> Selection:
+    """Identify several candidates, and rank them.
+
+    Parameters
+    ----------
+    candidates : mapping or sequence
+        Name to what `identify` takes: a class, a model as the start, or a structure. Those of a sequence are
+        named by themselves, a class by its name.
+    record_or_records : Record or sequence of Record
+        What they are identified on.
+    criterion : {"bic", "aic", "fpe", "cv_rmse"}
+        What they are ranked by; the last needs `cross_validate`.
+    initial, noise, cross_validate, seed, workers
+        As in `identify`, the same for all.
+    progress : callable, optional
+        Called as ``progress(done, total)`` after each candidate.
+
+    Returns
+    -------
+    Selection
+
+    Raises
+    ------
+    ValueError
+        If there is no candidate, two have one name, the criterion is unknown or not computed, or as `identify`.
+    TypeError
+        If a candidate is not something that can be identified.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> rec = hs.datasets.table1(dwell=1.0)
+    >>> hs.select([hs.Line, hs.SingleValued], rec).name
+    'Line'
+    """
+    if criterion not in CRITERIA:
+        raise ValueError(f"criterion must be one of {', '.join(CRITERIA)}, got {criterion!r}")
+    if criterion == "cv_rmse" and cross_validate is None:
+        raise ValueError('criterion="cv_rmse" needs a cross-validation: cross_validate="loo", or a number of blocks')
+    named = _named(candidates)
+    fits: dict[str, Identification] = {}
+    for name, candidate in named.items():
+        fits[name] = identify(
+            candidate,
+            record_or_records,
+            initial=initial,
+            noise=noise,
+            cross_validate=cross_validate,
+            seed=seed,
+            workers=workers,
+        )
+        if progress is not None:
+            progress(len(fits), len(named))
+
+    def score(name: str) -> float:
+        value = float(getattr(fits[name], criterion))
+        return math.inf if math.isnan(value) else value
+
+    ranked = sorted(fits, key=score)
+    return Selection(criterion=criterion, name=ranked[0], fits={name: fits[name] for name in ranked})
+
+
+def _named(candidates: Mapping[str, Any] | Sequence[Any]) -> dict[str, Any]:
+    if not isinstance(candidates, (Mapping, Sequence)):
+        raise TypeError(f"select takes several candidates, got {type(candidates).__name__}: use identify for one")
+    if isinstance(candidates, Mapping):
+        named = dict(candidates)
+    else:
+        named = {each.__name__ if isinstance(each, type) else str(each): each for each in candidates}
+    if len(named) < len(candidates):
+        raise ValueError("two candidates have one name: give a mapping, name to candidate")
+    if not named:
+        raise ValueError("there is nothing to select from: give at least one candidate")
+    return named

@@ -1,0 +1,63 @@
+"""`select` finds the order behind the noise, and ranks by what it is asked."""
+
+import numpy as np
+import pytest
+
+import hysim as hs
+
+
+def test_the_order_of_a_stiff_plant_is_found_in_noise():
+    true = hs.TransferFunction(num=(-6400.0, 1600.0), den=(1.0, 5.0, 408.0, 416.0, 1600.0))
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.choice([-1.0, 1.0], 60), 20)
+    clean = true.response(u, 0.01)
+    y = clean + rng.standard_normal(u.size) * np.sqrt(np.var(clean) / 10.0)
+    record = hs.Record(u=u, y=y, t=0.01 * np.arange(u.size))
+    done = []
+    choice = hs.select(
+        hs.TransferFunction.structures(poles=range(2, 6), zeros=(1,)), record, progress=lambda *at: done.append(at)
+    )
+    assert choice.name == "4 poles, 1 zero"
+    assert choice.best is choice.fits["4 poles, 1 zero"]
+    assert done == [(k, 4) for k in range(1, 5)]
+    scores = [fit.bic for fit in choice.fits.values()]
+    assert scores == sorted(scores)
+    lines = choice.to_text().splitlines()
+    assert len(lines) == 2 + 4
+    assert lines[0].split()[-1] == "bic"
+    assert lines[2].startswith("4 poles, 1 zero ")
+
+
+def test_candidates_of_unlike_families_are_ranked_by_any_criterion():
+    record = hs.datasets.table1(dwell=1.0)
+    for criterion in ("bic", "aic", "fpe", "cv_rmse"):
+        choice = hs.select([hs.Line, hs.SingleValued], record, criterion=criterion, cross_validate=4)
+        assert set(choice.fits) == {"Line", "SingleValued"}
+        assert getattr(choice.best, criterion) == min(getattr(fit, criterion) for fit in choice.fits.values())
+
+
+def test_structures_are_all_those_below_the_number_of_poles():
+    found = hs.TransferFunction.structures(poles=(1, 2, 3), delays=(0.0, 0.5, "free"), sample="end")
+    assert len(found) == (1 + 2 + 3) * 3
+    assert found["3 poles, 1 zero, delay 0.5 s"].delay == 0.5
+    assert found["1 pole, 0 zeros, free delay"].delay is None
+    assert all(structure.sample == "end" and structure.zeros < structure.poles for structure in found.values())
+
+
+@pytest.mark.parametrize(
+    ("candidates", "options", "message"),
+    [
+        ([], {}, "nothing to select"),
+        ([hs.Line, hs.Line], {}, "one name"),
+        ([hs.Line], {"criterion": "r2"}, "criterion must be"),
+        ([hs.Line], {"criterion": "cv_rmse"}, "needs a cross-validation"),
+    ],
+)
+def test_what_cannot_be_ranked_is_refused(candidates, options, message):
+    with pytest.raises(ValueError, match=message):
+        hs.select(candidates, hs.datasets.table1(), **options)
+
+
+def test_one_candidate_is_no_selection():
+    with pytest.raises(TypeError, match="use identify"):
+        hs.select(hs.Line, hs.datasets.table1())
