@@ -7,20 +7,21 @@ Bias is the median error in standard errors of the record. With the redundant pa
 to say so, and to print no interval.
 """
 
-import csv
-import json
 from concurrent.futures import ProcessPoolExecutor
 from itertools import repeat
 from pathlib import Path
 
 import numpy as np
+from results_folder import write_results
 
 import hysim as hs
-from hysim.plot import Figure, figure, house_style, save_svg
+from hysim.plot import Figure, figure
 
 RESULTS = Path(__file__).parent / "results" / "recovery"
 LEVELS = (0.0, 0.3, 1.0)  # of the noise, in quanta
-LENGTHS = (60, 180)
+RECORDS = {60: 400, 180: 100}
+"""Numbers of samples, and of records with so many."""
+
 Row = dict[str, float | str]
 
 
@@ -104,9 +105,8 @@ def redundant_pair() -> str:
 
 def main(smoke: bool = False) -> list[Row]:
     """Measure, print and write table, figure and result."""
-    n_records, processes = (4, 1) if smoke else (400, 2)
-    lengths, levels = ((60,), (0.3,)) if smoke else (LENGTHS, LEVELS)
-    rows = [row for n in lengths for level in levels for row in coverage(n, level, n_records, processes)]
+    records, levels, processes = ({60: 2}, (0.3,), 1) if smoke else (RECORDS, LEVELS, 2)
+    rows = [row for n, many in records.items() for level in levels for row in coverage(n, level, many, processes)]
     message = redundant_pair()
     for row in rows:
         print(
@@ -116,20 +116,8 @@ def main(smoke: bool = False) -> list[Row]:
         )
     print(f"A and gain both free: {message}")
     if not smoke:
-        write(rows, message)
+        write_results(RESULTS, rows, draw, {"redundant_pair": message})
     return rows
-
-
-def write(rows: list[Row], message: str) -> None:
-    """Table, figure and result."""
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    with (RESULTS / "table.csv").open("w", newline="") as file:
-        table = csv.DictWriter(file, rows[0].keys(), lineterminator="\n")
-        table.writeheader()
-        table.writerows(rows)
-    (RESULTS / "result.json").write_text(json.dumps({"rows": rows, "redundant_pair": message}, indent=1) + "\n")
-    with house_style():
-        save_svg(draw(rows), RESULTS / "figure.svg")
 
 
 def draw(rows: list[Row]) -> Figure:
