@@ -67,8 +67,8 @@ def at_most(workers: int | None) -> Iterator[None]:
 
 
 def _check(workers: int | None) -> None:
-    if workers is not None and workers < 1:
-        raise ValueError(f"workers must be at least 1, got {workers}")
+    if workers is not None and (not isinstance(workers, int) or workers < 1):
+        raise ValueError(f"workers must be an integer of at least 1, got {workers}")
 
 
 @contextmanager

@@ -92,8 +92,8 @@ def identify(
     Raises
     ------
     ValueError
-        If a name or an option is unknown, the record is too short for the parameters, its input is constant, or
-        it has no resolution for quantised noise.
+        If a name or an option is unknown, nothing is free, the record is too short for the parameters, its input
+        is constant, or it has no resolution for quantised noise.
     TypeError
         If the first argument is not something that can be identified.
 
@@ -109,8 +109,12 @@ def identify(
     family, records = _family(model_or_class), _records(record_or_records)
     if intervals not in ("linear", "profile", "bootstrap"):
         raise ValueError(f'intervals must be "linear", "profile" or "bootstrap", got {intervals!r}')
+    if not isinstance(seed, (int, np.integer)) or seed < 0:
+        raise ValueError(f"seed must be an integer from 0 on, got {seed!r}")
     with at_most(workers):
-        whole = problem(family, records, Freedom(fixed or {}, tuple(free), bounds or {}), initial)
+        whole = problem(family, records, _freedom(fixed or {}, free, bounds or {}), initial)
+        if not whole.space.names:
+            raise ValueError("every parameter is fixed: nothing is left to identify")
         if whole.y.size < len(whole.space.names):
             raise ValueError(
                 f"{whole.y.size} samples cannot tell {len(whole.space.names)} parameters: fix some of them"
@@ -141,6 +145,18 @@ def _records(given: Record | Sequence[Record]) -> tuple[Record, ...]:
     if not records:
         raise ValueError("there is no record to identify from")
     return tuple(records)
+
+
+def _freedom(
+    fixed: Mapping[str, float], free: Sequence[str], bounds: Mapping[str, tuple[float, float]]
+) -> Freedom:
+    for name, value in fixed.items():
+        if not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
+            raise ValueError(f"fixed must hold finite numbers, got {value!r} for {name!r}")
+    for name, pair in bounds.items():
+        if np.shape(pair) != (2,):
+            raise ValueError(f"bounds of {name!r} must be (lower, upper), got {pair!r}")
+    return Freedom(fixed, (free,) if isinstance(free, str) else tuple(free), bounds)
 
 
 def _family(model_or_class: Any) -> Identifiable:
@@ -427,6 +443,8 @@ def _phrases(
     """How the search ended, and what the data cannot tell."""
     phrases = ["converged" if converged else "the search did not converge", *known.reasons]
     inputs = [part.record.u for part in whole.parts]
+    if not any(np.ptp(part.record.y) for part in whole.parts):
+        phrases.append("the output is constant: nothing shows how it depends on the input")
     if all((np.diff(u) >= 0.0).all() or (np.diff(u) <= 0.0).all() for u in inputs):
         phrases.append("the input never turns back: nothing shows what unloading does")
     for name, curve in curves.items():

@@ -223,7 +223,7 @@ def problem(
 
 def _kinds(initial: str | Sequence[str] | None, n: int) -> list[str | None]:
     """What is known of the state at the first sample of each record; None where the family's default holds."""
-    kinds: list[str | None] = [initial] * n if initial is None or isinstance(initial, str) else list(initial)
+    kinds: list[Any] = list(initial) if isinstance(initial, (list, tuple)) else [initial] * n
     if len(kinds) != n:
         raise ValueError(f"initial must be one word, or one for each of the {n} records, got {initial!r}")
     for kind in kinds:

@@ -76,9 +76,8 @@ class _Ends:
     def move_in(self, which: npt.NDArray[np.intp], values: FloatArray, root: FloatArray, theta: FloatArray) -> None:
         """Inner values, farther out than the ones before."""
         gone, whole = values - self.inside[which], values - self.origin[which]
-        slope = (theta - self.theta[which]) / gone[:, np.newaxis]
         far = np.abs(gone) > 0.1 * np.abs(whole)  # of neighbours the difference is that of how far each descended
-        self.slope[which[far]] = slope[far]
+        self.slope[which[far]] = (theta[far] - self.theta[which[far]]) / gone[far, np.newaxis]
         self.inside[which], self.r_inside[which], self.theta[which] = values, root, theta
         self.doubtful[which] = np.isfinite(self.outside[which]) & (self.outside[which] != values)
         self.outside[which] = np.where(self.doubtful[which], self.outside[which], np.nan)

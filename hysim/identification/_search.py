@@ -49,6 +49,8 @@ def optima(problem: Problem, *, seed: int, progress: Progress | None = None) -> 
     candidates = np.concatenate([space.starts, _uniform(space, screened, seed)])
     n_starts = max(16, round(N_DESCENDING * share))
     starts = _apart(space, candidates, problem.costs(candidates), _APART, n_starts, len(space.starts))
+    if not len(starts):
+        return []
     reached = _descended(problem, starts, scale, exact=False)
     x, cost = reached.theta[:, : space.lower.size], reached.loss
     best = _apart(space, x, cost, _SAME, N_POLISHED)

@@ -5,8 +5,8 @@ loss in the model's output (1/sigma^2 for normal noise), and G = d(the user's pa
 
     cov = N / (N - d) G (J^T W J)^-1 G^T.
 
-A coordinate at a side of its box is taken as known; it and a direction along which the output does not change have
-no standard error. The condition number is that of W^(1/2) J with columns of length one.
+A coordinate at a side of its box is taken as known, where the output depends on it; it and a direction along which
+the output does not change have no standard error. The condition number is that of W^(1/2) J with columns of length one.
 """
 
 from dataclasses import dataclass
@@ -44,11 +44,16 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
     slopes, way_back = output_slopes(problem, theta), named_slopes(problem, theta[np.newaxis])[0]
     if not np.isfinite(slopes).all():
         return _unknown(problem, theta, "no standard errors: the output is not finite beside the optimum")
-    x = theta[: len(space.coordinates)]
-    margin = _AT_SIDE * (space.upper - space.lower)
-    at_side = (x - space.lower < margin) | (space.upper - x < margin)
-    reasons = [f"{name} is at a side of its box" for name, side in zip(space.coordinates, at_side, strict=True) if side]
-    known = np.concatenate([at_side, np.zeros(len(space.linear), dtype=bool)])
+    x, linear = np.split(theta, [len(space.coordinates)])
+    width = space.upper - space.lower
+    at_side = (x - space.lower < _AT_SIDE * width) | (space.upper - x < _AT_SIDE * width)
+    at_bound = np.logical_or(*(linear == bound for bound in problem.linear_box()))
+    ended = zip((*space.coordinates, *space.linear), np.concatenate([at_side, at_bound]), strict=True)
+    reasons = [f"{name} is at a side of its box" for name, side in ended if side]
+    reach = np.linalg.norm(slopes[:, : x.size], axis=0) * width
+    felt = reach > _SINGULAR * reach.max(initial=0.0)
+    known = np.concatenate([at_side & felt, np.zeros(linear.size, dtype=bool)])
+    slopes[:, : x.size][:, at_side & ~felt] = 0.0
     scaled, way_back = np.where(known, 0.0, slopes) * np.sqrt(curvature)[:, np.newaxis], np.where(known, 0.0, way_back)
     norms = np.linalg.norm(scaled, axis=0)
     norms[norms == 0.0] = 1.0

@@ -65,6 +65,8 @@ def search_space(
     at_rest = ("z0",) if freedom.starts_at_rest() else ()
     held = freedom.held(defaults, redundant=(*REDUNDANT, *alike), at_rest=at_rest)
     bounds = freedom.limits(defaults, held)
+    if held.get("n", 1.0) <= 0.0:
+        raise ValueError(f"n must be positive, got {held['n']}")
     if "n" in bounds and not (bounds["n"][0] >= 0.0 and (bounds["n"][0] > 0.0 or np.isinf(bounds["n"][1]))):
         raise ValueError(f"bounds of 'n' must be positive, got {bounds['n']}")
     signs = {name: pair for name, pair in bounds.items() if name in _MEMORY and np.isinf(pair).any()}

@@ -260,7 +260,7 @@ class MemoryLaw(ABC):
                     break
                 secant = z0 - drift * (z0 - before) / (drift - drift_before)
             before, drift_before, z0 = z0, drift, np.where(np.isfinite(secant), secant, z0 + drift)
-        return {"z0": z0}
+        return {"z0": np.where(np.isfinite(z0), z0, np.nan)}
 
     def assemble(self, parameters: Mapping[str, float]) -> Self:
         """The law with these parameters, one number for each name."""

@@ -1,0 +1,143 @@
+"""Data that cannot tell end in one clear line, or in a result that says what they cannot tell."""
+
+import numpy as np
+import pytest
+
+import hysim as hs
+
+LOOP = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=40)
+RISE = np.linspace(0.0, 1.0, 30)
+KINDS = ("linear", "profile", "bootstrap")
+
+
+@pytest.fixture(scope="module")
+def table1() -> hs.Record:
+    return hs.datasets.table1()
+
+
+def test_numbers_that_are_not_finite_are_named_by_their_sample():
+    with pytest.raises(ValueError, match="y must be finite, got nan at index 1"):
+        hs.Record(u=[0.0, 1.0, 2.0], y=[0.0, np.nan, 1.0])
+    with pytest.raises(ValueError, match="u must be finite, got inf at index 2"):
+        hs.Record(u=[0.0, 1.0, np.inf], y=[0.0, 1.0, 1.0])
+
+
+@pytest.mark.parametrize("family", [hs.BoucWen, hs.PolynomialBoucWen, hs.Line, hs.Play, hs.PrandtlIshlinskii])
+def test_a_constant_input_is_refused(family):
+    with pytest.raises(ValueError, match="the input is constant"):
+        hs.identify(family, hs.Record(u=np.ones(20), y=np.arange(20.0)))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("family", "untold"), [(hs.BoucWen, "beta gamma z0"), (hs.Play, "threshold z0"), (hs.Line, "")])
+def test_a_constant_output_is_said_and_tells_nothing_of_the_memory(family, untold, kind):
+    held = {"n": 1.0} if family is hs.BoucWen else {}
+    for level in (0.0, 1.0):
+        fit = hs.identify(family, hs.Record(u=LOOP, y=np.full(LOOP.size, level)), fixed=held, intervals=kind)
+        assert "the output is constant" in fit.message
+        assert fit.rmse < 1e-14
+        assert fit.estimates["offset"] == pytest.approx(level, abs=1e-14)
+        for name in untold.split():
+            assert np.isnan([fit.stderr[name], *fit.intervals[name]]).all()
+
+
+def test_too_few_samples_are_counted(table1):
+    with pytest.raises(ValueError, match="5 samples cannot tell 7 parameters: fix some of them"):
+        hs.identify(hs.BoucWen, table1[:5])
+    with pytest.raises(ValueError, match="2 samples cannot tell 4 parameters"):
+        hs.identify(hs.Play, hs.Record(u=[0.0, 1.0], y=[0.0, 1.0]))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("noise", ["gaussian", "quantised", "robust"])
+def test_as_many_samples_as_parameters_leave_no_standard_error(kind, noise):
+    two = hs.Record(u=[0.0, 1.0], y=[0.0, 1.0], resolution=0.1)
+    fit = hs.identify(hs.Line, two, intervals=kind, noise=noise)
+    assert fit.estimates["slope"] == pytest.approx(1.0)
+    assert np.isnan([*fit.stderr.values(), *fit.intervals["slope"], fit.fpe, fit.bic]).all()
+    assert "no standard errors: 2 samples for 2 parameters" in fit.message
+
+
+@pytest.mark.parametrize("family", [hs.BoucWen, hs.PolynomialBoucWen])
+def test_loading_alone_tells_nothing_of_unloading(family):
+    fit = hs.identify(family, hs.Record(u=RISE, y=np.tanh(RISE)), fixed={"n": 2.0, "z0": 0.0})
+    assert "the input never turns back" in fit.message
+    assert "cannot tell beta, gamma apart" in fit.message
+    assert np.isnan([fit.stderr["beta"], fit.stderr["gamma"]]).all()
+    assert fit.model.beta + fit.model.gamma == pytest.approx(1.0, abs=1e-6)  # tanh' = 1 - tanh^2
+
+
+@pytest.mark.parametrize(("of_u", "of_y"), [(1e-6, 1.0), (1e6, 1.0), (1.0, 1e-6), (1.0, 1e6)])
+def test_wrong_units_do_not_change_the_fit(table1, of_u, of_y):
+    scaled = hs.Record(u=of_u * table1.u, y=of_y * table1.y)
+    fit, plain = (hs.identify(hs.BoucWen, rec, fixed={"n": 1.0}) for rec in (scaled, table1))
+    assert fit.fit_percent == pytest.approx(plain.fit_percent, abs=1e-6)
+    for name, scale in (("gain", of_y / of_u), ("beta", 1.0 / of_u), ("z0", of_u), ("offset", of_y)):
+        assert fit.estimates[name] == pytest.approx(plain.estimates[name] * scale, rel=1e-3)
+        assert fit.stderr[name] == pytest.approx(plain.stderr[name] * scale, rel=1e-3)
+
+
+def test_values_beyond_all_units_are_refused(table1):
+    for family in (hs.Line, hs.BoucWen):
+        with pytest.raises(ValueError, match="no law in the box stays finite on this record: check its units"):
+            hs.identify(family, hs.Record(u=table1.u, y=1e200 * table1.y))
+
+
+def test_a_large_offset_of_the_input_is_borne_by_the_output_offset(table1):
+    plain, moved = (
+        hs.identify(hs.BoucWen, hs.Record(u=table1.u + by, y=table1.y), fixed={"n": 1.0}) for by in (0.0, 1e5)
+    )
+    assert moved.fit_percent == pytest.approx(plain.fit_percent, abs=1e-6)
+    for name in ("beta", "gamma", "gain", "z0"):
+        # the slope's column differs from the offset's by 1e-3: the standard errors lose these digits
+        assert moved.estimates[name] == pytest.approx(plain.estimates[name], rel=1e-3)
+        assert moved.stderr[name] == pytest.approx(plain.stderr[name], rel=0.01)
+
+
+def test_samples_that_are_there_twice_change_no_estimate(table1):
+    twice = np.repeat(np.arange(len(table1)), 2)
+    fit, plain = (
+        hs.identify(hs.BoucWen, rec, fixed={"n": 1.0})
+        for rec in (hs.Record(u=table1.u[twice], y=table1.y[twice]), table1)
+    )
+    assert fit.fit_percent == pytest.approx(plain.fit_percent, abs=1e-6)
+    assert fit.estimates["beta"] == pytest.approx(plain.estimates["beta"], rel=1e-3)
+    assert fit.whiteness < 1e-3  # which says that these are not independent
+
+
+@pytest.mark.parametrize("noise", ["gaussian", "quantised", "robust"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_perfect_line_has_intervals_of_no_width_or_none(noise, kind):
+    fit = hs.identify(hs.Line, hs.Record(u=LOOP, y=3.0 * LOOP, resolution=0.05), noise=noise, intervals=kind)
+    assert fit.estimates["slope"] == pytest.approx(3.0, abs=1e-12)
+    lower, upper = fit.intervals["slope"]
+    assert np.isnan([lower, upper]).all() or upper - lower < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        ({"noise": "quantized"}, ValueError, 'noise must be "gaussian", "quantised" or "robust", got \'quantized\''),
+        ({"intervals": "profiles"}, ValueError, "intervals must be .* got 'profiles'"),
+        ({"initial": "periodc"}, ValueError, "initial must be .* got 'periodc'"),
+        ({"cross_validate": "lou"}, ValueError, "cross_validate must be .* got 'lou'"),
+        ({"cross_validate": True}, ValueError, "cross_validate must be .* got True"),
+        ({"workers": 0}, ValueError, "workers must be an integer of at least 1, got 0"),
+        ({"workers": 1.5}, ValueError, "workers must be an integer of at least 1, got 1.5"),
+        ({"seed": -1}, ValueError, "seed must be an integer from 0 on, got -1"),
+        ({"seed": "a"}, ValueError, "seed must be an integer from 0 on, got 'a'"),
+        ({"bounds": {"slope": 3.0}}, ValueError, r"bounds of 'slope' must be \(lower, upper\), got 3.0"),
+        ({"fixed": {"slope": np.nan}}, ValueError, "fixed must hold finite numbers, got nan for 'slope'"),
+        ({"fixed": {"slope": "a"}}, ValueError, "fixed must hold finite numbers, got 'a' for 'slope'"),
+        ({"fixed": {"slope": 1.0, "offset": 0.0}}, ValueError, "every parameter is fixed"),
+    ],
+)
+def test_what_is_asked_wrongly_is_named(table1, options, error, message):
+    with pytest.raises(error, match=message):
+        hs.identify(hs.Line, table1, **options)
+
+
+@pytest.mark.parametrize("n", [0.0, -1.0])
+def test_an_exponent_that_is_not_positive_is_refused(table1, n):
+    with pytest.raises(ValueError, match="n must be positive"):
+        hs.identify(hs.BoucWen, table1, fixed={"n": n})
