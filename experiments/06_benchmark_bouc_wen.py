@@ -176,7 +176,7 @@ def draw(rows: list[Row]) -> Figure:
     ax.set_yticks(range(len(lines)), [str(line["method"]) for line in lines])
     ax.invert_yaxis()
     ax.set(xlabel="Root mean square error on the test [m]", title="Bouc-Wen benchmark: clean test data")
-    ax.legend(loc="center")
+    ax.legend(loc="lower right")
     return canvas
 
 

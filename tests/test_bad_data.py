@@ -29,7 +29,9 @@ def test_a_constant_input_is_refused(family):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(("family", "untold"), [(hs.BoucWen, "beta gamma z0"), (hs.Play, "threshold z0"), (hs.Line, "")])
+@pytest.mark.parametrize(
+    ("family", "untold"), [(hs.BoucWen, "beta gamma z0"), (hs.Play, "threshold z0"), (hs.Line, "")]
+)
 def test_a_constant_output_is_said_and_tells_nothing_of_the_memory(family, untold, kind):
     held = {"n": 1.0} if family is hs.BoucWen else {}
     for level in (0.0, 1.0):

@@ -190,7 +190,7 @@ def escapes(w: float, forcing: float, c: float, n: float, length: float) -> bool
     if c >= 0.0 or n <= 1.0:
         return False
     growth = -c * w**n
-    return growth > 2.0 * forcing and 2.0 * w < (n - 1.0) * growth * length
+    return bool(growth > 2.0 * forcing and 2.0 * w < (n - 1.0) * growth * length)
 
 
 @kernel
