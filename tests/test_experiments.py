@@ -85,3 +85,27 @@ def test_transfer_functions_come_as_near_as_the_noise_allows():
         assert abs(row["median_fit"] - row["bound_median_fit"]) < 0.25 * (100.0 - row["bound_median_fit"])
         # four sampling errors of a standard deviation from 200 draws
         assert 0.8 < row["lowest_spread_over_stderr"] <= row["highest_spread_over_stderr"] < 1.2
+
+
+def test_the_readme_quotes_the_identifications():
+    folder = EXPERIMENTS[0].parent
+    results = {
+        name: json.loads((folder / "results" / name / "result.json").read_text())
+        for name in ("benchmark_bouc_wen", "transfer_functions", "table1_models", "recovery")
+    }
+    readme = " ".join((folder.parent / "README.md").read_text().split())
+    known = results["benchmark_bouc_wen"]["summary"][0]
+    assert f"the test error is at most {known['multisine']:.1e} m on the multisine and {known['sweep']:.1e} m" in readme
+    assert f"in {known['parameters_reached']:.0f} of 5 seeds" in readme
+    _, ten, one = results["transfer_functions"]["rows"]
+    assert f"is {ten['median_fit']:.2f} % at SNR 10 and {one['median_fit']:.2f} % at SNR 1" in readme
+    assert f"allows {ten['bound_median_fit']:.2f} % and {one['bound_median_fit']:.2f} %" in readme
+    best = results["table1_models"]["rows"][0]
+    assert f"fits {best['fit_percent']:.2f} % with {best['parameters']} parameters" in readme
+    assert f"leave-one-out rmse of {1e3 * best['loo_rmse']:.0f} nm" in readme
+    profile = [
+        row["coverage_percent"]
+        for row in results["recovery"]["rows"]
+        if (row["kind"], row["records"]) == ("profile", 400) and row["noise_in_quanta"] > 0.0
+    ]
+    assert f"hold the truth in {min(profile):.0f} to {max(profile):.0f} % of 400 records" in readme

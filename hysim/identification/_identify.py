@@ -77,7 +77,8 @@ def identify(
         likelihood, or from 500 records drawn anew.
     cross_validate : {None, "loo", "cycles", "records"} or int, optional
         ``"loo"`` leaves one output sample out at a time, an int one of that many blocks of samples, ``"cycles"``
-        a cycle of the input, ``"records"`` a record; the input is kept. Fills `Identification.cv_rmse`.
+        a cycle of the input (not the first, which tells the state), ``"records"`` a record; the input is kept.
+        Fills `Identification.cv_rmse`.
     seed : int
         Of the starts of the search, and of what is drawn. The optimum does not depend on it.
     workers : int, optional
@@ -147,9 +148,7 @@ def _records(given: Record | Sequence[Record]) -> tuple[Record, ...]:
     return tuple(records)
 
 
-def _freedom(
-    fixed: Mapping[str, float], free: Sequence[str], bounds: Mapping[str, tuple[float, float]]
-) -> Freedom:
+def _freedom(fixed: Mapping[str, float], free: Sequence[str], bounds: Mapping[str, tuple[float, float]]) -> Freedom:
     for name, value in fixed.items():
         if not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
             raise ValueError(f"fixed must hold finite numbers, got {value!r} for {name!r}")
@@ -203,14 +202,14 @@ def _left_out(cross_validate: str | int | None, whole: Problem) -> list[npt.NDAr
 
 
 def _cycles(whole: Problem) -> list[npt.NDArray[np.intp]]:
-    """The samples between every second turning point of each record's input."""
-    ends = [
-        begin + part.record.reversals(TOLERANCE)[1::2] for part, begin in zip(whole.parts, whole.cuts, strict=False)
-    ]
-    cuts = np.unique(np.concatenate([whole.cuts[1:-1], *ends])).astype(int)
-    if not cuts.size:
+    """The samples between every second turning point of each record's input, but the first, which tell its state."""
+    left_out = []
+    for part, begin in zip(whole.parts, whole.cuts, strict=False):
+        cuts = part.record.reversals(TOLERANCE)[1::2]
+        left_out += [begin + samples for samples in np.split(np.arange(len(part.record)), cuts)[1:]]
+    if not left_out:
         raise ValueError('cross_validate="cycles" needs at least 2 cycles of the input')
-    return np.split(np.arange(whole.y.size), cuts)
+    return left_out
 
 
 @dataclass(frozen=True)
