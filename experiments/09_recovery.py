@@ -97,7 +97,7 @@ def coverage(n_samples: int, noise: float, n_records: int, processes: int) -> li
 def redundant_pair() -> str:
     """What the result says of A and gain, both free."""
     _, record = random_record(60, 0.3, 0)
-    fit = hs.identify(hs.BoucWen, record, free=("A",), noise="quantised", intervals="profile")
+    fit = hs.identify(hs.BoucWen, record, free=("A", "gain"), noise="quantised", intervals="profile")
     if not all(np.isnan(fit.intervals[name]).all() for name in ("A", "gain")):
         raise RuntimeError("an interval is printed for a parameter that the data cannot tell")
     return fit.message
