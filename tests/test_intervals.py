@@ -132,6 +132,21 @@ def test_a_redundant_pair_has_no_numbers_but_words(kind):
     assert fit.condition > 1e7
 
 
+def test_a_bootstrap_of_data_that_rounding_alone_disturbs_is_not_trusted():
+    quantum = 0.1
+    rounded = hs.Record(u=INPUT, y=quantum * np.round(LAW.response(INPUT) / quantum), resolution=quantum)
+    drawn, profile = (
+        hs.identify(LAW, rounded, fixed={"n": 1.0, "z0": 0.0}, noise="quantised", intervals=kind)
+        for kind in ("bootstrap", "profile")
+    )
+    assert "ask for profiles" in drawn.message
+    assert "ask for profiles" not in profile.message
+    for name in profile.free_names:
+        lower, upper = profile.intervals[name]
+        assert lower < getattr(LAW, name) < upper
+        assert upper - lower > np.ptp(drawn.intervals[name])
+
+
 def test_one_of_a_redundant_pair_can_be_chosen():
     fit = hs.identify(LAW, noisy(), free=("A",), fixed={"n": 1.0})
     assert "A" in fit.free_names

@@ -29,6 +29,7 @@ LEVEL = 0.95
 TAILS = (0.025, 0.975)
 N_BOOTSTRAP = 500
 _SAME = 1e-6  # relative difference of two costs that are the same
+_FAINT = 0.3  # quanta: noise below does not spread the rounding
 _EXACT = 100.0  # smallest sigmas: below, nothing is left to explain
 
 
@@ -345,6 +346,8 @@ class _Search:
         x, linear = np.split(best.theta, [len(whole.space.coordinates)])
         models = tuple(whole.family.assemble(whole.estimates(x, linear, k)) for k in range(len(whole.parts)))
         notes = whole.family.notes(first, chosen.model) if hasattr(whole.family, "notes") else ()
+        if len(draws) and isinstance(self.noise, Quantised) and best.sigma < _FAINT * self.noise.quantum:
+            notes = ("noise this far below the quantum hardly changes a record drawn anew: ask for profiles", *notes)
         return Identification(
             model=chosen.model,
             models=models,

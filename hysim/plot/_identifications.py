@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from hysim import metrics
 from hysim._frozen import FloatArray
 from hysim.identification import Identification
 from hysim.plot._style import GUIDE, MEASURED, POINTS, AxesArray, label, line, printed, several
@@ -54,6 +55,9 @@ def identification(
     u, y = (np.concatenate([getattr(each, name) for each in records]) for name in ("u", "y"))
     if u.size != fit.residual.size:
         raise ValueError(f"the result is of {fit.residual.size} samples, the record has {u.size}")
+    percent = metrics.fit_percent(y, y - fit.residual)
+    if not np.isclose(percent, fit.fit_percent, rtol=1e-6, equal_nan=True):
+        raise ValueError(f"the result is of another record: its fit is {fit.fit_percent:g} %, not {percent:g} %")
     cuts = np.cumsum([len(each) for each in records])[:-1]
     with several(axes, 3 if fit.profiles else 2, height=3.0, sharex=False) as panels:
         _loop(panels[0], u, y, fit, cuts.tolist(), records[0])
