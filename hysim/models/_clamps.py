@@ -192,10 +192,12 @@ class ClampLaw(ABC):
 
         Parameters
         ----------
-        direction, u : array
-            Velocity u' or its sign, not zero, and input.
+        direction : array
+            Velocity u' or its sign, not zero.
         z : array, shape (..., n_plays)
             Positions as `memory` gives them; without the last axis for a single play or stop.
+        u : array
+            Input, broadcast against the direction.
 
         Returns
         -------
@@ -231,7 +233,7 @@ class ClampLaw(ABC):
     def limit_cycle(self, amplitude: float) -> LimitCycle:
         """Steady loop between the inputs -amplitude and amplitude, about the offset.
 
-        A play of threshold r < X goes to and fro between -(X - r) and X - r. So with the amplitude X
+        A play of threshold r < X goes to and fro between -(X - r) and X - r. So with the amplitude X ::
 
             peak      = c X + sum v (X - r)         mid_width = 2 |sum v min(r, X - r)|
             energy    = -4 sum v r (X - r)          over the plays with r < X

@@ -37,11 +37,13 @@ class GeneralizedBoucWen(SteppedLaw):
 
     Parameters
     ----------
-    A, beta, gamma, n, gain, offset, z0 : float
+    A, beta, gamma, n : float
         As in `BoucWen`; beta is their beta_1, and theirs has no gamma.
     b2, b3, b4, b5, b6 : float
         Their beta_2 to beta_6 [unit of z^(1-n) / unit of u]. The loop is symmetric about its centre if b4, b5
         and b6 are zero.
+    gain, offset, z0 : float
+        As in `BoucWen`.
     input_coefficients : sequence of float
         (c1, c2, ...) [unit of y / (unit of u)^k]; c1 is the feedthrough. Their number is the degree that
         `identify` fits.

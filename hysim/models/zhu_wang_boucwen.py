@@ -37,11 +37,13 @@ class ZhuWangBoucWen(SteppedLaw):
 
     Parameters
     ----------
-    A, beta, gamma, n, gain, offset, z0 : float
+    A, beta, gamma, n : float
         As in `BoucWen`.
     delta : float
         What the slope of z gains on the way up, and loses on the way down, for each unit of u
         [unit of z / (unit of u)^2]; zero is the Bouc-Wen law. An input that is shifted has another loop.
+    gain, offset, z0 : float
+        As in `BoucWen`.
     input_coefficients : sequence of float
         (c1, c2, ...) [unit of y / (unit of u)^k]; c1 is the feedthrough. Their number is the degree that
         `identify` fits.
