@@ -90,19 +90,20 @@ def prepare(A: float, beta: float, gamma: float, n: float, last_n: float, work: 
     """Make `work`, shape (N_WORK,), ready for a law; it has been ready for the exponent `last_n`."""
     if n == 1.0 or n == 2.0:
         return
-    prepare_side(A, beta + gamma, n, work[_LOADING:])
-    prepare_side(A, beta - gamma, n, work[_UNLOADING:])
+    prepare_side(A, beta + gamma, n, _LOADING, work)
+    prepare_side(A, beta - gamma, n, _UNLOADING, work)
     if n != last_n:
         prepare_exponent(n, work)
 
 
 @inner
-def prepare_side(A: float, c: float, n: float, side: FloatArray) -> None:
+def prepare_side(A: float, c: float, n: float, side: int, work: FloatArray) -> None:
     """Fill w*, 1/w* and |A|/w*; they are 0 where one of the terms vanishes, or w* is not a number of this size."""
-    side[0] = side[1] = side[2] = 0.0
+    balance = inverse = rate = 0.0
     if A != 0.0 and c != 0.0 and abs(math.log(abs(A)) - math.log(abs(c))) < _EXTREME * min(n, 1.0):
-        side[0] = abs(A / c) ** (1.0 / n)
-        side[1], side[2] = 1.0 / side[0], abs(A) / side[0]
+        balance = abs(A / c) ** (1.0 / n)
+        inverse, rate = 1.0 / balance, abs(A) / balance
+    work[side], work[side + 1], work[side + 2] = balance, inverse, rate
 
 
 # ---------------------------------------------------------------------------------- path and batch

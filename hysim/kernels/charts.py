@@ -60,8 +60,8 @@ def prepare_exponent(n: float, work: FloatArray) -> None:
     """Fill `work`, shape (N_WORK,), from FREE on with what all charts of an exponent share, and forget its cells."""
     for k in range(8):
         work[_ZERO_THERE + k] = 1.0 / ((k + 1) * n + 1.0)
-    zero_back(n, work[_ZERO_BACK:], work[_SPARE:])
-    saturation(n, work[_SATURATION_THERE:], work[_SATURATION_BACK:], work[_SPARE:])
+    zero_back(n, work)
+    saturation(n, work)
     w_zero = _ZERO ** (1.0 / n)
     half = _SATURATION / max(n, 1.0)
     work[_W_ZERO], work[_W_LOW], work[_W_HIGH] = w_zero, 1.0 - half, 1.0 + half
@@ -72,67 +72,68 @@ def prepare_exponent(n: float, work: FloatArray) -> None:
         x = _ZERO if side == 0 else -_ZERO
         work[_VISITED + side] = 0.0
         work[_T_ZERO + side] = w_zero + w_zero * x * sum8(work, _ZERO_THERE, x)
-        work[_LAST_CELL + side] = edges(n, side, w_zero, 1.0 - half, work[_EDGES + side * (_N_CELLS + 1) :]) - 1.0
+        work[_LAST_CELL + side] = edges(n, side, w_zero, 1.0 - half, work) - 1.0
     for i in range(2 * _N_CELLS):
         work[_CELLS + i * _CELL + _CENTRE] = 0.0
 
 
 @inner
-def zero_back(n: float, v: FloatArray, power: FloatArray) -> None:
-    """Fill v_1 to v_8 of w = T (1 + v_1 y + ...), with `power` for the coefficients of v^n."""
-    power[0] = 1.0
+def zero_back(n: float, work: FloatArray) -> None:
+    """Fill v_1 to v_8 of w = T (1 + v_1 y + ...), with the spare room for the coefficients of v^n."""
+    work[_SPARE] = 1.0
     for k in range(1, 9):
-        v[k - 1] = -power[k - 1] / (1.0 + k * n)
+        work[_ZERO_BACK + k - 1] = -work[_SPARE + k - 1] / (1.0 + k * n)
         convolution = 0.0
         for j in range(1, k + 1):
-            convolution += (j * (n + 1.0) - k) * v[j - 1] * power[k - j]
-        power[k] = convolution / k
+            convolution += (j * (n + 1.0) - k) * work[_ZERO_BACK + j - 1] * work[_SPARE + k - j]
+        work[_SPARE + k] = convolution / k
 
 
 @inner
-def saturation(n: float, there: FloatArray, back: FloatArray, spare: FloatArray) -> None:
+def saturation(n: float, work: FloatArray) -> None:
     """Fill both series of the chart of saturation.
 
     With e' = -n e f(e), f = 1 + f_1 e + ...: S'(e)/S = 1/(e f), so (e S')(f) = S; and S e'(S) = e f(e).
     """
     scale = max(n, 1.0)
-    f, bracket = spare[: N_TERMS + 1], spare[N_TERMS + 1 :]
     # (1 - (1 - e/m)^n) m / (n e): each term follows from the last
-    f[0] = 1.0
+    work[_SPARE] = 1.0
     for k in range(1, N_TERMS):
-        f[k] = f[k - 1] * (k - n) / ((k + 1) * scale)
-    there[0] = 1.0
+        work[_SPARE + k] = work[_SPARE + k - 1] * (k - n) / ((k + 1) * scale)
+    work[_SATURATION_THERE] = 1.0
     for k in range(1, N_TERMS):
         total = 0.0
         for j in range(k):
-            total += (j + 1) * there[j] * f[k - j]
-        there[k] = -total / k
+            total += (j + 1) * work[_SATURATION_THERE + j] * work[_SPARE + k - j]
+        work[_SATURATION_THERE + k] = -total / k
     # b = (1 - e/m)^n as a series in S, from (1 - e/m) b' = -(n/m) e' b; then S e' = (m/n) (1 - b)
-    back[0], bracket[0], bracket[1] = 1.0, 1.0, -n / scale
+    work[_SATURATION_BACK], work[_SPARE], work[_SPARE + 1] = 1.0, 1.0, -n / scale
     for k in range(2, N_TERMS + 1):
         # the coefficient k of b holds -(n/m) e_k, which S e' = (m/n)(1 - b) then determines
         total = 0.0
         for j in range(1, k):
-            total += (j * (n + 1.0) - k) * (-back[j - 1] / scale) * bracket[k - j]
-        back[k - 1] = -(scale / n) * (total / k) / (k - 1.0)
-        bracket[k] = total / k - n / scale * back[k - 1]
+            total += (j * (n + 1.0) - k) * (-work[_SATURATION_BACK + j - 1] / scale) * work[_SPARE + k - j]
+        work[_SATURATION_BACK + k - 1] = -(scale / n) * (total / k) / (k - 1.0)
+        work[_SPARE + k] = total / k - n / scale * work[_SATURATION_BACK + k - 1]
 
 
 @inner
-def edges(n: float, side: int, bottom: float, top: float, out: FloatArray) -> int:
+def edges(n: float, side: int, bottom: float, top: float, work: FloatArray) -> int:
     """Fill the edges of a line of cells, upwards from `bottom`, for sigma = 1 to `top`; the number of cells."""
-    out[0] = bottom
+    first = _EDGES + side * (_N_CELLS + 1)
+    work[first] = below = bottom
     ratio = _REACH / max(n, 1.0)
     for i in range(_N_CELLS):
-        half = out[i] * ratio / (1.0 - ratio)
+        half = below * ratio / (1.0 - ratio)
         if side == 0:
             half = 0.0
             for _ in range(3):  # h = reach * distance(w + h) contracts by 1/8 each time
-                half = _REACH * distance(out[i] + half, n)
-        out[i + 1] = out[i] + 2.0 * half
-        if side == 0 and out[i + 1] >= top:
-            out[i + 1] = top
+                half = _REACH * distance(below + half, n)
+        below += 2.0 * half
+        if side == 0 and below >= top:
+            work[first + i + 1] = top
             return i + 1
+        work[first + i + 1] = below
     return _N_CELLS
 
 

@@ -13,20 +13,21 @@ Where H changes its sign, the rest of the way is gone from H = 0 with the other 
 import math
 from fractions import Fraction
 
+from hysim._frozen import read_only
 from hysim.kernels._compile import inlined, inner
 from hysim.kernels.polynomials import N_TERMS, sum16
 
 
-def _tangent_series() -> tuple[float, ...]:
+def _tangent_series() -> list[float]:
     """Coefficients of tanh(sqrt(y)) / sqrt(y) in powers of y, from T' = 1 - T^2."""
     c = [Fraction(1)]
     for k in range(1, N_TERMS):
         c.append(-sum((c[j] * c[k - 1 - j] for j in range(k)), Fraction(0)) / (2 * k + 1))
-    return tuple(float(value) for value in c)
+    return [float(value) for value in c]
 
 
-_DECAY = tuple((-1.0) ** k / math.factorial(k + 1) for k in range(N_TERMS))  # of (1 - exp(-x)) / x
-_TANGENT = _tangent_series()
+_DECAY = read_only([(-1.0) ** k / math.factorial(k + 1) for k in range(N_TERMS)])  # of (1 - exp(-x)) / x
+_TANGENT = read_only(_tangent_series())
 DECAY_REACH = 0.75  # the terms left out are below 3e-17 here
 _TANGENT_REACH = 0.2  # and below 5e-18 here
 _LARGEST_EXPONENT = 709.0

@@ -24,7 +24,7 @@ A law that escapes is returned as `inf`; one so stiff that it needs more than MA
 
 import math
 
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, read_only
 from hysim.kernels import boucwen
 from hysim.kernels._compile import kernel
 from hysim.kernels.duhem import MAX_STEPS, N_TERMS, reach
@@ -35,7 +35,7 @@ from hysim.kernels.polynomials import sum16
 N_HEAD = 2
 N_STATE = N_HEAD + 2 * (N_TERMS + 1)
 
-_RAMP = tuple((-1.0) ** k / math.factorial(k + 2) for k in range(N_RAMP))  # of (x - 1 + exp(-x)) / x^2
+_RAMP = read_only([(-1.0) ** k / math.factorial(k + 2) for k in range(N_RAMP)])  # of (x - 1 + exp(-x)) / x^2
 _RAMP_REACH = 0.75  # the terms left out are below 1e-18 here
 _LARGEST_EXPONENT = 709.0
 _LARGEST = 1.7976931348623157e308
