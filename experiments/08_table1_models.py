@@ -8,16 +8,19 @@ whose BIC is within 6 of the lowest are hardly told apart (Kass and Raftery 1995
 same 52 points, so that the winner's lead is partly that choice.
 """
 
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from results_folder import write_results
 
 import hysim as hs
 from hysim.plot import Figure, figure
+
+sys.path.insert(0, str(Path(__file__).parent))
+from results_folder import write_results
 
 RESULTS = Path(__file__).parent / "results" / "table1_models"
 RECORD = hs.datasets.table1(dwell=1.0)

@@ -7,15 +7,18 @@ Bias is the median error in standard errors of the record. With the redundant pa
 to say so, and to print no interval.
 """
 
+import sys
 from concurrent.futures import ProcessPoolExecutor
 from itertools import repeat
 from pathlib import Path
 
 import numpy as np
-from results_folder import write_results
 
 import hysim as hs
 from hysim.plot import Figure, figure
+
+sys.path.insert(0, str(Path(__file__).parent))
+from results_folder import write_results
 
 RESULTS = Path(__file__).parent / "results" / "recovery"
 LEVELS = (0.0, 0.3, 1.0)  # of the noise, in quanta
