@@ -14,10 +14,9 @@ def table1() -> hs.Record:
     return hs.datasets.table1()
 
 
-def loop_record(law, noise=0.0, seed=0) -> hs.Record:
+def loop_record(law) -> hs.Record:
     u = np.concatenate([hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=60), [-0.4, 0.3, -0.2, 0.9]])
-    rng = np.random.default_rng(seed)
-    return hs.Record(u=u, y=law.response(u) + noise * rng.standard_normal(u.size))
+    return hs.Record(u=u, y=law.response(u))
 
 
 def test_clean_data_give_the_law_back():
@@ -82,15 +81,6 @@ def test_the_optimum_does_not_depend_on_the_seed(table1, seed):
     reference = hs.identify(hs.PolynomialBoucWen, table1, fixed={"n": 1.0}, seed=0)
     other = hs.identify(hs.PolynomialBoucWen, table1, fixed={"n": 1.0}, seed=seed)
     assert other.rmse == pytest.approx(reference.rmse, rel=5e-7)  # the cost within 1e-6
-
-
-def test_standard_errors_are_those_of_repeated_experiments():
-    law = hs.BoucWen(beta=1.4, gamma=-0.6, n=1.0, feedthrough=0.7, gain=-0.5)
-    fits = [hs.identify(law, loop_record(law, 0.01, seed), fixed={"n": 1.0, "z0": 0.0}) for seed in range(40)]
-    for name in fits[0].free_names:
-        scatter = np.std([fit.estimates[name] for fit in fits], ddof=1)
-        # 40 draws: the relative error of a standard deviation is 11 %; four of these
-        assert np.median([fit.stderr[name] for fit in fits]) == pytest.approx(scatter, rel=0.45)
 
 
 def test_fixed_free_and_the_redundant_pair(table1):
