@@ -56,6 +56,11 @@ class Problem:
         return np.concatenate([part.record.y for part in self.parts])
 
     @cached_property
+    def scale(self) -> float:
+        """Size of the outputs [unit of y]."""
+        return float(np.abs(self.y).max()) or 1.0
+
+    @cached_property
     def cuts(self) -> list[int]:
         """Where each record begins, and the number of samples."""
         return [0, *np.cumsum([len(part.record) for part in self.parts]).tolist()]

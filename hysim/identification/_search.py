@@ -2,7 +2,7 @@
 
 A scrambled Sobol sequence covers the box. Its best points that lie apart from each other, and the family's
 own starts, descend by projected Levenberg-Marquardt steps, all of them in one batch. The distinct optima
-that come out best descend on all parameters at once to the end.
+that come out best descend to the end in the same way.
 """
 
 import math
@@ -41,9 +41,8 @@ class Optimum(NamedTuple):
 def optima(problem: Problem, *, seed: int, progress: Progress | None = None) -> list[Optimum]:
     """Distinct local optima of `problem`, best first; empty if nothing in the box stays finite."""
     space = problem.space
-    scale = float(np.abs(problem.y).max()) or 1.0
     if not space.coordinates:
-        return polish(problem, np.empty((1, 0)), scale)
+        return polish(problem, np.empty((1, 0)))
     share = min(1.0, _LONG / problem.y.size)
     screened = max(256, round(N_SCREENED * share)) if space.screened is None else space.screened
     candidates = np.concatenate([space.starts, _uniform(space, screened, seed)])
@@ -51,20 +50,20 @@ def optima(problem: Problem, *, seed: int, progress: Progress | None = None) -> 
     starts = _apart(space, candidates, problem.costs(candidates), _APART, n_starts, len(space.starts))
     if not len(starts):
         return []
-    reached = _descended(problem, starts, scale, exact=False)
+    reached = _descended(problem, starts, exact=False)
     x, cost = reached.theta[:, : space.lower.size], reached.loss
     best = _apart(space, x, cost, _SAME, N_POLISHED)
     if progress is not None:
         progress(1, 2)
-    found = polish(problem, best, scale) if len(best) else []
+    found = polish(problem, best) if len(best) else []
     if progress is not None:
         progress(2, 2)
     return _distinct(found)
 
 
-def polish(problem: Problem, starts: FloatArray, scale: float) -> list[Optimum]:
-    """The local optima that are reached from `starts` (n, n_x); `scale` is that of the outputs [unit of y]."""
-    reached = _descended(problem, starts, scale, exact=True)
+def polish(problem: Problem, starts: FloatArray) -> list[Optimum]:
+    """The local optima that are reached from `starts` (n, n_x)."""
+    reached = _descended(problem, starts, exact=True)
     x = reached.theta[:, : starts.shape[1]]
     costs = problem.costs(x)
     return [
@@ -72,10 +71,10 @@ def polish(problem: Problem, starts: FloatArray, scale: float) -> list[Optimum]:
     ]
 
 
-def _descended(problem: Problem, starts: FloatArray, scale: float, *, exact: bool) -> Reached:
+def _descended(problem: Problem, starts: FloatArray, *, exact: bool) -> Reached:
     """Where the points `starts` (n, n_x) descend to, on the way or at the end."""
     theta = np.concatenate([starts, problem.solve(starts)[0]], axis=1)
-    noise, everything = Gaussian(floor=PERFECT * scale), np.ones((1, problem.y.size))
+    noise, everything = Gaussian(floor=PERFECT * problem.scale), np.ones((1, problem.y.size))
     projected = not problem.space.bounds
     descent = Descent(problem, noise, problem.y[np.newaxis], everything, projected=projected)
     gain, steps = (_TOLERANCE, N_POLISHING) if exact else (_GAIN, N_STEPS)

@@ -66,7 +66,7 @@ class ClampStructure:
         names, columns = self._names("thresholds", thresholds.size), self._columns(thresholds.size)
         first = float(record.u[0])
         defaults = {**dict(zip(names, thresholds.tolist(), strict=True)), **dict.fromkeys(columns, 0.0), TURN: first}
-        given = freedom.held(defaults, at_rest=(TURN,) if is_settled(freedom, default="rest") else ())
+        given = freedom.held(defaults, at_rest=(TURN,) if freedom.starts_at_rest("rest") else ())
         held = {name: defaults[name] for name in names if name not in freedom.free} | given
         limits = freedom.limits(defaults, held)
         box = dict(zip(names, _gaps(thresholds), strict=True)) | {TURN: (first - 2.0 * half, first + 2.0 * half)}
@@ -170,7 +170,7 @@ def single_space(defaults: Mapping[str, float], record: Record, freedom: Freedom
         If the input is constant, `initial` is unknown, or a name or a bound does not fit.
     """
     half, first = half_span(record), float(record.u[0])
-    held = freedom.held(defaults, at_rest=("z0",) if is_settled(freedom) else ())
+    held = freedom.held(defaults, at_rest=("z0",) if freedom.starts_at_rest() else ())
     limits = freedom.limits(defaults, held)
     box = {"threshold": (_SHORTEST * half, 1.5 * half), "z0": (first - half, first + half)} | limits
     free = [name for name in ("threshold", "z0") if name not in held]
@@ -199,11 +199,6 @@ def single_space(defaults: Mapping[str, float], record: Record, freedom: Freedom
         state=("z0",),
         screened=256,
     )
-
-
-def is_settled(freedom: Freedom, default: str = "free") -> bool:
-    """Whether the initial memory is not searched: it is at rest, or `steady` finds it."""
-    return freedom.initial == "periodic" or freedom.starts_at_rest(default)
 
 
 def half_span(record: Record) -> float:

@@ -17,7 +17,6 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim.models._batch import Reduction
-from hysim.models._clamp_search import is_settled
 from hysim.models._memory_law import State
 from hysim.models.boucwen import BoucWen
 from hysim.models.boucwen_inverse import BoucWenInverse, InverseState
@@ -160,7 +159,7 @@ class Dahl:
         if span == 0.0:
             raise ValueError("the input is constant: nothing can be identified from it")
         defaults = {name: float(getattr(self, name)) for name in _NAMES}
-        held = freedom.held(defaults, at_rest=("z0",) if is_settled(freedom) else ())
+        held = freedom.held(defaults, at_rest=("z0",) if freedom.starts_at_rest() else ())
         limits = freedom.limits(defaults, held)
         box = {
             "stiffness": (_FORCES[0] / _LENGTHS[1] * stroke / span, _FORCES[1] / _LENGTHS[0] * stroke / span),
