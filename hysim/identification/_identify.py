@@ -233,11 +233,6 @@ class _Search:
     seed: int
 
     @property
-    def scale(self) -> float:
-        """Size of the outputs [unit of y]."""
-        return float(np.abs(self.problem.y).max()) or 1.0
-
-    @property
     def descent(self) -> Descent:
         return Descent(self.problem, self.noise, self.problem.y[np.newaxis], np.ones((1, self.problem.y.size)))
 
@@ -250,7 +245,7 @@ class _Search:
         ranked = np.argsort(reached.loss, kind="stable")
         found: list[_Optimum] = []
         for k in ranked[np.isfinite(reached.loss[ranked])].tolist():
-            perfect = bool(found) and found[0].sigma <= _EXACT * PERFECT * self.scale
+            perfect = bool(found) and found[0].sigma <= _EXACT * PERFECT * self.problem.scale
             if not found or (not perfect and reached.loss[k] - found[-1].loss > 0.5 * self.problem.y.size * _SAME):
                 found.append(
                     _Optimum(reached.theta[k], float(reached.loss[k]), float(reached.sigma[k]), squares[k].converged)
@@ -306,7 +301,7 @@ class _Search:
             curves, better = self._profiles(found, known)
             if better is not None:
                 n_x = len(self.problem.space.coordinates)
-                found = self.likely(polish(self.problem, better[np.newaxis, :n_x], self.scale)) + found
+                found = self.likely(polish(self.problem, better[np.newaxis, :n_x])) + found
                 found = sorted(found, key=lambda optimum: optimum.loss)
                 known = self._uncertainty(found[0])
                 curves, _ = self._profiles(found, known)
