@@ -16,6 +16,7 @@ MODELS = [
     hs.BoucWen(A=1 / 3, beta=0.1, gamma=-np.pi, n=1.7),
     hs.PolynomialBoucWen(input_coefficients=(0.1, 1e-17, 3e300)),
     hs.Duhem.from_terms({"u'": 0.1, "|u'| u y": -2 / 3}, y0=0.7),
+    hs.Duhem.from_terms({"u'": 0.1, "u' u |z|": 1 / 3, "|u'| |z| z^2": -2 / 3}, feedthrough=0.3, y0=0.7),
     hs.PrandtlIshlinskii(thresholds=(0.0, 1 / 3), weights=(0.1, -1e-17), offset=0.7),
     hs.PrandtlIshlinskii(),
     hs.Play(threshold=1 / 3, z0=0.1),

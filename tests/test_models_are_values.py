@@ -13,6 +13,8 @@ NUMBERS = [
     (hs.ZhuWangBoucWen, {"delta": 0.2}, "delta"),
     (hs.GeneralizedBoucWen, {"b4": 0.2}, "b4"),
     (hs.Duhem, {"p": [[1.0]], "q": [[0.0, -1.0]]}, "q"),
+    (hs.Duhem, {"p": [[1.0]], "q": [[0.0]], "p_abs": [[0.5]], "q_abs": [[0.0, -1.0]]}, "q_abs"),
+    (hs.Duhem, {"p": [[1.0]], "q": [[0.0]], "feedthrough": 2.0}, "feedthrough"),
     (hs.PrandtlIshlinskii, {"thresholds": (0.0, 0.5), "weights": (1.0, 2.0)}, "weights"),
     (hs.Play, {"threshold": 0.5}, "threshold"),
     (hs.MaxwellSlip, {"stiffness": (1.0, 2.0), "slips": (0.5, 0.1)}, "stiffness"),

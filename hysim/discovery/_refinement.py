@@ -17,12 +17,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray, read_only
-from hysim._parallel import in_chunks
+from hysim._frozen import FloatArray
 from hysim.discovery._library import Regression
-from hysim.kernels import duhem as kernels
 from hysim.models.duhem import Duhem
-from hysim.models.duhem_terms import Term, branches, coefficient_units, polynomials
+from hysim.models.duhem_runs import free_runs
+from hysim.models.duhem_terms import Term, coefficient_units
 from hysim.records import Record
 
 BOUND = 30.0
@@ -33,7 +32,6 @@ RANKING = 1e-5  # relative change of the cost at which a descent ends: far less 
 POLISH = 1e-12
 _MAX_EVALUATIONS = 60
 _RIDGES = tuple(10.0**power for power in range(-9, 1))
-_SAMPLES_PER_THREAD = 20_000
 
 
 @dataclass(frozen=True)
@@ -88,16 +86,8 @@ class FreeRun:
 
     def outputs(self, terms: Sequence[Term], unknowns: FloatArray) -> FloatArray:
         """Free runs (n_sets, n_samples) of coefficients and y0 (n_sets, n_terms + 1), inf where one diverges."""
-        u, y = self.record.u[np.newaxis], np.empty((len(unknowns), len(self.record)))
-        rising, falling = branches(*polynomials(terms, unknowns[:, :-1]))
-        y0, bound = read_only(unknowns[:, -1]), BOUND * self.stroke + float(np.abs(self.record.y).max())
-
-        def work(start: int, stop: int) -> None:
-            with np.errstate(all="ignore"):  # a divergence overflows, and uncompiled kernels would warn of it
-                kernels.batch(rising, falling, y0, u, bound, y, start, stop)
-
-        in_chunks(work, len(unknowns), minimum=1 + _SAMPLES_PER_THREAD // len(self.record))
-        return y
+        bound = BOUND * self.stroke + float(np.abs(self.record.y).max())
+        return free_runs(terms, unknowns[:, :-1], 0.0, unknowns[:, -1], self.record.u[np.newaxis], bound)
 
     def residuals(self, terms: Sequence[Term], unknowns: FloatArray) -> FloatArray:
         """Weighted residuals (n_sets, n_samples) in strokes."""

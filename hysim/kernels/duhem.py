@@ -1,20 +1,27 @@
 """The polynomial Duhem law along a piecewise-linear input.
 
-    y' = u' p(u, y) + |u'| q(u, y),    p = sum p_ij u^i y^j,    q likewise
+    z' = u' p(u, z) + |u'| q(u, z),    p = sum (p_ij + p_abs_ij |z|) u^i z^j,    q likewise
 
-On a stretch of the input in one direction time drops out, and the law is one of two equations,
+On a stretch of the input in one direction time drops out, and on one side of z = 0 so does the bar of |z|.
+What is left is one of two equations, or of four in a law with |z|,
 
-    dy/du = rising(u, y)  = p + q     where u rises
-    dy/du = falling(u, y) = p - q     where u falls
+    dz/du = f(u, z) = sum f_ij u^i z^j
 
 each solved by the power series of its flow about the present point. With u = u0 + h x, 0 <= x <= 1,
 
-    y = sum t_k x^k,    (k + 1) t_(k+1) = h sum_j [a_j y^j]_k,    a_j(x) = sum_i f_ij (u0 + h x)^i
+    z = sum t_k x^k,    (k + 1) t_(k+1) = h sum_j [a_j z^j]_k,    a_j(x) = sum_i f_ij (u0 + h x)^i
 
 The order follows the terms: the series ends where they have become rounding. Where N_TERMS do not reach
 that, the step is cut to the length at which the last of them do, at no further cost because t_k goes
 with h^k. There is no closed form and the law is not called exact: it is good to 1e-12 of the range.
 A law that escapes is returned as `inf`; one so stiff that it needs more than MAX_STEPS as `nan`.
+
+In a law with |z| a step ends where its series crosses zero, and the memory is then zero to the bit. A step is
+cut before to a length on which the series keeps away from zero or is monotone, so that its sign at the end
+tells. From zero on, the side is that to which the memory moves; both sides have the same slope there.
+
+A law is an array of its polynomials f, shape (2, rows, columns): where u rises, and where it falls. With |z|
+it is (4, rows, columns), each of the two for z >= 0 and then for z <= 0.
 
 Layers: scalar functions first (no allocation, no exceptions), then the loops over a path and over a
 batch of laws, then `step`, the form in which closed loops and chains take the law.
@@ -34,18 +41,20 @@ LARGEST = 1.7976931348623157e308
 _NEGLIGIBLE = 2.0**-54
 _GROWTH = 16.0  # of the length tried, over the last one that served
 _RETREAT = 2.0**-10  # of a length at which a term overflows
+_GRAZE = 2.0**-18  # of a step: on less, a dip below zero and back has no weight
+_MAX_NEWTON = 100
 
 
 # ---------------------------------------------------------------------------------- scalar functions
 
 
 @inner
-def expand(f: FloatArray, u: float, h: float, local: FloatArray) -> None:
-    """Fill `local`, of the shape of `f`, with the coefficients of f(u + h x, y) in powers of x and y."""
-    rows, columns = f.shape
+def expand(law: FloatArray, part: int, u: float, h: float, local: FloatArray) -> None:
+    """Fill `local`, (rows, columns), with the coefficients of f(u + h x, z) in powers of x and z; f is law[part]."""
+    rows, columns = local.shape
     for j in range(columns):
         for i in range(rows):
-            local[i, j] = f[i, j]
+            local[i, j] = law[part, i, j]
         scale = 1.0
         for i in range(rows):
             for m in range(rows - 2, i - 1, -1):
@@ -56,7 +65,7 @@ def expand(f: FloatArray, u: float, h: float, local: FloatArray) -> None:
 
 @kernel
 def coefficient(local: FloatArray, powers: FloatArray, k: int) -> float:
-    """Coefficient k of local(x, y(x)); row j of `powers` is the series of y^j, known before k and extended to k."""
+    """Coefficient k of local(x, z(x)); row j of `powers` is the series of z^j, known before k and extended to k."""
     rows, columns = local.shape
     total = local[k, 0] if k < rows else 0.0
     for j in range(1, columns):
@@ -71,14 +80,14 @@ def coefficient(local: FloatArray, powers: FloatArray, k: int) -> float:
 
 
 @inner
-def series(local: FloatArray, y: float, h: float, powers: FloatArray) -> int:
-    """Fill row 1 of `powers` with the terms of y(x) until they have died out, N_TERMS after the first at most.
+def series(local: FloatArray, z: float, h: float, powers: FloatArray) -> int:
+    """Fill row 1 of `powers` with the terms of z(x) until they have died out, N_TERMS after the first at most.
 
     Returns the index of the last one, or -1 if they have not died out.
     """
     rows, columns = local.shape
-    powers[1, 0] = y
-    scale, small = abs(y), 0
+    powers[1, 0] = z
+    scale, small = abs(z), 0
     for k in range(N_TERMS):
         term = h * coefficient(local, powers, k) / (k + 1.0)
         powers[1, k + 1] = term
@@ -107,17 +116,85 @@ def reach(powers: FloatArray, n_last: int) -> float:
 
 
 @inner
-def advance(u: float, y: float, du: float, f: FloatArray, bound: float, local: FloatArray, powers: FloatArray) -> float:
-    """Output after the input has moved monotonically from `u` by `du` along dy/du = f(u, y).
+def falls_from_zero(local: FloatArray, h: float) -> bool:
+    """Whether the memory goes from zero to below it along a step of `h`."""
+    for i in range(local.shape[0]):
+        if local[i, 0] != 0.0:
+            return bool((local[i, 0] < 0.0) == (h > 0.0))
+    return False
 
-    An output beyond `bound` counts as an escape.
+
+@inner
+def untangled(powers: FloatArray, last: int, fraction: float) -> float:
+    """Fraction of a step, no more than the one given, on which the series is monotone or keeps away from zero."""
+    lead = 1
+    while lead < last and powers[1, lead] == 0.0:
+        lead += 1
+    first = abs(powers[1, lead])
+    while fraction > _GRAZE:
+        others, steepness = 0.0, 0.0
+        for k in range(last, lead, -1):
+            others = others * fraction + abs(powers[1, k])
+            steepness = steepness * fraction + k * abs(powers[1, k])
+        if lead * first >= steepness * fraction:
+            break
+        if abs(powers[1, 0]) > (first + others * fraction) * fraction**lead:
+            break
+        fraction *= 0.5
+    return fraction
+
+
+@inner
+def place(powers: FloatArray, last: int, x: float) -> tuple[float, float]:
+    """Value and slope of the series in row 1 of `powers` at the place x."""
+    value, slope = 0.0, 0.0
+    for k in range(last, -1, -1):
+        slope = slope * x + value
+        value = value * x + powers[1, k]
+    return value, slope
+
+
+@inner
+def newton(low: float, high: float, x: float, value: float, slope: float) -> float:
+    """The next place to look for the zero of a falling function: by Newton's rule if it stays in the bracket."""
+    trial = x - value / slope if slope < 0.0 else math.nan
+    return trial if low < trial < high else 0.5 * (low + high)
+
+
+@inner
+def zero(powers: FloatArray, last: int, end: float) -> float:
+    """The place up to `end` at which the series, of another sign there than at 0, is zero."""
+    sign = math.copysign(1.0, powers[1, 0])
+    low, high, x = 0.0, end, end
+    for _ in range(_MAX_NEWTON):
+        value, slope = place(powers, last, x)
+        low, high = (x, high) if sign * value >= 0.0 else (low, x)
+        trial = newton(low, high, x, sign * value, sign * slope)
+        if value == 0.0 or abs(trial - x) <= _NEGLIGIBLE * x:
+            break
+        x = trial
+    return x
+
+
+@inner
+def advance(
+    u: float, z: float, du: float, law: FloatArray, bound: float, local: FloatArray, powers: FloatArray
+) -> float:
+    """Memory after the input has moved monotonically from `u` by `du`.
+
+    A memory beyond `bound` counts as an escape.
     """
+    two_sided = law.shape[0] == 4
+    above = 0 if du > 0.0 else law.shape[0] // 2
     rest = h = du
     for _ in range(MAX_STEPS):
         if rest == 0.0:
-            return y
-        expand(f, u + (du - rest), h, local)
-        last = series(local, y, h, powers)
+            return z
+        here = u + (du - rest)
+        expand(law, above + 1 if two_sided and z < 0.0 else above, here, h, local)
+        if two_sided and z == 0.0 and falls_from_zero(local, h):
+            expand(law, above + 1, here, h, local)
+        last = series(local, z, h, powers)
         fraction = 1.0
         if last < 0:
             last = N_TERMS
@@ -127,14 +204,19 @@ def advance(u: float, y: float, du: float, f: FloatArray, bound: float, local: F
                 return math.inf
             h *= _RETREAT
             continue
-        y = 0.0
+        served = h * fraction
+        if two_sided:
+            fraction = untangled(powers, last, fraction)
+        before, z = z, 0.0
         for k in range(last, -1, -1):
-            y = y * fraction + powers[1, k]
-        if not abs(y) <= bound:
+            z = z * fraction + powers[1, k]
+        if not abs(z) <= bound:
             return math.inf
+        if two_sided and ((before > 0.0 and z < 0.0) or (before < 0.0 and z > 0.0)):
+            fraction, z = zero(powers, last, fraction), 0.0
         taken = h * fraction
         rest = 0.0 if taken == rest else rest - taken
-        h = math.copysign(min(abs(rest), _GROWTH * abs(taken)), du)
+        h = math.copysign(min(abs(rest), _GROWTH * abs(served)), du)
     return math.nan
 
 
@@ -142,40 +224,33 @@ def advance(u: float, y: float, du: float, f: FloatArray, bound: float, local: F
 
 
 @kernel
-def path(
-    rising: FloatArray, falling: FloatArray, last_u: float, y: float, u: FloatArray, bound: float, out: FloatArray
-) -> int:
-    """Output at the samples of `u` from the state (last_u, y) into `out`: the first one not finite, or -1."""
-    local, powers = np.empty(rising.shape), np.empty((max(2, rising.shape[1]), N_TERMS + 1))
+def path(law: FloatArray, last_u: float, z: float, u: FloatArray, bound: float, out: FloatArray) -> int:
+    """Memory at the samples of `u` from the state (last_u, z) into `out`: the first one not finite, or -1."""
+    rows, columns = law.shape[1:]
+    local, powers = np.empty((rows, columns)), np.empty((max(2, columns), N_TERMS + 1))
     for k in range(u.size):
-        du = u[k] - last_u
-        y = advance(last_u, y, du, rising if du > 0.0 else falling, bound, local, powers)
+        z = advance(last_u, z, u[k] - last_u, law, bound, local, powers)
         last_u = u[k]
-        out[k] = y
-        if not math.isfinite(y):
+        out[k] = z
+        if not math.isfinite(z):
             return k
     return -1
 
 
 @kernel
 def batch(
-    rising: FloatArray,
-    falling: FloatArray,
-    y0: FloatArray,
-    u: FloatArray,
-    bound: float,
-    out: FloatArray,
-    start: int,
-    stop: int,
+    laws: FloatArray, z0: FloatArray, u: FloatArray, bound: float, out: FloatArray, start: int, stop: int
 ) -> None:
-    """Outputs of the laws `start` to `stop - 1`.
+    """Memories of the laws `start` to `stop - 1`.
 
-    `rising` and `falling` are (n_sets, rows, columns), `y0` is (n_sets,), `u` is (1, n_samples) or
-    (n_sets, n_samples), `out` is (n_sets, n_samples). A law that escapes is a row of inf.
+    `laws` is (n_sets, 2 or 4, rows, columns), `z0` is (n_sets,), `u` is (1, n_samples) or (n_sets, n_samples),
+    `out` is (n_sets, n_samples). A law that escapes is a row of inf.
     """
+    if u.shape[1] == 0:
+        return
     for i in range(start, stop):
         row = u[min(i, u.shape[0] - 1)]
-        if path(rising[i], falling[i], row[0], y0[i], row, bound, out[i]) >= 0:
+        if path(laws[i], row[0], z0[i], row, bound, out[i]) >= 0:
             out[i] = math.inf
 
 
@@ -184,20 +259,18 @@ def batch(
 
 @kernel
 def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
-    """Output at the next input `u`; `state` is (last u, y, scratch), `state_size` long, and moves along.
+    """Output at the next input `u`; `state` is (last u, z, scratch), `state_size` long, and moves along.
 
-    `parameters` is (rows, columns, rising, falling), the two polynomials row by row.
+    `parameters` is (feedthrough, 2 or 4, rows, columns, law), the polynomials of the law one after the other.
     """
-    rows, columns = int(parameters[0]), int(parameters[1])
+    rows, columns = int(parameters[2]), int(parameters[3])
+    law = parameters[4:].reshape((int(parameters[1]), rows, columns))
     size = rows * columns
-    du = u - state[0]
-    first = 2 if du > 0.0 else 2 + size
-    f = parameters[first : first + size].reshape((rows, columns))
     local = state[2 : 2 + size].reshape((rows, columns))
     powers = state[2 + size : state_size(rows, columns)].reshape((max(2, columns), N_TERMS + 1))
-    y = advance(state[0], state[1], du, f, LARGEST, local, powers)
-    state[0], state[1] = u, y
-    return y
+    z = advance(state[0], state[1], u - state[0], law, LARGEST, local, powers)
+    state[0], state[1] = u, z
+    return float(parameters[0] * u + z)
 
 
 @kernel

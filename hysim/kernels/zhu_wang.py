@@ -27,7 +27,7 @@ import math
 from hysim._frozen import FloatArray, read_only
 from hysim.kernels import boucwen
 from hysim.kernels._compile import kernel
-from hysim.kernels.duhem import MAX_STEPS, N_TERMS, reach
+from hysim.kernels.duhem import MAX_STEPS, N_TERMS, newton, place, reach
 from hysim.kernels.elementary import linear_flow
 from hysim.kernels.polynomials import N_TERMS as N_RAMP
 from hysim.kernels.polynomials import sum16
@@ -81,13 +81,6 @@ def advance(u: float, z: float, du: float, parameters: FloatArray, scratch: Floa
         if w != 0.0 or travelled >= left:
             return direction * side * w
         begin += travelled
-
-
-@kernel
-def newton(low: float, high: float, x: float, value: float, slope: float) -> float:
-    """The next place to look for the zero of a falling function: by Newton's rule if it stays in the bracket."""
-    trial = x - value / slope if slope < 0.0 else math.nan
-    return trial if low < trial < high else 0.5 * (low + high)
 
 
 # ---------------------------------------------------------------------------------- n = 1
@@ -241,16 +234,6 @@ def series(w: float, a: float, d: float, c: float, n: float, h: float, terms: Fl
             convolution += weight * terms[1, j] * terms[0, k + 1 - j]
         terms[0, k + 1] = convolution / ((k + 1.0) * w)
     return N_TERMS, reach(terms, _N_LAST)
-
-
-@kernel
-def place(terms: FloatArray, last: int, x: float) -> tuple[float, float]:
-    """w and dw/dx at the place x of a series."""
-    w, slope = 0.0, 0.0
-    for k in range(last, -1, -1):
-        slope = slope * x + w
-        w = w * x + terms[1, k]
-    return w, slope
 
 
 @kernel

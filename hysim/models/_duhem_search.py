@@ -1,8 +1,10 @@
 """The box in which a Duhem law is searched: its own structure, around its own coefficients.
 
 A coordinate is a coefficient measured by what its term contributes over the span of the input, in units
-of the stroke; y0 is measured in strokes. The box reaches 10 to both sides of the law's own coefficients,
-and 1 of its y0. A parameter that the user bounds has these bounds.
+of the stroke; the feedthrough likewise; y0 is measured in strokes. The box reaches 10 to both sides of the
+law's own coefficients, and 1 of its y0. A parameter that the user bounds has these bounds.
+
+A law that has neither |z| nor a feedthrough is not given one: its polynomials in u and y already hold it.
 """
 
 from collections.abc import Mapping
@@ -23,7 +25,7 @@ def search_space(
     record: Record,
     freedom: Freedom,
 ) -> SearchSpace:
-    """Declare the box for the terms and y0 in `defaults`.
+    """Declare the box for the terms, the feedthrough and y0 in `defaults`.
 
     Raises
     ------
@@ -32,10 +34,15 @@ def search_space(
     """
     if np.ptp(record.u) == 0.0:
         raise ValueError("the input is constant: nothing can be identified from it")
-    held = freedom.held(defaults, at_rest=("y0",) if freedom.starts_at_rest() else ())
+    terms = {name: Term.parse(name) for name in defaults if name not in ("feedthrough", "y0")}
+    held = freedom.held(
+        defaults,
+        redundant=() if defaults["feedthrough"] or _any_absolute(terms) else (("feedthrough",),),
+        at_rest=("y0",) if freedom.starts_at_rest() else (),
+    )
     limits = freedom.limits(defaults, held)
     names = tuple(name for name in defaults if name not in held)
-    unit = _units(defaults, record)
+    unit = _units(terms, defaults["feedthrough"], record)
     scale = np.array([unit[name] for name in names])
     start = np.array([defaults[name] for name in names]) / scale
     reach = np.array([_REACH_Y0 if name == "y0" else _REACH for name in names])
@@ -63,7 +70,11 @@ def search_space(
     )
 
 
-def _units(defaults: Mapping[str, float], record: Record) -> dict[str, float]:
-    names = [name for name in defaults if name != "y0"]
-    units = coefficient_units(record.u, record.y, map(Term.parse, names)).tolist()
-    return dict(zip(names, units, strict=True)) | {"y0": float(np.ptp(record.y)) or 1.0}
+def _any_absolute(terms: Mapping[str, Term]) -> bool:
+    return any(term.absolute for term in terms.values())
+
+
+def _units(terms: Mapping[str, Term], feedthrough: float, record: Record) -> dict[str, float]:
+    stroke = float(np.ptp(record.y)) or 1.0
+    units = coefficient_units(record.u, record.y - feedthrough * record.u, terms.values()).tolist()
+    return {**dict(zip(terms, units, strict=True)), "feedthrough": stroke / float(np.ptp(record.u)), "y0": stroke}

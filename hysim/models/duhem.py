@@ -1,49 +1,65 @@
 """The polynomial Duhem law: one slope where the input rises, another where it falls.
 
-    y' = u' p(u, y) + |u'| q(u, y),    p = sum p_ij u^i y^j,    q = sum q_ij u^i y^j
-    dy/du = p + q  where u rises,      dy/du = p - q  where u falls
+    y = feedthrough u + z,    z' = u' p(u, z) + |u'| q(u, z)
+    p = sum (p_ij + p_abs_ij |z|) u^i z^j,    q = sum (q_ij + q_abs_ij |z|) u^i z^j
+    dz/du = p + q  where u rises,             dz/du = p - q  where u falls
 
-u is the input, y the output; there is no other memory than y itself. The law does not depend on time.
-It has hysteresis exactly if q is not zero. The output is evaluated at the samples of an input that is
-linear between them by power series (`hysim.kernels.duhem`), to 1e-12 of the range. Special cases:
+u is the input, z the memory, y the output. The law does not depend on time. It has hysteresis exactly if q is
+not zero. Without feedthrough the memory is the output: the law is one of u and y. The memory is evaluated at the
+samples of an input that is linear between them by power series (`hysim.kernels.duhem`), to 1e-12 of the range.
+Special cases:
 
-    Coleman-Hodgdon    p = b,  q = a (c u - y)        Dahl    p = r,  q = -(r / F) y
+    Coleman-Hodgdon    p = b,                q = a (c u - y)
+    Dahl               p = r,                q = -(r / F) y
+    Bouc-Wen, n = 1    p = A - gamma |z|,    q = -beta z
+    Bouc-Wen, n = 2    p = A - gamma z^2,    q = -beta |z| z
 
 Sources: P. Duhem 1897; B. D. Coleman and M. L. Hodgdon, Int. J. Eng. Sci. 24 (1986).
 """
 
 from collections.abc import Mapping
+from dataclasses import field
 from typing import Self
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim._parallel import in_chunks
 from hysim.errors import SimulationError
 from hysim.kernels import duhem as kernels
-from hysim.models import _duhem_search
-from hysim.models.duhem_terms import Term, branches, equation, polynomials
+from hysim.models import _duhem_search, _numeric_inverse
+from hysim.models.duhem_runs import branches, free_runs, outputs
+from hysim.models.duhem_terms import Polynomials, Term, equation, latex, polynomials, terms_of
 from hysim.models.model import CompiledLaw, model
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
 State = tuple[float, float]
-"""Last input and output."""
+"""Last input and memory."""
 
 _BOUND = 1e3
+_OUTPUT = ("feedthrough", "y0")
+_AXES = {**dict.fromkeys(Polynomials._fields, 3), **dict.fromkeys(_OUTPUT, 1)}  # of the parameters of many laws
+
+
+def _none() -> FloatArray:
+    return np.zeros((1, 1))
 
 
 @model
 class Duhem:
-    """Polynomial Duhem law, ``y' = u' p(u, y) + |u'| q(u, y)``.
+    """Polynomial Duhem law, ``y = feedthrough u + z`` with ``z' = u' p(u, z) + |u'| q(u, z)``.
 
     Parameters
     ----------
     p, q : array, shape (rows, columns)
-        Element [i, j] multiplies ``u^i y^j`` [unit of y^(1-j) / unit of u^(i+1)]. The shapes may differ.
+        Element [i, j] multiplies ``u^i z^j`` [unit of y^(1-j) / unit of u^(i+1)]. The shapes may differ.
+    p_abs, q_abs : array, shape (rows, columns)
+        Element [i, j] multiplies ``|z| u^i z^j`` in p and in q [unit of y^(-j) / unit of u^(i+1)].
+    feedthrough : float
+        Slope of the output beside the memory [unit of y / unit of u].
     y0 : float
-        Output at the first sample [unit of y].
+        Output at the first sample [unit of y], whatever the input there.
 
     Raises
     ------
@@ -58,52 +74,67 @@ class Duhem:
     "y' = u' (1) + |u'| (-1 y)"
     >>> law.response([0.0, 1.0, -1.0]).round(6).tolist()
     [0.0, 0.632121, -0.779117]
+    >>> law = hs.Duhem.from_terms({"u'": 1.0, "u' |z|": -0.3, "|u'| z": -0.6}, feedthrough=40.0)  # Bouc-Wen's
+    >>> law.equation
+    "z' = u' (1 - 0.3 |z|) + |u'| (-0.6 z), y = 40 u + z"
     """
 
     p: FloatArray
     q: FloatArray
+    p_abs: FloatArray = field(default_factory=_none)
+    q_abs: FloatArray = field(default_factory=_none)
+    feedthrough: float = 0.0
     y0: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("p", "q"):
+        for name in Polynomials._fields:
             shape = getattr(self, name).shape
             if len(shape) != 2 or 0 in shape:
                 raise ValueError(f"{name} must have two axes and at least one element, got shape {shape}")
 
     @classmethod
-    def from_terms(cls, terms: Mapping[str, float], *, y0: float = 0.0) -> Self:
+    def from_terms(cls, terms: Mapping[str, float], *, feedthrough: float = 0.0, y0: float = 0.0) -> Self:
         """The law with these coefficients.
 
         Parameters
         ----------
         terms : mapping
-            Names such as ``"u'"``, ``"u' u^2"``, ``"|u'| u y"`` to coefficients.
+            Names such as ``"u'"``, ``"u' u^2"``, ``"|u'| u y"``, ``"u' |z|"``, ``"|u'| |z| z"`` to coefficients;
+            the memory is called y or z.
+        feedthrough : float
+            Slope of the output beside the memory.
         y0 : float
             Output at the first sample.
 
         Raises
         ------
         ValueError
-            If a name is not in the vocabulary.
+            If a name is not in the vocabulary, or two name the same term.
         """
         parsed = [Term.parse(name) for name in terms]
-        p, q = polynomials(parsed, np.array([list(terms.values())], dtype=float))
-        return cls(p=p[0], q=q[0], y0=y0)
+        for term, name in zip(parsed, terms, strict=True):
+            if parsed.count(term) > 1:
+                raise ValueError(f"the term {name!r} is given twice, once with y and once with z")
+        parts = polynomials(parsed, np.array([list(terms.values())], dtype=float))
+        return cls(**{name: part[0] for name, part in parts._asdict().items()}, feedthrough=feedthrough, y0=y0)
 
     @property
     def terms(self) -> dict[str, float]:
-        """Coefficients that are not zero by term, all of ``u'`` before those of ``|u'|``, each by degree."""
-        found = {
-            Term(rectified, int(i + j), int(j)): float(part[i, j])
-            for rectified, part in ((False, self.p), (True, self.q))
-            for i, j in np.argwhere(part)
-        }
-        return {term.name: found[term] for term in sorted(found)}
+        """Coefficients that are not zero by term, all of ``u'`` before those of ``|u'|``, each by degree.
+
+        The memory is called y where it is the output: without feedthrough and terms with ``|z|``; else z.
+        """
+        return {term.named(self._letter): value for term, value in self._coefficients.items()}
 
     @property
     def equation(self) -> str:
         """The law as text, coefficients to 4 significant digits."""
-        return equation(self.terms)
+        return equation(self._coefficients, self._letter, self.feedthrough)
+
+    @property
+    def latex(self) -> str:
+        """The equation for LaTeX, without dollar signs."""
+        return latex(self.equation)
 
     def response(self, u: npt.ArrayLike) -> FloatArray:
         """Output y at the samples of an input that is linear between them.
@@ -127,8 +158,36 @@ class Duhem:
         return self.advance(u)[0]
 
     def memory(self, u: npt.ArrayLike) -> FloatArray:
-        """The memory, which is the output: see `response`."""
-        return self.response(u)
+        """Memory z at the samples of an input that is linear between them; errors as in `response`."""
+        return self._memory(read_only(u, "u", ndim=1), None)
+
+    def tangent(self, direction: npt.ArrayLike, z: npt.ArrayLike, u: npt.ArrayLike = 0.0) -> FloatArray:
+        """Slope dy/du of the output at the memory `z`, for an input at `u` that moves in `direction`.
+
+        Parameters
+        ----------
+        direction : array
+            Velocity u' or its sign, not zero.
+        z, u : array
+            Memory and input, broadcast against the direction.
+
+        Returns
+        -------
+        array
+            [unit of y / unit of u].
+
+        Raises
+        ------
+        ValueError
+            If a direction is zero: the slope ahead and the one behind differ.
+        """
+        velocity = np.asarray(direction, dtype=float)
+        if not np.all(velocity):
+            raise ValueError("direction must not be zero: an input that stands still has two slopes")
+        inputs, memory = np.broadcast_arrays(np.asarray(u, dtype=float), np.asarray(z, dtype=float))
+        p, q, p_abs, q_abs = (np.polynomial.polynomial.polyval2d(inputs, memory, part) for part in self._parts)
+        size = np.abs(memory)
+        return np.asarray(self.feedthrough + (p + size * p_abs) + np.sign(velocity) * (q + size * q_abs))
 
     def advance(self, u: npt.ArrayLike, state: State | None = None) -> tuple[FloatArray, State]:
         """Output at the samples of `u`, continued from `state`, and the state after the last sample.
@@ -138,7 +197,7 @@ class Duhem:
         u : array, shape (n_samples,)
             Input, linear between its samples and from the state's input to the first of them.
         state : (float, float), optional
-            Input and output at the last sample so far; by default ``(u[0], y0)``.
+            Input and memory at the last sample so far; by default ``u[0]``, with the output at y0.
 
         Returns
         -------
@@ -153,24 +212,55 @@ class Duhem:
             As `response`.
         """
         inputs = read_only(u, "u", ndim=1)
-        if state is None:
-            state = (float(inputs[0]) if inputs.size else 0.0), self.y0
-        y = np.empty(inputs.size)
-        rising, falling = branches(self.p, self.q)
-        with np.errstate(all="ignore"):  # an escape overflows, and uncompiled kernels would warn of it
-            lost = kernels.path(rising, falling, float(state[0]), float(state[1]), inputs, kernels.LARGEST, y)
-        if lost >= 0:
-            what = "is too stiff to be followed" if np.isnan(y[lost]) else "escapes to infinity"
-            raise SimulationError(f"the output {what} at sample {lost} (u = {inputs[lost]:g}): {self.equation}")
-        return y, (float(inputs[-1]), float(y[-1])) if y.size else state
+        z = self._memory(inputs, state)
+        y = self.feedthrough * inputs + z
+        return y, (float(inputs[-1]), float(z[-1])) if z.size else state or self._start(0.0)
+
+    def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
+        """Input that gives the output `y`, linear between the samples.
+
+        Parameters
+        ----------
+        y : array, shape (n_samples,)
+            Wanted output.
+        u0 : float, optional
+            Input at which the law rests, its output at y0, before it moves to the first sample; by default zero.
+        state : (float, float), optional
+            Input and memory to continue from, in place of u0 and y0.
+
+        Returns
+        -------
+        array, shape (n_samples,)
+            The law that comes from u0 through these inputs has the output y, to 1e-12 of its range; so has its
+            `response` if y begins at y0. A sample costs some twenty steps of the law, outside compiled code.
+
+        Raises
+        ------
+        SimulationError
+            If the slope dy/du does not keep its sign on the way, or the output does not reach a sample; the
+            message names the sample and the input.
+        ValueError
+            If y is not finite or has not one axis, both u0 and state are given, or the slope is zero where the
+            record begins.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> law = hs.Duhem.from_terms({"u'": 1.0, "u' |z|": -0.3, "|u'| z": -0.6}, feedthrough=2.0)
+        >>> law.inverse_response(law.response([0.0, 1.0, 0.2])).round(9).tolist()
+        [0.0, 1.0, 0.2]
+        """
+        if state is not None and u0 is not None:
+            raise ValueError("give u0 or state, not both: the state has its own input")
+        outputs = read_only(y, "y", ndim=1)
+        return _numeric_inverse.inverse_response(self, outputs, state or self._start(float(u0 or 0.0)))
 
     def compiled(self, u0: float = 0.0) -> CompiledLaw:
         """The law as compiled loops take it; the state is that of a first sample at the input `u0`."""
-        rising, falling = branches(self.p, self.q)
-        parameters = np.concatenate([rising.shape, rising.ravel(), falling.ravel()])
-        state = np.zeros(kernels.state_size(*rising.shape))
-        state[:2] = u0, self.y0
-        return CompiledLaw(kernels.step, read_only(parameters), state)
+        law = branches(self._parts)
+        state = np.zeros(kernels.state_size(*law.shape[1:]))
+        state[:2] = self._start(u0)
+        return CompiledLaw(kernels.step, read_only(np.concatenate([[self.feedthrough], law.shape, law.ravel()])), state)
 
     @classmethod
     def responses(cls, parameters: Parameters, u: npt.ArrayLike, *, workers: int | None = None) -> FloatArray:
@@ -179,8 +269,8 @@ class Duhem:
         Parameters
         ----------
         parameters : mapping
-            ``"p"`` and ``"q"``, shape (n_sets, rows, columns) or (rows, columns) for all sets, and
-            optionally ``"y0"``, shape (n_sets,) or one number.
+            ``"p"`` and ``"q"``, shape (n_sets, rows, columns) or (rows, columns) for all sets, and optionally
+            ``"p_abs"``, ``"q_abs"`` likewise, ``"feedthrough"`` and ``"y0"``, shape (n_sets,) or one number.
         u : array, shape (n_samples,) or (n_sets, n_samples)
             One input for all sets, or one for each.
         workers : int, optional
@@ -189,7 +279,8 @@ class Duhem:
         Returns
         -------
         array, shape (n_sets, n_samples)
-            Each row the same bits as `response`. A law that escapes is a row of inf.
+            Each row the same bits as `response`, but a law without ``|z|`` among others that have it the same to
+            rounding. A law that escapes is a row of inf.
 
         Raises
         ------
@@ -198,57 +289,79 @@ class Duhem:
         ValueError
             If lengths do not fit, or a value is not finite.
         """
-        return cls._outputs(parameters, u, kernels.LARGEST, workers)
+        if not {"p", "q"} <= parameters.keys() <= _AXES.keys():
+            raise TypeError(
+                "the parameters of Duhem are p, q, and optionally p_abs, q_abs, feedthrough and y0, "
+                f"got {', '.join(parameters)}"
+            )
+        defaults = {"p_abs": _none(), "q_abs": _none(), "feedthrough": 0.0, "y0": 0.0}
+        given = {
+            name: read_only(_with_axes(values, _AXES[name]), name, ndim=_AXES[name])
+            for name, values in {**defaults, **parameters}.items()
+        }
+        given["u"] = read_only(_with_axes(u, 2), "u", ndim=2)
+        lengths = {name: len(values) for name, values in given.items() if len(values) != 1}
+        if len(set(lengths.values())) > 1:
+            raise ValueError(f"parameters and inputs must have one length or length 1, got {lengths}")
+        laws = branches(Polynomials(*(given[name] for name in Polynomials._fields)))
+        return outputs(laws, given["feedthrough"], given["y0"], given["u"], kernels.LARGEST, workers)
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box that `identify` searches; see `hysim.models._duhem_search`."""
-        return _duhem_search.search_space({**self.terms, "y0": self.y0}, record, freedom)
+        return _duhem_search.search_space(self._scalars, record, freedom)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """The output itself, shape (n_sets, n_samples, 1): it is affine in none of the parameters.
 
-        A law that goes 1000 times as far as the record counts as one that escapes: following it costs much
-        and can only lose.
+        A law whose memory goes 1000 times as far as the record counts as one that escapes: following it costs
+        much and can only lose.
         """
-        values = {**self.terms, "y0": self.y0, **parameters}
-        names = list(values)
-        sets = np.stack(np.broadcast_arrays(*map(np.atleast_1d, values.values())), axis=1)
-        is_term = np.array([name != "y0" for name in names])
-        p, q = polynomials([Term.parse(name) for name in names if name != "y0"], sets[:, is_term])
+        values = {**self._scalars, **parameters}
+        names = [name for name in values if name not in _OUTPUT]
+        columns = np.broadcast_arrays(*(np.atleast_1d(values[name]) for name in (*names, *_OUTPUT)))
+        *coefficients, feedthrough, y0 = columns
+        sets = np.stack(coefficients, axis=1) if coefficients else np.empty((len(y0), 0))
         bound = _BOUND * (float(np.abs(record.y).max()) or 1.0)
-        return self._outputs({"p": p, "q": q, "y0": sets[:, ~is_term][:, 0]}, record.u, bound, None)[..., np.newaxis]
+        terms = [Term.parse(name) for name in names]
+        return free_runs(terms, sets, feedthrough, y0, record.u[np.newaxis], bound)[..., np.newaxis]
 
     def assemble(self, parameters: Mapping[str, float]) -> Self:
         """The law with these parameters, one number for each name."""
-        return self.from_terms(
-            {name: value for name, value in parameters.items() if name != "y0"}, y0=parameters.get("y0", self.y0)
-        )
+        terms = {name: value for name, value in parameters.items() if name not in _OUTPUT}
+        others = {name: parameters.get(name, getattr(self, name)) for name in _OUTPUT}
+        return self.from_terms(terms, **others)
 
-    @classmethod
-    def _outputs(cls, parameters: Parameters, u: npt.ArrayLike, bound: float, workers: int | None) -> FloatArray:
-        if not {"p", "q"} <= set(parameters) <= {"p", "q", "y0"}:
-            raise TypeError(f"the parameters of Duhem are p, q and y0, got {', '.join(parameters)}")
-        axes = {"p": 3, "q": 3, "y0": 1, "u": 2}
-        given = {
-            name: read_only(_with_axes(values, axes[name]), name, ndim=axes[name])
-            for name, values in {"y0": 0.0, **parameters, "u": u}.items()
-        }
-        lengths = {name: len(values) for name, values in given.items() if len(values) != 1}
-        if len(set(lengths.values())) > 1:
-            raise ValueError(f"parameters and inputs must have one length or length 1, got {lengths}")
-        n_sets = next(iter(lengths.values()), 1)
-        rising, falling = (
-            read_only(np.broadcast_to(part, (n_sets, *part.shape[1:]))) for part in branches(given["p"], given["q"])
-        )
-        y0 = read_only(np.broadcast_to(given["y0"], n_sets))
-        y = np.empty((n_sets, given["u"].shape[1]))
+    @property
+    def _parts(self) -> Polynomials:
+        return Polynomials(self.p, self.q, self.p_abs, self.q_abs)
 
-        def work(start: int, stop: int) -> None:
-            with np.errstate(all="ignore"):
-                kernels.batch(rising, falling, y0, given["u"], bound, y, start, stop)
+    @property
+    def _coefficients(self) -> dict[Term, float]:
+        return terms_of(self._parts)
 
-        in_chunks(work, n_sets, workers=workers)
-        return y
+    @property
+    def _letter(self) -> str:
+        return "z" if self.feedthrough or self.p_abs.any() or self.q_abs.any() else "y"
+
+    @property
+    def _scalars(self) -> dict[str, float]:
+        return {**self.terms, "feedthrough": self.feedthrough, "y0": self.y0}
+
+    def _start(self, u0: float) -> State:
+        """The state of a first sample at the input `u0`."""
+        return u0, self.y0 - self.feedthrough * u0
+
+    def _memory(self, u: FloatArray, state: State | None) -> FloatArray:
+        z = np.empty(u.size)
+        if not u.size:
+            return z
+        last_u, start = self._start(float(u[0])) if state is None else map(float, state)
+        with np.errstate(all="ignore"):  # an escape overflows, and uncompiled kernels would warn of it
+            lost = kernels.path(branches(self._parts), last_u, start, u, kernels.LARGEST, z)
+        if lost >= 0:
+            what = "is too stiff to be followed" if np.isnan(z[lost]) else "escapes to infinity"
+            raise SimulationError(f"the output {what} at sample {lost} (u = {u[lost]:g}): {self.equation}")
+        return z
 
 
 def _with_axes(values: npt.ArrayLike, ndim: int) -> npt.NDArray[np.generic]:
