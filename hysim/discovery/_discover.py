@@ -1,131 +1,125 @@
-"""The verb `discover`: from a record to a polynomial Duhem law.
+"""The verb `discover`: from records to a law with memory.
 
-    y' = u' p(u, y) + |u'| q(u, y)
+    z' = sum c_k phi_k(u', |u'|, u, z),    y = offset + feedthrough u + gain z
 
-Regression of the slope along the loading length (`_derivatives`, `_library`), PySINDy's optimizer from dense
-to sparse (`_pysindy`), refinement by simulation error (`_refinement`), choice of one structure (`_selection`).
+Regression of the slope along the loading length (`_derivatives`, `_library`, `_shifts`), PySINDy's optimizers from
+dense to sparse (`_pysindy`), refinement by simulation error (`_refinement`), choice of one structure (`_selection`,
+`_search`, `_exponent`), and the question whether it is hysteresis at all (`_judgement`).
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from hysim import metrics
-from hysim._frozen import FloatArray, frozen
+from hysim._frozen import FloatArray
 from hysim._parallel import Progress
-from hysim.discovery import _pysindy
-from hysim.discovery._library import duhem_terms, regression
-from hysim.discovery._refinement import POLISH, Candidate, FreeRun, law
-from hysim.discovery._selection import SEARCHED, Search, preferred, thinned
-from hysim.discovery._validation import cross_validated_rmse
+from hysim.discovery import _laws, _pysindy
+from hysim.discovery._exponent import or_any_exponent
+from hysim.discovery._judgement import UNSTABLE, Judgement, judge
+from hysim.discovery._library import FORMS, duhem_terms, memory_terms, named_terms, signs_of, symmetric
+from hysim.discovery._refinement import Candidate, FreeRun
+from hysim.discovery._result import Discovery
+from hysim.discovery._search import Library, Outcome, searched
+from hysim.discovery._structures import AnyExponent
+from hysim.discovery._validation import left_out_rmse
 from hysim.identification.folds import folds
-from hysim.models.duhem import Duhem
 from hysim.records import Record
 
-ONE_RATE = "cannot be told from one rate"
-NO_STRUCTURE = "no structure found"
-UNSTABLE = "unstable"
-
-_RESTARTS = 4
-_SAME = 1e-6  # relative difference of the cost within which two optima are the same
-_SPREAD = 0.3  # of a random restart, in units of what each term contributes over the span of the input
-
-
-@frozen
-class Discovery:
-    """What `discover` found.
-
-    Parameters
-    ----------
-    model : Duhem
-        The law, refined by simulation error.
-    coefficients : mapping
-        Term to coefficient, for instance ``"|u'| y"``.
-    equation : str
-        The law as text.
-    verdict : str
-        ``"cannot be told from one rate"``, ``"no structure found"`` or ``"unstable"``; see `discover`.
-    scores : mapping
-        Of the law's free run, as in `hysim.metrics`: ``"fit_percent"`` [%], ``"rmse"`` [unit of y], ``"bic"``,
-        and ``"n_terms"``; of the search: ``"threshold"``, the largest one whose structure still has all terms of
-        the law, ``"n_structures"`` refined, ``"condition"`` of the regression.
-    n_parameters : int
-        What was fitted: the terms, and y0.
-    cv_rmse : float
-        Cross-validated rmse [unit of y]; nan if it was not asked for.
-    left_out : tuple of str
-        Terms of the library that this record cannot tell from those of lower degree.
-    thresholds, path_n_terms, path_fit_percent, path_bic : array, shape (n_thresholds,)
-        The optimizer's path from dense to sparse, each structure refined: for a Pareto figure. A structure
-        whose free run diverges has a fit of -inf and a BIC of inf. Long records are thinned for the path.
-    """
-
-    model: Duhem
-    coefficients: Mapping[str, float]
-    equation: str
-    verdict: str
-    scores: Mapping[str, float]
-    n_parameters: int
-    cv_rmse: float
-    left_out: tuple[str, ...]
-    thresholds: FloatArray
-    path_n_terms: FloatArray
-    path_fit_percent: FloatArray
-    path_bic: FloatArray
+ROUTES = ("auto", "memory", "output", "oscillator")
 
 
 def discover(
-    record: Record,
+    record_or_records: Record | Sequence[Record],
     *,
+    route: str = "auto",
+    library: str | Sequence[str] | None = None,
     degree: int = 2,
+    symmetry: str | None = None,
+    signs: Mapping[str, int] | None = None,
+    optimizer: str = "STLSQ",
+    derivative: str = "auto",
+    mass: float | None = None,
+    damping: float | None = None,
+    stiffness: float | None = None,
     cross_validate: str | int | None = None,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Discovery:
-    """Discover a law ``y' = u' p(u, y) + |u'| q(u, y)`` in a record.
+    """Discover the law of a memory in one or several records.
 
-    The slope dy/dL along the loading length, dL = \\|du\\|, is taken branch by branch and regressed on the terms
-    by PySINDy's STLSQ, from a dense law to a sparse one. Every structure on that path is refined by its error
-    in free run; the search goes on from there by taking terms away, and by trying every structure whose form
-    does not depend on where u and y are zero. Of the structures whose BIC is within 2 of the lowest, which the
-    record cannot tell apart, one of these is taken first, then the one of fewest terms.
+    The slope of the memory along the loading length, dL = ``|du|``, is regressed on a library of terms by PySINDy,
+    from a dense law to a sparse one. Every structure on that path is refined by its error in free run, and the search
+    goes on from there by taking terms away. Of the structures that the records cannot tell apart the one of fewest
+    numbers is taken. A linear dynamic model is fitted beside it, and both are judged on data they have not seen.
 
     Parameters
     ----------
-    record : Record
-        Input and output; its time is not used. The input is taken as exact, and must reverse.
+    record_or_records : Record or sequence of Record
+        Input and output. The input is taken as exact, and must reverse. Several records share the law; each begins
+        at a memory of its own. A law with memory does not need the time; whether it is hysteresis cannot be told
+        without. Records with gaps are given as several (``hs.load(..., on_missing="split")``).
+    route : {"auto", "memory", "output", "oscillator"}
+        What is measured: the memory itself, y = z; an output, y = offset + feedthrough u + gain z; or force u and
+        displacement y of a mass on a hysteretic spring, m y'' + c y' + k y + z = u. By default the first two are
+        tried, and a Duhem law, and the one of lowest BIC is taken; where linear dynamics run better than any of
+        these, the third is tried too.
+    library : {"bouc-wen", "duhem"} or sequence of str, optional
+        ``"bouc-wen"``, for z: ``u'`` and ``|u'|`` times z^j, and times ``|z|`` z^(j-1), j up to `degree`.
+        ``"duhem"``, for y: ``u'`` and ``|u'|`` times u^i y^j, i + j up to `degree`. Or the names of the terms:
+        ``["u'", "|u'| z", "u' |z|"]``.
     degree : int
-        Highest total degree of the monomials u^i y^j.
+        Of the library's monomials.
+    symmetry : {None, "odd", "even"}
+        Of the response: only terms that leave it so. Loops about the origin are odd, butterflies even.
+    signs : mapping, optional
+        Term to 1 or -1, the sign that its coefficient must have.
+    optimizer : {"STLSQ", "SR3", "SSR", "FROLS"}
+        PySINDy's optimizer that makes the path.
+    derivative : {"auto", "smoothed", "weak"}
+        Slopes of smoothed branches, or the integral form, which needs none; by default the one whose regressions run
+        nearest to samples that they have not seen.
+    mass, damping, stiffness : float, optional
+        Of the oscillator, where they are known [u per unit of y''; y'; y].
     cross_validate : {None, "loo"} or int, optional
-        ``"loo"`` leaves one output sample out at a time, an int that many blocks of samples; the input and
-        the structure are kept, the numbers fitted anew. Fills `Discovery.cv_rmse`.
+        ``"loo"`` leaves one output sample out at a time, an int that many blocks of samples; the input and the
+        structure are kept, the numbers fitted anew. Fills `Discovery.cv_rmse`.
     seed : int
-        Of the random restarts of the last refinement.
+        Of random restarts, and of the ensemble.
     progress : callable, optional
         Called as ``progress(done, total)``.
 
     Returns
     -------
     Discovery
-        The verdict is "cannot be told from one rate" where a law with a term of \\|u'\\| runs best. That is as
-        much as one record can say: under a triangle at one rate the output of a linear lag is a function of
-        u, y and the direction too, so on that record the lag *is* a rate-independent law. It is
-        "no structure found" where a single-valued law (no term of \\|u'\\|, such as a line) does as well, and
-        "unstable" where no structure of the optimizer stays finite; the model is then the best line.
+        Its verdict is
+
+        - ``"rate-independent hysteresis"``: under several rates the law predicts what it has not seen better than the
+          linear model, and predicts a rate it has not seen too;
+        - ``"linear lag"``: the linear model does;
+        - ``"cannot be told from one rate"``: there is a loop, but the input passes each place at one rate only, or
+          there is no time. Under a triangle at one rate the output of a linear lag is a function of u, y and the
+          direction, so on that record the lag *is* a rate-independent law;
+        - ``"no structure found"``: a single-valued law does as well, or neither model explains the records;
+        - ``"unstable"``: no law stays finite in free run.
 
     Raises
     ------
     ValueError
-        If the input or the output is constant, the input never reverses, its branches are too short to have
-        a slope, or there are no more samples than terms.
+        If an option is unknown, an input or output is constant, the input never reverses, its branches are too short
+        to have a slope, there are no more samples than terms, or an oscillator's record has no even time.
     TypeError
-        If the first argument is not a record.
+        If the first argument is not a record or a sequence of them.
+    ImportError
+        If `optimizer` is one of PySINDy's that needs an extra.
 
     Notes
     -----
-    Structures are compared by BIC = N ln V + d ln N with V the mean squared residual in free run plus 1e-12
-    squared strokes: smaller residuals are no evidence. d counts the terms and y0.
+    Structures are compared by BIC = N ln V + d ln N with V the mean squared residual in free run plus 1e-12 squared
+    strokes: smaller residuals are no evidence. d counts the numbers of the law, and y0 of each record.
 
     Sources: S. L. Brunton, J. L. Proctor and J. N. Kutz, PNAS 113 (2016); PySINDy 2.1.
 
@@ -134,71 +128,144 @@ def discover(
     >>> import numpy as np
     >>> import hysim as hs
     >>> u = np.concatenate([np.linspace(0, 2, 41), np.linspace(2, -1, 61)[1:], np.linspace(-1, 2, 61)[1:]])
-    >>> law = hs.Duhem.from_terms({"u'": 1.0, "|u'| y": -1.0})
-    >>> hs.discover(hs.Record(u=u, y=law.response(u))).equation
-    "y' = u' (1) + |u'| (-1 y)"
+    >>> rec = hs.Record(u=u, y=hs.BoucWen(A=1.0, beta=0.6, gamma=0.3).memory(u))
+    >>> dis = hs.discover(rec, route="memory")
+    >>> {term: round(value, 4) for term, value in dis.coefficients.items()}
+    {"u'": 1.0, "u' |z|": -0.3, "|u'| z": -0.6}
     """
-    if not isinstance(record, Record):
-        raise TypeError(f"discover takes a Record, got {type(record).__name__}: hs.Record(u=u, y=y)")
+    records = _checked(record_or_records)
+    _pysindy.check(optimizer)
     if cross_validate is not None:
-        folds(cross_validate, len(record), name="cross_validate")
-    problem = regression(record, duhem_terms(degree))
-    path = _pysindy.sparse_path(problem)
-    structures = [problem.kept(coefficients) for _, coefficients in path]
-    search = Search(FreeRun(thinned(record, SEARCHED)), problem)
-    refined = [search.refine(structure) for structure in structures]
-    search.eliminate()
-    search.enumerate_complete(progress)
-    chosen = _restarted(FreeRun(record), preferred(search.found), seed)
-    model = law(chosen)
-    path_scores = [_scores(candidate, search.free_run.record) for candidate in refined]
+        folds(cross_validate, sum(map(len, records)), name="cross_validate")
+    if derivative not in ("auto", *FORMS):
+        raise ValueError(f'derivative must be "auto", "smoothed" or "weak", got {derivative!r}')
+    options = {"optimizer": optimizer, "derivative": derivative, "seed": seed}
+    outcomes = _searched(records, _libraries(route, library, degree, symmetry), signs, options, progress)
+    outcome = min(outcomes, key=lambda each: each.candidate.bic)
+    candidate: Candidate[Any] = outcome.candidate
+    if library is None and symmetry is None and not signs:
+        candidate = or_any_exponent(FreeRun(records), outcomes[0], outcome)
+    return _discovery(records, outcome, candidate, cross_validate, seed)
+
+
+def _checked(record_or_records: Record | Sequence[Record]) -> tuple[Record, ...]:
+    records = (record_or_records,) if isinstance(record_or_records, Record) else record_or_records
+    if not isinstance(records, (list, tuple)) or not records:
+        raise TypeError(f"discover takes a Record or several, got {type(records).__name__}: hs.Record(u=u, y=y)")
+    for record in records:
+        if not isinstance(record, Record):
+            raise TypeError(f"discover takes records, got {type(record).__name__}: hs.Record(u=u, y=y)")
+        for name, values in (("input", record.u), ("output", record.y)):
+            if np.ptp(values) == 0.0:
+                raise ValueError(f"the {name} is constant: give a record on which it moves")
+    return tuple(records)
+
+
+def _libraries(
+    route: str, library: str | Sequence[str] | None, degree: int, symmetry: str | None
+) -> tuple[Library, ...]:
+    """The libraries that a route looks into, the cheaper first."""
+    feedthrough = {"auto": "may", "memory": "no", "output": "must"}.get(route)
+    if feedthrough is None:
+        raise ValueError(f"route must be one of {', '.join(ROUTES)}, got {route!r}")
+    hidden = Library(symmetric(memory_terms(degree), symmetry), "z", feedthrough, offset=route != "memory")
+    shown = Library(symmetric(duhem_terms(degree), symmetry), "y", complete=True)
+    if library is None:
+        return (hidden, shown) if route == "auto" else (hidden,)
+    if library == "bouc-wen":
+        return (hidden,)
+    if library == "duhem":
+        chosen = shown
+    elif isinstance(library, str):
+        raise ValueError(f'library must be "bouc-wen", "duhem" or names of terms, got {library!r}')
+    else:
+        terms = symmetric(named_terms(library), symmetry)
+        of_z = any("z" in name for name in library)
+        chosen = replace(hidden, terms=terms) if of_z else Library(terms, "y")
+    if chosen.letter == "y" and route == "output":
+        raise ValueError('a library in u and y has its feedthrough in the terms: give it with route="memory"')
+    return (chosen,)
+
+
+def _searched(
+    records: tuple[Record, ...],
+    libraries: Sequence[Library],
+    signs: Mapping[str, int] | None,
+    options: Mapping[str, Any],
+    progress: Progress | None,
+) -> list[Outcome]:
+    """What each library has for the records; a later one that cannot compete has nothing."""
+    n = sum(map(len, records))
+    wanted = signs_of([term for library in libraries for term in library.terms], signs)
+    outcomes: list[Outcome] = []
+    for library in libraries:
+        if n <= len(library.terms):
+            raise ValueError(f"{n} samples cannot tell {len(library.terms)} terms and y0: lower the degree")
+        lowest = min((outcome.searched_bic for outcome in outcomes), default=math.inf)
+        found = searched(records, library, signs=wanted, best=lowest, progress=progress, **options)
+        outcomes += [] if found is None else [found]
+    return outcomes
+
+
+def _discovery(
+    records: tuple[Record, ...],
+    outcome: Outcome,
+    candidate: Candidate[Any],
+    cross_validate: str | int | None,
+    seed: int,
+) -> Discovery:
+    letter, structure = outcome.library.letter, candidate.structure
+    found = _laws.found(candidate, records, "z" if isinstance(structure, AnyExponent) else letter)
+    judgement = _judged(records, candidate, letter, found.models)
+    path = [(threshold, outcome.search.refine(each)) for threshold, each in outcome.path]
+    path_scores = [_scores(each, outcome.search.free_run.records) for _, each in path]
     return Discovery(
-        model=model,
-        coefficients=model.terms,
-        equation=model.equation,
-        verdict=_verdict(chosen, refined),
+        model=found.models[0],
+        models=found.models,
+        coefficients=found.coefficients,
+        stderr=found.stderr,
+        equation=found.equation,
+        verdict=judgement.verdict if not outcome.unstable else UNSTABLE,
+        route="output" if structure.feedthrough or structure.offset else "memory",
         scores={
-            **_scores(chosen, record),
-            "n_terms": len(chosen.terms),
-            "threshold": max(t for (t, _), s in zip(path, structures, strict=True) if set(chosen.terms) <= set(s)),
-            "n_structures": len(search.tried),
-            "condition": problem.condition,
+            **_scores(candidate, records),
+            "n_terms": len(found.coefficients),
+            "threshold": outcome.threshold,
+            "n_structures": len(outcome.search.tried),
+            "condition": outcome.start.regression.condition,
         },
-        n_parameters=chosen.n_parameters,
-        cv_rmse=math.nan if cross_validate is None else cross_validated_rmse(model, record, cross_validate),
-        left_out=tuple(term.name for term in problem.dependent),
+        n_parameters=candidate.n_parameters,
+        judgement=judgement,
+        cv_rmse=math.nan if cross_validate is None else left_out_rmse(records, candidate, cross_validate),
+        left_out=tuple(term.named(letter) for term in outcome.start.regression.dependent),
+        inclusion=outcome.inclusion(seed),
         thresholds=np.array([threshold for threshold, _ in path]),
-        path_n_terms=np.array([len(structure) for structure in structures]),
+        path_n_terms=np.array([len(structure.terms) for _, structure in outcome.path], dtype=float),
         path_fit_percent=np.array([scores["fit_percent"] for scores in path_scores]),
         path_bic=np.array([scores["bic"] for scores in path_scores]),
     )
 
 
-def _scores(candidate: Candidate | None, record: Record) -> dict[str, float]:
+def _judged(records: tuple[Record, ...], candidate: Candidate[Any], letter: str, models: Sequence[Any]) -> Judgement:
+    structure = candidate.structure
+
+    def refit(some: Sequence[Record], weights: Sequence[FloatArray]) -> Sequence[Any]:
+        refined = FreeRun(tuple(some), tuple(weights)).refine(structure, candidate.unknowns[np.newaxis])
+        if refined is None:
+            raise ValueError("the law diverges")
+        return _laws.found(refined, some, letter).models
+
+    curved = isinstance(structure, AnyExponent) or any(term.rectified for term in structure.terms)
+    return judge(records, models, refit, single_valued=not curved)
+
+
+def _scores(candidate: Candidate[Any] | None, records: Sequence[Record]) -> dict[str, float]:
     if candidate is None:
         return {"fit_percent": -math.inf, "rmse": math.inf, "bic": math.inf}
-    residual = candidate.residual * float(np.ptp(record.y))
+    y = np.concatenate([record.y for record in records])
+    residual = candidate.residual * float(np.ptp(y))
     return {
-        "fit_percent": metrics.fit_percent(record.y, record.y - residual),
-        "rmse": metrics.rmse(record.y, record.y - residual),
+        "fit_percent": metrics.fit_percent(y, y - residual),
+        "rmse": metrics.rmse(y, y - residual),
         "bic": metrics.bic(residual, candidate.n_parameters),
     }
-
-
-def _restarted(free_run: FreeRun, chosen: Candidate, seed: int) -> Candidate:
-    """The best of polishing the chosen candidate and descending again from random starts around it."""
-    random = np.random.default_rng(seed)
-    spread = _SPREAD * free_run.units(chosen.terms)
-    starts = [chosen.unknowns + spread * random.standard_normal(len(spread)) for _ in range(_RESTARTS)]
-    best = chosen
-    for k, start in enumerate((chosen.unknowns, *starts)):
-        found = free_run.refine(chosen.terms, start[np.newaxis], tolerance=POLISH)
-        if found is not None and (k == 0 or found.cost < best.cost * (1.0 - _SAME)):
-            best = found
-    return best
-
-
-def _verdict(chosen: Candidate, path: list[Candidate | None]) -> str:
-    if all(candidate is None for candidate in path):
-        return UNSTABLE
-    return ONE_RATE if any(term.rectified for term in chosen.terms) else NO_STRUCTURE

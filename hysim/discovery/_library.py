@@ -1,45 +1,85 @@
-"""The library of a Duhem law on a record: its terms, their sizes, and which of them the record can tell apart.
+"""Libraries of terms, and the regression of a record's slope on them.
 
-Along the loading length L, with s = sgn(du), the law is linear in its coefficients:
+Two libraries, both closed under a change of units of u and y:
 
-    dy/dL = sum p_ij s u^i y^j + sum q_ij u^i y^j
+    Duhem       u' u^i y^j and |u'| u^i y^j                        the output is the memory
+    Bouc-Wen    u' and |u'| times z^j or |z| z^j                   y = offset + feedthrough u + z
 
-Each column is scaled to unit rms over the samples, and so is dy/dL: a threshold is then a number without
-unit, the share of a term in the slope.
+Each column is scaled to unit rms over the rows, and so is the slope: a threshold is then a number without unit,
+the share of a term in the slope.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.discovery._derivatives import MIN_SAMPLES, Branch, branches
+from hysim.discovery._derivatives import MIN_SAMPLES, Rows, smoothed_rows, weak_rows
 from hysim.models.duhem_terms import Term
 from hysim.records import Record
 
 DEPENDENT = 1e-6  # share of a column that those before it do not explain, below which it is left out
+FORMS = {"smoothed": smoothed_rows, "weak": weak_rows}
 
 
 def duhem_terms(degree: int) -> tuple[Term, ...]:
     """All terms u' u^i y^j and |u'| u^i y^j with i + j <= degree, in the one order."""
-    if not isinstance(degree, int) or isinstance(degree, bool) or degree < 0:
-        raise ValueError(f"degree must be a whole number from 0 up, got {degree!r}")
-    powers = [(total, j) for total in range(degree + 1) for j in range(total + 1)]
+    powers = [(total, j) for total in range(_whole(degree) + 1) for j in range(total + 1)]
     return tuple(Term(rectified, total, j) for rectified in (False, True) for total, j in powers)
+
+
+def memory_terms(degree: int) -> tuple[Term, ...]:
+    """All terms u' and |u'| times z^j, or |z| z^(j - 1) for j > 0, with j <= degree, in the one order."""
+    powers = [(j, j, False) for j in range(_whole(degree) + 1)] + [(j, j - 1, True) for j in range(1, degree + 1)]
+    return tuple(sorted(Term(rectified, *power) for rectified in (False, True) for power in powers))
+
+
+def named_terms(names: Iterable[str]) -> tuple[Term, ...]:
+    """The terms of these names, in the one order."""
+    given = [names] if isinstance(names, str) else list(names)
+    terms = tuple(sorted({Term.parse(name) for name in given}))
+    if len(terms) < len(given) or not terms:
+        raise ValueError(f"a library is a list of different terms, got {given}")
+    return terms
+
+
+def symmetric(terms: Iterable[Term], symmetry: str | None) -> tuple[Term, ...]:
+    """The terms of an odd law, whose response to -u is -y, or of an even one, whose response to -u is y.
+
+    With u and z, u' turns its sign and |u'| does not: an odd law has of u' the monomials that are even in (u, z) and
+    of |u'| those that are odd; an even one has of u' those that are odd in u and of |u'| those that are even.
+    """
+    if symmetry is None:
+        return tuple(terms)
+    if symmetry == "odd":
+        return tuple(term for term in terms if (term.i + term.j) % 2 == int(term.rectified))
+    if symmetry == "even":
+        return tuple(term for term in terms if term.i % 2 != int(term.rectified))
+    raise ValueError(f'symmetry must be None, "odd" or "even", got {symmetry!r}')
+
+
+def signs_of(terms: Sequence[Term], signs: Mapping[str, int] | None) -> dict[Term, int]:
+    """The signs that coefficients must have, by term."""
+    wanted = {Term.parse(name): sign for name, sign in (signs or {}).items()}
+    for term, sign in wanted.items():
+        if term not in terms:
+            raise ValueError(f"signs: {term.name!r} is not in the library")
+        if sign not in (-1, 1):
+            raise ValueError(f"signs: the sign of {term.name!r} must be 1 or -1, got {sign!r}")
+    return wanted
 
 
 @dataclass(frozen=True)
 class Regression:
-    """dy/dL = features @ coefficients on the branches of a record, in scaled units.
+    """slope = features @ coefficients, in scaled units.
 
-    `sizes` (n_terms,) are the rms values of the columns, `slope_size` that of dy/dL. `dependent` are the
-    terms left out since their columns are combinations of those of lower degree on this record.
+    `sizes` (n_terms,) are the rms values of the columns, `slope_size` that of the slope. `dependent` are the terms
+    left out since their columns are combinations of those of lower degree on these records.
     """
 
     terms: tuple[Term, ...]
     dependent: tuple[Term, ...]
-    branches: list[Branch]
     features: FloatArray
     slope: FloatArray
     sizes: FloatArray
@@ -49,6 +89,12 @@ class Regression:
     def condition(self) -> float:
         """Condition number of the scaled features."""
         return float(np.linalg.cond(self.features))
+
+    @property
+    def misfit(self) -> float:
+        """Share of the slope, in rms, that all terms together leave over, in the unit of the slope."""
+        scaled = np.linalg.lstsq(self.features, self.slope, rcond=None)[0]
+        return float(np.sqrt(np.mean((self.slope - self.features @ scaled) ** 2))) * self.slope_size
 
     def kept(self, coefficients: FloatArray) -> tuple[Term, ...]:
         """The terms whose coefficients (n_terms,) are not zero."""
@@ -63,46 +109,63 @@ class Regression:
         return np.asarray(scaled * self.slope_size / self.sizes[kept])
 
 
-def feature(term: Term, u: FloatArray, y: FloatArray, direction: FloatArray | float) -> FloatArray:
-    """The column of a term in dy/dL."""
-    column = u**term.i * y**term.j
-    return column if term.rectified else direction * column
+@dataclass(frozen=True)
+class Slopes:
+    """The rows of several records in one form."""
+
+    rows: tuple[Rows, ...]
+
+    def regression(self, terms: Sequence[Term], feedthrough: float = 0.0, offset: float = 0.0) -> Regression:
+        """The regression on those of the terms that the records can tell apart, for z = y - feedthrough u - offset."""
+
+        def features(u: FloatArray, z: FloatArray, direction: FloatArray) -> FloatArray:
+            return np.stack([feature(term, u, z, direction) for term in terms], axis=1)
+
+        raw = np.concatenate([rows.columns(features, feedthrough, offset) for rows in self.rows])
+        slope = np.concatenate([rows.left(feedthrough) for rows in self.rows])
+        sizes, slope_size = np.sqrt(np.mean(raw**2, axis=0)), float(np.sqrt(np.mean(slope**2))) or 1.0
+        scaled = raw / np.where(sizes > 0.0, sizes, 1.0)
+        kept = sorted(_independent(scaled, sorted(range(len(terms)), key=lambda k: (terms[k].degree, k))))
+        return Regression(
+            terms=tuple(terms[k] for k in kept),
+            dependent=tuple(term for k, term in enumerate(terms) if k not in kept),
+            features=scaled[:, kept],
+            slope=slope / slope_size,
+            sizes=sizes[kept],
+            slope_size=slope_size,
+        )
 
 
-def regression(record: Record, terms: tuple[Term, ...]) -> Regression:
-    """Set up the regression on a record, with those of the terms that it can tell apart.
+def slopes(records: Sequence[Record], form: str) -> Slopes:
+    """The rows of records in the "smoothed" or the "weak" form.
 
     Raises
     ------
     ValueError
-        If the record cannot tell u' from |u'|: its input or output is constant, its input never reverses,
-        or its branches are too short; or if it has no more samples than there are terms.
+        If the records cannot tell u' from |u'|: their input never reverses, or their branches are too short.
     """
-    for name, values in (("input", record.u), ("output", record.y)):
-        if np.ptp(values) == 0.0:
-            raise ValueError(f"the {name} is constant: give a record on which it moves")
-    found = branches(record.u, record.y)
-    if len({branch.direction for branch in found}) < 2:
+    found = tuple(rows for record in records if (rows := FORMS[form](record.u, record.y)) is not None)
+    directions = {sign for rows in found for sign in np.unique(rows.direction).tolist()}
+    if len(directions) < 2:
         raise ValueError(
-            f"a Duhem law needs a rising and a falling branch of at least {MIN_SAMPLES} samples each: with one of "
+            f"a memory law needs a rising and a falling branch of at least {MIN_SAMPLES} samples each: with one of "
             "them alone u' and |u'| are the same thing. Give a record whose input reverses, sampled more finely"
         )
-    if len(record) <= len(terms):
-        raise ValueError(f"{len(record)} samples cannot tell {len(terms)} terms and y0: lower the degree")
-    raw = np.concatenate([np.stack([feature(t, b.u, b.y, b.direction) for t in terms], axis=1) for b in found])
-    slope = np.concatenate([branch.slope for branch in found])
-    sizes, slope_size = np.sqrt(np.mean(raw**2, axis=0)), float(np.sqrt(np.mean(slope**2)))
-    scaled = raw / np.where(sizes > 0.0, sizes, 1.0)
-    kept = sorted(_independent(scaled, sorted(range(len(terms)), key=lambda k: (terms[k].degree, k))))
-    return Regression(
-        terms=tuple(terms[k] for k in kept),
-        dependent=tuple(term for k, term in enumerate(terms) if k not in kept),
-        branches=found,
-        features=scaled[:, kept],
-        slope=slope / slope_size,
-        sizes=sizes[kept],
-        slope_size=slope_size,
-    )
+    return Slopes(found)
+
+
+def feature(term: Term, u: FloatArray, z: FloatArray, direction: FloatArray | float) -> FloatArray:
+    """The column of a term in dz/dL."""
+    column = u**term.i * z**term.j
+    if term.absolute:
+        column = column * np.abs(z)
+    return column if term.rectified else direction * column
+
+
+def _whole(degree: int) -> int:
+    if not isinstance(degree, int) or isinstance(degree, bool) or degree < 0:
+        raise ValueError(f"degree must be a whole number from 0 up, got {degree!r}")
+    return degree
 
 
 def _independent(columns: FloatArray, order: list[int]) -> list[int]:

@@ -1,75 +1,138 @@
-"""The only place that touches PySINDy (2.1): sparse regression of dy/dL on a library of terms.
+"""The only place that touches PySINDy (2.1): its optimizers, from dense to sparse, and its ensembles.
 
-PySINDy's STLSQ alternates least squares and the removal of coefficients below a threshold. It sees one
-trajectory for each branch, with the slope given, so that it never differentiates across a reversal.
+Features and slopes come scaled, as arrays: PySINDy never differentiates, so that nothing is taken across a
+reversal, and never sees a unit. Its ensembles draw from NumPy's global generator, which is seeded around the call
+and put back.
 """
 
+import contextlib
 import warnings
-from collections.abc import Callable
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.discovery._library import Regression, feature
-from hysim.models.duhem_terms import Term
 
 RIDGE = 1e-12  # of the mean square of the columns: keeps the normal equations solvable and changes nothing else
 _MAX_ITERATIONS = 50
+_EXTRAS = {
+    "ConstrainedSR3": "cvxpy",
+    "StableLinearSR3": "cvxpy",
+    "TrappingSR3": "cvxpy",
+    "MIOSR": "miosr",
+    "SBR": "sbr",
+}
+
+OPTIMIZERS = ("STLSQ", "SR3", "SSR", "FROLS")
+"""PySINDy's optimizers that a path is made with."""
 
 
-def sparse_path(regression: Regression) -> list[tuple[float, FloatArray]]:
-    """Thresholds from zero up, and the scaled coefficients (n_terms,) that STLSQ finds at each.
+def sparse_path(features: FloatArray, slope: FloatArray, optimizer: str = "STLSQ") -> list[tuple[float, FloatArray]]:
+    """Thresholds from zero up, and the coefficients (n_terms,) that the optimizer finds at each.
 
-    The next threshold is just above the smallest coefficient of the last result, so that every threshold
-    changes the result and none that matters is missed. The path ends with the last term.
+    The next threshold is just above the smallest coefficient of the last result, so that every threshold changes the
+    result and none that matters is missed. The path ends with the last term. SSR and FROLS have no threshold: their
+    own sequence of structures is the path, each with its smallest coefficient.
     """
+    if optimizer in ("SSR", "FROLS"):
+        return _greedy_path(features, slope, optimizer)
     path: list[tuple[float, FloatArray]] = []
     threshold = 0.0
     while True:
-        coefficients = sparse_fit(regression, threshold)
+        coefficients = sparse_fit(features, slope, threshold, optimizer)
         kept = np.abs(coefficients[coefficients != 0.0])
         if not kept.size:
             return path
         path.append((threshold, coefficients))
-        threshold = float(kept.min()) * (1.0 + 1e-9)
+        threshold = max(float(kept.min()), threshold) * (1.0 + 1e-9)
 
 
-def sparse_fit(regression: Regression, threshold: float) -> FloatArray:
-    """Scaled coefficients (n_terms,) of STLSQ at one threshold, zero where it removed the term."""
+def sparse_fit(features: FloatArray, slope: FloatArray, threshold: float, optimizer: str = "STLSQ") -> FloatArray:
+    """Coefficients (n_terms,) at one threshold, zero where the optimizer removed the term."""
+    found = _thresholding(optimizer, threshold, len(features))
+    with _quiet():
+        found.fit(features, slope[:, np.newaxis])
+    return np.array(found.coef_[0])
+
+
+def inclusion(features: FloatArray, slope: FloatArray, threshold: float, *, n_models: int, seed: int) -> FloatArray:
+    """Share of fits (n_terms,) by STLSQ that keep each term when the rows are drawn anew (PySINDy's bagging)."""
     import pysindy
+
+    optimizer = _thresholding("STLSQ", threshold, len(features))
+    ensemble = pysindy.EnsembleOptimizer(optimizer, bagging=True, n_models=n_models)
+    with _quiet(), _seeded(seed):
+        ensemble.fit(features, slope[:, np.newaxis])
+    return np.asarray(np.mean([coefficients[0] != 0.0 for coefficients in ensemble.coef_list], axis=0))
+
+
+def check(optimizer: str) -> None:
+    """Refuse an optimizer that no path can be made with.
+
+    Raises
+    ------
+    ImportError
+        If PySINDy needs an extra for it that is not installed.
+    ValueError
+        If it is none of `OPTIMIZERS`.
+    """
+    if optimizer in OPTIMIZERS:
+        return
+    extra = _EXTRAS.get(optimizer)
+    if extra is not None:
+        import pysindy
+
+        if not hasattr(pysindy, optimizer):
+            raise ImportError(f"PySINDy's {optimizer} needs its extra: pip install 'pysindy[{extra}]'")
+    raise ValueError(f"optimizer must be one of {', '.join(OPTIMIZERS)}, got {optimizer!r}")
+
+
+def _thresholding(optimizer: str, threshold: float, n_rows: int) -> Any:
+    import pysindy
+
+    if optimizer == "SR3":
+        return pysindy.SR3(
+            reg_weight_lam=0.5 * threshold**2, regularizer="L0", relax_coeff_nu=1.0, max_iter=1000, unbias=True
+        )
+    return pysindy.STLSQ(threshold=threshold, alpha=RIDGE * n_rows, max_iter=_MAX_ITERATIONS, unbias=False)
+
+
+def _greedy_path(features: FloatArray, slope: FloatArray, optimizer: str) -> list[tuple[float, FloatArray]]:
+    import pysindy
+
+    n_terms = features.shape[1]
+    if optimizer == "SSR":
+        found = pysindy.SSR(alpha=RIDGE * len(features), max_iter=n_terms, unbias=False)
+    else:
+        found = pysindy.FROLS(alpha=RIDGE * len(features), max_iter=n_terms, unbias=False)
+    with _quiet():
+        found.fit(features, slope[:, np.newaxis])
+    structures: dict[tuple[bool, ...], FloatArray] = {}
+    for coefficients in (np.ravel(each) for each in found.history_):
+        if coefficients.any():
+            structures.setdefault(tuple(coefficients != 0.0), np.array(coefficients))
+    ordered = sorted(structures.values(), key=np.count_nonzero, reverse=True)
+    return [(float(np.abs(each[each != 0.0]).min()), each) for each in ordered]
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """An empty law is the end of a path, and the last iterate of an unfinished one is still a structure."""
     from sklearn.exceptions import ConvergenceWarning
 
-    samples = len(regression.features)
-    library = pysindy.CustomLibrary(
-        library_functions=[_column(term, size) for term, size in zip(regression.terms, regression.sizes, strict=True)],
-        function_names=[_named(term) for term in regression.terms],
-    )
-    optimizer = pysindy.STLSQ(threshold=threshold, alpha=RIDGE * samples, max_iter=_MAX_ITERATIONS, unbias=False)
-    model = pysindy.SINDy(optimizer=optimizer, feature_library=library)
-    branches = regression.branches
     with warnings.catch_warnings():
-        # An empty law is the end of the path, and the last iterate of an unfinished one is still a structure.
         warnings.filterwarnings("ignore", message="Sparsity parameter is too big")
         warnings.filterwarnings("ignore", category=ConvergenceWarning)
-        model.fit(
-            [branch.y[:, np.newaxis] for branch in branches],
-            t=[branch.length for branch in branches],
-            x_dot=[branch.slope[:, np.newaxis] / regression.slope_size for branch in branches],
-            u=[np.stack([branch.u, np.full(branch.u.size, branch.direction)], axis=1) for branch in branches],
-            feature_names=["y", "u", "s"],
-        )
-    return np.array(model.coefficients()[0])
+        yield
 
 
-def _column(term: Term, size: float) -> Callable[[FloatArray, FloatArray, FloatArray], FloatArray]:
-    def scaled(y: FloatArray, u: FloatArray, s: FloatArray) -> FloatArray:
-        return feature(term, u, y, s) / size
-
-    return scaled
-
-
-def _named(term: Term) -> Callable[..., str]:
-    def name(*_inputs: str) -> str:
-        return term.name
-
-    return name
+@contextlib.contextmanager
+def _seeded(seed: int) -> Iterator[None]:
+    """NumPy's global generator with this seed, and afterwards as it was."""
+    before = np.random.get_state()  # noqa: NPY002  PySINDy takes no generator
+    np.random.seed(seed)  # noqa: NPY002
+    try:
+        yield
+    finally:
+        np.random.set_state(before)  # noqa: NPY002

@@ -1,51 +1,60 @@
-"""Refinement by simulation error: the coefficients and y0 whose free run is nearest to the record.
+"""Refinement by simulation error: the numbers of a structure whose free run is nearest to the records.
 
-    minimise sum w_k (y_k - law(u; c, y0)_k)^2
+    minimise sum w_k (y_k - y(u; c, feedthrough, offset, y0)_k)^2
 
-A derivative that fits says little about a law that must run on its own output, so every structure is
-judged by its free run alone. Unknowns are measured in what they contribute, outputs in strokes; the
-Jacobian is a central difference, all of it one batch. A free run that leaves BOUND strokes has diverged.
+A derivative that fits says little about a law that must run on its own output, so every structure is judged by its
+free run alone. Records share all numbers but y0. Unknowns are measured in what they contribute, outputs in strokes.
+A free run that leaves BOUND strokes has diverged.
 
-    BIC = N ln(V + FLOOR^2) + d ln N,    V = mean squared residual in strokes,  d = terms + 1 for y0
+    BIC = N ln(V + FLOOR^2) + d ln N,    V = mean squared residual in strokes,  d = n_parameters
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
 from hysim._frozen import FloatArray
+from hysim.discovery._descent import descend
 from hysim.discovery._library import Regression
-from hysim.models.duhem import Duhem
-from hysim.models.duhem_runs import free_runs
-from hysim.models.duhem_terms import Term, coefficient_units
+from hysim.discovery._structures import Structure, Terms
+from hysim.models.duhem_terms import Term
 from hysim.records import Record
 
 BOUND = 30.0
 FLOOR = 1e-6  # smaller residuals, in strokes, are no evidence for one law over another
 _DIVERGED = 1e3  # the residual, in strokes, of a free run that has
-_DIFFERENCE = 1e-6  # truncation and rounding of a central difference are both near 1e-10
 RANKING = 1e-5  # relative change of the cost at which a descent ends: far less than a difference of BIC that counts
 POLISH = 1e-12
-_MAX_EVALUATIONS = 60
+_STEPS_TO_RANK = 20  # a structure that is still on its way then is not taken for its last digits
+_STEPS = 200
 _RIDGES = tuple(10.0**power for power in range(-9, 1))
+_SINGULAR = 1e-10
+_AMPLITUDES = (1.0, 0.5)  # of the steady loops, in ranges of the input
+_CYCLES = 20
+_STEADY = 1e-2  # strokes by which the last two may differ
+
+
+S = TypeVar("S", bound=Structure)
 
 
 @dataclass(frozen=True)
-class Candidate:
+class Candidate(Generic[S]):
     """A refined structure.
 
-    `unknowns` (n_terms + 1,) are the coefficients and y0, `residual` (n_samples,) is in strokes, `jacobian`
-    (n_samples, n_terms + 1) is its derivative.
+    `unknowns` (size + n_records,) are its numbers and the y0 of each record, `residual` (n_samples,) is in strokes,
+    `jacobian` (n_samples, size + n_records) is its derivative. `settles` tells whether the law, when the input goes on
+    to and fro over its range, stays finite and comes to a steady loop.
     """
 
-    terms: tuple[Term, ...]
+    structure: S
     unknowns: FloatArray
     jacobian: FloatArray
     residual: FloatArray
+    settles: bool
 
     @property
     def cost(self) -> float:
@@ -54,13 +63,26 @@ class Candidate:
 
     @property
     def n_parameters(self) -> int:
-        """The terms and y0."""
+        """The numbers of the structure, and y0 of each record."""
         return len(self.unknowns)
 
     @property
     def bic(self) -> float:
         """Bayesian information criterion, the lower the better."""
         return information(self.cost, self.residual.size, self.n_parameters)
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of the unknowns; nan throughout where the records do not tell one of them."""
+        n, d = self.jacobian.shape
+        sizes = np.linalg.norm(self.jacobian, axis=0)
+        if n <= d or not (sizes > 0.0).all():
+            return np.full((d, d), np.nan)
+        singular, right = np.linalg.svd(self.jacobian / sizes, full_matrices=False)[1:]
+        if singular[-1] < _SINGULAR * singular[0]:
+            return np.full((d, d), np.nan)
+        root = (right / singular[:, np.newaxis]).T / sizes[:, np.newaxis]
+        return np.asarray(root @ root.T * (self.cost / (n - d)))
 
 
 def information(cost: float, n_samples: int, n_parameters: int) -> float:
@@ -70,85 +92,128 @@ def information(cost: float, n_samples: int, n_parameters: int) -> float:
 
 @dataclass(frozen=True)
 class FreeRun:
-    """The least-squares problem of one record; `weights`, shape (n_samples,), may leave samples out."""
+    """The least-squares problem of some records.
 
-    record: Record
-    weights: FloatArray | None = None
+    `weights`, shape (n_samples,) for each record, may leave samples out; `signs` are those that coefficients must have.
+    """
+
+    records: tuple[Record, ...]
+    weights: tuple[FloatArray, ...] | None = None
+    signs: Mapping[Term, int] = field(default_factory=dict)
 
     @cached_property
     def stroke(self) -> float:
-        """Range of the measured output, the unit of outputs and residuals."""
-        return float(np.ptp(self.record.y))
+        """Range of the measured outputs, the unit of outputs and residuals."""
+        return float(max(record.y.max() for record in self.records) - min(record.y.min() for record in self.records))
 
-    def units(self, terms: Sequence[Term]) -> FloatArray:
-        """Units of the unknowns (n_terms + 1,): the law's coefficients and y0 are these times x."""
-        return np.append(coefficient_units(self.record.u, self.record.y, terms), self.stroke)
+    @cached_property
+    def n_samples(self) -> int:
+        """Of all records."""
+        return sum(map(len, self.records))
 
-    def outputs(self, terms: Sequence[Term], unknowns: FloatArray) -> FloatArray:
-        """Free runs (n_sets, n_samples) of coefficients and y0 (n_sets, n_terms + 1), inf where one diverges."""
-        bound = BOUND * self.stroke + float(np.abs(self.record.y).max())
-        return free_runs(terms, unknowns[:, :-1], 0.0, unknowns[:, -1], self.record.u[np.newaxis], bound)
+    @cached_property
+    def largest(self) -> Record:
+        """The record with the widest input, which sets the units."""
+        return max(self.records, key=lambda record: float(np.ptp(record.u)))
 
-    def residuals(self, terms: Sequence[Term], unknowns: FloatArray) -> FloatArray:
+    @property
+    def measured_starts(self) -> FloatArray:
+        """The first output of each record."""
+        return np.array([record.y[0] for record in self.records])
+
+    def units(self, structure: Structure) -> FloatArray:
+        """Units of the unknowns (size + n_records,): what moves the output by about a stroke."""
+        starts = np.full(len(self.records), self.stroke)
+        return np.concatenate([structure.units(self.largest, self.stroke), starts])
+
+    def outputs(self, structure: Structure, unknowns: FloatArray) -> FloatArray:
+        """Free runs (n_sets, n_samples) of unknowns (n_sets, size + n_records), inf where one diverges."""
+        runs = [self._run(structure, unknowns, k) for k in range(len(self.records))]
+        return np.concatenate(runs, axis=1)
+
+    def residuals(self, structure: Structure, unknowns: FloatArray) -> FloatArray:
         """Weighted residuals (n_sets, n_samples) in strokes."""
-        left = (self.record.y - self.outputs(terms, unknowns)) / self.stroke
-        left[~np.isfinite(left)] = _DIVERGED
-        return left if self.weights is None else left * np.sqrt(self.weights)
+        return np.concatenate([self._left(structure, unknowns, k) for k in range(len(self.records))], axis=1)
 
-    def refine(self, terms: tuple[Term, ...], starts: FloatArray, *, tolerance: float = RANKING) -> Candidate | None:
-        """The optimum that is reached from the best of `starts` (n_starts, n_terms + 1), or None if all diverge."""
-        from scipy.optimize import least_squares
-
-        costs = np.sum(self.residuals(terms, starts) ** 2, axis=1)
+    def refine(self, structure: S, starts: FloatArray, *, tolerance: float = RANKING) -> Candidate[S] | None:
+        """The optimum that is reached from the best of `starts` (n_starts, size + n_records); None if all diverge."""
+        units = self.units(structure)
+        lower, upper = self._bounds(structure)
+        starts = np.clip(starts, lower, upper)
+        costs = np.sum(self.residuals(structure, starts) ** 2, axis=1)
         if costs.min() >= _DIVERGED**2:
             return None
-        units = self.units(terms)
-        steps = _DIFFERENCE * np.eye(len(units))
-
-        def jacobian(x: FloatArray) -> FloatArray:
-            around = np.concatenate([x + steps, x - steps])
-            ahead, behind = np.split(self.residuals(terms, around * units), 2)
-            return np.asarray((ahead - behind).T / (2.0 * _DIFFERENCE))
-
-        found = least_squares(
-            lambda x: self.residuals(terms, x[np.newaxis] * units)[0],
+        found = descend(
+            lambda x: self.residuals(structure, x * units),
             starts[np.argmin(costs)] / units,
-            jac=jacobian,
-            method="trf",  # "lm" (SciPy 1.17) now and then gives other bits from the same start
-            ftol=tolerance,
-            xtol=1e-2 * tolerance,
-            gtol=tolerance,
-            max_nfev=_MAX_EVALUATIONS,
+            lower / units,
+            upper / units,
+            tolerance=tolerance,
+            steps=_STEPS_TO_RANK if tolerance >= RANKING else _STEPS,
+            central=tolerance < RANKING,
         )
-        return Candidate(terms, found.x * units, found.jac / units, found.fun)
+        unknowns = found.x * units
+        return Candidate(
+            structure, unknowns, found.jacobian / units, found.residual, self._settles(structure, unknowns)
+        )
 
-    def regressed(self, regression: Regression, terms: Sequence[Term]) -> FloatArray:
-        """Starts (n_ridges, n_terms + 1) from ridge regressions of the slope: the stiffer, the tamer the free run."""
-        y0 = regression.branches[0].y[0]
-        return np.array([[*regression.ridge(terms, weight), y0] for weight in _RIDGES])
+    def regressed(
+        self, regression: Regression, structure: Terms, feedthrough: float = 0.0, offset: float = 0.0
+    ) -> FloatArray:
+        """Starts (n_ridges, size + n_records) from ridge regressions: the stiffer, the tamer the free run."""
+        shift = [feedthrough] * structure.feedthrough + [offset] * structure.offset
+        ends = [*shift, *self.measured_starts]
+        return np.array([[*regression.ridge(structure.terms, weight), *ends] for weight in _RIDGES])
 
+    @cached_property
+    def _edges(self) -> list[int]:
+        return [0, *np.cumsum([len(record) for record in self.records]).tolist()]
 
-def law(candidate: Candidate) -> Duhem:
-    """The law with a candidate's coefficients."""
-    *coefficients, y0 = candidate.unknowns.tolist()
-    return Duhem.from_terms(dict(zip((t.name for t in candidate.terms), coefficients, strict=True)), y0=y0)
+    def _bounds(self, structure: Structure) -> tuple[FloatArray, FloatArray]:
+        free = np.full(len(self.records), np.inf)
+        lower, upper = structure.bounds(self.signs)
+        return np.concatenate([lower, -free]), np.concatenate([upper, free])
+
+    def _run(self, structure: Structure, unknowns: FloatArray, k: int) -> FloatArray:
+        record = self.records[k]
+        bound = BOUND * self.stroke + float(np.abs(record.y).max())
+        return structure.run(record.u, unknowns[:, : structure.size], unknowns[:, structure.size + k], bound)
+
+    def _settles(self, structure: Structure, unknowns: FloatArray) -> bool:
+        k = max(range(len(self.records)), key=lambda k: float(np.ptp(self.records[k].u)))
+        for share in _AMPLITUDES:
+            u = self.records[k].u
+            middle, reach = 0.5 * (u.max() + u.min()), 0.5 * share * float(np.ptp(u))
+            path = np.concatenate([u, np.tile([middle - reach, middle + reach], _CYCLES)])
+            path.setflags(write=False)
+            numbers, y0 = unknowns[np.newaxis, : structure.size], unknowns[np.newaxis, structure.size + k]
+            y = structure.run(path, numbers, y0, BOUND * self.stroke)[0]
+            if not np.isfinite(y).all() or np.abs(y[-4:-2] - y[-2:]).max() > _STEADY * self.stroke:
+                return False
+        return True
+
+    def _left(self, structure: Structure, unknowns: FloatArray, k: int) -> FloatArray:
+        left = (self.records[k].y - self._run(structure, unknowns, k)) / self.stroke
+        left[~np.isfinite(left)] = _DIVERGED
+        return left if self.weights is None else left * np.sqrt(self.weights[k])
 
 
 class Loss(NamedTuple):
-    """A structure that has lost a term: its cost and unknowns as the linearised free run predicts them."""
+    """A structure that has lost a number: its cost and unknowns as the linearised free run predicts them."""
 
-    terms: tuple[Term, ...]
+    structure: Terms
     cost: float
     unknowns: FloatArray
 
 
-def without(candidate: Candidate, k: int) -> Loss:
-    """Take term `k` out of a candidate."""
-    jacobian = np.delete(candidate.jacobian, k, axis=1)
-    sizes = np.linalg.norm(jacobian, axis=0)
-    sizes[sizes == 0.0] = 1.0
-    removed = candidate.jacobian[:, k] * candidate.unknowns[k]
-    shift = np.linalg.lstsq(jacobian / sizes, removed, rcond=1e-10)[0] / sizes
-    left = candidate.residual - removed + jacobian @ shift
-    terms = candidate.terms[:k] + candidate.terms[k + 1 :]
-    return Loss(terms, float(left @ left), np.delete(candidate.unknowns, k) + shift)
+def losses(candidate: Candidate[Terms]) -> Iterator[Loss]:
+    """What taking each number of a candidate's structure out would cost."""
+    for k in range(candidate.structure.size):
+        jacobian = np.delete(candidate.jacobian, k, axis=1)
+        sizes = np.linalg.norm(jacobian, axis=0)
+        sizes[sizes == 0.0] = 1.0
+        removed = candidate.jacobian[:, k] * candidate.unknowns[k]
+        shift = np.linalg.lstsq(jacobian / sizes, removed, rcond=1e-10)[0] / sizes
+        left = candidate.residual - removed + jacobian @ shift
+        unknowns = np.delete(candidate.unknowns, k) + shift
+        yield Loss(candidate.structure.without(k), float(left @ left), unknowns)

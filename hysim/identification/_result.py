@@ -1,15 +1,13 @@
 """What `identify` returns."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import field
 from typing import Any, Self
 
 import numpy as np
 
-import hysim
 from hysim._frozen import FloatArray, frozen
-from hysim.identification import _json
+from hysim.identification import json_forms
 from hysim.identification._profile import Profile
 
 
@@ -200,8 +198,7 @@ class Identification:
         TypeError
             If the model is not of one of hysim's families.
         """
-        document = {"hysim": hysim.__version__, "identification": _json.to_plain(self)}
-        return json.dumps(document, indent=2, allow_nan=False) + "\n"
+        return json_forms.to_text("identification", self)
 
     @classmethod
     def from_json(cls, text: str) -> Self:
@@ -212,10 +209,5 @@ class Identification:
         ValueError
             If the text does not hold one.
         """
-        try:
-            found = _json.from_plain(json.loads(text)["identification"], (cls, Candidate, Width, Profile))
-        except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
-            raise ValueError(f"this is not an identification of hysim: {type(error).__name__}: {error}") from None
-        if not isinstance(found, cls):
-            raise ValueError(f"this is not an identification of hysim, but {type(found).__name__}")
+        found: Self = json_forms.from_text("identification", text, (cls, Candidate, Width, Profile))
         return found

@@ -261,16 +261,16 @@ def batch(
 def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """Output at the next input `u`; `state` is (last u, z, scratch), `state_size` long, and moves along.
 
-    `parameters` is (feedthrough, 2 or 4, rows, columns, law), the polynomials of the law one after the other.
+    `parameters` is (offset, feedthrough, 2 or 4, rows, columns, law), the polynomials of the law one after the other.
     """
-    rows, columns = int(parameters[2]), int(parameters[3])
-    law = parameters[4:].reshape((int(parameters[1]), rows, columns))
+    rows, columns = int(parameters[3]), int(parameters[4])
+    law = parameters[5:].reshape((int(parameters[2]), rows, columns))
     size = rows * columns
     local = state[2 : 2 + size].reshape((rows, columns))
     powers = state[2 + size : state_size(rows, columns)].reshape((max(2, columns), N_TERMS + 1))
     z = advance(state[0], state[1], u - state[0], law, LARGEST, local, powers)
     state[0], state[1] = u, z
-    return float(parameters[0] * u + z)
+    return float(parameters[0] + (parameters[1] * u + z))
 
 
 @kernel

@@ -1,13 +1,13 @@
 """The polynomial Duhem law: one slope where the input rises, another where it falls.
 
-    y = feedthrough u + z,    z' = u' p(u, z) + |u'| q(u, z)
+    y = offset + feedthrough u + z,    z' = u' p(u, z) + |u'| q(u, z)
     p = sum (p_ij + p_abs_ij |z|) u^i z^j,    q = sum (q_ij + q_abs_ij |z|) u^i z^j
     dz/du = p + q  where u rises,             dz/du = p - q  where u falls
 
 u is the input, z the memory, y the output. The law does not depend on time. It has hysteresis exactly if q is
-not zero. Without feedthrough the memory is the output: the law is one of u and y. The memory is evaluated at the
-samples of an input that is linear between them by power series (`hysim.kernels.duhem`), to 1e-12 of the range.
-Special cases:
+not zero. Without feedthrough and offset the memory is the output: the law is one of u and y. The memory is
+evaluated at the samples of an input that is linear between them by power series (`hysim.kernels.duhem`), to 1e-12
+of the range. Special cases:
 
     Coleman-Hodgdon    p = b,                q = a (c u - y)
     Dahl               p = r,                q = -(r / F) y
@@ -38,7 +38,7 @@ State = tuple[float, float]
 """Last input and memory."""
 
 _BOUND = 1e3
-_OUTPUT = ("feedthrough", "y0")
+_OUTPUT = ("feedthrough", "offset", "y0")
 _AXES = {**dict.fromkeys(Polynomials._fields, 3), **dict.fromkeys(_OUTPUT, 1)}  # of the parameters of many laws
 
 
@@ -48,7 +48,7 @@ def _none() -> FloatArray:
 
 @model
 class Duhem:
-    """Polynomial Duhem law, ``y = feedthrough u + z`` with ``z' = u' p(u, z) + |u'| q(u, z)``.
+    """Polynomial Duhem law, ``y = offset + feedthrough u + z`` with ``z' = u' p(u, z) + |u'| q(u, z)``.
 
     Parameters
     ----------
@@ -58,6 +58,8 @@ class Duhem:
         Element [i, j] multiplies ``|z| u^i z^j`` in p and in q [unit of y^(-j) / unit of u^(i+1)].
     feedthrough : float
         Slope of the output beside the memory [unit of y / unit of u].
+    offset : float
+        Output where u and the memory are zero [unit of y].
     y0 : float
         Output at the first sample [unit of y], whatever the input there.
 
@@ -84,6 +86,7 @@ class Duhem:
     p_abs: FloatArray = field(default_factory=_none)
     q_abs: FloatArray = field(default_factory=_none)
     feedthrough: float = 0.0
+    offset: float = 0.0
     y0: float = 0.0
 
     def __post_init__(self) -> None:
@@ -93,7 +96,9 @@ class Duhem:
                 raise ValueError(f"{name} must have two axes and at least one element, got shape {shape}")
 
     @classmethod
-    def from_terms(cls, terms: Mapping[str, float], *, feedthrough: float = 0.0, y0: float = 0.0) -> Self:
+    def from_terms(
+        cls, terms: Mapping[str, float], *, feedthrough: float = 0.0, offset: float = 0.0, y0: float = 0.0
+    ) -> Self:
         """The law with these coefficients.
 
         Parameters
@@ -101,8 +106,8 @@ class Duhem:
         terms : mapping
             Names such as ``"u'"``, ``"u' u^2"``, ``"|u'| u y"``, ``"u' |z|"``, ``"|u'| |z| z"`` to coefficients;
             the memory is called y or z.
-        feedthrough : float
-            Slope of the output beside the memory.
+        feedthrough, offset : float
+            Slope of the output beside the memory, and what is added to both.
         y0 : float
             Output at the first sample.
 
@@ -116,20 +121,21 @@ class Duhem:
             if parsed.count(term) > 1:
                 raise ValueError(f"the term {name!r} is given twice, once with y and once with z")
         parts = polynomials(parsed, np.array([list(terms.values())], dtype=float))
-        return cls(**{name: part[0] for name, part in parts._asdict().items()}, feedthrough=feedthrough, y0=y0)
+        arrays = {name: part[0] for name, part in parts._asdict().items()}
+        return cls(**arrays, feedthrough=feedthrough, offset=offset, y0=y0)
 
     @property
     def terms(self) -> dict[str, float]:
         """Coefficients that are not zero by term, all of ``u'`` before those of ``|u'|``, each by degree.
 
-        The memory is called y where it is the output: without feedthrough and terms with ``|z|``; else z.
+        The memory is called y where it is the output: without feedthrough, offset and terms with ``|z|``; else z.
         """
         return {term.named(self._letter): value for term, value in self._coefficients.items()}
 
     @property
     def equation(self) -> str:
         """The law as text, coefficients to 4 significant digits."""
-        return equation(self._coefficients, self._letter, self.feedthrough)
+        return equation(self.terms, self._letter, feedthrough=self.feedthrough, offset=self.offset)
 
     @property
     def latex(self) -> str:
@@ -213,7 +219,7 @@ class Duhem:
         """
         inputs = read_only(u, "u", ndim=1)
         z = self._memory(inputs, state)
-        y = self.feedthrough * inputs + z
+        y = self.offset + (self.feedthrough * inputs + z)
         return y, (float(inputs[-1]), float(z[-1])) if z.size else state or self._start(0.0)
 
     def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
@@ -260,7 +266,8 @@ class Duhem:
         law = branches(self._parts)
         state = np.zeros(kernels.state_size(*law.shape[1:]))
         state[:2] = self._start(u0)
-        return CompiledLaw(kernels.step, read_only(np.concatenate([[self.feedthrough], law.shape, law.ravel()])), state)
+        parameters = np.concatenate([[self.offset, self.feedthrough], law.shape, law.ravel()])
+        return CompiledLaw(kernels.step, read_only(parameters), state)
 
     @classmethod
     def responses(cls, parameters: Parameters, u: npt.ArrayLike, *, workers: int | None = None) -> FloatArray:
@@ -270,7 +277,8 @@ class Duhem:
         ----------
         parameters : mapping
             ``"p"`` and ``"q"``, shape (n_sets, rows, columns) or (rows, columns) for all sets, and optionally
-            ``"p_abs"``, ``"q_abs"`` likewise, ``"feedthrough"`` and ``"y0"``, shape (n_sets,) or one number.
+            ``"p_abs"``, ``"q_abs"`` likewise, ``"feedthrough"``, ``"offset"`` and ``"y0"``, shape (n_sets,) or one
+            number.
         u : array, shape (n_samples,) or (n_sets, n_samples)
             One input for all sets, or one for each.
         workers : int, optional
@@ -291,10 +299,10 @@ class Duhem:
         """
         if not {"p", "q"} <= parameters.keys() <= _AXES.keys():
             raise TypeError(
-                "the parameters of Duhem are p, q, and optionally p_abs, q_abs, feedthrough and y0, "
+                "the parameters of Duhem are p, q, and optionally p_abs, q_abs, feedthrough, offset and y0, "
                 f"got {', '.join(parameters)}"
             )
-        defaults = {"p_abs": _none(), "q_abs": _none(), "feedthrough": 0.0, "y0": 0.0}
+        defaults = {"p_abs": _none(), "q_abs": _none(), **dict.fromkeys(_OUTPUT, 0.0)}
         given = {
             name: read_only(_with_axes(values, _AXES[name]), name, ndim=_AXES[name])
             for name, values in {**defaults, **parameters}.items()
@@ -304,7 +312,9 @@ class Duhem:
         if len(set(lengths.values())) > 1:
             raise ValueError(f"parameters and inputs must have one length or length 1, got {lengths}")
         laws = branches(Polynomials(*(given[name] for name in Polynomials._fields)))
-        return outputs(laws, given["feedthrough"], given["y0"], given["u"], kernels.LARGEST, workers)
+        offset = given["offset"]
+        y = outputs(laws, given["feedthrough"], given["y0"] - offset, given["u"], kernels.LARGEST, workers)
+        return y + offset[:, np.newaxis]
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box that `identify` searches; see `hysim.models._duhem_search`."""
@@ -319,11 +329,12 @@ class Duhem:
         values = {**self._scalars, **parameters}
         names = [name for name in values if name not in _OUTPUT]
         columns = np.broadcast_arrays(*(np.atleast_1d(values[name]) for name in (*names, *_OUTPUT)))
-        *coefficients, feedthrough, y0 = columns
+        *coefficients, feedthrough, offset, y0 = columns
         sets = np.stack(coefficients, axis=1) if coefficients else np.empty((len(y0), 0))
         bound = _BOUND * (float(np.abs(record.y).max()) or 1.0)
         terms = [Term.parse(name) for name in names]
-        return free_runs(terms, sets, feedthrough, y0, record.u[np.newaxis], bound)[..., np.newaxis]
+        y = free_runs(terms, sets, feedthrough, y0 - offset, record.u[np.newaxis], bound)
+        return np.asarray(y + offset[:, np.newaxis])[..., np.newaxis]
 
     def assemble(self, parameters: Mapping[str, float]) -> Self:
         """The law with these parameters, one number for each name."""
@@ -341,15 +352,15 @@ class Duhem:
 
     @property
     def _letter(self) -> str:
-        return "z" if self.feedthrough or self.p_abs.any() or self.q_abs.any() else "y"
+        return "z" if self.feedthrough or self.offset or self.p_abs.any() or self.q_abs.any() else "y"
 
     @property
     def _scalars(self) -> dict[str, float]:
-        return {**self.terms, "feedthrough": self.feedthrough, "y0": self.y0}
+        return {**self.terms, **{name: getattr(self, name) for name in _OUTPUT}}
 
     def _start(self, u0: float) -> State:
         """The state of a first sample at the input `u0`."""
-        return u0, self.y0 - self.feedthrough * u0
+        return u0, self.y0 - self.offset - self.feedthrough * u0
 
     def _memory(self, u: FloatArray, state: State | None) -> FloatArray:
         z = np.empty(u.size)

@@ -127,23 +127,32 @@ def coefficient_units(u: FloatArray, y: FloatArray, terms: Iterable[Term]) -> Fl
     return stroke / (span * np.array(sizes))
 
 
-def equation(coefficients: Mapping[Term, float], letter: str, feedthrough: float) -> str:
+def equation(
+    coefficients: Mapping[str, float],
+    letter: str,
+    *,
+    feedthrough: float = 0.0,
+    gain: float = 1.0,
+    offset: float = 0.0,
+) -> str:
     """The law as text, its coefficients to 4 significant digits; where the memory is called z, with the output."""
     groups = []
-    for rectified, rate in enumerate(RATES):
-        part = [(value, term.monomial(letter)) for term, value in coefficients.items() if term.rectified == rectified]
+    for rate in RATES:
+        part = {name.removeprefix(rate): value for name, value in coefficients.items() if name.startswith(rate)}
         if part:
-            summands = " + ".join(f"{value:.4g} {monomial}".rstrip() for value, monomial in part)
-            groups.append(f"{rate} ({summands.replace('+ -', '- ')})")
+            polynomial = " + ".join(f"{value:.4g}{monomial}" for monomial, value in part.items())
+            groups.append(f"{rate} ({polynomial.replace('+ -', '- ')})")
     law = f"{letter}' = {' + '.join(groups) or '0'}"
     if letter == "y":
         return law
-    return f"{law}, y = {feedthrough:.4g} u + z" if feedthrough else f"{law}, y = z"
+    summands = [f"{offset:.4g}"] * (offset != 0.0) + [f"{feedthrough:.4g} u"] * (feedthrough != 0.0)
+    summands += ["z" if gain == 1.0 else f"{gain:.4g} z"]
+    return f"{law}, y = {' + '.join(summands).replace('+ -', '- ')}"
 
 
 _TYPESETTING = (
     (r"([uyz])'", r"\\dot{\1}"),
-    (r"\^(\d+)", r"^{\1}"),
+    (r"\^([\d.]+)", r"^{\1}"),
     (r"e([+-])0*(\d+)", r" \\times 10^{\1\2}"),
     (r"\{\+", "{"),
     (r"\(", r"\\left("),

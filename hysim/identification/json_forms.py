@@ -1,5 +1,6 @@
 """Results to plain JSON values and back: nan is null, an infinity its name, a model its family and parameters."""
 
+import json
 import math
 import types
 import typing
@@ -9,9 +10,39 @@ from typing import Any
 
 import numpy as np
 
+import hysim
 from hysim.models import storage
 
 _INFINITE = ("inf", "-inf")
+
+
+def to_text(name: str, result: Any) -> str:
+    """A result as JSON under its name, with the version of hysim; `from_text` gives it back, every number to the bit.
+
+    Raises
+    ------
+    TypeError
+        If one of its models is not of hysim's families.
+    """
+    document = {"hysim": hysim.__version__, name: to_plain(result)}
+    return json.dumps(document, indent=2, allow_nan=False) + "\n"
+
+
+def from_text(name: str, text: str, kinds: Sequence[type]) -> Any:
+    """The result of the first of `kinds` that `to_text` wrote; it is made of the others.
+
+    Raises
+    ------
+    ValueError
+        If the text does not hold one.
+    """
+    try:
+        found = from_plain(json.loads(text)[name], kinds)
+    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+        raise ValueError(f"this is no {name} of hysim: {type(error).__name__}: {error}") from None
+    if not isinstance(found, kinds[0]):
+        raise ValueError(f"this is no {name} of hysim, but {type(found).__name__}")
+    return found
 
 
 def to_plain(value: Any) -> Any:

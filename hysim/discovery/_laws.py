@@ -1,0 +1,132 @@
+"""From the numbers of a structure to models: a Bouc-Wen law where the terms are one, else a Duhem law.
+
+    z' = A u' - beta |u'| |z|^(n-1) z - gamma u' |z|^n
+
+is the law of the terms u', |u'| |z|^(n-1) z and u' |z|^n. With y = feedthrough u + gain z only the products of gain
+with the others can be told: where there is a feedthrough A is 1, as everywhere in hysim, and otherwise the memory is
+the output and the gain is 1.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.discovery._refinement import Candidate
+from hysim.discovery._structures import AnyExponent, Terms
+from hysim.models.boucwen import BoucWen
+from hysim.models.duhem import Duhem
+from hysim.models.duhem_terms import Term, equation
+from hysim.records import Record
+
+_STEP = 1e-6
+_A = "u'"
+
+OTHERS = ("n", "feedthrough", "offset", "gain")
+"""Numbers of a law that are no coefficients."""
+
+
+class Found(NamedTuple):
+    """A law: a model for each record, its coefficients by term, standard errors by name, and the law as text."""
+
+    models: tuple[Any, ...]
+    coefficients: dict[str, float]
+    stderr: dict[str, float]
+    equation: str
+
+
+def found(candidate: Candidate[Any], records: Sequence[Record], letter: str) -> Found:
+    """The law of a structure refined on `records`, its memory called `letter`."""
+    structure, unknowns = candidate.structure, candidate.unknowns
+    numbers = _numbers(structure, letter)
+    values = numbers(unknowns[: structure.size])
+    models = tuple(
+        _model(structure, values, letter, float(y0), float(record.u[0]))
+        for y0, record in zip(unknowns[structure.size :], records, strict=True)
+    )
+    coefficients = _coefficients(values)
+    shifts = {name: values[name] for name in ("feedthrough", "gain", "offset") if name in values}
+    return Found(models, coefficients, _stderr(candidate, numbers), equation(coefficients, letter, **shifts))
+
+
+def bouc_wen_terms(n: int) -> tuple[Term, Term, Term]:
+    """u', |u'| |z|^(n-1) z and u' |z|^n for a whole n."""
+    even = n % 2 == 0
+    return Term(False, 0, 0), Term(True, n, n - even, even), Term(False, n, n - (not even), not even)
+
+
+def whole_exponent(terms: Iterable[Term]) -> int | None:
+    """The whole exponent of the Bouc-Wen law that has these terms, or None."""
+    present = set(terms)
+    n = max((term.degree for term in present), default=0)
+    return n if n > 0 and present <= set(bouc_wen_terms(n)) else None
+
+
+def _numbers(structure: Terms | AnyExponent, letter: str) -> Callable[[FloatArray], dict[str, float]]:
+    """From a structure's unknowns to the numbers that a user reads: a Bouc-Wen law with a feedthrough has A = 1."""
+    shifts = ["feedthrough"] * structure.feedthrough + ["offset"] * structure.offset
+
+    if isinstance(structure, AnyExponent):
+        return lambda unknowns: _of_any_exponent(unknowns, shifts)
+    names = [*(term.named(letter) for term in structure.terms), *shifts]
+    n = whole_exponent(structure.terms)
+
+    def numbers(unknowns: FloatArray) -> dict[str, float]:
+        values = dict(zip(names, unknowns.tolist(), strict=True))
+        return values if n is None or not structure.feedthrough else _normalised(values, float(n))
+
+    return numbers
+
+
+def _of_any_exponent(unknowns: FloatArray, shifts: Sequence[str]) -> dict[str, float]:
+    n = float(unknowns[3])
+    terms = [_A, f"|u'| |z|^{n - 1.0:.4g} z", f"u' |z|^{n:.4g}"]
+    values = dict(zip([*terms, "n", *shifts], unknowns.tolist(), strict=True))
+    return _normalised(values, n) if "feedthrough" in shifts else values
+
+
+def _normalised(values: dict[str, float], n: float) -> dict[str, float]:
+    """The same Bouc-Wen law with A = 1 and a gain; as it is if A is zero."""
+    gain = values.get(_A, 0.0)
+    if gain == 0.0:
+        return values
+    odd = abs(gain) ** (n - 1.0)
+    even = math.copysign(odd, gain)
+    scaled = {name: value * (odd if name.startswith("|u'|") else even) for name, value in _coefficients(values).items()}
+    return values | scaled | {_A: 1.0, "gain": gain}
+
+
+def _coefficients(values: dict[str, float]) -> dict[str, float]:
+    return {name: value for name, value in values.items() if name not in OTHERS}
+
+
+def _stderr(candidate: Candidate[Any], numbers: Callable[[FloatArray], dict[str, float]]) -> dict[str, float]:
+    """Standard errors of the numbers, carried forward by their derivatives."""
+    size = candidate.structure.size
+    unknowns, covariance = candidate.unknowns[:size], candidate.covariance[:size, :size]
+    steps = _STEP * np.diag(np.where(unknowns == 0.0, 1.0, unknowns))
+    ahead = np.array([list(numbers(unknowns + step).values()) for step in steps])
+    behind = np.array([list(numbers(unknowns - step).values()) for step in steps])
+    slopes = (ahead - behind) / (2.0 * np.diag(steps)[:, np.newaxis])
+    spread = np.sqrt(np.einsum("ik,ij,jk->k", slopes, covariance, slopes))
+    return dict(zip(numbers(unknowns), spread.tolist(), strict=True))
+
+
+def _model(structure: Terms | AnyExponent, values: dict[str, float], letter: str, y0: float, u0: float) -> Any:
+    feedthrough, offset, gain = values.get("feedthrough", 0.0), values.get("offset", 0.0), values.get("gain", 1.0)
+    n = values["n"] if isinstance(structure, AnyExponent) else whole_exponent(structure.terms)
+    if isinstance(structure, Terms) and (letter == "y" or n is None):
+        return Duhem.from_terms(_coefficients(values), feedthrough=feedthrough, offset=offset, y0=y0)
+    terms = {name: value for name, value in _coefficients(values).items() if name != _A}
+    return BoucWen(
+        A=values.get(_A, 0.0),
+        beta=-sum(value for name, value in terms.items() if name.startswith("|u'|")),
+        gamma=-sum(value for name, value in terms.items() if name.startswith("u'")),
+        n=float(n or 1),
+        feedthrough=feedthrough,
+        gain=gain,
+        offset=offset,
+        z0=(y0 - offset - feedthrough * u0) / gain,
+    )

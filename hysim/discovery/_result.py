@@ -1,0 +1,125 @@
+"""What `discover` returns."""
+
+import math
+from collections.abc import Mapping
+from typing import Any, Self
+
+from hysim._frozen import FloatArray, frozen
+from hysim.discovery._judgement import Judgement
+from hysim.identification import json_forms
+from hysim.models.duhem_terms import latex
+
+
+@frozen
+class Discovery:
+    """A law that was found in records.
+
+    Parameters
+    ----------
+    model : BoucWen, Duhem or BoucWenOscillator
+        The law, refined by simulation error, with the initial memory of the first record.
+    models : tuple of model
+        One for each record: they differ in the state at the first sample.
+    coefficients : mapping
+        Term to coefficient, for instance ``"|u'| z"``. With a feedthrough the scale of the memory is open, and a
+        Bouc-Wen law has that in which ``"u'"`` has the coefficient 1.
+    stderr : mapping
+        Standard errors of the coefficients, and of ``"feedthrough"``, ``"gain"``, ``"offset"`` or ``"n"`` where they
+        are part of the law; nan where the records cannot tell.
+    equation : str
+        The law as text.
+    verdict : str
+        ``"rate-independent hysteresis"``, ``"linear lag"``, ``"cannot be told from one rate"``, ``"unstable"`` or
+        ``"no structure found"``; see `discover`.
+    route : {"memory", "output", "oscillator"}
+        What the law takes the measured output for.
+    scores : mapping
+        Of the law's free run, as in `hysim.metrics`: ``"fit_percent"`` [%], ``"rmse"`` [unit of y], ``"bic"``, and
+        ``"n_terms"``; of the search: ``"threshold"``, the largest one whose structure still has all terms of the law,
+        ``"n_structures"`` refined, ``"condition"`` of the regression.
+    n_parameters : int
+        What was fitted: the numbers of the law, and y0 of each record.
+    judgement : Judgement
+        What the verdict rests on: the linear rival, errors on data that neither was fitted to, loop widths at other
+        rates, the dissipation.
+    cv_rmse : float
+        Cross-validated rmse [unit of y]; nan if it was not asked for.
+    left_out : tuple of str
+        Terms of the library that the records cannot tell from those of lower degree.
+    inclusion : mapping
+        Term of the library to the share of an ensemble of sparse regressions that keeps it.
+    thresholds, path_n_terms, path_fit_percent, path_bic : array, shape (n_thresholds,)
+        The optimizer's path from dense to sparse, each structure refined: for a Pareto figure. A structure whose free
+        run diverges has a fit of -inf and a BIC of inf. Long records are thinned for the path.
+    message : str
+        What else is to be said.
+    """
+
+    model: Any
+    models: tuple[Any, ...]
+    coefficients: Mapping[str, float]
+    stderr: Mapping[str, float]
+    equation: str
+    verdict: str
+    route: str
+    scores: Mapping[str, float]
+    n_parameters: int
+    judgement: Judgement
+    cv_rmse: float
+    left_out: tuple[str, ...]
+    inclusion: Mapping[str, float]
+    thresholds: FloatArray
+    path_n_terms: FloatArray
+    path_fit_percent: FloatArray
+    path_bic: FloatArray
+    message: str = ""
+
+    @property
+    def latex(self) -> str:
+        """The law for LaTeX, without dollar signs."""
+        return latex(self.equation)
+
+    def summary(self) -> str:
+        """The result in a few lines."""
+        scores, judged = self.scores, self.judgement
+        lines = [
+            f"{self.equation}",
+            f"  {self.verdict}; route {self.route}, fit {scores['fit_percent']:.2f} %, rmse {scores['rmse']:.4g}, "
+            f"BIC {scores['bic']:.1f}, {self.n_parameters} parameters",
+        ]
+        lines += [f"  {name} = {value:.6g}{self._spread(name)}" for name, value in self._numbers.items()]
+        errors = [f"{name} {value:.4g}" for name, value in judged.held_out.items()]
+        lines.append(f"  held-out rmse: {', '.join(errors)}")
+        lines += [
+            f"  relative width of the {name} at {', '.join(f'{rate:g}' for rate in judged.rates)} times the rate: "
+            + ", ".join(f"{100.0 * width:.2f} %" for width in widths)
+            for name, widths in judged.widths.items()
+        ]
+        if not math.isnan(self.cv_rmse):
+            lines.append(f"  cross-validated rmse {self.cv_rmse:.4g}")
+        return "\n".join(lines + [f"  {self.message}"] * bool(self.message))
+
+    @property
+    def _numbers(self) -> dict[str, float]:
+        others = {name: getattr(self.model, name) for name in self.stderr if name not in self.coefficients}
+        return {**self.coefficients, **others}
+
+    def _spread(self, name: str) -> str:
+        value = self.stderr.get(name, math.nan)
+        return "" if math.isnan(value) else f" +- {value:.2g}"
+
+    def to_json(self) -> str:
+        """The whole result as JSON, with the version of hysim; `from_json` gives it back, every number to the bit."""
+        return json_forms.to_text("discovery", self)
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """A result that `to_json` wrote.
+
+        Raises
+        ------
+        ValueError
+            If the text does not hold one.
+        """
+        found: Self = json_forms.from_text("discovery", text, (cls, Judgement))
+        return found

@@ -1,0 +1,198 @@
+"""One library on some records: from slopes to refined structures."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hysim._parallel import Progress
+from hysim.discovery import _pysindy
+from hysim.discovery._library import FORMS, Slopes, slopes
+from hysim.discovery._refinement import POLISH, Candidate, FreeRun
+from hysim.discovery._selection import HOPELESS, SEARCHED, Search, Start, preferred, thinned
+from hysim.discovery._shifts import shifted
+from hysim.discovery._structures import Terms, shifts
+from hysim.models.duhem_terms import Term
+from hysim.records import Record
+
+LINE = Terms((Term(False, 0, 0),))
+_FINALISTS = 6
+_RESTARTS = 4
+_SAME = 1e-6  # relative difference of the cost within which two optima are the same
+_SPREAD = 0.3  # of a random restart, in units of what each term contributes over the span of the input
+_HELD_OUT = 3  # every third sample decides between the forms of the slope
+_ENSEMBLE = 100
+_ENSEMBLE_ROWS = 2000
+
+
+@dataclass(frozen=True)
+class Library:
+    """What laws are looked for.
+
+    Parameters
+    ----------
+    terms : tuple of Term
+    letter : {"y", "z"}
+        What the memory is called: the output itself, or what the output hides.
+    feedthrough : {"no", "may", "must"}
+        Whether the output has one beside the memory.
+    offset : bool
+        Whether the memory may be zero at another output than zero.
+    complete : bool
+        Whether structures whose form does not depend on the origin come first.
+    """
+
+    terms: tuple[Term, ...]
+    letter: str
+    feedthrough: str = "no"
+    offset: bool = False
+    complete: bool = False
+
+    def structure(self, terms: Sequence[Term]) -> Terms:
+        """The largest structure of these terms."""
+        return Terms(tuple(terms), self.feedthrough != "no", self.offset)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The law that one library has for the records, and how it was found."""
+
+    library: Library
+    candidate: Candidate[Terms]
+    search: Search
+    start: Start
+    slopes: Slopes
+    form: str
+    path: list[tuple[float, Terms]]
+
+    @property
+    def searched_bic(self) -> float:
+        """BIC of the law on the samples of the search."""
+        candidate = self.search.tried[self.candidate.structure]
+        return math.inf if candidate is None else candidate.bic
+
+    @property
+    def unstable(self) -> bool:
+        """Whether no structure but the line stays finite in free run."""
+        return all(candidate is None for structure, candidate in self.search.tried.items() if structure != LINE)
+
+    @property
+    def threshold(self) -> float:
+        """The largest one whose structure still has all terms of the law; nan if none has."""
+        terms = set(self.candidate.structure.terms)
+        return max((t for t, structure in self.path if terms <= set(structure.terms)), default=math.nan)
+
+    def inclusion(self, seed: int) -> dict[str, float]:
+        """Share of an ensemble of sparse regressions that keeps each term, where the path is as sparse as the law."""
+        regression = self.start.regression
+        stride = max(1, -(-len(regression.slope) // _ENSEMBLE_ROWS))
+        n_terms = len(self.candidate.structure.terms)
+        threshold = max((t for t, structure in self.path if len(structure.terms) >= n_terms), default=0.0)
+        shares = _pysindy.inclusion(
+            regression.features[::stride], regression.slope[::stride], threshold, n_models=_ENSEMBLE, seed=seed
+        )
+        names = (term.named(self.library.letter) for term in regression.terms)
+        return dict(zip(names, shares.tolist(), strict=True))
+
+
+def searched(
+    records: Sequence[Record],
+    library: Library,
+    *,
+    signs: Mapping[Term, int],
+    optimizer: str,
+    derivative: str,
+    seed: int,
+    best: float = math.inf,
+    progress: Progress | None = None,
+) -> Outcome | None:
+    """The best law of a library; None if none can come near the BIC `best`."""
+    some = tuple(thinned(record, SEARCHED // len(records)) for record in records)
+    form = derivative if derivative != "auto" else _better_form(some, library, optimizer)
+    found = slopes(records, form)
+    starts = shifted(found, library.terms, feedthrough=library.feedthrough != "no", offset=library.offset)
+    held = frozenset({"feedthrough"} if library.feedthrough == "must" else ())
+    search = Search(FreeRun(some, signs=signs), starts, held)
+    for start in starts:
+        search.refine(library.structure(start.regression.terms))
+    if not search.could_win(1, best):
+        return None
+    search.refine(LINE)
+    for start in starts:
+        for _, structure in _path(start, library, optimizer):
+            search.refine(structure)
+    search.eliminate()
+    if library.complete:
+        search.enumerate_complete(starts[0].regression.terms, progress)
+    chosen = _on_all_samples(FreeRun(tuple(records), signs=signs), search, library, seed)
+    start = _start_at(found, library, chosen)
+    return Outcome(library, chosen, search, start, found, form, _path(start, library, optimizer))
+
+
+def _path(start: Start, library: Library, optimizer: str) -> list[tuple[float, Terms]]:
+    regression = start.regression
+    path = _pysindy.sparse_path(regression.features, regression.slope, optimizer)
+    return [(threshold, library.structure(regression.kept(coefficients))) for threshold, coefficients in path]
+
+
+def _start_at(found: Slopes, library: Library, candidate: Candidate[Terms]) -> Start:
+    """The regression at the shifts of a refined candidate."""
+    feedthrough, offset = shifts(candidate.structure, candidate.unknowns[np.newaxis, : candidate.structure.size])
+    place = float(feedthrough[0]), float(offset[0])
+    return Start(found.regression(library.terms, *place), *place)
+
+
+def _better_form(records: Sequence[Record], library: Library, optimizer: str) -> str:
+    """The form whose regressions, as they are, run free nearest to samples that they have not seen.
+
+    Every third sample is held out; the input's path is kept.
+    """
+    free_run, errors = FreeRun(tuple(records)), {}
+    unseen = np.concatenate([np.arange(len(record)) % _HELD_OUT == 1 for record in records])
+    for form in FORMS:
+        try:
+            found = slopes([_seen(record) for record in records], form)
+        except ValueError:
+            continue
+        starts = shifted(found, library.terms, feedthrough=library.feedthrough != "no", offset=library.offset)
+        runs = [
+            free_run.residuals(structure, free_run.regressed(start.regression, structure, *start[1:]))[:, unseen]
+            for start in starts
+            for _, structure in _path(start, library, optimizer)
+        ]
+        errors[form] = min((float(np.mean(run**2, axis=1).min()) for run in runs), default=math.inf)
+    return min(errors, key=lambda form: errors[form], default="smoothed")
+
+
+def _seen(record: Record) -> Record:
+    kept = np.arange(len(record)) % _HELD_OUT != 1
+    direction = np.sign(np.diff(record.u))
+    kept[1:-1] |= direction[1:] != direction[:-1]
+    return Record(u=record.u[kept], y=record.y[kept])
+
+
+def _on_all_samples(free_run: FreeRun, search: Search, library: Library, seed: int) -> Candidate[Terms]:
+    """Step 4 of the selection on all samples, and the best of descending again from random starts."""
+    sound = search.sound
+    finalists = [c for c in sound if c.bic < sound[0].bic + HOPELESS]
+    if free_run.n_samples > search.free_run.n_samples:
+        refined = [free_run.refine(c.structure, c.unknowns[np.newaxis]) for c in finalists[:_FINALISTS]]
+        finalists = [c for c in refined if c is not None] or finalists
+    chosen = preferred(finalists, complete=library.complete)
+    restarted = _restarted(search.free_run, search.tried[chosen.structure] or chosen, seed)
+    polished = free_run.refine(chosen.structure, np.stack([chosen.unknowns, restarted.unknowns]), tolerance=POLISH)
+    return polished or chosen
+
+
+def _restarted(free_run: FreeRun, chosen: Candidate[Terms], seed: int) -> Candidate[Terms]:
+    """The best of a candidate and of descending again from random starts around it."""
+    random = np.random.default_rng(seed)
+    spread = _SPREAD * free_run.units(chosen.structure)
+    best = chosen
+    for _ in range(_RESTARTS):
+        start = chosen.unknowns + spread * random.standard_normal(len(spread))
+        found = free_run.refine(chosen.structure, start[np.newaxis])
+        if found is not None and found.cost < best.cost * (1.0 - _SAME):
+            best = found
+    return best

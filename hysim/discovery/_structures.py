@@ -1,0 +1,129 @@
+"""What a law consists of, before its numbers are known: terms of a library, or a Bouc-Wen law of any exponent.
+
+A structure has `size` numbers, those of the memory first, then a feedthrough and an offset where it has them:
+
+    y = offset + feedthrough u + z
+
+The memory at the first sample is not among them: each record has its own.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol, Self
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.models.boucwen import BoucWen
+from hysim.models.duhem_runs import free_runs
+from hysim.models.duhem_terms import Term, coefficient_units
+from hysim.records import Record
+
+Bounds = tuple[FloatArray, FloatArray]
+
+
+class Structure(Protocol):
+    """What refinement needs of a structure."""
+
+    @property
+    def size(self) -> int:
+        """How many numbers it has."""
+        ...
+
+    def units(self, record: Record, stroke: float) -> FloatArray:
+        """What of each number moves the output by about a stroke, (size,)."""
+        ...
+
+    def bounds(self, signs: Mapping[Term, int]) -> Bounds:
+        """Lower and upper bounds of the numbers, (size,) each."""
+        ...
+
+    def run(self, u: FloatArray, numbers: FloatArray, y0: FloatArray, bound: float) -> FloatArray:
+        """Outputs (n_sets, n_samples) of numbers (n_sets, size) from y0 (n_sets,), rows of inf where one escapes."""
+        ...
+
+
+class Terms(NamedTuple):
+    """The law of some terms of a library."""
+
+    terms: tuple[Term, ...]
+    feedthrough: bool = False
+    offset: bool = False
+
+    @property
+    def size(self) -> int:
+        """How many numbers it has."""
+        return len(self.terms) + self.feedthrough + self.offset
+
+    def without(self, k: int) -> Self:
+        """The structure that lacks its number `k`."""
+        if k < len(self.terms):
+            return self._replace(terms=self.terms[:k] + self.terms[k + 1 :])
+        if self.feedthrough and k == len(self.terms):
+            return self._replace(feedthrough=False)
+        return self._replace(offset=False)
+
+    def units(self, record: Record, stroke: float) -> FloatArray:
+        """See `Structure`."""
+        of_terms = coefficient_units(record.u, record.y, self.terms)
+        return np.concatenate([of_terms, _shift_units(self, record, stroke)])
+
+    def bounds(self, signs: Mapping[Term, int]) -> Bounds:
+        """See `Structure`."""
+        wanted = np.array([signs.get(term, 0) for term in self.terms] + [0] * (self.feedthrough + self.offset))
+        return np.where(wanted > 0, 0.0, -np.inf), np.where(wanted < 0, 0.0, np.inf)
+
+    def run(self, u: FloatArray, numbers: FloatArray, y0: FloatArray, bound: float) -> FloatArray:
+        """See `Structure`."""
+        feedthrough, offset = shifts(self, numbers)
+        coefficients = numbers[:, : len(self.terms)]
+        return (
+            free_runs(self.terms, coefficients, feedthrough, y0 - offset, u[np.newaxis], bound) + offset[:, np.newaxis]
+        )
+
+
+@dataclass(frozen=True)
+class AnyExponent:
+    """z' = A u' - beta |u'| |z|^(n-1) z - gamma u' |z|^n; its numbers are A, -beta, -gamma and n, then the shifts."""
+
+    feedthrough: bool = False
+    offset: bool = False
+
+    LOWEST, HIGHEST = 0.3, 10.0
+
+    @property
+    def size(self) -> int:
+        """How many numbers it has."""
+        return 4 + self.feedthrough + self.offset
+
+    def units(self, record: Record, stroke: float) -> FloatArray:
+        """See `Structure`."""
+        span = float(np.ptp(record.u))
+        return np.concatenate([[stroke / span, 1.0 / span, 1.0 / span, 1.0], _shift_units(self, record, stroke)])
+
+    def bounds(self, signs: Mapping[Term, int]) -> Bounds:
+        """See `Structure`."""
+        lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
+        lower[3], upper[3] = self.LOWEST, self.HIGHEST
+        return lower, upper
+
+    def run(self, u: FloatArray, numbers: FloatArray, y0: FloatArray, bound: float) -> FloatArray:
+        """See `Structure`."""
+        feedthrough, offset = shifts(self, numbers)
+        A, dissipative, conservative, n = numbers[:, :4].T
+        laws = {"A": A, "beta": -dissipative, "gamma": -conservative, "n": n}
+        shift = {"feedthrough": feedthrough, "offset": offset, "z0": y0 - offset - feedthrough * u[0]}
+        y = BoucWen.responses({**laws, **shift}, u)
+        y[~(np.abs(y) <= bound).all(axis=1)] = np.inf
+        return y
+
+
+def shifts(structure: Terms | AnyExponent, numbers: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Feedthrough and offset, (n_sets,) each, of numbers (n_sets, size)."""
+    zero, first = np.zeros(len(numbers)), structure.size - structure.feedthrough - structure.offset
+    feedthrough = numbers[:, first] if structure.feedthrough else zero
+    return feedthrough, numbers[:, first + structure.feedthrough] if structure.offset else zero
+
+
+def _shift_units(structure: Terms | AnyExponent, record: Record, stroke: float) -> FloatArray:
+    return np.array([stroke / float(np.ptp(record.u))] * structure.feedthrough + [stroke] * structure.offset)
