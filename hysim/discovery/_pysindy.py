@@ -6,6 +6,7 @@ and put back.
 """
 
 import contextlib
+import math
 import warnings
 from collections.abc import Iterator
 from typing import Any
@@ -14,7 +15,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 
-RIDGE = 1e-12  # of the mean square of the columns: keeps the normal equations solvable and changes nothing else
+RIDGE = 1e-12  # of the squared columns: keeps the normal equations solvable and changes nothing else
 _MAX_ITERATIONS = 50
 _EXTRAS = {
     "ConstrainedSR3": "cvxpy",
@@ -35,6 +36,7 @@ def sparse_path(features: FloatArray, slope: FloatArray, optimizer: str = "STLSQ
     result and none that matters is missed. The path ends with the last term. SSR and FROLS have no threshold: their
     own sequence of structures is the path, each with its smallest coefficient.
     """
+    features, slope = compressed(features, slope)
     if optimizer in ("SSR", "FROLS"):
         return _greedy_path(features, slope, optimizer)
     path: list[tuple[float, FloatArray]] = []
@@ -48,9 +50,15 @@ def sparse_path(features: FloatArray, slope: FloatArray, optimizer: str = "STLSQ
         threshold = max(float(kept.min()), threshold) * (1.0 + 1e-9)
 
 
+def compressed(features: FloatArray, slope: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """A regression with as many rows as terms, and one more, whose least squares are those of all rows."""
+    triangle = np.asarray(np.linalg.qr(np.column_stack([features, slope]), mode="r")) / math.sqrt(len(slope))
+    return triangle[:, :-1], triangle[:, -1]
+
+
 def sparse_fit(features: FloatArray, slope: FloatArray, threshold: float, optimizer: str = "STLSQ") -> FloatArray:
     """Coefficients (n_terms,) at one threshold, zero where the optimizer removed the term."""
-    found = _thresholding(optimizer, threshold, len(features))
+    found = _thresholding(optimizer, threshold)
     with _quiet():
         found.fit(features, slope[:, np.newaxis])
     return np.array(found.coef_[0])
@@ -60,10 +68,9 @@ def inclusion(features: FloatArray, slope: FloatArray, threshold: float, *, n_mo
     """Share of fits (n_terms,) by STLSQ that keep each term when the rows are drawn anew (PySINDy's bagging)."""
     import pysindy
 
-    optimizer = _thresholding("STLSQ", threshold, len(features))
-    ensemble = pysindy.EnsembleOptimizer(optimizer, bagging=True, n_models=n_models)
+    ensemble = pysindy.EnsembleOptimizer(_thresholding("STLSQ", threshold), bagging=True, n_models=n_models)
     with _quiet(), _seeded(seed):
-        ensemble.fit(features, slope[:, np.newaxis])
+        ensemble.fit(features / math.sqrt(len(slope)), slope[:, np.newaxis] / math.sqrt(len(slope)))
     return np.asarray(np.mean([coefficients[0] != 0.0 for coefficients in ensemble.coef_list], axis=0))
 
 
@@ -88,14 +95,14 @@ def check(optimizer: str) -> None:
     raise ValueError(f"optimizer must be one of {', '.join(OPTIMIZERS)}, got {optimizer!r}")
 
 
-def _thresholding(optimizer: str, threshold: float, n_rows: int) -> Any:
+def _thresholding(optimizer: str, threshold: float) -> Any:
     import pysindy
 
     if optimizer == "SR3":
         return pysindy.SR3(
             reg_weight_lam=0.5 * threshold**2, regularizer="L0", relax_coeff_nu=1.0, max_iter=1000, unbias=True
         )
-    return pysindy.STLSQ(threshold=threshold, alpha=RIDGE * n_rows, max_iter=_MAX_ITERATIONS, unbias=False)
+    return pysindy.STLSQ(threshold=threshold, alpha=RIDGE, max_iter=_MAX_ITERATIONS, unbias=False)
 
 
 def _greedy_path(features: FloatArray, slope: FloatArray, optimizer: str) -> list[tuple[float, FloatArray]]:
@@ -103,9 +110,9 @@ def _greedy_path(features: FloatArray, slope: FloatArray, optimizer: str) -> lis
 
     n_terms = features.shape[1]
     if optimizer == "SSR":
-        found = pysindy.SSR(alpha=RIDGE * len(features), max_iter=n_terms, unbias=False)
+        found = pysindy.SSR(alpha=RIDGE, max_iter=n_terms, unbias=False)
     else:
-        found = pysindy.FROLS(alpha=RIDGE * len(features), max_iter=n_terms, unbias=False)
+        found = pysindy.FROLS(alpha=RIDGE, max_iter=n_terms, unbias=False)
     with _quiet():
         found.fit(features, slope[:, np.newaxis])
     structures: dict[tuple[bool, ...], FloatArray] = {}

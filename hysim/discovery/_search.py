@@ -23,7 +23,7 @@ _SAME = 1e-6  # relative difference of the cost within which two optima are the 
 _SPREAD = 0.3  # of a random restart, in units of what each term contributes over the span of the input
 _HELD_OUT = 3  # every third sample decides between the forms of the slope
 _ENSEMBLE = 100
-_ENSEMBLE_ROWS = 2000
+_ENSEMBLE_ROWS = 500
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,81 @@
+"""`hysim discover`: the law of a memory from a record in a file."""
+
+import argparse
+from typing import Any
+
+from hysim.cli import models, outputs, records
+
+SUCCESS = 0
+
+
+def add_to(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "discover",
+        help="find the law of the memory in a file of your own",
+        description="Find the law of a memory by sparse regression (PySINDy) and free runs, and print it with its "
+        "verdict: hysteresis, a linear lag, or what one rate cannot tell.",
+    )
+    records.add_to(parser)
+    parser.add_argument(
+        "--route",
+        choices=("auto", "memory", "output", "oscillator"),
+        default="auto",
+        help="what the output is: the memory, a feedthrough and a memory, or the displacement of an oscillator "
+        "(default: %(default)s)",
+    )
+    parser.add_argument(
+        "--library", metavar="NAME|TERM,...", type=_library, help="bouc-wen, duhem, or terms: \"u',|u'| z,u' |z|\""
+    )
+    parser.add_argument("--degree", type=int, default=2, help="of the library's monomials (default: %(default)s)")
+    parser.add_argument("--symmetry", choices=("odd", "even"), help="of the response")
+    for name in ("mass", "damping", "stiffness"):
+        parser.add_argument(f"--{name}", type=float, help=f"{name} of the oscillator, where it is known")
+    parser.add_argument(
+        "--cross-validate", metavar="loo|K", type=_folds, help="leave one sample out at a time, or one of K blocks"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of the random restarts (default: %(default)s)")
+    parser.add_argument("--out", metavar="MODEL.json", help="write the law, - for the standard output")
+    parser.add_argument("--plot", metavar="LOOP.svg", help="draw the record and the law, - for the standard output")
+    parser.add_argument("--json", action="store_true", help="print the whole result as JSON")
+    parser.set_defaults(command=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Discover, write the files that are asked for, and print the result."""
+    from hysim.discovery import discover
+    from hysim.models.storage import to_json
+
+    is_taken = outputs.check(options.out, pictures=[options.plot], printed=options.json)
+    record = records.read(options)
+    found = discover(
+        record,
+        route=options.route,
+        library=options.library,
+        degree=options.degree,
+        symmetry=options.symmetry,
+        mass=options.mass,
+        damping=options.damping,
+        stiffness=options.stiffness,
+        cross_validate=options.cross_validate,
+        seed=options.seed,
+        progress=outputs.progress(),
+    )
+    texts = {options.out: to_json(found.model, units=record.units)}
+    if options.plot:
+        texts[options.plot] = outputs.loop_svg(record, models.simulated(found.model, record, dict(record.units)))
+    if not is_taken:
+        texts[records.STANDARD] = found.to_json() if options.json else found.summary() + "\n"
+    outputs.write(texts)
+    return SUCCESS
+
+
+def _library(text: str) -> str | list[str]:
+    names = [name.strip() for name in text.split(",")]
+    return names if len(names) > 1 or "'" in text else text
+
+
+def _folds(text: str) -> str | int:
+    if text != "loo" and not text.isdigit():
+        raise argparse.ArgumentTypeError(f"expected loo or a number of blocks, got {text!r}")
+    return int(text) if text.isdigit() else text
