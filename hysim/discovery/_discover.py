@@ -118,7 +118,7 @@ def discover(
 
     Notes
     -----
-    Structures are compared by BIC = N ln V + d ln N with V the mean squared residual in free run plus 1e-12 squared
+    Structures are compared by BIC = N ln V + d ln N with V the mean squared residual in free run plus 1e-8 squared
     strokes: smaller residuals are no evidence. d counts the numbers of the law, and y0 of each record.
 
     Sources: S. L. Brunton, J. L. Proctor and J. N. Kutz, PNAS 113 (2016); PySINDy 2.1.
@@ -201,7 +201,7 @@ def _searched(
     for library in libraries:
         if n <= len(library.terms):
             raise ValueError(f"{n} samples cannot tell {len(library.terms)} terms and y0: lower the degree")
-        lowest = min((outcome.searched_bic for outcome in outcomes), default=math.inf)
+        lowest = min((outcome.searched.bic for outcome in outcomes), default=math.inf)
         found = searched(records, library, signs=wanted, best=lowest, progress=progress, **options)
         outcomes += [] if found is None else [found]
     return outcomes

@@ -15,7 +15,7 @@ from hysim._frozen import FloatArray
 from hysim.discovery._derivatives import Feature
 from hysim.discovery._refinement import POLISH, Candidate, FreeRun, information
 from hysim.discovery._search import Library, Outcome
-from hysim.discovery._selection import ALIKE, INDISTINCT
+from hysim.discovery._selection import ALIKE, INDISTINCT, gap
 from hysim.discovery._structures import AnyExponent, Terms
 
 _EXPONENTS = np.geomspace(0.4, 6.0, 16)
@@ -27,17 +27,17 @@ def or_any_exponent(free_run: FreeRun, hidden: Outcome, chosen: Outcome) -> Cand
 
     `hidden` is the outcome of the library of z, from which the scan takes its slopes and shifts.
     """
-    thin, best = hidden.search.free_run, min(hidden.searched_bic, chosen.searched_bic)
+    thin, best = hidden.search.free_run, chosen.searched
     if chosen.candidate.cost < free_run.n_samples * ALIKE**2:
         return chosen.candidate
     found = [_refined(thin, hidden, structure) for structure in _structures(hidden.library)[:1]]
     least = min((c.cost for c in found if c is not None), default=math.inf)
     fewest = _structures(hidden.library)[-1].size + len(thin.records)
-    if not information(least, thin.n_samples, fewest) < best - INDISTINCT:
+    if not information(least, thin.n_samples, fewest) < best.bic - INDISTINCT:
         return chosen.candidate
     found += [_refined(thin, hidden, structure) for structure in _structures(hidden.library)[1:]]
     lowest = min((c for c in found if c is not None), key=lambda c: c.bic)
-    if not lowest.bic < best - INDISTINCT:
+    if not lowest.bic < best.bic - INDISTINCT or gap(best, lowest) < ALIKE:
         return chosen.candidate
     return free_run.refine(lowest.structure, lowest.unknowns[np.newaxis], tolerance=POLISH) or chosen.candidate
 

@@ -25,7 +25,7 @@ from hysim.models.duhem_terms import Term
 from hysim.records import Record
 
 BOUND = 30.0
-FLOOR = 1e-6  # smaller residuals, in strokes, are no evidence for one law over another
+FLOOR = 1e-4  # smaller residuals, in strokes, are no evidence for one law over another: no input is exactly known
 _DIVERGED = 1e3  # the residual, in strokes, of a free run that has
 RANKING = 1e-5  # relative change of the cost at which a descent ends: far less than a difference of BIC that counts
 POLISH = 1e-12

@@ -10,7 +10,7 @@ from hysim._parallel import Progress
 from hysim.discovery import _pysindy
 from hysim.discovery._library import FORMS, Slopes, slopes
 from hysim.discovery._refinement import POLISH, Candidate, FreeRun
-from hysim.discovery._selection import HOPELESS, SEARCHED, Search, Start, preferred, thinned
+from hysim.discovery._selection import SEARCHED, Search, Start, preferred, thinned
 from hysim.discovery._shifts import shifted
 from hysim.discovery._structures import Terms, shifts
 from hysim.models.duhem_terms import Term
@@ -67,10 +67,9 @@ class Outcome:
     path: list[tuple[float, Terms]]
 
     @property
-    def searched_bic(self) -> float:
-        """BIC of the law on the samples of the search."""
-        candidate = self.search.tried[self.candidate.structure]
-        return math.inf if candidate is None else candidate.bic
+    def searched(self) -> Candidate[Terms]:
+        """The law as it was refined on the samples of the search."""
+        return self.search.tried[self.candidate.structure] or self.candidate
 
     @property
     def unstable(self) -> bool:
@@ -174,10 +173,11 @@ def _seen(record: Record) -> Record:
 
 def _on_all_samples(free_run: FreeRun, search: Search, library: Library, seed: int) -> Candidate[Terms]:
     """Step 4 of the selection on all samples, and the best of descending again from random starts."""
-    sound = search.sound
-    finalists = [c for c in sound if c.bic < sound[0].bic + HOPELESS]
+    finalists = search.followed(search.sound)
     if free_run.n_samples > search.free_run.n_samples:
-        refined = [free_run.refine(c.structure, c.unknowns[np.newaxis]) for c in finalists[:_FINALISTS]]
+        shortest = preferred(finalists, complete=library.complete)
+        few = {c.structure: c.unknowns for c in (shortest, *finalists[:_FINALISTS])}
+        refined = [free_run.refine(structure, unknowns[np.newaxis]) for structure, unknowns in few.items()]
         finalists = [c for c in refined if c is not None] or finalists
     chosen = preferred(finalists, complete=library.complete)
     restarted = _restarted(search.free_run, search.tried[chosen.structure] or chosen, seed)

@@ -25,7 +25,7 @@ are then refined on all samples, where step 4 is taken again.
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -105,6 +105,11 @@ class Search:
         found = self.found
         return [candidate for candidate in found if candidate.settles] or found
 
+    def followed(self, candidates: Sequence[Candidate[Terms]]) -> list[Candidate[Terms]]:
+        """Those of some candidates that are near the best one."""
+        best = self.sound[0]
+        return [c for c in candidates if c.bic < best.bic + HOPELESS or gap(c, best) < ALIKE]
+
     def eliminate(self) -> None:
         """Step 2: from the densest structure down, the best of each size lose one number at a time."""
         largest = max((structure.size for structure in self.tried), default=0)
@@ -133,12 +138,11 @@ class Search:
         bound = information(least, self.free_run.n_samples, size + len(self.free_run.records))
         return not sound or bound <= min(sound[0].bic, best) + INDISTINCT
 
+    def _best(self, size: int) -> list[Candidate[Terms]]:
+        return [c for c in self.followed(self.found) if c.structure.size == size][:WIDTH]
+
     def _may_be(self, structure: Terms) -> bool:
         return bool(structure.terms) and (structure.feedthrough or "feedthrough" not in self.held)
-
-    def _best(self, size: int) -> list[Candidate[Terms]]:
-        limit = self.sound[0].bic + HOPELESS
-        return [c for c in self.found if c.structure.size == size and c.bic < limit][:WIDTH]
 
 
 def complete_structures(terms: Sequence[Term], most: int) -> list[tuple[Term, ...]]:
@@ -160,10 +164,10 @@ def preferred(found: Sequence[Candidate[Terms]], *, complete: bool) -> Candidate
     """Step 4; only of a Duhem library is a complete structure preferred."""
     lowest = min(candidate.bic for candidate in found)
     best = min(found, key=lambda candidate: candidate.bic)
-    rivals = [c for c in found if c.bic <= lowest + INDISTINCT or _gap(c, best) < ALIKE]
+    rivals = [c for c in found if c.bic <= lowest + INDISTINCT or gap(c, best) < ALIKE]
     return min(rivals, key=lambda c: (complete and not is_complete(c.structure.terms), c.structure.size, c.bic))
 
 
-def _gap(candidate: Candidate[Terms], best: Candidate[Terms]) -> float:
+def gap(candidate: Candidate[Any], best: Candidate[Any]) -> float:
     """Rms difference in strokes that the better of two free runs makes up for."""
     return math.sqrt(max(candidate.cost - best.cost, 0.0) / best.residual.size)
