@@ -6,21 +6,18 @@ wide at 1 Hz, 10.0 % at 0.1 Hz and 2.7 % at 10 Hz. Under a sine a plant of one p
     sin(atan(omega tau_1) - atan(omega tau_2))
 
 wide; the first two widths give both times, and the third is then 1.8 %. Both this plant and a Bouc-Wen law of the same
-width at 1 Hz are measured with 1 % noise, under sines of 1 Hz alone, and of 1 Hz and 10 Hz. A law is fitted to each, of
-the right structure for Bouc-Wen, and for the lag a Duhem law of three terms, whose loop is its ellipse's.
+width at 1 Hz are measured with 1 % noise, under a sine or a triangle of 1 Hz alone, and under sines of 1 Hz and 10 Hz.
 """
 
 import math
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import brentq, least_squares
+from scipy.optimize import brentq
 
 import hysim as hs
-from hysim.discovery._judgement import Judgement, judge
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -28,7 +25,7 @@ from results_folder import write_results
 
 RESULTS = Path(__file__).parent / "results" / "sindy_lag_trap"
 PUBLISHED = {0.1: 0.100, 1.0: 0.152, 10.0: 0.027}  # relative width by frequency [Hz]
-FREQUENCIES = (1.0, 10.0)  # Hz, of the records
+CASES = (("sine", (1.0,)), ("triangle", (1.0,)), ("sine", (1.0, 10.0)))  # waveform, and frequency of each record [Hz]
 CYCLES, SAMPLES_PER_CYCLE, NOISE = 4, 100, 0.01
 Row = dict[str, float | str | None]
 
@@ -56,9 +53,10 @@ def law_of_width(width: float) -> hs.BoucWen:
     return wide(gain)
 
 
-def records(plant: hs.TransferFunction | hs.BoucWen, frequencies: Sequence[float]) -> list[hs.Record]:
-    """What is measured of the plant under a sine of each frequency."""
-    u = hs.signals.sine(1.0, cycles=CYCLES, samples_per_cycle=SAMPLES_PER_CYCLE)
+def records(plant: hs.TransferFunction | hs.BoucWen, waveform: str, frequencies: Sequence[float]) -> list[hs.Record]:
+    """What is measured of the plant under a sine or a triangle of each frequency."""
+    shape = {"cycles": CYCLES, "samples_per_cycle": SAMPLES_PER_CYCLE}
+    u = hs.signals.sine(1.0, **shape) if waveform == "sine" else hs.signals.triangle(-1.0, 1.0, **shape)
     found = []
     for seed, frequency in enumerate(frequencies):
         t = np.arange(u.size) / (SAMPLES_PER_CYCLE * frequency)
@@ -73,48 +71,20 @@ def response(plant: hs.TransferFunction | hs.BoucWen, u: np.ndarray, sample_time
     return plant.response(u) if isinstance(plant, hs.BoucWen) else plant.response(u, sample_time)
 
 
-def judged(measured: Sequence[hs.Record], names: Sequence[str], start: Sequence[float]) -> Judgement:
-    """A law fitted to the records, and what is said of it; `names` are a Duhem law's terms or Bouc-Wen's parameters."""
-
-    def laws(x: np.ndarray) -> list[hs.Duhem | hs.BoucWen]:
-        shared = dict(zip(names, x.tolist(), strict=False))
-        if "u'" in shared:
-            return [hs.Duhem.from_terms(shared, y0=y0) for y0 in x[len(names) :]]
-        return [replace(hs.BoucWen(z0=z0), **shared) for z0 in x[len(names) :]]
-
-    def refit(seen: Sequence[hs.Record], weights: Sequence[np.ndarray]) -> list[hs.Duhem | hs.BoucWen]:
-        def residual(x: np.ndarray) -> np.ndarray:
-            try:
-                y = [law.response(record.u) for law, record in zip(laws(x), seen, strict=True)]
-            except hs.SimulationError:
-                return np.full(sum(map(len, seen)), 1e3)
-            return np.concatenate([w * (r.y - each) for w, r, each in zip(weights, seen, y, strict=True)])
-
-        return laws(least_squares(residual, [*start, *[0.0] * len(seen)], xtol=1e-6, ftol=1e-6, max_nfev=40).x)
-
-    fitted = refit(measured, [np.ones(len(record)) for record in measured])
-    return judge(measured, fitted, refit, single_valued=False)
-
-
 def main(smoke: bool = False) -> list[Row]:
-    """Judge both plants at one rate and at two, and unless it is a smoke run write table, figure and result."""
+    """Discover both plants at one rate and at two, and unless it is a smoke run write table, figure and result."""
     lag = published_lag()
-    plants = {
-        "published lag": (lag, ("u'", "|u'| u", "|u'| y"), (0.5, 0.5, -0.5)),
-        "Bouc-Wen": (
-            law_of_width(PUBLISHED[1.0]),
-            ("beta", "gamma", "feedthrough", "gain"),
-            (1.0, 0.0, 1.0, -0.3),
-        ),
-    }
+    plants = {"published lag": lag, "Bouc-Wen": law_of_width(PUBLISHED[1.0])}
     rows: list[Row] = []
-    for name, (plant, terms, start) in list(plants.items())[: 1 if smoke else 2]:
-        for frequencies in FREQUENCIES[:1], FREQUENCIES:
-            found = judged(records(plant, frequencies), terms, start)
-            rows.append(row(name, frequencies, found))
+    for name, plant in list(plants.items())[: 1 if smoke else 2]:
+        for waveform, frequencies in CASES[:1] if smoke else CASES:
+            found = hs.discover(records(plant, waveform, frequencies))
+            rows.append(row(name, waveform, frequencies, found))
+            held_out = found.judgement.held_out
             print(
-                f"{name:14} {' and '.join(f'{f:g}' for f in frequencies):9} Hz  {found.verdict:30} "
-                f"held out: law {found.held_out['law']:.4f}, rival {found.held_out['rival']:.4f}"
+                f"{name:14} {waveform:8} {' and '.join(f'{f:g}' for f in frequencies):9} Hz  {found.verdict:30} "
+                f"held out: law {held_out['law']:.4f}, rival {held_out['rival']:.4f}; widths at 0.1, 1, 10 Hz: law "
+                f"{_percent(found, 'law')}, rival {_percent(found, 'rival')} %; {found.equation}"
             )
     if not smoke:
         numbers = {
@@ -122,27 +92,34 @@ def main(smoke: bool = False) -> list[Row]:
             "pole_time": lag.den[0],
             "published_widths": list(PUBLISHED.values()),
             "lag_widths": [width(lag, frequency) for frequency in PUBLISHED],
-            "bouc_wen_widths": [width(plants["Bouc-Wen"][0], frequency) for frequency in PUBLISHED],
+            "bouc_wen_widths": [width(plants["Bouc-Wen"], frequency) for frequency in PUBLISHED],
         }
         write_results(RESULTS, rows, draw, numbers)
     return rows
 
 
-def row(name: str, frequencies: Sequence[float], found: Judgement) -> Row:
+def _percent(found: hs.Discovery, who: str) -> str:
+    return " ".join(f"{100.0 * width:.1f}" for width in found.judgement.widths[who])
+
+
+def row(name: str, waveform: str, frequencies: Sequence[float], found: hs.Discovery) -> Row:
     """A line of the table; the widths are at 0.1, 1 and 10 times 1 Hz, the rate of the first record."""
+    judged = found.judgement
     widths = {
         f"{who}_width_at_{rate:g}": float(width)
         for who in ("law", "rival")
-        for rate, width in zip(found.rates, found.widths[who], strict=True)
+        for rate, width in zip(judged.rates, judged.widths[who], strict=True)
     }
     return {
         "plant": name,
+        "waveform": waveform,
         "frequencies_hz": " ".join(f"{frequency:g}" for frequency in frequencies),
         "verdict": found.verdict,
-        "rate_spread": found.rate_spread,
-        "law_held_out": found.held_out["law"],
-        "rival_held_out": found.held_out["rival"],
-        "rival_poles": found.rival.order if found.rival is not None else None,
+        "equation": found.equation,
+        "rate_spread": judged.rate_spread,
+        "law_held_out": judged.held_out["law"],
+        "rival_held_out": judged.held_out["rival"],
+        "rival_poles": judged.rival.order if judged.rival is not None else None,
         **widths,
     }
 
