@@ -5,7 +5,9 @@ trajectory for each branch, with the slope given, so that it never differentiate
 """
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 
@@ -37,7 +39,6 @@ def sparse_path(regression: Regression) -> list[tuple[float, FloatArray]]:
 def sparse_fit(regression: Regression, threshold: float) -> FloatArray:
     """Scaled coefficients (n_terms,) of STLSQ at one threshold, zero where it removed the term."""
     import pysindy
-    from sklearn.exceptions import ConvergenceWarning
 
     samples = len(regression.features)
     library = pysindy.CustomLibrary(
@@ -47,10 +48,7 @@ def sparse_fit(regression: Regression, threshold: float) -> FloatArray:
     optimizer = pysindy.STLSQ(threshold=threshold, alpha=RIDGE * samples, max_iter=_MAX_ITERATIONS, unbias=False)
     model = pysindy.SINDy(optimizer=optimizer, feature_library=library)
     branches = regression.branches
-    with warnings.catch_warnings():
-        # An empty law is the end of the path, and the last iterate of an unfinished one is still a structure.
-        warnings.filterwarnings("ignore", message="Sparsity parameter is too big")
-        warnings.filterwarnings("ignore", category=ConvergenceWarning)
+    with _quiet():
         model.fit(
             [branch.y[:, np.newaxis] for branch in branches],
             t=[branch.length for branch in branches],
@@ -59,6 +57,58 @@ def sparse_fit(regression: Regression, threshold: float) -> FloatArray:
             feature_names=["y", "u", "s"],
         )
     return np.array(model.coefficients()[0])
+
+
+def matrix_path(features: FloatArray, target: FloatArray) -> list[tuple[float, FloatArray]]:
+    """As `sparse_path`, for features (n_samples, n_terms) and a target (n_samples,) of any regression."""
+    path: list[tuple[float, FloatArray]] = []
+    threshold = 0.0
+    while True:
+        coefficients = matrix_fit(features, target, threshold)
+        kept = np.abs(coefficients[coefficients != 0.0])
+        if not kept.size:
+            return path
+        path.append((threshold, coefficients))
+        threshold = float(kept.min()) * (1.0 + 1e-9)
+
+
+def matrix_fit(features: FloatArray, target: FloatArray, threshold: float) -> FloatArray:
+    """Coefficients (n_terms,) of STLSQ at one threshold."""
+    with _quiet():
+        return np.array(_optimizer(features, threshold).fit(features, target[:, np.newaxis]).coef_[0])
+
+
+def inclusion(features: FloatArray, target: FloatArray, threshold: float, *, seed: int, n_models: int) -> FloatArray:
+    """Share (n_terms,) of fits to samples drawn with replacement in which STLSQ keeps each term."""
+    import pysindy
+
+    ensemble = pysindy.EnsembleOptimizer(_optimizer(features, threshold), bagging=True, n_models=n_models)
+    state = np.random.get_state()  # noqa: NPY002 PySINDy draws from NumPy's global generator
+    np.random.seed(seed)  # noqa: NPY002
+    try:
+        with _quiet():
+            ensemble.fit(features, target[:, np.newaxis])
+    finally:
+        np.random.set_state(state)  # noqa: NPY002
+    return np.asarray(np.mean(np.array(ensemble.coef_list)[:, 0, :] != 0.0, axis=0))
+
+
+def _optimizer(features: FloatArray, threshold: float) -> Any:
+    import pysindy
+
+    ridge = RIDGE * float(np.sum(features**2)) / features.shape[1]
+    return pysindy.STLSQ(threshold=threshold, alpha=ridge, max_iter=_MAX_ITERATIONS, unbias=False)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """An empty law is the end of a path, and the last iterate of an unfinished one is still a structure."""
+    from sklearn.exceptions import ConvergenceWarning
+
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Sparsity parameter is too big")
+        warnings.filterwarnings("ignore", category=ConvergenceWarning)
+        yield
 
 
 def _column(term: Term, size: float) -> Callable[[FloatArray, FloatArray, FloatArray], FloatArray]:
