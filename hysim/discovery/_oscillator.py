@@ -7,12 +7,14 @@
 2. Along the measured motion, with z from the equation of motion and m, c and k projected out, the laws of Bouc and Wen
    with n = 1, 2 and 3 and a linear relaxation are regressed (`_hidden_memory`): the nearest one begins.
 3. It is refined by simulation error (`hysim.identify`).
-4. About the refined law the whole library is regressed, the law's own terms like all others: PySINDy's STLSQ from dense
-   to sparse, one structure by BIC, inclusion by bagging (`_oscillator_response`). Terms that are not chosen leave the
-   law, which is refined again. If terms come in, n is no whole number, or the law is none of Bouc and Wen's.
+4. About the refined law the whole library is regressed, the law's own terms like all others: PySINDy's STLSQ and plain
+   elimination from dense to sparse, one structure by BIC, inclusion by bagging (`_oscillator_response`). Terms that are
+   not chosen leave the law, which is refined again. If terms come in, n is no whole number, or the law is none of Bouc
+   and Wen's.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +22,6 @@ import numpy as np
 from hysim import metrics
 from hysim._frozen import FloatArray, frozen
 from hysim._parallel import Progress
-from hysim.discovery import _pysindy
 from hysim.discovery._hidden_memory import PLANT, HiddenMemory, Regressed
 from hysim.discovery._memory_terms import (
     RELAXATION,
@@ -30,7 +31,8 @@ from hysim.discovery._memory_terms import (
     equation,
     memory_terms,
 )
-from hysim.discovery._oscillator_response import Oscillator, Response, TermRegression
+from hysim.discovery._oscillator_response import Oscillator, Response
+from hysim.discovery._term_regression import TermRegression
 from hysim.identification import Identification, identify
 from hysim.models.equation_of_motion import Linear, linear_plant
 from hysim.models.oscillator import BoucWenOscillator
@@ -43,7 +45,7 @@ NO_STRUCTURE = "no structure found"
 RATE_DEPENDENT = "rate-dependent hysteresis"
 OTHER = "rate-independent hysteresis, not of Bouc and Wen"
 
-N_MODELS = 20
+N_DRAWS = 20
 
 _SURE = 0.9  # inclusion below which the message names a term of the law
 _LARGEST_CONDITION = 1e4
@@ -81,10 +83,10 @@ class FoundOscillator:
         ``"fit_percent"`` [%], ``"rmse"`` [unit of y], ``"bic"`` of the free run; ``"held_out_rmse"`` [unit of y], on
         each period (or quarter) with the coefficients of the others; ``"linear_rmse"`` and ``"linear_bic"`` of the
         rival without memory; ``"condition"`` of the regression on all terms.
-    thresholds, path_n_terms, path_bic, path_held_out_rmse : array, shape (n_thresholds,)
-        The path of STLSQ from dense to sparse; a threshold is a number of standard errors.
     path_terms : tuple of str
-        The structures of the path, each as its terms joined by commas.
+        The structures that were compared, from dense to sparse, each as its terms joined by commas.
+    path_n_terms, path_bic, path_held_out_rmse : array, shape (n_structures,)
+        Their sizes, BIC, and rmse on what is held out [unit of y]: for a Pareto figure.
     message : str
         What to know about all this.
     """
@@ -101,7 +103,6 @@ class FoundOscillator:
     inclusion: Mapping[str, float]
     left_out: tuple[str, ...]
     scores: Mapping[str, float]
-    thresholds: FloatArray
     path_n_terms: FloatArray
     path_bic: FloatArray
     path_held_out_rmse: FloatArray
@@ -129,9 +130,9 @@ def oscillator(
         Force, displacement and time, evenly spaced; all of one plant. They must be long enough to hold several
         swings, and large enough for the memory to be curved: only that tells A from k.
     structure : OscillatorStructure, optional
-        How the records were made, from ``BoucWenOscillator.structure(...)``. By default an input that repeats itself
-        exactly is taken as band-limited, and the record as steady if its periods are alike; any other as linear
-        between samples, and the record as beginning at rest.
+        How the records were made, from ``BoucWenOscillator.structure(...)``. By default a record whose input
+        repeats itself and whose periods are alike is taken as steady, its input as band-limited or as linear between
+        samples, whichever fits better; any other record as beginning at rest, its input as linear between samples.
     mass, damping, stiffness : float, optional
         Known parts of the plant.
     degree : {1, 2, 3}
@@ -174,7 +175,8 @@ def oscillator(
     chosen, given = _checked(records, structure, degree, symmetry), tuple(records)
     response = Response(chosen, given, known)
     library = memory_terms(degree, symmetry)
-    return _Search(chosen, given, response, library, seed, progress or (lambda done, total: None)).found()
+    others = () if structure is not None or chosen.period is None else (replace(chosen, hold="foh"),)
+    return _Search(chosen, others, given, response, library, seed, progress or (lambda done, total: None)).found()
 
 
 def recorded(record: Record) -> OscillatorStructure:
@@ -211,17 +213,12 @@ class _Fitted(NamedTuple):
 
 
 class _Tried(NamedTuple):
-    """The library tried about a refined oscillator: the path of STLSQ and its structures."""
+    """The library tried about a refined oscillator: its structures from dense to sparse, and the one chosen."""
 
     fitted: _Fitted
     regression: TermRegression
-    thresholds: list[float]
     structures: list[tuple[MemoryTerm, ...]]
-
-    @property
-    def chosen(self) -> tuple[MemoryTerm, ...]:
-        """The structure of the lowest BIC, none among them."""
-        return min([*self.structures, ()], key=self.regression.bic)
+    chosen: tuple[MemoryTerm, ...]
 
     @property
     def beyond(self) -> set[MemoryTerm]:
@@ -231,6 +228,7 @@ class _Tried(NamedTuple):
 
 class _Search(NamedTuple):
     structure: OscillatorStructure
+    others: tuple[OscillatorStructure, ...]
     records: tuple[Record, ...]
     response: Response
     library: tuple[MemoryTerm, ...]
@@ -248,15 +246,25 @@ class _Search(NamedTuple):
             return self._described(first, elastic, {})
         nearest = memory.nearest()
         self.progress(3, _STEPS)
-        found = self._tried(self._refined(nearest, elastic))
+        searches = [self, *(self._made(structure) for structure in self.others)]
+        refined = [(search, search._refined(nearest, elastic)) for search in searches]
+        best, fitted = min(refined, key=lambda each: float(each[1].residual @ each[1].residual))
         self.progress(4, _STEPS)
+        return best._judged(fitted, elastic, nearest)
+
+    def _made(self, structure: OscillatorStructure) -> "_Search":
+        """The same search with another belief about how the records were made."""
+        return self._replace(structure=structure, response=replace(self.response, structure=structure))
+
+    def _judged(self, fitted: _Fitted, elastic: _Fitted, nearest: Regressed) -> FoundOscillator:
+        found = self._tried(fitted)
         law = found.fitted.oscillator.coefficients
         if found.fitted.verdict == HYSTERESIS and set(found.chosen) < set(law):
             found = self._tried(self._bouc_wen([term for k, term in enumerate(law) if not k or term in found.chosen]))
         if found.beyond:
             found = self._widened(found)
         if found.fitted.bic(found.regression.floor) >= elastic.bic(found.regression.floor):
-            return self._described(first, elastic, {})
+            found = found._replace(fitted=elastic)
         return self._described(found, elastic, nearest.coefficients)
 
     def _along(self) -> HiddenMemory:
@@ -335,21 +343,22 @@ class _Search(NamedTuple):
         return self._tried(self._simulated(Oscillator(found.fitted.oscillator.plant, law), free.fitted.model))
 
     def _tried(self, fitted: _Fitted) -> _Tried:
-        """Step 4."""
-        return _tried(fitted, self.response.regression(fitted.oscillator, fitted.residual, self.library))
+        """Step 4; where n is free, the terms that differ from the law's own by their power are no others."""
+        law = fitted.oscillator.coefficients
+        same = {(term.rectified, term.even) for term in law if not (term.whole or term.relaxing)}
+        library = [term for term in self.library if not term.power or (term.rectified, term.even) not in same]
+        return _tried(fitted, self.response.regression(fitted.oscillator, fitted.residual, library))
 
     def _identified(self, fixed: Mapping[str, float]) -> Identification:
         return identify(self.structure, self.records, fixed={**fixed, **self.response.known})
 
     def _described(self, found: _Tried, elastic: _Fitted, regressed: Mapping[MemoryTerm, float]) -> FoundOscillator:
-        fitted, regression, n = found.fitted, found.regression, len(self.response.measured)
+        fitted, regression = found.fitted, found.regression
         measured = self.response.measured
         law = {} if fitted.verdict == NO_STRUCTURE else fitted.oscillator.coefficients
         coefficients = {term.name: value for term, value in law.items()}
-        keep = _pysindy.inclusion(
-            regression.features, regression.target, float(np.sqrt(np.log(n))), seed=self.seed, n_models=N_MODELS
-        )
-        inclusion = {term.name: share for term, share in zip(regression.terms, keep.tolist(), strict=True)}
+        shares = regression.inclusion(np.random.default_rng(self.seed), N_DRAWS)
+        inclusion = {term.name: share for term, share in shares.items()}
         plant = fitted.oscillator.plant
         if fitted.verdict == NO_STRUCTURE:
             plant = plant | {"stiffness": fitted.model.stiffness}
@@ -374,7 +383,6 @@ class _Search(NamedTuple):
                 "linear_bic": elastic.bic(regression.floor),
                 "condition": regression.condition,
             },
-            thresholds=np.array(found.thresholds),
             path_n_terms=np.array([len(terms) for terms in structures], dtype=float),
             path_bic=np.array([regression.bic(terms) for terms in structures]),
             path_held_out_rmse=np.array([regression.held_out_rmse(terms) for terms in structures]),
@@ -384,11 +392,9 @@ class _Search(NamedTuple):
 
 
 def _tried(fitted: _Fitted, regression: TermRegression) -> _Tried:
-    path = _pysindy.matrix_path(regression.features, regression.target)
-    structures = [
-        tuple(term for term, value in zip(regression.terms, values, strict=True) if value != 0.0) for _, values in path
-    ]
-    return _Tried(fitted, regression, [threshold for threshold, _ in path], structures)
+    paths = {*regression.thresholded(), *regression.eliminated()}
+    structures = sorted(paths, key=lambda terms: (-len(terms), regression.bic(terms)))
+    return _Tried(fitted, regression, structures, regression.best(structures))
 
 
 def _message(found: _Tried, law: Mapping[str, float], inclusion: Mapping[str, float]) -> str:

@@ -7,7 +7,6 @@ trajectory for each branch, with the slope given, so that it never differentiate
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
 
 import numpy as np
 
@@ -59,45 +58,23 @@ def sparse_fit(regression: Regression, threshold: float) -> FloatArray:
     return np.array(model.coefficients()[0])
 
 
-def matrix_path(features: FloatArray, target: FloatArray) -> list[tuple[float, FloatArray]]:
-    """As `sparse_path`, for features (n_samples, n_terms) and a target (n_samples,) of any regression."""
-    path: list[tuple[float, FloatArray]] = []
+def matrix_path(features: FloatArray, target: FloatArray) -> list[FloatArray]:
+    """Coefficients (n_terms,) of STLSQ at the thresholds of `sparse_path`, for a target (n_samples,) of any features."""
+    import pysindy
+
+    ridge = RIDGE * float(np.sum(features**2)) / max(features.shape[1], 1)
+    path: list[FloatArray] = []
     threshold = 0.0
-    while True:
-        coefficients = matrix_fit(features, target, threshold)
+    while features.shape[1]:
+        optimizer = pysindy.STLSQ(threshold=threshold, alpha=ridge, max_iter=_MAX_ITERATIONS, unbias=False)
+        with _quiet():
+            coefficients = np.array(optimizer.fit(features, target[:, np.newaxis]).coef_[0])
         kept = np.abs(coefficients[coefficients != 0.0])
         if not kept.size:
-            return path
-        path.append((threshold, coefficients))
+            break
+        path.append(coefficients)
         threshold = float(kept.min()) * (1.0 + 1e-9)
-
-
-def matrix_fit(features: FloatArray, target: FloatArray, threshold: float) -> FloatArray:
-    """Coefficients (n_terms,) of STLSQ at one threshold."""
-    with _quiet():
-        return np.array(_optimizer(features, threshold).fit(features, target[:, np.newaxis]).coef_[0])
-
-
-def inclusion(features: FloatArray, target: FloatArray, threshold: float, *, seed: int, n_models: int) -> FloatArray:
-    """Share (n_terms,) of fits to samples drawn with replacement in which STLSQ keeps each term."""
-    import pysindy
-
-    ensemble = pysindy.EnsembleOptimizer(_optimizer(features, threshold), bagging=True, n_models=n_models)
-    state = np.random.get_state()  # noqa: NPY002 PySINDy draws from NumPy's global generator
-    np.random.seed(seed)  # noqa: NPY002
-    try:
-        with _quiet():
-            ensemble.fit(features, target[:, np.newaxis])
-    finally:
-        np.random.set_state(state)  # noqa: NPY002
-    return np.asarray(np.mean(np.array(ensemble.coef_list)[:, 0, :] != 0.0, axis=0))
-
-
-def _optimizer(features: FloatArray, threshold: float) -> Any:
-    import pysindy
-
-    ridge = RIDGE * float(np.sum(features**2)) / features.shape[1]
-    return pysindy.STLSQ(threshold=threshold, alpha=ridge, max_iter=_MAX_ITERATIONS, unbias=False)
+    return path
 
 
 @contextmanager

@@ -1,17 +1,19 @@
 """The regression of an oscillator's output on the terms of its memory, the plant projected out.
 
 Columns are scaled so that the coefficients of all terms together have standard errors of one: a threshold is then a
-number of standard errors, without unit.
+number of standard errors, without unit. Where terms are nearly collinear a small coefficient is no sign of a small
+loss, so that STLSQ's thresholds are accompanied by plain elimination.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.discovery._memory_terms import MemoryTerm
+from hysim.discovery._pysindy import matrix_path
 
 FLOOR = 1e-5  # of the rms output: smaller residuals are no evidence of a term
 BLOCKS = 4  # that are held out in turn, where there are no periods
@@ -41,6 +43,35 @@ class TermRegression:
     def triangle(self) -> FloatArray:
         """The R of [features, target]."""
         return np.asarray(np.linalg.qr(np.column_stack([self.features, self.target]), mode="r"))
+
+    def thresholded(self) -> list[tuple[MemoryTerm, ...]]:
+        """Structures on the path of PySINDy's STLSQ, from dense to sparse."""
+        path = matrix_path(self.triangle[:, :-1], self.triangle[:, -1])
+        return [tuple(t for t, value in zip(self.terms, values, strict=True) if value != 0.0) for values in path]
+
+    def eliminated(self) -> list[tuple[MemoryTerm, ...]]:
+        """Structures from dense to sparse, each without the term that the last one loses least by."""
+        R, kept, path = self.triangle, list(range(len(self.terms))), []
+        normal, right = R[:, :-1].T @ R[:, :-1], R[:, :-1].T @ R[:, -1]
+        while kept:
+            path.append(tuple(self.terms[k] for k in kept))
+            inverse = np.linalg.inv(normal[np.ix_(kept, kept)])
+            kept.pop(int(np.argmin((inverse @ right[kept]) ** 2 / np.diag(inverse))))
+        return path
+
+    def best(self, structures: Sequence[tuple[MemoryTerm, ...]]) -> tuple[MemoryTerm, ...]:
+        """The structure of the lowest BIC, that without terms among them."""
+        return min([*structures, ()], key=self.bic)
+
+    def inclusion(self, rng: np.random.Generator, n_draws: int) -> dict[MemoryTerm, float]:
+        """Share of regressions on samples drawn with replacement whose best structure has each term."""
+        counts = dict.fromkeys(self.terms, 0)
+        for _ in range(n_draws):
+            rows = rng.integers(self.target.size, size=self.target.size)
+            drawn = replace(self, features=self.features[rows], target=self.target[rows])
+            for term in drawn.best(drawn.eliminated()):
+                counts[term] += 1
+        return {term: count / n_draws for term, count in counts.items()}
 
     @cached_property
     def condition(self) -> float:
@@ -87,7 +118,7 @@ def term_regression(
 
     `floor` is the noise below which nothing counts as evidence, `blocks` are what is held out in turn.
     """
-    basis = list(np.linalg.qr(plant / np.linalg.norm(plant, axis=0))[0].T)
+    basis = list(np.linalg.qr(plant / np.linalg.norm(plant, axis=0))[0].T) if plant.size else []
     n_plant, independent = len(basis), []
     for k, slope in enumerate(slopes.T):
         rest = slope.copy()
@@ -96,7 +127,7 @@ def term_regression(
         if np.linalg.norm(rest) > DEPENDENT * np.linalg.norm(slope):
             basis.append(rest / np.linalg.norm(rest))
             independent.append(k)
-    Q = np.array(basis[:n_plant]).reshape(n_plant, -1)
+    Q = np.array(basis[:n_plant]).reshape(n_plant, target.size)
     features, goal = slopes[:, independent], target
     features, goal = features - Q.T @ (Q @ features), goal - Q.T @ (Q @ goal)
     size = np.linalg.norm(features, axis=0)
