@@ -169,9 +169,7 @@ def oscillator(
     >>> found.equation
     "z' = 50000 u' - 800 |u'| z + 300 u' |z|"
     """
-    known = {
-        name: float(value) for name, value in zip(PLANT, (mass, damping, stiffness), strict=True) if value is not None
-    }
+    known = _known({"mass": mass, "damping": damping, "stiffness": stiffness})
     chosen, given = _checked(records, structure, degree, symmetry), tuple(records)
     response = Response(chosen, given, known)
     library = memory_terms(degree, symmetry)
@@ -438,9 +436,21 @@ def _checked(
     return structure
 
 
+def _known(given: Mapping[str, float | None]) -> dict[str, float]:
+    known = {name: float(value) for name, value in given.items() if value is not None}
+    for name, value in known.items():
+        if not np.isfinite(value):
+            raise ValueError(f"{name} must be finite, got {value}")
+    if known.get("mass", 1.0) <= 0.0:
+        raise ValueError(f"mass must be positive, got {known['mass']}")
+    return known
+
+
 def _period(u: FloatArray) -> int | None:
     """The smallest shift, up to half of the record, by which an input repeats itself."""
     n = u.size
+    if np.ptp(u) == 0.0:
+        return None
     centred = u - u.mean()
     squares = np.concatenate([[0.0], np.cumsum(centred**2)])
     shifts = np.arange(1, n // 2 + 1)

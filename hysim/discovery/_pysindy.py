@@ -59,7 +59,7 @@ def sparse_fit(regression: Regression, threshold: float) -> FloatArray:
 
 
 def matrix_path(features: FloatArray, target: FloatArray) -> list[FloatArray]:
-    """Coefficients (n_terms,) of STLSQ at the thresholds of `sparse_path`, for a target (n_samples,) of any features."""
+    """Coefficients (n_terms,) of STLSQ at the thresholds of `sparse_path`, for any features and target (n_samples,)."""
     import pysindy
 
     ridge = RIDGE * float(np.sum(features**2)) / max(features.shape[1], 1)

@@ -18,6 +18,7 @@ from scipy.signal import cont2discrete, lfilter
 from hysim._frozen import FloatArray
 
 _ROUNDS = 20  # of the linear fit: it settles in five to ten
+_SETTLED = 1e-9
 _DAMPING = (1e-3, 2.0)  # damping ratio of D
 _HIGHEST = 3.0  # lines up to this multiple of the highest excited one are compared
 _EXCITED = 1e-3  # share of the largest line of the input
@@ -54,7 +55,9 @@ def linear_plant(motion: Motion) -> Linear | None:
         mass, damping, stiffness = regression(columns, filtered(motion.force, 0))
         if not (mass > 0.0 and stiffness > 0.0):
             return None
-        plant = checked_plant(mass, damping, stiffness)
+        last, plant = plant, checked_plant(mass, damping, stiffness)
+        if np.allclose(plant, last, rtol=_SETTLED, atol=0.0):
+            break
     return plant
 
 
@@ -86,12 +89,10 @@ def filtering(motion: Motion, plant: Linear) -> Filter:
 
         return by_spectrum
 
-    powers = [1.0], [1.0, 0.0], [1.0, 0.0, 0.0]
-    discrete = [cont2discrete((power, denominator), motion.sample_time, "foh") for power in powers]
+    numerators, poles, _ = cont2discrete((np.eye(3)[::-1], denominator), motion.sample_time, "foh")
 
     def in_time(signals: FloatArray, power: int) -> FloatArray:
-        b, a, _ = discrete[power]
-        return np.asarray(lfilter(np.ravel(b), a, signals, axis=-1))
+        return np.asarray(lfilter(numerators[power], poles, signals, axis=-1))
 
     return in_time
 
