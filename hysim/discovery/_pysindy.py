@@ -6,7 +6,6 @@ and put back.
 """
 
 import contextlib
-import math
 import warnings
 from collections.abc import Iterator
 from typing import Any
@@ -52,13 +51,13 @@ def sparse_path(features: FloatArray, slope: FloatArray, optimizer: str = "STLSQ
 
 def compressed(features: FloatArray, slope: FloatArray) -> tuple[FloatArray, FloatArray]:
     """A regression with as many rows as terms, and one more, whose least squares are those of all rows."""
-    triangle = np.asarray(np.linalg.qr(np.column_stack([features, slope]), mode="r")) / math.sqrt(len(slope))
+    triangle = np.asarray(np.linalg.qr(np.column_stack([features, slope]), mode="r"))
     return triangle[:, :-1], triangle[:, -1]
 
 
 def sparse_fit(features: FloatArray, slope: FloatArray, threshold: float, optimizer: str = "STLSQ") -> FloatArray:
     """Coefficients (n_terms,) at one threshold, zero where the optimizer removed the term."""
-    found = _thresholding(optimizer, threshold)
+    found = _thresholding(optimizer, threshold, features)
     with _quiet():
         found.fit(features, slope[:, np.newaxis])
     return np.array(found.coef_[0])
@@ -68,9 +67,9 @@ def inclusion(features: FloatArray, slope: FloatArray, threshold: float, *, n_mo
     """Share of fits (n_terms,) by STLSQ that keep each term when the rows are drawn anew (PySINDy's bagging)."""
     import pysindy
 
-    ensemble = pysindy.EnsembleOptimizer(_thresholding("STLSQ", threshold), bagging=True, n_models=n_models)
+    ensemble = pysindy.EnsembleOptimizer(_thresholding("STLSQ", threshold, features), bagging=True, n_models=n_models)
     with _quiet(), _seeded(seed):
-        ensemble.fit(features / math.sqrt(len(slope)), slope[:, np.newaxis] / math.sqrt(len(slope)))
+        ensemble.fit(features, slope[:, np.newaxis])
     return np.asarray(np.mean([coefficients[0] != 0.0 for coefficients in ensemble.coef_list], axis=0))
 
 
@@ -95,14 +94,18 @@ def check(optimizer: str) -> None:
     raise ValueError(f"optimizer must be one of {', '.join(OPTIMIZERS)}, got {optimizer!r}")
 
 
-def _thresholding(optimizer: str, threshold: float) -> Any:
+def _thresholding(optimizer: str, threshold: float, features: FloatArray) -> Any:
     import pysindy
 
     if optimizer == "SR3":
         return pysindy.SR3(
             reg_weight_lam=0.5 * threshold**2, regularizer="L0", relax_coeff_nu=1.0, max_iter=1000, unbias=True
         )
-    return pysindy.STLSQ(threshold=threshold, alpha=RIDGE, max_iter=_MAX_ITERATIONS, unbias=False)
+    return pysindy.STLSQ(threshold=threshold, alpha=_ridge(features), max_iter=_MAX_ITERATIONS, unbias=False)
+
+
+def _ridge(features: FloatArray) -> float:
+    return RIDGE * float(np.mean(np.sum(features**2, axis=0)))
 
 
 def _greedy_path(features: FloatArray, slope: FloatArray, optimizer: str) -> list[tuple[float, FloatArray]]:
@@ -110,9 +113,9 @@ def _greedy_path(features: FloatArray, slope: FloatArray, optimizer: str) -> lis
 
     n_terms = features.shape[1]
     if optimizer == "SSR":
-        found = pysindy.SSR(alpha=RIDGE, max_iter=n_terms, unbias=False)
+        found = pysindy.SSR(alpha=_ridge(features), max_iter=n_terms, unbias=False)
     else:
-        found = pysindy.FROLS(alpha=RIDGE, max_iter=n_terms, unbias=False)
+        found = pysindy.FROLS(alpha=_ridge(features), max_iter=n_terms, unbias=False)
     with _quiet():
         found.fit(features, slope[:, np.newaxis])
     structures: dict[tuple[bool, ...], FloatArray] = {}

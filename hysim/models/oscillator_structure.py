@@ -18,8 +18,9 @@ from hysim._frozen import FloatArray, checked
 from hysim._parallel import in_chunks
 from hysim.errors import SimulationError
 from hysim.models import _boucwen_search
-from hysim.models._oscillator_start import Linear, Motion, start
+from hysim.models._oscillator_start import start
 from hysim.models.boucwen import BoucWen
+from hysim.models.equation_of_motion import Linear, Motion
 from hysim.models.oscillator import METHODS, BoucWenOscillator
 from hysim.models.resampling import HALF_FILTER, decimated, interpolated
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
@@ -86,7 +87,7 @@ class OscillatorStructure:
         """
         if freedom.initial is not None:
             raise ValueError("the structure says how the record begins: BoucWenOscillator.structure(initial=...)")
-        motion = self._motion(record)
+        motion = self.motion(record)
         redundant = (_SCALED,) if self.excitation == "base" else ()
         held = freedom.held(dict.fromkeys(NAMES, 1.0), redundant=redundant)
         limits = freedom.limits(dict.fromkeys(NAMES, 1.0), held)
@@ -112,7 +113,7 @@ class OscillatorStructure:
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """The output itself, shape (n_sets, n_samples, 1), sets on threads; inf for a set that escapes."""
-        force, step = self._fine_input(record.u), record.sample_time / self.oversampling
+        force, step = self.fine_input(record.u), record.sample_time / self.oversampling
         sets = np.stack(np.broadcast_arrays(*(np.atleast_1d(parameters[name]) for name in NAMES)), axis=1)
         outputs = np.full((len(sets), len(record), 1), np.inf)
 
@@ -123,7 +124,7 @@ class OscillatorStructure:
                     y = self._fine_output(replace(plant, substeps=1), force, step)
                 except SimulationError:
                     continue
-                outputs[k, :, 0] = np.resize(self._sampled(y), len(record))
+                outputs[k, :, 0] = np.resize(self.sampled(y), len(record))
 
         in_chunks(simulate, len(sets), minimum=1)
         return outputs
@@ -141,7 +142,7 @@ class OscillatorStructure:
             substeps=self.oversampling,
         )
 
-    def _motion(self, record: Record) -> Motion:
+    def motion(self, record: Record) -> Motion:
         """Force and displacement that the start is found from: of a periodic record, the mean period."""
         sample_time = record.sample_time
         if np.ptp(record.u) == 0.0:
@@ -167,7 +168,8 @@ class OscillatorStructure:
         whole = signal.size // self.period * self.period
         return np.asarray(signal[:whole].reshape(-1, self.period).mean(axis=0))
 
-    def _fine_input(self, u: FloatArray) -> FloatArray:
+    def fine_input(self, u: FloatArray) -> FloatArray:
+        """Inputs at the ends of the steps: of one period, or of the whole record."""
         u, factor = self._mean_period(u), self.oversampling
         if self.hold == "band-limited":
             return interpolated(u, factor)
@@ -179,7 +181,8 @@ class OscillatorStructure:
     def _fine_output(self, plant: BoucWenOscillator, force: FloatArray, step: float) -> FloatArray:
         return plant.response(force, step) if self.period is None else plant.periodic_response(force, step)
 
-    def _sampled(self, y: FloatArray) -> FloatArray:
+    def sampled(self, y: FloatArray) -> FloatArray:
+        """What the record keeps of an output at the ends of the steps."""
         if self.decimation:
             return decimated(y, self.decimation, periodic=self.period is not None)
         return y[:: self.oversampling]

@@ -1,0 +1,174 @@
+"""The oscillator's output as its terms make it: simulation, its slopes, and the regression on them.
+
+    y = y0 + sum of (coefficient - its value) times dy/d(coefficient) + the same for m, c and k
+
+About a law that simulates the record well the residual is white, whatever the noise does to y' and z, and the slopes
+are free of noise. So this regression, unlike one of z' on noisy signals, has no bias, its standard errors are right and
+its BIC counts (`_term_regression`).
+"""
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray
+from hysim._parallel import in_chunks
+from hysim.discovery._marquardt import descended
+from hysim.discovery._hidden_memory import PLANT
+from hysim.discovery._memory_terms import MemoryTerm, law
+from hysim.discovery._term_regression import BLOCKS, FLOOR, TermRegression, term_regression
+from hysim.kernels import hidden as kernels
+from hysim.models.oscillator_structure import OscillatorStructure
+from hysim.records import Record
+
+_DIFFERENCES = (3e-4, 3e-5, 3e-6)  # of a parameter, for its slope: the first with which nothing escapes
+_STEADY = 1e-9  # relative change of the state from period to period
+_MOST_PERIODS = 100
+
+
+class Oscillator(NamedTuple):
+    """A plant and the coefficients of its memory."""
+
+    plant: dict[str, float]
+    coefficients: dict[MemoryTerm, float]
+
+
+@dataclass(frozen=True)
+class Response:
+    """Outputs of oscillators on records that were made as `structure` says; names in `known` are not free."""
+
+    structure: OscillatorStructure
+    records: Sequence[Record]
+    known: Mapping[str, float]
+
+    @cached_property
+    def measured(self) -> FloatArray:
+        """Outputs of all records, one after the other, (n_samples,)."""
+        return np.concatenate([record.y for record in self.records])
+
+    @cached_property
+    def free(self) -> tuple[str, ...]:
+        """The plant's free parameters."""
+        return tuple(name for name in PLANT if name not in self.known)
+
+    @cached_property
+    def _inputs(self) -> list[tuple[FloatArray, float]]:
+        """Forces at the ends of the steps, and the time of a step."""
+        return [(self.structure.fine_input(r.u), r.sample_time / self.structure.oversampling) for r in self.records]
+
+    def outputs(self, oscillators: Sequence[Oscillator]) -> FloatArray:
+        """Simulated outputs, (n_oscillators, n_samples); inf where one escapes or never is steady."""
+        found = np.empty((len(oscillators), self.measured.size))
+
+        def work(start: int, stop: int) -> None:
+            for k in range(start, stop):
+                parts = []
+                for record, given in zip(self.records, self._inputs, strict=True):
+                    y = self._simulated(oscillators[k], *given)
+                    parts.append(np.full(len(record), np.inf) if y is None else np.resize(y, len(record)))
+                found[k] = np.concatenate(parts)
+
+        in_chunks(work, len(oscillators), minimum=1)
+        return found
+
+    def _simulated(self, oscillator: Oscillator, force: FloatArray, h: float) -> FloatArray | None:
+        degree = max((int(term.power) for term in oscillator.coefficients if term.whole), default=0)
+        polynomial, extra, power, relaxation = law(oscillator.coefficients, degree)
+        plant = np.array([*(oscillator.plant[name] for name in PLANT), relaxation, power])
+        state = np.zeros(3)
+        if self.structure.period is None:
+            y = np.zeros(force.size)
+            whole = kernels.motion(plant, polynomial, extra, force, h, state, y[1:])
+            return self.structure.sampled(y) if whole else None
+        y, force = np.empty(force.size), np.append(force, force[0])
+        for _ in range(_MOST_PERIODS):
+            before = state.copy()
+            if not kernels.motion(plant, polynomial, extra, force, h, state, y):
+                return None
+            if np.all(np.abs(state - before) <= _STEADY * np.maximum(np.abs(state), np.abs(before))):
+                return self.structure.sampled(np.roll(y, 1))
+        return None
+
+    def slopes(self, oscillator: Oscillator, terms: Sequence[MemoryTerm]) -> FloatArray:
+        """Derivatives of the output by the plant's free parameters and the coefficients of `terms`, (n_samples, n).
+
+        Zero where the motion would escape, or never be steady, with any of the differences.
+        """
+        slopes = np.zeros((self.measured.size, len(self.free) + len(terms)))
+        missing = np.arange(slopes.shape[1])
+        for difference in _DIFFERENCES:
+            if missing.size:
+                found = self._differences(oscillator, terms, missing, difference)
+                whole = np.isfinite(found).all(axis=0)
+                slopes[:, missing[whole]] = found[:, whole]
+                missing = missing[~whole]
+        return slopes
+
+    def _differences(
+        self, oscillator: Oscillator, terms: Sequence[MemoryTerm], places: npt.NDArray[np.intp], difference: float
+    ) -> FloatArray:
+        """Central differences by the parameters at some places; not finite where one escapes."""
+        plant, coefficients = oscillator
+        spring = plant["stiffness"] + next(iter(coefficients.values()), 0.0)
+        size = spring * float(np.sqrt(np.mean(self.measured**2)))
+        frequency = np.sqrt(abs(spring) / plant["mass"])
+        units = {"mass": plant["mass"], "damping": plant["mass"] * frequency, "stiffness": spring}
+        steps = [units[name] for name in self.free]
+        steps += [frequency if term.relaxing else spring / size**term.power for term in terms]
+
+        def moved(k: int, by: float) -> Oscillator:
+            if k < len(self.free):
+                return Oscillator(plant | {self.free[k]: plant[self.free[k]] + by}, coefficients)
+            term = terms[k - len(self.free)]
+            return Oscillator(plant, coefficients | {term: coefficients.get(term, 0.0) + by})
+
+        by = difference * np.array(steps)[places]
+        both = [moved(int(k), sign * step) for sign in (1.0, -1.0) for k, step in zip(places, by, strict=True)]
+        with np.errstate(invalid="ignore"):
+            ahead, behind = np.split(self.outputs(both), 2)
+            return np.asarray((ahead - behind).T / (2.0 * by))
+
+    def descended(self, oscillator: Oscillator) -> Oscillator:
+        """The optimum below an oscillator."""
+        terms = tuple(oscillator.coefficients)
+
+        def at(x: FloatArray) -> Oscillator:
+            plant = oscillator.plant | dict(zip(self.free, x.tolist(), strict=False))
+            return Oscillator(plant, dict(zip(terms, x[len(self.free) :].tolist(), strict=True)))
+
+        def left(x: FloatArray) -> FloatArray | None:
+            there = at(x)
+            found = self.measured - self.outputs([there])[0] if there.plant["mass"] > 0.0 else None
+            return found if found is not None and np.isfinite(found).all() else None
+
+        def slopes(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+            J = self.slopes(at(x), terms)
+            return J, np.linalg.norm(J, axis=0)
+
+        start = [oscillator.plant[name] for name in self.free] + list(oscillator.coefficients.values())
+        return at(descended(left, slopes, np.array(start)))
+
+    def regression(self, oscillator: Oscillator, residual: FloatArray, library: Sequence[MemoryTerm]) -> TermRegression:
+        """The regression about an oscillator with this residual on all terms of the library and its own."""
+        terms = (*library, *(term for term in oscillator.coefficients if term not in library))
+        slopes = self.slopes(oscillator, terms)
+        n_plant = len(self.free)
+        values = np.array([oscillator.coefficients.get(term, 0.0) for term in terms])
+        target = residual + slopes[:, n_plant:] @ values
+        noise = FLOOR * float(np.sqrt(np.mean(self.measured**2)))
+        return term_regression(terms, slopes[:, :n_plant], slopes[:, n_plant:], target, noise, self._blocks)
+
+    @cached_property
+    def _blocks(self) -> list[slice]:
+        """The periods of periodic records, or blocks of others."""
+        edges = [0]
+        for record in self.records:
+            period = self.structure.period
+            n = len(record) // period if period is not None and len(record) >= 2 * period else BLOCKS
+            edges += [edges[-1] + len(record) * (k + 1) // n for k in range(n - 1)] + [edges[-1] + len(record)]
+        return [slice(*pair) for pair in itertools.pairwise(edges)]

@@ -1,0 +1,149 @@
+"""The regression of an oscillator's output on the terms of its memory, the plant projected out.
+
+Columns are scaled so that the coefficients of all terms together have standard errors of one: a threshold is then a
+number of standard errors, without unit. Where terms are nearly collinear a small coefficient is no sign of a small
+loss, so that STLSQ's thresholds are accompanied by plain elimination.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.discovery._memory_terms import MemoryTerm
+from hysim.discovery._pysindy import sparse_path
+
+FLOOR = 1e-5  # of the rms output: smaller residuals are no evidence of a term
+BLOCKS = 4  # that are held out in turn, where there are no periods
+DEPENDENT = 1e-5  # share of a slope that those before it do not explain, below which it is left out
+
+
+@dataclass(frozen=True)
+class TermRegression:
+    """target = plant @ ... + features @ coefficients + noise of one, all about an oscillator.
+
+    `features` (n_samples, n_terms) and `target` are without what the plant explains, and scaled by `units`, the
+    standard errors of the coefficients of all terms together. `dependent` are the terms left out since their slopes
+    are combinations of the plant's and of those of lower degree.
+    """
+
+    terms: tuple[MemoryTerm, ...]
+    dependent: tuple[MemoryTerm, ...]
+    features: FloatArray
+    target: FloatArray
+    units: FloatArray
+    sigma: float
+    floor: float
+    n_plant: int
+    blocks: list[slice]
+
+    @cached_property
+    def triangle(self) -> FloatArray:
+        """The R of [features, target]."""
+        return np.asarray(np.linalg.qr(np.column_stack([self.features, self.target]), mode="r"))
+
+    def thresholded(self) -> list[tuple[MemoryTerm, ...]]:
+        """Structures on the path of PySINDy's STLSQ, from dense to sparse."""
+        path = sparse_path(self.features, self.target) if self.terms else []
+        return [tuple(t for t, value in zip(self.terms, values, strict=True) if value != 0.0) for _, values in path]
+
+    def eliminated(self) -> list[tuple[MemoryTerm, ...]]:
+        """Structures from dense to sparse, each without the term that the last one loses least by."""
+        R, kept, path = self.triangle, list(range(len(self.terms))), []
+        normal, right = R[:, :-1].T @ R[:, :-1], R[:, :-1].T @ R[:, -1]
+        while kept:
+            path.append(tuple(self.terms[k] for k in kept))
+            inverse = np.linalg.inv(normal[np.ix_(kept, kept)])
+            kept.pop(int(np.argmin((inverse @ right[kept]) ** 2 / np.diag(inverse))))
+        return path
+
+    def best(self, structures: Sequence[tuple[MemoryTerm, ...]]) -> tuple[MemoryTerm, ...]:
+        """The structure of the lowest BIC, that without terms among them."""
+        return min([*structures, ()], key=self.bic)
+
+    def inclusion(self, rng: np.random.Generator, n_draws: int) -> dict[MemoryTerm, float]:
+        """Share of regressions on samples drawn with replacement whose best structure has each term."""
+        counts = dict.fromkeys(self.terms, 0)
+        for _ in range(n_draws):
+            rows = rng.integers(self.target.size, size=self.target.size)
+            drawn = replace(self, features=self.features[rows], target=self.target[rows])
+            for term in drawn.best(drawn.eliminated()):
+                counts[term] += 1
+        return {term: count / n_draws for term, count in counts.items()}
+
+    @cached_property
+    def condition(self) -> float:
+        """Condition number of the features, each of unit size."""
+        R = self.triangle[:, :-1]
+        return float(np.linalg.cond(R / np.linalg.norm(R, axis=0))) if R.shape[1] else 1.0
+
+    def places(self, terms: Sequence[MemoryTerm]) -> list[int]:
+        """Columns of some terms."""
+        return [self.terms.index(term) for term in terms]
+
+    def squares(self, terms: Sequence[MemoryTerm]) -> float:
+        """Sum of squares that a structure leaves, in units of the noise."""
+        kept, goal = self.triangle[:, self.places(terms)], self.triangle[:, -1]
+        left = goal - kept @ np.linalg.lstsq(kept, goal, rcond=None)[0]
+        return float(left @ left)
+
+    def bic(self, terms: Sequence[MemoryTerm]) -> float:
+        """Bayesian information criterion of a structure, [squared unit of y]."""
+        n = self.target.size
+        variance = self.squares(terms) / n * self.sigma**2 + self.floor**2
+        return float(n * np.log(variance) + (self.n_plant + len(terms)) * np.log(n))
+
+    def held_out_rmse(self, terms: Sequence[MemoryTerm]) -> float:
+        """Root mean square error on each block of a structure that the other blocks have fitted [unit of y]."""
+        X, y = self.features[:, self.places(terms)], self.target
+        whole, right, total = X.T @ X, X.T @ y, 0.0
+        for block in self.blocks:
+            rest = whole - X[block].T @ X[block], right - X[block].T @ y[block]
+            left = y[block] - X[block] @ np.linalg.lstsq(*rest, rcond=None)[0]
+            total += float(left @ left)
+        return float(self.sigma * np.sqrt(total / y.size))
+
+
+def term_regression(
+    terms: tuple[MemoryTerm, ...],
+    plant: FloatArray,
+    slopes: FloatArray,
+    target: FloatArray,
+    floor: float,
+    blocks: list[slice],
+) -> TermRegression:
+    """The regression of `target` (n_samples,) on slopes (n_samples, n_terms), the plant's (n_samples, n) aside.
+
+    `floor` is the noise below which nothing counts as evidence, `blocks` are what is held out in turn.
+    """
+    basis = list(np.linalg.qr(plant / np.linalg.norm(plant, axis=0))[0].T) if plant.size else []
+    n_plant, independent = len(basis), []
+    for k, slope in enumerate(slopes.T):
+        rest = slope.copy()
+        for _ in range(2):  # the second time takes away what rounding left
+            rest -= np.array(basis).T @ (np.array(basis) @ rest) if basis else 0.0
+        if np.linalg.norm(rest) > DEPENDENT * np.linalg.norm(slope):
+            basis.append(rest / np.linalg.norm(rest))
+            independent.append(k)
+    Q = np.array(basis[:n_plant]).reshape(n_plant, target.size)
+    features, goal = slopes[:, independent], target
+    features, goal = features - Q.T @ (Q @ features), goal - Q.T @ (Q @ goal)
+    size = np.linalg.norm(features, axis=0)
+    scaled = features / size
+    left = goal - scaled @ np.linalg.lstsq(scaled, goal, rcond=None)[0]
+    freedom = max(goal.size - n_plant - len(independent), 1)
+    sigma = max(float(np.sqrt(left @ left / freedom)), floor)
+    units = sigma * np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled))) / size
+    return TermRegression(
+        terms=tuple(terms[k] for k in independent),
+        dependent=tuple(term for k, term in enumerate(terms) if k not in independent),
+        features=features * units / sigma,
+        target=goal / sigma,
+        units=units,
+        sigma=sigma,
+        floor=floor,
+        n_plant=n_plant,
+        blocks=blocks,
+    )

@@ -1,0 +1,205 @@
+"""A hidden memory's law is found from an oscillator's input and output, and none is found where there is none."""
+
+import os
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import hysim as hs
+from hysim.discovery import FoundOscillator, oscillator
+from hysim.discovery._memory_terms import RELAXATION, MemoryTerm, bouc_wen_terms, cases, law, memory_terms
+from hysim.discovery._oscillator import recorded
+from hysim.kernels import hidden
+
+COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
+needs_compiled = pytest.mark.skipif(not COMPILED, reason="millions of steps, which only compiled code does in time")
+
+STEP = 1.0 / 750.0
+TRUTH = {"u'": 5e4, "|u'| z": -800.0, "u' |z|": 300.0}
+PLANT = {"mass": 2.0, "damping": 10.0, "stiffness": 5e4}
+
+
+def record(noise: float = 0.0, n_samples: int = 600, **numbers: float) -> hs.Record:
+    """From rest, a chirp through the resonance; noise as a share of the output's rms."""
+    shape = {"A": 5e4, "beta": 800.0, "gamma": -300.0} | numbers
+    plant = hs.BoucWenOscillator(**PLANT, law=hs.BoucWen(**shape), substeps=4)
+    t = STEP * np.arange(n_samples)
+    u = 60.0 * np.sin(2.0 * np.pi * (20.0 + 20.0 * t / t[-1]) * t)
+    y = plant.response(u, STEP)
+    return hs.Record(u=u, y=y + noise * y.std() * np.random.default_rng(1).standard_normal(t.size), t=t)
+
+
+@pytest.fixture(scope="module")
+def noisy() -> FoundOscillator:
+    return oscillator([record(noise=0.01)])
+
+
+@needs_compiled
+def test_without_noise_the_law_comes_back_exactly_and_with_no_other_term():
+    found = oscillator([record()])
+    assert found.verdict == "rate-independent hysteresis"
+    assert set(found.coefficients) == set(TRUTH)
+    for name, value in TRUTH.items():
+        assert found.coefficients[name] == pytest.approx(value, rel=1e-7)  # the search ends at 1e-10 of the squares
+    assert (found.mass, found.damping, found.stiffness) == pytest.approx((2.0, 10.0, 5e4), rel=1e-7)
+    assert found.model.law.beta == -found.coefficients["|u'| z"]
+    assert found.model.law.gamma == -found.coefficients["u' |z|"]
+
+
+@needs_compiled
+def test_with_noise_the_same_terms_come_within_their_standard_errors(noisy):
+    assert set(noisy.coefficients) == set(TRUTH)
+    for name, value in TRUTH.items():
+        assert abs(noisy.coefficients[name] - value) < 4.0 * noisy.stderr[name]  # one in 16 000 is farther off
+        assert noisy.inclusion[name] >= 0.9
+    assert noisy.scores["rmse"] < noisy.scores["held_out_rmse"] < 0.1 * noisy.scores["linear_rmse"]
+    assert noisy.path_bic.min() == noisy.path_bic[noisy.path_n_terms == 3].min()
+    assert len(noisy.inclusion) + len(noisy.left_out) == 15
+
+
+@needs_compiled
+def test_before_refinement_the_regression_is_off_by_no_more_than_what_noise_does_to_a_path(noisy):
+    for name, value in TRUTH.items():
+        assert noisy.regressed[name] == pytest.approx(value, rel=0.2)  # of 600 samples with 1 % noise on each
+
+
+@needs_compiled
+def test_the_same_seed_gives_the_same_bits(noisy):
+    assert oscillator([record(noise=0.01)]) == noisy
+
+
+@needs_compiled
+def test_what_is_given_of_the_plant_is_kept():
+    found = oscillator([record(noise=0.01)], **PLANT)
+    assert (found.mass, found.damping, found.stiffness) == (2.0, 10.0, 5e4)
+    assert set(found.stderr) == set(found.coefficients) == set(TRUTH)
+
+
+@needs_compiled
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_a_linear_spring_has_no_memory(noise):
+    found = oscillator([record(noise=noise, beta=0.0, gamma=0.0)])
+    assert found.verdict == "no structure found"
+    assert (found.equation, found.coefficients) == ("z' = 0", {})
+    assert found.model.law.A == 0.0
+    assert found.stiffness == pytest.approx(1e5, rel=0.01)  # of both springs; 2 % noise on 600 samples
+
+
+@needs_compiled
+def test_terms_that_a_law_has_not_are_left_out_and_n_is_found():
+    assert set(oscillator([record(noise=0.01, n_samples=400, gamma=0.0)]).coefficients) == {"u'", "|u'| z"}
+    squared = oscillator([record(noise=0.01, beta=20.0, gamma=-10.0, n=2.0)])
+    assert set(squared.coefficients) == {"u'", "|u'| |z| z", "u' z^2"}
+    assert squared.model.law.n == 2.0
+
+
+@needs_compiled
+def test_a_relaxation_is_no_hysteresis():
+    u = record().u
+    m, c, k = PLANT.values()
+    y, v, z = np.zeros(u.size), 0.0, 0.0
+    fine = np.interp(np.arange((u.size - 1) * 200) / 200.0, np.arange(u.size), u)
+    at, h = 0.0, STEP / 200.0
+    for i, force in enumerate(fine):  # semi-implicit Euler: off by 0.1 %, far less than the relaxation does
+        v += h * (force - c * v - k * at - z) / m
+        at += h * v
+        z += h * (5e4 * v - 100.0 * z)
+        if (i + 1) % 200 == 0:
+            y[(i + 1) // 200] = at
+    y += 0.01 * y.std() * np.random.default_rng(0).standard_normal(y.size)
+    found = oscillator([hs.Record(u=u, y=y, t=STEP * np.arange(u.size))])
+    assert found.verdict == "linear lag"
+    assert found.coefficients["z"] == pytest.approx(-100.0, rel=0.05)
+
+
+def test_how_a_record_was_made_is_seen():
+    assert recorded(record()).initial == "rest"
+    phases = np.random.default_rng(0).random(6)
+    t = STEP * np.arange(128)
+    u = sum(np.sin(2.0 * np.pi * ((k + 3) / t.size * np.arange(t.size) + phase)) for k, phase in enumerate(phases))
+    steady = hs.Record(u=np.tile(u, 3), y=np.tile(np.roll(u, 3), 3), t=STEP * np.arange(384))
+    assert recorded(steady).period == 128
+    fading = replace(steady, y=steady.y + np.exp(-np.arange(384) / 40.0))
+    assert recorded(fading).initial == "rest"
+
+
+def of_time(t):
+    return hs.Record(u=np.sin(np.arange(99.0)), y=np.sin(np.arange(99.0)), t=t)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (of_time(None), "no time"),
+        (of_time(np.arange(99.0) ** 1.1), "evenly spaced"),
+        (record()[:20], "more than 30 samples"),
+        (replace(record(), u=np.ones(600)), "input is constant"),
+        (replace(record(), y=np.ones(600)), "output is constant"),
+        (replace(record(), y=-record().y), "sign of u and y"),
+    ],
+)
+def test_a_record_that_cannot_do_is_refused(given, message):
+    with pytest.raises(ValueError, match=message):
+        oscillator([given])
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        ({"degree": 4}, ValueError, "degree must be 1, 2 or 3"),
+        ({"symmetry": "even"}, ValueError, "symmetry must be one of none, odd"),
+        ({"mass": -1.0}, ValueError, "mass must be positive"),
+        ({"damping": float("nan")}, ValueError, "damping must be finite"),
+        ({"structure": hs.BoucWenOscillator.structure(excitation="base")}, ValueError, "must be a force"),
+        ({"structure": "newmark"}, TypeError, "structure comes from"),
+    ],
+)
+def test_an_option_that_cannot_do_is_refused(options, error, message):
+    with pytest.raises(error, match=message):
+        oscillator([record()], **options)
+
+
+def test_a_record_alone_is_no_sequence():
+    with pytest.raises(TypeError, match="sequence of records"):
+        oscillator(record())
+
+
+def test_the_library_has_names_of_its_own():
+    names = [term.name for term in memory_terms(3)]
+    assert len(set(names)) == len(names) == 15
+    assert {*TRUTH, "|u'| |z| z", "u' z^2", "|u'| z^3", "u' |z| z^2", "z"} <= set(names)
+    assert len(memory_terms(3, "odd")) == 8
+    assert [term.name for term in bouc_wen_terms(1.5)] == ["u'", "|u'| |z|^0.5 z", "u' |z|^1.5"]
+
+
+@given(st.sampled_from(memory_terms(3)[:-1]), st.sampled_from([-1.0, 1.0]), st.floats(-2.0, 2.0))
+def test_the_cases_of_a_term_are_its_name_read_literally(term: MemoryTerm, rate: float, z: float):
+    words = {"u'": rate, "|u'|": abs(rate), "z": z, "|z|": abs(z), "z^2": z**2, "z^3": z**3}
+    literal = np.prod([words[word] for word in term.name.split()])
+    case = cases(term, 3)[int(rate > 0.0), int(z > 0.0)]
+    assert np.polyval(case[::-1], z) == pytest.approx(literal, abs=1e-14)  # rounding of z^3 to 8
+
+
+def test_the_memory_along_a_path_is_that_of_the_law_and_its_slopes_are_derivatives():
+    path = np.sin(np.linspace(0.0, 9.0, 4001))
+    terms = bouc_wen_terms(1.0)
+    units = np.array([cases(term, 1) for term in terms])
+
+    def run(coefficients: list[float], relaxation: float = 0.0) -> np.ndarray:
+        found = np.zeros((5, path.size))
+        polynomial = law(dict(zip(terms, coefficients, strict=True)), 1).polynomial
+        assert hidden.along(np.diff(path), 1e-3, polynomial, relaxation, units, found[0], found[1:])
+        return found
+
+    found = run([1.0, -0.6, -0.3])
+    exact = hs.BoucWen(A=1.0, beta=0.6, gamma=0.3).memory(path)
+    assert np.abs(found[0] - exact).max() < 1e-5  # second order: the square of increments of 2e-3
+    for k in range(3):
+        moved = [1.0, -0.6, -0.3]
+        moved[k] += 1e-6
+        assert np.abs((run(moved)[0] - found[0]) / 1e-6 - found[1 + k]).max() < 1e-4  # the difference's own error
+    assert np.abs((run([1.0, -0.6, -0.3], 1e-6)[0] - found[0]) / 1e-6 - found[4]).max() < 1e-4
+    assert RELAXATION.name == "z"
