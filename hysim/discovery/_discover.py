@@ -7,6 +7,7 @@ dense to sparse (`_pysindy`), refinement by simulation error (`_refinement`), ch
 `_search`, `_exponent`), and the question whether it is hysteresis at all (`_judgement`).
 """
 
+import contextlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -18,17 +19,21 @@ from hysim import metrics
 from hysim._frozen import FloatArray
 from hysim._parallel import Progress
 from hysim.discovery import _laws, _pysindy
+from hysim.discovery import _oscillator_result as oscillator_result
 from hysim.discovery._exponent import or_any_exponent
-from hysim.discovery._judgement import UNSTABLE, Judgement, judge
+from hysim.discovery._judgement import HYSTERESIS, UNSTABLE, Judgement, judge
 from hysim.discovery._library import FORMS, duhem_terms, memory_terms, named_terms, signs_of, symmetric
+from hysim.discovery._oscillator import oscillator
 from hysim.discovery._refinement import Candidate, FreeRun
 from hysim.discovery._result import Discovery
 from hysim.discovery._search import Library, Outcome, searched
 from hysim.discovery._structures import AnyExponent
 from hysim.discovery._validation import left_out_rmse
 from hysim.identification.folds import folds
+from hysim.models.oscillator_structure import OscillatorStructure
 from hysim.records import Record
 
+_POOR = 80.0  # fit of a law without dynamics [%] below which an oscillator is tried
 ROUTES = ("auto", "memory", "output", "oscillator")
 
 
@@ -42,6 +47,7 @@ def discover(
     signs: Mapping[str, int] | None = None,
     optimizer: str = "STLSQ",
     derivative: str = "auto",
+    structure: OscillatorStructure | None = None,
     mass: float | None = None,
     damping: float | None = None,
     stiffness: float | None = None,
@@ -82,6 +88,9 @@ def discover(
     derivative : {"auto", "smoothed", "weak"}
         Slopes of smoothed branches, or the integral form, which needs none; by default the one whose regressions run
         nearest to samples that they have not seen.
+    structure : OscillatorStructure, optional
+        How an oscillator's records were made, from ``BoucWenOscillator.structure(...)``; by default a record whose
+        input repeats itself is taken as steady, any other as beginning at rest.
     mass, damping, stiffness : float, optional
         Of the oscillator, where they are known [u per unit of y''; y'; y].
     cross_validate : {None, "loo"} or int, optional
@@ -139,13 +148,66 @@ def discover(
         folds(cross_validate, sum(map(len, records)), name="cross_validate")
     if derivative not in ("auto", *FORMS):
         raise ValueError(f'derivative must be "auto", "smoothed" or "weak", got {derivative!r}')
-    options = {"optimizer": optimizer, "derivative": derivative, "seed": seed}
-    outcomes = _searched(records, _libraries(route, library, degree, symmetry), signs, options, progress)
+    plant: dict[str, Any] = {"structure": structure, "mass": mass, "damping": damping, "stiffness": stiffness}
+    if route == "oscillator":
+        return _in_an_oscillator(records, library, degree, symmetry, signs, plant, seed, progress)
+    hidden, *shown = _libraries(route, library, degree, symmetry)
+    options: dict[str, Any] = {
+        "signs": signs_of([term for each in (hidden, *shown) for term in each.terms], signs),
+        "optimizer": optimizer,
+        "derivative": derivative,
+        "seed": seed,
+        "progress": progress,
+    }
+    outcomes = _searched(records, (hidden,), options)
+    if route == "auto":
+        moving = _moving(records, outcomes[0].candidate, plant, seed)
+        if moving is not None:
+            return moving
+    outcomes += _searched(records, shown, options, outcomes[0].searched.bic)
     outcome = min(outcomes, key=lambda each: each.candidate.bic)
     candidate: Candidate[Any] = outcome.candidate
     if library is None and symmetry is None and not signs:
         candidate = or_any_exponent(FreeRun(records), outcomes[0], outcome)
     return _discovery(records, outcome, candidate, cross_validate, seed)
+
+
+def _moving(
+    records: tuple[Record, ...], candidate: Candidate[Any], plant: Mapping[str, Any], seed: int
+) -> Discovery | None:
+    """An oscillator's hysteresis, where a law without dynamics explains little and the oscillator more."""
+    static = _scores(candidate, records)
+    if static["fit_percent"] > _POOR or not all(_is_even(record) for record in records):
+        return None
+    with contextlib.suppress(ValueError):  # no mass on springs is near
+        found = oscillator_result.discovery(oscillator(records, seed=seed, **plant), records)
+        if found.verdict == HYSTERESIS and found.scores["rmse"] < static["rmse"]:
+            return found
+    return None
+
+
+def _is_even(record: Record) -> bool:
+    return record.t is not None and float(np.ptp(np.diff(record.t))) < 1e-6 * float(np.ptp(record.t))
+
+
+def _in_an_oscillator(
+    records: tuple[Record, ...],
+    library: str | Sequence[str] | None,
+    degree: int,
+    symmetry: str | None,
+    signs: Mapping[str, int] | None,
+    plant: Mapping[str, Any],
+    seed: int,
+    progress: Progress | None,
+) -> Discovery:
+    if library not in (None, "bouc-wen") or signs:
+        raise ValueError("an oscillator's library is bouc-wen, all of it: give neither names of terms nor signs")
+    if symmetry not in (None, "odd"):
+        raise ValueError(f'symmetry of an oscillator must be None or "odd", got {symmetry!r}')
+    found = oscillator(
+        records, degree=min(degree + 1, 3), symmetry=symmetry or "none", seed=seed, progress=progress, **plant
+    )
+    return oscillator_result.discovery(found, records)
 
 
 def _checked(record_or_records: Record | Sequence[Record]) -> tuple[Record, ...]:
@@ -190,19 +252,16 @@ def _libraries(
 def _searched(
     records: tuple[Record, ...],
     libraries: Sequence[Library],
-    signs: Mapping[str, int] | None,
     options: Mapping[str, Any],
-    progress: Progress | None,
+    best: float = math.inf,
 ) -> list[Outcome]:
-    """What each library has for the records; a later one that cannot compete has nothing."""
+    """What each library has for the records; one that cannot come near the BIC `best` has nothing."""
     n = sum(map(len, records))
-    wanted = signs_of([term for library in libraries for term in library.terms], signs)
     outcomes: list[Outcome] = []
     for library in libraries:
         if n <= len(library.terms):
             raise ValueError(f"{n} samples cannot tell {len(library.terms)} terms and y0: lower the degree")
-        lowest = min((outcome.searched.bic for outcome in outcomes), default=math.inf)
-        found = searched(records, library, signs=wanted, best=lowest, progress=progress, **options)
+        found = searched(records, library, best=best, **options)
         outcomes += [] if found is None else [found]
     return outcomes
 
@@ -238,12 +297,22 @@ def _discovery(
         judgement=judgement,
         cv_rmse=math.nan if cross_validate is None else left_out_rmse(records, candidate, cross_validate),
         left_out=tuple(term.named(letter) for term in outcome.start.regression.dependent),
+        regressed=_regressed(outcome) if candidate is outcome.candidate else {},
         inclusion=outcome.inclusion(seed),
         thresholds=np.array([threshold for threshold, _ in path]),
         path_n_terms=np.array([len(structure.terms) for _, structure in outcome.path], dtype=float),
         path_fit_percent=np.array([scores["fit_percent"] for scores in path_scores]),
         path_bic=np.array([scores["bic"] for scores in path_scores]),
     )
+
+
+def _regressed(outcome: Outcome) -> dict[str, float]:
+    structure, start = outcome.candidate.structure, outcome.start
+    if not set(structure.terms) <= set(start.regression.terms):
+        return {}
+    shift = [start.feedthrough] * structure.feedthrough + [start.offset] * structure.offset
+    numbers = np.array([*start.regression.ridge(structure.terms, 0.0), *shift])
+    return _laws.coefficients(structure, numbers, outcome.library.letter)
 
 
 def _judged(records: tuple[Record, ...], candidate: Candidate[Any], letter: str, models: Sequence[Any]) -> Judgement:

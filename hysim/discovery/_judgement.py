@@ -67,8 +67,8 @@ class Judgement:
     rates : array, shape (3,)
         Multiples of the rate of the longest record, the one with most samples; of equals the first.
     widths : mapping
-        ``"law"`` and ``"rival"`` to the relative width of the loop at these rates, (3,): the last complete cycle of
-        the law's free run along that record, the steady loop of the rival. nan where the record has no complete cycle.
+        ``"law"`` and ``"rival"`` to the relative widths of the loop at these rates: the last complete cycle of the
+        law's free run along that record, the steady loop of the rival. nan where the record has no complete cycle.
     dissipation : float
         Signed area of the law's steady loop over the range of the input [unit of y times unit of u]: positive
         counterclockwise, as a piezoelectric actuator's is, negative for a plain spring force.
@@ -84,7 +84,7 @@ class Judgement:
     held_out: Mapping[str, float]
     held_out_by: str
     rates: FloatArray
-    widths: Mapping[str, FloatArray]
+    widths: Mapping[str, tuple[float, ...]]
     dissipation: float
     one_sign: bool
     rate_spread: float
@@ -112,12 +112,11 @@ def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, *, singl
     Examples
     --------
     >>> import hysim as hs
-    >>> from hysim.discovery import refit
     >>> from hysim.discovery._judgement import judge
     >>> u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=40)
     >>> law = hs.Duhem.from_terms({"u'": 1.0, "|u'| y": -1.0})
     >>> rec = hs.Record(u=u, y=law.response(u))
-    >>> judge([rec], [law], lambda recs, w: [refit(law, recs[0], weights=w[0])], single_valued=False).verdict
+    >>> judge([rec], [law], lambda recs, weights: [law], single_valued=False).verdict
     'cannot be told from one rate'
     """
     timed = all(record.t is not None for record in records)
@@ -136,7 +135,7 @@ def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, *, singl
         held_out_by=trial.by,
         rates=np.array(RATES),
         widths={
-            "law": np.full(len(RATES), _width(laws[longest], records[longest])),
+            "law": (_width(laws[longest], records[longest]),) * len(RATES),
             "rival": _rival_widths(linear, longest, records[longest]),
         },
         dissipation=float(areas[-1]),
@@ -174,11 +173,11 @@ def _width(law: Law, record: Record) -> float:
     return metrics.loop_metrics(record.u, y).relative_width
 
 
-def _rival_widths(linear: Rival | None, k: int, record: Record) -> FloatArray:
+def _rival_widths(linear: Rival | None, k: int, record: Record) -> tuple[float, ...]:
     cycles = record.cycles()
     if linear is None or not cycles:
-        return np.full(len(RATES), math.nan)
-    return np.array([steady_width(linear.plants[k], cycles[-1], rate) for rate in RATES])
+        return (math.nan,) * len(RATES)
+    return tuple(steady_width(linear.plants[k], cycles[-1], rate) for rate in RATES)
 
 
 def _areas(law: Law, u: FloatArray) -> FloatArray:

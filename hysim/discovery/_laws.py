@@ -46,9 +46,14 @@ def found(candidate: Candidate[Any], records: Sequence[Record], letter: str) -> 
         _model(structure, values, letter, float(y0), float(record.u[0]))
         for y0, record in zip(unknowns[structure.size :], records, strict=True)
     )
-    coefficients = _coefficients(values)
+    terms = _coefficients(values)
     shifts = {name: values[name] for name in ("feedthrough", "gain", "offset") if name in values}
-    return Found(models, coefficients, _stderr(candidate, numbers), equation(coefficients, letter, **shifts))
+    return Found(models, terms, _stderr(candidate, numbers), equation(terms, letter, **shifts))
+
+
+def coefficients(structure: Terms, unknowns: FloatArray, letter: str) -> dict[str, float]:
+    """The coefficients of a structure with these numbers, by name."""
+    return _coefficients(_numbers(structure, letter)(unknowns[: structure.size]))
 
 
 def bouc_wen_terms(n: int) -> tuple[Term, Term, Term]:

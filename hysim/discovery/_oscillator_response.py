@@ -18,8 +18,8 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim._parallel import in_chunks
-from hysim.discovery._marquardt import descended
 from hysim.discovery._hidden_memory import PLANT
+from hysim.discovery._marquardt import descended
 from hysim.discovery._memory_terms import MemoryTerm, law
 from hysim.discovery._term_regression import BLOCKS, FLOOR, TermRegression, term_regression
 from hysim.kernels import hidden as kernels

@@ -33,6 +33,7 @@ _STEPS_TO_RANK = 20  # a structure that is still on its way then is not taken fo
 _STEPS = 200
 _RIDGES = tuple(10.0**power for power in range(-9, 1))
 _SINGULAR = 1e-10
+_STIFFEST = 200.0  # units that a number may reach: a memory that turns within 1/200 of the range of u is a step
 _AMPLITUDES = (1.0, 0.5)  # of the steady loops, in ranges of the input
 _CYCLES = 20
 _STEADY = 1e-2  # strokes by which the last two may differ
@@ -138,7 +139,7 @@ class FreeRun:
     def refine(self, structure: S, starts: FloatArray, *, tolerance: float = RANKING) -> Candidate[S] | None:
         """The optimum that is reached from the best of `starts` (n_starts, size + n_records); None if all diverge."""
         units = self.units(structure)
-        lower, upper = self._bounds(structure)
+        lower, upper = self._bounds(structure, units)
         starts = np.clip(starts, lower, upper)
         costs = np.sum(self.residuals(structure, starts) ** 2, axis=1)
         if costs.min() >= _DIVERGED**2:
@@ -169,10 +170,14 @@ class FreeRun:
     def _edges(self) -> list[int]:
         return [0, *np.cumsum([len(record) for record in self.records]).tolist()]
 
-    def _bounds(self, structure: Structure) -> tuple[FloatArray, FloatArray]:
+    def _bounds(self, structure: Structure, units: FloatArray) -> tuple[FloatArray, FloatArray]:
         free = np.full(len(self.records), np.inf)
         lower, upper = structure.bounds(self.signs)
-        return np.concatenate([lower, -free]), np.concatenate([upper, free])
+        limit = _STIFFEST * units
+        return (
+            np.maximum(np.concatenate([lower, -free]), -limit),
+            np.minimum(np.concatenate([upper, free]), limit),
+        )
 
     def _run(self, structure: Structure, unknowns: FloatArray, k: int) -> FloatArray:
         record = self.records[k]

@@ -46,6 +46,8 @@ class Discovery:
         Cross-validated rmse [unit of y]; nan if it was not asked for.
     left_out : tuple of str
         Terms of the library that the records cannot tell from those of lower degree.
+    regressed : mapping
+        The coefficients before their refinement, from the regression of slopes; empty for a scanned exponent.
     inclusion : mapping
         Term of the library to the share of an ensemble of sparse regressions that keeps it.
     thresholds, path_n_terms, path_fit_percent, path_bic : array, shape (n_thresholds,)
@@ -67,6 +69,7 @@ class Discovery:
     judgement: Judgement
     cv_rmse: float
     left_out: tuple[str, ...]
+    regressed: Mapping[str, float]
     inclusion: Mapping[str, float]
     thresholds: FloatArray
     path_n_terms: FloatArray

@@ -55,13 +55,17 @@ class Start(NamedTuple):
 
 
 def thinned(record: Record, most: int) -> Record:
-    """Every m-th sample of a record, its last one and its reversals, about `most` together."""
+    """Every m-th sample of a record, its last one and its reversals, about `most` together.
+
+    A record that has more reversals than that is cut short.
+    """
     stride = -(-len(record) // most)
     direction = np.sign(np.diff(record.u))
     kept = np.arange(len(record)) % stride == 0
     kept[1:-1] |= direction[1:] != direction[:-1]
     kept[-1] = True
-    return Record(u=record.u[kept], y=record.y[kept])
+    samples = np.flatnonzero(kept)[: 2 * most]
+    return Record(u=record.u[samples], y=record.y[samples])
 
 
 def is_complete(terms: Iterable[Term]) -> bool:
