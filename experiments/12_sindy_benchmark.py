@@ -23,7 +23,6 @@ import numpy as np
 import pysindy
 
 import hysim as hs
-from hysim.discovery import oscillator
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -66,7 +65,7 @@ def of_seed(seed: int, told: bool) -> Row:
     """One discovery on the benchmark, told how the record was made or not, and its tests."""
     record = hs.benchmarks.noel_schoukens(seed=seed, periods=4, noise=NOISE)
     begin = time.perf_counter()
-    found = oscillator([record], structure=recipe() if told else None)
+    found = hs.discover(record, route="oscillator", structure=recipe() if told else None)
     row = described("benchmark" if told else "benchmark, recipe not told", seed, found, time.perf_counter() - begin)
     row |= tested(found.model)
     errors = [100.0 * (found.coefficients.get(name, 0.0) / value - 1.0) for name, value in TRUTH.items()]
@@ -94,8 +93,8 @@ def described(case: str, seed: int, found: Any, seconds: float) -> Row:
         **plant,
         "library": len(found.inclusion) + len(found.left_out),
         "rmse": found.scores["rmse"],
-        "held_out_rmse": found.scores["held_out_rmse"],
-        "linear_rmse": found.scores["linear_rmse"],
+        "held_out_rmse": found.judgement.held_out["law"],
+        "linear_rmse": found.judgement.held_out["rival"],
         "condition": found.scores["condition"],
         "seconds": seconds,
     }
@@ -163,7 +162,7 @@ def other_plants(n_samples: int) -> list[Row]:
     for name, force, y, given in cases:
         noisy = y + 0.01 * y.std() * np.random.default_rng(1).standard_normal(y.size)
         begin = time.perf_counter()
-        found = oscillator([hs.Record(u=force, y=noisy, t=t)], **given)
+        found = hs.discover(hs.Record(u=force, y=noisy, t=t), route="oscillator", **given)
         rows.append(described(name, 1, found, time.perf_counter() - begin))
     return rows
 

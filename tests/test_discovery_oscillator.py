@@ -9,9 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hysim as hs
-from hysim.discovery import FoundOscillator, oscillator
 from hysim.discovery._memory_terms import RELAXATION, MemoryTerm, bouc_wen_terms, cases, law, memory_terms
-from hysim.discovery._oscillator import recorded
+from hysim.discovery._oscillator import FoundOscillator, oscillator, recorded
 from hysim.kernels import hidden
 
 COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"

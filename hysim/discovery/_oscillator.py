@@ -160,7 +160,7 @@ def oscillator(
     --------
     >>> import numpy as np
     >>> import hysim as hs
-    >>> from hysim.discovery import oscillator
+    >>> from hysim.discovery._oscillator import oscillator
     >>> law = hs.BoucWen(A=5e4, beta=800.0, gamma=-300.0)
     >>> plant = hs.BoucWenOscillator(mass=2.0, damping=10.0, stiffness=5e4, law=law)
     >>> t = np.arange(300) / 750
