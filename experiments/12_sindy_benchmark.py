@@ -84,7 +84,7 @@ def of_seed(seed: int, told: bool) -> Row:
 
 def described(case: str, seed: int, found: Any, seconds: float) -> Row:
     """What is said of one record."""
-    plant = {name: float(getattr(found, name)) for name in PLANT}
+    plant = {name: float(getattr(found.model, name)) for name in PLANT}
     return {
         "case": case,
         "seed": seed,
