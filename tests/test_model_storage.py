@@ -75,14 +75,14 @@ def test_a_typo_in_a_parameter_is_an_error(model):
         ("", "does not hold a model"),
         ("[1, 2]", "does not hold a model"),
         ("{}", "does not hold a model"),
-        ('{"family": "Preisach", "parameters": {}}', "family 'Preisach'; there are Actuator, BoucWen, "),
+        ('{"family": "Preisach", "parameters": {}}', "family 'Preisach'; there are Actuator, Amplifier, BoucWen, "),
         ('{"family": "BoucWen", "parameters": {"bta": 1}}', "bta"),
         ('{"family": "BoucWen", "parameters": {"beta": NaN}}', "beta must be finite"),
         ('{"family": "BoucWen", "parameters": {"beta": "much"}}', "beta must be a number"),
         ('{"family": "Line", "parameters": 3}', "does not hold a model"),
         ('{"family": "Line", "parameters": []}', "does not hold a model"),
         ('{"family": "Line", "parameters": {"slope": 1}}', "offset missing"),
-        ('{"family": ["Line"], "parameters": {}}', "there are Actuator, BoucWen, "),
+        ('{"family": ["Line"], "parameters": {}}', "there are Actuator, Amplifier, BoucWen, "),
     ],
 )
 def test_a_file_without_a_model_is_named(tmp_path, text, message):

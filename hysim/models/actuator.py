@@ -289,7 +289,7 @@ class Actuator:
 
 def as_vibration(value: Any) -> Vibration | None:
     """A linear stage, one of another package converted."""
-    plant = value if value is None or isinstance(value, Vibration) else linear_plant(value)
+    plant = linear_plant(value)
     if plant is not None and not isinstance(plant, Vibration):
         raise TypeError(f"vibration must be a TransferFunction, a StateSpace or Modes, got {type(value).__name__}")
     if isinstance(plant, TransferFunction) and plant.hold != "zoh":

@@ -148,7 +148,7 @@ def sampled(stage: Stage, step: float, delay: float = 0.0, *, creeping: int = 0,
         decline=read_only(np.expm1(np.diag(stage.F)[:creeping] * (stage.rate * step))),
         A=read_only(moved[creeping:]),
         B=read_only(B),
-        output=read_only([0.0, through[0], through[1], *stage.C]),
+        output=read_only([0.0, stage.D * through[0], stage.D * through[1], *stage.C]),
         lag=lag,
         rest=stage.rest,
     )

@@ -83,7 +83,8 @@ def linear_plant(system: Any) -> Any:
         If it has several inputs or outputs, or is discrete.
     """
     by_matrices = all(hasattr(system, name) for name in "ABCD")
-    if not by_matrices and not all(hasattr(system, name) for name in ("num", "den")):
+    own = isinstance(system, StateSpace | TransferFunction)
+    if own or not (by_matrices or all(hasattr(system, name) for name in ("num", "den"))):
         return system
     if getattr(system, "dt", None):
         raise ValueError(f"vibration must be a system in continuous time, got one with dt = {system.dt}")
