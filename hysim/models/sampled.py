@@ -20,7 +20,7 @@ from hysim._frozen import FloatArray, read_only
 from hysim.models._linear_response import scaled_companion, transitions
 from hysim.models.creep import Creep
 from hysim.models.modes import Modes
-from hysim.models.state_space import StateSpace
+from hysim.models.state_space import StateSpace, resting_states
 from hysim.models.transfer_function import TransferFunction
 
 _WHOLE = 1e-6  # of a sub-step: a delay this close to a whole number of them is one
@@ -97,9 +97,11 @@ def vibration_stage(plant: Vibration, sample_time: float) -> Stage:
     if isinstance(plant, TransferFunction):
         return _companion(plant, sample_time)
     system = plant.state_space if isinstance(plant, Modes) else plant
+    if not system.B.size:
+        return gain(system.D)
     F, (units, _) = matrix_balance(system.A, permute=False, separate=True)
     g, C = system.B / units, system.C * units
-    return Stage(F, g, C, system.D, _rest(F, g))
+    return Stage(F, g, C, system.D, resting_states(F, g))
 
 
 def _companion(plant: TransferFunction, sample_time: float) -> Stage:
@@ -113,12 +115,6 @@ def _companion(plant: TransferFunction, sample_time: float) -> Stage:
         rest = np.concatenate([1.0 / scaled[0, -1:], np.zeros(max(n - 1, 0))])[:n]
     C = ((numerator[1:] - numerator[0] * monic) * back)[::-1]
     return Stage(F[0], np.eye(n, 1, 1 - n)[:, 0], C, float(numerator[0]), rest, float(rate[0, 0]))
-
-
-def _rest(F: FloatArray, g: FloatArray) -> FloatArray:
-    if F.size and np.linalg.matrix_rank(F) < len(F):
-        return np.full(g.size, math.inf)
-    return np.asarray(np.linalg.solve(F, -g))
 
 
 def sampled(stage: Stage, step: float, delay: float = 0.0, *, creeping: int = 0, linear: bool = False) -> SampledStage:

@@ -69,9 +69,16 @@ class StateSpace:
     @property
     def dc_gain(self) -> float:
         """Output under a constant input of one, at rest; infinite with a pole at zero."""
-        if np.linalg.matrix_rank(self.A) < self.B.size:
-            return math.inf
-        return self.D - float(self.C @ np.linalg.solve(self.A, self.B))
+        rest = resting_states(self.A, self.B)
+        return self.D + float(self.C @ rest) if np.isfinite(rest).all() else math.inf
+
+
+def resting_states(A: FloatArray, B: FloatArray) -> FloatArray:
+    """The x with A x + B = 0; infinite where A is singular."""
+    try:
+        return np.asarray(np.linalg.solve(A, -B))
+    except np.linalg.LinAlgError:
+        return np.full(B.size, math.inf)
 
 
 def linear_plant(system: Any) -> Any:
