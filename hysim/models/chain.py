@@ -154,17 +154,19 @@ class Chain:
         law = state.law._replace(state=state.law.state.copy())
         voltages, x, past, readings = (part.copy() for part in (state.voltages, state.x, state.past, state.readings))
         noise = read_only(self.sensor.noise_samples(state.samples + n)[state.samples :])
+        quantum = read_only([self.sensor.quantum])
         v, w = np.empty((2, n * self.substeps))
         command, drive, y, measurement = np.empty((4, n))
         lost = -1
         for start in range(0, n, _CHUNK):
             stop = min(start + _CHUNK, n)
-            lost = kernels.close(
-                *controller, amplifier, voltages, *law,
-                self.stage.decline, self.stage.A, self.stage.B, self._outputs, x, past,
-                noise, readings, read_only([self.sensor.quantum]), reference, start, stop, self.substeps, self.seen_in,
-                command, drive, v, w, y, measurement,
-            )  # fmt: skip
+            with np.errstate(all="ignore"):  # an unstable loop may overflow before it is lost
+                lost = kernels.close(
+                    *controller, amplifier, voltages, *law,
+                    self.stage.decline, self.stage.A, self.stage.B, self._outputs, x, past,
+                    noise, readings, quantum, reference, start, stop, self.substeps, self.seen_in,
+                    command, drive, v, w, y, measurement,
+                )  # fmt: skip
             if lost >= 0:
                 break
             if progress is not None:
