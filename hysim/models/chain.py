@@ -180,7 +180,7 @@ class Chain:
         return self.run(CompiledController(controllers.through, read_only([]), np.zeros(1)), state, u)
 
     def just_after(self, before: float, fine: FloatArray) -> FloatArray:
-        """`v` or `w` just after each new command; `before` is its value before the run."""
+        """The voltages `fine` just after each new command; `before` is the voltage before the run."""
         return np.append(before, fine)[: -1 : self.substeps] if self.amplifier.dynamic else fine
 
 
