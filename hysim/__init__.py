@@ -46,6 +46,12 @@ _HOME = {
     "CustomLaw": "hysim.models.custom",
     "BoucWenOscillator": "hysim.models.oscillator",
     "TransferFunction": "hysim.models.transfer_function",
+    "StateSpace": "hysim.models.state_space",
+    "Modes": "hysim.models.modes",
+    "mode": "hysim.models.modes",
+    "Creep": "hysim.models.creep",
+    "Amplifier": "hysim.models.amplifier",
+    "Sensor": "hysim.models.sensor",
     "Actuator": "hysim.models.actuator",
     "Line": "hysim.models.static",
     "SingleValued": "hysim.models.static",
@@ -82,19 +88,25 @@ if TYPE_CHECKING:
     from hysim.metrics import LoopMetrics as LoopMetrics
     from hysim.metrics import loop_metrics as loop_metrics
     from hysim.models.actuator import Actuator as Actuator
+    from hysim.models.amplifier import Amplifier as Amplifier
     from hysim.models.boucwen import BoucWen as BoucWen
     from hysim.models.boucwen_inverse import BoucWenInverse as BoucWenInverse
+    from hysim.models.creep import Creep as Creep
     from hysim.models.custom import CustomLaw as CustomLaw
     from hysim.models.dahl import Dahl as Dahl
     from hysim.models.duhem import Duhem as Duhem
     from hysim.models.generalized_boucwen import GeneralizedBoucWen as GeneralizedBoucWen
     from hysim.models.limit_cycle import LimitCycle as LimitCycle
     from hysim.models.maxwell_slip import MaxwellSlip as MaxwellSlip
+    from hysim.models.modes import Modes as Modes
+    from hysim.models.modes import mode as mode
     from hysim.models.oscillator import BoucWenOscillator as BoucWenOscillator
     from hysim.models.play import Play as Play
     from hysim.models.play import Stop as Stop
     from hysim.models.polynomial_boucwen import PolynomialBoucWen as PolynomialBoucWen
     from hysim.models.prandtl_ishlinskii import PrandtlIshlinskii as PrandtlIshlinskii
+    from hysim.models.sensor import Sensor as Sensor
+    from hysim.models.state_space import StateSpace as StateSpace
     from hysim.models.static import Line as Line
     from hysim.models.static import SingleValued as SingleValued
     from hysim.models.storage import load_model as load_model

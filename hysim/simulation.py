@@ -77,15 +77,8 @@ def simulate(
         raise TypeError(f"simulate takes a model with a response, got {type(plant).__name__}")
     inputs = read_only(u, "u", ndim=1)
     times = None if t is None else read_only(t, "t", ndim=1)
-    if needs_time(plant):
-        sample_time = Record(u=inputs, y=np.zeros_like(inputs), t=times).sample_time
-        signals_of = getattr(plant, "signals", None)
-        own = signals_of(inputs, sample_time) if signals_of else {"y": plant.response(inputs, sample_time)}
-    else:
-        if times is not None:
-            Record(u=inputs, y=np.zeros_like(inputs), t=times)
-        own = {"y": plant.response(inputs)}
-    z = plant.memory(inputs) if callable(getattr(plant, "memory", None)) else own.get("z")
+    own = _signals(plant, inputs, times)
+    z = own["z"] if "z" in own else plant.memory(inputs) if callable(getattr(plant, "memory", None)) else None
     signals = {"t": times, "u": inputs, "z": z, **own}
     return Simulation(
         u=inputs,
@@ -95,3 +88,15 @@ def simulate(
         signals={name: values for name, values in signals.items() if values is not None},
         units=units or {},
     )
+
+
+def _signals(plant: Any, u: FloatArray, t: FloatArray | None) -> Mapping[str, FloatArray]:
+    """The plant's own signals: its output at least."""
+    time: tuple[float, ...] = ()
+    if needs_time(plant):
+        time = (Record(u=u, y=np.zeros_like(u), t=t).sample_time,)
+    elif t is not None:
+        Record(u=u, y=np.zeros_like(u), t=t)
+    signals_of = getattr(plant, "signals", None)
+    own: Mapping[str, FloatArray] = signals_of(u, *time) if signals_of else {"y": plant.response(u, *time)}
+    return own

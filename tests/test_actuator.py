@@ -12,7 +12,7 @@ from strategies import bounded_laws, short_inputs
 
 import hysim as hs
 from hysim.kernels.stepping import drive
-from hysim.models.sampled import THROUGH, sampled
+from hysim.models.sampled import sampled, vibration_stage
 
 MODE = hs.TransferFunction(num=(0.3, 1.0), den=(1.0, 0.4, 2.0), delay=0.13)
 LAW = hs.BoucWen(n=1.5, gain=0.5, feedthrough=1.0, offset=0.2)
@@ -57,25 +57,24 @@ def test_a_constant_voltage_finds_the_actuator_at_rest(law, u0, sample):
 )
 def test_the_sampled_stage_is_the_response_just_before_each_sample(num, den, delay):
     plant = hs.TransferFunction(num=num, den=den, delay=delay, sample="end")
-    stage = sampled(plant, 0.1)
+    continuous = vibration_stage(plant, 0.1)
+    stage = sampled(continuous, 0.1, delay)
     v = np.random.default_rng(0).standard_normal(200)
     x, y = np.zeros(len(den) - 1), np.empty(201)
     past = np.concatenate([np.zeros(stage.lag + 1), v])  # past[k + lag + 1] is v_k
     for k in range(201):
         older = past[k]
-        y[k] = stage.C @ x + stage.D * older
+        y[k] = stage.output @ [0.0, older, 0.0, *x]
         if k < 200:
-            x = stage.A @ x + stage.B_old * older + stage.B_new * past[k + 1]
+            x = stage.A @ x + stage.B[1] * older + stage.B[0] * past[k + 1]
     assert y[1:] == pytest.approx(plant.response(v, 0.1), abs=EXACT * 10)  # outputs up to 10
     assert y[0] == 0.0
     if len(den) > 1:
-        settled = stage.A @ stage.rest + stage.B_old + stage.B_new
-        assert settled == pytest.approx(stage.rest, abs=EXACT)
-        assert stage.C @ stage.rest + stage.D == pytest.approx(plant.dc_gain, rel=EXACT)
+        assert stage.A @ stage.rest + stage.B.sum(axis=0) == pytest.approx(stage.rest, abs=EXACT)
+        assert continuous.dc_gain == pytest.approx(plant.dc_gain, rel=EXACT)
 
 
-def test_no_vibration_is_no_stage():
-    assert hs.Actuator(hysteresis=LAW).sampled(0.1) is THROUGH
+def test_an_actuator_without_dynamics_needs_no_time():
     assert hs.Actuator().response([1.0, -2.0]).tolist() == [1.0, -2.0]
     assert hs.Actuator(vibration=MODE).response([], 0.1).size == 0
     assert not hs.Actuator(hysteresis=LAW).dynamic
@@ -84,9 +83,9 @@ def test_no_vibration_is_no_stage():
 
 def test_an_integrator_has_no_state_of_rest():
     integrator = hs.TransferFunction(num=(1.0,), den=(1.0, 0.0))
-    assert np.isinf(sampled(integrator, 0.1).rest).any()
+    assert np.isinf(vibration_stage(integrator, 0.1).rest).any()
     assert hs.Actuator(vibration=integrator).response([0.0, 1.0, 1.0], 0.5).tolist() == [0.0, 0.0, 0.5]
-    with pytest.raises(ValueError, match="integrates: it cannot rest at the law's first output 1"):
+    with pytest.raises(ValueError, match="integrates: it cannot rest at the law's output 1"):
         hs.Actuator(vibration=integrator).response([1.0, 1.0], 0.5)
 
 
@@ -135,7 +134,7 @@ def test_an_actuator_is_a_value_and_comes_back_from_its_file(actuator, tmp_path)
     [
         (lambda: hs.Actuator(hysteresis=3.0), TypeError, "hysteresis must be a law .* got float"),
         (lambda: hs.Actuator(hysteresis=MODE), TypeError, "hysteresis must be a law .* got TransferFunction"),
-        (lambda: hs.Actuator(vibration=LAW), TypeError, "vibration must be a TransferFunction, got BoucWen"),
+        (lambda: hs.Actuator(vibration=LAW), TypeError, "vibration must be a TransferFunction, a .*, got BoucWen"),
         (lambda: hs.Actuator(vibration=dataclasses.replace(MODE, hold="foh")), ValueError, 'hold must be "zoh"'),
         (
             lambda: hs.Actuator(vibration=dataclasses.replace(MODE, initial_state=(0.0, 1.0))),
@@ -143,7 +142,9 @@ def test_an_actuator_is_a_value_and_comes_back_from_its_file(actuator, tmp_path)
             "must not hold an initial state",
         ),
         (lambda: hs.Actuator(LAW), TypeError, "positional"),
-        (lambda: hs.Actuator(creep=LAW), TypeError, "creep"),
+        (lambda: hs.Actuator(creep=LAW), TypeError, "creep must be of Creep, got BoucWen"),
+        (lambda: hs.Actuator(amplifier=2.0), TypeError, "amplifier must be of Amplifier, got float"),
+        (lambda: hs.Actuator(sensor=LAW), TypeError, "sensor must be of Sensor, got BoucWen"),
         (lambda: hs.Actuator(vibration=MODE).response([0.0, 1.0]), ValueError, "needs sample_time"),
         (lambda: hs.Actuator(vibration=MODE).response([0.0, 1.0], 0.0), ValueError, "sample_time must be positive"),
         (lambda: hs.Actuator().response([0.0, np.nan]), ValueError, "u must be finite, got nan at index 1"),

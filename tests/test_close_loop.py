@@ -186,7 +186,7 @@ def test_the_sampled_loop_converges_to_the_continuous_one_at_first_order():
 def test_a_run_in_chunks_gives_the_same_bits_and_calls_back(monkeypatch, chunk):
     plant, r = replace(PROPER, delay=0.12), reference(100)
     whole = closed(LAWS[2], plant, FULL, r, 0.3)
-    monkeypatch.setattr("hysim.control._loop._CHUNK", chunk)
+    monkeypatch.setattr("hysim.models.chain._CHUNK", chunk)
     calls = []
     actuator = hs.Actuator(hysteresis=LAWS[2], vibration=plant)
     parts = hs.close_loop(actuator, FULL, whole.t, r, u0=0.3, progress=lambda *done: calls.append(done))
@@ -195,7 +195,7 @@ def test_a_run_in_chunks_gives_the_same_bits_and_calls_back(monkeypatch, chunk):
 
 
 def test_an_interrupting_callback_stops_the_loop(monkeypatch):
-    monkeypatch.setattr("hysim.control._loop._CHUNK", 10)
+    monkeypatch.setattr("hysim.models.chain._CHUNK", 10)
 
     def stop(done, total):
         raise KeyboardInterrupt
@@ -261,14 +261,18 @@ def test_conditions_say_under_what_the_loop_ran():
         "plant": hs.Actuator(hysteresis=LAWS[2], vibration=plant),
         "controller": FULL,
         "sample_time": pytest.approx(H),
+        "substeps": 1,
         "delay": 0.12,
         "limits": (-0.7, 0.6),
+        "amplifier_limits": None,
         "sensor_quantum": 0.0,
         "noise": 0.0,
         "seed": None,
         "u0": 0.3,
         "lowest_u": run.u.min(),
         "highest_u": run.u.max(),
+        "voltage_noise_rms": 0.0,
+        "voltage_noise_peak": 0.0,
     }
     labelled = hs.close_loop(LAG, FULL, [0.0, 1.0], [0.0, 1.0], units={"u": "V"})
     assert labelled.units["u"] == "V"
@@ -405,7 +409,7 @@ T4, R4 = np.arange(4.0), np.zeros(4)
 @pytest.mark.parametrize(
     ("call", "error", "message"),
     [
-        (lambda: hs.close_loop(3, FULL, T4, R4), TypeError, "Actuator, a law or a TransferFunction, got int"),
+        (lambda: hs.close_loop(3, FULL, T4, R4), TypeError, "Actuator, a law or a linear plant, got int"),
         (lambda: hs.close_loop(LAG, FULL, T4, R4[:3]), ValueError, "equal lengths, got 3 and 4"),
         (lambda: hs.close_loop(LAG, FULL, T4**2, R4), ValueError, "evenly spaced, got steps from 1.0 to 5.0"),
         (lambda: hs.close_loop(LAG, FULL, -T4, R4), ValueError, "increas"),

@@ -28,6 +28,14 @@ MODELS = [
     hs.Line(offset=0.1, slope=1e-300),
     hs.SingleValued(u=[0.0, 0.1], y=[1 / 3, 2.0]),
     hs.Actuator(hysteresis=hs.BoucWen(n=1.7), vibration=hs.TransferFunction(num=(1.0,), den=(1.0, 0.1, 3.0))),
+    hs.Actuator(
+        amplifier=hs.Amplifier(gain=15.0, limits=(0.0, 150.0), slew_rate=2e5, time_constant=1e-5),
+        hysteresis=hs.BoucWen(n=1.7),
+        creep=hs.Creep.per_decade(1.5),
+        vibration=hs.Modes(natural_frequencies=(3e3, 8e3), damping_ratios=(0.01, 0.02), gains=(0.9, 0.1)),
+        sensor=hs.Sensor(quantum=0.0763, noise=1e-3, delay=5e-5, seed=3),
+    ),
+    hs.Actuator(vibration=hs.StateSpace(A=[[-1.0, 2.0], [0.0, -3.0]], B=[0.0, 1.0], C=[1.0, 0.5], D=0.1, delay=0.2)),
     hs.PID(kp=1 / 3, ki=0.1, limits=(0.0, 125.0)),
     hs.PID(kd=-0.0, tracking_time=0.1),
 ]
@@ -76,14 +84,14 @@ def test_a_typo_in_a_parameter_is_an_error(model):
         ("", "does not hold a model"),
         ("[1, 2]", "does not hold a model"),
         ("{}", "does not hold a model"),
-        ('{"family": "Preisach", "parameters": {}}', "family 'Preisach'; there are Actuator, BoucWen, "),
+        ('{"family": "Preisach", "parameters": {}}', "family 'Preisach'; there are Actuator, Amplifier, BoucWen, "),
         ('{"family": "BoucWen", "parameters": {"bta": 1}}', "bta"),
         ('{"family": "BoucWen", "parameters": {"beta": NaN}}', "beta must be finite"),
         ('{"family": "BoucWen", "parameters": {"beta": "much"}}', "beta must be a number"),
         ('{"family": "Line", "parameters": 3}', "does not hold a model"),
         ('{"family": "Line", "parameters": []}', "does not hold a model"),
         ('{"family": "Line", "parameters": {"slope": 1}}', "offset missing"),
-        ('{"family": ["Line"], "parameters": {}}', "there are Actuator, BoucWen, "),
+        ('{"family": ["Line"], "parameters": {}}', "there are Actuator, Amplifier, BoucWen, "),
     ],
 )
 def test_a_file_without_a_model_is_named(tmp_path, text, message):

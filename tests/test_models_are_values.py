@@ -21,6 +21,11 @@ NUMBERS = [
     (hs.Dahl, {"coulomb": 0.7}, "coulomb"),
     (hs.TransferFunction, {"num": (1.0,), "den": (1.0, 2.0)}, "den"),
     (hs.BoucWenOscillator, {"mass": 2.0, "damping": 1.0, "stiffness": 3.0, "law": hs.BoucWen()}, "stiffness"),
+    (hs.Amplifier, {"slew_rate": 2.0}, "slew_rate"),
+    (hs.Creep, {"time_constants": (1.0, 2.0), "weights": (0.1, 0.2)}, "weights"),
+    (hs.StateSpace, {"A": [[-1.0]], "B": [1.0], "C": [2.0]}, "A"),
+    (hs.Modes, {"natural_frequencies": (1.0, 2.0), "damping_ratios": (0.1, 0.2), "gains": (1.0, 0.5)}, "gains"),
+    (hs.Sensor, {"quantum": 0.1}, "quantum"),
     (hs.Line, {"slope": 2.0}, "slope"),
     (hs.SingleValued, {"u": [0.0, 1.0], "y": [0.0, 2.0]}, "y"),
 ]

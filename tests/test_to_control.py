@@ -141,7 +141,7 @@ def test_the_closed_loops_poles_tell_whether_the_loop_is_stable():
             TypeError,
             "holds no law",
         ),
-        (lambda: hs.to_control(3.0), TypeError, "Actuator, a law or a TransferFunction, got float"),
+        (lambda: hs.to_control(3.0), TypeError, "Actuator, a law or a linear plant, got float"),
         (lambda: hs.to_control(late(PLANTS[0], 0.1)), ValueError, "dead time .* give a sample_time"),
         (lambda: hs.to_control(hs.PID(kd=1.0)), ValueError, "not proper; give a derivative_filter or a sample_time"),
     ],

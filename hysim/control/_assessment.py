@@ -6,7 +6,6 @@ together; square waves over their last period.
 """
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ import numpy as np
 from hysim import signals
 from hysim._frozen import FloatArray, frozen
 from hysim.control._drive import secant_gain, without_memory
-from hysim.control._loop import ClosedLoop, Controller, as_actuator, close_loop
+from hysim.control._loop import ClosedLoop, Controller, RestingPlant, as_actuator, close_loop
 from hysim.metrics import LoopMetrics, VibrationReduction, loop_metrics, reduction_percent, rmse, vibration_reduction
 from hysim.models.actuator import Actuator
 
@@ -123,7 +122,7 @@ def assess_hysteresis(
 
     Parameters
     ----------
-    plant : Actuator, law or TransferFunction
+    plant : Actuator, law or linear plant
         At rest at no voltage before the first sample.
     controller : PID, or anything with its ``compiled``
         What closes the loop.
@@ -191,7 +190,7 @@ def assess_step(
 
     Parameters
     ----------
-    plant : Actuator, law or TransferFunction
+    plant : Actuator, law or linear plant
         At rest at `u0` before the first sample.
     controller : PID, or anything with its ``compiled``
         What closes the loop.
@@ -242,7 +241,7 @@ def assess_square_wave(
 
     Parameters
     ----------
-    plant : Actuator, law or TransferFunction
+    plant : Actuator, law or linear plant
         At rest at no voltage before the first sample.
     controller : PID, or anything with its ``compiled``
         What closes the loop.
@@ -316,12 +315,11 @@ def _width(reference: FloatArray, y: FloatArray) -> float:
 
 def _held(actuator: Actuator, u: FloatArray, sample_time: float, u0: float) -> FloatArray:
     """Displacements just before each voltage, as a loop measures them, from rest at `u0`."""
-    at_end = None if actuator.vibration is None else replace(actuator.vibration, sample="end")
-    return replace(actuator, vibration=at_end).response(np.append(u0, u), sample_time)[:-1]
+    return RestingPlant(actuator, sample_time, u0).driven(u)
 
 
 def _resting_displacement(actuator: Actuator, u0: float) -> float:
-    return float(actuator.response(np.array([u0, u0]), 1.0)[0])
+    return RestingPlant(actuator, 1.0, u0).y0
 
 
 def _decay_rate(actuator: Actuator) -> float:

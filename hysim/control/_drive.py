@@ -5,6 +5,7 @@ that it is found by iteration: the gain at which the cycle that it drives has th
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -32,8 +33,8 @@ def secant_gain(actuator: Actuator, cycle: FloatArray, sample_time: float | None
     """
     span = float(np.ptp(cycle))
     if actuator.hysteresis is None and sample_time is None:
-        return _usable(_dc_gain(actuator))
-    gain, change = _usable(_dc_gain(actuator) * _slope(actuator, 1.0)), math.inf
+        return _usable(actuator.dc_gain)
+    gain, change = _usable(actuator.dc_gain * _slope(actuator, 1.0)), math.inf
     for _ in range(_ITERATIONS):
         y = steady_cycle(actuator, cycle / gain, sample_time)
         following = _usable(math.copysign(float(np.ptp(y)), gain) / (span / abs(gain)))
@@ -60,19 +61,19 @@ def without_memory(actuator: Actuator, u: FloatArray) -> Actuator:
     """The actuator with its law replaced by a line of its secant gain over the steady cycle of `u`."""
     if actuator.hysteresis is None:
         return actuator
-    level = steady_cycle(Actuator(hysteresis=actuator.hysteresis), u, None)
-    rises = float(np.diff(level) @ np.diff(u))
-    slope = math.copysign(float(np.ptp(level)) / float(np.ptp(u)), rises)
-    offset = 0.5 * float(level.max() + level.min()) - slope * 0.5 * float(u.max() + u.min())
-    return Actuator(hysteresis=Line(offset=offset, slope=slope), vibration=actuator.vibration)
+    voltage, level = actuator.voltage(u), _steady_level(actuator, u)
+    rises = float(np.diff(level) @ np.diff(voltage))
+    slope = math.copysign(float(np.ptp(level)) / float(np.ptp(voltage)), rises)
+    offset = 0.5 * float(level.max() + level.min()) - slope * 0.5 * float(voltage.max() + voltage.min())
+    return replace(actuator, hysteresis=Line(offset=offset, slope=slope))
 
 
 def slopes(actuator: Actuator, u: FloatArray) -> tuple[float, float]:
     """The least and the largest slope of the law along the steady cycle of `u`; one without a law."""
     if actuator.hysteresis is None:
         return 1.0, 1.0
-    level = steady_cycle(Actuator(hysteresis=actuator.hysteresis), u, None)
-    moves = np.diff(u, append=u[0])
+    voltage, level = actuator.voltage(u), _steady_level(actuator, u)
+    moves = np.diff(voltage, append=voltage[0])
     local = np.diff(level, append=level[0])[moves != 0.0] / moves[moves != 0.0]
     return float(local.min()), float(local.max())
 
@@ -80,7 +81,17 @@ def slopes(actuator: Actuator, u: FloatArray) -> tuple[float, float]:
 def _driven(actuator: Actuator, u: FloatArray, sample_time: float | None) -> FloatArray:
     if sample_time is not None:
         return actuator.response(u, sample_time)
-    return np.asarray(_dc_gain(actuator) * (u if actuator.hysteresis is None else actuator.hysteresis.response(u)))
+    return np.asarray(_behind(actuator) * actuator.level(u))
+
+
+def _steady_level(actuator: Actuator, u: FloatArray) -> FloatArray:
+    """The law's output over a period of the command `u`, once it repeats and where nothing takes time."""
+    return steady_cycle(Actuator(hysteresis=actuator.hysteresis), actuator.voltage(u), None)
+
+
+def _behind(actuator: Actuator) -> float:
+    """Gain at rest of what is behind the law."""
+    return replace(actuator, amplifier=None).dc_gain
 
 
 def _slope(actuator: Actuator, rise: float) -> float:
@@ -88,10 +99,6 @@ def _slope(actuator: Actuator, rise: float) -> float:
         return 1.0
     low, high = actuator.hysteresis.response(np.array([0.0, rise]))
     return float(high - low) / rise
-
-
-def _dc_gain(actuator: Actuator) -> float:
-    return 1.0 if actuator.vibration is None else actuator.vibration.dc_gain
 
 
 def _usable(gain: float) -> float:

@@ -2,22 +2,21 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import field
-from typing import Any, NamedTuple, Protocol
+from dataclasses import field, replace
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen, read_only
 from hysim._parallel import Progress
-from hysim.control._pid import CompiledController
 from hysim.errors import SimulationError
-from hysim.kernels import loop as kernels
 from hysim.models.actuator import Actuator, is_law
-from hysim.models.transfer_function import TransferFunction
+from hysim.models.chain import Signals
+from hysim.models.model import CompiledController
+from hysim.models.sampled import Vibration
+from hysim.models.state_space import linear_plant
 from hysim.records import Record
-
-_CHUNK = 1_000_000
 
 
 class Controller(Protocol):
@@ -38,15 +37,20 @@ class ClosedLoop:
         Times of the samples [s].
     reference, error : array
         Reference, and reference minus measurement [unit of y].
-    command, u : array
-        What the controller asks for, and the voltage within its limits; held from each sample on [unit of u].
+    command, drive : array
+        What the controller asks for, and what it gives within its limits; held from each sample on [unit of u].
+    u : array
+        Voltage at the law just after each new command, within the amplifier's limits [unit of u]. It is held, unless
+        the amplifier takes time.
     z : array, or None
-        Memory of the law at each sample, before the new voltage; None for a law without one.
+        Memory of the law at each sample, before the new command; None for a law without one.
     y, measurement : array
-        True displacement at each sample, before the new voltage, and what the sensor gives [unit of y].
+        True displacement at each sample, before the new command, and what the sensor gives [unit of y].
     conditions : mapping
-        Under which the loop ran: plant, controller, sample_time [s], delay [s], limits, sensor_quantum, noise
-        (rms), seed, u0, and the extremes of the voltage.
+        Under which the loop ran: plant, controller, sample_time [s], substeps, delay (of the vibration and the
+        sensor together) [s], limits (the controller's), amplifier_limits, sensor_quantum, noise (rms), seed, u0,
+        the extremes lowest_u and highest_u of the voltage, and voltage_noise_rms and voltage_noise_peak: of the
+        voltage less that of the same loop without noise.
     units : mapping
         Labels of the units of ``"t"``, ``"u"`` and ``"y"``.
     """
@@ -55,6 +59,7 @@ class ClosedLoop:
     reference: FloatArray
     error: FloatArray
     command: FloatArray
+    drive: FloatArray
     u: FloatArray
     z: FloatArray | None
     y: FloatArray
@@ -70,18 +75,21 @@ def close_loop(
     reference: npt.ArrayLike,
     *,
     u0: float = 0.0,
+    substeps: int | None = None,
     units: Mapping[str, str] | None = None,
     progress: Progress | None = None,
 ) -> ClosedLoop:
     """Run a sampled controller around an actuator.
 
-    At every sample the controller reads the displacement and gives a voltage, which is held until the next.
-    The plant between the samples is exact.
+    At every sample the controller reads the sensor and gives a command, which is held until the next. The plant
+    between the samples is exact, unless its amplifier takes time: then it is second order in the sub-step. The
+    delay of the sensor is that of the loop: one sample of it, ``hs.Sensor(delay=sample_time)``, is a controller
+    that needs a sample to compute.
 
     Parameters
     ----------
-    plant : Actuator, law or TransferFunction
-        At rest at `u0` before the first sample.
+    plant : Actuator, law or linear plant
+        At rest at `u0` before the first sample, creep included.
     controller : PID, or anything with its ``compiled``
         At rest too, without a bump.
     t : array, shape (n,)
@@ -89,7 +97,9 @@ def close_loop(
     reference : array, shape (n,)
         [unit of y]
     u0 : float
-        Voltage before the first sample [unit of u].
+        Command before the first sample [unit of u].
+    substeps : int, optional
+        Of a sample, behind an amplifier that takes time; by default as in `Actuator.response`.
     units : mapping, optional
         Labels to carry along.
     progress : callable, optional
@@ -119,94 +129,101 @@ def close_loop(
         raise TypeError(f"controller must be a PID or the like, got {type(controller).__name__}")
     r, times = read_only(reference, "reference", ndim=1), read_only(t, "t", ndim=1)
     sample_time = Record(u=r, y=r, t=times).sample_time
-    signals = RestingPlant(actuator, sample_time, u0).run(controller, r, progress)
+    plant_at_rest = RestingPlant(actuator, sample_time, u0, substeps)
+    signals = plant_at_rest.run(controller, r, progress)
     if signals.lost >= 0:
         raise SimulationError(f"the loop leaves the finite numbers at t = {times[signals.lost]:g}: it is unstable")
-    memory = actuator.memory(np.append(u0, signals.u))
+    u = plant_at_rest.voltages(signals)
     return ClosedLoop(
         t=times,
         reference=r,
-        error=r - signals.y,
+        error=r - signals.measurement,
         command=signals.command,
-        u=signals.u,
-        z=None if memory is None else memory[:-1],
+        drive=signals.drive,
+        u=u,
+        z=plant_at_rest.memory(signals),
         y=signals.y,
-        measurement=signals.y,
-        conditions=_conditions(actuator, controller, sample_time, u0, signals.u),
+        measurement=signals.measurement,
+        conditions={
+            **_conditions(actuator, controller, plant_at_rest, u),
+            **_voltage_noise(actuator, controller, plant_at_rest, r, u),
+        },
         units=units or {},
     )
 
 
-class Signals(NamedTuple):
-    """What a loop gives at every sample; `lost` is the first one that is not finite, or -1."""
-
-    command: FloatArray
-    u: FloatArray
-    y: FloatArray
-    lost: int
-
-
 class RestingPlant:
-    """An actuator at rest at the voltage `u0`, sampled: every loop that is run starts from here."""
+    """An actuator at rest at the command `u0`, sampled: every loop that is run starts from here."""
 
-    def __init__(self, actuator: Actuator, sample_time: float, u0: float) -> None:
-        if not math.isfinite(u0):
-            raise ValueError(f"u0 must be finite, got {u0}")
+    def __init__(self, actuator: Actuator, sample_time: float, u0: float = 0.0, substeps: int | None = None) -> None:
         self.sample_time, self.u0 = sample_time, u0
-        self._law = actuator.compiled(u0)
-        self._stage = actuator.sampled(sample_time)
-        self._level = u0 if actuator.hysteresis is None else float(actuator.hysteresis.response([u0])[0])
-        self._x = np.zeros(2 * self._stage.C.size)
-        if self._level != 0.0:
-            self._x[: self._stage.C.size] = self._stage.rest * self._level
-        if not np.isfinite(self._x).all():
-            raise ValueError(f"the vibration integrates: it cannot rest at the law's output {self._level:g}")
-        self.y0 = float(self._stage.C @ self._x[: self._stage.C.size] + self._stage.D * self._level)
+        self.chain = actuator.chain(sample_time, substeps)
+        self.state = self.chain.rest(u0)
+        self.y0 = self.chain.displacement(self.state)
 
     def run(self, controller: Controller, reference: FloatArray, progress: Progress | None = None) -> Signals:
         """Close the loop around it."""
-        step, parameters, state = controller.compiled(self.sample_time, self.u0, self.y0)
-        law, law_parameters, law_state = self._law
-        law_state, x, past = law_state.copy(), self._x.copy(), np.full(self._stage.lag + 2, self._level)
-        A, B_old, B_new, C, D, _, _ = self._stage
-        command, u, w, y = np.empty((4, reference.size))
-        for start in range(0, reference.size, _CHUNK):
-            stop = min(start + _CHUNK, reference.size)
-            lost = kernels.close(
-                step, parameters, state, law, law_parameters, law_state, A, B_old, B_new, C, D, x, past,
-                reference, start, stop, command, u, w, y,
-            )  # fmt: skip
-            if lost >= 0:
-                return Signals(command, u, y, lost)
-            if progress is not None:
-                progress(stop, reference.size)
-        return Signals(command, u, y, -1)
+        compiled = CompiledController(*controller.compiled(self.sample_time, self.u0, self.y0))
+        return self.chain.run(compiled, self.state, reference, progress)[0]
+
+    def voltages(self, signals: Signals) -> FloatArray:
+        """Voltage at the law just after each new command."""
+        return self.chain.just_after(float(self.state.voltages[1]), signals.v)
+
+    def memory(self, signals: Signals) -> FloatArray | None:
+        """Memory of the law just before each new command; None for a law without one."""
+        memory = getattr(self.chain.hysteresis, "memory", None)
+        if not callable(memory):
+            return None
+        path = np.append(self.state.voltages[1], signals.v)
+        return np.asarray(memory(path)[: -1 : self.chain.substeps])
+
+    def driven(self, u: FloatArray) -> FloatArray:
+        """Displacements just before each of the commands `u`, as a loop would measure them."""
+        return self.chain.driven(u, self.state)[0].y
 
 
 def as_actuator(plant: Any) -> Actuator:
     """Any plant as the chain that loops run."""
     if isinstance(plant, Actuator):
         return plant
-    if isinstance(plant, TransferFunction):
-        return Actuator(vibration=plant)
     if is_law(plant):
         return Actuator(hysteresis=plant)
-    raise TypeError(f"plant must be an Actuator, a law or a TransferFunction, got {type(plant).__name__}")
+    vibration = linear_plant(plant)
+    if isinstance(vibration, Vibration):
+        return Actuator(vibration=vibration)
+    raise TypeError(f"plant must be an Actuator, a law or a linear plant, got {type(plant).__name__}")
 
 
-def _conditions(
-    actuator: Actuator, controller: Controller, sample_time: float, u0: float, u: FloatArray
-) -> dict[str, Any]:
+def _conditions(actuator: Actuator, controller: Controller, plant: RestingPlant, u: FloatArray) -> dict[str, Any]:
+    sensor = plant.chain.sensor
     return {
         "plant": actuator,
         "controller": controller,
-        "sample_time": sample_time,
-        "delay": 0.0 if actuator.vibration is None else actuator.vibration.delay,
+        "sample_time": plant.sample_time,
+        "substeps": plant.chain.substeps,
+        "delay": plant.chain.delay + sensor.delay,
         "limits": getattr(controller, "limits", None),
-        "sensor_quantum": 0.0,
-        "noise": 0.0,
-        "seed": None,
-        "u0": u0,
+        "amplifier_limits": plant.chain.amplifier.limits,
+        "sensor_quantum": sensor.quantum,
+        "noise": sensor.noise,
+        "seed": sensor.seed if sensor.noise else None,
+        "u0": plant.u0,
         "lowest_u": float(u.min()),
         "highest_u": float(u.max()),
     }
+
+
+def _voltage_noise(
+    actuator: Actuator, controller: Controller, plant: RestingPlant, reference: FloatArray, u: FloatArray
+) -> dict[str, float]:
+    """What the sensor's noise adds to the voltage: against the same loop without it; nan where that one is lost."""
+    if actuator.sensor is None or not actuator.sensor.noise:
+        return {"voltage_noise_rms": 0.0, "voltage_noise_peak": 0.0}
+    quiet = replace(actuator, sensor=replace(actuator.sensor, noise=0.0))
+    at_rest = RestingPlant(quiet, plant.sample_time, plant.u0, plant.chain.substeps)
+    signals = at_rest.run(controller, reference)
+    if signals.lost >= 0:
+        return {"voltage_noise_rms": math.nan, "voltage_noise_peak": math.nan}
+    noise = u - at_rest.voltages(signals)
+    return {"voltage_noise_rms": float(np.sqrt(np.mean(noise**2))), "voltage_noise_peak": float(np.abs(noise).max())}

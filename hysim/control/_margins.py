@@ -11,6 +11,7 @@ have to lie inside the unit circle (x' the state one sample later).
 """
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,6 @@ import numpy.typing as npt
 from hysim.control._loop import as_actuator
 from hysim.control._pid import PID
 from hysim.control._to_control import to_control
-from hysim.models.actuator import Actuator
 
 _FREQUENCIES = 300
 _SLOWEST = 1e-4
@@ -31,7 +31,7 @@ class LinearLoop:
 
     Parameters
     ----------
-    plant : Actuator, law or TransferFunction
+    plant : Actuator, law or linear plant
         Of which the linear part is taken.
     sample_time : float
         Of the controller [s].
@@ -47,7 +47,7 @@ class LinearLoop:
 
     def __init__(self, plant: Any, sample_time: float) -> None:
         self.sample_time = sample_time
-        self.system = to_control(Actuator(vibration=as_actuator(plant).vibration), sample_time)
+        self.system = to_control(replace(as_actuator(plant), hysteresis=None), sample_time)
         highest = math.pi / sample_time
         self.frequencies = np.geomspace(_SLOWEST * highest, highest, _FREQUENCIES)
         self.plant = np.asarray(self.system(np.exp(1j * self.frequencies * sample_time)))

@@ -9,25 +9,17 @@ kd = Kp Td, with b = c = 1 and T_f = 0. How it is sampled is written in `hysim.k
 """
 
 import math
-from typing import NamedTuple, Self
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
 from hysim.kernels import controllers as kernels
-from hysim.models.model import model
+from hysim.models.model import CompiledController, model
 
 State = tuple[float, float, float, float]
 """Last command before the limits, integral part, derivative part, and last c r - y."""
-
-
-class CompiledController(NamedTuple):
-    """A controller as loops take it: `u = step(parameters, state, reference, measurement)`."""
-
-    step: object
-    parameters: FloatArray
-    state: FloatArray
 
 
 @model

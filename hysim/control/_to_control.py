@@ -7,6 +7,8 @@ import numpy as np
 
 from hysim.control._loop import as_actuator
 from hysim.control._pid import PID
+from hysim.models.actuator import Actuator
+from hysim.models.sampled import sampled
 from hysim.models.transfer_function import TransferFunction
 
 
@@ -15,9 +17,10 @@ def to_control(plant: Any, sample_time: float | None = None) -> Any:
 
     Parameters
     ----------
-    plant : TransferFunction, Actuator without a law, or PID
-        A PID becomes the system from its error to its command, without limits; its derivative acts on the
-        error, which leaves its loop's poles as they are.
+    plant : TransferFunction, StateSpace, Modes, Actuator without a law, or PID
+        An actuator's limits and slewing are left out; its sensor's delay is not. A PID becomes the system from its
+        error to its command, without limits; its derivative acts on the error, which leaves its loop's poles as
+        they are.
     sample_time : float, optional
         Of the system's discrete form, exact under the hold [s]; by default it stays continuous.
 
@@ -48,36 +51,40 @@ def to_control(plant: Any, sample_time: float | None = None) -> Any:
     actuator = as_actuator(plant)
     if actuator.hysteresis is not None:
         raise TypeError(f"a linear system holds no law, got {type(actuator.hysteresis).__name__}")
-    return _continuous(actuator.vibration) if sample_time is None else _discrete(actuator, sample_time)
+    return _continuous(actuator) if sample_time is None else _discrete(actuator, sample_time)
 
 
-def _continuous(plant: TransferFunction | None) -> Any:
+def _continuous(actuator: Actuator) -> Any:
     import control
 
-    if plant is None:
-        return control.tf([1.0], [1.0])
-    if plant.delay:
+    stage, delay = actuator.linear(1.0)
+    if delay:
         raise ValueError("a dead time has no continuous transfer function; give a sample_time")
-    return control.tf(plant.num, plant.den)
+    if actuator == Actuator(vibration=actuator.vibration) and isinstance(actuator.vibration, TransferFunction):
+        return control.tf(actuator.vibration.num, actuator.vibration.den)
+    if not stage.g.size:
+        return control.tf([stage.D], [1.0])
+    return control.ss(stage.rate * stage.F, stage.rate * stage.g[:, np.newaxis], stage.C[np.newaxis], stage.D)
 
 
-def _discrete(actuator: Any, sample_time: float) -> Any:
-    """The stage of `hysim.models.sampled`, its held values in a chain of further states."""
+def _discrete(actuator: Actuator, sample_time: float) -> Any:
+    """The linear chain of `hysim.models.sampled`, its held values in a chain of further states."""
     import control
 
-    stage = actuator.sampled(sample_time)
-    n, held = stage.C.size, stage.lag + 1
+    linear, delay = actuator.linear(sample_time)
+    stage = sampled(linear, sample_time, delay)
+    n, held = linear.g.size, stage.lag + 1
     A = np.zeros((n + held, n + held))
     A[:n, :n] = stage.A
-    A[:n, -1] = stage.B_old  # the last of the chain is v_(k-1-lag)
+    A[:n, -1] = stage.B[1]  # the last of the chain is v_(k-1-lag)
     A[n + 1 :, n:-1] = np.eye(held - 1)
     B = np.zeros((n + held, 1))
     B[n] = 1.0
     if stage.lag:
-        A[:n, -2] = stage.B_new
+        A[:n, -2] = stage.B[0]
     else:
-        B[:n, 0] = stage.B_new
-    C = np.concatenate([stage.C, np.zeros(held - 1), [stage.D]])
+        B[:n, 0] = stage.B[0]
+    C = np.concatenate([linear.C, np.zeros(held - 1), [linear.D]])
     return control.ss(A, B, C[np.newaxis], 0.0, sample_time)
 
 

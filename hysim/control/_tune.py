@@ -92,7 +92,7 @@ def tune(
 
     Parameters
     ----------
-    plant : Actuator, law or TransferFunction
+    plant : Actuator, law or linear plant
         At rest at `u0` before the first sample.
     t : array, shape (n,)
         Evenly spaced times [s]; their spacing is the controller's sample time.
@@ -172,7 +172,7 @@ class _Search:
         self.gain = secant_gain(actuator, cycle)
         low, high = slopes(actuator, cycle / self.gain)
         self.slopes = sorted({low, high})
-        self.secant = self.gain if actuator.vibration is None else self.gain / actuator.vibration.dc_gain
+        self.secant = self.gain / actuator.dc_gain
         self.linear = LinearLoop(actuator, self.h)
         self.trials: list[Trial] = []
 

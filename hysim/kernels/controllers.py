@@ -38,6 +38,13 @@ def pid(parameters: FloatArray, state: FloatArray, reference: float, measurement
     return float(u)
 
 
+@signed_kernel(float64(CONSTANTS, VECTOR, float64, float64))
+def through(parameters: FloatArray, state: FloatArray, reference: float, measurement: float) -> float:
+    """No controller: the voltage is the reference."""
+    state[0] = reference
+    return reference
+
+
 @signed_kernel(int64(CONTROLLER, CONSTANTS, VECTOR, CONSTANTS, CONSTANTS, VECTOR, VECTOR))
 def replay(
     controller: object,

@@ -63,12 +63,18 @@ def scaled_companion(monic: FloatArray, sample_time: float) -> tuple[FloatArray,
     return F, rate, scaled
 
 
-def transitions(F: FloatArray, spans: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """A, B0 and B1 of x' = F x + (0, ..., 0, v) over each of the spans (n_sets, n_pieces); see `kernels.linear`."""
+def transitions(
+    F: FloatArray, spans: FloatArray, g: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """A, B0 and B1 of x' = F x + g v over each of the spans (n_sets, n_pieces); see `kernels.linear`.
+
+    By default g is (0, ..., 0, 1), that of a companion matrix.
+    """
     n = F.shape[-1]
+    entry = np.eye(n, 1, 1 - n)[:, 0] if g is None else g
     generators = np.zeros((*spans.shape, n + 2, n + 2))
     generators[..., :n, :n] = F[:, np.newaxis] * spans[..., np.newaxis, np.newaxis]
-    generators[..., n - 1 : n, n] = spans[..., np.newaxis]
+    generators[..., :n, n] = entry * spans[..., np.newaxis]
     generators[..., n, n + 1] = 1.0
     exponentials = np.empty_like(generators)
     kernels.exponentials(generators.reshape(-1, n + 2, n + 2), exponentials.reshape(-1, n + 2, n + 2))

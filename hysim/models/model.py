@@ -30,6 +30,17 @@ class CompiledLaw(NamedTuple):
     state: FloatArray
 
 
+class CompiledController(NamedTuple):
+    """A controller as loops take it: `u = step(parameters, state, reference, measurement)`.
+
+    The state begins with the last command, before the controller's limits.
+    """
+
+    step: Callable[[FloatArray, FloatArray, float, float], float]
+    parameters: FloatArray
+    state: FloatArray
+
+
 class Dynamic(Protocol):
     """A plant whose output depends on time; it says so by `dynamic = True`."""
 

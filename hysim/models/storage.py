@@ -17,8 +17,8 @@ from hysim._atomic import write_text
 from hysim.models.model import FAMILIES
 
 _MODULES = (
-    *("actuator", "boucwen", "dahl", "duhem", "maxwell_slip", "oscillator", "play", "polynomial_boucwen"),
-    *("prandtl_ishlinskii", "static", "transfer_function"),
+    *("actuator", "amplifier", "boucwen", "creep", "dahl", "duhem", "maxwell_slip", "modes", "oscillator", "play"),
+    *("polynomial_boucwen", "prandtl_ishlinskii", "sensor", "state_space", "static", "transfer_function"),
 )
 
 

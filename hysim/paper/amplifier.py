@@ -6,7 +6,7 @@
 The paper takes V of (3) at the amplifier's input; it is the output that slews.
 """
 
-import math
+from hysim.models.amplifier import Amplifier
 
 UA741_SUPPLY_SPAN = 44.0
 """Most that a uA741 may have between its supplies, 22 V each side [V]; the absolute maximum rating in the part's
@@ -49,6 +49,4 @@ def full_power_bandwidth(slew_rate: float, amplitude: float) -> float:
     >>> round(full_power_bandwidth(0.5e6, 5.0)), round(full_power_bandwidth(0.5e6, 50.0))
     (15915, 1592)
     """
-    if not (slew_rate > 0.0 and amplitude > 0.0):
-        raise ValueError(f"slew rate and amplitude must be positive, got {slew_rate} and {amplitude}")
-    return slew_rate / (2.0 * math.pi * amplitude)
+    return Amplifier(slew_rate=slew_rate).full_power_bandwidth(amplitude)

@@ -1,0 +1,170 @@
+"""Amplifiers that drive a piezoelectric stack, which is a capacitor.
+
+    s   = gain u + offset, within the limits        the output's target
+    s'  within +-slew rate                          the output
+    v'  = (s - v) / time constant                   the voltage at the stack, behind the output's resistance
+
+The paper's non-inverting operational amplifier has (2), gain = 1 + Rf / Rin, and (3): a sine of the amplitude V is
+not slewed up to the frequency slew rate / (2 pi V). V is that of the output, which is what slews.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, read_only
+from hysim.models.model import model
+
+
+class CompiledAmplifier(NamedTuple):
+    """An amplifier as loops take it; see `hysim.kernels.loop`."""
+
+    parameters: FloatArray
+    state: FloatArray
+
+
+@model
+class Amplifier:
+    """From the command to the voltage at the actuator.
+
+    Parameters
+    ----------
+    gain : float
+        Voltage gain.
+    offset : float
+        Output at a command of zero [V].
+    limits : (float, float), optional
+        Lowest and highest output; None for none [V].
+    slew_rate : float, optional
+        Largest rate of the output, positive; None for no bound [V/s].
+    time_constant : float
+        Of the output's resistance with the actuator's capacitance, R C [s]; 0 for none.
+
+    Raises
+    ------
+    ValueError
+        If the limits are no interval, the slew rate is not positive, or the time constant is negative.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> amplifier = hs.Amplifier(gain=15.0, limits=(0.0, 150.0))
+    >>> amplifier.voltage([-1.0, 4.0, 12.0]).tolist()
+    [0.0, 60.0, 150.0]
+    """
+
+    gain: float = 1.0
+    offset: float = 0.0
+    limits: tuple[float, ...] | None = None
+    slew_rate: float | None = None
+    time_constant: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.limits is not None and not (len(self.limits) == 2 and self.limits[0] <= self.limits[1]):
+            raise ValueError(f"limits must be (lowest, highest), got {self.limits}")
+        if self.slew_rate is not None and not self.slew_rate > 0.0:
+            raise ValueError(f"slew_rate must be positive, got {self.slew_rate}; None takes the bound away")
+        if self.time_constant < 0.0:
+            raise ValueError(f"time_constant must not be negative, got {self.time_constant}")
+
+    @classmethod
+    def non_inverting(
+        cls,
+        *,
+        feedback_resistance: float,
+        input_resistance: float,
+        limits: tuple[float, float] | None = None,
+        slew_rate: float | None = None,
+        output_resistance: float = 0.0,
+        capacitance: float = 0.0,
+    ) -> "Amplifier":
+        """An operational amplifier with the gain 1 + Rf / Rin, equation (2).
+
+        Parameters
+        ----------
+        feedback_resistance, input_resistance : float
+            Rf and Rin [ohm]; Rin positive, Rf not negative.
+        limits : (float, float), optional
+            What its supplies leave for the output [V].
+        slew_rate : float, optional
+            Of the output [V/s].
+        output_resistance : float
+            Between the output and the actuator [ohm], not negative.
+        capacitance : float
+            Of the actuator [F], not negative.
+
+        Raises
+        ------
+        ValueError
+            If a resistance or the capacitance is outside its range, or as the constructor.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> hs.Amplifier.non_inverting(feedback_resistance=9e3, input_resistance=1e3, slew_rate=0.5e6).gain
+        10.0
+        """
+        if not input_resistance > 0.0:
+            raise ValueError(f"input_resistance must be positive, got {input_resistance}")
+        for name, value in (
+            ("feedback_resistance", feedback_resistance),
+            ("output_resistance", output_resistance),
+            ("capacitance", capacitance),
+        ):
+            if value < 0.0:
+                raise ValueError(f"{name} must not be negative, got {value}")
+        return cls(
+            gain=1.0 + feedback_resistance / input_resistance,
+            limits=limits,
+            slew_rate=slew_rate,
+            time_constant=output_resistance * capacitance,
+        )
+
+    @property
+    def dynamic(self) -> bool:
+        """Whether the voltage takes time."""
+        return self.slew_rate is not None or self.time_constant > 0.0
+
+    @property
+    def bandwidth(self) -> float:
+        """Frequency at which the load takes 3 dB, 1 / (2 pi time constant) [Hz]; infinite without one."""
+        return 1.0 / (2.0 * math.pi * self.time_constant) if self.time_constant else math.inf
+
+    def full_power_bandwidth(self, amplitude: float) -> float:
+        """Highest frequency [Hz] at which a sine is not slewed, equation (3).
+
+        Parameters
+        ----------
+        amplitude : float
+            Of the output, not of the command [V].
+
+        Raises
+        ------
+        ValueError
+            If the amplitude is not positive.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> ua741 = hs.Amplifier(gain=10.0, slew_rate=0.5e6)
+        >>> round(ua741.full_power_bandwidth(5.0)), round(ua741.full_power_bandwidth(50.0))
+        (15915, 1592)
+        """
+        if not amplitude > 0.0:
+            raise ValueError(f"amplitude must be positive, got {amplitude}")
+        return math.inf if self.slew_rate is None else self.slew_rate / (2.0 * math.pi * amplitude)
+
+    def voltage(self, u: npt.ArrayLike) -> FloatArray:
+        """Voltage that a command comes to when it is held, in the shape of `u`."""
+        lowest, highest = self.limits or (-math.inf, math.inf)
+        return np.clip(self.gain * np.asarray(u, dtype=float) + self.offset, lowest, highest)
+
+    def compiled(self, step: float, u0: float = 0.0) -> CompiledAmplifier:
+        """The amplifier as compiled loops take it, for sub-steps of this length [s], at rest at the command `u0`."""
+        lowest, highest = self.limits or (-math.inf, math.inf)
+        reach = math.inf if self.slew_rate is None else self.slew_rate * step
+        rate = step / self.time_constant if self.time_constant else math.inf
+        parameters = [reach, rate, self.gain, self.offset, lowest, highest]
+        return CompiledAmplifier(read_only(parameters, finite=False), np.full(2, float(self.voltage(u0))))

@@ -1,0 +1,66 @@
+"""Displacement sensors: what a sampled controller gets to see.
+
+    measurement_k = quantum floor((y(t_k - delay) + noise_k) / quantum + 1/2)
+
+The noise is gaussian and white from sample to sample, a function of the seed and the sample alone.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray
+from hysim.models.model import model
+
+
+@model
+class Sensor:
+    """From the true displacement to the measured one.
+
+    Parameters
+    ----------
+    quantum : float
+        Step of the readings, of a converter or a camera's pixel; 0 for none [unit of y].
+    noise : float
+        Its rms value, before the quantum [unit of y].
+    delay : float
+        Age of what is read [s]; it need not be a whole number of samples.
+    seed : int
+        Of the noise: the same seed gives the same noise.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a number is negative, or the seed is no integer.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> hs.Sensor(quantum=0.5).measure([0.2, 0.3, 0.8]).tolist()
+    [0.0, 0.5, 1.0]
+    """
+
+    quantum: float = 0.0
+    noise: float = 0.0
+    delay: float = 0.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("quantum", "noise", "delay"):
+            if getattr(self, name) < 0.0:
+                raise ValueError(f"{name} must not be negative, got {getattr(self, name)}")
+        if not isinstance(self.seed, int) or isinstance(self.seed, bool):
+            raise TypeError(f"seed must be an integer, got {self.seed!r}")
+        if self.seed < 0:
+            raise ValueError(f"seed must not be negative, got {self.seed}")
+
+    def noise_samples(self, n: int) -> FloatArray:
+        """The noise of the first `n` samples; more samples begin with the same."""
+        if not self.noise:
+            return np.zeros(n)
+        return self.noise * np.random.default_rng(self.seed).standard_normal(n)
+
+    def measure(self, y: npt.ArrayLike) -> FloatArray:
+        """Readings of displacements that are as old as the delay has them, shape (n,)."""
+        seen = np.asarray(y, dtype=float)
+        noisy = seen + self.noise_samples(seen.size)
+        return self.quantum * np.floor(noisy / self.quantum + 0.5) if self.quantum else noisy
