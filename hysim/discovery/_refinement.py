@@ -122,6 +122,12 @@ class FreeRun:
         """The first output of each record."""
         return np.array([record.y[0] for record in self.records])
 
+    @property
+    def line(self) -> FloatArray:
+        """Unknowns of y' = b u': the slope that the largest record has on the whole, and the first outputs."""
+        u, y = self.largest.u, self.largest.y
+        return np.append(np.polyfit(u, y, 1)[0], self.measured_starts)
+
     def units(self, structure: Structure) -> FloatArray:
         """Units of the unknowns (size + n_records,): what moves the output by about a stroke."""
         starts = np.full(len(self.records), self.stroke)
