@@ -15,7 +15,7 @@ import numpy as np
 from hysim._frozen import FloatArray
 
 RIDGE = 1e-12  # of the squared columns: keeps the normal equations solvable and changes nothing else
-STEP = 1.05
+STEP = 1.1
 _MAX_ITERATIONS = 50
 _EXTRAS = {
     "ConstrainedSR3": "cvxpy",
