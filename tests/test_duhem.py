@@ -189,7 +189,7 @@ def test_the_search_space_begins_at_the_law_and_goes_back_to_it():
     space = GENERAL.search_space(record, Freedom(fixed={"u'": 0.8}, bounds={"|u'|": (0.0, 0.5)}))
     assert space.names == (*list(GENERAL.terms)[1:], "y0")
     values = space.parameters(space.starts)
-    everything = {**GENERAL.terms, "feedthrough": 0.0, "y0": 0.3}
+    everything = {**GENERAL.terms, "feedthrough": 0.0, "offset": 0.0, "y0": 0.3}
     assert {name: value[0] for name, value in values.items()} == pytest.approx(everything, rel=1e-14)
     assert space.parameters(space.lower)["|u'|"][0] == 0.0
     assert space.parameters(space.upper)["|u'|"][0] == pytest.approx(0.5, rel=1e-15)
@@ -201,7 +201,8 @@ def test_the_search_space_begins_at_the_law_and_goes_back_to_it():
 
 def test_at_rest_the_law_starts_at_zero():
     record = hs.Record(u=PATH, y=GENERAL.response(PATH))
-    assert GENERAL.search_space(record, Freedom(initial="rest")).held == {"feedthrough": 0.0, "y0": 0.0}
+    held = {"feedthrough": 0.0, "offset": 0.0, "y0": 0.0}
+    assert GENERAL.search_space(record, Freedom(initial="rest")).held == held
     with pytest.raises(ValueError, match='initial must be "free", "rest" or "periodic"'):
         GENERAL.search_space(record, Freedom(initial="warm"))
     with pytest.raises(ValueError, match="no steady cycle"):

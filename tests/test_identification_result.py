@@ -71,7 +71,7 @@ def test_what_is_not_finite_comes_back(fits):
     ],
 )
 def test_other_text_is_refused_in_one_line(text):
-    with pytest.raises(ValueError, match="this is not an identification of hysim") as caught:
+    with pytest.raises(ValueError, match="this is no identification of hysim") as caught:
         hs.Identification.from_json(text)
     assert "\n" not in str(caught.value)
 

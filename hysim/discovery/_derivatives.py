@@ -96,12 +96,13 @@ def weak_rows(u: FloatArray, y: FloatArray) -> Rows | None:
     size = max(_SHORTEST, min(n // _WINDOWS, n // len(pieces(u))))
     stride = max(1, size // _OVERLAP)
     x = np.linspace(-1.0, 1.0, size + 1)
-    bump, middle = (1.0 - x**2) ** 2, (1.0 - (0.5 * (x[1:] + x[:-1])) ** 2) ** 2
+    bump = (1.0 - x**2) ** 2
+    shares = 0.5 * (bump[1:] + bump[:-1])  # with these the sum by parts is exact, whatever the steps of the input
     du, smooth = np.diff(u), _smoothed_where_long(u, y)
     mean_y = 0.5 * (y[1:] + y[:-1])
     slope = -sliding_window_view(mean_y, size)[::stride] @ np.diff(bump)
     points = [0.5 * (values[1:] + values[:-1]) for values in (u, smooth)]
-    return Rows(points[0], points[1], np.sign(du), slope, np.abs(du), middle, stride)
+    return Rows(points[0], points[1], np.sign(du), slope, np.abs(du), shares, stride)
 
 
 def branches(u: FloatArray, y: FloatArray) -> list[Branch]:

@@ -15,6 +15,7 @@ import numpy as np
 from hysim._frozen import FloatArray
 
 RIDGE = 1e-12  # of the squared columns: keeps the normal equations solvable and changes nothing else
+STEP = 1.1
 _MAX_ITERATIONS = 50
 _EXTRAS = {
     "ConstrainedSR3": "cvxpy",
@@ -32,21 +33,21 @@ def sparse_path(features: FloatArray, slope: FloatArray, optimizer: str = "STLSQ
     """Thresholds from zero up, and the coefficients (n_terms,) that the optimizer finds at each.
 
     The next threshold is just above the smallest coefficient of the last result, so that every threshold changes the
-    result and none that matters is missed. The path ends with the last term. SSR and FROLS have no threshold: their
-    own sequence of structures is the path, each with its smallest coefficient.
+    result and none that matters is missed; SR3, whose coefficients may be smaller than its threshold, goes on in steps
+    of STEP. The path ends with the last term. SSR and FROLS have no threshold: their own sequence of structures is the
+    path, each with its smallest coefficient.
     """
     features, slope = compressed(features, slope)
     if optimizer in ("SSR", "FROLS"):
         return _greedy_path(features, slope, optimizer)
     path: list[tuple[float, FloatArray]] = []
     threshold = 0.0
-    while True:
-        coefficients = sparse_fit(features, slope, threshold, optimizer)
-        kept = np.abs(coefficients[coefficients != 0.0])
-        if not kept.size:
-            return path
-        path.append((threshold, coefficients))
-        threshold = max(float(kept.min()), threshold) * (1.0 + 1e-9)
+    while (coefficients := sparse_fit(features, slope, threshold, optimizer)).any():
+        if not path or not np.array_equal(coefficients != 0.0, path[-1][1] != 0.0):
+            path.append((threshold, coefficients))
+        smallest = float(np.abs(coefficients[coefficients != 0.0]).min())
+        threshold = smallest * (1.0 + 1e-9) if smallest > threshold else STEP * threshold
+    return path
 
 
 def compressed(features: FloatArray, slope: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -122,6 +122,12 @@ class FreeRun:
         """The first output of each record."""
         return np.array([record.y[0] for record in self.records])
 
+    @property
+    def line(self) -> FloatArray:
+        """Unknowns of y' = b u': the slope that the largest record has on the whole, and the first outputs."""
+        u, y = self.largest.u, self.largest.y
+        return np.append(np.polyfit(u, y, 1)[0], self.measured_starts)
+
     def units(self, structure: Structure) -> FloatArray:
         """Units of the unknowns (size + n_records,): what moves the output by about a stroke."""
         starts = np.full(len(self.records), self.stroke)
@@ -212,9 +218,12 @@ class Loss(NamedTuple):
 
 
 def losses(candidate: Candidate[Terms]) -> Iterator[Loss]:
-    """What taking each number of a candidate's structure out would cost."""
+    """What taking each number of a candidate's structure out would cost; a term at zero is held there by its sign."""
+    held = np.zeros(candidate.n_parameters, dtype=bool)
+    held[: len(candidate.structure.terms)] = candidate.unknowns[: len(candidate.structure.terms)] == 0.0
+    free = np.where(held, 0.0, candidate.jacobian)
     for k in range(candidate.structure.size):
-        jacobian = np.delete(candidate.jacobian, k, axis=1)
+        jacobian = np.delete(free, k, axis=1)
         sizes = np.linalg.norm(jacobian, axis=0)
         sizes[sizes == 0.0] = 1.0
         removed = candidate.jacobian[:, k] * candidate.unknowns[k]

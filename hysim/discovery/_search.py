@@ -117,7 +117,7 @@ def searched(
         search.refine(library.structure(start.regression.terms))
     if not search.could_win(1, best):
         return None
-    search.refine(LINE)
+    search.refine(LINE, search.free_run.line)
     for start in starts:
         for _, structure in _path(start, library, optimizer):
             search.refine(structure)

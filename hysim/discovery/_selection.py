@@ -10,8 +10,8 @@ y^2 are nearly one, and the order is rough. So the path is where the search begi
    penalty of their size alone rules them out.
 4. Laws that come to no steady loop when the input goes on to and fro are out. Structures within INDISTINCT of the
    lowest BIC cannot be told apart by the records ("not worth more than a bare mention", Kass and Raftery 1995), nor
-   can those whose free runs differ by less than ALIKE strokes in rms. Among them a complete one is preferred, then
-   the one of fewest numbers, then the lowest BIC.
+   can smaller ones whose free runs differ by less than ALIKE strokes in rms. Among them a complete one is preferred,
+   then the one of fewest numbers, then the lowest BIC.
 
 A structure is *complete* if with each monomial it has all that divide it. The form of such a law does not depend on
 where the zeros of u and y are, which are conventions of the instrument; any other is a statement about these zeros
@@ -168,8 +168,12 @@ def preferred(found: Sequence[Candidate[Terms]], *, complete: bool) -> Candidate
     """Step 4; only of a Duhem library is a complete structure preferred."""
     lowest = min(candidate.bic for candidate in found)
     best = min(found, key=lambda candidate: candidate.bic)
-    rivals = [c for c in found if c.bic <= lowest + INDISTINCT or gap(c, best) < ALIKE]
+    rivals = [c for c in found if c.bic <= lowest + INDISTINCT or _is_as_good(c, best)]
     return min(rivals, key=lambda c: (complete and not is_complete(c.structure.terms), c.structure.size, c.bic))
+
+
+def _is_as_good(candidate: Candidate[Terms], best: Candidate[Terms]) -> bool:
+    return candidate.structure.size < best.structure.size and gap(candidate, best) < ALIKE
 
 
 def gap(candidate: Candidate[Any], best: Candidate[Any]) -> float:

@@ -11,6 +11,7 @@ where the free runs begin.
 
 import numpy as np
 
+from hysim._frozen import FloatArray
 from hysim.discovery._library import Slopes, symmetric
 from hysim.discovery._selection import Start
 from hysim.models.duhem_terms import Term
@@ -34,9 +35,13 @@ def shifted(slopes: Slopes, terms: tuple[Term, ...], *, feedthrough: bool, offse
 
 
 def _slopes_tried(slopes: Slopes) -> list[float]:
-    """The chord of y over u, on the whole, sets the scale."""
-    steep = max(float(np.ptp(rows.y) / np.ptp(rows.u)) for rows in slopes.rows)
-    return [0.0, *(steep * _FEEDTHROUGHS).tolist()]
+    """The chord of y over u, on the whole, sets the scale, and the sign."""
+    chord = max((_chord(rows.u, rows.y) for rows in slopes.rows), key=abs)
+    return [0.0, *(chord * _FEEDTHROUGHS).tolist()]
+
+
+def _chord(u: FloatArray, y: FloatArray) -> float:
+    return float(np.copysign(np.ptp(y) / np.ptp(u), np.cov(u, y)[0, 1]))
 
 
 def _levels(slopes: Slopes, feedthrough: float) -> list[float]:

@@ -1,0 +1,161 @@
+"""What `discover` is told: library, symmetry, signs, optimizer, form of the slope; and what it refuses."""
+
+import itertools
+
+import numpy as np
+import pytest
+from discovered import CYCLES, DAHL, LAW, TRUTH, duhem, multisine, record_of, zigzag
+
+import hysim as hs
+
+RECORD = record_of(LAW.memory, multisine(200), noise=0.01)
+NAMES = list(TRUTH)
+
+
+@pytest.mark.parametrize("optimizer", ["SR3", "SSR", "FROLS"])
+def test_every_optimizer_leads_to_the_law(optimizer):
+    found = hs.discover(RECORD, route="memory", optimizer=optimizer, degree=1)
+    assert list(found.coefficients) == NAMES
+
+
+@pytest.mark.parametrize("derivative", ["smoothed", "weak"])
+def test_both_forms_of_the_slope_lead_to_the_law(derivative):
+    found = hs.discover(RECORD, route="memory", derivative=derivative)
+    assert list(found.coefficients) == NAMES
+
+
+def test_a_library_is_a_list_of_names():
+    found = hs.discover(RECORD, library=NAMES, route="memory")
+    assert list(found.inclusion) == list(found.coefficients) == NAMES
+    named_y = hs.discover(record_of(duhem(DAHL), CYCLES), library=["u'", "u' y", "|u'| y"])
+    assert isinstance(named_y.model, hs.Duhem)
+    assert dict(named_y.coefficients) == pytest.approx(DAHL, abs=1e-6)  # the root of rounding
+
+
+def test_an_odd_law_is_found_in_the_odd_library():
+    found = hs.discover(RECORD, symmetry="odd", route="memory")
+    assert list(found.coefficients) == NAMES
+    assert set(found.inclusion) == {"u'", "u' |z|", "u' z^2", "|u'| z", "|u'| |z| z"}
+
+
+def test_an_even_law_is_found_in_the_even_library():
+    butterfly = {"u' u": 1.0, "|u'|": 0.3, "|u'| y": -0.5}
+    found = hs.discover(record_of(duhem(butterfly), CYCLES), library="duhem", symmetry="even")
+    assert dict(found.coefficients) == pytest.approx(butterfly, abs=1e-6)  # the root of rounding
+
+
+def test_a_wrong_sign_leaves_the_term_out_and_a_right_one_changes_nothing():
+    right = hs.discover(RECORD, library=NAMES, signs={"u' |z|": -1, "|u'| z": -1}, route="memory")
+    assert list(right.coefficients) == NAMES
+    wrong = hs.discover(RECORD, signs={"u' |z|": 1}, route="memory")
+    assert "u' |z|" not in wrong.coefficients
+    assert wrong.scores["rmse"] > right.scores["rmse"]
+
+
+def test_units_do_not_decide_what_is_found():
+    """A threshold is a number without unit: kilovolts and nanometres give the same structure, rescaled."""
+    found = hs.discover(RECORD, library=NAMES, route="memory")
+    rescaled = hs.discover(hs.Record(u=1e3 * RECORD.u, y=1e-9 * RECORD.y), library=NAMES, route="memory")
+    assert list(rescaled.coefficients) == NAMES
+    scales = {"u'": 1e-12, "u' |z|": 1e-3, "|u'| z": 1e-3}
+    for name, scale in scales.items():
+        # the descent ends where a step changes the cost by 1e-12 of it: its root in the numbers
+        assert rescaled.coefficients[name] == pytest.approx(scale * found.coefficients[name], rel=1e-5)
+
+
+def test_terms_that_a_record_cannot_tell_apart_are_left_out_by_name():
+    u = zigzag(0.0, 1.0, 0.0)
+    found = hs.discover(hs.Record(u=u, y=3.0 * u), library="duhem")
+    assert {"u' y", "u' u y", "u' y^2"} <= set(found.left_out)
+    assert dict(found.coefficients) == pytest.approx({"u'": 3.0}, rel=1e-9)  # a line is fitted to rounding
+    assert found.verdict == "no structure found"
+
+
+def test_a_curve_without_a_loop_has_no_structure():
+    u = zigzag(0.0, 2.0, -2.0, 2.0)
+    found = hs.discover(hs.Record(u=u, y=np.tanh(u)), library="duhem")
+    assert found.verdict == "no structure found"
+    assert dict(found.coefficients) == pytest.approx({"u'": 1.0, "u' y^2": -1.0}, abs=1e-6)  # the root of rounding
+
+
+def test_a_line_with_noise_has_no_structure():
+    u = zigzag(0.0, 2.0, -2.0, 2.0)
+    found = hs.discover(
+        hs.Record(u=u, y=2.0 * u + 0.01 * np.random.default_rng(0).standard_normal(u.size)), route="memory"
+    )
+    assert found.verdict == "no structure found"
+    assert found.model.response(u) == pytest.approx(2.0 * u, abs=0.01)  # far less than the loops of a law
+
+
+def test_a_lag_under_one_triangle_cannot_be_told_from_hysteresis():
+    u = np.tile(zigzag(0.0, 1.0, -1.0, 0.0, per_branch=12), 2)
+    y = np.array(list(itertools.accumulate(u[1:], lambda last, now: last + 0.3 * (now - last), initial=0.0)))
+    found = hs.discover(hs.Record(u=u, y=y), library="duhem", degree=1)
+    assert found.scores["fit_percent"] > 95.0  # a fine law, and no hysteresis at all
+    assert found.verdict == "cannot be told from one rate"
+
+
+@pytest.mark.parametrize(
+    ("u", "y", "message"),
+    [
+        (np.linspace(0, 1, 30), np.linspace(0, 1, 30) ** 2, "needs a rising and a falling branch"),
+        (np.ones(30), np.arange(30.0), "the input is constant"),
+        (zigzag(0, 1, 0), np.ones(59), "the output is constant"),
+        (np.tile([0.0, 1.0], 20), np.tile([0.0, 1.0], 20), "at least 4 samples each"),
+        (zigzag(0, 1, 0, per_branch=5), zigzag(0, 1, 0, per_branch=5), "9 samples cannot tell 10 terms"),
+    ],
+)
+def test_records_without_the_information_are_refused(u, y, message):
+    with pytest.raises(ValueError, match=message):
+        hs.discover(hs.Record(u=u, y=y), derivative="smoothed")
+
+
+def test_a_monotone_loading_is_refused_in_every_form():
+    u = np.linspace(0.0, 1.0, 200)
+    for derivative in ("auto", "smoothed", "weak"):
+        with pytest.raises(ValueError, match="needs a rising and a falling branch"):
+            hs.discover(hs.Record(u=u, y=np.sin(u)), derivative=derivative)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"route": "input"}, "route must be one of auto, memory, output, oscillator, got 'input'"),
+        ({"degree": -1}, "degree must be a whole number from 0 up, got -1"),
+        ({"degree": True}, "degree must be a whole number"),
+        ({"library": "fourier"}, 'library must be "bouc-wen", "duhem" or names of terms'),
+        ({"library": []}, "a list of different terms"),
+        ({"library": ["u'", "u'"]}, "a list of different terms"),
+        ({"library": ["u' y", "|u'|  z"]}, "unknown term"),
+        ({"library": "duhem", "route": "output"}, "has its feedthrough in the terms"),
+        ({"symmetry": "none"}, 'symmetry must be None, "odd" or "even"'),
+        ({"signs": {"u' z^9": 1}}, "'u' y\\^9' is not in the library|\"u' y\\^9\" is not in the library"),
+        ({"signs": {"u'": 2}}, "must be 1 or -1, got 2"),
+        ({"optimizer": "lasso"}, "optimizer must be one of STLSQ, SR3, SSR, FROLS, got 'lasso'"),
+        ({"derivative": "spline"}, 'derivative must be "auto", "smoothed" or "weak"'),
+        ({"cross_validate": 1}, 'cross_validate must be "loo"'),
+        ({"cross_validate": "all"}, 'cross_validate must be "loo"'),
+    ],
+)
+def test_options_are_checked(options, message):
+    with pytest.raises(ValueError, match=message):
+        hs.discover(RECORD, **options)
+
+
+@pytest.mark.parametrize("given", [CYCLES, [], [CYCLES], None, {"u": CYCLES, "y": CYCLES}])
+def test_only_records_are_taken(given):
+    with pytest.raises(TypeError, match="discover takes"):
+        hs.discover(given)
+
+
+@pytest.mark.parametrize("optimizer", ["ConstrainedSR3", "MIOSR", "SBR"])
+def test_an_optimizer_that_needs_an_extra_says_so(optimizer):
+    with pytest.raises(ImportError, match=rf"{optimizer} needs its extra: pip install 'pysindy\["):
+        hs.discover(RECORD, optimizer=optimizer)
+
+
+def test_a_gap_is_refused_where_the_record_is_made():
+    y = RECORD.y.copy()
+    y[7] = np.nan
+    with pytest.raises(ValueError, match="y must be finite, got nan at index 7"):
+        hs.Record(u=RECORD.u, y=y)

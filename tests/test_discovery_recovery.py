@@ -1,0 +1,136 @@
+"""`discover` finds the law that made a record: with the memory measured, hidden behind an output, of any exponent."""
+
+import math
+
+import numpy as np
+import pytest
+from discovered import COLEMAN_HODGDON, CYCLES, DAHL, LAW, QUADRATIC, TRUTH, duhem, multisine, record_of
+
+import hysim as hs
+from hysim.discovery import _search
+
+# Clean records: a descent ends where the cost stands still to rounding, and the error is its square root.
+EXACT = 1e-6
+SIGMAS = 5.0
+
+
+def close(found, truth):
+    """Within five standard errors."""
+    return all(abs(found.coefficients[term] - truth[term]) <= SIGMAS * found.stderr[term] for term in truth)
+
+
+def test_a_measured_memory_has_its_law_exactly():
+    found = hs.discover(record_of(LAW.memory), route="memory")
+    assert dict(found.coefficients) == pytest.approx(TRUTH, abs=EXACT)
+    assert isinstance(found.model, hs.BoucWen)
+    assert (found.model.n, found.model.feedthrough, found.model.offset, found.model.gain) == (1.0, 0.0, 0.0, 1.0)
+    assert found.route == "memory"
+    assert found.verdict == "cannot be told from one rate"
+
+
+@pytest.mark.parametrize("noise", [0.01, 0.05])
+def test_a_measured_memory_has_its_law_under_noise(noise):
+    found = hs.discover(record_of(LAW.memory, noise=noise), route="memory")
+    assert list(found.coefficients) == list(TRUTH)
+    assert close(found, TRUTH)
+    assert found.coefficients["|u'| z"] == pytest.approx(-0.6, rel=noise)  # less than the noise of one sample
+
+
+def test_at_a_small_amplitude_clean_terms_are_still_told_apart():
+    """At z = 0.1 the three terms differ by a tenth."""
+    found = hs.discover(record_of(LAW.memory, multisine(amplitude=0.1)), route="memory")
+    assert dict(found.coefficients) == pytest.approx(TRUTH, abs=10.0 * EXACT)
+
+
+def test_a_memory_behind_an_output_is_found():
+    found = hs.discover(record_of(lambda u: 7.0 + 40.0 * u + 60.0 * LAW.memory(u), noise=0.01), route="output")
+    assert list(found.coefficients) == list(TRUTH)
+    assert close(found, TRUTH)
+    assert found.coefficients["u'"] == 1.0  # the scale of the memory is open: a convention, with no error
+    assert found.stderr["u'"] == 0.0
+    model = found.model
+    assert abs(model.feedthrough - 40.0) <= SIGMAS * found.stderr["feedthrough"]
+    assert abs(model.gain - 60.0) <= SIGMAS * found.stderr["gain"]
+    assert abs(model.offset - 7.0) <= SIGMAS * found.stderr["offset"]
+    assert found.route == "output"
+
+
+@pytest.mark.parametrize("slope", [40.0, -40.0])
+def test_an_output_may_rise_or_fall_and_its_memory_oppose_it(slope):
+    law = hs.BoucWen(A=1.0, beta=0.6, gamma=0.3, n=2.0)
+    clean = record_of(lambda u: 5.0 + slope * u - 0.5 * slope * law.memory(u))
+    found = hs.discover(clean, route="output", symmetry="odd")
+    numbers = [getattr(found.model, name) for name in ("A", "beta", "gamma", "n", "feedthrough", "gain", "offset")]
+    truth = [1.0, 0.6, 0.3, 2.0, slope, -0.5 * slope, 5.0]
+    assert numbers == pytest.approx(truth, abs=1e3 * EXACT)  # 1e-6 of the stroke
+
+
+def test_a_cubic_exponent_is_in_a_library_of_degree_3():
+    law = hs.BoucWen(A=1.0, beta=0.6, gamma=0.3, n=3.0)
+    found = hs.discover(record_of(law.memory, noise=0.01), route="memory", degree=3)
+    assert list(found.coefficients) == ["u'", "u' |z| z^2", "|u'| z^3"]
+    assert found.model.n == 3.0
+    assert close(found, {"u'": 1.0, "u' |z| z^2": -0.3, "|u'| z^3": -0.6})
+
+
+def test_an_exponent_that_is_no_whole_number_is_found():
+    law = hs.BoucWen(A=1.0, beta=0.6, gamma=0.3, n=1.5)
+    found = hs.discover(record_of(law.memory), route="memory")
+    assert isinstance(found.model, hs.BoucWen)
+    assert [getattr(found.model, name) for name in ("A", "beta", "gamma", "n")] == pytest.approx(
+        [1.0, 0.6, 0.3, 1.5], abs=EXACT
+    )
+    assert set(found.coefficients) == {"u'", "|u'| |z|^0.5 z", "u' |z|^1.5"}
+    assert found.stderr["n"] < EXACT
+
+
+def test_records_share_the_law_and_each_has_a_memory_of_its_own():
+    other = hs.BoucWen(A=1.0, beta=0.6, gamma=0.3, z0=0.4)
+    records = [record_of(LAW.memory, noise=0.01), record_of(other.memory, CYCLES, noise=0.01, seed=1)]
+    found = hs.discover(records, route="memory")
+    assert list(found.coefficients) == list(TRUTH)
+    assert close(found, TRUTH)
+    first, second = found.models
+    assert found.model == first
+    assert second.z0 == pytest.approx(0.4, abs=0.01)  # the noise of one sample
+    assert first.z0 == pytest.approx(0.0, abs=0.01)
+    assert second == hs.BoucWen(A=first.A, beta=first.beta, gamma=first.gamma, z0=second.z0)
+    assert found.n_parameters == len(TRUTH) + 2
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+def test_a_dahl_law_is_a_bouc_wen_law_without_its_second_term(noise):
+    found = hs.discover(record_of(duhem(DAHL), CYCLES, noise=noise), route="memory")
+    assert list(found.coefficients) == ["u'", "|u'| z"]
+    assert isinstance(found.model, hs.BoucWen)
+    tolerance = SIGMAS * noise / math.sqrt(CYCLES.size) + EXACT  # for terms of the order of the stroke
+    assert list(found.coefficients.values()) == pytest.approx([1.0, -1.0], abs=tolerance)
+
+
+def test_a_coleman_hodgdon_law_is_a_dahl_law_beside_a_feedthrough():
+    """With y = c u + z the law y' = b u' + a |u'| (c u - y) is z' = (b - c) u' - a |u'| z."""
+    found = hs.discover(record_of(duhem(COLEMAN_HODGDON), CYCLES), route="output")
+    assert list(found.coefficients) == ["u'", "|u'| z"]
+    numbers = found.coefficients["|u'| z"], found.model.feedthrough, found.model.gain
+    assert numbers == pytest.approx((-1.0, 3.1635, 0.345 - 3.1635), abs=10.0 * EXACT)
+
+
+@pytest.mark.parametrize("terms", [COLEMAN_HODGDON, QUADRATIC], ids=["Coleman-Hodgdon", "quadratic"])
+def test_the_duhem_library_holds_laws_in_input_and_output(terms):
+    found = hs.discover(record_of(duhem(terms), CYCLES), library="duhem")
+    assert list(found.coefficients) == list(terms)
+    assert dict(found.coefficients) == pytest.approx(terms, abs=EXACT)
+    assert isinstance(found.model, hs.Duhem)
+    assert found.model.y0 == pytest.approx(0.0, abs=EXACT)
+
+
+def test_standard_errors_cover_the_truth(monkeypatch):
+    """Of 3 coefficients and 8 draws, scores have unit variance: their mean square is 1 within 4 sqrt(2 / 24)."""
+    monkeypatch.setattr(_search, "_ENSEMBLE", 1)  # which has no part in it
+    scores = []
+    for seed in range(8):
+        found = hs.discover(
+            record_of(LAW.memory, multisine(150), noise=0.02, seed=seed), library=list(TRUTH), derivative="weak"
+        )
+        scores += [(found.coefficients[term] - TRUTH[term]) / found.stderr[term] for term in TRUTH]
+    assert np.mean(np.square(scores)) == pytest.approx(1.0, abs=4.0 * math.sqrt(2.0 / len(scores)))

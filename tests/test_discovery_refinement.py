@@ -1,0 +1,160 @@
+"""Refinement under `discover`: the descent, structures on their way to models, laws of any exponent."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from discovered import COLEMAN_HODGDON, CYCLES, DAHL, LAW, duhem, multisine, record_of
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import least_squares
+
+import hysim as hs
+from hysim.discovery import _laws
+from hysim.discovery._descent import descend
+from hysim.discovery._refinement import FreeRun, losses
+from hysim.discovery._structures import AnyExponent, Terms
+from hysim.discovery._validation import left_out_rmse
+from hysim.models.duhem_terms import Term
+
+OPEN = np.full(2, np.inf)
+
+
+def rosenbrock(x):
+    """Residuals of many points (n_sets, 2)."""
+    x = np.atleast_2d(x)
+    return np.stack([10.0 * (x[:, 1] - x[:, 0] ** 2), 1.0 - x[:, 0]], axis=1)
+
+
+def terms(names):
+    return tuple(Term.parse(name) for name in names)
+
+
+@pytest.mark.parametrize("central", [True, False])
+@pytest.mark.parametrize(
+    ("lower", "upper"), [(-OPEN, OPEN), ((-2.0, -2.0), (0.5, 2.0)), ((-2.0, 0.5), (2.0, 0.7)), ((0.0, 1.2), (1.5, 3.0))]
+)
+def test_the_descent_ends_where_scipys_does(central, lower, upper):
+    start, lower, upper = np.array([-1.2, 1.0]), np.array(lower, dtype=float), np.array(upper, dtype=float)
+    start = np.clip(start, lower, upper)
+    found = descend(rosenbrock, start, lower, upper, tolerance=1e-14, steps=300, central=central)
+    inside = np.clip(start, lower + 1e-9, upper - 1e-9)  # which SciPy's method asks for
+    expected = least_squares(lambda x: rosenbrock(x)[0], inside, bounds=(lower, upper), xtol=1e-14, ftol=1e-14)
+    # Both end where the cost, of the order of 1, changes by rounding; the bounds are reached to SciPy's 1e-6.
+    assert found.residual @ found.residual <= 2.0 * expected.cost + 1e-9
+    assert found.x == pytest.approx(expected.x, abs=1e-4)
+    assert (found.x >= lower).all()
+    assert (found.x <= upper).all()
+    assert found.residual == pytest.approx(rosenbrock(found.x)[0], abs=1e-15)
+
+
+@given(seed=st.integers(0, 2**31))
+@settings(max_examples=30)
+def test_a_linear_problem_is_solved(seed):
+    random = np.random.default_rng(seed)
+    matrix, left = random.standard_normal((8, 3)), random.standard_normal(8)
+    lower, upper = -0.3 * np.ones(3), 0.3 * np.ones(3)
+    found = descend(lambda x: left - x @ matrix.T, np.zeros(3), lower, upper, tolerance=1e-14, steps=300, central=True)
+    best = least_squares(lambda x: left - matrix @ x, np.zeros(3), bounds=(lower, upper)).cost
+    assert 0.5 * found.residual @ found.residual <= best * (1.0 + 1e-5)  # what SciPy leaves at its bounds
+    assert found.jacobian == pytest.approx(-matrix, abs=1e-8)  # rounding of a difference
+
+
+def test_an_infinite_or_flat_direction_stops_nothing():
+    def residuals(x):
+        return np.stack([x[:, 0] - 1.0, 0.0 * x[:, 0]], axis=1)
+
+    found = descend(residuals, np.array([5.0, 3.0]), -OPEN, OPEN, tolerance=1e-12, steps=50, central=True)
+    assert found.x == pytest.approx([1.0, 3.0], abs=1e-9)  # the second coordinate has no say, and stays
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4])
+@pytest.mark.parametrize("A", [1.0, 0.7, -2.5])
+@pytest.mark.parametrize("offset", [0.0, 3.0])
+def test_the_scale_of_a_memory_is_a_convention(n, A, offset):
+    """With a feedthrough the law is written with A = 1 and a gain: the response is the same."""
+    names = _laws.bouc_wen_terms(n)
+    numbers = np.array([A, -0.3, -0.2, 5.0, offset])[[0, 1, 2, 3] + [4] * bool(offset)]
+    structure = Terms(tuple(sorted(names)), True, bool(offset))
+    numbers[:3] = numbers[:3][[names.index(term) for term in structure.terms]]
+    record = record_of(lambda u: u)
+    candidate = SimpleNamespace(
+        structure=structure, unknowns=np.append(numbers, 0.4), covariance=np.eye(numbers.size + 1)
+    )
+    found = _laws.found(candidate, [record], "z")
+    expected = structure.run(record.u, numbers[np.newaxis], np.array([0.4]), 1e6)[0]
+    model = found.models[0]
+    assert isinstance(model, hs.BoucWen)
+    assert (model.A, model.gain, model.n) == (1.0, A, float(n))
+    assert found.coefficients["u'"] == 1.0
+    assert model.response(record.u) == pytest.approx(expected, abs=1e-11 * np.ptp(expected))  # the series' promise
+
+
+@pytest.mark.parametrize("n", [0.5, 1.7])
+@pytest.mark.parametrize("shifts", [(False, False), (True, False), (True, True)])
+def test_a_law_of_any_exponent_is_the_model_that_it_becomes(n, shifts):
+    structure = AnyExponent(*shifts)
+    numbers = np.array([-1.5, -0.3, -0.1, n, 5.0, 2.0])[: structure.size]
+    record = record_of(lambda u: u)
+    candidate = SimpleNamespace(
+        structure=structure, unknowns=np.append(numbers, 0.4), covariance=np.eye(numbers.size + 1)
+    )
+    found = _laws.found(candidate, [record], "z")
+    expected = structure.run(record.u, numbers[np.newaxis], np.array([0.4]), 1e6)[0]
+    assert found.models[0].response(record.u) == pytest.approx(expected, abs=1e-9 * np.ptp(expected))  # its kernel's
+    assert found.models[0].n == n
+    assert set(found.stderr) >= {*found.coefficients, "n"}
+
+
+def test_standard_errors_are_carried_to_the_gain():
+    """gain = A, and beta n = 1 stays: errors of numbers under A = 1 are those of a ratio."""
+    structure = Terms(terms(["u'", "u' |z|", "|u'| z"]), True)
+    covariance = np.diag([0.01, 0.04, 0.09, 0.25, 1.0])
+    candidate = SimpleNamespace(
+        structure=structure, unknowns=np.array([-2.0, -0.3, -0.6, 5.0, 0.0]), covariance=covariance
+    )
+    spread = _laws.found(candidate, [record_of(lambda u: u)], "z").stderr
+    # differences of step 1e-6; for n = 1 only the term u' |z| takes the sign of the gain, none its size
+    assert spread == pytest.approx({"u'": 0.0, "u' |z|": 0.2, "|u'| z": 0.3, "feedthrough": 0.5, "gain": 0.1}, rel=1e-6)
+
+
+def test_refinement_leaves_out_what_has_no_weight():
+    record = record_of(duhem(COLEMAN_HODGDON), CYCLES)
+    spoilt = record.y.copy()
+    spoilt[100] += 5.0
+    weights = np.ones(len(record))
+    weights[100] = 0.0
+    start = 0.9 * np.array([[*COLEMAN_HODGDON.values(), 0.0]])
+    free_run = FreeRun((hs.Record(u=record.u, y=spoilt),), (weights,))
+    found = free_run.refine(Terms(terms(COLEMAN_HODGDON)), start, tolerance=1e-12)
+    assert found.unknowns == pytest.approx([*COLEMAN_HODGDON.values(), 0.0], abs=1e-7)  # the root of rounding
+
+
+def test_samples_that_are_left_out_cost_little_where_there_are_many():
+    record = record_of(duhem(DAHL), CYCLES, noise=0.05)
+    candidate = FreeRun((record,)).refine(Terms(terms(DAHL)), np.array([[1.0, -1.0, 0.0]]), tolerance=1e-12)
+    noise = np.sqrt(candidate.cost / len(record)) * np.ptp(record.y)
+    # Theory for 3 numbers from 204 samples: 1 + 3/204 of the noise; this draw may differ by as much again.
+    assert left_out_rmse([record], candidate, "loo") == pytest.approx(noise, rel=0.03)
+    assert left_out_rmse([record], candidate, 10) == pytest.approx(noise, rel=0.05)
+
+
+def test_the_loss_of_a_term_is_the_cost_without_it():
+    record = record_of(LAW.memory, multisine(150), noise=0.05)
+    free_run = FreeRun((record,))
+    names = ["u'", "u' z", "u' |z|", "|u'| z"]
+    whole = free_run.refine(Terms(terms(names)), np.array([[1.0, 0.0, -0.3, -0.6, 0.0]]), tolerance=1e-12)
+    loss = next(loss for loss in losses(whole) if Term.parse("u' z") not in loss.structure.terms)
+    without = free_run.refine(loss.structure, loss.unknowns[np.newaxis], tolerance=1e-12)
+    assert loss.cost == pytest.approx(without.cost, rel=1e-3)  # a term that says nothing: linear to its square
+
+
+def test_a_term_that_its_sign_holds_at_zero_stays_there_when_another_is_lost():
+    record, held = record_of(LAW.memory, multisine(150)), Term.parse("u' |z|")
+    free_run = FreeRun((record,), signs={held: 1})
+    names = ["u'", "u' |z|", "u' z^2", "|u'| z"]
+    whole = free_run.refine(Terms(terms(names)), np.array([[1.0, 0.1, -0.1, -0.6, 0.0]]))
+    assert whole.unknowns[1] == 0.0
+    for loss in losses(whole):
+        if held in loss.structure.terms:
+            assert loss.unknowns[loss.structure.terms.index(held)] == pytest.approx(0.0, abs=1e-15)

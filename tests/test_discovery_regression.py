@@ -1,0 +1,191 @@
+"""The regression under `discover`: slopes, libraries, and PySINDy's path over them."""
+
+import inspect
+import itertools
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pysindy
+import pytest
+from discovered import COLEMAN_HODGDON, CYCLES, DAHL, QUADRATIC, duhem, record_of, zigzag
+
+import hysim as hs
+from hysim.discovery import _pysindy
+from hysim.discovery._derivatives import branches, smoothed, weak_rows
+from hysim.discovery._library import (
+    duhem_terms,
+    feature,
+    memory_terms,
+    named_terms,
+    signs_of,
+    slopes,
+    symmetric,
+)
+from hysim.discovery._selection import complete_structures, is_complete, preferred, thinned
+from hysim.discovery._structures import Terms
+from hysim.models.duhem_terms import Term
+
+
+def test_slopes_are_never_taken_across_a_reversal():
+    u = np.concatenate([zigzag(0.0, 1.0), [1.0, 1.0], zigzag(1.0, -1.0)])
+    found = branches(u, np.abs(1.0 - u) ** 3)
+    assert [branch.direction for branch in found] == [1.0, -1.0]
+    for branch in found:
+        exact = -branch.direction * 3.0 * (1.0 - branch.u) ** 2
+        assert np.abs(branch.slope - exact).max() < 1e-10  # a cubic is in the basis: rounding of a fit
+
+
+def test_smoothing_takes_noise_away_and_leaves_the_slope():
+    u = np.linspace(0.0, 3.0, 200)
+    branch = smoothed(u, np.sin(u) + 0.01 * np.random.default_rng(0).standard_normal(u.size))
+    inside = slice(20, -20)
+    # A polynomial of degree m has slope errors of about noise * m^1.5 / (span/2) / sqrt(n), here 0.006 at m = 5.
+    assert np.abs(branch.slope - np.cos(u))[inside].max() < 0.02
+
+
+@pytest.mark.parametrize("feedthrough", [0.0, 3.0])
+@pytest.mark.parametrize("per_branch", [4, 400])
+def test_the_weak_form_of_a_law_linear_in_the_input_is_exact(feedthrough, per_branch):
+    """z' = u' u + |u'| / 2 has z = (u^2 + L) / 2; reversals and uneven steps change nothing."""
+    u = zigzag(0.0, 2.0, -1.0, 1.5, 0.5, per_branch=per_branch)
+    length = np.append(0.0, np.cumsum(np.abs(np.diff(u))))
+    rows = weak_rows(u, 4.0 + feedthrough * u + 0.5 * (u**2 + length))
+
+    def features(u, z, direction):
+        return np.stack([direction * u, np.ones_like(u)], axis=1)
+
+    errors = rows.left(feedthrough) - rows.columns(features, feedthrough, 4.0) @ [1.0, 0.5]
+    assert np.abs(errors).max() < 1e-14 * 10.0  # rounding of outputs up to 10
+
+
+@pytest.mark.parametrize("form", ["smoothed", "weak"])
+def test_the_features_are_those_of_the_law(form):
+    problem = slopes([record_of(duhem(QUADRATIC), CYCLES)], form).regression(duhem_terms(2))
+    exact = np.array([QUADRATIC.get(term.named("y"), 0.0) for term in problem.terms])
+    predicted = problem.features @ (exact * problem.sizes / problem.slope_size)
+    # Truncation of the branch polynomials, degree 12 at most, or of the windows' midpoint rule.
+    assert np.abs(predicted - problem.slope).max() < {"smoothed": 1e-4, "weak": 2e-2}[form]
+    assert np.sqrt(np.mean(problem.features**2, axis=0)) == pytest.approx(1.0, rel=1e-12)
+    assert problem.misfit < 1e-2 * problem.slope_size
+
+
+@pytest.mark.parametrize("terms", [duhem_terms(3), memory_terms(4)], ids=["Duhem", "Bouc-Wen"])
+@pytest.mark.parametrize(("symmetry", "sign"), [("odd", -1.0), ("even", 1.0)])
+def test_symmetric_terms_are_those_whose_slope_turns_as_that_of_the_response(terms, symmetry, sign):
+    """Under u -> -u and z -> sign z the slope along the path, dz/dL, must be sign times itself."""
+    u, z = np.array([0.7]), np.array([-0.4])
+    kept = symmetric(terms, symmetry)
+    for term in terms:
+        mirrored = feature(term, -u, sign * z, -1.0)
+        assert (mirrored == sign * feature(term, u, z, 1.0)) == (term in kept)
+    assert symmetric(terms, None) == terms
+
+
+def test_libraries_have_their_sizes_and_one_order():
+    for degree in range(5):
+        assert len(duhem_terms(degree)) == (degree + 1) * (degree + 2)
+        assert len(memory_terms(degree)) == 2 * (2 * degree + 1)
+        assert list(memory_terms(degree)) == sorted(memory_terms(degree))
+        assert list(duhem_terms(degree)) == sorted(duhem_terms(degree))
+    assert named_terms(["|u'| z", "u'"]) == named_terms(["u'", "|u'| y"])
+    assert signs_of(memory_terms(1), {"u' |z|": -1}) == {Term.parse("u' |z|"): -1}
+
+
+def test_every_threshold_on_the_path_changes_the_structure():
+    problem = slopes([record_of(duhem(COLEMAN_HODGDON), CYCLES)], "smoothed").regression(duhem_terms(2))
+    path = _pysindy.sparse_path(problem.features, problem.slope)
+    structures = [problem.kept(coefficients) for _, coefficients in path]
+    assert len(set(structures)) == len(structures)
+    for threshold, coefficients in path:
+        assert (np.abs(coefficients[coefficients != 0.0]) >= threshold).all()
+    assert not _pysindy.sparse_fit(problem.features, problem.slope, 1e6).any()
+
+
+@pytest.mark.parametrize("optimizer", ["SR3", "SSR", "FROLS"])
+def test_other_optimizers_have_paths_too(optimizer):
+    problem = slopes([record_of(duhem(DAHL), CYCLES)], "smoothed").regression(duhem_terms(1))
+    path = _pysindy.sparse_path(problem.features, problem.slope, optimizer)
+    structures = [problem.kept(coefficients) for _, coefficients in path]
+    assert len(set(structures)) == len(structures)
+    assert tuple(Term.parse(name) for name in DAHL) in structures
+
+
+def test_fewer_rows_of_the_same_least_squares():
+    random = np.random.default_rng(0)
+    features, slope = random.standard_normal((200, 4)), random.standard_normal(200)
+    fewer, left = _pysindy.compressed(features, slope)
+    assert fewer.shape == (5, 4)
+    exact = np.linalg.lstsq(features, slope)[0]
+    assert np.linalg.lstsq(fewer, left)[0] == pytest.approx(exact, abs=1e-12)  # rounding
+    assert np.sum((left - fewer @ exact) ** 2) == pytest.approx(np.sum((slope - features @ exact) ** 2), rel=1e-12)
+
+
+def test_an_ensemble_is_drawn_from_its_seed_alone():
+    random = np.random.default_rng(0)
+    features = random.standard_normal((100, 3))
+    slope = features @ [1.0, 0.1, 0.0] + 0.5 * random.standard_normal(100)
+    first, again, other = (_pysindy.inclusion(features, slope, 0.1, n_models=20, seed=seed) for seed in (5, 5, 6))
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)
+    assert first[0] == 1.0
+
+
+def test_complete_structures_are_those_that_a_shift_of_the_origin_keeps():
+    terms = duhem_terms(2)
+    listed = complete_structures(terms, 10_000)
+    brute = [chosen for size in range(1, 13) for chosen in itertools.combinations(terms, size) if is_complete(chosen)]
+    assert listed == brute
+    assert complete_structures(terms, 5) == brute[:5]
+
+
+def test_a_complete_law_is_preferred_only_where_it_is_as_likely():
+    def candidate(terms, bic, cost=0.0):
+        parsed = Terms(tuple(Term.parse(name) for name in terms))
+        return SimpleNamespace(structure=parsed, bic=bic, cost=cost, residual=np.zeros(100))
+
+    sparse, whole = candidate(["u'", "|u'| u"], 0.0), candidate(["u'", "|u'|", "|u'| u"], 1.9)
+    assert preferred([sparse, whole], complete=True) is whole
+    assert preferred([sparse, whole], complete=False) is sparse
+    whole.bic = 4.6
+    assert preferred([sparse, whole], complete=True) is sparse
+    smaller = candidate(["u'"], 9.0, cost=1e-7)  # less than 1e-4 strokes apart in rms
+    assert preferred([sparse, smaller], complete=False) is smaller
+    smaller.cost = 1e-5
+    assert preferred([sparse, smaller], complete=False) is sparse
+
+
+def test_thinning_keeps_reversals_and_the_law():
+    record = record_of(duhem(DAHL), CYCLES)
+    thin = thinned(record, 40)
+    assert 40 <= len(thin) <= 60
+    assert set(thin.u) >= {2.0, -2.0, 1.5, -1.0}
+    # The series is good to 1e-12 of the range on both.
+    assert hs.Duhem.from_terms(DAHL).response(thin.u) == pytest.approx(thin.y, abs=1e-11)
+    assert len(thinned(record, 1000)) == len(record)
+
+
+def test_pysindy_is_what_the_adapter_expects():
+    def parameters(function):
+        return set(inspect.signature(function).parameters)
+
+    assert {"threshold", "alpha", "max_iter", "unbias"} <= parameters(pysindy.STLSQ)
+    assert {"reg_weight_lam", "regularizer", "relax_coeff_nu", "max_iter", "unbias"} <= parameters(pysindy.SR3)
+    for greedy in (pysindy.SSR, pysindy.FROLS):
+        assert {"alpha", "max_iter", "unbias"} <= parameters(greedy)
+    assert {"opt", "bagging", "n_models"} <= parameters(pysindy.EnsembleOptimizer)
+    x = np.random.default_rng(0).standard_normal((50, 3))
+    y = x @ np.ones((3, 1))
+    for optimizer in (pysindy.STLSQ(), pysindy.SR3(), pysindy.SSR(max_iter=3), pysindy.FROLS(max_iter=3)):
+        optimizer.fit(x, y)
+        assert optimizer.coef_.shape == (1, 3)
+        assert all(np.size(each) == 3 for each in optimizer.history_)
+    ensemble = pysindy.EnsembleOptimizer(pysindy.STLSQ(threshold=0.0), bagging=True, n_models=4)
+    ensemble.fit(x, y)
+    assert [coefficients.shape for coefficients in ensemble.coef_list] == [(1, 3)] * 4
+
+
+def test_importing_discovery_does_not_import_pysindy():
+    code = "import sys, hysim.discovery; sys.exit('pysindy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
