@@ -147,10 +147,12 @@ class Actuator:
 
         Parameters
         ----------
-        u, sample_time, substeps
-            As in `response`; the same for every part of a record.
+        u, sample_time
+            As in `response`; the time is the same for every part of a record.
         state : ChainState, optional
             By default rest at the first sample.
+        substeps : int, optional
+            As in `response`, the same for every part.
 
         Returns
         -------

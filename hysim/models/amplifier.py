@@ -140,6 +140,10 @@ class Amplifier:
         amplitude : float
             Of the output, not of the command [V].
 
+        Returns
+        -------
+        float
+
         Raises
         ------
         ValueError
