@@ -25,3 +25,11 @@ def paper_study():
     from hysim.paper.study import study
 
     return study(quick=True)
+
+
+@pytest.fixture(scope="session")
+def discovered_table1():
+    """The law of Table 1, discovered once for all tests."""
+    import hysim as hs
+
+    return hs.discover(hs.datasets.table1(), cross_validate="loo")

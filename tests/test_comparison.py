@@ -61,8 +61,8 @@ def test_a_fit_is_the_model_it_reports(comparison):
     assert comparison["structure"].y == pytest.approx(comparison.record.y - fit.residual, abs=1e-9)  # rounding
 
 
-def test_a_discovery_can_be_compared(table1):
-    found = hs.discover(table1)
+def test_a_discovery_can_be_compared(table1, discovered_table1):
+    found = discovered_table1
     row = hs.compare({"sindy": found}, table1)["sindy"]
     assert row.model == found.model
     assert row.n_parameters == len(found.coefficients) + 1

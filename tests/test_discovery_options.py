@@ -159,3 +159,10 @@ def test_a_gap_is_refused_where_the_record_is_made():
     y[7] = np.nan
     with pytest.raises(ValueError, match="y must be finite, got nan at index 7"):
         hs.Record(u=RECORD.u, y=y)
+
+
+@pytest.mark.parametrize("library", [NAMES, "duhem"])
+def test_progress_counts_up_to_its_total(library):
+    calls = []
+    hs.discover(RECORD, library=library, degree=1, progress=lambda done, total: calls.append((done, total)))
+    assert calls == [(k, len(calls)) for k in range(1, len(calls) + 1)]

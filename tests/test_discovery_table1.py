@@ -12,13 +12,8 @@ def table1():
 
 
 @pytest.fixture(scope="module")
-def calls():
-    return []
-
-
-@pytest.fixture(scope="module")
-def found(table1, calls):
-    return hs.discover(table1, cross_validate="loo", progress=lambda done, total: calls.append((done, total)))
+def found(discovered_table1):
+    return discovered_table1
 
 
 def test_the_law_has_few_terms(found):
@@ -56,12 +51,6 @@ def test_the_path_goes_from_dense_to_sparse(found):
     assert found.path_n_terms[-1] == found.path_n_terms.min() < 12.0
     assert found.path_fit_percent.shape == found.path_bic.shape == found.thresholds.shape
     assert found.scores["bic"] <= found.path_bic.min()
-
-
-def test_progress_counts_up_to_its_total(found, calls):
-    done, totals = zip(*calls, strict=True)
-    assert list(done) == list(range(1, len(calls) + 1))
-    assert set(totals) == {len(calls)}
 
 
 def test_neither_units_nor_the_seed_decide_what_is_found(found, table1):

@@ -34,6 +34,7 @@ from hysim.models.oscillator_structure import OscillatorStructure
 from hysim.records import Record
 
 _POOR = 80.0  # fit of a law without dynamics [%] below which an oscillator is tried
+_STAGES = 4  # hidden memory, other libraries, any exponent, judgement
 ROUTES = ("auto", "memory", "output", "oscillator")
 
 
@@ -157,19 +158,25 @@ def discover(
         "optimizer": optimizer,
         "derivative": derivative,
         "seed": seed,
-        "progress": progress,
     }
+    report = progress or (lambda done, total: None)
     outcomes = _searched(records, (hidden,), options)
+    report(1, _STAGES)
     if route == "auto":
         moving = _moving(records, outcomes[0].candidate, plant, seed)
         if moving is not None:
+            report(_STAGES, _STAGES)
             return moving
     outcomes += _searched(records, shown, options, outcomes[0].searched.bic)
+    report(2, _STAGES)
     outcome = min(outcomes, key=lambda each: each.candidate.bic)
     candidate: Candidate[Any] = outcome.candidate
     if library is None and symmetry is None and not signs:
         candidate = or_any_exponent(FreeRun(records), outcomes[0], outcome)
-    return _discovery(records, outcome, candidate, cross_validate, seed)
+    report(3, _STAGES)
+    found = _discovery(records, outcome, candidate, cross_validate, seed)
+    report(_STAGES, _STAGES)
+    return found
 
 
 def _moving(

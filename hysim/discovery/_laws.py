@@ -87,8 +87,9 @@ def _numbers(structure: Terms | AnyExponent, letter: str) -> Callable[[FloatArra
 
 def _of_any_exponent(unknowns: FloatArray, shifts: Sequence[str]) -> dict[str, float]:
     n = float(unknowns[3])
-    terms = [_A, f"|u'| |z|^{n - 1.0:.4g} z", f"u' |z|^{n:.4g}"]
-    values = dict(zip([*terms, "n", *shifts], unknowns.tolist(), strict=True))
+    A, dissipative, conservative, *others = unknowns.tolist()
+    terms = {_A: A, f"u' |z|^{n:.4g}": conservative, f"|u'| |z|^{n - 1.0:.4g} z": dissipative}
+    values = terms | dict(zip(["n", *shifts], others, strict=True))
     return _normalised(values, n) if "feedthrough" in shifts else values
 
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hysim._parallel import Progress
 from hysim.discovery import _pysindy
 from hysim.discovery._library import FORMS, Slopes, slopes
 from hysim.discovery._refinement import POLISH, Candidate, FreeRun
@@ -104,7 +103,6 @@ def searched(
     derivative: str,
     seed: int,
     best: float = math.inf,
-    progress: Progress | None = None,
 ) -> Outcome | None:
     """The best law of a library; None if none can come near the BIC `best`."""
     some = tuple(thinned(record, SEARCHED // len(records)) for record in records)
@@ -123,7 +121,7 @@ def searched(
             search.refine(structure)
     search.eliminate()
     if library.complete:
-        search.enumerate_complete(starts[0].regression.terms, progress)
+        search.enumerate_complete(starts[0].regression.terms)
     chosen = _on_all_samples(FreeRun(tuple(records), signs=signs), search, library, seed)
     start = _start_at(found, library, chosen)
     return Outcome(library, chosen, search, start, found, form, _path(start, library, optimizer))

@@ -30,7 +30,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim._parallel import Progress
 from hysim.discovery._library import Regression
 from hysim.discovery._refinement import Candidate, FreeRun, information, losses
 from hysim.discovery._structures import Terms
@@ -123,14 +122,11 @@ class Search:
                 for loss in [loss for loss in ranked if self._may_be(loss.structure)][:TRIED]:
                     self.refine(loss.structure, loss.unknowns)
 
-    def enumerate_complete(self, terms: Sequence[Term], progress: Progress | None = None) -> None:
+    def enumerate_complete(self, terms: Sequence[Term]) -> None:
         """Step 3: the complete structures, from the smallest up."""
-        listed = complete_structures(terms, MOST_COMPLETE)
-        for done, each in enumerate(listed):
+        for each in complete_structures(terms, MOST_COMPLETE):
             if self.could_win(len(each)):
                 self.refine(Terms(each))
-            if progress is not None:
-                progress(done + 1, len(listed))
 
     def could_win(self, size: int, best: float = math.inf) -> bool:
         """Whether a structure of `size` numbers would be preferred if it ran as well as the best of any size.
