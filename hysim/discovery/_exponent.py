@@ -53,10 +53,7 @@ def _refined(free_run: FreeRun, hidden: Outcome, structure: AnyExponent) -> Cand
     starts = []
     for start in hidden.search.starts:
         for n in _EXPONENTS.tolist():
-            columns = np.concatenate(
-                [rows.columns(_features(n), start.feedthrough, start.offset) for rows in hidden.slopes.rows]
-            )
-            left = np.concatenate([rows.left(start.feedthrough) for rows in hidden.slopes.rows])
+            columns, left = hidden.slopes.equations(_features(n), start.feedthrough, start.offset)
             shift = [start.feedthrough] * structure.feedthrough + [start.offset] * structure.offset
             ends = [n, *shift, *free_run.measured_starts]
             starts += [[*_ridge(columns, left, weight), *ends] for weight in _RIDGES]

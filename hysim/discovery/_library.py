@@ -9,13 +9,14 @@ Each column is scaled to unit rms over the rows, and so is the slope: a threshol
 the share of a term in the slope.
 """
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.discovery._derivatives import MIN_SAMPLES, Rows, smoothed_rows, weak_rows
+from hysim.discovery._derivatives import MIN_SAMPLES, Feature, Rows, smoothed_rows, weak_rows
 from hysim.models.duhem_terms import Term
 from hysim.records import Record
 
@@ -90,12 +91,6 @@ class Regression:
         """Condition number of the scaled features."""
         return float(np.linalg.cond(self.features))
 
-    @property
-    def misfit(self) -> float:
-        """Share of the slope, in rms, that all terms together leave over, in the unit of the slope."""
-        scaled = np.linalg.lstsq(self.features, self.slope, rcond=None)[0]
-        return float(np.sqrt(np.mean((self.slope - self.features @ scaled) ** 2))) * self.slope_size
-
     def kept(self, coefficients: FloatArray) -> tuple[Term, ...]:
         """The terms whose coefficients (n_terms,) are not zero."""
         return tuple(term for term, value in zip(self.terms, coefficients, strict=True) if value != 0.0)
@@ -115,14 +110,22 @@ class Slopes:
 
     rows: tuple[Rows, ...]
 
+    def equations(
+        self, features: Feature, feedthrough: float = 0.0, offset: float = 0.0
+    ) -> tuple[FloatArray, FloatArray]:
+        """Right sides (n_rows, n_terms) and left side (n_rows,) for z = y - feedthrough u - offset."""
+        columns = np.concatenate([rows.columns(features, feedthrough, offset) for rows in self.rows])
+        return columns, np.concatenate([rows.left(feedthrough) for rows in self.rows])
+
+    def misfit(self, terms: Sequence[Term], feedthrough: float, offset: float) -> float:
+        """Rms of the slope that all terms together leave over."""
+        columns, slope = self.equations(_features(terms), feedthrough, offset)
+        triangle = np.asarray(np.linalg.qr(np.column_stack([columns, slope]), mode="r"))
+        return abs(float(triangle[-1, -1])) / math.sqrt(len(slope))
+
     def regression(self, terms: Sequence[Term], feedthrough: float = 0.0, offset: float = 0.0) -> Regression:
         """The regression on those of the terms that the records can tell apart, for z = y - feedthrough u - offset."""
-
-        def features(u: FloatArray, z: FloatArray, direction: FloatArray) -> FloatArray:
-            return np.stack([feature(term, u, z, direction) for term in terms], axis=1)
-
-        raw = np.concatenate([rows.columns(features, feedthrough, offset) for rows in self.rows])
-        slope = np.concatenate([rows.left(feedthrough) for rows in self.rows])
+        raw, slope = self.equations(_features(terms), feedthrough, offset)
         sizes, slope_size = np.sqrt(np.mean(raw**2, axis=0)), float(np.sqrt(np.mean(slope**2))) or 1.0
         scaled = raw / np.where(sizes > 0.0, sizes, 1.0)
         kept = sorted(_independent(scaled, sorted(range(len(terms)), key=lambda k: (terms[k].degree, k))))
@@ -152,6 +155,13 @@ def slopes(records: Sequence[Record], form: str) -> Slopes:
             "them alone u' and |u'| are the same thing. Give a record whose input reverses, sampled more finely"
         )
     return Slopes(found)
+
+
+def _features(terms: Sequence[Term]) -> Feature:
+    def features(u: FloatArray, z: FloatArray, direction: FloatArray) -> FloatArray:
+        return np.stack([feature(term, u, z, direction) for term in terms], axis=1)
+
+    return features
 
 
 def feature(term: Term, u: FloatArray, z: FloatArray, direction: FloatArray | float) -> FloatArray:

@@ -57,7 +57,7 @@ class Candidate(Generic[S]):
     residual: FloatArray
     settles: bool
 
-    @property
+    @cached_property
     def cost(self) -> float:
         """Sum of squared residuals, in squared strokes."""
         return float(self.residual @ self.residual)
@@ -67,7 +67,7 @@ class Candidate(Generic[S]):
         """The numbers of the structure, and y0 of each record."""
         return len(self.unknowns)
 
-    @property
+    @cached_property
     def bic(self) -> float:
         """Bayesian information criterion, the lower the better."""
         return information(self.cost, self.residual.size, self.n_parameters)

@@ -25,7 +25,7 @@ def shifted(slopes: Slopes, terms: tuple[Term, ...], *, feedthrough: bool, offse
     """The regressions to begin at: that of the output itself, and those at the best places of the scan."""
     trial = symmetric(terms, "odd") or terms  # about the origin of z a law is odd, or nearly
     places = sorted(
-        (slopes.regression(trial, slope, level).misfit, slope, level)
+        (slopes.misfit(trial, slope, level), slope, level)
         for slope in (_slopes_tried(slopes) if feedthrough else (0.0,))
         for level in (_levels(slopes, slope) if offset else (0.0,))
     )
