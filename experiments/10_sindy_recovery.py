@@ -191,7 +191,7 @@ def draw(rows: list[Row]) -> Figure:
     ax.set_yticks(np.arange(len(names)), names)
     ax.invert_yaxis()
     ax.set(xlabel="Exact structure found [% of seeds]", xlim=(0.0, 100.0))
-    ax.legend(loc="lower right")
+    canvas.legend(loc="outside lower center", ncols=2)
     return canvas
 
 

@@ -232,7 +232,7 @@ def draw(rows: list[Row]) -> Figure:
     ax.set_yscale("log")
     ax.set_xticks(list(SEEDS))
     ax.set(xlabel="Seed", ylabel="Largest error of a coefficient [%]", title="Law of the benchmark, 39 dB")
-    ax.legend(fontsize="small")
+    canvas.legend(loc="outside lower center", ncols=2)
     return canvas
 
 

@@ -109,3 +109,39 @@ def test_the_readme_quotes_the_identifications():
         if (row["kind"], row["records"]) == ("profile", 400) and row["noise_in_quanta"] > 0.0
     ]
     assert f"hold the truth in {min(profile):.0f} to {max(profile):.0f} % of 400 records" in readme
+
+
+def test_the_readme_quotes_the_discoveries():
+    folder = EXPERIMENTS[0].parent
+    results = {
+        name: json.loads((folder / "results" / name / "result.json").read_text())
+        for name in ("sindy_recovery", "sindy_table1", "sindy_benchmark", "sindy_lag_trap")
+    }
+    readme = " ".join((folder.parent / "README.md").read_text().split())
+    own, plain = (
+        {row["condition"]: row for row in results["sindy_recovery"]["rows"] if row["method"] == method}
+        for method in ("hysim", "PySINDy")
+    )
+    noisy = [own[f"noise {percent}%"] for percent in (0, 1, 5, 10)]
+    exact, worst = ([row[name] for row in noisy] for name in ("exact", "worst_error_percent"))
+    assert f"exact in {exact[0]}, {exact[1]}, {exact[2]} and {exact[3]} of them at 0, 1, 5 and 10 % noise" in readme
+    assert f"than {worst[0]:.2g}, {worst[1]:.2g}, {worst[2]:.2g} and {worst[3]:.2g} % off" in readme
+    assert f"the true velocity reaches {plain['noise 10%']['exact']} at 10 %" in readme
+    hidden = "y = 40 u + 60 z"
+    assert f"it is exact in {own['amplitude / 20']['exact']}, with the memory hidden" in readme
+    assert f"in {own[hidden]['exact']} (PySINDy: {plain[hidden]['exact']})" in readme
+    assert f"to a period in {own['100 Hz']['exact']}:" in readme
+    law, bouc_wen = results["sindy_table1"]["rows"][:2]
+    assert f"A law of {law['n_parameters'] - 1} terms fits {law['fit_percent']:.2f} %" in readme
+    left_out = [1e3 * row["left_out_rmse_um"] for row in (law, bouc_wen)]
+    assert f"left-out points to {left_out[0]:.0f} nm, where Bouc-Wen's leaves {left_out[1]:.0f} nm" in readme
+    rows = results["sindy_benchmark"]["rows"]
+    told = [row for row in rows if row["case"] == "benchmark"]
+    regressed = [row["worst_percent"] for row in rows if row["case"] == "plain PySINDy, m, c, k given"]
+    assert all(row["right_terms"] for row in told)
+    assert f"each coefficient within {max(row['worst_percent'] for row in told):.2g} %" in readme
+    assert f"at most {max(max(row['multisine'], row['sweep']) for row in told):.1e} m; sparse" in readme
+    assert f"is {min(regressed):.1f} to {max(regressed):.1f} % off" in readme
+    verdicts = {(row["plant"], row["frequencies_hz"]): row["verdict"] for row in results["sindy_lag_trap"]["rows"]}
+    assert verdicts["published lag", "1"] == "cannot be told from one rate"
+    assert verdicts["published lag", "1 10"] == "linear lag"
