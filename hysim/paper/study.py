@@ -73,7 +73,7 @@ def study(
         "tf-identified": lambda: identify(structure, record, cross_validate=folds),
         "bouc-wen": lambda: identify(BoucWen, record, cross_validate=folds),
         "bouc-wen-asymmetric": lambda: asymmetric(quick),
-        "sindy": lambda: discover(record, cross_validate=folds),
+        "sindy": lambda: discover(record, library="duhem", cross_validate=folds),
         "line": lambda: identify(Line, record, cross_validate=folds),
         "single-valued": lambda: identify(SingleValued, record, cross_validate=folds),
     }
