@@ -164,7 +164,8 @@ class RestingPlant:
     def run(self, controller: Controller, reference: FloatArray, progress: Progress | None = None) -> Signals:
         """Close the loop around it."""
         compiled = CompiledController(*controller.compiled(self.sample_time, self.u0, self.y0))
-        return self.chain.run(compiled, self.state, reference, progress)[0]
+        given = _known_ahead(reference, preview(controller, self.sample_time))
+        return self.chain.run(compiled, self.state, given, progress)[0]
 
     def voltages(self, signals: Signals) -> FloatArray:
         """Voltage at the law just after each new command."""
@@ -193,6 +194,19 @@ def as_actuator(plant: Any) -> Actuator:
     if isinstance(vibration, Vibration):
         return Actuator(vibration=vibration)
     raise TypeError(f"plant must be an Actuator, a law or a linear plant, got {type(plant).__name__}")
+
+
+def preview(controller: Controller, sample_time: float) -> int:
+    """By how many samples a controller gets the reference ahead of its time."""
+    ahead = getattr(controller, "ahead", None)
+    return int(ahead(sample_time)) if callable(ahead) else 0
+
+
+def _known_ahead(reference: FloatArray, samples: int) -> FloatArray:
+    """The reference of some samples later; after its end the last value."""
+    if not samples:
+        return reference
+    return read_only(np.append(reference[samples:], np.full(min(samples, reference.size), reference[-1])))
 
 
 def _conditions(actuator: Actuator, controller: Controller, plant: RestingPlant, u: FloatArray) -> dict[str, Any]:

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
+from hysim.control._sampled import SampledController
 from hysim.kernels import controllers as kernels
 from hysim.models.model import CompiledController, model
 
@@ -23,7 +24,7 @@ State = tuple[float, float, float, float]
 
 
 @model
-class PID:
+class PID(SampledController):
     """Sampled PID controller with limits, anti-windup and a filtered derivative.
 
     Parameters
