@@ -181,8 +181,8 @@ class ModeInverse:
         stage = sampled(vibration_stage(mode(self.natural_frequency, self.damping_ratio), sample_time), sample_time)
         C, moved = stage.output[3:], stage.A
         a1, a2 = -np.trace(moved), np.linalg.det(moved)
-        b1 = C @ stage.B[1]
-        b2 = C @ moved @ stage.B[1] + a1 * b1
+        b1 = C @ stage.B[0]
+        b2 = C @ moved @ stage.B[0] + a1 * b1
         return np.convolve([1.0, a1, a2], [b2, b1]) / (b1 + b2) ** 2
 
 
