@@ -6,8 +6,8 @@ Shaping. Impulses A_i at the samples t_i leave no vibration of a mode with the p
 
 Half a period pi / w_d is seldom a whole number of samples. Three impulses, at 0 and at the two samples around it,
 satisfy both equations exactly (zero vibration, ZV); the same twice over does for the derivative by the frequency too
-(ZVD); several modes take one shaper behind the other. Moving averages, three in a row, make a step of the reference
-a motion whose acceleration is continuous.
+(ZVD); several modes take one shaper behind the other. Two moving averages in a row make a step of the reference
+a motion of constant acceleration and deceleration.
 
 The mode's inverse. Under the hold a mode is A(z) y = B(z) w with B(z) = b_1 z + b_2 and a zero -b_2 / b_1 close to
 -1, so that its inverse rings. With the reference known two samples ahead
@@ -38,7 +38,7 @@ from hysim.models.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.sampled import sampled, vibration_stage
 from hysim.models.static import Line
 
-_BOXES = 3  # moving averages in a row: their motion has a continuous acceleration
+_BOXES = 2  # moving averages in a row: their motion has a bounded acceleration, that of a mode in least time
 
 
 @model
