@@ -49,9 +49,7 @@ def secant_gain(
     return gain
 
 
-def steady_cycle(
-    actuator: Actuator, u: FloatArray, sample_time: float | None, driven: int | None = None
-) -> FloatArray:
+def steady_cycle(actuator: Actuator, u: FloatArray, sample_time: float | None, driven: int | None = None) -> FloatArray:
     """The displacement over a period of the voltage `u`, once it repeats, or over the last of the driven ones."""
     if driven is not None:
         return _driven(actuator, np.tile(u, driven), sample_time)[-u.size :]

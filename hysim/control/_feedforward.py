@@ -183,7 +183,8 @@ class ModeInverse:
         a1, a2 = -np.trace(moved), np.linalg.det(moved)
         b1 = C @ stage.B[0]
         b2 = C @ moved @ stage.B[0] + a1 * b1
-        return np.convolve([1.0, a1, a2], [b2, b1]) / (b1 + b2) ** 2
+        weights: FloatArray = np.convolve([1.0, a1, a2], [b2, b1]) / (b1 + b2) ** 2
+        return weights
 
 
 class InverseBlocks(NamedTuple):

@@ -136,7 +136,7 @@ def _discrete(
     """Coefficients of a filter that is given by ascending powers of s, of second order or of first."""
     if not frequency * sample_time < math.pi:
         raise ValueError(
-            f"the filter's frequency must be below pi / sample_time = {math.pi / sample_time:g} rad/s, got {frequency:g}"
+            f"a filter's frequency must be below pi / sample_time, {math.pi / sample_time:g} rad/s, got {frequency:g}"
         )
     c = frequency / math.tan(0.5 * frequency * sample_time)
     if denominator[2] == 0.0:

@@ -135,21 +135,22 @@ class TrackingController(SampledController):
         """The controller as compiled loops take it, at rest at `u0` and `y0`."""
         if not 0.0 < sample_time < math.inf:
             raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
-        taps, rest = self._taps(sample_time), np.full(self._taps(sample_time).shape[1], y0)
+        taps = self._taps(sample_time)
         counts, plant, plant_state = self._model_blocks(sample_time, u0)
         feedback = (self.feedback or PID()).compiled(sample_time, u0 if self.feedforward is None else 0.0, y0)
         inverse = None if self.feedforward is None else self.feedforward.blocks(sample_time, u0)
         amplifier = (None if self.feedforward is None else self.feedforward.amplifier) or Amplifier()
         lowest, highest = self.limits or (-math.inf, math.inf)
         head = [
-            lowest, highest, *sorted(amplifier.voltage([lowest, highest])), amplifier.gain, amplifier.offset, taps.shape[1],
+            lowest, highest, *sorted(amplifier.voltage([lowest, highest])), amplifier.gain, amplifier.offset,
+            taps.shape[1],
         ]  # fmt: skip
         filters = [
             _THROUGH if self.notch is None else self.notch.coefficients(sample_time),
             0.0 * _THROUGH if self.damping is None else self.damping.coefficients(sample_time),
         ]
         parameters = [taps.ravel(), plant, feedback.parameters, *filters]
-        state = [np.array([u0, 0.0, 0.0]), rest, plant_state, feedback.state, np.zeros(4)]
+        state = [np.array([u0, 0.0, 0.0]), np.full(taps.shape[1], y0), plant_state, feedback.state, np.zeros(4)]
         if inverse is None:
             head += [0.0] * 5
         else:

@@ -20,18 +20,17 @@ state, which begins with the command before the limits.
 
 import math
 
-from numba import float64
-
 from hysim._frozen import FloatArray
 from hysim.kernels import boucwen_inverse, clamps
-from hysim.kernels._compile import inlined, inner, signed_kernel
+from hysim.kernels._compile import inlined, inner, kernel
 from hysim.kernels.controllers import pid
 from hysim.kernels.loop import advance, output
-from hysim.kernels.stepping import CONSTANTS, VECTOR
 
 N_HEAD = 18
 LINE, BOUC_WEN, PLAYS = 1, 2, 3
 """Laws of which the kernel has the inverse; 0 stands for no feed-forward."""
+
+_JUST, _TINY = 1e-15, 1e-300  # beyond a limit: what is asked for where nothing reaches
 
 
 @inlined
@@ -78,7 +77,7 @@ def invert_bouc_wen(
     reached[1] = boucwen_inverse.forward(u_before, z_before, reached[0], parameters, memory)
     memory[0] = reached[0]
     state[0] = reached[1]
-    return reached[0] + math.copysign(1e-15 * abs(reached[0]) + 1e-300, beyond) if math.isnan(u) else float(u)
+    return float(reached[0] + math.copysign(_JUST * abs(reached[0]) + _TINY, beyond)) if math.isnan(u) else float(u)
 
 
 @inner
@@ -121,7 +120,7 @@ def invert(
     return float(u)
 
 
-@signed_kernel(float64(CONSTANTS, VECTOR, float64, float64))
+@kernel
 def track(parameters: FloatArray, state: FloatArray, reference: float, measurement: float) -> float:
     """The command within the limits.
 
@@ -144,11 +143,8 @@ def track(parameters: FloatArray, state: FloatArray, reference: float, measureme
     decline, p = parameters[p : p + creeping], p + creeping
     A, p = parameters[p : p + others * order].reshape((others, order)), p + others * order
     B, p = parameters[p : p + 3 * order].reshape((3, order)), p + 3 * order
-    at_samples, within, p = (
-        parameters[p : p + order + 3],
-        parameters[p + order + 3 : p + 2 * order + 6],
-        p + 2 * order + 6,
-    )
+    at_samples, p = parameters[p : p + order + 3], p + order + 3
+    within, p = parameters[p : p + order + 3], p + order + 3
     x, s = state[s : s + 2 * order], s + 2 * order
     past, s = state[s : s + dead + 3], s + dead + 3
     readings, s = state[s : s + late + 2], s + late + 2
