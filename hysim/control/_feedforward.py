@@ -165,9 +165,9 @@ class ModeInverse:
     --------
     >>> import numpy as np, hysim as hs
     >>> weights = hs.ModeInverse(natural_frequency=100.0, damping_ratio=0.0).weights(sample_time=1e-3)
-    >>> ramp = np.arange(4.0)[::-1]  # the newest first: now, the value of two samples ago is given
+    >>> ramp = np.array([2.0, 1.0, 0.0, -1.0])  # what is given is held, and right in the middle of the sample
     >>> round(float(weights @ ramp), 9), round(float(weights.sum()), 9)
-    (1.0, 1.0)
+    (0.5, 1.0)
     """
 
     natural_frequency: float

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
+from hysim.control._sampled import Feedback
 from hysim.models.model import model
 
 
@@ -128,6 +129,14 @@ def biquad_response(
     back = np.exp(-1j * np.asarray(frequency, dtype=float) * sample_time)
     b0, b1, b2, a1, a2 = coefficients
     return np.asarray((b0 + (b1 + b2 * back) * back) / (1.0 + (a1 + a2 * back) * back))
+
+
+def biquad(coefficients: FloatArray) -> Feedback:
+    """The filter with its two states."""
+    b0, b1, b2, a1, a2 = coefficients
+    return Feedback(
+        np.array([[-a1, 1.0], [-a2, 0.0]]), np.array([b1 - a1 * b0, b2 - a2 * b0]), np.array([1.0, 0.0]), float(b0)
+    )
 
 
 def _discrete(

@@ -1,10 +1,41 @@
 """What every sampled controller shares: a step from state to state, the same that compiled loops take."""
 
 from abc import ABC, abstractmethod
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
+from hysim._frozen import FloatArray
 from hysim.models.model import CompiledController
+
+
+class Feedback(NamedTuple):
+    """What a controller makes of the measurement, limits apart: x' = A x + B m, command = C x + D m."""
+
+    A: FloatArray
+    B: FloatArray
+    C: FloatArray
+    D: float
+
+    def then(self, other: "Feedback") -> "Feedback":
+        """This one, and another behind it."""
+        return Feedback(
+            np.block([[self.A, np.zeros((self.B.size, other.B.size))], [np.outer(other.B, self.C), other.A]]),
+            np.concatenate([self.B, other.B * self.D]),
+            np.concatenate([other.D * self.C, other.C]),
+            other.D * self.D,
+        )
+
+    def beside(self, other: "Feedback") -> "Feedback":
+        """The sum of both."""
+        n, m = self.B.size, other.B.size
+        return Feedback(
+            np.block([[self.A, np.zeros((n, m))], [np.zeros((m, n)), other.A]]),
+            np.concatenate([self.B, other.B]),
+            np.concatenate([self.C, other.C]),
+            self.D + other.D,
+        )
 
 
 class SampledController(ABC):
@@ -13,6 +44,14 @@ class SampledController(ABC):
     @abstractmethod
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
         """The controller as compiled loops take it, at rest at the command `u0` and the displacement `y0`."""
+
+    @abstractmethod
+    def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
+        """From the negative measurement to the command, limits apart, at frequencies [rad/s] in their shape."""
+
+    @abstractmethod
+    def linear(self, sample_time: float) -> Feedback:
+        """From the measurement to the command, limits apart."""
 
     def ahead(self, sample_time: float) -> int:
         """By how many samples the reference must be known ahead of its time; 0 for a controller without preview."""

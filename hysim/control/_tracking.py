@@ -18,9 +18,9 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
 from hysim.control._feedforward import InverseFeedforward, ModeInverse, Shaper
-from hysim.control._filters import DampingLoop, Notch
+from hysim.control._filters import DampingLoop, Notch, biquad
 from hysim.control._pid import PID
-from hysim.control._sampled import SampledController
+from hysim.control._sampled import Feedback, SampledController
 from hysim.kernels import tracking as kernels
 from hysim.models.actuator import Actuator
 from hysim.models.amplifier import Amplifier
@@ -130,6 +130,15 @@ class TrackingController(SampledController):
         if self.damping is not None:
             total = total - self.damping.frequency_response(frequency, sample_time)
         return np.asarray(total)
+
+    def linear(self, sample_time: float) -> Feedback:
+        """From the measurement to the command, limits apart."""
+        total = (self.feedback or PID()).linear(sample_time)
+        if self.notch is not None:
+            total = total.then(biquad(self.notch.coefficients(sample_time)))
+        if self.damping is not None:
+            total = total.beside(biquad(self.damping.coefficients(sample_time)))
+        return total
 
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
         """The controller as compiled loops take it, at rest at `u0` and `y0`."""
