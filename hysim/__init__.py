@@ -22,6 +22,12 @@ _HOME = {
     "discover": "hysim.discovery",
     "Discovery": "hysim.discovery",
     "PID": "hysim.control",
+    "TrackingController": "hysim.control",
+    "InverseFeedforward": "hysim.control",
+    "ModeInverse": "hysim.control",
+    "Shaper": "hysim.control",
+    "Notch": "hysim.control",
+    "DampingLoop": "hysim.control",
     "close_loop": "hysim.control",
     "ClosedLoop": "hysim.control",
     "tune": "hysim.control",
@@ -73,6 +79,12 @@ if TYPE_CHECKING:
     from hysim.comparison import compare as compare
     from hysim.control import PID as PID
     from hysim.control import ClosedLoop as ClosedLoop
+    from hysim.control import DampingLoop as DampingLoop
+    from hysim.control import InverseFeedforward as InverseFeedforward
+    from hysim.control import ModeInverse as ModeInverse
+    from hysim.control import Notch as Notch
+    from hysim.control import Shaper as Shaper
+    from hysim.control import TrackingController as TrackingController
     from hysim.control import Tuning as Tuning
     from hysim.control import close_loop as close_loop
     from hysim.control import to_control as to_control

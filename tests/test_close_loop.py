@@ -260,6 +260,8 @@ def test_conditions_say_under_what_the_loop_ran():
     assert dict(run.conditions) == {
         "plant": hs.Actuator(hysteresis=LAWS[2], vibration=plant),
         "controller": FULL,
+        "preview": 0.0,
+        "limited_samples": int(np.count_nonzero(run.command != run.drive)),
         "sample_time": pytest.approx(H),
         "substeps": 1,
         "delay": 0.12,

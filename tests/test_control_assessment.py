@@ -336,3 +336,15 @@ def test_an_unstable_loop_is_an_error_in_every_assessment():
     ):
         with pytest.raises(hs.SimulationError, match="t = "):
             call()
+
+
+def test_a_creeping_plant_is_judged_over_the_cycles_that_it_is_driven():
+    """Its cycle never becomes steady: the secant gain is that of the last one, which the open loop then has."""
+    law = hs.BoucWen(beta=0.5, gamma=0.3, gain=-0.5, feedthrough=1.0)
+    plant = hs.Actuator(hysteresis=law, creep=hs.Creep.per_decade(1.5))
+    inverse = hs.TrackingController(feedforward=hs.InverseFeedforward.of(plant), preview=True)
+    found = hs.control.assess_hysteresis(plant, inverse, low=0.5, high=2.0, period=1.0, sample_time=0.01)
+    # a rounding of the width against a loop of some tenths
+    assert found.hysteresis_reduction_percent > 100.0 - 1e-9
+    # the hold is a sample late, so that the last cycle of both is one sample of a hundred apart
+    assert found.secant_gain == pytest.approx(np.ptp(found.open_y[-100:]) / np.ptp(found.open_u[-100:]), rel=0.02)

@@ -42,3 +42,23 @@ def test_the_maximum_sensitivity_is_the_distance_from_minus_one(plant):
     assert linear.response(pid) == pytest.approx(loop, rel=1e-9)  # two ways of multiplying polynomials
     assert linear.max_sensitivity(pid) == pytest.approx(np.max(1.0 / np.abs(1.0 + loop)), rel=1e-9)
     assert linear.max_sensitivity(pid, 1e6) == math.inf
+
+
+def test_a_controller_of_parts_has_the_margins_of_its_feedback():
+    plant = hs.Actuator(vibration=hs.mode(2.0 * np.pi * 500.0, 0.01), sensor=hs.Sensor(delay=5e-5))
+    pid = hs.PID(ki=30.0)
+    around = np.union1d(np.geomspace(1.0, 6e4, 200), 2.0 * np.pi * 500.0 * np.linspace(0.9, 1.1, 201))
+    loop = hs.control.LinearLoop(plant, 5e-5, around)
+    alone = loop.max_sensitivity(pid)
+    assert loop.max_sensitivity(hs.TrackingController(feedback=pid)) == alone
+    assert alone == pytest.approx(1.0 / (1.0 - 30.0 / (2.0 * 0.01 * 2.0 * np.pi * 500.0)), rel=0.05)  # at the resonance
+    assert hs.control.LinearLoop(plant, 5e-5).max_sensitivity(pid) < 0.9 * alone  # which the default passes by
+    notched = hs.TrackingController(
+        feedback=hs.PID(ki=300.0), notch=hs.Notch(natural_frequency=2.0 * np.pi * 500.0, damping_ratio=0.01)
+    )
+    damped = hs.TrackingController(
+        feedback=hs.PID(ki=300.0), damping=hs.DampingLoop(gain=0.5, frequency=2.0 * np.pi * 500.0 / 3.0)
+    )
+    assert loop.max_sensitivity(hs.PID(ki=300.0)) == np.inf
+    assert loop.max_sensitivity(notched) < 1.3
+    assert loop.max_sensitivity(damped) < 3.0

@@ -8,19 +8,28 @@ from hysim.control._assessment import (
     assess_square_wave,
     assess_step,
 )
+from hysim.control._feedforward import InverseFeedforward, ModeInverse, Shaper
+from hysim.control._filters import DampingLoop, Notch
 from hysim.control._loop import ClosedLoop, close_loop
 from hysim.control._margins import LinearLoop
 from hysim.control._pid import PID
 from hysim.control._to_control import to_control
+from hysim.control._tracking import TrackingController
 from hysim.control._tune import Tuning, tune
 
 __all__ = [
     "PID",
     "ClosedLoop",
+    "DampingLoop",
     "HysteresisAssessment",
+    "InverseFeedforward",
     "LinearLoop",
+    "ModeInverse",
+    "Notch",
+    "Shaper",
     "SquareWaveAssessment",
     "StepAssessment",
+    "TrackingController",
     "Tuning",
     "assess_hysteresis",
     "assess_square_wave",

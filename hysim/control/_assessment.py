@@ -157,7 +157,7 @@ def assess_hysteresis(
     reference = signals.triangle(low, high, cycles=cycles, samples_per_cycle=samples)
     last = slice(-samples - 1, None)
     cycle = reference[last]
-    gain = secant_gain(actuator, cycle, sample_time)
+    gain = secant_gain(actuator, cycle, sample_time, None if actuator.creep is None else cycles)
     line = without_memory(actuator, cycle / gain)
     t = sample_time * np.arange(reference.size)
     closed = close_loop(actuator, controller, t, reference)

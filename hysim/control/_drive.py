@@ -20,11 +20,14 @@ _PERIODS = 96  # at most, until a driven cycle is steady
 _STEADY = 1e-12  # of the stroke
 
 
-def secant_gain(actuator: Actuator, cycle: FloatArray, sample_time: float | None = None) -> float:
+def secant_gain(
+    actuator: Actuator, cycle: FloatArray, sample_time: float | None = None, periods: int | None = None
+) -> float:
     """Stroke over span of the steady cycle that the voltage ``cycle / secant gain`` drives.
 
     `cycle` is one period of a reference that starts where it ends. Without a sample time the cycle is
-    quasi-static: the law's, times the vibration's DC gain.
+    quasi-static: the law's, times the vibration's DC gain. With a number of periods the last of them stands for the
+    steady cycle, which creep takes for ever to come to.
 
     Raises
     ------
@@ -36,7 +39,7 @@ def secant_gain(actuator: Actuator, cycle: FloatArray, sample_time: float | None
         return _usable(actuator.dc_gain)
     gain, change = _usable(actuator.dc_gain * _slope(actuator, 1.0)), math.inf
     for _ in range(_ITERATIONS):
-        y = steady_cycle(actuator, cycle / gain, sample_time)
+        y = steady_cycle(actuator, cycle / gain, sample_time, periods)
         following = _usable(math.copysign(float(np.ptp(y)), gain) / (span / abs(gain)))
         change, gain = abs(following / gain - 1.0), following
         if change <= _CONVERGED:
@@ -46,8 +49,10 @@ def secant_gain(actuator: Actuator, cycle: FloatArray, sample_time: float | None
     return gain
 
 
-def steady_cycle(actuator: Actuator, u: FloatArray, sample_time: float | None) -> FloatArray:
-    """The displacement over a period of the voltage `u`, once it repeats."""
+def steady_cycle(actuator: Actuator, u: FloatArray, sample_time: float | None, driven: int | None = None) -> FloatArray:
+    """The displacement over a period of the voltage `u`, once it repeats, or over the last of the driven ones."""
+    if driven is not None:
+        return _driven(actuator, np.tile(u, driven), sample_time)[-u.size :]
     periods = 3
     while True:
         y = _driven(actuator, np.tile(u, periods), sample_time)

@@ -48,9 +48,10 @@ class ClosedLoop:
         True displacement at each sample, before the new command, and what the sensor gives [unit of y].
     conditions : mapping
         Under which the loop ran: plant, controller, sample_time [s], substeps, delay (of the vibration and the
-        sensor together) [s], limits (the controller's), amplifier_limits, sensor_quantum, noise (rms), seed, u0,
-        the extremes lowest_u and highest_u of the voltage, and voltage_noise_rms and voltage_noise_peak: of the
-        voltage less that of the same loop without noise.
+        sensor together) [s], preview (by how much the controller knows the reference ahead) [s], limits (the
+        controller's), amplifier_limits, sensor_quantum, noise (rms), seed, u0, the extremes lowest_u and highest_u
+        of the voltage, limited_samples (at which the controller or the amplifier gave less than was asked for),
+        and voltage_noise_rms and voltage_noise_peak: of the voltage less that of the same loop without noise.
     units : mapping
         Labels of the units of ``"t"``, ``"u"`` and ``"y"``.
     """
@@ -90,8 +91,9 @@ def close_loop(
     ----------
     plant : Actuator, law or linear plant
         At rest at `u0` before the first sample, creep included.
-    controller : PID, or anything with its ``compiled``
-        At rest too, without a bump.
+    controller : PID, TrackingController, or anything with its ``compiled``
+        At rest too, without a bump. A controller with a method ``ahead`` is given the reference so many samples
+        ahead of its time, and after the end of the record its last value.
     t : array, shape (n,)
         Evenly spaced times [s]; their spacing is the controller's sample time.
     reference : array, shape (n,)
@@ -145,7 +147,7 @@ def close_loop(
         y=signals.y,
         measurement=signals.measurement,
         conditions={
-            **_conditions(actuator, controller, plant_at_rest, u),
+            **_conditions(actuator, controller, plant_at_rest, signals, u),
             **_voltage_noise(actuator, controller, plant_at_rest, r, u),
         },
         units=units or {},
@@ -164,7 +166,8 @@ class RestingPlant:
     def run(self, controller: Controller, reference: FloatArray, progress: Progress | None = None) -> Signals:
         """Close the loop around it."""
         compiled = CompiledController(*controller.compiled(self.sample_time, self.u0, self.y0))
-        return self.chain.run(compiled, self.state, reference, progress)[0]
+        given = _known_ahead(reference, _preview(controller, self.sample_time))
+        return self.chain.run(compiled, self.state, given, progress)[0]
 
     def voltages(self, signals: Signals) -> FloatArray:
         """Voltage at the law just after each new command."""
@@ -195,22 +198,40 @@ def as_actuator(plant: Any) -> Actuator:
     raise TypeError(f"plant must be an Actuator, a law or a linear plant, got {type(plant).__name__}")
 
 
-def _conditions(actuator: Actuator, controller: Controller, plant: RestingPlant, u: FloatArray) -> dict[str, Any]:
-    sensor = plant.chain.sensor
+def _preview(controller: Controller, sample_time: float) -> int:
+    """By how many samples a controller gets the reference ahead of its time."""
+    ahead = getattr(controller, "ahead", None)
+    return int(ahead(sample_time)) if callable(ahead) else 0
+
+
+def _known_ahead(reference: FloatArray, samples: int) -> FloatArray:
+    """The reference of some samples later; after its end the last value."""
+    if not samples:
+        return reference
+    return read_only(np.append(reference[samples:], np.full(min(samples, reference.size), reference[-1])))
+
+
+def _conditions(
+    actuator: Actuator, controller: Controller, plant: RestingPlant, signals: Signals, u: FloatArray
+) -> dict[str, Any]:
+    sensor, amplifier = plant.chain.sensor, plant.chain.amplifier
+    within = amplifier.voltage(signals.command) == amplifier.gain * signals.command + amplifier.offset
     return {
         "plant": actuator,
         "controller": controller,
         "sample_time": plant.sample_time,
         "substeps": plant.chain.substeps,
         "delay": plant.chain.delay + sensor.delay,
+        "preview": _preview(controller, plant.sample_time) * plant.sample_time,
         "limits": getattr(controller, "limits", None),
-        "amplifier_limits": plant.chain.amplifier.limits,
+        "amplifier_limits": amplifier.limits,
         "sensor_quantum": sensor.quantum,
         "noise": sensor.noise,
         "seed": sensor.seed if sensor.noise else None,
         "u0": plant.u0,
         "lowest_u": float(u.min()),
         "highest_u": float(u.max()),
+        "limited_samples": int(np.count_nonzero((signals.drive != signals.command) | ~within)),
     }
 
 

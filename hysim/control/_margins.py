@@ -1,13 +1,13 @@
 """How far a sampled linear loop is from instability.
 
-L is the loop's frequency response: the plant behind the hold, times the PID. Its distance from -1 is one over
+L is the loop's frequency response: the plant behind the hold, times the controller. Its distance from -1 is one over
 the maximum sensitivity max |1 / (1 + L)|. That says nothing about a loop that is unstable already: the poles
 of
 
-    x' = A x + B v,    v = -(kp + r) y + I + a D + r y_before,    y = C x
-    I' = I - ki h y,   D' = -r y + a D + r y_before,              r = kd / (T_f + h),  a = T_f / (T_f + h)
+    x' = A x + B v,        v = C_c q + D_c y,    y = C x
+    q' = A_c q + B_c y
 
-have to lie inside the unit circle (x' the state one sample later).
+have to lie inside the unit circle (x' and q' the states of plant and controller one sample later).
 """
 
 import math
@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim.control._loop import as_actuator
-from hysim.control._pid import PID
+from hysim.control._sampled import SampledController
 from hysim.control._to_control import to_control
 
 _FREQUENCIES = 300
@@ -35,6 +35,9 @@ class LinearLoop:
         Of which the linear part is taken.
     sample_time : float
         Of the controller [s].
+    frequencies : array, optional
+        At which L is looked at, increasing [rad/s]; by default 300, log-spaced up to pi / sample time. A sharp
+        resonance lies between two of those: give the frequencies around it.
 
     Examples
     --------
@@ -45,32 +48,30 @@ class LinearLoop:
     (1.33, inf)
     """
 
-    def __init__(self, plant: Any, sample_time: float) -> None:
+    def __init__(self, plant: Any, sample_time: float, frequencies: npt.ArrayLike | None = None) -> None:
         self.sample_time = sample_time
         self.system = to_control(replace(as_actuator(plant), hysteresis=None), sample_time)
         highest = math.pi / sample_time
-        self.frequencies = np.geomspace(_SLOWEST * highest, highest, _FREQUENCIES)
+        default = np.geomspace(_SLOWEST * highest, highest, _FREQUENCIES)
+        self.frequencies = default if frequencies is None else np.array(frequencies, dtype=float)
         self.plant = np.asarray(self.system(np.exp(1j * self.frequencies * sample_time)))
 
-    def response(self, pid: PID) -> npt.NDArray[np.complex128]:
+    def response(self, controller: SampledController) -> npt.NDArray[np.complex128]:
         """L at `frequencies`."""
-        return self.plant * pid.frequency_response(self.frequencies, self.sample_time)
+        return self.plant * controller.frequency_response(self.frequencies, self.sample_time)
 
-    def max_sensitivity(self, pid: PID, slope: float = 1.0) -> float:
+    def max_sensitivity(self, controller: SampledController, slope: float = 1.0) -> float:
         """Largest ``|1 / (1 + L)|`` with a law of this slope; infinite if the loop is unstable."""
-        if not self.is_stable(pid, slope):
+        if not self.is_stable(controller, slope):
             return math.inf
-        return float(np.max(1.0 / np.abs(1.0 + slope * self.response(pid))))
+        return float(np.max(1.0 / np.abs(1.0 + slope * self.response(controller))))
 
-    def is_stable(self, pid: PID, slope: float = 1.0) -> bool:
+    def is_stable(self, controller: SampledController, slope: float = 1.0) -> bool:
         """Whether all poles of the loop with a law of this slope lie inside the unit circle."""
-        lag, n = pid.derivative_filter + self.sample_time, len(self.system.A)
-        rate, kept, output = pid.kd / lag, pid.derivative_filter / lag, self.system.C[0]
-        integrates = 1 if pid.ki else 0
-        matrix = np.zeros((n + 3, n + 3))
-        matrix[:n] = slope * self.system.B * np.concatenate([-(pid.kp + rate) * output, [integrates, kept, rate]])
+        feedback, n = controller.linear(self.sample_time), len(self.system.A)
+        output = self.system.C[0]
+        matrix = np.zeros((n + feedback.B.size, n + feedback.B.size))
+        matrix[:n] = slope * self.system.B * np.concatenate([feedback.D * output, feedback.C])
         matrix[:n, :n] += self.system.A
-        matrix[n, :n], matrix[n, n] = -pid.ki * self.sample_time * output, integrates
-        matrix[n + 1, :n], matrix[n + 1, n + 1 :] = -rate * output, (kept, rate)
-        matrix[n + 2, :n] = output
+        matrix[n:, :n], matrix[n:, n:] = np.outer(feedback.B, output), feedback.A
         return bool(np.abs(np.linalg.eigvals(matrix)).max() < 1.0)

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
+from hysim.control._sampled import Feedback, SampledController
 from hysim.kernels import controllers as kernels
 from hysim.models.model import CompiledController, model
 
@@ -23,7 +24,7 @@ State = tuple[float, float, float, float]
 
 
 @model
-class PID:
+class PID(SampledController):
     """Sampled PID controller with limits, anti-windup and a filtered derivative.
 
     Parameters
@@ -190,6 +191,17 @@ class PID:
         derivative = self.kd / lag * (z - 1.0) / (z - self.derivative_filter / lag)
         integral = self.ki * sample_time / (z - 1.0) if self.ki else 0.0
         return np.asarray(self.kp + integral + derivative)
+
+    def linear(self, sample_time: float) -> Feedback:
+        """From the measurement to the command, limits apart: the states are I, D and the measurement before."""
+        lag, integrates = self.derivative_filter + sample_time, 1.0 if self.ki else 0.0
+        rate, kept = self.kd / lag, self.derivative_filter / lag
+        return Feedback(
+            np.array([[integrates, 0.0, 0.0], [0.0, kept, rate], [0.0, 0.0, 0.0]]),
+            np.array([-self.ki * sample_time, -rate, 1.0]),
+            np.array([integrates, kept, rate]),
+            -(self.kp + rate),
+        )
 
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
         """The controller as compiled loops take it, at rest at `u0` and `y0`."""

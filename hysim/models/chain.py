@@ -104,7 +104,7 @@ class Chain:
         if part:
             self.seen_in, at = whole_and_part((1.0 - part) * self.substeps)
             seen = seen_within(self.linear, self.step, self.delay, at, **between)
-        self._outputs = read_only([self.stage.output, seen])
+        self.outputs = read_only([self.stage.output, seen])
 
     def rest(self, u0: float) -> ChainState:
         """At rest at the command `u0`.
@@ -163,7 +163,7 @@ class Chain:
             with np.errstate(all="ignore"):  # an unstable loop may overflow before it is lost
                 lost = kernels.close(
                     *controller, amplifier, voltages, *law,
-                    self.stage.decline, self.stage.A, self.stage.B, self._outputs, x, past,
+                    self.stage.decline, self.stage.A, self.stage.B, self.outputs, x, past,
                     noise, readings, quantum, reference, start, stop, self.substeps, self.seen_in,
                     command, drive, v, w, y, measurement,
                 )  # fmt: skip

@@ -1,0 +1,162 @@
+"""Linear filters of a sampled controller, of second order and less.
+
+    notch     (s^2 + 2 zeta w s + w^2) / (s^2 + 2 zeta' w s + w^2)
+    damping   gain w / (s + w)                              integral resonant control
+              gain w^2 / (s^2 + 2 zeta w s + w^2)           positive position feedback
+
+Each is discretised by s = w / tan(w h / 2) (z - 1) / (z + 1), which keeps its response at the frequency w.
+
+Sources: A. J. Fleming, S. S. Aphale and S. O. R. Moheimani, IEEE Trans. Nanotechnology 9 (2010), for the first
+damping loop in this equivalent form; J. L. Fanson and T. K. Caughey, AIAA Journal 28 (1990), for the second.
+"""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray
+from hysim.control._sampled import Feedback
+from hysim.models.model import model
+
+
+@model
+class Notch:
+    """A filter that takes a resonance out of the feedback's command.
+
+    Parameters
+    ----------
+    natural_frequency : float
+        Of the resonance, positive [rad/s].
+    damping_ratio : float
+        Of the resonance, not negative: the filter's zeros lie on its poles.
+    new_damping_ratio : float
+        Of the poles that it puts in their place, positive.
+
+    Raises
+    ------
+    ValueError
+        If a number is outside its range.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> notch = hs.Notch(natural_frequency=100.0, damping_ratio=0.01)
+    >>> abs(notch.frequency_response([1.0, 100.0], sample_time=1e-3)).round(3).tolist()
+    [1.0, 0.01]
+    """
+
+    natural_frequency: float
+    damping_ratio: float
+    new_damping_ratio: float = 1.0
+
+    def __post_init__(self) -> None:
+        _check_frequency(self.natural_frequency)
+        if self.damping_ratio < 0.0:
+            raise ValueError(f"damping_ratio must not be negative, got {self.damping_ratio}")
+        if not self.new_damping_ratio > 0.0:
+            raise ValueError(f"new_damping_ratio must be positive, got {self.new_damping_ratio}")
+
+    def coefficients(self, sample_time: float) -> FloatArray:
+        """(b0, b1, b2, a1, a2) of its discrete form."""
+        w = self.natural_frequency
+        numerator, denominator = (
+            (w**2, 2.0 * ratio * w, 1.0) for ratio in (self.damping_ratio, self.new_damping_ratio)
+        )
+        return _discrete(numerator, denominator, w, sample_time)
+
+    def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
+        """Of its discrete form at frequencies [rad/s], in their shape."""
+        return biquad_response(self.coefficients(sample_time), frequency, sample_time)
+
+
+@model
+class DampingLoop:
+    """Positive feedback of the displacement through a low-pass filter, which damps a resonance.
+
+    It acts on the measurement less where the displacement is to be, so that it is silent where nothing vibrates.
+
+    Parameters
+    ----------
+    gain : float
+        At rest, of the plant's sign; its product with the plant's gain below one [unit of u / unit of y].
+    frequency : float
+        Corner of the filter, positive [rad/s].
+    damping_ratio : float, optional
+        Of a filter of second order (positive position feedback), positive; None for one of first order (integral
+        resonant control).
+
+    Raises
+    ------
+    ValueError
+        If a number is outside its range.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> irc = hs.DampingLoop(gain=2.0, frequency=100.0)
+    >>> ppf = hs.DampingLoop(gain=0.2, frequency=100.0, damping_ratio=0.5)
+    >>> [abs(loop.frequency_response(100.0, sample_time=1e-3)).round(6).item() for loop in (irc, ppf)]
+    [1.414214, 0.2]
+    """
+
+    gain: float
+    frequency: float
+    damping_ratio: float | None = None
+
+    def __post_init__(self) -> None:
+        _check_frequency(self.frequency, "frequency")
+        if self.damping_ratio is not None and not self.damping_ratio > 0.0:
+            raise ValueError(f"damping_ratio must be positive, got {self.damping_ratio}")
+
+    def coefficients(self, sample_time: float) -> FloatArray:
+        """(b0, b1, b2, a1, a2) of its discrete form."""
+        w = self.frequency
+        if self.damping_ratio is None:
+            return _discrete((self.gain * w, 0.0, 0.0), (w, 1.0, 0.0), w, sample_time)
+        numerator, denominator = (self.gain * w**2, 0.0, 0.0), (w**2, 2.0 * self.damping_ratio * w, 1.0)
+        return _discrete(numerator, denominator, w, sample_time)
+
+    def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
+        """Of its discrete form at frequencies [rad/s], in their shape."""
+        return biquad_response(self.coefficients(sample_time), frequency, sample_time)
+
+
+def biquad_response(
+    coefficients: FloatArray, frequency: npt.ArrayLike, sample_time: float
+) -> npt.NDArray[np.complex128]:
+    """(b0 + b1 / z + b2 / z^2) / (1 + a1 / z + a2 / z^2) on the unit circle."""
+    back = np.exp(-1j * np.asarray(frequency, dtype=float) * sample_time)
+    b0, b1, b2, a1, a2 = coefficients
+    return np.asarray((b0 + (b1 + b2 * back) * back) / (1.0 + (a1 + a2 * back) * back))
+
+
+def biquad(coefficients: FloatArray) -> Feedback:
+    """The filter with its two states."""
+    b0, b1, b2, a1, a2 = coefficients
+    return Feedback(
+        np.array([[-a1, 1.0], [-a2, 0.0]]), np.array([b1 - a1 * b0, b2 - a2 * b0]), np.array([1.0, 0.0]), float(b0)
+    )
+
+
+def _discrete(
+    numerator: tuple[float, ...], denominator: tuple[float, ...], frequency: float, sample_time: float
+) -> FloatArray:
+    """Coefficients of a filter that is given by ascending powers of s, of second order or of first."""
+    if not frequency * sample_time < math.pi:
+        raise ValueError(
+            f"a filter's frequency must be below pi / sample_time, {math.pi / sample_time:g} rad/s, got {frequency:g}"
+        )
+    c = frequency / math.tan(0.5 * frequency * sample_time)
+    if denominator[2] == 0.0:
+        d = denominator[0] + c * denominator[1]
+        return np.array([numerator[0], numerator[0], 0.0, denominator[0] - c * denominator[1], 0.0]) / d
+    (b0, b1, b2), (a0, a1, a2) = (
+        (p + c * q + c * c * r, 2.0 * (p - c * c * r), p - c * q + c * c * r) for p, q, r in (numerator, denominator)
+    )
+    return np.array([b0, b1, b2, a1, a2]) / a0
+
+
+def _check_frequency(value: float, name: str = "natural_frequency") -> None:
+    if not value > 0.0:
+        raise ValueError(f"{name} must be positive, got {value}")

@@ -1,0 +1,217 @@
+"""Feed-forward and feedback composed, in one compiled step; its equations stand in `hysim.kernels.tracking`.
+
+    reference -> shaper -> mode's inverse -> inverse of creep and law -> limits -> u
+                   |                                  |                    |
+                   +--> where to be, or what ------ model                  |
+                        it would measure -> PID -> notch -> + -------------+
+                                       \\-> damping --------/
+
+Every part may be left out. With `preview` the reference is given as many samples ahead as its filters and the hold
+take, so that the displacement is at the reference in its own time.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, read_only
+from hysim.control._feedforward import InverseFeedforward, ModeInverse, Shaper
+from hysim.control._filters import DampingLoop, Notch, biquad
+from hysim.control._pid import PID
+from hysim.control._sampled import Feedback, SampledController
+from hysim.kernels import tracking as kernels
+from hysim.models.actuator import Actuator
+from hysim.models.amplifier import Amplifier
+from hysim.models.model import CompiledController, model
+
+_THROUGH = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
+
+
+@model
+class TrackingController(SampledController):
+    """A sampled controller of parts.
+
+    Parameters
+    ----------
+    shaper : Shaper, optional
+        Filter of the reference.
+    mode_inverse : ModeInverse, optional
+        Inverse of the vibration, behind the shaper.
+    feedforward : InverseFeedforward, optional
+        Inverse of creep, law and amplifier, behind it; without one the reference reaches the feedback only.
+    feedback : PID, optional
+        On the shaped reference, or on the model's measurement; its limits must be left to the controller.
+    notch : Notch, optional
+        Filter of the feedback's command.
+    damping : DampingLoop, optional
+        Beside the feedback.
+    model : Actuator, optional
+        The plant as the feed-forward sees it, with vibration and the sensor's delay: the feedback then compares with
+        what it would measure, and answers only to what the model does not know. Its law and amplifier must be the
+        feed-forward's.
+    preview : bool
+        Whether the reference is known ahead.
+    limits : (float, float), optional
+        Lowest and highest command; None for none [unit of u].
+
+    Raises
+    ------
+    TypeError
+        If a part is not of its kind.
+    ValueError
+        If the limits are no interval or the feedback has its own, a mode's inverse or a model comes without a
+        feed-forward, or the model is another plant than the feed-forward's.
+
+    Examples
+    --------
+    >>> import numpy as np, hysim as hs
+    >>> law = hs.BoucWen(feedthrough=1.0, gain=0.5)
+    >>> inverse = hs.TrackingController(feedforward=hs.InverseFeedforward(law=law), preview=True)
+    >>> t = 0.01 * np.arange(200)
+    >>> reference = np.sin(t)
+    >>> run = hs.close_loop(law, inverse, t, reference)
+    >>> bool(np.abs(run.y - reference)[1:].max() < 1e-12)
+    True
+    """
+
+    shaper: Shaper | None = None
+    mode_inverse: ModeInverse | None = None
+    feedforward: InverseFeedforward | None = None
+    feedback: PID | None = None
+    notch: Notch | None = None
+    damping: DampingLoop | None = None
+    model: Actuator | None = None
+    preview: bool = False
+    limits: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        for name, kind in _PARTS.items():
+            if not isinstance(getattr(self, name), kind | None):
+                raise TypeError(f"{name} must be of {kind.__name__}, got {type(getattr(self, name)).__name__}")
+        if self.limits is not None and not (len(self.limits) == 2 and self.limits[0] <= self.limits[1]):
+            raise ValueError(f"limits must be (lowest, highest), got {self.limits}")
+        if self.feedback is not None and self.feedback.limits is not None:
+            raise ValueError(
+                "the feedback is limited together with the feed-forward: give the limits to the controller"
+            )
+        if self.feedforward is None and (self.mode_inverse is not None or self.model is not None):
+            raise ValueError("a mode's inverse and a model need a feedforward; InverseFeedforward() passes on")
+        if self.model is not None and self.feedforward is not None:
+            seen = self.feedforward.law, self.feedforward.amplifier
+            if (self.model.hysteresis, self.model.amplifier) != seen:
+                raise ValueError("the model's law and amplifier must be those of the feedforward")
+
+    def ahead(self, sample_time: float) -> int:
+        """By how many samples the reference must be known ahead: what the filters and the hold take."""
+        if not self.preview:
+            return 0
+        shaped = self._shaped(sample_time)
+        return self._hold + round(float(shaped @ np.arange(shaped.size)))
+
+    def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
+        """Of the feedback, from the negative measurement to the command; limits apart.
+
+        Parameters
+        ----------
+        frequency : array, any shape
+            Not zero where there is an integral [rad/s].
+        sample_time : float
+            [s]
+
+        Returns
+        -------
+        array of complex
+        """
+        total = (self.feedback or PID()).frequency_response(frequency, sample_time)
+        if self.notch is not None:
+            total = total * self.notch.frequency_response(frequency, sample_time)
+        if self.damping is not None:
+            total = total - self.damping.frequency_response(frequency, sample_time)
+        return np.asarray(total)
+
+    def linear(self, sample_time: float) -> Feedback:
+        """From the measurement to the command, limits apart."""
+        total = (self.feedback or PID()).linear(sample_time)
+        if self.notch is not None:
+            total = total.then(biquad(self.notch.coefficients(sample_time)))
+        if self.damping is not None:
+            total = total.beside(biquad(self.damping.coefficients(sample_time)))
+        return total
+
+    def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
+        """The controller as compiled loops take it, at rest at `u0` and `y0`."""
+        if not 0.0 < sample_time < math.inf:
+            raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
+        taps = self._taps(sample_time)
+        counts, plant, plant_state = self._model_blocks(sample_time, u0)
+        feedback = (self.feedback or PID()).compiled(sample_time, u0 if self.feedforward is None else 0.0, y0)
+        inverse = None if self.feedforward is None else self.feedforward.blocks(sample_time, u0)
+        amplifier = (None if self.feedforward is None else self.feedforward.amplifier) or Amplifier()
+        lowest, highest = self.limits or (-math.inf, math.inf)
+        head = [
+            lowest, highest, *sorted(amplifier.voltage([lowest, highest])), amplifier.gain, amplifier.offset,
+            taps.shape[1],
+        ]  # fmt: skip
+        filters = [
+            _THROUGH if self.notch is None else self.notch.coefficients(sample_time),
+            0.0 * _THROUGH if self.damping is None else self.damping.coefficients(sample_time),
+        ]
+        parameters = [taps.ravel(), plant, feedback.parameters, *filters]
+        state = [np.array([u0, 0.0, 0.0]), np.full(taps.shape[1], y0), plant_state, feedback.state, np.zeros(4)]
+        if inverse is None:
+            head += [0.0] * 5
+        else:
+            head += [inverse.kind, inverse.law.size, inverse.law_state.size, inverse.weights.size, inverse.scale]
+            parameters += [inverse.weights, inverse.declines, inverse.law]
+            state += [np.full(inverse.weights.size, inverse.level), inverse.law_state]
+        return CompiledController(
+            kernels.track,
+            read_only(np.concatenate([head, counts, *parameters]), finite=False),
+            np.concatenate(state),
+        )
+
+    @property
+    def _hold(self) -> int:
+        """Samples from the drive to the displacement that it is to give."""
+        return 0 if self.feedforward is None else 1 if self.mode_inverse is None else 2
+
+    def _shaped(self, sample_time: float) -> FloatArray:
+        return np.ones(1) if self.shaper is None else self.shaper.impulses(sample_time)
+
+    def _taps(self, sample_time: float) -> FloatArray:
+        """Weights of the reference, the newest first, for the drive and for where to be."""
+        shaped = self._shaped(sample_time)
+        inverted = np.ones(1) if self.mode_inverse is None else self.mode_inverse.weights(sample_time)
+        drive, target = np.convolve(shaped, inverted), np.concatenate([np.zeros(self._hold), shaped])
+        size = max(drive.size, target.size)
+        return np.stack([np.pad(weights, (0, size - weights.size)) for weights in (drive, target)])
+
+    def _model_blocks(self, sample_time: float, u0: float) -> tuple[list[float], FloatArray, FloatArray]:
+        """The model as the kernel takes it: the head's numbers, the matrices, the state at rest."""
+        chain = (self.model or Actuator()).chain(sample_time)
+        rest = chain.rest(u0)
+        stage, seen_in = chain.stage, chain.seen_in
+        counts = [
+            float(self.model is not None), stage.decline.size, stage.rest.size, stage.lag, chain.samples_late,
+            float(seen_in >= 0),
+        ]  # fmt: skip
+        matrices = (stage.decline, stage.A, stage.B, chain.outputs)
+        readings = np.full(chain.samples_late + 2, chain.displacement(rest))
+        return (
+            counts,
+            np.concatenate([np.ravel(matrix) for matrix in matrices]),
+            np.concatenate([rest.x, rest.past, readings]),
+        )
+
+
+_PARTS: dict[str, Any] = {
+    "shaper": Shaper,
+    "mode_inverse": ModeInverse,
+    "feedforward": InverseFeedforward,
+    "feedback": PID,
+    "notch": Notch,
+    "damping": DampingLoop,
+    "model": Actuator,
+}
