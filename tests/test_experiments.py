@@ -145,3 +145,19 @@ def test_the_readme_quotes_the_discoveries():
     verdicts = {(row["plant"], row["frequencies_hz"]): row["verdict"] for row in results["sindy_lag_trap"]["rows"]}
     assert verdicts["published lag", "1"] == "cannot be told from one rate"
     assert verdicts["published lag", "1 10"] == "linear lag"
+
+
+def test_the_readme_quotes_the_compensation():
+    folder = EXPERIMENTS[0].parent
+    result = json.loads((folder / "results" / "compensation_matrix" / "result.json").read_text())
+    readme = " ".join((folder.parent / "README.md").read_text().split())
+    rows = {row["controller"]: row for row in result["rows"]}
+    widths = {name: row["hysteresis_reduction_percent"] for name, row in rows.items()}
+    assert f"A PID takes {widths['PID']:.1f} % of the hysteresis away" in readme
+    assert f"creep {widths['inverse + creep inverse']:.1f} %, with mode inverse" in readme
+    follow, damped = rows["model-following"], rows["model-following, damped"]
+    assert f"model-following {follow['hysteresis_reduction_percent']:.1f} %; after a step" in readme
+    assert f"{follow['residual_rms_reduction_percent']:.1f} % of the residual vibration goes" in readme
+    assert f"{follow['worst_residual_rms_reduction_percent']:.0f} % where the mode is 10 % off" in readme
+    assert f"and {damped['worst_residual_rms_reduction_percent']:.0f} % with a damping loop" in readme
+    assert f"keeps {result['parameters_within_5_percent'][0]['median']:.1f} % in the median" in readme

@@ -11,7 +11,7 @@ import contextlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,19 +19,19 @@ from hysim import metrics
 from hysim._frozen import FloatArray
 from hysim._parallel import Progress
 from hysim.discovery import _laws, _pysindy
-from hysim.discovery import _oscillator_result as oscillator_result
 from hysim.discovery._exponent import or_any_exponent
 from hysim.discovery._judgement import HYSTERESIS, UNSTABLE, Judgement, judge
 from hysim.discovery._library import FORMS, duhem_terms, memory_terms, named_terms, signs_of, symmetric
-from hysim.discovery._oscillator import oscillator
 from hysim.discovery._refinement import Candidate, FreeRun
 from hysim.discovery._result import Discovery
 from hysim.discovery._search import Library, Outcome, searched
 from hysim.discovery._structures import AnyExponent
 from hysim.discovery._validation import left_out_rmse
 from hysim.identification.folds import folds
-from hysim.models.oscillator_structure import OscillatorStructure
 from hysim.records import Record
+
+if TYPE_CHECKING:
+    from hysim.models.oscillator_structure import OscillatorStructure
 
 _POOR = 80.0  # fit of a law without dynamics [%] below which an oscillator is tried
 _STAGES = 4  # hidden memory, other libraries, any exponent, judgement
@@ -48,7 +48,7 @@ def discover(
     signs: Mapping[str, int] | None = None,
     optimizer: str = "STLSQ",
     derivative: str = "auto",
-    structure: OscillatorStructure | None = None,
+    structure: "OscillatorStructure | None" = None,
     mass: float | None = None,
     damping: float | None = None,
     stiffness: float | None = None,
@@ -187,7 +187,7 @@ def _moving(
     if static["fit_percent"] > _POOR or not all(_is_even(record) for record in records):
         return None
     with contextlib.suppress(ValueError):  # no mass on springs is near
-        found = oscillator_result.discovery(oscillator(records, seed=seed, **plant), records)
+        found = _as_oscillator(records, seed=seed, **plant)
         if found.verdict == HYSTERESIS and found.scores["rmse"] < static["rmse"]:
             return found
     return None
@@ -211,10 +211,16 @@ def _in_an_oscillator(
         raise ValueError("an oscillator's library is bouc-wen, all of it: give neither names of terms nor signs")
     if symmetry not in (None, "odd"):
         raise ValueError(f'symmetry of an oscillator must be None or "odd", got {symmetry!r}')
-    found = oscillator(
+    return _as_oscillator(
         records, degree=min(degree + 1, 3), symmetry=symmetry or "none", seed=seed, progress=progress, **plant
     )
-    return oscillator_result.discovery(found, records)
+
+
+def _as_oscillator(records: tuple[Record, ...], **options: Any) -> Discovery:
+    from hysim.discovery._oscillator import oscillator
+    from hysim.discovery._oscillator_result import discovery
+
+    return discovery(oscillator(records, **options), records)
 
 
 def _checked(record_or_records: Record | Sequence[Record]) -> tuple[Record, ...]:

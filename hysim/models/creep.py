@@ -14,7 +14,6 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import nnls
 
 from hysim._frozen import FloatArray
 from hysim.models.model import model
@@ -102,6 +101,8 @@ class Creep:
         >>> len(creep.weights), creep.step_response([0.01, 0.1, 10.0]).round(3).tolist()
         (19, [0.985, 1.0, 1.03])
         """
+        from scipy.optimize import nnls
+
         low, high = (float(end) for end in band)
         if not 0.0 < low < high < math.inf:
             raise ValueError(f"band must rise from a positive time [s], got {band}")
