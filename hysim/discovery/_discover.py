@@ -79,7 +79,7 @@ def discover(
         ``"duhem"``, for y: ``u'`` and ``|u'|`` times u^i y^j, i + j up to `degree`. Or the names of the terms:
         ``["u'", "|u'| z", "u' |z|"]``.
     degree : int
-        Of the library's monomials.
+        Of the library's monomials; an oscillator's goes one higher, to 3 at most.
     symmetry : {None, "odd", "even"}
         Of the response: only terms that leave it so. Loops about the origin are odd, butterflies even.
     signs : mapping, optional
@@ -96,7 +96,8 @@ def discover(
         Of the oscillator, where they are known [u per unit of y''; y'; y].
     cross_validate : {None, "loo"} or int, optional
         ``"loo"`` leaves one output sample out at a time, an int that many blocks of samples; the input and the
-        structure are kept, the numbers fitted anew. Fills `Discovery.cv_rmse`.
+        structure are kept, the numbers fitted anew. Fills `Discovery.cv_rmse`, but for an oscillator, which is tried on
+        blocks of the record in any case (`Judgement.held_out`).
     seed : int
         Of random restarts, and of the ensemble.
     progress : callable, optional

@@ -36,8 +36,9 @@ def or_any_exponent(free_run: FreeRun, hidden: Outcome, chosen: Outcome) -> Cand
     if not information(least, thin.n_samples, fewest) < best.bic - INDISTINCT:
         return chosen.candidate
     found += [_refined(thin, hidden, structure) for structure in _structures(hidden.library)[1:]]
-    lowest = min((c for c in found if c is not None), key=lambda c: c.bic)
-    if not lowest.bic < best.bic - INDISTINCT or gap(best, lowest) < ALIKE:
+    sound = [candidate for candidate in found if candidate is not None and candidate.settles]
+    lowest = min(sound, key=lambda candidate: candidate.bic, default=None)
+    if lowest is None or lowest.bic >= best.bic - INDISTINCT or gap(best, lowest) < ALIKE:
         return chosen.candidate
     return free_run.refine(lowest.structure, lowest.unknowns[np.newaxis], tolerance=POLISH) or chosen.candidate
 

@@ -43,7 +43,7 @@ class Discovery:
         What the verdict rests on: the linear rival, errors on data that neither was fitted to, loop widths at other
         rates, the dissipation.
     cv_rmse : float
-        Cross-validated rmse [unit of y]; nan if it was not asked for.
+        Cross-validated rmse [unit of y]; nan if it was not asked for, and for an oscillator.
     left_out : tuple of str
         Terms of the library that the records cannot tell from those of lower degree.
     regressed : mapping
