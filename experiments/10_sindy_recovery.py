@@ -55,7 +55,7 @@ CONDITIONS = (
     Condition("2 s", duration=2.0),
     Condition("y = 40 u + 60 z", hidden=True),
 )
-SMOKE = (Condition("noise 1%", duration=2.0), Condition("y = 40 u + 60 z", duration=2.0, hidden=True))
+SMOKE = (Condition("noise 1%", rate=200, duration=2.0),)
 
 
 def measured(condition: Condition, seed: int) -> tuple[hs.Record, np.ndarray]:
