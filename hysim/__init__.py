@@ -32,6 +32,8 @@ _HOME = {
     "ClosedLoop": "hysim.control",
     "tune": "hysim.control",
     "Tuning": "hysim.control",
+    "to_c": "hysim.control",
+    "CSource": "hysim.control",
     "to_control": "hysim.control",
     "compare": "hysim.comparison",
     "Comparison": "hysim.comparison",
@@ -79,6 +81,7 @@ if TYPE_CHECKING:
     from hysim.comparison import compare as compare
     from hysim.control import PID as PID
     from hysim.control import ClosedLoop as ClosedLoop
+    from hysim.control import CSource as CSource
     from hysim.control import DampingLoop as DampingLoop
     from hysim.control import InverseFeedforward as InverseFeedforward
     from hysim.control import ModeInverse as ModeInverse
@@ -87,6 +90,7 @@ if TYPE_CHECKING:
     from hysim.control import TrackingController as TrackingController
     from hysim.control import Tuning as Tuning
     from hysim.control import close_loop as close_loop
+    from hysim.control import to_c as to_c
     from hysim.control import to_control as to_control
     from hysim.control import tune as tune
     from hysim.discovery import Discovery as Discovery

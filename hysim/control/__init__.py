@@ -8,6 +8,7 @@ from hysim.control._assessment import (
     assess_square_wave,
     assess_step,
 )
+from hysim.control._c_export import CSource, to_c
 from hysim.control._feedforward import InverseFeedforward, ModeInverse, Shaper
 from hysim.control._filters import DampingLoop, Notch
 from hysim.control._loop import ClosedLoop, close_loop
@@ -19,6 +20,7 @@ from hysim.control._tune import Tuning, tune
 
 __all__ = [
     "PID",
+    "CSource",
     "ClosedLoop",
     "DampingLoop",
     "HysteresisAssessment",
@@ -35,6 +37,7 @@ __all__ = [
     "assess_square_wave",
     "assess_step",
     "close_loop",
+    "to_c",
     "to_control",
     "tune",
 ]
