@@ -240,7 +240,7 @@ def draw(rows: list[Row]) -> Figure:
     ax.set_yticks(places, [str(row["controller"]) for row in rows])
     ax.invert_yaxis()
     ax.set_xlabel("Left of the open loop's [%]")
-    ax.legend()
+    canvas.legend(loc="outside lower center", ncols=2)
     return canvas
 
 
