@@ -135,6 +135,9 @@ def test_the_readme_quotes_the_discoveries():
     assert f"A law of {law['n_parameters'] - 1} terms fits {law['fit_percent']:.2f} %" in readme
     left_out = [1e3 * row["left_out_rmse_um"] for row in (law, bouc_wen)]
     assert f"left-out points to {left_out[0]:.0f} nm, where Bouc-Wen's leaves {left_out[1]:.0f} nm" in readme
+    shares = results["sindy_table1"]["found_again"]
+    kept = [shares[term] for term in ("u'", "u' y", "|u'|", "|u'| u", "|u'| y", "|u'| y^2")]
+    assert (kept.count(1.0), sum(share < 0.5 for share in kept)) == (2, 1)
     rows = results["sindy_benchmark"]["rows"]
     told = [row for row in rows if row["case"] == "benchmark"]
     regressed = [row["worst_percent"] for row in rows if row["case"] == "plain PySINDy, m, c, k given"]
