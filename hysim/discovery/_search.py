@@ -9,7 +9,7 @@ import numpy as np
 from hysim.discovery import _pysindy
 from hysim.discovery._library import FORMS, Slopes, slopes
 from hysim.discovery._refinement import POLISH, Candidate, FreeRun
-from hysim.discovery._selection import SEARCHED, Search, Start, preferred, thinned
+from hysim.discovery._selection import SEARCHED, Search, Start, preferred, thinned, turning
 from hysim.discovery._shifts import shifted
 from hysim.discovery._structures import Terms, shifts
 from hysim.models.duhem_terms import Term
@@ -163,9 +163,7 @@ def _better_form(records: Sequence[Record], library: Library, optimizer: str) ->
 
 
 def _seen(record: Record) -> Record:
-    kept = np.arange(len(record)) % _HELD_OUT != 1
-    direction = np.sign(np.diff(record.u))
-    kept[1:-1] |= direction[1:] != direction[:-1]
+    kept = (np.arange(len(record)) % _HELD_OUT != 1) | turning(record.u)
     return Record(u=record.u[kept], y=record.y[kept])
 
 

@@ -28,6 +28,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim.discovery._library import Regression
@@ -59,12 +60,16 @@ def thinned(record: Record, most: int) -> Record:
     A record that has more reversals than that is cut short.
     """
     stride = -(-len(record) // most)
-    direction = np.sign(np.diff(record.u))
     kept = np.arange(len(record)) % stride == 0
-    kept[1:-1] |= direction[1:] != direction[:-1]
     kept[-1] = True
-    samples = np.flatnonzero(kept)[: 2 * most]
+    samples = np.flatnonzero(kept | turning(record.u))[: 2 * most]
     return Record(u=record.u[samples], y=record.y[samples])
+
+
+def turning(u: FloatArray) -> npt.NDArray[np.bool_]:
+    """Where an input turns, rests or leaves a rest, (n,): a path through these samples keeps its extremes."""
+    direction = np.sign(np.diff(u))
+    return np.concatenate([[False], direction[1:] != direction[:-1], [False]])
 
 
 def is_complete(terms: Iterable[Term]) -> bool:
