@@ -133,11 +133,6 @@ class FreeRun:
         starts = np.full(len(self.records), self.stroke)
         return np.concatenate([structure.units(self.largest, self.stroke), starts])
 
-    def outputs(self, structure: Structure, unknowns: FloatArray) -> FloatArray:
-        """Free runs (n_sets, n_samples) of unknowns (n_sets, size + n_records), inf where one diverges."""
-        runs = [self._run(structure, unknowns, k) for k in range(len(self.records))]
-        return np.concatenate(runs, axis=1)
-
     def residuals(self, structure: Structure, unknowns: FloatArray) -> FloatArray:
         """Weighted residuals (n_sets, n_samples) in strokes."""
         return np.concatenate([self._left(structure, unknowns, k) for k in range(len(self.records))], axis=1)
@@ -171,10 +166,6 @@ class FreeRun:
         shift = [feedthrough] * structure.feedthrough + [offset] * structure.offset
         ends = [*shift, *self.measured_starts]
         return np.array([[*regression.ridge(structure.terms, weight), *ends] for weight in _RIDGES])
-
-    @cached_property
-    def _edges(self) -> list[int]:
-        return [0, *np.cumsum([len(record) for record in self.records]).tolist()]
 
     def _bounds(self, structure: Structure, units: FloatArray) -> tuple[FloatArray, FloatArray]:
         free = np.full(len(self.records), np.inf)
