@@ -235,7 +235,7 @@ def test_a_controller_of_parts_keeps_its_parts_and_gets_its_gains():
     given = hs.close_loop(SHARP, PARTS, T_RAMP, RAMP)
     assert found.objective < np.sqrt(np.mean((RAMP - given.y) ** 2))
     only = replace(PARTS, feedback=None, notch=None)
-    damped = hs.tune(SHARP, T_RAMP, RAMP, controller=only, objective="rms", variations=OFF)
+    damped = hs.tune(SHARP, T_RAMP, RAMP, controller=only, objective="rms")
     assert damped.controller == replace(only, damping=damped.controller.damping)
 
 
@@ -250,8 +250,6 @@ def test_the_bounds_hold_on_the_variations_too():
     assert found.success
     # the slopes are those of a voltage of another secant gain
     assert max(map(max, gain.values())) == pytest.approx(found.max_sensitivity, rel=0.03)
-    nominal = hs.tune(SHARP, T_RAMP, RAMP, **options)
-    assert nominal.objective < found.objective
     quiet = hs.tune(SHARP, T_RAMP, RAMP, variations=OFF, max_voltage_noise=0.3 * found.voltage_noise, **options)
     assert quiet.success
     assert 0.0 < quiet.voltage_noise <= 0.3 * found.voltage_noise
