@@ -153,6 +153,20 @@ def test_selection_puts_what_is_hopeless_or_diverged_on_the_edge():
     assert lower.get_xlabel() == "Number of terms"
 
 
+def test_a_trade_off_shows_the_front_and_the_chosen_one():
+    lag = hs.TransferFunction(num=(1.0,), den=(1.0, 1.0), delay=0.2)
+    found = hs.tune(lag, 0.1 * np.arange(100), np.ones(100))
+    ax = hs.plot.trade_off(found)
+    expected = [(trial.max_sensitivity, trial.objective) for trial in found.trade_off]
+    front = labelled(ax, "best so robust").get_xydata()
+    assert {tuple(point) for point in front.tolist()} <= set(expected)
+    assert 2 < len(front) <= len(expected)
+    assert labelled(ax, "chosen").get_xydata().tolist() == [[found.max_sensitivity, found.objective]]
+    assert [found.max_sensitivity, found.objective] in front.tolist()
+    assert len(labelled(ax, "simulated").get_xydata()) >= len(front)
+    assert (ax.get_xlabel(), ax.get_yscale()) == ("Maximum sensitivity", "log")
+
+
 def test_selection_of_a_real_discovery():
     u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=80)
     found = hs.discover(hs.Record(u=u, y=hs.BoucWen(beta=2.0).response(u)), degree=1)

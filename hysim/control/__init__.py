@@ -16,7 +16,8 @@ from hysim.control._margins import LinearLoop
 from hysim.control._pid import PID
 from hysim.control._to_control import to_control
 from hysim.control._tracking import TrackingController
-from hysim.control._tune import Tuning, tune
+from hysim.control._tune import tune
+from hysim.control._tuning import Trial, Tuning
 
 __all__ = [
     "PID",
@@ -32,6 +33,7 @@ __all__ = [
     "SquareWaveAssessment",
     "StepAssessment",
     "TrackingController",
+    "Trial",
     "Tuning",
     "assess_hysteresis",
     "assess_square_wave",

@@ -14,6 +14,7 @@ from hysim.plot._identifications import identification
 from hysim.plot._records import history, loop, response, traces
 from hysim.plot._style import figure, house_style, panels
 from hysim.plot._svg import save_svg, to_svg
+from hysim.plot._tunings import trade_off
 
 __all__ = [
     "Axes",
@@ -31,5 +32,6 @@ __all__ = [
     "selection",
     "to_svg",
     "traces",
+    "trade_off",
     "widths",
 ]

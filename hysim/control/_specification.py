@@ -1,0 +1,92 @@
+"""What a tuned loop must keep to on every plant that it may meet: linear figures, at both extreme slopes of the law."""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.control._drive import secant_gain, slopes
+from hysim.control._margins import LinearLoop
+from hysim.control._sampled import SampledController
+from hysim.control._tuning import Trial
+from hysim.models.actuator import Actuator
+
+
+class Judgement(NamedTuple):
+    """The largest figures of all plants and slopes; infinite where one loop is unstable."""
+
+    max_sensitivity: float
+    voltage_noise: float
+
+
+class Specification:
+    """Bounds on the maximum sensitivity and on the voltage noise.
+
+    The first plant is the one whose gain and resonances the linear rule looks at.
+    """
+
+    def __init__(
+        self,
+        plants: Sequence[Actuator],
+        cycle: FloatArray,
+        sample_time: float,
+        max_sensitivity: float,
+        max_voltage_noise: float | None,
+    ) -> None:
+        if not max_sensitivity > 1.0:
+            raise ValueError(f"max_sensitivity must be above one, got {max_sensitivity}")
+        if max_voltage_noise is not None and not max_voltage_noise > 0.0:
+            raise ValueError(f"max_voltage_noise must be positive, got {max_voltage_noise}")
+        self.max_sensitivity = max_sensitivity
+        self.max_voltage_noise = math.inf if max_voltage_noise is None else max_voltage_noise
+        self.plants = [_PlantLoops(plant, cycle, sample_time) for plant in plants]
+
+    def judge(self, controller: SampledController) -> Judgement:
+        """How the worst of the loops fares."""
+        sensitivity = 0.0
+        for loop, slope in self._loops():
+            sensitivity = max(sensitivity, loop.max_sensitivity(controller, slope))
+            if sensitivity == math.inf:
+                return Judgement(math.inf, math.inf)
+        return Judgement(sensitivity, max(plant.voltage_noise(controller) for plant in self.plants))
+
+    def excess(self, found: Judgement | Trial) -> float:
+        """By which parts of the bounds they are exceeded, in sum; 0 within."""
+        if found.max_sensitivity == math.inf:
+            return math.inf
+        parts = found.max_sensitivity / self.max_sensitivity, found.voltage_noise / self.max_voltage_noise
+        return sum(max(0.0, part - 1.0) for part in parts)
+
+    def words(self, found: Trial) -> str:
+        """The figures and their bounds."""
+        sensitivity = f"sensitivity {found.max_sensitivity:.2f} of {self.max_sensitivity:g} allowed"
+        if self.max_voltage_noise == math.inf:
+            return sensitivity
+        return f"{sensitivity}, voltage noise {found.voltage_noise:.2g} of {self.max_voltage_noise:g}"
+
+    def margins(self, controller: SampledController) -> tuple[float, float]:
+        """The smallest gain and phase margin."""
+        gains, phases = np.array([loop.margins(controller, slope) for loop, slope in self._loops()]).T
+        return float(gains.min()), float(phases.min())
+
+    def _loops(self) -> Iterator[tuple[LinearLoop, float]]:
+        return ((plant.loop, slope) for plant in self.plants for slope in plant.slopes)
+
+
+class _PlantLoops:
+    """One plant along the reference's cycle: its gain, the extreme slopes of its law, and its linear part."""
+
+    def __init__(self, plant: Actuator, cycle: FloatArray, sample_time: float) -> None:
+        self.gain = secant_gain(plant, cycle)
+        self.secant = self.gain / plant.dc_gain
+        self.slopes = sorted(set(slopes(plant, cycle / self.gain)))
+        self.loop = LinearLoop(plant, sample_time)
+        self.noise = 0.0 if plant.sensor is None else plant.sensor.noise
+        self.volts = 1.0 if plant.amplifier is None else abs(plant.amplifier.gain)
+
+    def voltage_noise(self, controller: SampledController) -> float:
+        if not self.noise:
+            return 0.0
+        return self.volts * self.noise * max(self.loop.noise_gain(controller, slope) for slope in self.slopes)

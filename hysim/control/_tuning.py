@@ -1,0 +1,78 @@
+"""What `tune` found: the controller, how far it can be trusted, and the trade-off that it was chosen from."""
+
+import math
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+from hysim._frozen import frozen
+
+
+class Trial(NamedTuple):
+    """A controller that was tried.
+
+    Parameters
+    ----------
+    controller : PID or TrackingController
+        Its gains, with the limits.
+    max_sensitivity : float
+        Largest ``|1 / (1 + L)|`` of all plants, at either slope of the law; infinite if a loop is unstable.
+    voltage_noise : float
+        Largest rms of the voltage that the sensor's noise causes in these linear loops [unit of u].
+    objective : float
+        Of the simulated loop, in units of the reference's span; infinite if a loop is unstable.
+    """
+
+    controller: Any
+    max_sensitivity: float
+    voltage_noise: float
+    objective: float
+
+
+@frozen
+class Tuning:
+    """What `tune` found.
+
+    Parameters
+    ----------
+    controller : PID or TrackingController
+        The gains, with the limits.
+    objective : float
+        Its value, in units of the reference's span.
+    max_sensitivity : float
+        Largest ``|1 / (1 + L)|`` of all plants, at either slope of the law.
+    gain_margin, phase_margin : float
+        Factor and angle [degrees] by which the loop may change before it is unstable: the smallest of all plants and
+        slopes.
+    voltage_noise : float
+        Largest rms of the voltage that the sensor's noise causes in the linear loops of all plants and slopes, limits
+        apart [unit of u]. What the noise does to the memory comes on top; `close_loop` has it in its conditions.
+    trade_off : tuple of Trial
+        What a smaller maximum sensitivity costs: the trials within the bound on the noise that no other beats in both
+        objective and sensitivity, the most robust first.
+    trials : tuple of Trial
+        Every controller that was simulated.
+    success : bool
+        Whether a controller within the bounds was found.
+    message : str
+        What was searched, how near the bounds are, and at how many samples the voltage was limited.
+    """
+
+    controller: Any
+    objective: float
+    max_sensitivity: float
+    gain_margin: float
+    phase_margin: float
+    voltage_noise: float
+    trade_off: tuple[Trial, ...]
+    trials: tuple[Trial, ...]
+    success: bool
+    message: str
+
+
+def front(trials: Iterable[Trial]) -> tuple[Trial, ...]:
+    """Those that no other beats in both objective and maximum sensitivity, the most robust first."""
+    best: list[Trial] = []
+    for trial in sorted(trials, key=lambda trial: (trial.max_sensitivity, trial.objective)):
+        if trial.objective < (best[-1].objective if best else math.inf):
+            best.append(trial)
+    return tuple(best)
