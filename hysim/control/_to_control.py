@@ -32,8 +32,9 @@ def to_control(plant: Any, sample_time: float | None = None) -> Any:
     Returns
     -------
     control.TransferFunction, control.StateSpace or control.NonlinearIOSystem
-        The state zero is rest at u = 0, or the start of the plant's own simulations. The output of a discrete plant
-        is what is measured just before each new command, which is held until the next.
+        The state zero is rest at u = 0, or where an oscillator's own simulations start; a controller's is rest at
+        u = 0 and the displacement zero, while `close_loop` takes the plant's. The output of a discrete plant is what
+        is measured just before each new command, which is held until the next.
 
     Raises
     ------
