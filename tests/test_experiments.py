@@ -164,3 +164,12 @@ def test_the_readme_quotes_the_compensation():
     assert f"{follow['worst_residual_rms_reduction_percent']:.0f} % where the mode is 10 % off" in readme
     assert f"and {damped['worst_residual_rms_reduction_percent']:.0f} % with a damping loop" in readme
     assert f"keeps {result['parameters_within_5_percent'][0]['median']:.1f} % in the median" in readme
+
+
+def test_a_closed_loop_is_300_times_as_fast_as_in_python_control():
+    folder = EXPERIMENTS[0].parent
+    rows = json.loads((folder / "results" / "closed_loop_speed" / "result.json").read_text())["rows"]
+    _, *peers = [row for row in rows if row["kind"] == "loop"]
+    for row in peers:
+        assert row["times_hysim_q1"] > 300.0
+        assert row["largest_difference_um"] < 1e-11

@@ -134,13 +134,6 @@ def test_the_closed_loops_poles_tell_whether_the_loop_is_stable():
 @pytest.mark.parametrize(
     ("call", "error", "message"),
     [
-        (lambda: hs.to_control(hs.BoucWen()), TypeError, "holds no law, got BoucWen"),
-        (lambda: hs.to_control(hs.BoucWen(), H), TypeError, "holds no law, got BoucWen"),
-        (
-            lambda: hs.to_control(hs.Actuator(hysteresis=hs.BoucWen(), vibration=PLANTS[0]), H),
-            TypeError,
-            "holds no law",
-        ),
         (lambda: hs.to_control(3.0), TypeError, "Actuator, a law or a linear plant, got float"),
         (lambda: hs.to_control(late(PLANTS[0], 0.1)), ValueError, "dead time .* give a sample_time"),
         (lambda: hs.to_control(hs.PID(kd=1.0)), ValueError, "not proper; give a derivative_filter or a sample_time"),

@@ -127,7 +127,7 @@ def close_loop(
     (1.0, 0.01)
     """
     actuator = as_actuator(plant)
-    if not callable(getattr(controller, "compiled", None)) or callable(getattr(controller, "response", None)):
+    if not is_controller(controller):
         raise TypeError(f"controller must be a PID or the like, got {type(controller).__name__}")
     r, times = read_only(reference, "reference", ndim=1), read_only(t, "t", ndim=1)
     sample_time = Record(u=r, y=r, t=times).sample_time
@@ -184,6 +184,11 @@ class RestingPlant:
     def driven(self, u: FloatArray) -> FloatArray:
         """Displacements just before each of the commands `u`, as a loop would measure them."""
         return self.chain.driven(u, self.state)[0].y
+
+
+def is_controller(value: Any) -> bool:
+    """Whether a value gives a compiled step from reference and measurement to a command."""
+    return callable(getattr(value, "compiled", None)) and not callable(getattr(value, "response", None))
 
 
 def as_actuator(plant: Any) -> Actuator:

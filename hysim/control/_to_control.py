@@ -5,53 +5,80 @@ from typing import Any
 
 import numpy as np
 
-from hysim.control._loop import as_actuator
+from hysim.control._io_systems import actuator_system, controller_system, held_oscillator_system, oscillator_system
+from hysim.control._loop import as_actuator, is_controller
 from hysim.control._pid import PID
 from hysim.models.actuator import Actuator
+from hysim.models.oscillator import BoucWenOscillator
 from hysim.models.sampled import sampled
 from hysim.models.transfer_function import TransferFunction
 
 
 def to_control(plant: Any, sample_time: float | None = None) -> Any:
-    """A linear plant or a PID as a system of python-control.
+    """A plant or a controller as a system of python-control.
 
     Parameters
     ----------
-    plant : TransferFunction, StateSpace, Modes, Actuator without a law, or PID
-        An actuator's limits and slewing are left out; its sensor's delay is not. A PID becomes the system from its
-        error to its command, without limits; its derivative acts on the error, which leaves its loop's poles as
-        they are.
+    plant : TransferFunction, StateSpace, Modes, Actuator, law, BoucWenOscillator, PID or TrackingController
+        What is linear becomes a linear system: a plant without a law, of whose actuator limits and slewing are left
+        out but not the sensor's delay; and a PID, from its error to its command without limits, its derivative
+        acting on the error, which leaves its loop's poles as they are. All others become nonlinear systems with
+        their memory in the state: an actuator with its limits and its sensor but without the noise, a
+        `TrackingController` from reference and measurement to the command.
     sample_time : float, optional
-        Of the system's discrete form, exact under the hold [s]; by default it stays continuous.
+        Of the system's discrete form, which is that of `close_loop` [s]. By default the system stays continuous,
+        as linear ones and an oscillator can: laws, actuators with one and a `TrackingController` cannot.
 
     Returns
     -------
-    control.TransferFunction or control.StateSpace
+    control.TransferFunction, control.StateSpace or control.NonlinearIOSystem
+        The state zero is rest at u = 0, or where an oscillator's own simulations start; a controller's is rest at
+        u = 0 and the displacement zero, while `close_loop` takes the plant's. The output of a discrete plant is what
+        is measured just before each new command, which is held until the next.
 
     Raises
     ------
     TypeError
-        If there is no linear system.
+        If the plant is none of these.
     ValueError
-        If a plant with a dead time is to stay continuous, or a pure derivative is, or the sample time is not
-        positive.
+        If a plant with a dead time, with a law, a pure derivative or a `TrackingController` is to stay continuous,
+        or the sample time is not positive.
+
+    Notes
+    -----
+    Inputs and outputs of nonlinear systems are called u and y, and reference, measurement and u. ``Line(slope=1.0)``
+    as an actuator's law keeps the limits of one without a law. A `TrackingController` with preview takes the
+    reference ``controller.ahead(sample_time)`` samples ahead of its time.
 
     Examples
     --------
-    >>> import hysim as hs
+    >>> import control, numpy as np, hysim as hs
     >>> lag = hs.TransferFunction(num=(1.0,), den=(1.0, 1.0))
     >>> loop = hs.to_control(lag) * hs.to_control(hs.PID(kp=4.0))
     >>> round(float((loop / (1 + loop)).dcgain()), 3)
     0.8
+    >>> play = hs.to_control(hs.Play(threshold=0.25, gain=2.0), sample_time=0.1)
+    >>> control.input_output_response(play, 0.1 * np.arange(5), [0.0, 1.0, 0.75, 0.0, 0.0]).outputs.tolist()
+    [0.0, 0.0, 1.5, 1.5, 0.5]
     """
     if sample_time is not None and not 0.0 < sample_time < math.inf:
         raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
     if isinstance(plant, PID):
         return _pid(plant, sample_time)
+    if isinstance(plant, BoucWenOscillator):
+        return oscillator_system(plant) if sample_time is None else held_oscillator_system(plant, sample_time)
+    if is_controller(plant):
+        return controller_system(plant, _given(sample_time, plant))
     actuator = as_actuator(plant)
     if actuator.hysteresis is not None:
-        raise TypeError(f"a linear system holds no law, got {type(actuator.hysteresis).__name__}")
+        return actuator_system(actuator, _given(sample_time, actuator.hysteresis))
     return _continuous(actuator) if sample_time is None else _discrete(actuator, sample_time)
+
+
+def _given(sample_time: float | None, stepped: Any) -> float:
+    if sample_time is None:
+        raise ValueError(f"{type(stepped).__name__} moves from sample to sample: give a sample_time")
+    return sample_time
 
 
 def _continuous(actuator: Actuator) -> Any:

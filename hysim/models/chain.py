@@ -134,6 +134,12 @@ class Chain:
         row, n = self.stage.output, self.stage.rest.size
         return float(row[3:] @ state.x[:n] + row[1] * state.past[2] + row[2] * state.past[1])
 
+    def seen(self, state: ChainState) -> float:
+        """The displacement that the sensor gives just before the next command, without its noise and its quantum."""
+        if self.samples_late:
+            return float(state.readings[1])
+        return self.displacement(state) if self.seen_in < 0 else float(state.readings[-1])
+
     def after_the_command(self, signals: Signals, state: ChainState) -> FloatArray:
         """The displacement just after each new command; `state` is the one before the run."""
         if self.amplifier.dynamic or whole_and_part(self.delay / self.step)[1] or not self.linear.D:

@@ -137,6 +137,12 @@ class BoucWenOscillator:
         """Of small motions about y = 0, z = 0, undamped [rad/s]; that of the size of a negative stiffness."""
         return math.sqrt(abs(self.stiffness + self._coefficients[0] + self.law.gain * self.law.A) / self.mass)
 
+    @property
+    def elastic_force(self) -> np.polynomial.Polynomial:
+        """Force of both springs without the memory, a polynomial of y [N]."""
+        slope, *curve = self._coefficients
+        return np.polynomial.Polynomial([self.law.offset, self.stiffness + slope, *curve])
+
     def response(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
         """Displacement at the samples of `u`.
 
@@ -276,8 +282,7 @@ class BoucWenOscillator:
         law, start = self.law, self._start(0.0)
         recoverable = law.gain / law.A if law.A else 0.0
         in_memory = 0.5 * recoverable * (z - start.z) * (z + start.z)
-        slope, *curve = self._coefficients
-        elastic_force = np.polynomial.Polynomial([law.offset, self.stiffness + slope, *curve])
+        elastic_force = self.elastic_force
         potential = elastic_force.integ()
         stored = 0.5 * self.mass * (velocity**2 - start.velocity**2) + in_memory + potential(y) - potential(start.y)
         signals = {

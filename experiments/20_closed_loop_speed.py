@@ -1,0 +1,210 @@
+"""How fast is a closed loop, and how fast is the same loop inside python-control?
+
+The plant is that of the compensation matrix, a law of Table 1, creep, a mode of 500 Hz and one sample of delay, at
+20 kHz, without noise, and so all-discrete: python-control refuses a sampled controller on a continuous plant. The
+controller is a PI, a state space for python-control. It runs the loop in two forms: with the plant as `hs.to_control`
+gives it, and as one writes it with python-control alone, where the law is a Python function with the exact step of
+n = 1, and creep, mode and delay are one discretised state space. Both peers run a shorter record; the times are for a
+sample, medians of repeats in turns, and the outputs are compared. Beside them stands `close_loop` for 10 s with the
+controllers of the matrix and its noisy sensor, as a user calls it: every loop is run twice, for what the noise does.
+"""
+
+import importlib.util
+import math
+import statistics
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+
+import control
+import numpy as np
+
+import hysim as hs
+from hysim.plot import Figure, figure
+
+sys.path.insert(0, str(Path(__file__).parent))
+from results_folder import write_results
+
+RESULTS = Path(__file__).parent / "results" / "closed_loop_speed"
+H = 1.0 / 20e3  # s
+PI = hs.PID(kp=0.3, ki=1000.0)
+PEERS = ("python-control, plant by to_control", "python-control alone")
+
+Row = dict[str, float | str | None]
+
+
+def matrix() -> ModuleType:
+    """The experiment whose plant and controllers are run here."""
+    path = Path(__file__).parent / "14_compensation_matrix.py"
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def memory_after(law: hs.PolynomialBoucWen, z: float, du: float) -> float:
+    """The memory of n = 1 after a way: with s = z sign(du), ds/d|u| = A - |s| (gamma + beta sign(s))."""
+    direction, left = math.copysign(1.0, du), abs(du)
+    s, slower, faster = direction * z, law.gamma - law.beta, law.gamma + law.beta
+    if s < 0.0:
+        crossing = -math.log1p(slower * s / law.A) / slower if law.A + slower * s > 0.0 else math.inf
+        if left <= crossing:
+            return direction * (s * math.exp(slower * left) + law.A * math.expm1(slower * left) / slower)
+        s, left = 0.0, left - crossing
+    return direction * (s * math.exp(-faster * left) - law.A * math.expm1(-faster * left) / faster)
+
+
+def law_block(law: hs.PolynomialBoucWen) -> control.NonlinearIOSystem:
+    """The law with its last input and its memory as states; the output follows the input at once."""
+    first, second = law.input_coefficients
+
+    def update(t, x, u, params):
+        return np.array([u[0], memory_after(law, x[1], u[0] - x[0])])
+
+    def output(t, x, u, params):
+        z = memory_after(law, x[1], u[0] - x[0])
+        return np.array([law.offset + (first + second * u[0]) * u[0] + law.gain * z])
+
+    return control.nlsys(update, output, inputs="u", outputs="w", states=["v", "z"], dt=H, name="law")
+
+
+def linear_block(plant: hs.Actuator) -> control.StateSpace:
+    """Creep, mode and one sample of delay."""
+    rates = 1.0 / np.array(plant.creep.time_constants)
+    creep = control.ss(-np.diag(rates), rates[:, np.newaxis], [plant.creep.weights], plant.creep.instant_gain)
+    mode = control.ss(control.tf(plant.vibration.num, plant.vibration.den))
+    sampled = control.sample_system(mode * creep, H, method="zoh")
+    n = sampled.nstates
+    A = np.block([[sampled.A, np.zeros((n, 1))], [sampled.C, 0.0]])
+    B, C = np.append(sampled.B, [[0.0]], axis=0), np.eye(1, n + 1, n)
+    return control.ss(A, B, C, 0.0, H, inputs="w", outputs="y", name="linear")
+
+
+def written_alone(plant: hs.Actuator) -> tuple[control.InterconnectedSystem, np.ndarray]:
+    """The loop as python-control's own blocks, and where it rests."""
+    law, linear = law_block(plant.hysteresis), linear_block(plant)
+    level = plant.hysteresis.response([0.0])
+    resting = np.linalg.solve(np.eye(linear.nstates) - linear.A, linear.B @ level)
+    return joined(law, linear), np.concatenate([[0.0, plant.hysteresis.z0], resting, [0.0]])
+
+
+def joined(*plant: control.InputOutputSystem) -> control.InterconnectedSystem:
+    """The plant's blocks with the controller."""
+    controller = control.ss(1.0, 1.0, PI.ki * H, PI.kp, H, inputs="e", outputs="u", name="controller")
+    error = control.summing_junction(["r", "-y"], "e", name="error")
+    return control.interconnect([*plant, controller, error], inputs="r", outputs="y")
+
+
+def reference(samples: int) -> np.ndarray:
+    """A triangle of 20 Hz from 0.1 to 2.5 um."""
+    period = round(0.05 / H)
+    wave = hs.signals.triangle(0.1, 2.5, cycles=-(-samples // period), samples_per_cycle=period)
+    return wave[:samples]
+
+
+def in_turns(works: list[Callable[[], object]], repeats: int) -> np.ndarray:
+    """Times [s], shape (repeats, n_works), the first turn not counted."""
+    times = np.empty((repeats + 1, len(works)))
+    for turn in times:
+        for k, work in enumerate(works):
+            begin = time.perf_counter()
+            work()
+            turn[k] = time.perf_counter() - begin
+    return times[1:]
+
+
+def loops(plant: hs.Actuator, samples: int, fewer: int, repeats: int) -> list[Row]:
+    """One loop by hysim on a long record, and by the peers on a shorter one."""
+    whole, part = reference(samples), reference(fewer)
+    systems = [(joined(hs.to_control(plant, H)), 0.0), written_alone(plant)]
+    own = hs.close_loop(plant, PI, H * np.arange(fewer), part).measurement
+
+    def inside(system: control.InterconnectedSystem, start: np.ndarray | float) -> np.ndarray:
+        return control.input_output_response(system, H * np.arange(fewer), part, start).outputs
+
+    errors = [0.0, *(float(np.abs(inside(*system) - own).max()) for system in systems)]
+    works = [lambda: hs.close_loop(plant, PI, H * np.arange(samples), whole)]
+    works += [lambda system=system: inside(*system) for system in systems]
+    each = 1e6 * in_turns(works, repeats) / [samples, fewer, fewer]
+    return [
+        {
+            "kind": "loop",
+            "name": name,
+            "samples": n,
+            **spread("microseconds_per_sample", each[:, k]),
+            **spread("times_hysim", each[:, k] / each[:, 0]),
+            "largest_difference_um": error,
+        }
+        for k, (name, n, error) in enumerate(zip(("hysim", *PEERS), (samples, fewer, fewer), errors, strict=True))
+    ]
+
+
+def ten_seconds(plant: hs.Actuator, samples: int, repeats: int) -> list[Row]:
+    """`close_loop` with each controller of the matrix, noise included, as a user calls it."""
+    experiment = matrix()
+    r, t = hs.signals.triangle(0.1, 2.5, cycles=10, samples_per_cycle=samples // 10)[:samples], H * np.arange(samples)
+    u0 = experiment.resting_voltage(plant, 0.1)
+    rows = []
+    for name, controller in experiment.controllers(plant).items():
+        times = in_turns([lambda each=controller: hs.close_loop(plant, each, t, r, u0=u0)], repeats)[:, 0]
+        rows.append(
+            {
+                "kind": "controller",
+                "name": name,
+                "samples": samples,
+                **spread("microseconds_per_sample", 1e6 * times / samples),
+                **dict.fromkeys(("times_hysim", "times_hysim_q1", "times_hysim_q3", "largest_difference_um")),
+            }
+        )
+    return rows
+
+
+def spread(name: str, values: np.ndarray) -> dict[str, float]:
+    """Median and quartiles."""
+    low, middle, high = statistics.quantiles(values.tolist(), n=4, method="inclusive")
+    return {name: middle, f"{name}_q1": low, f"{name}_q3": high}
+
+
+def main(smoke: bool = False) -> list[Row]:
+    """Measure, print, and unless it is a smoke run write table, figure and result."""
+    plant = matrix().reference_plant()
+    quiet = replace(plant, sensor=replace(plant.sensor, noise=0.0))
+    rows = loops(quiet, 400, 40, 2) if smoke else loops(quiet, 200_000, 1000, 9)
+    rows += ten_seconds(plant, 400, 2) if smoke else ten_seconds(plant, 200_000, 5)
+    slowest = max((row for row in rows if row["kind"] == "controller"), key=lambda row: row["microseconds_per_sample"])
+    for row in rows:
+        print(f"{row['name']:<36} {row['microseconds_per_sample']:10.3f} us a sample", end="")
+        if row["times_hysim"] is not None:
+            print(f", {row['times_hysim']:8.1f} times hysim, {row['largest_difference_um']:.1e} um apart", end="")
+        print()
+    seconds = {"controller": slowest["name"], "seconds": 0.2 * float(slowest["microseconds_per_sample"])}
+    print("10 s at 20 kHz, the slowest:", seconds)
+    if not smoke:
+        write_results(RESULTS, rows, draw, {"at_least_times": 300, "slowest_10_s": seconds})
+    return rows
+
+
+def draw(rows: list[Row]) -> Figure:
+    """Time of a sample by tool, and of 10 s by controller."""
+    canvas = figure(height=5.0)
+    shown = [row for row in rows if row["kind"] == "loop"], [row for row in rows if row["kind"] == "controller"]
+    axes = canvas.subplots(2, 1, height_ratios=[len(part) for part in shown])
+    scales = (1.0, "Time of one sample, the same loop [us]"), (0.2, "Time of close_loop for 10 s at 20 kHz [s]")
+    for ax, part, (scale, label) in zip(axes, shown, scales, strict=True):
+        names = ("microseconds_per_sample", "microseconds_per_sample_q1", "microseconds_per_sample_q3")
+        middle, low, high = (scale * np.array([float(row[name]) for row in part]) for name in names)
+        places = np.arange(len(part))
+        ax.errorbar(middle, places, xerr=[middle - low, high - middle], fmt="o", markersize=5)
+        ax.set_yticks(places, [str(row["name"]) for row in part])
+        ax.set_ylim(len(part) - 0.5, -0.5)
+        ax.set_xlabel(label)
+    axes[0].set_xscale("log")
+    axes[1].set_xlim(left=0.0)
+    return canvas
+
+
+if __name__ == "__main__":
+    main()

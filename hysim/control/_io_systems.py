@@ -1,0 +1,166 @@
+"""Plants and controllers with a memory as nonlinear systems of python-control.
+
+    x[k+1] = f(x[k], u[k]),    y[k] = g(x[k])
+
+A discrete plant is one sample of hysim's own loop: x is what is carried from sample to sample, its memory among it,
+and y the measurement just before the new command u[k], so that no command reaches the output of its own sample. A
+controller is its own step, whose command answers to the inputs at once. Both are functions of their arguments alone:
+python-control may evaluate them as often and in whatever order it likes.
+
+Every state is counted from rest: x = 0, from which python-control starts, is the system at rest at u = 0.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.errors import SimulationError
+from hysim.kernels.boucwen_inverse import N_OWN
+from hysim.kernels.tracking import BOUC_WEN
+from hysim.models.actuator import Actuator
+from hysim.models.boucwen_inverse import BoucWenInverse
+from hysim.models.chain import Chain, ChainState
+from hysim.models.model import CompiledController
+from hysim.models.oscillator import BoucWenOscillator, OscillatorState
+from hysim.models.sensor import Sensor
+
+Rule = Callable[[float, FloatArray, FloatArray, Any], FloatArray]
+"""Of python-control: time, state, input and parameters to the state's change or to the output."""
+
+_MOTION = ["y", "velocity", "z"]
+
+
+def actuator_system(actuator: Actuator, sample_time: float) -> Any:
+    """The actuator with its limits and its sensor, the noise left out."""
+    if isinstance(actuator.hysteresis, BoucWenInverse):
+        raise TypeError("the inverse of a law is part of a controller: give it as InverseFeedforward(law=...)")
+    sensor = replace(actuator.sensor or Sensor(), noise=0.0)
+    chain = replace(actuator, sensor=sensor).chain(sample_time)
+    rest = chain.rest(0.0)
+    at_rest, names = np.concatenate(_parts(rest)), _names(chain, rest)
+    carried = np.array([bool(name) for name in names])
+
+    def state(x: FloatArray) -> ChainState:
+        here = at_rest.copy()
+        here[carried] += x
+        return _with_parts(rest, here)
+
+    def update(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:
+        signals, end = chain.driven(u, state(x))
+        if signals.lost >= 0:
+            raise SimulationError(f"the plant leaves the finite numbers after t = {t:g}, at the command {u[0]:g}")
+        return np.asarray((np.concatenate(_parts(end)) - at_rest)[carried])
+
+    def output(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:
+        return sensor.measure([chain.seen(state(x))])
+
+    return _system(update, output, ["u"], "y", [name for name in names if name], sample_time)
+
+
+def oscillator_system(plant: BoucWenOscillator) -> Any:
+    """The oscillator as its differential equations."""
+    start, elastic_force = _start(plant), plant.elastic_force
+    law = plant.law
+    weight = 1.0 if plant.excitation == "force" else -plant.mass
+
+    def slope(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:
+        y, velocity, z = (x + start).tolist()
+        force = weight * float(u[0]) - plant.damping * velocity - (float(elastic_force(y)) + law.gain * z)
+        against = law.gamma * velocity + law.beta * abs(velocity) * math.copysign(1.0, z)
+        return np.array([velocity, force / plant.mass, law.A * velocity - abs(z) ** law.n * against])
+
+    def output(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:
+        return (x + start)[:1]
+
+    return _system(slope, output, ["u"], "y", _MOTION, 0)
+
+
+def held_oscillator_system(plant: BoucWenOscillator, sample_time: float) -> Any:
+    """The oscillator from sample to sample, its input held between them."""
+    start, held = _start(plant), replace(plant, hold="zoh")
+
+    def update(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:
+        _, end = held.advance(u, sample_time, OscillatorState(float(u[0]), *(x + start).tolist()))
+        return np.array([end.y, end.velocity, end.z]) - start
+
+    def output(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:
+        return (x + start)[:1]
+
+    return _system(update, output, ["u"], "y", _MOTION, sample_time)
+
+
+def controller_system(controller: Any, sample_time: float) -> Any:
+    """The controller from reference and measurement to the command, within its limits."""
+    compiled = CompiledController(*controller.compiled(sample_time, 0.0, 0.0))
+    at_rest = compiled.state
+    carried = np.isfinite(at_rest)  # what is not finite is written before it is read
+    carried[at_rest.size - _scratch(controller, sample_time) :] = False
+
+    def moved(x: FloatArray, inputs: FloatArray) -> tuple[float, FloatArray]:
+        state = at_rest.copy()
+        state[carried] += x
+        command = compiled.step(compiled.parameters, state, float(inputs[0]), float(inputs[1]))
+        return command, (state - at_rest)[carried]
+
+    def update(t: float, x: FloatArray, inputs: FloatArray, params: Any) -> FloatArray:
+        return moved(x, inputs)[1]
+
+    def output(t: float, x: FloatArray, inputs: FloatArray, params: Any) -> FloatArray:
+        return np.array([moved(x, inputs)[0]])
+
+    names = [f"x[{i}]" for i in range(np.count_nonzero(carried))]
+    return _system(update, output, ["reference", "measurement"], "u", names, sample_time)
+
+
+def _system(update: Rule, output: Rule, inputs: list[str], name: str, states: list[str], sample_time: float) -> Any:
+    import control
+
+    return control.nlsys(update, output, inputs=inputs, outputs=[name], states=states, dt=sample_time)
+
+
+def _start(plant: BoucWenOscillator) -> FloatArray:
+    """Displacement, velocity and memory with which the plant's own simulations begin."""
+    return np.array([*(plant.initial_state or (0.0, 0.0)), plant.law.z0])
+
+
+def _parts(state: ChainState) -> list[FloatArray]:
+    return [state.voltages, state.law.state, state.x, state.past, state.readings]
+
+
+def _with_parts(state: ChainState, values: FloatArray) -> ChainState:
+    """The state with the values of its parts, one behind the other."""
+    ends = np.cumsum([part.size for part in _parts(state)])
+    voltages, memory, x, past, readings = np.split(values, ends[:-1])
+    return state._replace(voltages=voltages, law=state.law._replace(state=memory), x=x, past=past, readings=readings)
+
+
+def _names(chain: Chain, state: ChainState) -> list[str]:
+    """What each element of a chain's state is called, in the order of its parts; nothing where it is scratch."""
+    creeping, order, late = chain.stage.decline.size, chain.stage.rest.size, chain.samples_late
+    memory = _memory_names(chain.hysteresis, state.law.state)
+    return [
+        *(["output", "voltage"] if chain.amplifier.dynamic else ["", ""]),
+        *memory, *[""] * (state.law.state.size - len(memory)),
+        *(f"creep[{i}]" for i in range(creeping)), *(f"vibration[{i}]" for i in range(order - creeping)), *[""] * order,
+        "", *(f"w[-{age}]" for age in range(chain.stage.lag + 2, 0, -1)),
+        "", *(f"y[-{age}]" for age in range(late, 0, -1)), "seen" if chain.seen_in >= 0 else "",
+    ]  # fmt: skip
+
+
+def _memory_names(law: Any, state: FloatArray) -> list[str]:
+    """The state that a law's `advance` hands on is the begin of its compiled one, of which the rest is scratch."""
+    advance = getattr(law, "advance", None)
+    size = len(advance(state[:1])[1]) if callable(advance) else state.size
+    others = ["z"] if size == 2 else [f"z[{i}]" for i in range(size - 1)]
+    return ["v", *others][:size]
+
+
+def _scratch(controller: Any, sample_time: float) -> int:
+    """How many elements at the end of a controller's state are room for the charts of a Bouc-Wen law."""
+    feedforward = getattr(controller, "feedforward", None)
+    inverse = feedforward and feedforward.blocks(sample_time, 0.0)
+    return inverse.law_state.size - N_OWN - 2 if inverse and inverse.kind == BOUC_WEN else 0
