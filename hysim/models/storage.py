@@ -18,7 +18,8 @@ from hysim.models.model import FAMILIES
 
 _MODULES = (
     *("actuator", "amplifier", "boucwen", "creep", "dahl", "duhem", "maxwell_slip", "modes", "oscillator", "play"),
-    *("polynomial_boucwen", "prandtl_ishlinskii", "sensor", "state_space", "static", "transfer_function"),
+    *("generalized_prandtl_ishlinskii", "modified_prandtl_ishlinskii", "polynomial_boucwen", "prandtl_ishlinskii"),
+    *("rate_dependent_prandtl_ishlinskii", "sensor", "state_space", "static", "transfer_function"),
 )
 
 
