@@ -27,6 +27,7 @@ N_HEAD = RIGHT + N_ENVELOPE
 
 _MAX_STEPS = 400
 _ROUNDINGS = 4.0 * 2.0**-52
+_REACHED = 1e-13  # of the terms: what rounding may leave where the bracket has closed
 _FIRST_STEP = 2.0**-10  # where the output stands still; doubled until it moves
 
 
@@ -152,7 +153,7 @@ def inverse_step(parameters: FloatArray, state: FloatArray, y: float) -> float:
             if trial in (behind, beyond):
                 break
         u = trial
-    if not abs(error) <= 1e-9 * (size + abs(y)):
+    if not abs(error) <= _REACHED * (size + abs(y)):
         return math.nan
     step(parameters, state, u)
     return float(u)

@@ -3,11 +3,11 @@
     y = offset + S(sum_i w_i z_i),    S(x) = x + sum_j c_j S_(d_j)(x)
 
 With given weights of the plays the output is affine in those of the dead zones, which are solved for. The plays'
-weights are searched; the plain law's least squares is where the search begins. Plays have their thresholds given, as
-for the plain law, and so have the dead zones: where a record says nothing else, they are spread evenly inside the
-range of x that the plain law has on it. The weight of the dead zone zero is one, because a factor on x could be
-taken for one on S. At the first sample the plays
-stand at zero, or where the record leaves them.
+weights are searched; the search begins with the plain law's least squares, and with a law's own weights where there
+is one. Plays have their thresholds given, as for the plain law, and so have the dead zones: where a record says nothing
+else, they are spread evenly inside the range of x that the plain law has on it. The weight of the dead zone zero is
+one, because a factor on x could be taken for one on S. At the first sample the plays stand at zero, or where a periodic
+record leaves them.
 """
 
 from collections.abc import Mapping
@@ -32,6 +32,7 @@ class DeadZoneStructure:
     plays: ClampStructure
     dead_zones: tuple[float, ...] = ()
     count: int = 5
+    weights: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if isinstance(self.count, bool) or not isinstance(self.count, int):
@@ -59,6 +60,7 @@ class DeadZoneStructure:
         through = tuple(columns[j] for j in np.flatnonzero(zones == 0.0))
         held = freedom.held(defaults | dict.fromkeys(through, 1.0), redundant=tuple((name,) for name in through))
         limits = freedom.limits(defaults, held)
+        starts = [defaults, *([dict(zip(weights, self.weights, strict=True))] if self.weights else [])]
         slope = float(np.ptp(record.y)) / float(np.ptp(record.u)) or 1.0
         sides = {
             name: np.clip(own.bounds.get(name, (-np.inf, np.inf)), -_LARGEST * slope, _LARGEST * slope)
@@ -78,7 +80,7 @@ class DeadZoneStructure:
             coordinates=tuple(box),
             lower=lower,
             upper=upper,
-            starts=np.clip([[defaults[name] / slope for name in box]], lower, upper),
+            starts=np.clip([[point[name] / slope for name in box] for point in starts], lower, upper),
             names=tuple(name for name in defaults if name not in held),
             columns=columns,
             linear=tuple(name for name in columns if name not in held),

@@ -89,10 +89,10 @@ class GeneralizedPrandtlIshlinskii(RateIndependentPlays):
         *,
         plays: int = 10,
         thresholds: npt.ArrayLike = (),
+        one_signed: bool = True,
         envelopes: int = 1,
         left: npt.ArrayLike = (),
         right: npt.ArrayLike = (),
-        one_signed: bool = True,
     ) -> ClampStructure:
         """What `hysim.identify` takes: where the plays are, and what is known of the envelopes.
 

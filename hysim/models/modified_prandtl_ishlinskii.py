@@ -83,8 +83,8 @@ class ModifiedPrandtlIshlinskii(RateIndependentPlays):
         *,
         plays: int = 10,
         thresholds: npt.ArrayLike = (),
-        dead_zones: int | npt.ArrayLike = 5,
         one_signed: bool = True,
+        dead_zones: int | npt.ArrayLike = 5,
     ) -> DeadZoneStructure:
         """What `hysim.identify` takes: where the plays and the dead zones are.
 
@@ -168,7 +168,8 @@ class ModifiedPrandtlIshlinskii(RateIndependentPlays):
     def _structure(self) -> DeadZoneStructure:
         plays = replace(PrandtlIshlinskii.structure(thresholds=self.thresholds), one_signed=self.plays.is_one_signed())
         own = self.dead_zones if self.thresholds else ()
-        return DeadZoneStructure(law=type(self), plays=plays, dead_zones=own, count=0 if own else 5)
+        count = 0 if own else 5
+        return DeadZoneStructure(law=type(self), plays=plays, dead_zones=own, count=count, weights=self.weights)
 
     def _side(self, side: float) -> PrandtlIshlinskii:
         """Plays whose initial curve is the sum of the dead zones from zero upwards, or (side = -1) downwards."""

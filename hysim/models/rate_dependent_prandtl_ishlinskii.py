@@ -205,10 +205,12 @@ class RateDependentPrandtlIshlinskii(ExtendedPlays):
         ----------
         parameters : mapping
             As of `PrandtlIshlinskii.responses`, and ``beta``.
-        u, reduce, target, workers
-            As there.
+        u : array, shape (n_samples,) or (n_sets, n_samples)
+            One input for all sets, or one for each.
         sample_time : float
             Time between two samples [s].
+        reduce, target, workers
+            As there.
 
         Returns
         -------

@@ -18,8 +18,7 @@ from hysim.models.model import FAMILIES
 
 _MODULES = (
     *("actuator", "amplifier", "boucwen", "creep", "dahl", "duhem", "maxwell_slip", "modes", "oscillator", "play"),
-    *("generalized_prandtl_ishlinskii", "modified_prandtl_ishlinskii", "polynomial_boucwen", "prandtl_ishlinskii"),
-    *("rate_dependent_prandtl_ishlinskii", "sensor", "state_space", "static", "transfer_function"),
+    *("polynomial_boucwen", "prandtl_ishlinskii", "sensor", "state_space", "static", "transfer_function"),
 )
 
 
