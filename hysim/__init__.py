@@ -47,6 +47,9 @@ _HOME = {
     "LimitCycle": "hysim.models.limit_cycle",
     "Duhem": "hysim.models.duhem",
     "PrandtlIshlinskii": "hysim.models.prandtl_ishlinskii",
+    "ModifiedPrandtlIshlinskii": "hysim.models.modified_prandtl_ishlinskii",
+    "GeneralizedPrandtlIshlinskii": "hysim.models.generalized_prandtl_ishlinskii",
+    "RateDependentPrandtlIshlinskii": "hysim.models.rate_dependent_prandtl_ishlinskii",
     "Play": "hysim.models.play",
     "Stop": "hysim.models.play",
     "MaxwellSlip": "hysim.models.maxwell_slip",
@@ -112,15 +115,22 @@ if TYPE_CHECKING:
     from hysim.models.dahl import Dahl as Dahl
     from hysim.models.duhem import Duhem as Duhem
     from hysim.models.generalized_boucwen import GeneralizedBoucWen as GeneralizedBoucWen
+    from hysim.models.generalized_prandtl_ishlinskii import (
+        GeneralizedPrandtlIshlinskii as GeneralizedPrandtlIshlinskii,
+    )
     from hysim.models.limit_cycle import LimitCycle as LimitCycle
     from hysim.models.maxwell_slip import MaxwellSlip as MaxwellSlip
     from hysim.models.modes import Modes as Modes
     from hysim.models.modes import mode as mode
+    from hysim.models.modified_prandtl_ishlinskii import ModifiedPrandtlIshlinskii as ModifiedPrandtlIshlinskii
     from hysim.models.oscillator import BoucWenOscillator as BoucWenOscillator
     from hysim.models.play import Play as Play
     from hysim.models.play import Stop as Stop
     from hysim.models.polynomial_boucwen import PolynomialBoucWen as PolynomialBoucWen
     from hysim.models.prandtl_ishlinskii import PrandtlIshlinskii as PrandtlIshlinskii
+    from hysim.models.rate_dependent_prandtl_ishlinskii import (
+        RateDependentPrandtlIshlinskii as RateDependentPrandtlIshlinskii,
+    )
     from hysim.models.sensor import Sensor as Sensor
     from hysim.models.state_space import StateSpace as StateSpace
     from hysim.models.static import Line as Line

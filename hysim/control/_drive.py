@@ -102,7 +102,7 @@ def _behind(actuator: Actuator) -> float:
 def _slope(actuator: Actuator, rise: float) -> float:
     if actuator.hysteresis is None:
         return 1.0
-    low, high = actuator.hysteresis.response(np.array([0.0, rise]))
+    low, high = Actuator(hysteresis=actuator.hysteresis).level(np.array([0.0, rise]))
     return float(high - low) / rise
 
 

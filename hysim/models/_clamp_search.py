@@ -9,6 +9,8 @@ One-signed weights (the default) are those of the classical operator, of one den
 threshold zero turn the loop the way in which the record's own runs. Least squares without it fit noise by
 weights of alternating sign, and such a law may have no inverse.
 
+A law whose plays are pushed by more than the input (`Pushing`) adds what is searched of that.
+
 The memory of many plays is as many unknowns, which no record can tell. With ``initial="rest"``, the default of
 a bank, the plays stand at zero before the first sample. With ``"free"`` the memory is the one that a single
 former turning point leaves behind:
@@ -20,14 +22,15 @@ any other steady cycle is ``"periodic"``: the positions that the record itself l
 has its z0, searched where the first input allows it to be.
 """
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import fields
-from typing import Any
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from hysim._frozen import FloatArray, checked
-from hysim.models._clamps import ClampLaw, check_elements, end_positions, positions
+from hysim.models._clamps import Bank, check_elements, positions
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
@@ -37,14 +40,65 @@ _SHORTEST = 1e-3  # threshold of a single element, in half spans
 _STARTS = (0.1, 0.3, 0.6)
 
 
+class Axis(NamedTuple):
+    """A coordinate beside thresholds and turning point: its box and starts, and the scale by which it is divided."""
+
+    lower: float
+    upper: float
+    starts: tuple[float, ...]
+    scale: float
+
+
+class Pushing(Protocol):
+    """How a law's plays are pushed, as far as its parameters are to be identified."""
+
+    def axes(self, record: Record) -> dict[str, Axis]:
+        """What is searched beside thresholds and turning point, by name."""
+        ...
+
+    def derived(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
+        """What the law has in place of the coordinates, by name, (n_sets,) each."""
+        ...
+
+    def positions(self, parameters: Parameters, thresholds: FloatArray, z0: FloatArray, record: Record) -> FloatArray:
+        """Positions (n_sets, n_samples, n_plays) for thresholds and initial positions (n_sets, n_plays)."""
+        ...
+
+    def arguments(self, parameters: Mapping[str, float]) -> dict[str, Any]:
+        """The constructor's arguments beside those of every bank."""
+        ...
+
+
+@checked
+class ByTheInput:
+    """Plays and stops that the input itself pushes."""
+
+    def axes(self, record: Record) -> dict[str, Axis]:
+        """Nothing."""
+        return {}
+
+    def derived(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
+        """Nothing."""
+        return {}
+
+    def positions(self, parameters: Parameters, thresholds: FloatArray, z0: FloatArray, record: Record) -> FloatArray:
+        """Positions (n_sets, n_samples, n_plays)."""
+        return positions(thresholds, z0, record.u)
+
+    def arguments(self, parameters: Mapping[str, float]) -> dict[str, Any]:
+        """Nothing."""
+        return {}
+
+
 @checked
 class ClampStructure:
     """A bank of plays or stops to be identified; see `PrandtlIshlinskii.structure`."""
 
-    law: type[ClampLaw]
+    law: type[Bank]
     thresholds: tuple[float, ...] = ()
     plays: int = 10
     one_signed: bool = True
+    pushing: Pushing = ByTheInput()
 
     def __post_init__(self) -> None:
         if isinstance(self.plays, bool) or not isinstance(self.plays, int):
@@ -64,29 +118,38 @@ class ClampStructure:
         half = half_span(record)
         thresholds = self._thresholds(half)
         names, columns = self._names("thresholds", thresholds.size), self._columns(thresholds.size)
-        first = float(record.u[0])
-        defaults = {**dict(zip(names, thresholds.tolist(), strict=True)), **dict.fromkeys(columns, 0.0), TURN: first}
+        first, axes = float(record.u[0]), self.pushing.axes(record)
+        defaults = {
+            **dict(zip(names, thresholds.tolist(), strict=True)),
+            **{name: axis.starts[0] for name, axis in axes.items()},
+            **dict.fromkeys(columns, 0.0),
+            TURN: first,
+        }
         given = freedom.held(defaults, at_rest=(TURN,) if freedom.starts_at_rest("rest") else ())
         held = {name: defaults[name] for name in names if name not in freedom.free} | given
         limits = freedom.limits(defaults, held)
         box = dict(zip(names, _gaps(thresholds), strict=True)) | {TURN: (first - 2.0 * half, first + 2.0 * half)}
+        box |= {name: (axis.lower, axis.upper) for name, axis in axes.items()}
         box = {name: limits.get(name, pair) for name, pair in box.items() if name not in held}
-        lower, upper = (np.array([pair[side] for pair in box.values()]) / half for side in (0, 1))
+        scales = np.array([axes[name].scale if name in axes else half for name in box])
+        lower, upper = (np.array([pair[side] for pair in box.values()]) / scales for side in (0, 1))
         constants = {name: value for name, value in held.items() if name not in columns}
 
         def parameters(x: FloatArray) -> dict[str, FloatArray]:
             sets = np.atleast_2d(x)
             fixed = {name: np.full(len(sets), value) for name, value in constants.items()}
-            return fixed | dict(zip(box, half * sets.T, strict=True))
+            searched = fixed | dict(zip(box, (scales * sets).T, strict=True))
+            return searched | self.pushing.derived(searched, record)
 
         linear = tuple(name for name in columns if name not in held)
+        starts = {name: axes[name].starts if name in axes else (defaults[name],) for name in box}
         signs = self._signs(record, dict(zip(self._names("weights", thresholds.size), thresholds, strict=True)))
         own = {name: pair for name, pair in limits.items() if name in columns}
         return SearchSpace(
             coordinates=tuple(box),
             lower=lower,
             upper=upper,
-            starts=_starts({name: defaults[name] / half for name in box}, lower, upper),
+            starts=_starts(starts, half, scales, lower, upper),
             names=tuple(name for name in defaults if name not in held),
             columns=columns,
             linear=linear,
@@ -94,13 +157,13 @@ class ClampStructure:
             parameters=parameters,
             bounds={name: pair for name, pair in signs.items() if name in linear} | own,
             state=(TURN,),
-            screened=0 if set(box) <= {TURN} else 256,
+            screened=0 if set(box) <= {TURN, *axes} else 256,
         )
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """One column for each element, the input where there is a feedthrough, 1 and 0."""
         thresholds, z0 = self._elements(parameters)
-        z = positions(thresholds, z0, record.u)
+        z = self.pushing.positions(parameters, thresholds, z0, record)
         elements: FloatArray = record.u[:, np.newaxis] - z if self.law.stops else z
         ones = np.ones((*z.shape[:2], 1))
         static = [record.u[:, np.newaxis] * ones] if _has_feedthrough(self.law) else []
@@ -112,19 +175,19 @@ class ClampStructure:
         One run through the record wipes out what was before it.
         """
         thresholds, z0 = self._elements(parameters)
-        z = end_positions(thresholds, z0, record.u)
+        z = self.pushing.positions(parameters, thresholds, z0, record)[:, -1]
         shape = np.broadcast_shapes(*map(np.shape, parameters.values()))
         columns = (column.reshape(shape)[()] for column in z.T)
         return {**parameters} | dict(zip(self._names("z0", z.shape[1]), columns, strict=True))
 
-    def assemble(self, parameters: Mapping[str, float]) -> ClampLaw:
+    def assemble(self, parameters: Mapping[str, float]) -> Any:
         """The law with these parameters, one number for each name."""
         thresholds, z0 = self._elements(parameters)
         law: Any = self.law
         weights = [parameters[name] for name in self._names("weights", thresholds.shape[1])]
         others = {name: parameters[name] for name in ("feedthrough", "offset") if name in parameters}
         tuples = {law.thresholds_name: thresholds[0], law.weights_name: weights, "z0": z0[0]}
-        return law(**tuples, **others)  # type: ignore[no-any-return]
+        return law(**tuples, **others, **self.pushing.arguments(parameters))
 
     def _thresholds(self, half: float) -> FloatArray:
         """Those given, or in even steps: from zero for plays; for stops, which are nothing there, up to the end."""
@@ -232,11 +295,14 @@ def _gaps(thresholds: FloatArray) -> list[tuple[float, float]]:
     return [(lower, upper) for lower, upper in gaps.tolist()]
 
 
-def _starts(point: Mapping[str, float], lower: FloatArray, upper: FloatArray) -> FloatArray:
-    """The thresholds as they are given, with every level of the former turning point."""
-    levels = np.linspace(-2.0, 2.0, _LEVELS) if TURN in point else np.zeros(1)
-    rows = [[value + level * (name == TURN) for name, value in point.items()] for level in levels]
-    return np.clip(np.reshape(rows, (len(rows), len(point))), lower, upper)
+def _starts(
+    points: Mapping[str, tuple[float, ...]], half: float, scales: FloatArray, lower: FloatArray, upper: FloatArray
+) -> FloatArray:
+    """Every combination of the points given, with every level of the former turning point."""
+    levels = half * np.linspace(-2.0, 2.0, _LEVELS)
+    choices = [values[0] + levels if name == TURN else np.array(values) for name, values in points.items()]
+    rows = list(itertools.product(*choices))
+    return np.clip(np.reshape(rows, (len(rows), len(points))) / scales, lower, upper)
 
 
 def _runs_clockwise(record: Record) -> bool:

@@ -29,8 +29,8 @@ State = tuple[float, ...]
 """Last input, and the positions of the plays."""
 
 
-class ClampLaw(ABC):
-    """A sum of plays or stops; a law says what its thresholds and weights are called, and adds its fields."""
+class Bank(ABC):
+    """Plays or stops; a law says what its thresholds and weights are called, and adds its fields."""
 
     thresholds_name: ClassVar[str]
     weights_name: ClassVar[str]
@@ -51,6 +51,10 @@ class ClampLaw(ABC):
         names = self.thresholds_name, self.weights_name, "z0"
         thresholds, weights, z0 = (read_only(np.atleast_1d(getattr(self, name)), name) for name in names)
         return thresholds, weights, z0
+
+
+class ClampLaw(Bank):
+    """A sum of plays or stops, and what else can be told of it."""
 
     @property
     def as_plays(self) -> tuple[float, FloatArray, FloatArray]:
@@ -281,42 +285,51 @@ class ClampLaw(ABC):
 
     @classmethod
     def _batch(cls, parameters: Parameters, u: npt.ArrayLike) -> Batch:
-        defaults = {field.name: field.default for field in fields(cls)}  # type: ignore[arg-type]
-        if unknown := set(parameters) - set(defaults):
-            raise TypeError(f"unknown parameter {sorted(unknown)[0]!r}: {cls.__name__} has {', '.join(defaults)}")
-        inputs = np.atleast_2d(read_only(u, "u"))
-        if inputs.ndim != 2:
-            raise ValueError(f"u must have 1 axis or 2, got shape {inputs.shape}")
-        tables = {name: cls._table(name, value) for name, value in {**defaults, **parameters}.items()}
-        lengths = {name: len(table) for name, table in {**tables, "u": inputs}.items() if len(table) != 1}
-        if len(set(lengths.values())) > 1:
-            raise ValueError(f"parameters and inputs must have one length or length 1, got {lengths}")
-        n_sets = next(iter(lengths.values()), 1)
-        n_plays = tables[cls.thresholds_name].shape[1]
-        if tables["z0"].shape[1] == 1:
-            tables["z0"] = np.tile(tables["z0"], n_plays)
-        check_elements(cls, tables[cls.thresholds_name], tables[cls.weights_name], tables["z0"])
-        thresholds, weights, z0 = (
-            read_only(np.broadcast_to(tables[name], (n_sets, n_plays)))
-            for name in (cls.thresholds_name, cls.weights_name, "z0")
-        )
+        tables, inputs = sets_of(cls, parameters, u)
+        thresholds, weights, z0 = (read_only(tables[name]) for name in (cls.thresholds_name, cls.weights_name, "z0"))
+        n_sets = len(z0)
         output = np.zeros((n_sets, kernels.N_OUTPUT))
         output[:, 0] = cls.stops
         for column, name in ((1, "offset"), (2, "feedthrough")):
             output[:, column] = tables[name][:, 0] if name in tables else 0.0
         return _batch(thresholds, weights, read_only(output), z0, inputs)
 
-    @classmethod
-    def _table(cls, name: str, values: npt.ArrayLike) -> FloatArray:
-        """Values over sets, shape (1 or n_sets, 1 or n_plays)."""
-        array = read_only(values, name)
-        is_row = cls.bank and name in (cls.thresholds_name, cls.weights_name, "z0")
-        if array.ndim > (2 if is_row else 1):
-            raise ValueError(f"{name} has too many axes: got shape {array.shape}")
-        return np.atleast_2d(array) if is_row else array.reshape(-1, 1)
+
+def sets_of(cls: type[Bank], parameters: Parameters, u: npt.ArrayLike) -> tuple[dict[str, FloatArray], FloatArray]:
+    """Every argument of the constructor over sets, shape (n_sets, its length), and the inputs (1 or n_sets, n_samples).
+
+    Raises
+    ------
+    TypeError, ValueError
+        As `ClampLaw.responses`.
+    """
+    defaults = {field.name: field.default for field in fields(cls)}  # type: ignore[arg-type]
+    if unknown := set(parameters) - set(defaults):
+        raise TypeError(f"unknown parameter {sorted(unknown)[0]!r}: {cls.__name__} has {', '.join(defaults)}")
+    inputs = np.atleast_2d(read_only(u, "u"))
+    if inputs.ndim != 2:
+        raise ValueError(f"u must have 1 axis or 2, got shape {inputs.shape}")
+    given = {**defaults, **parameters}
+    tables = {name: _table(name, given[name], isinstance(default, tuple)) for name, default in defaults.items()}
+    lengths = {name: len(table) for name, table in {**tables, "u": inputs}.items() if len(table) != 1}
+    if len(set(lengths.values())) > 1:
+        raise ValueError(f"parameters and inputs must have one length or length 1, got {lengths}")
+    if tables["z0"].shape[1] == 1:
+        tables["z0"] = np.tile(tables["z0"], tables[cls.thresholds_name].shape[1])
+    check_elements(cls, tables[cls.thresholds_name], tables[cls.weights_name], tables["z0"])
+    n_sets = next(iter(lengths.values()), 1)
+    return {name: np.broadcast_to(table, (n_sets, table.shape[1])) for name, table in tables.items()}, inputs
 
 
-def check_elements(cls: type[ClampLaw], thresholds: FloatArray, weights: FloatArray, z0: FloatArray) -> None:
+def _table(name: str, values: npt.ArrayLike, is_row: bool) -> FloatArray:
+    """Values over sets, shape (1 or n_sets, 1 or the length of a row)."""
+    array = read_only(values, name)
+    if array.ndim > (2 if is_row else 1):
+        raise ValueError(f"{name} has too many axes: got shape {array.shape}")
+    return np.atleast_2d(array) if is_row else array.reshape(-1, 1)
+
+
+def check_elements(cls: type[Bank], thresholds: FloatArray, weights: FloatArray, z0: FloatArray) -> None:
     """Refuse tables (n_sets, n_plays) that are no elements of a law of the class `cls`."""
     name = cls.thresholds_name
     if not thresholds.shape[1] == weights.shape[1] == z0.shape[1]:

@@ -1,12 +1,13 @@
 """The actuator as a chain of stages:  u -> amplifier -> hysteresis -> creep -> vibration -> y -> sensor.
 
-The hysteresis is a rate-independent law, the amplifier's limits are static, and what is behind the law is linear. A
+The hysteresis is a law, the amplifier's limits are static, and what is behind the law is linear. A
 voltage that is held between samples moves the law at once to a level that is held too: the linear stages are
 discretised together, and the chain is exact. Behind an amplifier that slews or charges a capacitance the voltage is
 exact at the ends of sub-steps, between which the law's output is taken as linear: second order in the sub-step.
 A stage that is left out passes its input on.
 """
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -18,7 +19,7 @@ from hysim.errors import SimulationError
 from hysim.models.amplifier import Amplifier
 from hysim.models.chain import Chain, ChainState, linear_chain
 from hysim.models.creep import Creep
-from hysim.models.model import model, needs_time
+from hysim.models.model import law_at, model, needs_time
 from hysim.models.sampled import Stage, Vibration
 from hysim.models.sensor import Sensor
 from hysim.models.state_space import linear_plant
@@ -26,8 +27,9 @@ from hysim.models.transfer_function import TransferFunction
 
 
 def is_law(value: Any) -> bool:
-    """Whether a value answers to an input and can be stepped in a loop."""
-    return all(callable(getattr(value, name, None)) for name in ("response", "compiled")) and not needs_time(value)
+    """Whether a value answers to an input and can be stepped in a loop, at a sample time if it needs one."""
+    steps = all(callable(getattr(value, name, None)) for name in ("response", "compiled"))
+    return steps and (not needs_time(value) or callable(getattr(value, "at", None)))
 
 
 @model
@@ -39,7 +41,8 @@ class Actuator:
     amplifier : Amplifier, optional
         From the command to the voltage.
     hysteresis : law, optional
-        Rate-independent law from voltage to displacement, such as `BoucWen`.
+        Law from voltage to displacement, such as `BoucWen`. One that depends on the voltage's speed, such as
+        `RateDependentPrandtlIshlinskii`, sees each step as a way that takes the whole sample before it.
     creep : Creep, optional
         Slow growth of the displacement.
     vibration : TransferFunction, StateSpace or Modes, optional
@@ -99,7 +102,7 @@ class Actuator:
     def level(self, u: npt.ArrayLike) -> FloatArray:
         """Output of the law for commands of which each is held until nothing slews, shape (n,)."""
         voltage = self.voltage(read_only(u, "u", ndim=1))
-        return voltage if self.hysteresis is None else np.array(self.hysteresis.response(voltage))
+        return voltage if self.hysteresis is None else np.array(law_at(self.hysteresis, math.inf).response(voltage))
 
     def response(
         self, u: npt.ArrayLike, sample_time: float | None = None, *, substeps: int | None = None
@@ -242,13 +245,15 @@ class Actuator:
 
         The sample time is needed behind an amplifier that takes time.
         """
-        memory = getattr(self.hysteresis, "memory", None)
-        if not callable(memory):
+        if not callable(getattr(self.hysteresis, "memory", None)):
             return None
         inputs = read_only(u, "u", ndim=1)
-        if self.amplifier is None or not self.amplifier.dynamic or not inputs.size:
-            return np.asarray(memory(self.voltage(inputs)))
+        if not self._drive_takes_time and not needs_time(self.hysteresis):
+            return np.asarray(self.hysteresis.memory(self.voltage(inputs)))
         chain = self.chain(sample_time, substeps)
+        memory = law_at(self.hysteresis, chain.step).memory
+        if not self._drive_takes_time or not inputs.size:
+            return np.asarray(memory(self.voltage(inputs)))
         begin = chain.rest(float(inputs[0]))
         signals, _ = chain.driven(inputs, begin)
         return np.asarray(memory(np.append(begin.voltages[1], signals.v))[: -1 : chain.substeps])
@@ -278,8 +283,12 @@ class Actuator:
     @property
     def _moves(self) -> bool:
         """Whether the true displacement depends on time."""
-        slow = self.amplifier is not None and self.amplifier.dynamic
+        slow = self._drive_takes_time or needs_time(self.hysteresis)
         return slow or self.creep is not None or self.vibration is not None
+
+    @property
+    def _drive_takes_time(self) -> bool:
+        return self.amplifier is not None and self.amplifier.dynamic
 
     def _late(self, delay: float) -> "Actuator":
         """The actuator whose true displacement is this one's of some time ago."""

@@ -14,7 +14,7 @@ from hysim.kernels import controllers
 from hysim.kernels import loop as kernels
 from hysim.models.amplifier import Amplifier
 from hysim.models.creep import Creep
-from hysim.models.model import CompiledController, CompiledLaw
+from hysim.models.model import CompiledController, CompiledLaw, law_at
 from hysim.models.sampled import (
     Stage,
     Vibration,
@@ -91,9 +91,9 @@ class Chain:
         if not 0.0 < sample_time < math.inf:
             raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
         self.amplifier, self.sensor = amplifier or Amplifier(), sensor or Sensor()
-        self.hysteresis = Line(slope=1.0) if hysteresis is None else hysteresis
         self.substeps = _substeps(self.amplifier, sample_time, substeps)
         self.step = sample_time / self.substeps
+        self.hysteresis = Line(slope=1.0) if hysteresis is None else law_at(hysteresis, self.step)
         self.delay = 0.0 if vibration is None else vibration.delay
         self.linear = linear_stage(creep, vibration, self.step)
         between = {"linear": self.amplifier.dynamic}

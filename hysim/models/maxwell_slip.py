@@ -175,7 +175,7 @@ class MaxwellSlip(ClampLaw):
 
     def assemble(self, parameters: Mapping[str, float]) -> ClampLaw:
         """The law with these parameters, one number for each name."""
-        return self._structure().assemble(parameters)
+        return self._structure().assemble(parameters)  # type: ignore[no-any-return]
 
     def _structure(self) -> ClampStructure:
         one_signed = all(k >= 0.0 for k in self.stiffness) or all(k <= 0.0 for k in self.stiffness)

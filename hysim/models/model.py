@@ -54,3 +54,9 @@ class Dynamic(Protocol):
 def needs_time(plant: Any) -> TypeGuard[Dynamic]:
     """Whether a plant is `Dynamic`."""
     return bool(getattr(plant, "dynamic", False))
+
+
+def law_at(law: Any, sample_time: float) -> Any:
+    """A law as it is stepped at a sample time [s]: itself, or where it depends on time what its ``at`` gives."""
+    at = getattr(law, "at", None)
+    return law if at is None else at(sample_time)

@@ -116,9 +116,25 @@ class PrandtlIshlinskii(ClampLaw):
             one_signed=one_signed,
         )  # fmt: skip
 
+    def is_one_signed(self) -> bool:
+        """Whether all weights past the threshold zero have one sign."""
+        lagging = [weight for weight, threshold in zip(self.weights, self.thresholds, strict=True) if threshold > 0.0]
+        return all(weight >= 0.0 for weight in lagging) or all(weight <= 0.0 for weight in lagging)
+
     def is_invertible(self) -> bool:
         """Whether r_0 = 0 and the sums w_0 + ... + w_i have one sign: then there is an `inverse`."""
-        return self._refusal() is None
+        return self.refusal() is None
+
+    def refusal(self) -> str | None:
+        """Why there is no `inverse`; None where there is one."""
+        if not self.thresholds or self.thresholds[0] > 0.0:
+            return "the law has no inverse: without a play of threshold zero its output stands still at a reversal"
+        if (wrong := wrong_sum(self.weights)) is None:
+            return None
+        return (
+            f"the law has no inverse: the sums of weights w_0 + ... + w_i must have one sign, but from "
+            f"{self.weights[0]:g} for i = 0 they come to {sum(self.weights[: wrong + 1]):g} for i = {wrong}"
+        )
 
     def inverse(self) -> "PrandtlIshlinskii":
         """The law that gives the input for a wanted output, exactly.
@@ -140,7 +156,7 @@ class PrandtlIshlinskii(ClampLaw):
         >>> law.inverse()
         PrandtlIshlinskii(thresholds=(0.0, 0.5), weights=(1.0, -0.5), offset=0.0, z0=(0.0, 0.0))
         """
-        if (refusal := self._refusal()) is not None:
+        if (refusal := self.refusal()) is not None:
             raise ValueError(refusal)
         r, w, z = self.elements
         z = _consistent(r, z)
@@ -198,26 +214,17 @@ class PrandtlIshlinskii(ClampLaw):
 
     def assemble(self, parameters: Mapping[str, float]) -> ClampLaw:
         """The law with these parameters, one number for each name."""
-        return self._structure().assemble(parameters)
+        return self._structure().assemble(parameters)  # type: ignore[no-any-return]
 
     def _structure(self) -> ClampStructure:
-        return ClampStructure(law=type(self), thresholds=self.thresholds, one_signed=self._is_one_signed())
+        return ClampStructure(law=type(self), thresholds=self.thresholds, one_signed=self.is_one_signed())
 
-    def _is_one_signed(self) -> bool:
-        lagging = [weight for weight, threshold in zip(self.weights, self.thresholds, strict=True) if threshold > 0.0]
-        return all(weight >= 0.0 for weight in lagging) or all(weight <= 0.0 for weight in lagging)
 
-    def _refusal(self) -> str | None:
-        if not self.thresholds or self.thresholds[0] > 0.0:
-            return "the law has no inverse: without a play of threshold zero its output stands still at a reversal"
-        sums = np.cumsum(self.weights)
-        wrong = np.flatnonzero(~(sums * np.sign(sums[0]) > 0.0))
-        if not wrong.size:
-            return None
-        return (
-            f"the law has no inverse: the sums of weights w_0 + ... + w_i must have one sign, but from "
-            f"{sums[0]:g} for i = 0 they come to {sums[wrong[0]]:g} for i = {wrong[0]}"
-        )
+def wrong_sum(weights: npt.ArrayLike) -> int | None:
+    """The first i for which the sum of the weights up to i has not the sign of the first weight, or is zero."""
+    sums = np.cumsum(weights)
+    wrong = np.flatnonzero(~(sums * np.sign(sums[0]) > 0.0))
+    return int(wrong[0]) if wrong.size else None
 
 
 def _consistent(r: FloatArray, z: FloatArray) -> FloatArray:
