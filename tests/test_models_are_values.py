@@ -16,6 +16,8 @@ NUMBERS = [
     (hs.Duhem, {"p": [[1.0]], "q": [[0.0]], "p_abs": [[0.5]], "q_abs": [[0.0, -1.0]]}, "q_abs"),
     (hs.Duhem, {"p": [[1.0]], "q": [[0.0]], "feedthrough": 2.0}, "feedthrough"),
     (hs.PrandtlIshlinskii, {"thresholds": (0.0, 0.5), "weights": (1.0, 2.0)}, "weights"),
+    (hs.Preisach, {"levels": (0.0, 1.0, 2.0), "weights": (1.0, 0.5, 2.0)}, "weights"),
+    (hs.PreisachRelays, {"levels": (0.0, 1.0), "weights": (1.0,)}, "levels"),
     (hs.Play, {"threshold": 0.5}, "threshold"),
     (hs.MaxwellSlip, {"stiffness": (1.0, 2.0), "slips": (0.5, 0.1)}, "stiffness"),
     (hs.Dahl, {"coulomb": 0.7}, "coulomb"),

@@ -17,6 +17,7 @@ FAMILIES = {
     "prandtl-ishlinskii": "PrandtlIshlinskii",
     "maxwell-slip": "MaxwellSlip",
     "dahl": "Dahl",
+    "preisach": "Preisach",
     "line": "Line",
     "single-valued": "SingleValued",
 }
