@@ -101,16 +101,21 @@ def shortened(parameters: FloatArray, x: FloatArray, y: FloatArray, d: int) -> i
 def solved(parameters: FloatArray, start: float, y: float, wanted: float) -> float:
     """Input at which the output, `y` at the extreme `start`, is `wanted`; nan if that is beyond the last level."""
     side = 1 if wanted > y else -1
-    k = interval(parameters, start) + (side + 1) // 2
-    left, before = start, y
-    while 0 <= k < int(parameters[2]):
-        level = parameters[HEAD + k]
-        here = y + 2.0 * everett(parameters, level, start)
-        if side * here >= side * wanted:
-            return float(left + (level - left) * ((wanted - before) / (here - before)))
-        left, before = level, here
-        k += side
-    return math.nan
+    near = interval(parameters, start) + (side + 1) // 2
+    far = int(parameters[2]) - 1 if side > 0 else 0
+    if side * (y + 2.0 * everett(parameters, parameters[HEAD + far], start)) < side * wanted:
+        return math.nan
+    while near != far:  # the nearest level that is far enough
+        middle = (near + far) // 2 if side > 0 else (near + far + 1) // 2
+        if side * (y + 2.0 * everett(parameters, parameters[HEAD + middle], start)) >= side * wanted:
+            far = middle
+        else:
+            near = middle + side
+    level, before = parameters[HEAD + far], parameters[HEAD + far - side]
+    before = max(before, start) if side > 0 else min(before, start)
+    at_level = y + 2.0 * everett(parameters, level, start)
+    at_before = y + 2.0 * everett(parameters, before, start)
+    return float(before + (level - before) * ((wanted - at_before) / (at_level - at_before)))
 
 
 # ---------------------------------------------------------------------------------- path and batch
