@@ -139,6 +139,10 @@ class Preisach(SearchedRelays):
         offset : float
             [unit of y]
 
+        Returns
+        -------
+        Preisach
+
         Raises
         ------
         ValueError
@@ -161,6 +165,10 @@ class Preisach(SearchedRelays):
             ``density(a, b)`` at arrays of upper and lower thresholds [unit of y / unit of u^2].
         offset : float
             [unit of y]
+
+        Returns
+        -------
+        Preisach
 
         Raises
         ------
@@ -200,6 +208,10 @@ class Preisach(SearchedRelays):
             [unit of u]
         law : PrandtlIshlinskii
             Its z0 is not read.
+
+        Returns
+        -------
+        Preisach
 
         Raises
         ------
