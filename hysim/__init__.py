@@ -53,6 +53,8 @@ _HOME = {
     "Play": "hysim.models.play",
     "Stop": "hysim.models.play",
     "MaxwellSlip": "hysim.models.maxwell_slip",
+    "Preisach": "hysim.models.preisach",
+    "PreisachRelays": "hysim.models.preisach",
     "Dahl": "hysim.models.dahl",
     "CustomLaw": "hysim.models.custom",
     "BoucWenOscillator": "hysim.models.oscillator",
@@ -128,6 +130,8 @@ if TYPE_CHECKING:
     from hysim.models.play import Stop as Stop
     from hysim.models.polynomial_boucwen import PolynomialBoucWen as PolynomialBoucWen
     from hysim.models.prandtl_ishlinskii import PrandtlIshlinskii as PrandtlIshlinskii
+    from hysim.models.preisach import Preisach as Preisach
+    from hysim.models.preisach import PreisachRelays as PreisachRelays
     from hysim.models.rate_dependent_prandtl_ishlinskii import (
         RateDependentPrandtlIshlinskii as RateDependentPrandtlIshlinskii,
     )

@@ -124,6 +124,44 @@ def sine(amplitude: float, *, mean: float = 0.0, cycles: int, samples_per_cycle:
     return np.append(np.tile(period, _count("cycles", cycles)), mean)
 
 
+def reversal_curves(low: float, high: float, *, curves: int, samples_per_step: int = 1) -> FloatArray:
+    """First-order reversal curves: up from low to one level after the other, and back each time.
+
+    The levels divide the span evenly, and the highest one is last. With N curves and m samples for the way from
+    one level to the next, sampled evenly, curve k = 1 ... N takes 2 k m samples.
+
+    Parameters
+    ----------
+    low, high : float
+        Extremes, both hit exactly [unit of u].
+    curves : int
+        Number N of levels above low from which a curve falls.
+    samples_per_step : int
+        Samples m from level to level; every level is hit exactly.
+
+    Returns
+    -------
+    array, shape (curves * (curves + 1) * samples_per_step + 1,) [unit of u]
+        Starts and ends at low.
+
+    Raises
+    ------
+    ValueError
+        If high is not above low, or a count is below 1.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> hs.signals.reversal_curves(0.0, 1.0, curves=2).tolist()
+    [0.0, 0.5, 0.0, 0.5, 1.0, 0.5, 0.0]
+    """
+    _span(low, high)
+    m = _count("samples_per_step", samples_per_step)
+    up = np.linspace(low, high, _count("curves", curves) * m + 1)
+    ways = [np.append(up[: k * m], up[k * m : 0 : -1]) for k in range(1, curves + 1)]
+    return np.append(np.concatenate(ways), low)
+
+
 def _span(low: float, high: float) -> float:
     if not (math.isfinite(high - low) and high > low):
         raise ValueError(f"high must be above low, and both finite, got low {low} and high {high}")

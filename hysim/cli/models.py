@@ -20,6 +20,7 @@ FAMILIES = {
     "rate-dependent-prandtl-ishlinskii": "RateDependentPrandtlIshlinskii",
     "maxwell-slip": "MaxwellSlip",
     "dahl": "Dahl",
+    "preisach": "Preisach",
     "line": "Line",
     "single-valued": "SingleValued",
 }

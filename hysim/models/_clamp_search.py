@@ -220,7 +220,7 @@ class ClampStructure:
         """Bounds at zero of the weights that turn the loop."""
         if not self.one_signed:
             return {}
-        side = (0.0, np.inf) if self.law.stops == _runs_clockwise(record) else (-np.inf, 0.0)
+        side = (0.0, np.inf) if self.law.stops == runs_clockwise(record) else (-np.inf, 0.0)
         return {name: side for name, threshold in thresholds.items() if threshold > 0.0}
 
 
@@ -305,7 +305,7 @@ def _starts(
     return np.clip(np.reshape(rows, (len(rows), len(points))) / scales, lower, upper)
 
 
-def _runs_clockwise(record: Record) -> bool:
+def runs_clockwise(record: Record) -> bool:
     """Whether the path of the record, closed by its chord, encloses more area clockwise."""
     return bool(np.dot(record.u, np.roll(record.y, -1)) < np.dot(np.roll(record.u, -1), record.y))
 

@@ -18,7 +18,7 @@ from hysim.models.model import FAMILIES
 
 _MODULES = (
     *("actuator", "amplifier", "boucwen", "creep", "dahl", "duhem", "maxwell_slip", "modes", "oscillator", "play"),
-    *("polynomial_boucwen", "prandtl_ishlinskii", "sensor", "state_space", "static", "transfer_function"),
+    *("polynomial_boucwen", "prandtl_ishlinskii", "preisach", "sensor", "state_space", "static", "transfer_function"),
 )
 
 

@@ -1,0 +1,185 @@
+"""Relays under a staircase: the Preisach law along an input, and backwards.
+
+What the law remembers are the extremes x_0, x_1, ..., x_d of its input that later ones have not wiped out: minima at
+even places, maxima at odd ones, each between the two before it. x_0 is the lowest level, where all relays are
+down, and x_d is the input itself. With the Everett function E(a, b) = -E(b, a)
+
+    y_k = y_(k-1) + 2 E(x_k, x_(k-1))
+
+is the output at x_k. An input that goes on past x_(k-1) wipes out x_(k-1) and x_k; as each y_k depends on the x before
+it alone, a return to an extreme returns to the output there to the bit. E is monotone, so that the same
+holds of the outputs where the law is taken backwards.
+
+`parameters` is (spread, y_0, number of levels, levels, E at the pairs of levels). Spread relays make E linear in each
+argument between the levels; else a relay switches at the two levels themselves, and E is a step.
+"""
+
+import math
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.kernels._compile import inner, kernel
+
+HEAD = 3
+
+
+# ---------------------------------------------------------------------------------- scalar functions
+
+
+@inner
+def interval(parameters: FloatArray, u: float) -> int:
+    """Place of the last level but one that is not above `u`, an input between the levels."""
+    low, high = 0, int(parameters[2]) - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if u >= parameters[HEAD + middle]:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@inner
+def everett(parameters: FloatArray, a: float, b: float) -> float:
+    """E(a, b): half of what the output gains on the way from `b` to `a`, inputs between the levels."""
+    n = int(parameters[2])
+    i, j = interval(parameters, a), interval(parameters, b)
+    p = (a - parameters[HEAD + i]) / (parameters[HEAD + i + 1] - parameters[HEAD + i])
+    q = (b - parameters[HEAD + j]) / (parameters[HEAD + j + 1] - parameters[HEAD + j])
+    if parameters[0] == 0.0:  # the levels that the way has met
+        p, q = (math.floor(p), math.ceil(q)) if a > b else (math.ceil(p), math.floor(q))
+        if (a > b) != (i + p > j + q):
+            return 0.0
+    at = HEAD + n + i * n + j
+    low = (1.0 - q) * parameters[at] + q * parameters[at + 1]
+    high = (1.0 - q) * parameters[at + n] + q * parameters[at + n + 1]
+    return float((1.0 - p) * low + p * high)
+
+
+@inner
+def origin(of: FloatArray, d: int, end: float) -> int:
+    """Place of the extreme from which a way from place `d` to `end`, which differs, has come; -1 if from x_0 or below.
+
+    `of` holds the inputs x or the outputs y.
+    """
+    rising = end > of[d]
+    start = d - 1 if rising == (d % 2 == 1) else d
+    while start > 0 and (end >= of[start - 1] if rising else end <= of[start - 1]):
+        start -= 2
+    return start
+
+
+@inner
+def moved(parameters: FloatArray, x: FloatArray, y: FloatArray, d: int, u: float) -> int:
+    """Place of the last extreme once the input is `u`."""
+    end = min(max(u, parameters[HEAD]), parameters[HEAD + int(parameters[2]) - 1])
+    if end == x[d]:
+        return d
+    start = origin(x, d, end)
+    x[start + 1] = end
+    if start >= 0:
+        y[start + 1] = y[start] + 2.0 * everett(parameters, end, x[start])
+    return start + 1
+
+
+@inner
+def shortened(parameters: FloatArray, x: FloatArray, y: FloatArray, d: int) -> int:
+    """Place of the last extreme without those two neighbours that close the smallest rectangle of the staircase."""
+    least, chosen = math.inf, 1
+    for k in range(1, d - 1):
+        size = abs((x[k] - x[k + 2]) * (x[k + 1] - x[k - 1]))
+        if size < least:
+            least, chosen = size, k
+    for k in range(chosen, d - 1):
+        x[k] = x[k + 2]
+        y[k] = y[k - 1] + 2.0 * everett(parameters, x[k], x[k - 1])
+    return d - 2
+
+
+@inner
+def solved(parameters: FloatArray, start: float, y: float, wanted: float) -> float:
+    """Input at which the output, `y` at the extreme `start`, is `wanted`; nan if that is beyond the last level."""
+    side = 1 if wanted > y else -1
+    near = interval(parameters, start) + (side + 1) // 2
+    far = int(parameters[2]) - 1 if side > 0 else 0
+    if side * (y + 2.0 * everett(parameters, parameters[HEAD + far], start)) < side * wanted:
+        return math.nan
+    while near != far:  # the nearest level that is far enough
+        middle = (near + far) // 2 if side > 0 else (near + far + 1) // 2
+        if side * (y + 2.0 * everett(parameters, parameters[HEAD + middle], start)) >= side * wanted:
+            far = middle
+        else:
+            near = middle + side
+    level, before = parameters[HEAD + far], parameters[HEAD + far - side]
+    before = max(before, start) if side > 0 else min(before, start)
+    at_level = y + 2.0 * everett(parameters, level, start)
+    at_before = y + 2.0 * everett(parameters, before, start)
+    return float(before + (level - before) * ((wanted - at_before) / (at_level - at_before)))
+
+
+# ---------------------------------------------------------------------------------- path and batch
+
+
+@kernel
+def path(parameters: FloatArray, x: FloatArray, y: FloatArray, d: int, u: FloatArray, out: FloatArray) -> int:
+    """Outputs at the samples of `u` into `out`, and the place of the last extreme.
+
+    `x` and `y` hold the extremes and outputs up to place `d`, and have room for one more each sample.
+    """
+    for k in range(u.size):
+        d = moved(parameters, x, y, d, u[k])
+        out[k] = y[d]
+    return d
+
+
+@kernel
+def batch(parameters: FloatArray, z0: FloatArray, u: FloatArray, out: FloatArray) -> None:
+    """Outputs of many laws into `out`, shape (n_sets, n_samples).
+
+    `parameters` is (n_sets, n_parameters), `z0`, the inputs before the first sample, is (n_sets, n_past), `u` is
+    (1, n_samples) or (n_sets, n_samples).
+    """
+    room = 1 + z0.shape[1] + u.shape[1]
+    x, y, past = np.empty(room), np.empty(room), np.empty(z0.shape[1])
+    for i in range(out.shape[0]):
+        x[0], y[0] = parameters[i, HEAD], parameters[i, 1]
+        d = path(parameters[i], x, y, 0, z0[i], past)
+        path(parameters[i], x, y, d, u[min(i, u.shape[0] - 1)], out[i])
+
+
+@kernel
+def inverse(parameters: FloatArray, x: FloatArray, y: FloatArray, d: int, wanted: FloatArray, out: FloatArray) -> int:
+    """Inputs at which the output is `wanted` into `out`: the first sample that is out of reach, or -1.
+
+    The law must rise with its input. `x`, `y` and `d` are as in `path`.
+    """
+    for k in range(wanted.size):
+        if wanted[k] != y[d]:
+            start = origin(y, d, wanted[k])
+            if start < 0 and wanted[k] < y[0]:
+                return k
+            d = start + 1
+            if start >= 0:
+                x[d] = solved(parameters, x[start], y[start], wanted[k])
+            y[d] = wanted[k]
+        out[k] = x[d]
+        if math.isnan(x[d]):
+            return k
+    return -1
+
+
+# ---------------------------------------------------------------------------------- one sample at a time
+
+
+@kernel
+def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
+    """Output at the next input `u`; `state` is (last u, d, x, y), where x and y are equally long, and moves along."""
+    room = (state.size - 2) // 2
+    x, y = state[2 : 2 + room], state[2 + room :]
+    d = int(state[1])
+    if d + 1 == room:
+        d = shortened(parameters, x, y, d)
+    d = moved(parameters, x, y, d, u)
+    state[0], state[1] = u, d
+    return float(y[d])

@@ -1,0 +1,515 @@
+"""Relays under a staircase: closed forms, the properties that define the family, the exact inverse, reversal curves."""
+
+import dataclasses
+import pickle
+
+import numba
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import short_inputs
+
+import hysim as hs
+from hysim.kernels.stepping import drive
+from hysim.models.search_space import Freedom
+
+FAMILIES = [hs.Preisach, hs.PreisachRelays]
+LEVELS = (-1.0, -0.6, -0.1, 0.1, 0.45, 1.0)
+WEIGHTS = tuple(np.random.default_rng(5).uniform(0.1, 1.0, 15).tolist())
+ROUNDING = 1e-13  # a few hundred roundings of numbers of order one
+
+
+def a_law(family, **others):
+    return family(levels=LEVELS, weights=WEIGHTS, offset=0.3, **others)
+
+
+@st.composite
+def laws(draw, family=hs.Preisach, lowest: float = 0.05):
+    """One to six intervals over -1 ... 1, the weights of one sign, at least `lowest` on the diagonal."""
+    lengths = np.array(draw(st.lists(st.floats(0.2, 1.0), min_size=1, max_size=6)))
+    levels = -1.0 + 2.0 * np.cumsum([0.0, *lengths]) / lengths.sum()
+    rows, columns = np.tril_indices(lengths.size)
+    weights = np.array(draw(st.lists(st.floats(0.0, 1.0), min_size=rows.size, max_size=rows.size)))
+    weights[rows == columns] += lowest
+    sign = draw(st.sampled_from([1.0, -1.0]))
+    past = draw(short_inputs(1.0))
+    return family(levels=levels, weights=sign * weights, offset=draw(st.floats(-1.0, 1.0)), z0=past)
+
+
+def relay_bank(law, u) -> np.ndarray:
+    """The definition, one relay after the other."""
+    rows, columns = np.tril_indices(len(law.levels) - 1)
+    a, b = np.array(law.levels)[rows + 1], np.array(law.levels)[columns]
+    state, y = -np.ones(a.size), []
+    for value in [*law.z0, *u]:
+        state = np.where(value >= a, 1.0, np.where(value <= b, -1.0, state))
+        y.append(law.offset + np.array(law.weights) @ state)
+    return np.array(y[len(law.z0) :])
+
+
+def fine_bank(law, u, shares: int = 60) -> np.ndarray:
+    """The spread relays as many single ones, each in the middle of its part of two intervals."""
+    middles = (np.arange(shares) + 0.5) / shares
+    lengths, y = np.diff(law.levels), np.full(len(u), law.offset)
+    for weight, i, j in zip(law.weights, *np.tril_indices(lengths.size), strict=True):
+        a = law.levels[i] + lengths[i] * middles
+        b = a if i == j else (law.levels[j] + lengths[j] * middles)[:, np.newaxis]
+        state = -np.ones(np.broadcast_shapes(np.shape(a), np.shape(b)))
+        for k, value in enumerate([*law.z0, *u]):
+            state = np.where(value >= a, 1.0, np.where(value <= b, -1.0, state))
+            if k >= len(law.z0):
+                y[k - len(law.z0)] += weight * state.mean()
+    return y
+
+
+# ---------------------------------------------------------------------------------- closed forms
+
+
+def test_relays_go_up_and_down_at_their_own_levels():
+    law = hs.PreisachRelays(levels=(0.0, 1.0), weights=(2.0,), offset=1.0)
+    assert law.response([0.0, 0.999, 1.0, 0.001, 0.0, 0.5]).tolist() == [-1.0, -1.0, 3.0, 3.0, -1.0, -1.0]
+
+
+def test_a_constant_density_has_the_area_of_its_triangles_as_everett_function():
+    levels = np.linspace(-1.0, 1.0, 9)
+    law = hs.Preisach.from_density(levels, lambda a, b: np.ones_like(a))
+    area = 0.5 * np.maximum(levels[:, np.newaxis] - levels, 0.0) ** 2
+    assert law.everett == pytest.approx(area, abs=1e-14)
+    turns = levels[[0, 7, 2, 5, 3]]
+    exact = np.cumsum([-area[-1, 0], *(np.sign(np.diff(turns)) * np.diff(turns) ** 2)])
+    assert law.response(turns) == pytest.approx(exact, abs=1e-14)
+
+
+def test_a_density_is_integrated_over_its_part_of_the_diagonal():
+    """3 a^2 b over the triangle below (1, 1): the integral of 3 a^2 a^2 / 2 is 3/10; over the square beside it 7/2."""
+    law = hs.Preisach.from_density((0.0, 1.0, 2.0), lambda a, b: 3.0 * a**2 * b)
+    assert law.weights[:2] == pytest.approx((0.3, 3.5), abs=1e-14)
+
+
+@given(st.lists(st.integers(0, 16), min_size=2, max_size=30), st.integers(0, 1000))
+def test_plays_between_the_levels_of_their_thresholds(places, seed):
+    rng = np.random.default_rng(seed)
+    levels = np.linspace(-4.0, 4.0, 17)
+    plays = hs.PrandtlIshlinskii(
+        thresholds=0.25 * np.arange(4), weights=rng.uniform(0.1, 1.0, 4), offset=0.2, z0=levels[0] + 0.25 * np.arange(4)
+    )
+    u = np.append(levels[0], levels[places])
+    assert hs.Preisach.from_plays(levels, plays).response(u) == pytest.approx(plays.response(u), abs=ROUNDING)
+
+
+def test_fine_levels_follow_plays_everywhere_to_second_order():
+    plays = hs.PrandtlIshlinskii(thresholds=(0.0, 0.3), weights=(1.0, 0.5))
+    u = np.append(-1.0, np.sin(np.linspace(0.0, 20.0, 300)) * np.linspace(1.0, 0.2, 300))
+    errors = [
+        np.abs(hs.Preisach.from_plays(np.linspace(-1.0, 1.0, n + 1), plays).response(u) - plays.response(u)).max()
+        for n in (50, 200)
+    ]
+    assert errors[1] < 0.3 * errors[0]  # the kink of E at a - b = 2 r is cut off within one interval
+    assert errors[1] < 0.01
+
+
+# ---------------------------------------------------------------------------------- the definition
+
+
+@given(laws(hs.PreisachRelays), short_inputs(1.5))
+def test_relays_are_the_literal_bank(law, u):
+    assert law.response(u) == pytest.approx(relay_bank(law, u), abs=ROUNDING)
+
+
+@given(laws(hs.PreisachRelays), st.lists(st.integers(0, 6), min_size=1, max_size=20))
+def test_relays_switch_at_the_level_itself(law, places):
+    u = np.array(law.levels)[np.minimum(places, len(law.levels) - 1)]
+    assert law.response(u) == pytest.approx(relay_bank(law, u), abs=ROUNDING)
+
+
+@given(laws(hs.PreisachRelays), st.lists(st.integers(0, 6), min_size=1, max_size=20))
+def test_where_the_input_stops_at_levels_both_laws_agree(law, places):
+    relays = dataclasses.replace(law, z0=())
+    spread = hs.Preisach(levels=law.levels, weights=law.weights, offset=law.offset)
+    u = np.array(law.levels)[np.minimum(places, len(law.levels) - 1)]
+    assert spread.response(u) == pytest.approx(relays.response(u), abs=ROUNDING)
+
+
+def test_spread_relays_are_many_single_ones():
+    law = a_law(hs.Preisach, z0=(0.7, -0.3))
+    u = np.array([0.2, 0.9, -0.5, 0.33, -0.2, 0.28, -0.9, 0.5])
+    # the staircase cuts off a part of two intervals along its edge: half a share of each weight that is cut
+    assert law.response(u) == pytest.approx(fine_bank(law, u), abs=sum(WEIGHTS) / 60)
+
+
+@given(laws())
+def test_the_everett_function_is_half_of_a_fall(law):
+    levels = np.array(law.levels)
+    for m in range(1, levels.size):
+        y = dataclasses.replace(law, z0=()).response([levels[0], levels[m], *levels[m::-1]])
+        assert 0.5 * (y[1] - y[2:]) == pytest.approx(law.everett[m, m::-1], abs=ROUNDING)
+    again = hs.Preisach.from_everett(levels, law.everett, offset=law.offset)
+    assert again.weights == pytest.approx(law.weights, abs=ROUNDING)
+
+
+# ---------------------------------------------------------------------------------- the operators' properties
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@given(u=short_inputs(1.2), extra=st.integers(1, 4))
+def test_samples_on_the_way_change_nothing_to_the_bit(family, u, extra):
+    fine = np.append(np.linspace(u[:-1], u[1:], extra + 1, endpoint=False, axis=1).ravel(), u[-1])
+    law = a_law(family)
+    assert np.array_equal(law.response(fine)[:: extra + 1], law.response(u))
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@given(past=short_inputs(0.5), loop=short_inputs(0.4))
+def test_a_return_to_an_extreme_wipes_out_what_came_since_to_the_bit(family, past, loop):
+    law = a_law(family)
+    with_loop, state = law.advance([*past, -0.5, 0.5, *loop, 0.5])
+    without, other = law.advance([*past, -0.5, 0.5])
+    assert with_loop[-1] == without[-1]
+    assert state == other
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@given(first=short_inputs(1.0), second=short_inputs(1.0))
+def test_loops_between_the_same_inputs_are_congruent(family, first, second):
+    law, loop = a_law(family), np.array([0.3, -0.2, 0.1, -0.1, 0.3])
+    a, b = (law.response(np.concatenate([past, [0.3, -0.2], loop]))[-loop.size :] for past in (first, second))
+    assert a - a[0] == pytest.approx(b - b[0], abs=ROUNDING)
+
+
+@given(short_inputs(1.0), st.integers(1, 5), st.integers(0, 1000))
+def test_a_symmetric_density_is_odd(u, n, seed):
+    """w(a, b) = w(-b, -a): from all relays down, the mirrored input from all up has the mirrored output."""
+    weights = np.random.default_rng(seed).uniform(size=(n, n))
+    weights = np.tril(weights + weights[::-1, ::-1].T)
+    law = hs.Preisach(levels=np.linspace(-1.0, 1.0, n + 1), weights=weights[np.tril_indices(n)])
+    up = dataclasses.replace(law, z0=(1.0,))
+    assert law.response(u) == pytest.approx(-up.response(-u), abs=ROUNDING)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@given(u=short_inputs(1.2), data=st.data())
+def test_cut_and_continue_gives_the_same_bits(family, u, data):
+    law = a_law(family, z0=(0.8, -0.4))
+    cut = data.draw(st.integers(0, u.size))
+    head, state = law.advance(u[:cut]) if cut else (np.empty(0), None)
+    tail, end = law.advance(u[cut:], state)
+    whole, whole_end = law.advance(u)
+    assert np.array_equal(np.concatenate([head, tail]), whole)
+    assert end == whole_end
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@given(u=short_inputs(1.2))
+def test_stepping_one_sample_at_a_time_gives_the_same_bits(family, u):
+    law = a_law(family, z0=(0.8, -0.4))
+    compiled, y = law.compiled(u0=u[0]), np.empty(u.size)
+    assert drive(compiled.step, compiled.parameters, compiled.state, u, y) == -1
+    assert np.array_equal(y, law.response(u))
+    assert compiled.state[0] == u[-1]
+
+
+def test_a_compiled_loop_forgets_the_smallest_of_too_many_extremes():
+    """A ringing of 1500 half cycles: an extreme that is forgotten lies within the next one's reach."""
+    law = a_law(hs.Preisach)
+    u = np.array([1.0, -1.0] * 750) * np.linspace(0.95, 0.05, 1500)
+    u = np.concatenate([u, u[::-1][:1200]])
+    compiled, y = law.compiled(u0=u[0]), np.empty(u.size)
+    assert drive(compiled.step, compiled.parameters, compiled.state, u, y) == -1
+    step = 0.9 / 1499  # of the amplitude from one extreme to the next: two of them and the densest relays bound it
+    densest = max(WEIGHTS) / np.diff(LEVELS).min() ** 2
+    assert 0.0 < np.abs(y - law.response(u)).max() < 500 * 2.0 * densest * (4.0 * step) ** 2
+
+
+@given(short_inputs(1.2), st.integers(0, 1000), st.booleans())
+def test_batch_is_the_path_to_the_bit(u, seed, own_inputs):
+    rng = np.random.default_rng(seed)
+    sets = {
+        "levels": np.cumsum(rng.uniform(0.1, 0.6, (3, 4)), axis=1) - 0.8,
+        "weights": rng.normal(size=(3, 6)),
+        "offset": rng.normal(size=3),
+        "z0": rng.normal(size=(3, 2)),
+    }
+    inputs = u * np.array([[1.0], [0.7], [-0.3]]) if own_inputs else u
+    for family in FAMILIES:
+        rows = family.responses(sets, inputs, workers=2)
+        for k in range(3):
+            law = family(**{name: values[k] for name, values in sets.items()})
+            assert np.array_equal(rows[k], law.response(inputs[k] if own_inputs else u))
+
+
+def test_reductions_are_the_measures_of_the_rows():
+    weights = np.random.default_rng(0).uniform(0.1, 1.0, (300, 15))
+    u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=60)
+    rows = hs.Preisach.responses({"levels": LEVELS, "weights": weights}, u)
+    areas = hs.Preisach.responses({"levels": LEVELS, "weights": weights}, u, reduce="area")
+    assert areas[7] == hs.loop_metrics(u, rows[7]).area
+    assert hs.loop_metrics(u, rows[7]).orientation == "counterclockwise"
+
+
+def test_beyond_the_levels_the_law_is_saturated():
+    law = a_law(hs.Preisach)
+    assert law.response([-9.0, 9.0]) == pytest.approx([0.3 - sum(WEIGHTS), 0.3 + sum(WEIGHTS)], abs=ROUNDING)
+    assert law.response([-9.0, 9.0, 1.0, 0.2])[-1] == law.response([-1.0, 1.0, 0.2])[-1]
+
+
+@given(short_inputs(1.0), st.integers(0, 1000))
+def test_the_staircase_divides_the_relays_that_are_up_from_those_that_are_down(u, seed):
+    b, a = np.sort(np.random.default_rng(seed).uniform(-1.0, 1.0, (2, 50)), axis=0)
+    up = np.zeros(50, dtype=bool)
+    for value in u:
+        up = np.where(value >= a, True, np.where(value <= b, False, up))
+    corners = a_law(hs.Preisach).staircase(u)
+    below = (a <= corners[:, :1]) & (b < corners[:, 1:])
+    assert np.array_equal(below.any(axis=0), up)
+
+
+# ---------------------------------------------------------------------------------- the inverse
+
+
+@given(laws(), short_inputs(1.0))
+def test_the_inverse_undoes_the_response(law, u):
+    y = law.response(u)
+    found = law.inverse_response(y)
+    assert np.abs(found - u).max() <= 1e-11 * 2.0  # of the span of the levels; the slope is above 0.05
+    assert np.abs(law.response(found) - y).max() <= 1e-11 * np.abs(y).max()
+    assert (np.diff(found)[np.diff(y) == 0.0] == 0.0).all()
+
+
+@given(laws(), short_inputs(1.0), short_inputs(1.0))
+def test_the_inverse_continues_from_a_state(law, past, u):
+    _, state = law.advance(past)
+    y, _ = law.advance(u, state)
+    assert np.abs(law.inverse_response(y, state=state) - u).max() <= 2e-11
+    rested = law.response([0.5, *u])[1:]
+    assert np.abs(law.inverse_response(rested, u0=0.5) - u).max() <= 2e-11
+
+
+def test_a_long_record_of_plateaus_and_small_steps_both_ways():
+    rng = np.random.default_rng(1)
+    n = 100 if numba.config.DISABLE_JIT else 10_000
+    steps = rng.normal(size=n) * rng.choice([0.0, 1e-9, 1e-3, 0.1, 1.0], size=n)
+    u = np.clip(np.sin(np.cumsum(steps)), -0.999, 0.999)
+    law = a_law(hs.Preisach)
+    y = law.response(u)
+    found = law.inverse_response(y)
+    assert np.abs(found - u).max() < 1e-11
+    assert np.abs(law.response(found) - y).max() < 1e-11
+
+
+def test_both_ends_of_the_levels_are_reached():
+    law = a_law(hs.Preisach)
+    u = [-1.0, 1.0, -1.0, 0.3, 1.0]
+    assert law.inverse_response(law.response(u)) == pytest.approx(u, abs=ROUNDING)
+
+
+@given(laws(), short_inputs(1.0))
+def test_slopes_lie_between_their_bounds(law, u):
+    fine = np.append(np.linspace(u[:-1], u[1:], 7, endpoint=False, axis=1).ravel(), u[-1])
+    steps, low, high = np.diff(fine), *law.slope_bounds()
+    moves = np.abs(steps) > 1e-6
+    slopes = np.diff(law.response(fine))[moves] / steps[moves]
+    assert ((slopes >= low - 1e-8) & (slopes <= high + 1e-8)).all()  # rounding of order 1e-15 over 1e-6
+    assert law.is_invertible()
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "message"),
+    [
+        (lambda: hs.Preisach(levels=(0, 1), weights=(0,)).inverse_response([0.0]), ValueError, "from 0 to 0"),
+        (
+            lambda: hs.Preisach(levels=(0, 1, 2), weights=(1, -2, 1)).inverse_response([0.0]),
+            ValueError,
+            "it goes from -2 to 2",
+        ),
+        (lambda: hs.Preisach().inverse_response([0.0]), ValueError, "slope must have one sign"),
+        (
+            lambda: hs.Preisach(levels=(0, 1), weights=(2,), offset=1.0).inverse_response([0.0, 3.5]),
+            hs.SimulationError,
+            r"sample 1 \(y = 3.5\): it saturates at -1 and 3",
+        ),
+        (
+            lambda: hs.Preisach(levels=(0, 1), weights=(-2,), offset=1.0).inverse_response([-1.5]),
+            hs.SimulationError,
+            r"sample 0 \(y = -1.5\): it saturates at -1 and 3",
+        ),
+        (lambda: a_law(hs.Preisach).inverse_response([0.0], u0=0.0, state=(0.0,)), ValueError, "not both"),
+        (lambda: hs.Preisach(levels=(0, 1, 2), weights=(1, 2)), ValueError, "N \\(N \\+ 1\\) / 2 numbers, got 3 and 2"),
+        (lambda: hs.Preisach(levels=(0,)), ValueError, "got 1 and 0"),
+        (lambda: hs.Preisach(levels=(0, 1, 1), weights=(1, 1, 1)), ValueError, "levels must increase"),
+        (lambda: hs.Preisach.from_everett((0, 1), [[0.0]]), ValueError, "shape"),
+        (lambda: hs.Preisach.responses({"relays": 1.0}, [0.0]), TypeError, "unknown parameter 'relays'"),
+        (lambda: hs.Preisach.responses({"offset": [[1.0]]}, [0.0]), ValueError, "too many axes"),
+        (lambda: hs.Preisach.responses({"offset": [1, 2], "z0": [[1]] * 3}, [0.0]), ValueError, "one length"),
+        (lambda: hs.Preisach.structure(intervals=0), ValueError, "at least 1"),
+        (lambda: hs.Preisach.structure(intervals=2.0), TypeError, "intervals must be an int"),
+        (lambda: hs.Preisach.structure(levels=(1, 0)), ValueError, "increase"),
+        (lambda: hs.identify(hs.Preisach, hs.Record(u=[1, 1], y=[0, 1])), ValueError, "the input is constant"),
+        (
+            lambda: hs.identify(hs.Preisach, hs.datasets.table1(), free="levels[1]"),
+            ValueError,
+            r"'levels\[1\]' is not searched",
+        ),
+        (
+            lambda: hs.Preisach.from_reversal_curves(hs.Record(u=[0, 1], y=[0, 1])),
+            ValueError,
+            "never falls",
+        ),
+        (
+            lambda: hs.Preisach.from_reversal_curves(hs.Record(u=[0, 1, 0.5, 1, 0], y=np.zeros(5))),
+            ValueError,
+            "from 1 must end at the lowest input 0, it ends at 0.5",
+        ),
+    ],
+)
+def test_wrong_arguments_are_named(call, error, message):
+    with pytest.raises(error, match=message):
+        call()
+
+
+# ---------------------------------------------------------------------------------- from data
+
+
+def test_the_reversal_curves_turn_at_every_level():
+    u = hs.signals.reversal_curves(-1.0, 2.0, curves=3, samples_per_step=2)
+    assert u.size == 3 * 4 * 2 + 1
+    assert u[[2, 8, 18]].tolist() == [0.0, 1.0, 2.0]
+    assert np.abs(np.diff(u)) == pytest.approx(0.5)
+    for wrong in ({"curves": 0}, {"curves": 1, "samples_per_step": 0}):
+        with pytest.raises(ValueError, match="at least 1"):
+            hs.signals.reversal_curves(0.0, 1.0, **wrong)
+
+
+@given(laws(), short_inputs(1.0), st.integers(1, 3))
+def test_reversal_curves_tell_the_whole_law(law, u, samples):
+    """Measured at the law's own levels; any other input is then predicted."""
+    levels = np.array(law.levels)
+    k = hs.signals.reversal_curves(0.0, levels.size - 1.0, curves=levels.size - 1, samples_per_step=samples)
+    curves = np.interp(k, np.arange(levels.size), levels)
+    start = dataclasses.replace(law, z0=())
+    found = hs.Preisach.from_reversal_curves(hs.Record(u=curves, y=start.response(curves)))
+    assert found.weights == pytest.approx(law.weights, abs=ROUNDING)
+    assert found.response(u) == pytest.approx(start.response(u), abs=ROUNDING)
+
+
+def test_coarse_reversal_curves_predict_a_random_input_of_a_smooth_law():
+    """A Lorentzian density; E is interpolated, with an error of the second order in the distance of the levels."""
+
+    def density(a, b):
+        return 1.0 / ((1.0 + (a - b - 0.4) ** 2 / 0.1) * (1.0 + (a + b) ** 2))
+
+    truth = hs.Preisach.from_density(np.linspace(-1.0, 1.0, 81), density)
+    u = np.append(-1.0, np.random.default_rng(3).uniform(-1.0, 1.0, 200))
+    y = truth.response(u)
+    errors = []
+    for curves in (5, 10, 20):
+        sweep = hs.signals.reversal_curves(-1.0, 1.0, curves=curves, samples_per_step=4)
+        found = hs.Preisach.from_reversal_curves(hs.Record(u=sweep, y=truth.response(sweep)))
+        errors.append(np.abs(found.response(u) - y).max() / np.ptp(y))
+    assert errors[0] < 0.05
+    assert errors[2] < 0.3 * errors[1] < 0.1 * errors[0]
+
+
+def test_weights_come_back_from_a_record_with_inner_loops():
+    law = a_law(hs.Preisach)
+    u = np.interp(hs.signals.reversal_curves(0.0, 5.0, curves=5, samples_per_step=4), np.arange(6), LEVELS)
+    fit = hs.identify(hs.Preisach.structure(levels=LEVELS), hs.Record(u=u, y=law.response(u)))
+    assert fit.model.weights == pytest.approx(WEIGHTS, abs=1e-11)  # rounding times the condition, 1e2
+    assert fit.n_parameters == 16
+    again = hs.identify(law, hs.Record(u=u, y=3.0 * law.response(u)))
+    assert again.model.weights == pytest.approx(np.multiply(3.0, WEIGHTS), abs=1e-11)
+
+
+def test_noise_leaves_weights_of_one_sign():
+    law = hs.Preisach.from_density(np.linspace(-1.0, 1.0, 7), lambda a, b: np.exp(-5.0 * (a - b)))
+    u = hs.signals.reversal_curves(-1.0, 1.0, curves=6, samples_per_step=5)
+    record = hs.Record(u=u, y=law.response(u) + 0.01 * np.random.default_rng(2).normal(size=u.size))
+    fit = hs.identify(hs.Preisach.structure(levels=law.levels), record)
+    assert fit.model.is_invertible()
+    rough = hs.Preisach.from_reversal_curves(record)
+    walk = np.append(-1.0, np.random.default_rng(4).uniform(-1.0, 1.0, 300))
+    errors = [np.std(model.response(walk) - law.response(walk)) for model in (fit.model, rough)]
+    assert errors[0] < 0.5 * errors[1]
+
+
+def test_one_loop_tells_two_weights_for_each_interval_but_one():
+    fit = hs.identify(hs.Preisach, hs.datasets.table1())
+    assert fit.n_parameters == 8
+    assert fit.fit_percent > 96.4
+    assert fit.model.is_invertible()
+    assert np.isfinite([fit.stderr[name] for name in fit.free_names]).all()
+    assert "does not tell 3 of the 10 weights" in fit.message
+    wide = hs.identify(hs.Preisach, hs.datasets.table1(), free="weights[6]")
+    assert wide.n_parameters == 9
+    assert wide.rmse == pytest.approx(fit.rmse, rel=1e-9)  # it adds nothing
+
+
+@pytest.mark.parametrize("width", [0.3, 1.2])
+def test_a_single_loop_of_any_width_is_fitted(width):
+    """Held weights take nothing away from the fit: those that the loop needs are free."""
+    plays = hs.PrandtlIshlinskii(thresholds=(0.0, width / 2.0), weights=(0.2, 1.0))
+    u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=80)
+    law = hs.Preisach.from_plays(np.linspace(-1.0, 1.0, 9), plays)
+    fit = hs.identify(hs.Preisach.structure(intervals=8), hs.Record(u=u, y=law.response(u)))
+    assert fit.rmse < 1e-12
+    assert fit.n_parameters <= 16
+
+
+def test_a_clockwise_loop_gets_weights_of_the_other_sign():
+    u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=40)
+    law = hs.MaxwellSlip(stiffness=(1.0,), slips=(0.25,), feedthrough=0.5)
+    record = hs.Record(u=u, y=law.response(u))
+    fit = hs.identify(hs.Preisach, record)
+    assert min(fit.model.weights) < 0.0 < fit.model.slope_bounds()[0]
+    free = hs.identify(hs.Preisach.structure(one_signed=False), record)
+    assert max(fit.rmse, free.rmse) < 1e-14  # thresholds of half an interval are exact at these levels
+
+
+def test_the_former_turning_point_comes_back():
+    law = a_law(hs.Preisach)
+    u = np.interp(np.arange(0.0, 5.01, 0.1), np.arange(6), [0.1, 0.4, -0.6, 0.2, -0.4, 0.3])
+    _, state = law.advance([-1.0, 0.8, 0.1])
+    record = hs.Record(u=u, y=law.advance(u, state)[0])
+    fit = hs.identify(hs.Preisach.structure(levels=LEVELS), record, initial="free")
+    assert fit.rmse < 1e-6  # where the polish ends
+    assert fit.estimates["turn"] > 0.4
+    assert fit.model.z0 == (fit.estimates["turn"],)
+
+
+def test_the_steady_memory_repeats():
+    law = a_law(hs.Preisach)
+    period = np.array([0.0, 0.9, 0.2, 0.5, -0.7])
+    record = hs.Record(u=period, y=np.zeros(5))
+    space = law.search_space(record, Freedom(initial="periodic"))
+    steady = law.steady(space.parameters(np.zeros((1, 0))), record)
+    numbers = {name: float(np.ravel(value)[0]) for name, value in steady.items()} | dict.fromkeys(space.columns, 1.0)
+    assert np.array_equal(*law.assemble(numbers).response(np.tile(period, 2)).reshape(2, -1))
+    fit = hs.identify(law, hs.Record(u=np.tile(period, 6), y=law.response(np.tile(period, 7))[5:]), initial="periodic")
+    assert fit.rmse < 1e-12
+
+
+def test_a_law_is_a_plant_of_a_loop_and_of_an_actuator():
+    law = hs.Preisach.from_density(np.linspace(-4.0, 4.0, 9), lambda a, b: np.exp(b - a))
+    t = np.arange(200) / 100.0
+    run = hs.close_loop(law, hs.PID(ki=20.0), t, 0.3 * np.sin(3.0 * t))
+    assert run.y[1:] == pytest.approx(law.response([0.0, *run.u])[1:-1], abs=1e-12)
+    actuator = hs.Actuator(hysteresis=law, vibration=hs.mode(100.0, 0.1))
+    assert np.isfinite(actuator.response(np.sin(t), 0.01)).all()
+
+
+def test_a_law_is_a_value(tmp_path):
+    for family in FAMILIES:
+        law = a_law(family, z0=(0.5,))
+        assert pickle.loads(pickle.dumps(law)) == law
+        hs.save(law, tmp_path / "law.json")
+        assert hs.load_model(tmp_path / "law.json") == law
+    assert a_law(hs.Preisach) != a_law(hs.PreisachRelays)
+
+
+def test_nothing_in_nothing_out():
+    law = a_law(hs.Preisach, z0=(0.5, 0.2))
+    assert law.response([]).size == 0
+    assert law.advance([], (9.0, 1.0))[1] == (9.0, 1.0)
+    assert law.advance([])[1] == (0.2, 0.5, 0.2)
+    assert law.inverse_response([]).size == 0
+    assert hs.Preisach(offset=2.0).response([0.0, 1.0, -3.0]).tolist() == [2.0, 2.0, 2.0]
