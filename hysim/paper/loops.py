@@ -49,13 +49,13 @@ SQUARE_PERIODS = {4.0: "Table 2", 40.65: "10 s of .246 s a sample", 10.0: "the u
 """Periods in samples of Table 2, and which reading of the paper each is."""
 
 FAST_ON_EQUATION_1 = PID.standard(
-    26.5,
-    Ti=0.0258,
-    Td=9.46,
-    derivative_filter=0.00161,
+    34.0,
+    Ti=0.0361,
+    Td=5.86,
+    derivative_filter=0.003,
     limits=SUPPLY,
-    setpoint_weight=0.905,
-    derivative_weight=0.174,
+    setpoint_weight=0.852,
+    derivative_weight=0.258,
 )
 """From the global search of experiments/02_lag_of_equation_1.py: what a PID can do when robustness is given up."""
 
