@@ -18,6 +18,7 @@ from hysim.models.model import FAMILIES
 
 _MODULES = (
     *("actuator", "amplifier", "boucwen", "creep", "dahl", "duhem", "maxwell_slip", "modes", "oscillator", "play"),
+    *("baber_noori", "coleman_hodgdon"),
     *("polynomial_boucwen", "prandtl_ishlinskii", "sensor", "state_space", "static", "transfer_function"),
 )
 
