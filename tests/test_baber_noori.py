@@ -156,6 +156,7 @@ def test_what_does_not_stay_finite_is_named():
     assert np.isfinite(rows[1]).all()
 
 
+@pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="a search takes a million steps")
 def test_identify_finds_wear_and_holds_what_the_record_cannot_tell():
     u = hs.signals.triangle(-2.0, 2.0, cycles=4, samples_per_cycle=24)
     truth = hs.BoucWenBaberNoori(beta=0.7, gamma=0.2, delta_nu=0.15, delta_eta=0.08, gain=3.0)
@@ -195,7 +196,8 @@ def test_the_materials_of_opensees_are_their_equations_in_small_steps(name):
     """Their backward Euler step, written out for steps so short that an explicit one is as good."""
     p = THEIRS[name]
     model = getattr(hs.BoucWenBaberNoori, f"from_{name}")(**p)
-    u = np.concatenate([np.linspace(a, b, 20_000)[1:] for a, b in itertools.pairwise([0.0, 2.0, -1.0, 0.5])])
+    n_steps = 100 if numba.config.DISABLE_JIT else 20_000
+    u = np.concatenate([np.linspace(a, b, n_steps)[1:] for a, b in itertools.pairwise([0.0, 2.0, -1.0, 0.5])])
     stress, z, e, last = [], 0.0, 0.0, 0.0
     for strain in u.tolist():
         du = strain - last
@@ -211,8 +213,8 @@ def test_the_materials_of_opensees_are_their_equations_in_small_steps(name):
         e += (1 - p["alpha"]) * p["ko"] * du * (z + 0.5 * slope * du)
         z, last = z + slope * du, strain
         stress.append(p["alpha"] * p["ko"] * strain + (1 - p["alpha"]) * p["ko"] * z)
-    # First order in steps of 1e-4, with second derivatives and a force of order one.
-    assert np.abs(model.response(np.append(0.0, u))[1:] - stress).max() < 1e-3
+    # First order in steps of 3 / n at most, with second derivatives and a force of order one.
+    assert np.abs(model.response(np.append(0.0, u))[1:] - stress).max() < 10.0 / n_steps
     assert getattr(model, f"to_{name}")() == pytest.approx(p, rel=1e-14)  # a few roundings
 
 
