@@ -43,6 +43,7 @@ _HOME = {
     "PolynomialBoucWen": "hysim.models.polynomial_boucwen",
     "ZhuWangBoucWen": "hysim.models.zhu_wang_boucwen",
     "GeneralizedBoucWen": "hysim.models.generalized_boucwen",
+    "BoucWenBaberNoori": "hysim.models.baber_noori",
     "BoucWenInverse": "hysim.models.boucwen_inverse",
     "LimitCycle": "hysim.models.limit_cycle",
     "Duhem": "hysim.models.duhem",
@@ -56,6 +57,7 @@ _HOME = {
     "Preisach": "hysim.models.preisach",
     "PreisachRelays": "hysim.models.preisach",
     "Dahl": "hysim.models.dahl",
+    "ColemanHodgdon": "hysim.models.coleman_hodgdon",
     "CustomLaw": "hysim.models.custom",
     "BoucWenOscillator": "hysim.models.oscillator",
     "TransferFunction": "hysim.models.transfer_function",
@@ -110,8 +112,10 @@ if TYPE_CHECKING:
     from hysim.metrics import loop_metrics as loop_metrics
     from hysim.models.actuator import Actuator as Actuator
     from hysim.models.amplifier import Amplifier as Amplifier
+    from hysim.models.baber_noori import BoucWenBaberNoori as BoucWenBaberNoori
     from hysim.models.boucwen import BoucWen as BoucWen
     from hysim.models.boucwen_inverse import BoucWenInverse as BoucWenInverse
+    from hysim.models.coleman_hodgdon import ColemanHodgdon as ColemanHodgdon
     from hysim.models.creep import Creep as Creep
     from hysim.models.custom import CustomLaw as CustomLaw
     from hysim.models.dahl import Dahl as Dahl

@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 import hysim as hs
 
 U = np.array([0.0, 0.4, -0.3, 0.7, 0.7, -0.6, 0.1, 0.0])
+_MATERIALS = ("opensees", "opensees_original", "suanpan")
 POSITIVE = st.floats(0.1, 3.0)
 SIGNED = st.floats(-2.0, 2.0)
 
@@ -20,6 +21,8 @@ THEIRS = {
     "normalized": {"k_x": 0.4, "k_w": -2.0, "rho": 1.3, "sigma": 0.8, "n": 2.0, "w0": -0.3},
     "noel_schoukens": {"alpha": 2.0, "beta": 3.0, "gamma": 0.8, "delta": -0.3, "nu": 1.5, "z0": 0.1},
     "opensees": {"alpha": 0.05, "ko": 3.0, "n": 1.2, "gamma": 0.3, "beta": 0.6, "Ao": 0.7},
+    "opensees_original": {"E": 3.0, "fy": 0.6, "alphaL": 0.1, "eta": 1.3, "beta": 0.7, "gamma": 0.3},
+    "suanpan": {"elastic_modulus": 3.0, "yield_stress": 0.6, "hardening": 0.1, "beta": 0.7, "n": 1.3},
 }
 
 
@@ -38,6 +41,15 @@ def literal(name: str, p: dict, u: float, z: float, v: float) -> tuple[float, fl
     if name == "noel_schoukens":
         bend = p["gamma"] * abs(v) * abs(z) ** (p["nu"] - 1) * z + p["delta"] * v * abs(z) ** p["nu"]
         return z, p["alpha"] * v - p["beta"] * bend
+    if name == "opensees_original":
+        k2, yielding = p["alphaL"] * p["E"], p["fy"] / p["E"]
+        shape = p["gamma"] + p["beta"] * np.sign(z * v)
+        return (p["fy"] - k2 * yielding) * z + k2 * u, v / yielding * (1 - abs(z) ** p["eta"] * shape)
+    if name == "suanpan":
+        stiffness, ratio = p["elastic_modulus"], p["hardening"]
+        shape = 1 - p["beta"] + p["beta"] * np.sign(z * v)
+        force = ratio * stiffness * u + (1 - ratio) * p["yield_stress"] * z
+        return force, v * stiffness / p["yield_stress"] * (1 - abs(z) ** p["n"] * shape)
     force = p["alpha"] * p["ko"] * u + (1 - p["alpha"]) * p["ko"] * z
     return force, v * (p["Ao"] - abs(z) ** p["n"] * (p["gamma"] + p["beta"] * np.sign(v * z)))
 
@@ -71,7 +83,7 @@ def test_theirs_to_ours_to_theirs_is_canonical_and_stays(name):
     again = come_in(name, canonical)
     assert again.response(U) == pytest.approx(law.response(U), rel=1e-13, abs=1e-14)
     assert go_out(name, again) == pytest.approx(canonical, rel=1e-13)
-    if name in ("low_guo", "normalized"):  # one set only for each response
+    if name in ("low_guo", "normalized", "opensees_original", "suanpan"):  # one set only for each response
         assert canonical == pytest.approx(theirs, rel=1e-13)
     for key, value in {"wen": {"A": 1, "D": 1}, "noel_schoukens": {"beta": 1}, "opensees": {"Ao": 1}}.get(
         name, {}
@@ -91,9 +103,11 @@ def test_ours_to_theirs_to_ours_is_the_same_law(name, A, beta, ratio, n, gain, s
         n=1.0 if name == "low_guo" else n,
         feedthrough=0.0 if name == "noel_schoukens" else 0.7,
         gain=sign * gain,
-        z0=0.0 if name == "opensees" else z0,
+        z0=0.0 if name in _MATERIALS else z0,
     )
-    assume(abs(law.feedthrough + law.gain * law.A) > 0.05 or name not in ("wen", "opensees"))
+    assume(abs(law.feedthrough + law.gain * law.A) > 0.05 or name not in ("wen", *_MATERIALS))
+    if name in ("opensees_original", "suanpan"):  # they yield, at a positive force
+        assume(law.feedthrough + law.gain * law.A > 0.05 and law.beta + np.sign(law.A) * law.gamma > 0.0)
     back = come_in(name, go_out(name, law))
     y = law.response(U)
     # alpha = feedthrough / stiffness loses digits where the stiffness nearly cancels
@@ -136,6 +150,10 @@ def test_normalised_form_saturates_at_one():
         (lambda: hs.BoucWen(A=0.0).to_wen(), "A = 0"),
         (lambda: hs.BoucWen(feedthrough=-1.0).to_wen(), "needs a stiffness"),
         (lambda: hs.BoucWen(z0=0.1).to_opensees(), "begins with z = 0"),
+        (lambda: hs.BoucWen(z0=0.1).to_suanpan(), "begins with z = 0"),
+        (lambda: hs.BoucWen(gamma=-0.6).to_opensees_original(), "the material yields"),
+        (lambda: hs.BoucWen.from_opensees_original(E=1.0, fy=0.0, alphaL=0.1), "E and fy must be positive"),
+        (lambda: hs.BoucWen.from_opensees_original(E=1.0, fy=1.0, alphaL=0.1, alphaNL=0.1), "alphaNL must be zero"),
         (lambda: hs.BoucWen.from_opensees(**THEIRS["opensees"], deltaEta=0.1), "deltaEta must be zero"),
         (lambda: hs.BoucWen.from_wen(**THEIRS["wen"] | {"D": 0.0}), "D must not be zero"),
         *[(lambda name=name: go_out(name, hs.BoucWen(offset=1.0)), "no offset") for name in THEIRS],

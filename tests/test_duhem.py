@@ -144,6 +144,55 @@ def test_terms_and_arrays_are_one_law():
     assert GENERAL.terms["u' u y"] == GENERAL.p[1, 1]
 
 
+def test_the_slopes_of_the_two_branches_are_one_law():
+    rising, falling = np.array([[0.9, -0.5], [0.55, 0.0]]), np.array([[0.7, 0.7, -0.1]])
+    law = hs.Duhem.from_branches(ascending=rising, descending=falling, y0=0.3)
+    for direction, slope in ((1.0, rising), (-1.0, falling)):
+        at = np.polynomial.polynomial.polyval2d(0.4, -0.2, slope)
+        assert law.tangent(direction, -0.2, 0.4) == pytest.approx(at, rel=1e-15)
+    p, q = (np.pad(part, ((0, 0), (0, 0))) for part in (GENERAL.p, np.pad(GENERAL.q, ((0, 1), (0, 0)))))
+    again = hs.Duhem.from_branches(ascending=p + q, descending=p - q, y0=GENERAL.y0)
+    # Halves of sums: one rounding of a coefficient, and the series' promise.
+    assert np.abs(again.response(PATH) - GENERAL.response(PATH)).max() < 1e-12
+
+
+def test_a_structure_begins_at_a_regression_and_finds_the_law():
+    walk = np.cumsum(np.random.default_rng(1).uniform(-0.4, 0.4, 200))
+    record = hs.Record(u=walk - walk.mean(), y=GENERAL.response(walk - walk.mean()))
+    fit = hs.identify(hs.Duhem.structure(degree=2), record)
+    assert fit.n_parameters == 13
+    found = fit.model.terms
+    for name, value in GENERAL.terms.items():
+        # The descent ends where the residual has lost nine digits.
+        assert found[name] == pytest.approx(value, abs=1e-6), name
+    assert fit.fit_percent > 99.99999
+    few = hs.Duhem.structure(terms=["u'", "|u'| u", "|u'| y"])
+    assert few.search_space(record).names == ("u'", "|u'| u", "|u'| y", "y0")
+
+
+def test_a_structure_of_degree_1_fits_the_measured_loop():
+    fit = hs.identify(hs.Duhem.structure(degree=1), hs.datasets.table1(dwell=1.0))
+    assert fit.n_parameters == 7
+    assert fit.fit_percent == pytest.approx(96.09, abs=0.01)  # as printed
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        ({}, ValueError, "give degree or terms"),
+        ({"degree": 1, "terms": ["u'"]}, ValueError, "give degree or terms"),
+        ({"degree": -1}, ValueError, "must not be negative"),
+        ({"degree": 1.5}, TypeError, "must be a whole number"),
+        ({"terms": []}, ValueError, "at least one term"),
+        ({"terms": ["u' |z|"]}, ValueError, "memory of its own"),
+        ({"terms": ["u"]}, ValueError, "unknown term"),
+    ],
+)
+def test_a_structure_is_checked(arguments, error, message):
+    with pytest.raises(error, match=message):
+        hs.Duhem.structure(**arguments)
+
+
 @pytest.mark.parametrize(
     "name",
     ["u", "u' |z| y", "u' |y|^2", "u' z |z|", "u' |z| u", "u' y u", "u' u^1", "u' u^0", "|u'|y", "u' u u", "", "2 u'"],

@@ -28,6 +28,8 @@ MODELS = [
     hs.Stop(threshold=1e300),
     hs.MaxwellSlip(stiffness=(1 / 3, 0.1), slips=(0.3, 0.2), z0=(0.1, 0.2)),
     hs.Dahl(stiffness=1 / 3, coulomb=0.1),
+    hs.ColemanHodgdon(alpha=1 / 3, c=0.1),
+    hs.BoucWenBaberNoori(delta_nu=1 / 3, zeta_s=0.1, input_coefficients=(0.1, 1e-17)),
     hs.TransferFunction(num=(1 / 3,), den=(1.0, 2.0), delay=0.1, sample="end"),
     hs.BoucWenOscillator(mass=1 / 3, damping=0.1, stiffness=1e-17, law=hs.BoucWen(n=1.7), substeps=3),
     hs.Line(offset=0.1, slope=1e-300),

@@ -24,6 +24,8 @@ NUMBERS = [
     (hs.Play, {"threshold": 0.5}, "threshold"),
     (hs.MaxwellSlip, {"stiffness": (1.0, 2.0), "slips": (0.5, 0.1)}, "stiffness"),
     (hs.Dahl, {"coulomb": 0.7}, "coulomb"),
+    (hs.ColemanHodgdon, {"B": 0.7}, "B"),
+    (hs.BoucWenBaberNoori, {"delta_nu": 0.2}, "delta_nu"),
     (hs.TransferFunction, {"num": (1.0,), "den": (1.0, 2.0)}, "den"),
     (hs.BoucWenOscillator, {"mass": 2.0, "damping": 1.0, "stiffness": 3.0, "law": hs.BoucWen()}, "stiffness"),
     (hs.Amplifier, {"slew_rate": 2.0}, "slew_rate"),

@@ -30,13 +30,13 @@ def drive_each(
     """Outputs of the laws `start` to `stop - 1`, one a row of `parameters`; one that escapes is a row of inf.
 
     `u` is (1, n_samples) or (n_sets, n_samples). The laws use one state, of `n_state` places, in turn: each finds
-    its first input and its z0 in front, a zero in the last place, and the rest as its forerunner left it.
+    its first input, its z0 and a zero in front, a zero in the last place, and the rest as its forerunner left it.
     """
     state = np.zeros(n_state)
     for i in range(start, stop):
         row = u[min(i, u.shape[0] - 1)]
         if row.size == 0:
             continue
-        state[0], state[1], state[-1] = row[0], z0[i], 0.0
+        state[0], state[1], state[2], state[-1] = row[0], z0[i], 0.0, 0.0
         if drive(step, parameters[i], state, row, out[i]) >= 0:
             out[i] = math.inf

@@ -43,7 +43,8 @@ class SteppedLaw(PolynomialInput):
         """The law as compiled loops take it; the state is that of a first sample at the input `u0`."""
         scalars = self.scalars
         return self._compiled(
-            np.array([[scalars[name] for name in ("gain", "offset", *self.coefficient_names)]]), (u0, self.z0)
+            np.array([[scalars[name] for name in ("gain", "offset", *self.coefficient_names)]]),
+            self._start(np.array([u0])),
         )
 
     def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
@@ -87,13 +88,13 @@ class SteppedLaw(PolynomialInput):
                 input_coefficients=self.input_coefficients,
             )
             u0 = float(static.inverse_response(outputs[:1])[0])
-        start = (float(u0 or 0.0), self.z0) if state is None else state
+        start = self._start(np.array([u0 or 0.0])) if state is None else state
         return _numeric_inverse.inverse_response(self, outputs, start)
 
     def _compiled(self, output: FloatArray, start: State) -> CompiledLaw:
         memory = np.array([[getattr(self, name) for name in self.memory_names]])
         state = np.zeros(self.state_size)
-        state[:2] = start
+        state[: len(start)] = start
         return CompiledLaw(self._step, read_only(self._step_parameters(memory, output)[0], finite=False), state)
 
     @property
@@ -111,7 +112,7 @@ class SteppedLaw(PolynomialInput):
 
         return batch
 
-    def _memory(self, u: FloatArray, state: State) -> FloatArray:
+    def _memory(self, u: FloatArray, state: State) -> tuple[FloatArray, State]:
         law = self._compiled(_MEMORY_ITSELF, state)
         z = np.empty(u.size)
         with np.errstate(all="ignore"):
@@ -119,4 +120,4 @@ class SteppedLaw(PolynomialInput):
         if escaped >= 0:
             what = "is too stiff to be followed" if np.isnan(z[escaped]) else "escapes to infinity"
             raise SimulationError(f"the memory {what} at sample {escaped} (u = {u[escaped]:g})")
-        return z
+        return z, tuple(law.state[: len(state)].tolist())

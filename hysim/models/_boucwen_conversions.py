@@ -9,6 +9,10 @@ Ours is  y = offset + feedthrough u + gain z,  z' = A u' - beta |u'| |z|^(n-1) z
     Noel, Schoukens 2016 z' = alpha u' - beta (gamma |u'| |z|^(nu-1) z + delta u' |z|^nu)
     OpenSees BoucWen     sigma = alpha ko u + (1 - alpha) ko z,
                          z' = u' (Ao - |z|^n (gamma + beta sign(u' z))) without degradation
+    BoucWenOriginal      sigma = q_d z + k2 u + k3 sign(u) |u|^mu,
+                         z' = u' (1 - |z|^eta (gamma + beta sign(z u'))) / u_y,
+                         k2 = alphaL E, k3 = alphaNL E, u_y = fy / E, q_d = fy - k2 u_y - k3 u_y^mu
+    suanPan BoucWen      sigma = a E u + (1 - a) fy z,  z' as BoucWenOriginal with gamma = 1 - beta
 
 Measuring the memory in another unit, z = unit w, leaves the output as it is; a negative unit turns A and
 gamma round:
@@ -20,13 +24,18 @@ The way out chooses the unit, and with it one member of all the parameter sets w
 Sources: Y. K. Wen, J. Eng. Mech. Div. 102 (1976); T. S. Low and W. Guo, J. Microelectromech. Syst. 4 (1995);
 F. Ikhouane and J. Rodellar, Systems with Hysteresis (2007), for the normalised form; J. P. Noel and
 M. Schoukens, Hysteretic benchmark with a dynamic nonlinearity (2016); the OpenSees command manual,
-uniaxialMaterial BoucWen (Haukaas and Der Kiureghian 2003).
+uniaxialMaterial BoucWen (Haukaas and Der Kiureghian 2003); OpenSees, uniaxialMaterial BoucWenOriginal and BWBN;
+suanPan, material BoucWen.
+
+The two materials of OpenSees that change with the energy count it as e' = (1 - alpha) ko u' z, ours is e' = u' z, so
+that rates go over by the factor (1 - alpha) ko.
 """
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from hysim.models.baber_noori import BoucWenBaberNoori
     from hysim.models.boucwen import BoucWen
 
 Scalars = dict[str, float]
@@ -133,6 +142,89 @@ def to_opensees(law: "BoucWen") -> Scalars:
     return {name: same[name] for name in ("alpha", "n", "gamma", "beta")} | {"ko": same["k"], "Ao": 1.0}
 
 
+def from_opensees_original(
+    E: float, fy: float, alphaL: float, alphaNL: float, eta: float, beta: float, gamma: float
+) -> Scalars:
+    """Numbers of a `BoucWen` from those of the material with a linear spring."""
+    if alphaNL != 0.0:
+        raise ValueError(f"alphaNL must be zero, got {alphaNL:g}: the law has a linear spring only")
+    if E <= 0.0 or fy <= 0.0:
+        raise ValueError(f"E and fy must be positive, got {E:g} and {fy:g}")
+    shape = {"A": E / fy, "beta": beta * (E / fy), "gamma": gamma * (E / fy), "n": eta}
+    return {**shape, "feedthrough": alphaL * E, "gain": (1.0 - alphaL) * fy}
+
+
+def to_opensees_original(law: "BoucWen") -> Scalars:
+    """The member with beta + gamma = 1, for which fy is where the material yields."""
+    if law.z0 != 0.0:
+        raise ValueError(f"the material begins with z = 0, got z0 = {law.z0:g}")
+    same = _with_unit_slope(law, "the material")
+    loading = same["beta"] + same["gamma"]
+    if loading <= 0.0:
+        raise ValueError(f"the material yields: it needs beta + gamma > 0 where A = 1, got {loading:g}")
+    shape = {"beta": same["beta"] / loading, "gamma": same["gamma"] / loading, "eta": same["n"]}
+    return {"E": same["k"], "fy": same["k"] * loading ** (-1.0 / same["n"]), "alphaL": same["alpha"], **shape}
+
+
+def to_suanpan(law: "BoucWen") -> Scalars:
+    """The same member; there gamma is not written."""
+    same = to_opensees_original(law)
+    names = {"elastic_modulus": "E", "yield_stress": "fy", "hardening": "alphaL", "beta": "beta", "n": "eta"}
+    return {name: same[theirs] for name, theirs in names.items()}
+
+
+def from_opensees_energy(
+    alpha: float, ko: float, n: float, gamma: float, beta: float, Ao: float, rates: Scalars
+) -> dict[str, Any]:
+    """Numbers of a `BoucWenBaberNoori` from those that the materials with an energy share; `rates` are per energy."""
+    stiffness = (1.0 - alpha) * ko
+    worn = {name: rate * stiffness for name, rate in rates.items()}
+    shape = {"A": Ao, "beta": beta, "gamma": gamma, "n": n}
+    return {**shape, **worn, "gain": stiffness, "input_coefficients": (alpha * ko,)}
+
+
+def to_opensees_degrading(law: "BoucWenBaberNoori") -> Scalars:
+    """The member with Ao = A."""
+    if law.zeta_s != 0.0:
+        raise ValueError(f"the material does not pinch, got zeta_s = {law.zeta_s:g}: see to_opensees_bwbn")
+    return {
+        **_of_opensees_energy(law),
+        "deltaA": law.delta_a / law.gain,
+        "deltaNu": law.delta_nu / law.gain,
+        "deltaEta": law.delta_eta / law.gain,
+    }
+
+
+def to_opensees_pinching(law: "BoucWenBaberNoori") -> Scalars:
+    """The member with Ao = A."""
+    for name in ("delta_a", "delta_nu", "delta_eta"):
+        if getattr(law, name) != 0.0:
+            raise ValueError(f"the material does not degrade, got {name} = {getattr(law, name):g}: see to_opensees")
+    return {
+        **_of_opensees_energy(law),
+        "q": law.q,
+        "zetas": law.zeta_s,
+        "p": law.p / law.gain,
+        "Shi": law.psi,
+        "deltaShi": law.delta_psi / law.gain,
+        "lamda": law.lambda_,
+    }
+
+
+def _of_opensees_energy(law: "BoucWenBaberNoori") -> Scalars:
+    """What the two materials with an energy share."""
+    _no_offset(law, "the material")
+    if law.z0 != 0.0:
+        raise ValueError(f"the material begins with z = 0, got z0 = {law.z0:g}")
+    if any(law.input_coefficients[1:]):
+        raise ValueError(f"the material has a linear spring only, got input_coefficients = {law.input_coefficients}")
+    ko = law.input_coefficients[0] + law.gain
+    if ko == 0.0 or law.gain == 0.0:
+        raise ValueError(f"the material needs a stiffness and a gain, got {ko:g} and {law.gain:g}")
+    shape = {"n": law.n, "gamma": law.gamma, "beta": law.beta, "Ao": law.A}
+    return {"alpha": law.input_coefficients[0] / ko, "ko": ko, **shape}
+
+
 def _with_unit_slope(law: "BoucWen", whose: str) -> Scalars:
     """The form that Wen and OpenSees share, with A = 1."""
     _no_offset(law, whose)
@@ -160,6 +252,6 @@ def _in_unit(law: "BoucWen", unit: float) -> Scalars:
     }
 
 
-def _no_offset(law: "BoucWen", whose: str) -> None:
+def _no_offset(law: "BoucWen | BoucWenBaberNoori", whose: str) -> None:
     if law.offset != 0.0:
         raise ValueError(f"{whose} has no offset, got {law.offset:g}: take it off the output")

@@ -224,7 +224,7 @@ class BoucWenLaw(MemoryLaw):
     def _batch(self) -> Kernel:
         return kernels.batch
 
-    def _memory(self, u: FloatArray, state: State) -> FloatArray:
+    def _memory(self, u: FloatArray, state: State) -> tuple[FloatArray, State]:
         z = np.empty(u.size)
         law = self.A, self.beta, self.gamma
         start = float(state[0]), float(state[1])
@@ -242,7 +242,7 @@ class BoucWenLaw(MemoryLaw):
                 f"{self.beta + self.gamma:g} and beta - gamma = {self.beta - self.gamma:g} only a shorter input "
                 "bounds it"
             )
-        return z
+        return z, (float(u[-1]), float(z[-1])) if z.size else state
 
-    def _memory_slope(self, direction: FloatArray, z: FloatArray, u: FloatArray) -> FloatArray:
+    def _memory_slope(self, direction: FloatArray, z: FloatArray, u: FloatArray, *_: FloatArray) -> FloatArray:
         return np.asarray(self.A - np.abs(z) ** self.n * (self.gamma + self.beta * np.sign(z * direction)))

@@ -14,7 +14,8 @@ for every n,
 The box is |k| <= 40 for both, n in [0.5, 10] on a log scale, z0/Z in [-1, 1], and open for the
 parameters in which the output is affine. The further shape coefficients b2 to b6 of the generalised law
 have the coordinates of beta; the forcing delta of Zhu and Wang is measured by what it adds to |A| where |u|
-is largest, in [-5, 5]. A parameter that the user bounds is its own coordinate,
+is largest, in [-5, 5]. What wears off by Baber and Noori is measured by what Z times the length of the record's way
+takes away, and the widths of the pinching in Z. A parameter that the user bounds is its own coordinate,
 between these bounds; bounds from or to zero and infinity cut the box at zero.
 """
 
@@ -29,7 +30,20 @@ from hysim.records import Record
 
 REDUNDANT = (("A", "gain"),)
 _FURTHER = ("b2", "b3", "b4", "b5", "b6")
-_MEMORY = ("A", "beta", "gamma", "n", "delta", *_FURTHER, "z0")
+_SCALED = {  # parameters with a unit of their own, and their box in it
+    "delta": (-5.0, 5.0),
+    "delta_a": (-5.0, 5.0),
+    "delta_nu": (-1.0, 20.0),
+    "delta_eta": (-1.0, 20.0),
+    "zeta_s": (0.0, 0.99),
+    "q": (-1.0, 1.0),
+    "p": (0.0, 50.0),
+    "psi": (0.01, 5.0),
+    "delta_psi": (-1.0, 20.0),
+    "lambda_": (0.01, 5.0),
+    "z0": (-1.0, 1.0),
+}
+_MEMORY = ("A", "beta", "gamma", "n", *_FURTHER, *_SCALED)
 _PAIR = ("loading", "unloading")
 _KNEE = float(np.arcsinh(40.0))
 _BOX = {
@@ -39,9 +53,8 @@ _BOX = {
     "beta": (-_KNEE, _KNEE),
     "gamma": (-_KNEE, _KNEE),
     "n": (0.5, 10.0),
-    "delta": (-5.0, 5.0),
     **dict.fromkeys(_FURTHER, (-_KNEE, _KNEE)),
-    "z0": (-1.0, 1.0),
+    **_SCALED,
 }
 
 
@@ -75,7 +88,7 @@ def search_space(
     box = {name: limits.get(name, _cut(name, signs.get(name))) for name in chart.coordinates}
     box |= {"n": (float(np.log(box["n"][0])), float(np.log(box["n"][1])))} if "n" in box else {}
     lower, upper = (np.array([pair[side] for pair in box.values()]) for side in (0, 1))
-    extended = bool({"delta", *_FURTHER} & set(defaults))  # what is admissible for such a law is not known
+    extended = bool({*_SCALED, *_FURTHER} & set(defaults) - {"z0"})  # what is admissible for such a law is not known
     quadrant = np.array([max(low, 0.0) if name in _PAIR else low for name, (low, _) in box.items()])
     return SearchSpace(
         coordinates=chart.coordinates,
@@ -113,6 +126,7 @@ class _Chart:
     limits: Mapping[str, tuple[float, float]]  # parameters that are their own coordinates
     span: float
     reach: float  # of |u|
+    way: float  # of u
     slope: float  # what A is measured in
 
     def decode(self, x: FloatArray) -> dict[str, FloatArray]:
@@ -128,8 +142,7 @@ class _Chart:
         if "loading" in scaled:
             parameters["beta"] = 0.5 * (scaled["loading"] + scaled["unloading"])
             parameters["gamma"] = 0.5 * (scaled["loading"] - scaled["unloading"])
-        scaled |= {"z0": raw["z0"] * self._slope(A) * self.span} if "z0" in raw else {}
-        scaled |= {"delta": raw["delta"] * self._slope(A) / self.reach} if "delta" in raw else {}
+        scaled |= {name: raw[name] * size for name, size in self._sizes(A).items() if name in raw}
         parameters |= {name: values for name, values in scaled.items() if name not in _PAIR}
         return parameters | {name: raw[name] for name in self.limits if name not in ("A", "n")}
 
@@ -144,8 +157,7 @@ class _Chart:
             "beta": _knee(beta / unit, n),
             "gamma": _knee(gamma / unit, n),
             **{name: _knee(parameters[name] / unit, n) for name in _FURTHER if name in parameters},
-            "delta": parameters.get("delta", 0.0) * self.reach / self._slope(A),
-            "z0": parameters["z0"] / (self._slope(A) * self.span),
+            **{name: parameters[name] / size for name, size in self._sizes(A).items() if name in parameters},
         }
         scaled |= {name: parameters[name] for name in self.limits if name in scaled}
         scaled["n"] = np.log(n)
@@ -153,6 +165,20 @@ class _Chart:
 
     def _slope(self, A: FloatArray) -> FloatArray:
         return np.where(A == 0.0, 1.0, np.abs(A))
+
+    def _sizes(self, A: FloatArray) -> dict[str, FloatArray]:
+        """Units of the scaled parameters."""
+        slope, one = self._slope(A), np.ones_like(A)
+        worn = slope * self.span * self.way  # e where z is Z all the way
+        return {
+            "delta": slope / self.reach,
+            "delta_a": slope / worn,
+            **dict.fromkeys(("delta_nu", "delta_eta", "p"), one / worn),
+            **dict.fromkeys(("zeta_s", "q", "lambda_"), one),
+            "psi": slope * self.span,
+            "delta_psi": slope * self.span / worn,
+            "z0": slope * self.span,
+        }
 
     def _unit(self, A: FloatArray, n: FloatArray) -> FloatArray:
         slope = self._slope(A)
@@ -188,7 +214,7 @@ def _chart(
         raise ValueError("the input is constant: nothing can be identified from it")
     paired = {"beta", "gamma"} <= free and not {"beta", "gamma"} & (limits.keys() | signed)
     shapes = _PAIR if paired else ("beta", "gamma")
-    order = ("A", *shapes, "n", "delta", *_FURTHER, "z0")
+    order = ("A", *shapes, "n", *_FURTHER, *_SCALED)
     coordinates = [name for name in order if name in free or (paired and name in _PAIR)]
     return _Chart(
         coordinates=tuple(coordinates),
@@ -196,5 +222,6 @@ def _chart(
         limits=limits,
         span=span,
         reach=float(np.abs(record.u).max()),
+        way=float(np.abs(np.diff(record.u)).sum()),
         slope=float(np.ptp(record.y)) / (abs(values["gain"]) or 1.0) / span or 1.0,
     )

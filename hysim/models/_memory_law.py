@@ -23,8 +23,8 @@ from hysim.models.model import CompiledLaw
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
-State = tuple[float, float]
-"""Last input and memory."""
+State = tuple[float, ...]
+"""Last input and memory, and whatever else a law remembers."""
 
 _PASSES = 40
 
@@ -33,10 +33,12 @@ class MemoryLaw(ABC):
     """The memory, and an output that is a polynomial of u plus gain z.
 
     A law adds its fields, and says how its input coefficients are called. `memory_names` are the parameters
-    of its memory, A, beta, gamma, n first and z0 last.
+    of its memory, A, beta, gamma, n first and z0 last; `others_at_start` is what else it remembers at the first
+    sample.
     """
 
     memory_names: ClassVar[tuple[str, ...]]
+    others_at_start: ClassVar[tuple[float, ...]] = ()
 
     A: float
     beta: float
@@ -78,7 +80,9 @@ class MemoryLaw(ABC):
         """The names in which the output is affine."""
         return (*self.coefficient_names, "gain", "offset")
 
-    def tangent(self, direction: npt.ArrayLike, z: npt.ArrayLike, u: npt.ArrayLike = 0.0) -> FloatArray:
+    def tangent(
+        self, direction: npt.ArrayLike, z: npt.ArrayLike, u: npt.ArrayLike = 0.0, *others: npt.ArrayLike
+    ) -> FloatArray:
         """Slope dy/du of the output at the memory `z`, for an input at `u` that moves in `direction`.
 
         Parameters
@@ -87,6 +91,8 @@ class MemoryLaw(ABC):
             Velocity u' or its sign, not zero.
         z, u : array
             Memory and input, broadcast against the direction; only a polynomial's slope depends on u.
+        *others : array
+            What else a law remembers, in the order of its state.
 
         Returns
         -------
@@ -103,7 +109,8 @@ class MemoryLaw(ABC):
             raise ValueError("direction must not be zero: an input that stands still has two slopes")
         inputs = np.asarray(u, dtype=float)
         static = np.polynomial.polynomial.polyval(inputs, boucwen_inverse.derivative(self))
-        return np.asarray(static + self.gain * self._memory_slope(np.sign(velocity), memory, inputs))
+        further = (np.asarray(other, dtype=float) for other in others)
+        return np.asarray(static + self.gain * self._memory_slope(np.sign(velocity), memory, inputs, *further))
 
     def memory(self, u: npt.ArrayLike) -> FloatArray:
         """Memory z at the samples of an input that is linear between them.
@@ -125,7 +132,7 @@ class MemoryLaw(ABC):
             If u is not finite or has not one axis.
         """
         inputs = read_only(u, "u", ndim=1)
-        return self._memory(inputs, self._start(inputs))
+        return self._memory(inputs, self._start(inputs))[0]
 
     def response(self, u: npt.ArrayLike) -> FloatArray:
         """Output y at the samples of an input that is linear between them.
@@ -153,14 +160,14 @@ class MemoryLaw(ABC):
         ----------
         u : array, shape (n_samples,)
             Input, linear between its samples and from the state's input to the first of them.
-        state : (float, float), optional
+        state : tuple of float, optional
             Input and memory at the last sample so far; by default ``(u[0], z0)``.
 
         Returns
         -------
         y : array, shape (n_samples,)
             The same bits as from one uncut input.
-        state : (float, float)
+        state : tuple of float
             To continue from.
 
         Raises
@@ -170,10 +177,10 @@ class MemoryLaw(ABC):
         """
         inputs = read_only(u, "u", ndim=1)
         start = self._start(inputs) if state is None else state
-        z = self._memory(inputs, start)
+        z, end = self._memory(inputs, start)
         scalars = self.scalars
         y = _output([scalars[name] for name in self.coefficient_names], self.gain, self.offset, inputs, z)
-        return y, (float(inputs[-1]), float(z[-1])) if z.size else start
+        return y, end
 
     @classmethod
     def responses(
@@ -280,15 +287,15 @@ class MemoryLaw(ABC):
         """What computes many laws of this structure."""
 
     @abstractmethod
-    def _memory(self, u: FloatArray, state: State) -> FloatArray:
-        """Memory at the samples of `u`, continued from `state`."""
+    def _memory(self, u: FloatArray, state: State) -> tuple[FloatArray, State]:
+        """Memory at the samples of `u`, continued from `state`, and the state after them."""
 
     @abstractmethod
-    def _memory_slope(self, direction: FloatArray, z: FloatArray, u: FloatArray) -> FloatArray:
+    def _memory_slope(self, direction: FloatArray, z: FloatArray, u: FloatArray, *others: FloatArray) -> FloatArray:
         """Slope dz/du for an input at `u` that moves in `direction`, 1 or -1."""
 
     def _start(self, u: FloatArray) -> State:
-        return (float(u[0]) if u.size else 0.0), self.z0
+        return (float(u[0]) if u.size else 0.0), self.z0, *self.others_at_start
 
     def _columns(self, sets: Parameters, u: npt.ArrayLike) -> tuple[dict[str, FloatArray], FloatArray]:
         """Every scalar over the sets, shape (n_sets,) each (those not given are the law's own), and the inputs."""

@@ -6,10 +6,10 @@ begins, in both directions (or the output would not tell which way the input wen
 """
 
 import math
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim.errors import SimulationError
@@ -27,16 +27,18 @@ class SteppedLaw(Protocol):
         """The forward step."""
         ...
 
-    def tangent(self, direction: npt.ArrayLike, z: npt.ArrayLike, u: npt.ArrayLike = 0.0) -> FloatArray:
-        """The slope dy/du."""
+    @property
+    def tangent(self) -> Callable[..., FloatArray]:
+        """The slope dy/du, ``tangent(direction, z, u, ...)`` with the rest of the state."""
         ...
 
 
-def inverse_response(law: SteppedLaw, y: FloatArray, start: tuple[float, float]) -> FloatArray:
-    """Inputs for the outputs `y`, from the input and memory `start`; see `ZhuWangBoucWen.inverse_response`."""
+def inverse_response(law: SteppedLaw, y: FloatArray, start: tuple[float, ...]) -> FloatArray:
+    """Inputs for the outputs `y`, from the state `start`; see `ZhuWangBoucWen.inverse_response`."""
     forward = _Forward(law, start)
-    rising = math.copysign(1.0, forward.slope(*start, 1.0))
-    if forward.slope(*start, 1.0) == 0.0:
+    slope = forward.slope(start, 1.0)
+    rising = math.copysign(1.0, slope)
+    if slope == 0.0:
         raise ValueError(f"the law has no inverse: its slope is zero at u = {start[0]:g}")
     u = np.empty(y.size)
     with np.errstate(all="ignore"):  # a bracket may reach where the memory overflows
@@ -51,24 +53,25 @@ def inverse_response(law: SteppedLaw, y: FloatArray, start: tuple[float, float])
 class _Forward:
     """The law at its last input, and what it does from there."""
 
-    def __init__(self, law: SteppedLaw, start: tuple[float, float]) -> None:
+    def __init__(self, law: SteppedLaw, start: tuple[float, ...]) -> None:
         self.law, self.compiled = law, law.compiled()
         self.here = start
         self.y = self.output(start[0])
 
     def output(self, u: float) -> float:
         """Output at the input `u`, reached from here."""
-        self.compiled.state[:2] = self.here
+        self.compiled.state[: len(self.here)] = self.here
         return float(self.compiled.step(self.compiled.parameters, self.compiled.state, u))
 
-    def memory(self, u: float) -> float:
-        """Memory at the input `u`, reached from here."""
+    def state(self, u: float) -> tuple[float, ...]:
+        """State at the input `u`, reached from here."""
         self.output(u)
-        return float(self.compiled.state[1])
+        return tuple(self.compiled.state[: len(self.here)].tolist())
 
-    def slope(self, u: float, z: float, direction: float) -> float:
-        """Slope of the output at (u, z) for an input that moves in `direction`."""
-        return float(self.law.tangent(direction, z, u))
+    def slope(self, state: tuple[float, ...], direction: float) -> float:
+        """Slope of the output at a state for an input that moves in `direction`."""
+        u, z, *others = state
+        return float(self.law.tangent(direction, z, u, *others))
 
     def reach(self, wanted: float, rising: float) -> float:
         """Move to where the output is `wanted`, and return the input there; `rising` is the sign of the slope.
@@ -79,29 +82,30 @@ class _Forward:
             If there is no such place, or the slope has not this sign on the way.
         """
         gap = wanted - self.y
-        u, z = self.here
+        u = self.here[0]
         if gap == 0.0:
             return u
         direction = math.copysign(1.0, gap) * rising
-        self._check(np.array([u, u]), np.array([z, z]), np.array([direction, -direction]), rising)
+        self._check(np.array([self.here, self.here]), np.array([direction, -direction]), rising)
         end = self._zero(wanted, direction, rising)
         way = u + (end - u) * np.linspace(0.0, 1.0, _POINTS + 1)
-        self._check(way, np.array([self.memory(point) for point in way]), np.full(way.size, direction), rising)
-        self.here = end, self.memory(end)
+        self._check(np.array([self.state(point) for point in way]), np.full(way.size, direction), rising)
+        self.here = self.state(end)
         self.y = wanted
         return end
 
-    def _check(self, u: FloatArray, z: FloatArray, direction: FloatArray, rising: float) -> None:
-        slopes = self.law.tangent(direction, z, u)
+    def _check(self, states: FloatArray, direction: FloatArray, rising: float) -> None:
+        u, z, *others = states.T
+        slopes = self.law.tangent(direction, z, u, *others)
         if not (rising * slopes > 0.0).all():
             k = int(np.argmin(rising * slopes))
             raise ArithmeticError(f"at u = {u[k]:g} its slope is {slopes[k]:g}")
 
     def _zero(self, wanted: float, direction: float, rising: float) -> float:
         behind, beyond = self.here[0], direction * math.inf
-        target, z, error = behind, self.here[1], self.y - wanted
+        target, state, error = behind, self.here, self.y - wanted
         for _ in range(_MAX_STEPS):
-            slope = self.slope(target, z, direction)
+            slope = self.slope(state, direction)
             trial = target - error / slope if rising * slope > 0.0 else math.nan
             if not direction * behind < direction * trial < direction * beyond:
                 if math.isinf(beyond):
@@ -111,7 +115,7 @@ class _Forward:
                 return target
             target = trial
             error = self.output(target) - wanted
-            z = float(self.compiled.state[1])
+            state = tuple(self.compiled.state[: len(self.here)].tolist())
             if abs(error) <= _ROUNDINGS * (abs(wanted) + abs(self.y)):
                 return target
             if direction * rising * error < 0.0:

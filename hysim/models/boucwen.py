@@ -276,3 +276,93 @@ class BoucWen(BoucWenLaw):
             If there is an offset or an initial memory, A = 0, or no stiffness at z = 0.
         """
         return conversions.to_opensees(self)
+
+    @classmethod
+    def from_opensees_original(
+        cls,
+        *,
+        E: float,
+        fy: float,
+        alphaL: float,
+        alphaNL: float = 0.0,
+        eta: float = 1.0,
+        beta: float = 0.5,
+        gamma: float = 0.5,
+    ) -> Self:
+        """The material ``uniaxialMaterial BoucWenOriginal`` of OpenSees, ``alphaL E u + (1 - alphaL) fy z``.
+
+        Parameters
+        ----------
+        E, fy : float
+            Stiffness before yielding and yield force, positive.
+        alphaL : float
+            Ratio of the stiffness of the linear spring to E.
+        alphaNL : float
+            That of the spring with the power mu: a law without it takes zero only.
+        eta, beta, gamma : float
+            ``z' = u' (1 - |z|^eta (gamma + beta sign(z u'))) E / fy``; z has no unit.
+
+        Returns
+        -------
+        BoucWen
+
+        Raises
+        ------
+        ValueError
+            If E or fy is not positive, or alphaNL is not zero.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> bearing = hs.BoucWen.from_opensees_original(E=200.0, fy=4.0, alphaL=0.1)
+        >>> bearing.response([0.0, 10.0]).round(6).tolist()
+        [0.0, 203.6]
+        """
+        return cls(**conversions.from_opensees_original(E, fy, alphaL, alphaNL, eta, beta, gamma))
+
+    def to_opensees_original(self) -> dict[str, float]:
+        """The arguments of `from_opensees_original`, of all sets with this response the one with beta + gamma = 1.
+
+        Raises
+        ------
+        ValueError
+            If there is an offset or an initial memory, A = 0, no stiffness at z = 0, or nothing yields.
+        """
+        return conversions.to_opensees_original(self)
+
+    @classmethod
+    def from_suanpan(
+        cls, *, elastic_modulus: float, yield_stress: float, hardening: float, beta: float, n: float
+    ) -> Self:
+        """The material ``BoucWen`` of suanPan, whose gamma is 1 - beta.
+
+        Parameters
+        ----------
+        elastic_modulus, yield_stress : float
+            Positive; z is driven by the strain in units of yield_stress / elastic_modulus, and yields at 1.
+        hardening : float
+            Ratio of the stiffness after yielding to the one before it.
+        beta, n : float
+            ``z' = u' (1 - |z|^n (1 - beta + beta sign(z u'))) elastic_modulus / yield_stress``.
+
+        Returns
+        -------
+        BoucWen
+
+        Raises
+        ------
+        ValueError
+            If elastic_modulus or yield_stress is not positive.
+        """
+        shape = {"eta": n, "beta": beta, "gamma": 1.0 - beta}
+        return cls(**conversions.from_opensees_original(elastic_modulus, yield_stress, hardening, 0.0, **shape))
+
+    def to_suanpan(self) -> dict[str, float]:
+        """The arguments of `from_suanpan`; there is one set only.
+
+        Raises
+        ------
+        ValueError
+            As `to_opensees_original`.
+        """
+        return conversions.to_suanpan(self)

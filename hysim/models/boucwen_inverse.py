@@ -25,7 +25,7 @@ from hysim.kernels import boucwen_inverse as kernels
 from hysim.kernels.stepping import drive
 from hysim.models.model import CompiledLaw
 
-LawState = tuple[float, float]
+LawState = tuple[float, ...]
 InverseState = tuple[float, float, float]
 """Last input, memory and last output."""
 

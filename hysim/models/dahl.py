@@ -16,12 +16,10 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
+from hysim.models._as_bouc_wen import AsBoucWen, left_and_driven
 from hysim.models._batch import Reduction
-from hysim.models._memory_law import State
 from hysim.models.boucwen import BoucWen
-from hysim.models.boucwen_inverse import BoucWenInverse, InverseState
-from hysim.models.limit_cycle import LimitCycle
-from hysim.models.model import CompiledLaw, model
+from hysim.models.model import model
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
@@ -32,7 +30,7 @@ _STARTS = ((0.03, 0.5), (0.1, 0.5), (0.3, 0.7), (1.0, 1.5))
 
 
 @model
-class Dahl:
+class Dahl(AsBoucWen):
     """Dahl friction, ``F' = stiffness (u' - |u'| F / coulomb)`` and ``y = offset + F``.
 
     Parameters
@@ -79,40 +77,6 @@ class Dahl:
     def saturation(self) -> float:
         """What ``|F|`` tends to, the Coulomb force."""
         return self.coulomb
-
-    def memory(self, u: npt.ArrayLike) -> FloatArray:
-        """Force F at the samples of `u`, shape (n_samples,); see `hysim.BoucWen.memory`."""
-        return self.bouc_wen.memory(u)
-
-    def response(self, u: npt.ArrayLike) -> FloatArray:
-        """Output at the samples of an input that is linear between them; see `hysim.BoucWen.response`."""
-        return self.bouc_wen.response(u)
-
-    def advance(self, u: npt.ArrayLike, state: State | None = None) -> tuple[FloatArray, State]:
-        """Output continued from `state`, (last u, F), and the state after it; see `hysim.BoucWen.advance`."""
-        return self.bouc_wen.advance(u, state)
-
-    def compiled(self, u0: float = 0.0) -> CompiledLaw:
-        """The law as compiled loops take it; the state is that of a first sample at the input `u0`."""
-        return self.bouc_wen.compiled(u0)
-
-    def tangent(self, direction: npt.ArrayLike, z: npt.ArrayLike) -> FloatArray:
-        """Slope dF/du at the force `z` in a `direction` that is not zero; see `hysim.BoucWen.tangent`."""
-        return self.bouc_wen.tangent(direction, z)
-
-    def limit_cycle(self, amplitude: float) -> LimitCycle:
-        """Steady loop of F between the inputs -amplitude and amplitude; see `hysim.BoucWen.limit_cycle`."""
-        return self.bouc_wen.limit_cycle(amplitude)
-
-    def inverse(self) -> BoucWenInverse:
-        """The law's inverse as an object, for forces below the Coulomb force."""
-        return self.bouc_wen.inverse()
-
-    def inverse_response(
-        self, y: npt.ArrayLike, u0: float | None = None, state: State | InverseState | None = None
-    ) -> FloatArray:
-        """Input that gives the output `y` from the input `u0`; see `hysim.BoucWen.inverse_response`."""
-        return self.bouc_wen.inverse_response(y, u0, state)
 
     @classmethod
     def responses(
@@ -195,11 +159,10 @@ class Dahl:
         )
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """Columns 1, what is left of a force of one, and F from zero, shape (n_sets, n_samples, 3).
-
-        On every way of the length L a force dies out as exp(-L stiffness / coulomb), whatever else happens.
-        """
-        left, force = self._from_one_and_zero(parameters, record.u)
+        """Columns 1, what is left of a force of one, and F from zero, shape (n_sets, n_samples, 3)."""
+        left, force = self._left_and_driven(parameters, record.u)
+        if "z0" in parameters:  # it is affine in the initial force, unless that is known: of a steady cycle
+            force = force + np.ravel(parameters["z0"])[:, np.newaxis] * left
         return np.stack([np.ones_like(left), left, force], axis=-1)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, npt.ArrayLike]:
@@ -208,7 +171,7 @@ class Dahl:
         It adds F_1 to what is left of the force, F_0 -> F_1 + left F_0, which comes to rest at
         F_1 / (1 - left).
         """
-        left, force = self._from_one_and_zero(parameters, np.append(record.u, record.u[0]))
+        left, force = self._left_and_driven(parameters, np.append(record.u, record.u[0]))
         shape = np.broadcast_shapes(*map(np.shape, parameters.values()))
         return {**parameters, "z0": (force[:, -1] / (1.0 - left[:, -1])).reshape(shape)[()]}
 
@@ -216,11 +179,9 @@ class Dahl:
         """The law with these parameters."""
         return type(self)(**{**{name: getattr(self, name) for name in _NAMES}, **parameters})
 
-    def _from_one_and_zero(self, parameters: Parameters, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _left_and_driven(self, parameters: Parameters, u: FloatArray) -> tuple[FloatArray, FloatArray]:
         """What is left of a force of one, and F from zero, shape (n_sets, n_samples) each."""
         stiffness, coulomb = np.broadcast_arrays(
             *(np.ravel(parameters.get(name, getattr(self, name))) for name in ("stiffness", "coulomb"))
         )
-        travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(u)))])
-        left = np.exp(-(stiffness / coulomb)[:, np.newaxis] * travelled)
-        return left, self.responses({"stiffness": stiffness, "coulomb": coulomb}, u)
+        return left_and_driven(stiffness, stiffness / coulomb, u)

@@ -17,9 +17,9 @@ of the range. Special cases:
 Sources: P. Duhem 1897; B. D. Coleman and M. L. Hodgdon, Int. J. Eng. Sci. 24 (1986).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import field
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -33,6 +33,9 @@ from hysim.models.duhem_terms import Polynomials, Term, equation, latex, polynom
 from hysim.models.model import CompiledLaw, model
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
+
+if TYPE_CHECKING:
+    from hysim.models.duhem_structure import DuhemStructure
 
 State = tuple[float, float]
 """Last input and memory."""
@@ -123,6 +126,91 @@ class Duhem:
         parts = polynomials(parsed, np.array([list(terms.values())], dtype=float))
         arrays = {name: part[0] for name, part in parts._asdict().items()}
         return cls(**arrays, feedthrough=feedthrough, offset=offset, y0=y0)
+
+    @classmethod
+    def from_branches(
+        cls,
+        *,
+        ascending: npt.ArrayLike,
+        descending: npt.ArrayLike,
+        feedthrough: float = 0.0,
+        offset: float = 0.0,
+        y0: float = 0.0,
+    ) -> Self:
+        """The law by its two slopes, ``z' = f1(u, z) u'`` where u rises and ``z' = f2(u, z) u'`` where it falls.
+
+        Parameters
+        ----------
+        ascending, descending : array, shape (rows, columns)
+            Element [i, j] of f1 and of f2 multiplies ``u^i z^j`` [unit of y^(1-j) / unit of u^(i+1)]. The shapes may
+            differ.
+        feedthrough, offset, y0 : float
+            As in the constructor.
+
+        Returns
+        -------
+        Duhem
+            With p = (f1 + f2) / 2 and q = (f1 - f2) / 2.
+
+        Raises
+        ------
+        ValueError
+            If an array is empty, has not two axes, or a number is not finite.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> hs.Duhem.from_branches(ascending=[[1.0, -1.0]], descending=[[1.0, 1.0]]).equation
+        "y' = u' (1) + |u'| (-1 y)"
+        """
+        f1, f2 = (
+            read_only(slope, name, ndim=2) for name, slope in (("ascending", ascending), ("descending", descending))
+        )
+        half = np.zeros((2, max(len(f1), len(f2)), max(f1.shape[1], f2.shape[1])))
+        for k, slope in enumerate((f1, f2)):
+            half[k, : slope.shape[0], : slope.shape[1]] = 0.5 * slope
+        return cls(p=half[0] + half[1], q=half[0] - half[1], feedthrough=feedthrough, offset=offset, y0=y0)
+
+    @staticmethod
+    def structure(*, degree: int | None = None, terms: Sequence[str] | None = None) -> "DuhemStructure":
+        """What `hysim.identify` takes: the terms of a law between u and y, without their coefficients.
+
+        The search begins at a regression on the record, so that no start is needed.
+
+        Parameters
+        ----------
+        degree : int, optional
+            Every monomial of u and y up to this degree, with u' and with ``|u'|``: (degree + 1)(degree + 2) terms.
+        terms : sequence of str, optional
+            Or the names of the terms, as in `from_terms`, without ``|z|``.
+
+        Returns
+        -------
+        DuhemStructure
+
+        Raises
+        ------
+        ValueError, TypeError
+            If not one of the two is given, the degree is not a whole number of at least zero, or a name is not in the
+            vocabulary.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> law = hs.Duhem.from_terms({"u'": 0.345, "|u'| u": 3.1635, "|u'| y": -1.0})
+        >>> u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=60)
+        >>> structure = hs.Duhem.structure(terms=["u'", "|u'| u", "|u'| y"])
+        >>> fit = hs.identify(structure, hs.Record(u=u, y=law.response(u)))
+        >>> round(fit.estimates["|u'| u"], 6)
+        3.1635
+        """
+        from hysim.models import duhem_structure
+
+        if degree is not None and terms is None:
+            return duhem_structure.of_degree(degree)
+        if terms is not None and degree is None:
+            return duhem_structure.of_terms(tuple(terms))
+        raise ValueError("give degree or terms, one of the two")
 
     @property
     def terms(self) -> dict[str, float]:

@@ -105,7 +105,7 @@ class GeneralizedBoucWen(SteppedLaw):
                 laws += [np.stack([A, beta + both * b3 + direction * b5, own, n], axis=1), output]
         return np.concatenate(laws, axis=1)
 
-    def _memory_slope(self, direction: FloatArray, z: FloatArray, u: FloatArray) -> FloatArray:
+    def _memory_slope(self, direction: FloatArray, z: FloatArray, u: FloatArray, *_: FloatArray) -> FloatArray:
         s, e, side = direction, np.sign(z), np.sign(u)
         symmetric = self.gamma + self.beta * s * e + self.b2 * s * side + self.b3 * e * side
         return np.asarray(self.A - np.abs(z) ** self.n * (symmetric + self.b4 * s + self.b5 * e + self.b6 * side))

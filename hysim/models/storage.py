@@ -3,7 +3,6 @@
 A model inside another, such as the law of an actuator, is a family with its parameters in its place.
 """
 
-import importlib
 import json
 from collections.abc import Mapping
 from dataclasses import fields
@@ -15,11 +14,6 @@ import numpy as np
 import hysim
 from hysim._atomic import write_text
 from hysim.models.model import FAMILIES
-
-_MODULES = (
-    *("actuator", "amplifier", "boucwen", "creep", "dahl", "duhem", "maxwell_slip", "modes", "oscillator", "play"),
-    *("polynomial_boucwen", "prandtl_ishlinskii", "preisach", "sensor", "state_space", "static", "transfer_function"),
-)
 
 
 def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None) -> None:
@@ -95,11 +89,9 @@ def from_json(text: str | bytes, source: str | Path) -> tuple[Any, dict[str, str
 
 def from_document(document: Mapping[str, Any], path: str | Path) -> Any:
     """The model of a family with its parameters, models among them; `path` is what the messages call its place."""
-    for module in _MODULES:
-        importlib.import_module(f"hysim.models.{module}")
     family, given = str(document["family"]), document["parameters"]
     if family in hysim.__all__:
-        getattr(hysim, family)  # loads its module, which enters the families that live elsewhere
+        getattr(hysim, family)  # loads its module, which enters it into the families
     if family not in FAMILIES:
         raise ValueError(f"{path} holds a model of the family {family!r}; there are {', '.join(sorted(FAMILIES))}")
     try:

@@ -91,6 +91,6 @@ class ZhuWangBoucWen(SteppedLaw):
     def _step_parameters(memory: FloatArray, output: FloatArray) -> FloatArray:
         return np.concatenate([memory[:, :-1], output], axis=1)
 
-    def _memory_slope(self, direction: FloatArray, z: FloatArray, u: FloatArray) -> FloatArray:
+    def _memory_slope(self, direction: FloatArray, z: FloatArray, u: FloatArray, *_: FloatArray) -> FloatArray:
         bend = np.abs(z) ** self.n * (self.gamma + self.beta * np.sign(z * direction))
         return np.asarray(self.A - bend + self.delta * u * direction)

@@ -1,0 +1,244 @@
+"""The Bouc-Wen law of Baber and Noori along a monotone input: strength and stiffness that wear off, and pinching.
+
+    dz/du = h (A(e) - nu(e) |z|^n (gamma + beta sgn(z u'))) / eta(e),    de/du = z
+    A(e)  = A - delta_a e,    nu = 1 + delta_nu e,    eta = 1 + delta_eta e
+    h     = 1 - zeta1 exp(-(z sgn(u') - q z_u)^2 / zeta2^2),    z_u = (1 / (nu (beta + gamma)))^(1/n)
+    zeta1 = zeta_s (1 - exp(-p e)),    zeta2 = (psi + delta_psi e) (lambda + zeta1)
+
+Let s be the direction of the input and w = s z. With L the length travelled the direction drops out, and on one side
+of z = 0, where c = beta + gamma for w > 0 and gamma - beta for w < 0, everything is analytic:
+
+    dw/dL = h(w, e) (A(e) - c nu(e) |w|^n) / eta(e),    de/dL = w
+
+Its power series about the present point, L = t x, follows term by term from those of e, nu^(-1/n), exp(-p e), the
+bell exp(-X^2) and |w|^n. A step is as long as its last terms are rounding (`hysim.kernels.duhem`), and ends where w
+crosses zero. |w|^n has no series at w = 0 unless n is 1 or 2: within a distance in which the integral of its term is
+rounding it is left out. There is no closed form; this is good to 1e-12 of the range. A law that escapes is returned as
+`inf`; one that needs more than MAX_STEPS, or whose eta vanishes on the way, as `nan`.
+
+A law that neither wears off nor pinches takes the exact step of `hysim.kernels.boucwen`, so that z has its bits.
+"""
+
+import math
+
+from hysim._frozen import FloatArray
+from hysim.kernels import boucwen
+from hysim.kernels._compile import inner, kernel
+from hysim.kernels.charts import N_WORK
+from hysim.kernels.duhem import N_TERMS, place, reach, zero
+
+N_OWN = 9  # delta_a, delta_nu, delta_eta, zeta_s, q, p, psi, delta_psi, lambda, before what `boucwen.step` takes
+_A, _BETA, _GAMMA, _N = range(N_OWN, N_OWN + 4)
+
+# Rows of the series; `reach`, `place` and `zero` look at row 1.
+_POWER, _W, _ENERGY, _BRACKET, _ROOT, _FADED, _DEPTH, _WIDTH, _X, _SQUARE, _BELL, _PINCH, _SLOPE = range(13)
+_N_ROWS = 13
+
+_PLAIN = 3  # after u, z and e the workspace of the Bouc-Wen law
+_SERIES = _PLAIN + N_WORK
+_EXPONENT = _SERIES + _N_ROWS * (N_TERMS + 1)  # the n that its charts are made for
+_READY = _EXPONENT + 1  # 0 before the first step
+N_STATE = _READY + 1
+
+MAX_STEPS = 2_000
+_LARGEST = 1.7976931348623157e308
+_LARGEST_EXPONENT = 700.0
+_SMALL = 2.0**-54
+_N_LAST = 3  # terms that are rounding where a series ends: of a symmetric one every other term is zero
+_GROWTH = 16.0  # of the length tried, over the last one that served
+_VANISHED = 1e-3  # of eta: what is lost beside it did not escape
+_RETREAT = 2.0**-10  # of a length at which a term overflows
+
+
+@kernel
+def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
+    """Output at the next input `u`; `state`, shape (N_STATE,), has the last u, z and e in front, and moves along.
+
+    `parameters` are N_OWN of the law's own, and (A, beta, gamma, n, gain, offset, c1, c2, ...).
+    """
+    common, plain = parameters[N_OWN:], state[_PLAIN:_SERIES]
+    last, z, e = state[0], state[1], state[2]
+    if state[_READY] == 0.0:
+        A, beta, gamma, n = common[0], common[1], common[2], common[3]
+        boucwen.prepare(A, beta, gamma, n, state[_EXPONENT], plain)
+        state[_EXPONENT], state[_READY] = n, 1.0
+    if u != last:
+        direction = 1.0 if u > last else -1.0
+        series = state[_SERIES:_EXPONENT].reshape((_N_ROWS, N_TERMS + 1))
+        w, e = advance(direction * z, e, abs(u - last), parameters, series)
+        state[1], state[2] = direction * w, e
+    state[0] = u
+    if parameters[0] == 0.0 and parameters[1] == 0.0 and parameters[2] == 0.0 and parameters[3] == 0.0:
+        plain[0], plain[1] = last, z
+        y = boucwen.step(common, plain, u)
+        state[1] = plain[1]
+        return float(y)
+    return float(common[5] + boucwen.polynomial(u, common, 6) + common[4] * state[1])
+
+
+@kernel
+def advance(w: float, e: float, length: float, parameters: FloatArray, series: FloatArray) -> tuple[float, float]:
+    """w and e after the input has moved by `length`; `series` is (_N_ROWS, N_TERMS + 1)."""
+    n = parameters[_N]
+    left = t = length
+    largest = abs(w)
+    for _ in range(MAX_STEPS):
+        if left == 0.0:
+            return w, e
+        free = False
+        if w == 0.0 or not (n == 1.0 or n == 2.0):
+            begin(w, e, True, parameters, series)
+            forcing, near = series[_SLOPE, 0], nearness(e, length, parameters, series)
+            if w == 0.0 and forcing == 0.0:
+                return w, e
+            free = abs(w) <= near and not (n == 1.0 or n == 2.0)
+            if free:
+                t = min(t, 2.0 * abs(w / forcing) if w * forcing < 0.0 else near / abs(forcing))
+        last = expand(w, e, t, free, largest, parameters, series)
+        fraction = 1.0
+        if last < 0:
+            last, fraction = N_TERMS, max(reach(series, _N_LAST), died_out(series, largest))
+        if fraction == 0.0:
+            if not math.isfinite(series[_W, 1]):
+                return series[_W, 1], e
+            t *= _RETREAT
+            continue
+        if fraction < 1.0 and t * fraction <= _SMALL * length:  # nothing moves u any more, but w
+            return math.inf if abs(1.0 + parameters[2] * e) > _VANISHED else math.nan, e
+        before, w = w, place(series, last, fraction)[0]
+        if not abs(w) < _LARGEST:
+            return w, e
+        largest = max(largest, abs(w))
+        if before * w < 0.0:
+            fraction, w = zero(series, last, fraction), 0.0
+        e = place(series[_ENERGY - 1 :], last, fraction)[0]
+        taken = t * fraction
+        left = 0.0 if taken >= left else left - taken
+        t = min(left, _GROWTH * taken)
+    return math.nan, e
+
+
+@inner
+def died_out(series: FloatArray, size: float) -> float:
+    """Fraction of the step at which the last terms of w have become rounding beside `size`."""
+    fraction = 1.0
+    for k in range(N_TERMS + 1 - _N_LAST, N_TERMS + 1):
+        term = abs(series[_W, k])
+        if not math.isfinite(term):
+            return 0.0
+        if term > _SMALL * size:
+            fraction = min(fraction, (_SMALL * size / term) ** (1.0 / k))
+    return fraction
+
+
+@inner
+def nearness(e: float, length: float, parameters: FloatArray, series: FloatArray) -> float:
+    """How near to zero w must be that the integral of the term with ``|w|^n`` is rounding; after `begin`."""
+    n, forcing = parameters[_N], abs(series[_SLOPE, 0])
+    c = abs(parameters[_BETA]) + abs(parameters[_GAMMA])
+    factor = c * abs((1.0 + parameters[1] * e) * series[_PINCH, 0] / (1.0 + parameters[2] * e))
+    if forcing == 0.0 or factor == 0.0:
+        return 0.0 if forcing == 0.0 else math.inf
+    size = min(forcing * length, (forcing / factor) ** (1.0 / n))
+    return float(0.5 * (_SMALL * size * (n + 1.0) * forcing / factor) ** (1.0 / (n + 1.0)))
+
+
+@kernel
+def begin(w: float, e: float, free: bool, parameters: FloatArray, series: FloatArray) -> float:
+    """Fill the first terms, and return the side of zero; a `free` memory is without the term of ``|w|^n``."""
+    n, nu = parameters[_N], 1.0 + parameters[1] * e
+    series[_W, 0], series[_ENERGY, 0], series[_PINCH, 0] = w, e, 1.0
+    if parameters[3] != 0.0:
+        parting = parameters[4]  # q z_u where nu = 1
+        if parting != 0.0:
+            loading = parameters[_BETA] + parameters[_GAMMA]
+            parting *= loading ** (-1.0 / n) if loading > 0.0 else math.nan
+        series[_ROOT, 0] = parting * nu ** (-1.0 / n) if nu > 0.0 else math.nan
+        fading = min(-parameters[5] * e, _LARGEST_EXPONENT)
+        series[_FADED, 0], series[_DEPTH, 0] = math.exp(fading), -parameters[3] * math.expm1(fading)
+        series[_WIDTH, 0] = (parameters[6] + parameters[7] * e) * (parameters[8] + series[_DEPTH, 0])
+        series[_X, 0] = (w - series[_ROOT, 0]) / series[_WIDTH, 0]
+        series[_SQUARE, 0] = series[_X, 0] * series[_X, 0]
+        series[_BELL, 0] = math.exp(-series[_SQUARE, 0])
+        series[_PINCH, 0] = 1.0 - series[_DEPTH, 0] * series[_BELL, 0]
+    strength, eta = parameters[_A] - parameters[0] * e, 1.0 + parameters[2] * e
+    above = w > 0.0 or (w == 0.0 and series[_PINCH, 0] * strength / eta > 0.0)
+    side = 1.0 if above else -1.0
+    series[_POWER, 0] = 0.0 if free else abs(w) ** n
+    series[_BRACKET, 0] = strength - (parameters[_GAMMA] + side * parameters[_BETA]) * nu * series[_POWER, 0]
+    series[_SLOPE, 0] = series[_PINCH, 0] * series[_BRACKET, 0] / eta
+    return side
+
+
+@inner
+def expand(w: float, e: float, t: float, free: bool, size: float, parameters: FloatArray, series: FloatArray) -> int:
+    """Fill the series over a length t until the terms of w are rounding beside `size`: the index of the last, or -1."""
+    side = begin(w, e, free, parameters, series)
+    small = 0
+    for k in range(1, N_TERMS + 1):
+        term = t * series[_SLOPE, k - 1] / k
+        series[_W, k], series[_ENERGY, k] = term, t * series[_W, k - 1] / k
+        size = max(size, abs(term)) if k < 3 else size
+        small = small + 1 if abs(term) <= _SMALL * size else 0
+        if small == _N_LAST:
+            return k
+        if k < N_TERMS:
+            extend(k, side, free, parameters, series)
+    return -1
+
+
+@inner
+def extend(k: int, side: float, free: bool, parameters: FloatArray, series: FloatArray) -> None:
+    """The terms k of all rows, from those of w and e and all terms before.
+
+    They follow from  w g' = n w' g  for g = |w|^n,  nu r' = -nu' r / n  for r = nu^(-1/n),  f' = -p e' f  for
+    f = exp(-p e)  and  b' = -(X^2)' b  for b = exp(-X^2).
+    """
+    n, growth = parameters[_N], parameters[1]
+    nu, eta = 1.0 + growth * series[_ENERGY, 0], 1.0 + parameters[2] * series[_ENERGY, 0]
+    if free:
+        series[_POWER, k] = 0.0
+    elif n == 1.0:
+        series[_POWER, k] = side * series[_W, k]
+    elif n == 2.0:
+        series[_POWER, k] = product(series, _W, _W, k, 0)
+    else:
+        moment = (n + 1.0) * weighted(series, _W, _POWER, k) - k * product(series, _W, _POWER, k, 1)
+        series[_POWER, k] = moment / (k * series[_W, 0])
+    strength = nu * series[_POWER, k] + growth * product(series, _ENERGY, _POWER, k, 1)
+    strength *= parameters[_GAMMA] + side * parameters[_BETA]
+    series[_BRACKET, k] = -parameters[0] * series[_ENERGY, k] - strength
+    driven = series[_BRACKET, k]
+    if parameters[3] != 0.0:
+        moment = (1.0 / n - 1.0) * weighted(series, _ENERGY, _ROOT, k) + k * product(series, _ENERGY, _ROOT, k, 1)
+        series[_ROOT, k] = -growth * moment / (k * nu)
+        series[_FADED, k] = -parameters[5] * weighted(series, _ENERGY, _FADED, k) / k
+        series[_DEPTH, k] = -parameters[3] * series[_FADED, k]
+        breadth = parameters[6] + parameters[7] * series[_ENERGY, 0]
+        widened = parameters[7] * (product(series, _ENERGY, _DEPTH, k, 1) + parameters[8] * series[_ENERGY, k])
+        series[_WIDTH, k] = breadth * series[_DEPTH, k] + widened
+        apart = series[_W, k] - series[_ROOT, k] - product(series, _WIDTH, _X, k, 1)
+        series[_X, k] = apart / series[_WIDTH, 0]
+        series[_SQUARE, k] = product(series, _X, _X, k, 0)
+        series[_BELL, k] = -weighted(series, _SQUARE, _BELL, k) / k
+        series[_PINCH, k] = -product(series, _DEPTH, _BELL, k, 0)
+        driven = product(series, _PINCH, _BRACKET, k, 0)
+    series[_SLOPE, k] = (driven - parameters[2] * product(series, _ENERGY, _SLOPE, k, 1)) / eta
+
+
+@inner
+def product(series: FloatArray, a: int, b: int, k: int, first: int) -> float:
+    """Sum of a_j b_(k-j) from j = `first` on: the term k of a product, or what of it does not hold a_0."""
+    total = 0.0
+    for j in range(first, k + 1):
+        total += series[a, j] * series[b, k - j]
+    return total
+
+
+@inner
+def weighted(series: FloatArray, a: int, b: int, k: int) -> float:
+    """Sum of j a_j b_(k-j): k times what a' b gives."""
+    total = 0.0
+    for j in range(1, k + 1):
+        total += j * series[a, j] * series[b, k - j]
+    return total
