@@ -1,163 +1,70 @@
-"""The verb `compare`: models side by side on one record.
+"""The verb `compare`: models side by side on one record, all by the same protocol.
 
-Every model is simulated in free run on the record and judged by the same measures, those of
-`hysim.metrics`: how well its output fits, and how wide its loop is.
+Every model is identified on the same samples, cross-validated by the same splits and tried on the same test. It is
+simulated in free run and judged by the same measures, those of `hysim.metrics`: how well its output fits, and how wide
+its loop is.
 """
 
-import csv
-import io
 import math
-from collections.abc import Callable, Mapping
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from hysim import metrics
-from hysim._frozen import FloatArray, frozen
-from hysim.identification import identify
+from hysim._cycles import TOLERANCE, last_cycles
+from hysim._frozen import FloatArray
+from hysim._parallel import Progress, map_on_threads
+from hysim.comparison._result import Comparison, ComparisonRow
+from hysim.errors import SimulationError
+from hysim.identification import Identification, identify
 from hysim.metrics import LoopMetrics, loop_metrics
+from hysim.models.candidates import candidates, is_identifiable
+from hysim.models.model import needs_time
 from hysim.records import Record
 from hysim.simulation import simulate
 
 _SHORT = 200  # samples; leaving one out at a time costs as many fits as there are samples
 _BLOCKS = 10
+_SAME = 1e-6  # of the output's range: what a change of rate may change in a model that does not know rates
+_FAILURES = (ValueError, TypeError, ArithmeticError, SimulationError)
 
 
-@frozen
-class ComparisonRow:
-    """One model on the record.
-
-    Parameters
-    ----------
-    name : str
-        What the model is called.
-    model : model
-        The model itself.
-    n_parameters : int
-        How many of its parameters were fitted to this record.
-    fit_percent, rmse : float
-        Of the free-run output [unit of y].
-    cv_rmse : float
-        Cross-validated rmse, nan if unknown [unit of y]. A model that was not fitted has its rmse.
-    max_residual : float
-        Largest residual [unit of y].
-    max_width, max_width_at, area, width_rmse : float
-        Of the model's loop, as in `hysim.loop_metrics`; `width_rmse` is the rms difference from the
-        measured width over the measured inputs.
-    fpe : float
-        Final prediction error, nan where nothing was fitted.
-    y : array, shape (n,)
-        Output at the record's samples.
-    loop : LoopMetrics
-        The model's loop.
-    """
-
-    name: str
-    model: Any
-    n_parameters: int
-    fit_percent: float
-    rmse: float
-    cv_rmse: float
-    max_residual: float
-    max_width: float
-    max_width_at: float
-    area: float
-    width_rmse: float
-    fpe: float
-    y: FloatArray
-    loop: LoopMetrics
-
-
-@frozen
-class Comparison:
-    """Models side by side.
-
-    Parameters
-    ----------
-    record : Record
-        What they were compared on.
-    loop : LoopMetrics
-        Its loop.
-    rows : tuple of ComparisonRow
-        One for each model, in the order given.
-    """
-
-    record: Record
-    loop: LoopMetrics
-    rows: tuple[ComparisonRow, ...]
-
-    def __getitem__(self, name: str) -> ComparisonRow:
-        for row in self.rows:
-            if row.name == name:
-                return row
-        raise KeyError(f"no model {name!r}: there are {', '.join(row.name for row in self.rows)}")
-
-    def to_text(self) -> str:
-        """The table for a terminal."""
-        table = [self._header(), *self._cells(_rounded)]
-        widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-        lines = [
-            "  ".join([cells[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(cells[1:], widths[1:], strict=True))])
-            for cells in table
-        ]
-        return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])
-
-    def to_markdown(self) -> str:
-        """The table in Markdown."""
-        header = self._header()
-        rule = ["---", *("---:" for _ in header[1:])]
-        return "\n".join("| " + " | ".join(cells) + " |" for cells in [header, rule, *self._cells(_rounded)])
-
-    def to_csv(self) -> str:
-        """The table as comma-separated values, every digit kept."""
-        buffer = io.StringIO()
-        writer = csv.writer(buffer, lineterminator="\n")
-        writer.writerows([self._header(), *self._cells(_exact)])
-        return buffer.getvalue()
-
-    def _header(self) -> list[str]:
-        unit = self.record.units
-        labels = {name: f" [{unit[name]}]" if name in unit else "" for name in ("u", "y")}
-        quanta = ["max residual [quanta]"] if self.record.resolution else []
-        area = f" [{unit['y']} {unit['u']}]" if {"u", "y"} <= unit.keys() else ""
-        y = labels["y"]
-        return [
-            "model", "parameters", "fit [%]", f"rmse{y}", f"cv rmse{y}", *quanta, f"max width{y}",
-            f"at{labels['u']}", f"area{area}", f"width rmse{y}",
-        ]  # fmt: skip
-
-    def _cells(self, write: Callable[[float, int], str]) -> list[list[str]]:
-        quantum = self.record.resolution
-        return [
-            [
-                row.name,
-                str(row.n_parameters),
-                write(row.fit_percent, 2),
-                write(row.rmse, 4),
-                write(row.cv_rmse, 4),
-                *([write(row.max_residual / quantum, 2)] if quantum else []),
-                write(row.max_width, 3),
-                write(row.max_width_at, 1),
-                write(row.area, 2),
-                write(row.width_rmse, 4),
-            ]
-            for row in self.rows
-        ]
-
-
-def compare(subjects: Mapping[str, Any], record: Record, *, cross_validate: str | int | None = "auto") -> Comparison:
+def compare(
+    models: Mapping[str, Any] | str | None,
+    record: Record,
+    *,
+    cross_validate: str | int | None = "auto",
+    test: Record | int | None = None,
+    seed: int = 0,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> Comparison:
     """Compare models on a record.
 
     Parameters
     ----------
-    subjects : mapping
+    models : mapping, "all" or None
         Name to what is to be compared: a model, which is taken as it is; a result of `identify` or
-        `discover`; or a class or structure, which is identified on the record.
+        `discover`; or a class or structure, which is identified on the record. ``"all"``, or None, is every family
+        that can be identified without being told more; those that cannot be on this record say why.
     record : Record
         With at least one complete cycle of the input.
-    cross_validate : {"auto", "loo", None} or int
+    cross_validate : {"auto", "loo", "cycles", None} or int
         How the classes and structures are cross-validated; see `identify`. ``"auto"`` leaves one sample out at
         a time on records of up to 200 samples, and one of 10 blocks on longer ones.
+    test : Record or int, optional
+        What no fit sees: another record, or the number of last complete cycles of this one that are kept from it.
+        A model that was identified here begins another record with a state that is identified on it, everything
+        else fixed; the last cycles it meets in the state that it reaches in free run.
+    seed : int
+        Of the starts of the searches.
+    workers : int, optional
+        Number of threads; by default one for each core. The result does not depend on it.
+    progress : callable, optional
+        Called as ``progress(done, total)`` after each model.
 
     Returns
     -------
@@ -166,9 +73,9 @@ def compare(subjects: Mapping[str, Any], record: Record, *, cross_validate: str 
     Raises
     ------
     ValueError
-        If there is nothing to compare, or the record has no complete cycle.
-    SimulationError
-        If a model leaves the finite numbers on the record.
+        If there is nothing to compare, or the record has no complete cycle, or fewer than the test needs.
+    TypeError
+        If the record is none, or a subject is nothing that can be compared.
 
     Examples
     --------
@@ -181,42 +88,139 @@ def compare(subjects: Mapping[str, Any], record: Record, *, cross_validate: str 
     """
     if not isinstance(record, Record):
         raise TypeError(f"compare takes a Record, got {type(record).__name__}: hs.Record(u=u, y=y)")
-    if not subjects:
-        raise ValueError("there is nothing to compare: give at least one model by name")
+    subjects = _subjects(models)
+    trial = _trial(record, test)
+    training = trial.training if trial else record
     if cross_validate == "auto":
-        cross_validate = "loo" if len(record) <= _SHORT else _BLOCKS
-    measured = loop_metrics(record.u, record.y)
-    rows = [_row(name, subject, record, measured, cross_validate) for name, subject in subjects.items()]
-    return Comparison(record=record, loop=measured, rows=tuple(rows))
-
-
-def _row(
-    name: str, subject: Any, record: Record, measured: LoopMetrics, cross_validate: str | int | None
-) -> ComparisonRow:
-    fitted = identify(subject, record, cross_validate=cross_validate) if _is_family(subject) else subject
-    model = getattr(fitted, "model", fitted)
-    y = simulate(model, record.t, record.u).y
-    loop = loop_metrics(record.u, y)
-    residual = record.y - y
-    rmse = metrics.rmse(record.y, y)
-    is_fitted = fitted is not model
-    n_parameters = int(fitted.n_parameters) if is_fitted else 0
-    return ComparisonRow(
-        name=name,
-        model=model,
-        n_parameters=n_parameters,
-        fit_percent=metrics.fit_percent(record.y, y),
-        rmse=rmse,
-        cv_rmse=float(fitted.cv_rmse) if is_fitted else rmse,
-        max_residual=float(np.abs(residual).max()),
-        max_width=loop.max_width,
-        max_width_at=loop.max_width_at,
-        area=loop.area,
-        width_rmse=metrics.width_rmse(measured, loop),
-        fpe=metrics.fpe(residual, n_parameters) if is_fitted else math.nan,
-        y=y,
-        loop=loop,
+        cross_validate = "loo" if len(training) <= _SHORT else _BLOCKS
+    protocol = _Protocol(training, loop_metrics(training.u, training.y), cross_validate, seed, trial)
+    names = list(subjects)
+    results = map_on_threads(
+        lambda k: protocol.row(names[k], subjects[names[k]]), len(names), workers=workers, progress=progress
     )
+    found = dict(zip(names, results, strict=True))
+    return Comparison(
+        record=training,
+        loop=protocol.measured,
+        rows=tuple(row for row in found.values() if isinstance(row, ComparisonRow)),
+        failed={name: reason for name, reason in found.items() if isinstance(reason, str)},
+        test=trial.record if trial else None,
+    )
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """What is fitted, what drives the models in the test, and from which sample of it on they are judged."""
+
+    training: Record
+    drive: Record
+    begin: int
+    own_state: bool
+
+    @property
+    def record(self) -> Record:
+        """The samples that are judged."""
+        return self.drive[self.begin :]
+
+
+@dataclass(frozen=True)
+class _Protocol:
+    """What is done to every model."""
+
+    record: Record
+    measured: LoopMetrics
+    cross_validate: str | int | None
+    seed: int
+    trial: _Trial | None
+
+    def row(self, name: str, subject: Any) -> ComparisonRow | str:
+        """The row of one subject, or why there is none."""
+        begin, seconds = time.perf_counter(), math.nan
+        try:
+            if _is_family(subject):
+                fitted = identify(subject, self.record, cross_validate=self.cross_validate, seed=self.seed)
+                seconds = time.perf_counter() - begin
+                return self._judged(name, fitted, seconds, fitted.success, fitted.message)
+            return self._judged(name, subject, seconds, bool(getattr(subject, "success", True)), "")
+        except _FAILURES as error:
+            return " ".join(str(error).split())
+
+    def _judged(self, name: str, fitted: Any, seconds: float, success: bool, message: str) -> ComparisonRow:
+        record, measured = self.record, self.measured
+        model = getattr(fitted, "model", fitted)
+        y = simulate(model, record.t, record.u).y
+        loop = loop_metrics(record.u, y)
+        residual = record.y - y
+        rmse = metrics.rmse(record.y, y)
+        is_fitted = fitted is not model
+        n_parameters = int(fitted.n_parameters) if is_fitted else 0
+        sense = -1.0 if {loop.orientation, measured.orientation} == {"clockwise", "counterclockwise"} else 1.0
+        deviation = _rate_deviation(model, record, y)
+        test_fit, test_rmse = self._tested(fitted, model, math.isfinite(seconds))
+        return ComparisonRow(
+            name=name,
+            model=model,
+            n_parameters=n_parameters,
+            fit_percent=metrics.fit_percent(record.y, y),
+            rmse=rmse,
+            cv_rmse=float(fitted.cv_rmse) if is_fitted else rmse,
+            cv_residual=getattr(fitted, "cv_residual", np.empty(0)) if is_fitted else residual,
+            max_residual=float(np.abs(residual).max()),
+            max_width=loop.max_width,
+            max_width_at=loop.max_width_at,
+            area=loop.area,
+            width_rmse=metrics.width_rmse(measured, loop),
+            width_error_percent=_excess_percent(sense * loop.max_width, measured.max_width),
+            area_error_percent=_excess_percent(sense * loop.area, measured.area),
+            fpe=metrics.fpe(residual, n_parameters) if is_fitted else math.nan,
+            aic=metrics.aic(residual, n_parameters) if is_fitted else math.nan,
+            bic=metrics.bic(residual, n_parameters) if is_fitted else math.nan,
+            is_rate_independent=deviation <= _SAME,
+            rate_deviation=deviation,
+            y=y,
+            loop=loop,
+            test_fit_percent=test_fit,
+            test_rmse=test_rmse,
+            success=success,
+            message=message,
+            seconds=seconds,
+        )
+
+    def _tested(self, fitted: Any, model: Any, identified_here: bool) -> tuple[float, float]:
+        """Fit and rmse on the test."""
+        if self.trial is None:
+            return math.nan, math.nan
+        drive, judged = self.trial.drive, self.trial.record
+        if self.trial.own_state and identified_here:
+            model = _at_the_start_of(drive, fitted, self.seed)
+        y = simulate(model, drive.t, drive.u).y[self.trial.begin :]
+        return metrics.fit_percent(judged.y, y), metrics.rmse(judged.y, y)
+
+
+def _subjects(models: Mapping[str, Any] | str | None) -> dict[str, Any]:
+    if models is None or (isinstance(models, str) and models == "all"):
+        return candidates()
+    if not isinstance(models, Mapping):
+        raise TypeError(f'compare takes a mapping of names to models, or "all", got {models!r}')
+    if not models:
+        raise ValueError("there is nothing to compare: give at least one model by name")
+    for name, subject in models.items():
+        if not (is_identifiable(subject) or callable(getattr(getattr(subject, "model", subject), "response", None))):
+            raise TypeError(f"compare takes a model, a result, a model class or a structure, got {subject!r} as {name}")
+    return dict(models)
+
+
+def _trial(record: Record, test: Record | int | None) -> _Trial | None:
+    if test is None:
+        return None
+    if isinstance(test, Record):
+        return _Trial(training=record, drive=test, begin=0, own_state=True)
+    if not isinstance(test, int) or isinstance(test, bool):
+        raise TypeError(f"test takes a Record or a number of last cycles, got {test!r}")
+    begin = last_cycles(record.u, test, TOLERANCE)[-1].path.start + 1
+    if begin < 3:
+        raise ValueError(f"a test on {test} of the record's cycles leaves nothing to identify from")
+    return _Trial(training=record[:begin], drive=record, begin=begin, own_state=False)
 
 
 def _is_family(subject: Any) -> bool:
@@ -224,9 +228,28 @@ def _is_family(subject: Any) -> bool:
     return isinstance(subject, type) or not (hasattr(subject, "response") or hasattr(subject, "model"))
 
 
-def _rounded(value: float, digits: int) -> str:
-    return "-" if math.isnan(value) else f"{value:.{digits}f}"
+def _at_the_start_of(record: Record, fitted: Identification, seed: int) -> Any:
+    """The identified model, with the state at the first sample that suits another record best."""
+    model = fitted.model
+    if not is_identifiable(model):
+        return model
+    space = model.search_space(record)
+    state = set(space.state) & set(space.names)
+    if not state:
+        return model
+    shared = {name: value for name, value in fitted.estimates.items() if name not in state}
+    return identify(model, record, fixed=shared, seed=seed).model
 
 
-def _exact(value: float, digits: int) -> str:
-    return "" if math.isnan(value) else repr(float(value))
+def _rate_deviation(model: Any, record: Record, y: FloatArray) -> float:
+    """Largest change of the output, over its range, where the input takes twice as long on the same path."""
+    n = len(record)
+    slow = np.arange(2 * n - 1) / 2.0
+    t = record.sample_time * np.arange(2 * n - 1) if needs_time(model) else None
+    changed = simulate(model, t, np.interp(slow, np.arange(n), record.u)).y[::2]
+    span = float(np.ptp(y))
+    return float(np.abs(changed - y).max()) / span if span > 0.0 else 0.0
+
+
+def _excess_percent(value: float, measured: float) -> float:
+    return 100.0 * (value / measured - 1.0) if measured > 0.0 else math.nan

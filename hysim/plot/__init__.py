@@ -8,7 +8,7 @@ changes matplotlib's settings outside its own calls.
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hysim.plot._comparisons import loops, residuals, widths
+from hysim.plot._comparisons import comparison, loops, residuals, widths
 from hysim.plot._discoveries import selection
 from hysim.plot._identifications import identification
 from hysim.plot._records import history, loop, response, traces
@@ -18,6 +18,7 @@ from hysim.plot._svg import save_svg, to_svg
 __all__ = [
     "Axes",
     "Figure",
+    "comparison",
     "figure",
     "history",
     "house_style",
