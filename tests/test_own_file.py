@@ -80,7 +80,7 @@ def test_metrics_have_units_and_are_those_of_loop_metrics(run, folder):
     loop = hs.loop_metrics(*(getattr(hs.load(folder / "loop.csv", u=1, y=2), name) for name in "uy"))
     assert code == 0
     assert f"max width           {loop.max_width:.4g} um at {loop.max_width_at:.6g} V" in out
-    assert f"area               {loop.area:.4g} um V" in out
+    assert f"area                {loop.area:.4g} um V" in out
     document = json.loads(run("metrics", "loop.csv", *COLUMNS, "--json", "--unit", "y=nm")[1])
     assert document["area"] == loop.area
     assert document["units"] == {"u": "V", "y": "nm"}

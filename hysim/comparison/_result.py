@@ -1,5 +1,6 @@
 """What `compare` returns."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import field
 from typing import Any
@@ -150,9 +151,9 @@ class Comparison:
 
     @property
     def winner(self) -> str | None:
-        """The model with the least cross-validated rmse; None if no model has one."""
+        """The model with the least cross-validated rmse; None unless at least two models have one."""
         best = self.ranked()
-        return best[0].name if best else None
+        return best[0].name if len(best) > 1 else None
 
     @property
     def probabilities(self) -> dict[str, float]:
@@ -161,9 +162,9 @@ class Comparison:
         Name to the two-sided probability that the mean difference of squared errors on samples left out has by
         chance (Diebold and Mariano 1995, with the correlation of neighbours); nan where errors are unknown.
         """
-        best, *others = self.ranked() or (None,)
-        if best is None:
+        if self.winner is None:
             return {}
+        best, *others = self.ranked()
         return {
             row.name: probability(row.cv_residual, best.cv_residual)
             if row.cv_residual.shape == best.cv_residual.shape
@@ -179,22 +180,21 @@ class Comparison:
     @property
     def verdict(self) -> str:
         """The winner and what the record cannot decide, in words."""
-        if self.winner is None or len(self.rows) < 2:
-            return ""
-        unit = f" {self.record.units['y']}" if "y" in self.record.units else ""
-        told = (
-            f"{len(self.record)} samples cannot tell it from {_listed(self.undecided)}"
-            if self.undecided
-            else f"{len(self.record)} samples tell it from all others"
-            if any(value == value for value in self.probabilities.values())
-            else "whether the record tells it from the others is not known"
-        )
         by_bic = self.ranked("bic")
-        beside = f" The BIC prefers {by_bic[0].name}." if by_bic else ""
-        return (
-            f"{self.winner} predicts samples left out best, cross-validated rmse "
-            f"{self[self.winner].cv_rmse:.4g}{unit}; {told} (paired squared errors, 5 %).{beside}"
-        )
+        sentences = [f"The BIC prefers {by_bic[0].name}."] if len(by_bic) > 1 else []
+        if self.winner is not None:
+            unit = f" {self.record.units['y']}" if "y" in self.record.units else ""
+            rmse = f"cross-validated rmse {self[self.winner].cv_rmse:.4g}{unit}"
+            sentences.insert(0, f"{self.winner} predicts samples left out best, {rmse}; {self._undecided_in_words()}.")
+        return " ".join(sentences)
+
+    def _undecided_in_words(self) -> str:
+        samples = f"{len(self.record)} samples"
+        if self.undecided:
+            return f"{samples} cannot tell it from {_listed(self.undecided)} (paired squared errors, 5 %)"
+        if any(math.isnan(value) for value in self.probabilities.values()):
+            return "the errors that would tell it from the others are not all known"
+        return f"{samples} tell it from all others (paired squared errors, 5 %)"
 
     def to_text(self, *, timings: bool = True) -> str:
         """The table for a terminal, and the verdict under it.
