@@ -127,6 +127,10 @@ def _items(value: Any) -> dict[str, Any]:
     return {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
 
 
+def _compared(value: Any) -> tuple[Any, ...]:
+    return tuple(getattr(value, field.name) for field in dataclasses.fields(value) if field.compare)
+
+
 def _key(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return value.shape, (value + 0.0).tobytes()
@@ -140,11 +144,11 @@ def _key(value: Any) -> Any:
 def _equal(self: Any, other: object) -> Any:
     if type(self) is not type(other):
         return NotImplemented
-    return _key(tuple(_items(self).values())) == _key(tuple(_items(other).values()))
+    return _key(_compared(self)) == _key(_compared(other))
 
 
 def _hash(self: Any) -> int:
-    return hash((type(self), _key(tuple(_items(self).values()))))
+    return hash((type(self), _key(_compared(self))))
 
 
 def _reduce(self: Any) -> tuple[Any, ...]:

@@ -14,7 +14,9 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import Any
+from typing import Any, TypeVar
+
+T = TypeVar("T")
 
 _most: ContextVar[int | None] = ContextVar("most threads", default=None)
 
@@ -53,6 +55,42 @@ def in_chunks(work: Callable[[int, int], None], n_items: int, *, workers: int | 
         work(*own)
         for chunk in running:
             chunk.result()
+
+
+def map_on_threads(
+    work: Callable[[int], T], n_items: int, *, workers: int | None = None, progress: Progress | None = None
+) -> list[T]:
+    """The results of `work(k)` for k in `range(n_items)`, in order; inside, `in_chunks` has a thread to itself.
+
+    Parameters
+    ----------
+    work : callable
+        Computes the item k, by itself.
+    n_items : int
+        Number of items. A thread takes the next one when it is done with the last.
+    workers : int, optional
+        Number of threads; by default one for each core.
+    progress : callable, optional
+        Called as ``progress(done, total)`` after each item.
+    """
+    _check(workers)
+    n_threads = min(workers or _most.get() or cores(), n_items)
+
+    def alone(k: int) -> T:
+        with at_most(1 if n_threads > 1 else None):
+            return work(k)
+
+    results = []
+    with ThreadPoolExecutor(n_threads) as pool:
+        try:
+            for result in pool.map(alone, range(n_items)):
+                results.append(result)
+                if progress is not None:
+                    progress(len(results), n_items)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    return results
 
 
 @contextmanager

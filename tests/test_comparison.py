@@ -1,13 +1,19 @@
-"""`compare` judges every model by the same measures, whatever it is given."""
+"""`compare` judges every model by the same measures and the same splits, and says what the record cannot decide."""
 
 import csv
+import dataclasses
 import io
 import math
+import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import hysim as hs
+from hysim.comparison._verdict import probability
+from hysim.models import candidates as registry
+from hysim.models.model import FAMILIES
 
 
 @pytest.fixture(scope="module")
@@ -75,9 +81,14 @@ def test_tables_hold_every_row(comparison):
     assert float(rows[1]["fit [%]"]) == comparison["fitted"].fit_percent
     assert rows[1]["max residual [quanta]"]
     text, markdown = comparison.to_text().splitlines(), comparison.to_markdown().splitlines()
-    assert len(text) == len(markdown) == 6
-    assert len({len(line) for line in text}) == 1
+    assert len(text) > len(markdown) == 6
+    assert len({len(line) for line in text[:6]}) == 1
+    assert " ".join(line.strip() for line in text[6:]) == comparison.verdict
     assert all(line.count("|") == markdown[0].count("|") for line in markdown)
+    latex = comparison.to_latex().splitlines()
+    cells = latex[0].count("r") - 1  # of "tabular"
+    assert [line.count(" & ") for line in latex if line.endswith(r"\\")] == [cells] * 5
+    assert r"fit [\%]" in latex[2]
 
 
 def test_long_records_are_cross_validated_by_blocks():
@@ -91,7 +102,7 @@ def test_without_a_resolution_there_are_no_quanta(table1):
     bare = hs.Record(u=table1.u, y=table1.y)
     header = hs.compare({"line": hs.Line}, bare).to_csv().splitlines()[0]
     assert "quanta" not in header
-    assert "[" not in header.replace("fit [%]", "")
+    assert "[" not in header.replace("[%]", "")
 
 
 @pytest.mark.parametrize(
@@ -101,9 +112,233 @@ def test_without_a_resolution_there_are_no_quanta(table1):
         ({"line": hs.Line}, "branch", ValueError, "cycle"),
         ({"line": hs.Line}, None, TypeError, "takes a Record"),
         ({"word": "bouc-wen"}, "table", TypeError, "takes a model"),
+        ({"class": hs.Sensor}, "table", TypeError, "takes a model"),
+        ("bouc-wen", "table", TypeError, "takes a mapping"),
     ],
 )
 def test_wrong_arguments_are_named(table1, subjects, record, error, message):
     chosen = {"table": table1, "branch": table1[:26], None: [1.0, 2.0]}[record]
     with pytest.raises(error, match=message):
         hs.compare(subjects, chosen)
+
+
+QUICK = ("Line", "SingleValued", "Play", "Dahl")
+
+
+@pytest.fixture(scope="module")
+def quick(table1) -> hs.Comparison:
+    return hs.compare({name: getattr(hs, name) for name in QUICK} | {"untold": hs.Duhem}, table1)
+
+
+@pytest.fixture
+def few(monkeypatch):
+    """A registry of the families that are quick to identify."""
+    monkeypatch.setattr(registry, "FAMILIES", {name: FAMILIES[name] for name in QUICK})
+
+
+def test_every_family_of_the_registry_is_a_candidate_in_the_public_order():
+    found = registry.candidates()
+    assert {"BoucWen", "PrandtlIshlinskii", "TransferFunction", "Line"} <= found.keys()
+    assert "Sensor" not in found
+    assert [name for name in hs.__all__ if name in found] == [name for name in found if name in hs.__all__]
+    assert all(registry.is_identifiable(subject) for subject in found.values())
+    public = [name for name in hs.__all__ if name in FAMILIES]
+    alone = [name for name in public if registry.is_identifiable(FAMILIES[name])]
+    assert set(alone) <= {name for name in public if name in found or hasattr(FAMILIES[name], "candidates")}
+
+
+def test_a_family_says_itself_what_is_tried(monkeypatch, few):
+    class Declared:
+        candidates = staticmethod(lambda: {"gentle": hs.Line(slope=0.1), "steep": hs.Line(slope=9.0)})
+
+    monkeypatch.setitem(registry.FAMILIES, "BoucWen", Declared)
+    assert list(registry.candidates()) == ["gentle", "steep", "Play", "Dahl", "Line", "SingleValued"]
+
+
+@pytest.mark.parametrize("models", [None, "all"])
+def test_without_models_all_families_are_compared(table1, quick, few, models):
+    table = hs.compare(models, table1)
+    assert {row.name for row in table.rows} == set(QUICK)
+    assert all(table[name] == quick[name] for name in QUICK)
+
+
+def test_the_number_of_threads_does_not_change_a_bit(table1, quick):
+    done = []
+    again = hs.compare(
+        {name: getattr(hs, name) for name in QUICK} | {"untold": hs.Duhem},
+        table1,
+        workers=1,
+        progress=lambda *at: done.append(at),
+    )
+    assert again == quick
+    assert again.to_csv() == quick.to_csv()
+    assert done == [(k, 5) for k in range(1, 6)]
+    with pytest.raises(ValueError, match="workers"):
+        hs.compare({"line": hs.Line}, table1, workers=0)
+
+
+def test_what_cannot_be_identified_is_a_row_with_its_reason(quick):
+    assert quick.failed == {"untold": "Duhem has no defaults for p, q: pass an instance as the start, or use discover"}
+    assert "not compared: untold: Duhem has no defaults" in quick.to_text()
+    assert "| untold | Duhem has no defaults" in quick.to_markdown()
+    assert r"untold & \multicolumn" in quick.to_latex()
+    last = list(csv.DictReader(io.StringIO(quick.to_csv())))[-1]
+    assert (last["model"], last["fit [%]"], last["converged"]) == ("untold", "", "no")
+    with pytest.raises(KeyError, match="could not be compared: Duhem"):
+        quick["untold"]
+
+
+def test_a_model_that_escapes_is_a_row_with_its_reason(table1):
+    escaping = hs.BoucWen(beta=-1.0, gamma=-1.0, n=2.0)
+    table = hs.compare({"line": hs.Line(), "escaping": escaping}, table1)
+    assert list(table.failed) == ["escaping"]
+    assert [row.name for row in table.rows] == ["line"]
+
+
+def test_times_are_shown_where_they_are_asked_for_and_make_no_difference(quick):
+    row = quick["Line"]
+    assert row.seconds > 0.0
+    assert dataclasses.replace(row, seconds=1e9) == row
+    assert hash(dataclasses.replace(row, seconds=1e9)) == hash(row)
+    assert "time [s]" in quick.to_text()
+    for form in ("text", "csv", "markdown", "latex"):
+        assert "time [s]" not in getattr(quick, f"to_{form}")(timings=False)
+        assert "time [s]" in getattr(quick, f"to_{form}")(timings=True)
+
+
+def test_width_and_area_errors_are_percent_of_the_records_and_negative_for_the_other_sense():
+    u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=80)
+    play, stop = hs.Play(threshold=0.25), hs.Stop(threshold=0.25)
+    record = hs.Record(u=u, y=play.response(u))
+    double = hs.Play(threshold=0.25, gain=2.0)
+    table = hs.compare({"same": play, "double": double, "reversed": stop}, record)
+    errors = [(row.width_error_percent, row.area_error_percent) for row in table.rows]
+    # The stop is u minus the play: the same width the other way round.
+    assert errors == [pytest.approx(pair, abs=1e-9) for pair in ((0, 0), (100, 100), (-200, -200))]
+
+
+def test_rates_are_tried_and_not_taken_on_trust(table1):
+    lag = hs.TransferFunction(num=(0.02,), den=(5.0, 1.0))
+    table = hs.compare({"law": hs.BoucWen(gain=0.02), "lag": lag, "line": hs.Line(slope=0.02)}, table1)
+    assert [row.is_rate_independent for row in table.rows] == [True, False, True]
+    assert table["lag"].rate_deviation > 0.01
+    assert table["law"].rate_deviation < 1e-12
+    uneven = dataclasses.replace(table1, t=np.arange(52.0) ** 2)
+    assert hs.compare({"law": hs.BoucWen(gain=0.02)}, uneven)["law"].is_rate_independent
+
+
+def test_the_winner_predicts_best_and_the_undecided_are_near(quick, table1):
+    ranked = quick.ranked()
+    assert [row.cv_rmse for row in ranked] == sorted(row.cv_rmse for row in quick.rows)
+    assert quick.winner == ranked[0].name == "Play"
+    best = quick["Play"].cv_residual
+    assert math.sqrt(np.mean(best**2)) == quick["Play"].cv_rmse
+    assert quick.probabilities == {row.name: probability(row.cv_residual, best) for row in ranked[1:]}
+    assert quick.undecided == tuple(name for name, value in quick.probabilities.items() if value >= 0.05)
+    assert f"Play predicts samples left out best, cross-validated rmse {quick['Play'].cv_rmse:.4g} um" in quick.verdict
+    assert "The BIC prefers Play." in quick.verdict
+    assert all(name in quick.verdict for name in quick.undecided)
+
+
+def test_a_twin_of_the_winner_is_undecided_and_a_poor_model_is_not(table1):
+    table = hs.compare({"one": hs.Play, "two": hs.Play, "poor": hs.Line(slope=1.0)}, table1)
+    assert table.undecided == ("two",)
+    assert "52 samples cannot tell it from two (" in table.verdict
+    told = hs.compare({"one": hs.Play, "poor": hs.Line(slope=1.0)}, table1)
+    assert "52 samples tell it from all others" in told.verdict
+
+
+def test_what_was_not_cross_validated_has_no_verdict_on_it(table1):
+    table = hs.compare({"a": hs.Line, "b": hs.SingleValued}, table1, cross_validate=None)
+    assert table.winner is None
+    assert table.probabilities == {}
+    assert table.verdict == "The BIC prefers a."
+    given = hs.compare({"a": hs.Line, "given": hs.Line(slope=0.02)}, table1, cross_validate=None)
+    assert (given.winner, given.verdict) == (None, "")  # the one model that has an error would win by default
+    with pytest.raises(ValueError, match="criterion must be"):
+        table.ranked("r2")
+
+
+def test_the_paired_probability_is_that_of_the_formula():
+    rng = np.random.default_rng(3)
+    a, b = 1.3 * rng.standard_normal(60), rng.standard_normal(60)
+    d = a**2 - b**2
+    m, n, lags = d.mean(), 60, 3  # floor(4 (60 / 100)^(2/9)) = floor(3.57)
+    g = [sum((d[i] - m) * (d[i + k] - m) for i in range(n - k)) / n for k in range(lags + 1)]
+    v = (g[0] + 2 * sum((1 - k / (lags + 1)) * g[k] for k in range(1, lags + 1))) / n
+    from scipy import stats
+
+    assert probability(a, b) == pytest.approx(2 * stats.t.sf(abs(m) / np.sqrt(v), n - 1), rel=1e-12)  # rounding
+    assert probability(a, a) == 1.0
+    assert probability(a, b) == probability(b, a)
+    a[:59] = np.nan
+    assert math.isnan(probability(a, b))
+
+
+def test_equal_models_are_told_apart_about_as_often_as_the_level_says():
+    rng = np.random.default_rng(0)
+    a, b = rng.standard_normal((2, 400, 60))
+    share = np.mean([probability(*pair) < 0.05 for pair in zip(a, b, strict=True)])
+    assert (
+        0.03 < share < 0.12
+    )  # 0.05 within 2 of its standard errors, 0.011; the variance of 60 samples is a little low
+
+
+def test_the_last_cycles_are_kept_from_every_fit():
+    u = hs.signals.triangle(0.0, 1.0, cycles=4, samples_per_cycle=40)
+    law = hs.Play(threshold=0.1, gain=2.0)
+    y = law.response(u) + np.where(np.arange(u.size) > 120, 0.3, 0.0)
+    table = hs.compare({"play": hs.Play, "line": hs.Line}, hs.Record(u=u, y=y), test=1, cross_validate=4)
+    assert (len(table.record), len(table.test)) == (121, 40)
+    assert table["play"].rmse == pytest.approx(0.0, abs=1e-9)
+    assert table["play"].test_rmse == pytest.approx(0.3, abs=1e-9)
+    assert "test rmse" in table.to_text()
+    assert float(next(csv.DictReader(io.StringIO(table.to_csv())))["test rmse"]) == table["play"].test_rmse
+    with pytest.raises(ValueError, match="asked for 9"):
+        hs.compare({"line": hs.Line}, hs.Record(u=u, y=y), test=9)
+    with pytest.raises(TypeError, match="test takes"):
+        hs.compare({"line": hs.Line}, hs.Record(u=u, y=y), test="last")
+
+
+def test_another_record_begins_with_a_state_of_its_own():
+    """The state at the first sample is the record's and not the model's; all else is from the training."""
+    u = hs.signals.triangle(0.0, 1.0, cycles=2, samples_per_cycle=40)
+    start = {"threshold": 0.1, "gain": 2.0}
+    train = hs.Record(u=u, y=hs.Play(**start, z0=0.05).response(u))
+    other = hs.Record(u=0.5 * u, y=hs.Play(**start, z0=-0.08).response(0.5 * u))
+    subjects = {"identified": hs.Play, "given": hs.Play(**start, z0=0.05), "line": hs.Line}
+    table = hs.compare(subjects, train, test=other)
+    assert table["identified"].test_rmse == pytest.approx(0.0, abs=1e-9)
+    assert table["given"].test_rmse > 0.01
+    line = table["line"].model
+    assert table["line"].test_rmse == hs.metrics.rmse(other.y, line.response(other.u))
+    assert table.test == other
+
+
+def test_a_frame_holds_the_columns_of_the_csv(quick, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", SimpleNamespace(DataFrame=dict))
+    frame = quick.to_frame()
+    assert list(frame) == next(csv.reader(io.StringIO(quick.to_csv())))
+    assert frame["model"] == [*(row.name for row in quick.rows), "untold"]
+    assert frame["fit [%]"] == [*(row.fit_percent for row in quick.rows), None]
+
+
+def test_a_missing_pandas_is_named_with_the_extra_that_brings_it(quick, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(ImportError, match="extra 'frames'"):
+        quick.to_frame()
+
+
+def test_the_picture_has_a_row_for_each_of_the_best_models(quick):
+    import matplotlib.pyplot as plt
+
+    grid = hs.plot.comparison(quick)
+    assert grid.shape == (4, 3)
+    names = [ax.get_title(loc="left").split(":")[0] for ax in grid[:, 0]]
+    assert names == [row.name for row in quick.ranked()]
+    chosen = hs.plot.comparison(quick, ["Line"])
+    np.testing.assert_array_equal(chosen[0, 0].lines[1].get_ydata(), quick["Line"].y)
+    np.testing.assert_array_equal(chosen[0, 2].lines[1].get_ydata(), quick["Line"].loop.width)
+    with pytest.raises(ValueError, match="no model to draw"):
+        hs.plot.comparison(quick, [])
+    plt.close("all")

@@ -89,6 +89,52 @@ def test_an_unclosed_loop_is_closed_by_a_straight_line():
     assert loop.width_at([0.0, 1.0, 2.0]).tolist() == [1.0, 1.0, 0.0]
 
 
+def test_a_viscous_damper_beside_a_spring_has_the_damping_ratio_of_its_resonance():
+    k, c, omega, amplitude = 3.0, 0.4, 2.5, 0.7
+    phase = np.pi + 2 * np.pi * (np.arange(4001) % 4000) / 4000
+    x, v = amplitude * np.cos(phase), -amplitude * omega * np.sin(phase)
+    loop = hs.loop_metrics(x, k * x + c * v)
+    inscribed = 1e-6  # a polygon of n corners lacks 2 pi^2 / (3 n^2) = 4e-7 of the area
+    assert loop.secant_stiffness == pytest.approx(k, rel=ROUNDING)
+    assert loop.energy == pytest.approx(np.pi * c * omega * amplitude**2, rel=inscribed)
+    assert loop.equivalent_damping == pytest.approx(c * omega / (2 * k), rel=inscribed)
+    assert loop.orientation == "clockwise"
+
+
+@pytest.mark.parametrize("ductility", [1.5, 2.0, 4.0, 8.0])
+def test_an_elastoplastic_loop_has_the_textbook_damping(ductility):
+    """zeta = 2 (mu - 1) / (pi mu), with mu the largest displacement over that at yield (Chopra)."""
+    yielding, stiffness = 0.25, 3.0
+    u = yielding * ductility * hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=480)
+    loop = hs.loop_metrics(u, stiffness * hs.Stop(threshold=yielding).response(u))
+    assert loop.secant_stiffness == pytest.approx(stiffness / ductility, rel=ROUNDING)
+    # Its corners fall on samples: 480 is a multiple of 4 mu / (mu - 1) and of 4 mu for these ductilities.
+    assert loop.equivalent_damping == pytest.approx(2 * (ductility - 1) / (np.pi * ductility), rel=ROUNDING)
+    assert loop.energy == pytest.approx(4 * stiffness * yielding**2 * (ductility - 1), rel=ROUNDING)
+
+
+def test_the_energy_of_a_bouc_wen_loop_is_that_of_its_limit_cycle():
+    law = hs.BoucWen(beta=0.8, gamma=0.3, n=1.0)
+    u = hs.signals.triangle(-2.0, 2.0, cycles=12, samples_per_cycle=4000)
+    cycle = law.limit_cycle(2.0)
+    loop = hs.loop_metrics(u, law.response(u))
+    chords = 1e-5  # of 2000 chords a branch, h^2 / 12 of its curvature
+    assert loop.energy == pytest.approx(cycle.energy, rel=chords)
+    assert loop.secant_stiffness == pytest.approx(cycle.peak / 2.0, rel=1e-9)  # what 11 cycles leave of the transient
+    ratio = cycle.energy / (2 * np.pi * cycle.peak * 2.0)
+    assert loop.equivalent_damping == pytest.approx(ratio, rel=chords)
+
+
+def test_a_counterclockwise_loop_gives_energy_away_and_no_stiffness_has_no_damping():
+    u, y = ellipse()
+    loop = hs.loop_metrics(u, y + u)
+    assert loop.energy == -loop.area
+    assert loop.equivalent_damping < 0.0
+    assert loop.secant_stiffness == pytest.approx(1.0, rel=ROUNDING)
+    assert math.isnan(hs.loop_metrics([0, 1, 0], [3, 3, 3]).equivalent_damping)
+    assert math.copysign(1.0, hs.loop_metrics([0, 1, 0], [0, 1, 0]).energy) == 1.0
+
+
 @pytest.mark.parametrize("n_peak", [1, 2, 3, 4, 7])
 def test_a_plateau_at_the_peak_is_divided_in_its_middle(n_peak):
     creep = np.linspace(2.0, 3.0, n_peak) if n_peak > 1 else np.array([2.0])

@@ -79,8 +79,8 @@ def test_metrics_have_units_and_are_those_of_loop_metrics(run, folder):
     code, out, _ = run("metrics", "loop.csv", *COLUMNS)
     loop = hs.loop_metrics(*(getattr(hs.load(folder / "loop.csv", u=1, y=2), name) for name in "uy"))
     assert code == 0
-    assert f"max width          {loop.max_width:.4g} um at {loop.max_width_at:.6g} V" in out
-    assert f"area               {loop.area:.4g} um V" in out
+    assert f"max width           {loop.max_width:.4g} um at {loop.max_width_at:.6g} V" in out
+    assert f"area                {loop.area:.4g} um V" in out
     document = json.loads(run("metrics", "loop.csv", *COLUMNS, "--json", "--unit", "y=nm")[1])
     assert document["area"] == loop.area
     assert document["units"] == {"u": "V", "y": "nm"}
@@ -136,6 +136,38 @@ def test_a_structure_takes_its_own_options_and_no_other_family_does(run):
 def test_every_name_of_a_model_stands_for_something_that_can_be_identified(name):
     family = getattr(hs, models.FAMILIES[name])
     assert callable(getattr(family, "structure" if name in models.STRUCTURES else "search_space"))
+
+
+def test_models_are_compared_side_by_side_and_the_tables_written(run, tmp_path):
+    names = ["--model", "line", "--model", "dahl", "--model", "law.json"]
+    table, latex, picture = tmp_path / "models.csv", tmp_path / "models.tex", tmp_path / "models.svg"
+    code, out, err = run(
+        "compare", "loop.csv", *COLUMNS, *names, "--cross-validate", 4, "--test-cycles", 1,
+        "--csv", table, "--latex", latex, "--plot", picture,
+    )  # fmt: skip
+    assert (code, err) == (0, "")
+    assert "test rmse [um]" in out
+    assert "law predicts samples left out best" in " ".join(out.split())
+    assert "time" not in out
+    assert [line.split(",")[0] for line in table.read_text().splitlines()] == ["model", "line", "dahl", "law"]
+    assert latex.read_text().startswith(r"\begin{tabular}")
+    assert picture.read_text().startswith("<svg")
+    code, out, _ = run(
+        "compare", "loop.csv", *COLUMNS, "--model", "line", "--test", "loop.csv", "--markdown", "-", "--timings"
+    )
+    assert code == 0
+    assert out.startswith("| model | parameters |")
+    assert "time [s]" in out
+    code, _, err = run("compare", "loop.csv", *COLUMNS, "--model", "parabola")
+    assert code == 2
+    assert err.startswith("hysim: error: there is no model 'parabola'")
+
+
+def test_without_models_all_families_are_compared(run, monkeypatch):
+    few = dict.fromkeys(("first", "second"), hs.Line)
+    monkeypatch.setattr("hysim.comparison._compare.candidates", lambda: few)
+    code, out, _ = run("compare", "loop.csv", *COLUMNS)
+    assert (code, [line.split()[0] for line in out.splitlines()[2:4]]) == (0, ["first", "second"])
 
 
 def test_a_search_that_does_not_converge_exits_with_1(run, monkeypatch):

@@ -48,7 +48,7 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--cross-validate",
         metavar="loo|cycles|K",
-        type=_folds,
+        type=folds,
         help="leave one sample out at a time, one cycle, or one of K blocks",
     )
     parser.add_argument("--seed", type=int, default=0, help="of the random starts (default: %(default)s)")
@@ -113,7 +113,8 @@ def _number(value: str, text: str, form: str) -> float:
         raise argparse.ArgumentTypeError(f"expected {form} with numbers, got {text!r}") from None
 
 
-def _folds(text: str) -> str | int:
+def folds(text: str) -> str | int:
+    """What `--cross-validate` says."""
     if text not in ("loo", "cycles") and not text.isdigit():
         raise argparse.ArgumentTypeError(f"expected loo, cycles or a number of blocks, got {text!r}")
     return int(text) if text.isdigit() else text

@@ -59,6 +59,9 @@ def _lines(loop: "LoopMetrics", units: Mapping[str, str]) -> Iterator[str]:
         "area": f"{loop.area:.4g} {y} {u}" if u and y else f"{loop.area:.4g}",
         "orientation": loop.orientation,
         "closure gap": f"{loop.closure_gap:.4g} {y}",
+        "energy": f"{loop.energy:.4g} {y} {u}" if u and y else f"{loop.energy:.4g}",
+        "secant stiffness": f"{loop.secant_stiffness:.4g} {y}/{u}" if u and y else f"{loop.secant_stiffness:.4g}",
+        "equivalent damping": f"{100 * loop.equivalent_damping:.2f} %",
         "cycles": f"{loop.n_cycles}",
     }
     width = max(map(len, values))

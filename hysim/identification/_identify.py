@@ -17,7 +17,7 @@ from hysim.identification._diagnostics import loop_widths, whiteness, width_stde
 from hysim.identification._noise import Gaussian, Noise, Quantised, Robust
 from hysim.identification._problem import Problem, problem
 from hysim.identification._profile import Profile, profiles, threshold
-from hysim.identification._resampling import bootstrap, left_out_rmse
+from hysim.identification._resampling import bootstrap, left_out_errors
 from hysim.identification._result import Candidate, Identification, Width
 from hysim.identification._search import PERFECT, Optimum, optima, polish
 from hysim.identification._uncertainty import Uncertainty, uncertainty
@@ -79,7 +79,7 @@ def identify(
     cross_validate : {None, "loo", "cycles", "records"} or int, optional
         ``"loo"`` leaves one output sample out at a time, an int one of that many blocks of samples, ``"cycles"``
         a cycle of the input (not the first, which tells the state), ``"records"`` a record; the input is kept.
-        Fills `Identification.cv_rmse`.
+        Fills `Identification.cv_rmse` and `Identification.cv_residual`.
     seed : int
         Of the starts of the search, and of what is drawn. The optimum does not depend on it.
     workers : int, optional
@@ -132,10 +132,12 @@ def identify(
         found = search.likely(squares)
         result, found = search.described(found, intervals, squares[0].x)
         thetas = np.array([optimum.theta for optimum in found])
+        errors = left_out_errors(whole, search.noise, thetas, left_out)
         return replace(
             result,
             regions=search.regions(found[0]),
-            cv_rmse=left_out_rmse(whole, search.noise, thetas, left_out),
+            cv_residual=errors,
+            cv_rmse=float(np.sqrt(np.mean(errors[~np.isnan(errors)] ** 2))) if left_out else float("nan"),
         )
 
 

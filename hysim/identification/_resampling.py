@@ -18,17 +18,19 @@ _SAMPLES_AT_ONCE = 1_000_000  # of all sets that descend together, to bound the 
 _TOLERANCE = 1e-9
 
 
-def left_out_rmse(
+def left_out_errors(
     problem: Problem, noise: Noise, optima: FloatArray, left_out: Sequence[npt.NDArray[np.intp]]
-) -> float:
-    """Rmse of samples that each fold leaves out of the fit; nan without a fold."""
+) -> FloatArray:
+    """Error of each sample, shape (n,), in the fit that leaves it out; nan where none does."""
+    found = np.full(problem.y.size, np.nan)
     if not left_out:
-        return float("nan")
+        return found
     starts = optima[:_AT_FOLD]
     at_once = max(1, _SAMPLES_AT_ONCE // (len(starts) * problem.y.size))
     groups = [left_out[k : k + at_once] for k in range(0, len(left_out), at_once)]
-    errors = np.concatenate([_left_out_errors(problem, noise, starts, group) for group in groups])
-    return float(np.sqrt(np.mean(errors**2)))
+    errors = [_left_out_errors(problem, noise, starts, group) for group in groups]
+    found[np.concatenate(left_out)] = np.concatenate(errors)
+    return found
 
 
 def _left_out_errors(

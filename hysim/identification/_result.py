@@ -107,6 +107,8 @@ class Identification:
         where the optimum lies outside.
     cv_rmse : float
         Cross-validated rmse [unit of y]; nan if it was not asked for.
+    cv_residual : array, shape (n,)
+        Measured minus model at each sample, by the fit that leaves it out; nan where none does.
     seed : int
         Of the starts of the search.
     """
@@ -142,6 +144,7 @@ class Identification:
     rivals: tuple[Candidate, ...] = ()
     regions: Mapping[str, Candidate] = field(default_factory=dict)
     cv_rmse: float = float("nan")
+    cv_residual: FloatArray = field(default_factory=lambda: np.empty(0))
     seed: int = 0
 
     @property

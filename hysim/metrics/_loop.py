@@ -11,6 +11,18 @@ are linear between their samples, y_l(u) and y_u(u).
 
 A positive signed area is a counterclockwise loop: unloading above loading, as a piezoelectric actuator has
 it. `area` is its magnitude.
+
+Where u is a displacement and y the force that it takes, with y+ and y- the forces at the largest and the
+smallest displacement (the mean of the two branches there) and D half the span of u:
+
+    energy             = integral of y du = -signed area         dissipated in a cycle; positive is clockwise
+    secant_stiffness   = (y+ - y-) / (max u - min u)
+    equivalent_damping = energy / (4 pi E_S),    E_S = secant_stiffness D^2 / 2
+
+The last is the damping ratio of the viscous oscillator that dissipates as much at its resonance.
+
+Sources: L. S. Jacobsen, Trans. ASME 52 (1930) 169, for the equivalence; FEMA 356 (2000), section 2.8.4, and
+ASCE 41 for the secant stiffness between the extremes of displacement, not of force.
 """
 
 import math
@@ -48,6 +60,14 @@ class LoopMetrics:
         for a steady cycle. Of several cycles the mean.
     n_cycles : int
         How many cycles were averaged.
+    energy : float
+        Integral of y du around the cycle [unit of y times unit of u]: what a force y on a displacement u
+        dissipates, negative where it gives energy away; minus the area for a counterclockwise loop.
+    secant_stiffness : float
+        Slope of the line through the loop's ends [unit of y / unit of u].
+    equivalent_damping : float
+        Damping ratio of the viscous oscillator of that stiffness that dissipates as much at its resonance; nan
+        where the stiffness is not positive.
     u : array, shape (m,)
         Increasing inputs: every input of either branch, over their common range [unit of u].
     loading, unloading, width : array, shape (m,)
@@ -64,6 +84,9 @@ class LoopMetrics:
     orientation: Literal["counterclockwise", "clockwise", "none"]
     closure_gap: float
     n_cycles: int
+    energy: float
+    secant_stiffness: float
+    equivalent_damping: float
     u: FloatArray
     loading: FloatArray
     unloading: FloatArray
@@ -154,6 +177,7 @@ def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, toleran
     span, stroke = float(np.ptp(path_u)), float(np.ptp(path_y))
     area = float(signed_area(path_u, path_y))
     max_width = float(magnitude.max())
+    stiffness = float(np.mean([loading[-1] - loading[0], unloading[-1] - unloading[0]]) / np.ptp(grid))
     return LoopMetrics(
         max_width=max_width,
         max_width_at=float(grid[np.argmax(magnitude >= max_width - ROUNDING * stroke)]),
@@ -165,6 +189,9 @@ def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, toleran
         orientation=_orientation(area, ROUNDING * span * stroke),
         closure_gap=float(np.mean([outputs[cycle.path][-1] - outputs[cycle.path][0] for cycle in found])),
         n_cycles=cycles,
+        energy=0.0 - area,
+        secant_stiffness=stiffness,
+        equivalent_damping=(0.0 - area) * 2.0 / (math.pi * stiffness * span**2) if stiffness > 0 else math.nan,
         u=grid,
         loading=loading,
         unloading=unloading,

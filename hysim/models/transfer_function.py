@@ -200,6 +200,11 @@ class TransferFunction:
         )
 
     @classmethod
+    def candidates(cls) -> dict[str, "TransferFunctionStructure"]:
+        """What `hysim.compare` tries of this family: two poles and one zero, one mode or a lag with a creep."""
+        return {cls.__name__: cls.structure(poles=2, zeros=1)}
+
+    @classmethod
     def structures(
         cls,
         *,

@@ -8,7 +8,7 @@ changes matplotlib's settings outside its own calls.
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hysim.plot._comparisons import loops, residuals, widths
+from hysim.plot._comparisons import comparison, loops, residuals, widths
 from hysim.plot._discoveries import selection
 from hysim.plot._identifications import identification
 from hysim.plot._records import history, loop, response, traces
@@ -19,6 +19,7 @@ from hysim.plot._tunings import trade_off
 __all__ = [
     "Axes",
     "Figure",
+    "comparison",
     "figure",
     "history",
     "house_style",

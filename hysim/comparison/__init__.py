@@ -1,0 +1,6 @@
+"""Models side by side: `compare`, and the table with its verdict."""
+
+from hysim.comparison._compare import compare
+from hysim.comparison._result import Comparison, ComparisonRow
+
+__all__ = ["Comparison", "ComparisonRow", "compare"]

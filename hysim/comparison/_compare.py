@@ -1,0 +1,255 @@
+"""The verb `compare`: models side by side on one record, all by the same protocol.
+
+Every model is identified on the same samples, cross-validated by the same splits and tried on the same test. It is
+simulated in free run and judged by the same measures, those of `hysim.metrics`: how well its output fits, and how wide
+its loop is.
+"""
+
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hysim import metrics
+from hysim._cycles import TOLERANCE, last_cycles
+from hysim._frozen import FloatArray
+from hysim._parallel import Progress, map_on_threads
+from hysim.comparison._result import Comparison, ComparisonRow
+from hysim.errors import SimulationError
+from hysim.identification import Identification, identify
+from hysim.metrics import LoopMetrics, loop_metrics
+from hysim.models.candidates import candidates, is_identifiable
+from hysim.models.model import needs_time
+from hysim.records import Record
+from hysim.simulation import simulate
+
+_SHORT = 200  # samples; leaving one out at a time costs as many fits as there are samples
+_BLOCKS = 10
+_SAME = 1e-6  # of the output's range: what a change of rate may change in a model that does not know rates
+_FAILURES = (ValueError, TypeError, ArithmeticError, SimulationError)
+
+
+def compare(
+    models: Mapping[str, Any] | str | None,
+    record: Record,
+    *,
+    cross_validate: str | int | None = "auto",
+    test: Record | int | None = None,
+    seed: int = 0,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> Comparison:
+    """Compare models on a record.
+
+    Parameters
+    ----------
+    models : mapping, "all" or None
+        Name to what is to be compared: a model, which is taken as it is; a result of `identify` or
+        `discover`; or a class or structure, which is identified on the record. ``"all"``, or None, is every family
+        that can be identified without being told more; those that cannot be on this record say why.
+    record : Record
+        With at least one complete cycle of the input.
+    cross_validate : {"auto", "loo", "cycles", None} or int
+        How the classes and structures are cross-validated; see `identify`. ``"auto"`` leaves one sample out at
+        a time on records of up to 200 samples, and one of 10 blocks on longer ones.
+    test : Record or int, optional
+        What no fit sees: another record, or the number of last complete cycles of this one that are kept from it.
+        A model that was identified here begins another record with a state that is identified on it, everything
+        else fixed; the last cycles it meets in the state that it reaches in free run.
+    seed : int
+        Of the starts of the searches.
+    workers : int, optional
+        Number of threads; by default one for each core. The result does not depend on it.
+    progress : callable, optional
+        Called as ``progress(done, total)`` after each model.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    ValueError
+        If there is nothing to compare, or the record has no complete cycle, or fewer than the test needs.
+    TypeError
+        If the record is none, or a subject is nothing that can be compared.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> u = hs.signals.triangle(0.0, 1.0, cycles=1, samples_per_cycle=40)
+    >>> rec = hs.Record(u=u, y=hs.BoucWen(beta=2.0, gamma=0.5).response(u))
+    >>> tab = hs.compare({"line": hs.Line, "truth": hs.BoucWen(beta=2.0, gamma=0.5)}, rec)
+    >>> [row.name for row in tab.rows], round(tab["truth"].fit_percent, 3)
+    (['line', 'truth'], 100.0)
+    """
+    if not isinstance(record, Record):
+        raise TypeError(f"compare takes a Record, got {type(record).__name__}: hs.Record(u=u, y=y)")
+    subjects = _subjects(models)
+    trial = _trial(record, test)
+    training = trial.training if trial else record
+    if cross_validate == "auto":
+        cross_validate = "loo" if len(training) <= _SHORT else _BLOCKS
+    protocol = _Protocol(training, loop_metrics(training.u, training.y), cross_validate, seed, trial)
+    names = list(subjects)
+    results = map_on_threads(
+        lambda k: protocol.row(names[k], subjects[names[k]]), len(names), workers=workers, progress=progress
+    )
+    found = dict(zip(names, results, strict=True))
+    return Comparison(
+        record=training,
+        loop=protocol.measured,
+        rows=tuple(row for row in found.values() if isinstance(row, ComparisonRow)),
+        failed={name: reason for name, reason in found.items() if isinstance(reason, str)},
+        test=trial.record if trial else None,
+    )
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """What is fitted, what drives the models in the test, and from which sample of it on they are judged."""
+
+    training: Record
+    drive: Record
+    begin: int
+    own_state: bool
+
+    @property
+    def record(self) -> Record:
+        """The samples that are judged."""
+        return self.drive[self.begin :]
+
+
+@dataclass(frozen=True)
+class _Protocol:
+    """What is done to every model."""
+
+    record: Record
+    measured: LoopMetrics
+    cross_validate: str | int | None
+    seed: int
+    trial: _Trial | None
+
+    def row(self, name: str, subject: Any) -> ComparisonRow | str:
+        """The row of one subject, or why there is none."""
+        begin, seconds = time.perf_counter(), math.nan
+        try:
+            if _is_family(subject):
+                fitted = identify(subject, self.record, cross_validate=self.cross_validate, seed=self.seed)
+                seconds = time.perf_counter() - begin
+                return self._judged(name, fitted, seconds, fitted.success, fitted.message)
+            return self._judged(name, subject, seconds, bool(getattr(subject, "success", True)), "")
+        except _FAILURES as error:
+            return " ".join(str(error).split())
+
+    def _judged(self, name: str, fitted: Any, seconds: float, success: bool, message: str) -> ComparisonRow:
+        record, measured = self.record, self.measured
+        model = getattr(fitted, "model", fitted)
+        y = simulate(model, record.t, record.u).y
+        loop = loop_metrics(record.u, y)
+        residual = record.y - y
+        rmse = metrics.rmse(record.y, y)
+        is_fitted = fitted is not model
+        n_parameters = int(fitted.n_parameters) if is_fitted else 0
+        sense = -1.0 if {loop.orientation, measured.orientation} == {"clockwise", "counterclockwise"} else 1.0
+        deviation = _rate_deviation(model, record, y)
+        test_fit, test_rmse = self._tested(fitted, model, math.isfinite(seconds))
+        return ComparisonRow(
+            name=name,
+            model=model,
+            n_parameters=n_parameters,
+            fit_percent=metrics.fit_percent(record.y, y),
+            rmse=rmse,
+            cv_rmse=float(fitted.cv_rmse) if is_fitted else rmse,
+            cv_residual=getattr(fitted, "cv_residual", np.empty(0)) if is_fitted else residual,
+            max_residual=float(np.abs(residual).max()),
+            max_width=loop.max_width,
+            max_width_at=loop.max_width_at,
+            area=loop.area,
+            width_rmse=metrics.width_rmse(measured, loop),
+            width_error_percent=_excess_percent(sense * loop.max_width, measured.max_width),
+            area_error_percent=_excess_percent(sense * loop.area, measured.area),
+            fpe=metrics.fpe(residual, n_parameters) if is_fitted else math.nan,
+            aic=metrics.aic(residual, n_parameters) if is_fitted else math.nan,
+            bic=metrics.bic(residual, n_parameters) if is_fitted else math.nan,
+            is_rate_independent=deviation <= _SAME,
+            rate_deviation=deviation,
+            y=y,
+            loop=loop,
+            test_fit_percent=test_fit,
+            test_rmse=test_rmse,
+            success=success,
+            message=message,
+            seconds=seconds,
+        )
+
+    def _tested(self, fitted: Any, model: Any, identified_here: bool) -> tuple[float, float]:
+        """Fit and rmse on the test."""
+        if self.trial is None:
+            return math.nan, math.nan
+        drive, judged = self.trial.drive, self.trial.record
+        if self.trial.own_state and identified_here:
+            model = _at_the_start_of(drive, fitted, self.seed)
+        y = simulate(model, drive.t, drive.u).y[self.trial.begin :]
+        return metrics.fit_percent(judged.y, y), metrics.rmse(judged.y, y)
+
+
+def _subjects(models: Mapping[str, Any] | str | None) -> dict[str, Any]:
+    if models is None or (isinstance(models, str) and models == "all"):
+        return candidates()
+    if not isinstance(models, Mapping):
+        raise TypeError(f'compare takes a mapping of names to models, or "all", got {models!r}')
+    if not models:
+        raise ValueError("there is nothing to compare: give at least one model by name")
+    for name, subject in models.items():
+        if not (is_identifiable(subject) or callable(getattr(getattr(subject, "model", subject), "response", None))):
+            raise TypeError(f"compare takes a model, a result, a model class or a structure, got {subject!r} as {name}")
+    return dict(models)
+
+
+def _trial(record: Record, test: Record | int | None) -> _Trial | None:
+    if test is None:
+        return None
+    if isinstance(test, Record):
+        return _Trial(training=record, drive=test, begin=0, own_state=True)
+    if not isinstance(test, int) or isinstance(test, bool):
+        raise TypeError(f"test takes a Record or a number of last cycles, got {test!r}")
+    begin = last_cycles(record.u, test, TOLERANCE)[-1].path.start + 1
+    if begin < 3:
+        raise ValueError(f"a test on {test} of the record's cycles leaves nothing to identify from")
+    return _Trial(training=record[:begin], drive=record, begin=begin, own_state=False)
+
+
+def _is_family(subject: Any) -> bool:
+    """Whether the subject is a class or a structure, and still to be identified."""
+    return isinstance(subject, type) or not (hasattr(subject, "response") or hasattr(subject, "model"))
+
+
+def _at_the_start_of(record: Record, fitted: Identification, seed: int) -> Any:
+    """The identified model, with the state at the first sample that suits another record best."""
+    model = fitted.model
+    if not is_identifiable(model):
+        return model
+    space = model.search_space(record)
+    state = set(space.state) & set(space.names)
+    if not state:
+        return model
+    shared = {name: value for name, value in fitted.estimates.items() if name not in state}
+    return identify(model, record, fixed=shared, seed=seed).model
+
+
+def _rate_deviation(model: Any, record: Record, y: FloatArray) -> float:
+    """Largest change of the output, over its range, where the input takes twice as long on the same path."""
+    n = len(record)
+    slow = np.arange(2 * n - 1) / 2.0
+    t = record.sample_time * np.arange(2 * n - 1) if needs_time(model) else None
+    changed = simulate(model, t, np.interp(slow, np.arange(n), record.u)).y[::2]
+    span = float(np.ptp(y))
+    return float(np.abs(changed - y).max()) / span if span > 0.0 else 0.0
+
+
+def _excess_percent(value: float, measured: float) -> float:
+    return 100.0 * (value / measured - 1.0) if measured > 0.0 else math.nan

@@ -1,0 +1,246 @@
+"""What `compare` returns."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import field
+from typing import Any
+
+from hysim._frozen import FloatArray, frozen
+from hysim.comparison import _tables
+from hysim.comparison._verdict import LEVEL, probability
+from hysim.metrics import LoopMetrics
+from hysim.records import Record
+
+
+@frozen
+class ComparisonRow:
+    """One model on the record.
+
+    Parameters
+    ----------
+    name : str
+        What the model is called.
+    model : model
+        The model itself.
+    n_parameters : int
+        How many of its parameters were fitted to this record.
+    fit_percent, rmse : float
+        Of the free-run output [unit of y].
+    cv_rmse : float
+        Cross-validated rmse, nan if unknown [unit of y]. A model that was not fitted has its rmse.
+    cv_residual : array, shape (n,)
+        Measured minus model at the samples that were left out, nan elsewhere; empty if unknown [unit of y].
+    max_residual : float
+        Largest residual [unit of y].
+    max_width, max_width_at, area, width_rmse : float
+        Of the model's loop, as in `hysim.loop_metrics`; `width_rmse` is the rms difference from the
+        measured width over the measured inputs.
+    width_error_percent, area_error_percent : float
+        By how much the model's largest width and area exceed the measured ones [%]; -200 and thereabouts where
+        its loop runs the other way round, nan where nothing was measured to open.
+    fpe, aic, bic : float
+        Final prediction error and the two criteria, nan where nothing was fitted.
+    is_rate_independent : bool
+        Whether its output stays the same, to 1e-6 of its range, when the same path of the input is run through at
+        half the rate.
+    rate_deviation : float
+        The largest change of the output by that, as a fraction of its range.
+    y : array, shape (n,)
+        Output at the record's samples.
+    loop : LoopMetrics
+        The model's loop.
+    test_fit_percent, test_rmse : float
+        On what was kept for the test; nan without one [unit of y].
+    success : bool
+        Whether its identification converged.
+    message : str
+        How that ended; empty for a model that was not identified here.
+    seconds : float
+        How long that took; nan where it was not done here. Rows that differ in it are equal [s].
+    """
+
+    name: str
+    model: Any
+    n_parameters: int
+    fit_percent: float
+    rmse: float
+    cv_rmse: float
+    cv_residual: FloatArray
+    max_residual: float
+    max_width: float
+    max_width_at: float
+    area: float
+    width_rmse: float
+    width_error_percent: float
+    area_error_percent: float
+    fpe: float
+    aic: float
+    bic: float
+    is_rate_independent: bool
+    rate_deviation: float
+    y: FloatArray
+    loop: LoopMetrics
+    test_fit_percent: float = float("nan")
+    test_rmse: float = float("nan")
+    success: bool = True
+    message: str = ""
+    seconds: float = field(default=float("nan"), compare=False)
+
+
+@frozen
+class Comparison:
+    """Models side by side.
+
+    Parameters
+    ----------
+    record : Record
+        What they were compared on.
+    loop : LoopMetrics
+        Its loop.
+    rows : tuple of ComparisonRow
+        One for each model, in the order given.
+    failed : mapping
+        Name to the reason, for candidates that could not be identified or simulated on the record.
+    test : Record or None
+        What was kept for the test.
+    """
+
+    record: Record
+    loop: LoopMetrics
+    rows: tuple[ComparisonRow, ...]
+    failed: Mapping[str, str] = field(default_factory=dict)
+    test: Record | None = None
+
+    def __getitem__(self, name: str) -> ComparisonRow:
+        for row in self.rows:
+            if row.name == name:
+                return row
+        if name in self.failed:
+            raise KeyError(f"{name!r} could not be compared: {self.failed[name]}")
+        raise KeyError(f"no model {name!r}: there are {', '.join(row.name for row in self.rows)}")
+
+    def ranked(self, criterion: str = "cv_rmse") -> tuple[ComparisonRow, ...]:
+        """The rows by a measure of which less is better, the best first; those that lack it are left out.
+
+        Parameters
+        ----------
+        criterion : {"cv_rmse", "bic", "aic", "fpe", "rmse", "test_rmse"}
+            The measure.
+
+        Returns
+        -------
+        tuple of ComparisonRow
+
+        Raises
+        ------
+        ValueError
+            If there is no such measure.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> tab = hs.compare({"curve": hs.SingleValued, "line": hs.Line}, hs.datasets.table1())
+        >>> [row.name for row in tab.ranked("bic")], [row.name for row in tab.ranked("rmse")]
+        (['line', 'curve'], ['curve', 'line'])
+        """
+        known = ("cv_rmse", "bic", "aic", "fpe", "rmse", "test_rmse")
+        if criterion not in known:
+            raise ValueError(f"criterion must be one of {', '.join(known)}, got {criterion!r}")
+        scores = [(float(getattr(row, criterion)), row) for row in self.rows]
+        return tuple(row for score, row in sorted(scores, key=lambda pair: pair[0]) if score == score)
+
+    @property
+    def winner(self) -> str | None:
+        """The model with the least cross-validated rmse; None unless at least two models have one."""
+        best = self.ranked()
+        return best[0].name if len(best) > 1 else None
+
+    @property
+    def probabilities(self) -> dict[str, float]:
+        """How surprising each other model's distance from the winner would be if both predicted equally well.
+
+        Name to the two-sided probability that the mean difference of squared errors on samples left out has by
+        chance (Diebold and Mariano 1995, with the correlation of neighbours); nan where errors are unknown.
+        """
+        if self.winner is None:
+            return {}
+        best, *others = self.ranked()
+        return {
+            row.name: probability(row.cv_residual, best.cv_residual)
+            if row.cv_residual.shape == best.cv_residual.shape
+            else float("nan")
+            for row in others
+        }
+
+    @property
+    def undecided(self) -> tuple[str, ...]:
+        """Models that the record does not tell from the winner at 5 %, the nearest first."""
+        return tuple(name for name, value in self.probabilities.items() if value >= LEVEL)
+
+    @property
+    def verdict(self) -> str:
+        """The winner and what the record cannot decide, in words."""
+        by_bic = self.ranked("bic")
+        sentences = [f"The BIC prefers {by_bic[0].name}."] if len(by_bic) > 1 else []
+        if self.winner is not None:
+            unit = f" {self.record.units['y']}" if "y" in self.record.units else ""
+            rmse = f"cross-validated rmse {self[self.winner].cv_rmse:.4g}{unit}"
+            sentences.insert(0, f"{self.winner} predicts samples left out best, {rmse}; {self._undecided_in_words()}.")
+        return " ".join(sentences)
+
+    def _undecided_in_words(self) -> str:
+        samples = f"{len(self.record)} samples"
+        if self.undecided:
+            return f"{samples} cannot tell it from {_listed(self.undecided)} (paired squared errors, 5 %)"
+        if any(math.isnan(value) for value in self.probabilities.values()):
+            return "the errors that would tell it from the others are not all known"
+        return f"{samples} tell it from all others (paired squared errors, 5 %)"
+
+    def to_text(self, *, timings: bool = True) -> str:
+        """The table for a terminal, and the verdict under it.
+
+        Parameters
+        ----------
+        timings : bool
+            Whether the seconds that each fit took are shown, where fits were made.
+
+        Returns
+        -------
+        str
+        """
+        return _tables.to_text(self, timings=timings and any(row.seconds == row.seconds for row in self.rows))
+
+    def to_markdown(self, *, timings: bool = False) -> str:
+        """The table in Markdown; `timings` adds the seconds that each fit took."""
+        return _tables.to_markdown(self, timings=timings)
+
+    def to_latex(self, *, timings: bool = False) -> str:
+        """The table as a plain LaTeX tabular, which needs no package; `timings` adds the seconds of each fit."""
+        return _tables.to_latex(self, timings=timings)
+
+    def to_csv(self, *, timings: bool = False) -> str:
+        """Every measure as comma-separated values, every digit kept; `timings` adds the seconds of each fit."""
+        return _tables.to_csv(self, timings=timings)
+
+    def to_frame(self, *, timings: bool = False) -> Any:
+        """Every measure as a pandas DataFrame, one row a model.
+
+        Parameters
+        ----------
+        timings : bool
+            Whether to add the seconds that each fit took.
+
+        Returns
+        -------
+        pandas.DataFrame
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed: it comes with the extra ``frames`` only.
+        """
+        return _tables.to_frame(self, timings=timings)
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -1,0 +1,44 @@
+"""What the registry offers to `hysim.compare`: every family that can be identified without being told more.
+
+A public family is its own candidate: `identify` takes the class. One that is identified through a structure, or
+only from a start, names in a class method ``candidates()`` what is tried instead, name to what `identify` takes;
+one that makes no sense without being told more names nothing.
+"""
+
+import importlib
+import pkgutil
+from typing import Any
+
+import hysim
+from hysim import models
+from hysim.models.model import FAMILIES
+
+
+def candidates() -> dict[str, Any]:
+    """Name to class, start or structure of every family, in the order of the public names.
+
+    Examples
+    --------
+    >>> list(candidates())[:2]
+    ['BoucWen', 'PolynomialBoucWen']
+    """
+    for module in pkgutil.iter_modules(models.__path__):
+        if not module.name.startswith("_"):
+            importlib.import_module(f"hysim.models.{module.name}")
+    found: dict[str, Any] = {}
+    for name in hysim.__all__:
+        if name in FAMILIES:
+            found |= _of_family(name, FAMILIES[name])
+    return found
+
+
+def is_identifiable(subject: Any) -> bool:
+    """Whether `identify` takes a class, a model or a structure."""
+    return all(callable(getattr(subject, name, None)) for name in ("search_space", "regressors", "assemble"))
+
+
+def _of_family(name: str, family: Any) -> dict[str, Any]:
+    declared = getattr(family, "candidates", None)
+    if declared is not None:
+        return dict(declared())
+    return {name: family} if is_identifiable(family) else {}
