@@ -20,6 +20,8 @@ FAMILIES = {
     "rate-dependent-prandtl-ishlinskii": "RateDependentPrandtlIshlinskii",
     "maxwell-slip": "MaxwellSlip",
     "dahl": "Dahl",
+    "coleman-hodgdon": "ColemanHodgdon",
+    "baber-noori": "BoucWenBaberNoori",
     "preisach": "Preisach",
     "line": "Line",
     "single-valued": "SingleValued",

@@ -5,13 +5,10 @@ only from a start, names in a class method ``candidates()`` what is tried instea
 one that makes no sense without being told more names nothing.
 """
 
-import importlib
-import pkgutil
 from typing import Any
 
 import hysim
-from hysim import models
-from hysim.models.model import FAMILIES
+from hysim.models.model import every_family
 
 
 def candidates() -> dict[str, Any]:
@@ -22,13 +19,11 @@ def candidates() -> dict[str, Any]:
     >>> list(candidates())[:2]
     ['BoucWen', 'PolynomialBoucWen']
     """
-    for module in pkgutil.iter_modules(models.__path__):
-        if not module.name.startswith("_"):
-            importlib.import_module(f"hysim.models.{module.name}")
+    families = every_family()
     found: dict[str, Any] = {}
     for name in hysim.__all__:
-        if name in FAMILIES:
-            found |= _of_family(name, FAMILIES[name])
+        if name in families:
+            found |= _of_family(name, families[name])
     return found
 
 

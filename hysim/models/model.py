@@ -4,6 +4,8 @@ A model is a specification. It is frozen and keyword-only, its numbers are finit
 compared by value. Evolving state is separate: it is passed in and handed back.
 """
 
+import importlib
+import pkgutil
 from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple, Protocol, TypeGuard, TypeVar, dataclass_transform
 
@@ -20,6 +22,16 @@ def model(cls: type[T]) -> type[T]:
     specification = checked(cls)
     FAMILIES[cls.__name__] = specification
     return specification
+
+
+def every_family() -> dict[str, type]:
+    """The registry after every public module of models has entered its families."""
+    from hysim import models
+
+    for module in pkgutil.iter_modules(models.__path__):
+        if not module.name.startswith("_"):
+            importlib.import_module(f"{models.__name__}.{module.name}")
+    return FAMILIES
 
 
 class CompiledLaw(NamedTuple):

@@ -13,7 +13,7 @@ import numpy as np
 
 import hysim
 from hysim._atomic import write_text
-from hysim.models.model import FAMILIES
+from hysim.models.model import FAMILIES, every_family
 
 
 def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None) -> None:
@@ -93,7 +93,8 @@ def from_document(document: Mapping[str, Any], path: str | Path) -> Any:
     if family in hysim.__all__:
         getattr(hysim, family)  # loads its module, which enters it into the families
     if family not in FAMILIES:
-        raise ValueError(f"{path} holds a model of the family {family!r}; there are {', '.join(sorted(FAMILIES))}")
+        known = ", ".join(sorted(every_family()))
+        raise ValueError(f"{path} holds a model of the family {family!r}; there are {known}")
     try:
         parameters = {
             name: from_document(value, path) if is_document(value) else value for name, value in given.items()
