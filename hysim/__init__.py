@@ -51,6 +51,9 @@ _HOME = {
     "Stop": "hysim.models.play",
     "MaxwellSlip": "hysim.models.maxwell_slip",
     "Dahl": "hysim.models.dahl",
+    "Sum": "hysim.models.sum",
+    "Cascade": "hysim.models.cascade",
+    "Dashpot": "hysim.models.dashpot",
     "CustomLaw": "hysim.models.custom",
     "BoucWenOscillator": "hysim.models.oscillator",
     "TransferFunction": "hysim.models.transfer_function",
@@ -107,9 +110,11 @@ if TYPE_CHECKING:
     from hysim.models.amplifier import Amplifier as Amplifier
     from hysim.models.boucwen import BoucWen as BoucWen
     from hysim.models.boucwen_inverse import BoucWenInverse as BoucWenInverse
+    from hysim.models.cascade import Cascade as Cascade
     from hysim.models.creep import Creep as Creep
     from hysim.models.custom import CustomLaw as CustomLaw
     from hysim.models.dahl import Dahl as Dahl
+    from hysim.models.dashpot import Dashpot as Dashpot
     from hysim.models.duhem import Duhem as Duhem
     from hysim.models.generalized_boucwen import GeneralizedBoucWen as GeneralizedBoucWen
     from hysim.models.limit_cycle import LimitCycle as LimitCycle
@@ -127,6 +132,7 @@ if TYPE_CHECKING:
     from hysim.models.static import SingleValued as SingleValued
     from hysim.models.storage import load_model as load_model
     from hysim.models.storage import save as save
+    from hysim.models.sum import Sum as Sum
     from hysim.models.transfer_function import TransferFunction as TransferFunction
     from hysim.models.zhu_wang_boucwen import ZhuWangBoucWen as ZhuWangBoucWen
     from hysim.records import Record as Record

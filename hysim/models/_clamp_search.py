@@ -28,6 +28,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray, checked
 from hysim.models._clamps import ClampLaw, check_elements, end_positions, positions
+from hysim.models.composable import Composable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
@@ -38,7 +39,7 @@ _STARTS = (0.1, 0.3, 0.6)
 
 
 @checked
-class ClampStructure:
+class ClampStructure(Composable):
     """A bank of plays or stops to be identified; see `PrandtlIshlinskii.structure`."""
 
     law: type[ClampLaw]

@@ -20,6 +20,7 @@ from hysim.models._batch import Reduction
 from hysim.models._memory_law import State
 from hysim.models.boucwen import BoucWen
 from hysim.models.boucwen_inverse import BoucWenInverse, InverseState
+from hysim.models.composable import Composable
 from hysim.models.limit_cycle import LimitCycle
 from hysim.models.model import CompiledLaw, model
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
@@ -32,7 +33,7 @@ _STARTS = ((0.03, 0.5), (0.1, 0.5), (0.3, 0.7), (1.0, 1.5))
 
 
 @model
-class Dahl:
+class Dahl(Composable):
     """Dahl friction, ``F' = stiffness (u' - |u'| F / coulomb)`` and ``y = offset + F``.
 
     Parameters
