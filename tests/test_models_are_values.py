@@ -19,6 +19,7 @@ NUMBERS = [
     (hs.Play, {"threshold": 0.5}, "threshold"),
     (hs.MaxwellSlip, {"stiffness": (1.0, 2.0), "slips": (0.5, 0.1)}, "stiffness"),
     (hs.Dahl, {"coulomb": 0.7}, "coulomb"),
+    (hs.Dashpot, {"c": 0.7}, "c"),
     (hs.TransferFunction, {"num": (1.0,), "den": (1.0, 2.0)}, "den"),
     (hs.BoucWenOscillator, {"mass": 2.0, "damping": 1.0, "stiffness": 3.0, "law": hs.BoucWen()}, "stiffness"),
     (hs.Amplifier, {"slew_rate": 2.0}, "slew_rate"),

@@ -49,6 +49,13 @@ def _tried(step: Step, parameters: FloatArray, state: FloatArray, trial: FloatAr
     return step(parameters, trial, u)
 
 
+@inlined
+def _apart(here: float, direction: float, low: float, way: float, high: float) -> bool:
+    """Whether the end of `way` is an input between those of `low` and `high`."""
+    end = direction * (here + direction * way)
+    return direction * (here + direction * low) < end < direction * (here + direction * high)
+
+
 @signed_kernel(int64(STEP, CONSTANTS, VECTOR, VECTOR, float64, float64, float64, CONSTANTS, VECTOR))
 def inverse(
     step: Step,
@@ -88,9 +95,9 @@ def inverse(
         last_side = 0
         for i in range(_HALVINGS):
             way = high - (high - low) * (high_error / (high_error - low_error))
-            if i % 3 == 2 or not low < way < high:
+            if i % 3 == 2 or not _apart(here, direction, low, way, high):
                 way = 0.5 * (low + high)
-            if not (low < way < high and here + direction * way != here + direction * low) or high_error == 0.0:
+            if high_error == 0.0 or not _apart(here, direction, low, way, high):
                 break
             error = side * (_tried(step, parameters, state, trial, here + direction * way) - wanted)
             if error < 0.0:

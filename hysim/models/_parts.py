@@ -33,7 +33,9 @@ def check_parts(parts: Any, what: str) -> tuple[Any, ...]:
     for member in members:
         if isinstance(member, type) or not callable(getattr(member, "response", None)):
             name = member.__name__ if isinstance(member, type) else type(member).__name__
-            raise TypeError(f"{what} must hold models with a response, got {name}: identify takes a structure of them")
+            raise TypeError(
+                f"{what} must hold models with a response, got {name} (classes and structures go to `structure`)"
+            )
     return members
 
 

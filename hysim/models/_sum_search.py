@@ -60,7 +60,10 @@ class SumStructure(Composable):
         )
         whole = together(spaces)
         return without_repetition(
-            whole, lambda x: self.regressors(whole.parameters(x), record)[..., :-1], self._values(found), freedom
+            whole,
+            lambda x: self.regressors(whole.parameters(x), record)[..., :-1],
+            self._values(whole.columns),
+            freedom,
         )
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
@@ -117,11 +120,11 @@ class SumStructure(Composable):
             label: part for label, part in zip(labels(self.parts), self.parts, strict=True) if is_identifiable(part)
         }
 
-    def _values(self, found: Mapping[str, Any]) -> dict[str, float]:
-        """What linear parameters of models are where they have a number of their own."""
+    def _values(self, columns: Sequence[str]) -> dict[str, float]:
+        """The numbers that models have for linear parameters of theirs."""
         return {
-            f"{label}.{name}": float(value)
-            for label, part in found.items()
-            for name in ("offset", "slope", "feedthrough", "gain", "c")
+            f"{label}.{name}": value
+            for label, part in self._identified.items()
+            for name in own(dict.fromkeys(columns), label)
             if isinstance(value := getattr(part, name, None), float)
         }
