@@ -1,5 +1,7 @@
 """Sums and cascades are models like any other: they respond, continue, invert, are stored and identified."""
 
+import os
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -8,6 +10,9 @@ from strategies import bounded_laws, short_inputs
 
 import hysim as hs
 
+needs_compiled = pytest.mark.skipif(
+    os.environ.get("NUMBA_DISABLE_JIT", "0") != "0", reason="thousands of runs, which only compiled code does in time"
+)
 TIME = 0.05
 PLANT = hs.TransferFunction(num=(2.0, 30.0), den=(1.0, 2.0, 30.0), delay=0.07)
 
@@ -187,6 +192,7 @@ WAVES = hs.signals.triangle(-1.0, 1.0, cycles=3, samples_per_cycle=40)
 WALK = np.interp(np.arange(240), np.arange(0, 240, 6), np.random.default_rng(3).uniform(-1.0, 1.0, 40))
 
 
+@needs_compiled
 def test_a_damper_is_found_in_noise():
     true = hs.BoucWen(beta=2.0, gamma=0.6, gain=2.0) + hs.Dashpot(c=0.2) + hs.Line(offset=0.3, slope=0.4)
     fit = hs.identify(hs.BoucWen() + hs.Dashpot() + hs.Line(), noisy(true, WAVES), fixed={"bouc_wen.n": 1.0})
@@ -200,6 +206,7 @@ def test_a_damper_is_found_in_noise():
     assert "bouc_wen: the law is" in fit.message
 
 
+@needs_compiled
 def test_a_law_in_front_of_linear_dynamics_is_found_in_noise():
     true = hs.Play(threshold=0.3, gain=2.0) >> hs.TransferFunction(num=(2.0, 30.0), den=(1.0, 2.0, 30.0))
     structure = hs.Cascade.structure(hs.Play, hs.TransferFunction.structure(poles=2, zeros=1))
@@ -209,6 +216,7 @@ def test_a_law_in_front_of_linear_dynamics_is_found_in_noise():
     assert fit.model.stages[1].dc_gain == pytest.approx(1.0, rel=1e-12)  # den_n over itself, through a power
 
 
+@needs_compiled
 def test_a_law_behind_linear_dynamics_is_found_in_noise():
     true = hs.TransferFunction(num=(6.0,), den=(1.0, 6.0)) >> hs.Play(threshold=0.1, gain=2.0, offset=0.5)
     structure = hs.TransferFunction.structure(poles=1, zeros=0) >> hs.Play(threshold=0.2)
@@ -216,6 +224,7 @@ def test_a_law_behind_linear_dynamics_is_found_in_noise():
     assert within(fit, {"play.threshold": 0.1, "play.gain": 2.0, "transfer_function.den[1]": 6.0})
 
 
+@needs_compiled
 def test_a_plant_that_is_known_stays():
     true = hs.Play(threshold=0.3, gain=2.0) >> PLANT
     fit = hs.identify(hs.Play(threshold=0.1) >> PLANT, noisy(true, WALK))
@@ -240,6 +249,7 @@ def test_regressors_are_the_response(initial):
         assert y == pytest.approx(model.response(record.u, TIME), rel=1e-9, abs=1e-9)  # sums in another order
 
 
+@needs_compiled
 def test_of_columns_that_repeat_each_other_the_last_is_free():
     record = noisy(hs.Line(slope=1.0) + hs.Dashpot(), WAVES)
     structure = hs.Sum.structure(hs.BoucWen, hs.Line, hs.PrandtlIshlinskii.structure(plays=3))
@@ -256,6 +266,7 @@ def test_of_columns_that_repeat_each_other_the_last_is_free():
     assert "line.offset" in fixed.free_names
 
 
+@needs_compiled
 def test_names_are_those_of_the_parts():
     record = noisy(hs.Line(slope=1.0) + hs.Dashpot(), WAVES)
     twins = hs.identify(hs.Play(threshold=0.2) + hs.Play(threshold=0.4), record, bounds={"play[1].gain": (0.0, 2.0)})
@@ -269,6 +280,7 @@ def test_names_are_those_of_the_parts():
                     fixed={"transfer_function.num[0]": 1.0})  # fmt: skip
 
 
+@needs_compiled
 def test_a_steady_cycle_is_that_of_the_parts():
     true = hs.Dahl(stiffness=3.0, coulomb=0.5) + hs.Line(slope=0.5)
     u = np.tile(0.8 * np.sin(2 * np.pi * np.arange(40) / 40), 4)
@@ -281,6 +293,7 @@ def test_a_steady_cycle_is_that_of_the_parts():
         hs.identify(hs.Dahl() >> hs.TransferFunction.structure(poles=1, zeros=0), record, initial="periodic")
 
 
+@needs_compiled
 def test_records_share_all_but_their_states():
     true = hs.Dahl(stiffness=3.0, coulomb=0.5) + hs.Dashpot(c=0.2)
     records = [noisy(true, WAVES, seed=1), noisy(true, WALK, seed=2)]
@@ -289,6 +302,7 @@ def test_records_share_all_but_their_states():
     assert within(fit, {"dahl.stiffness": 3.0, "dahl.coulomb": 0.5, "dashpot.c": 0.2})
 
 
+@needs_compiled
 def test_a_composed_structure_is_compared():
     record = noisy(hs.Dahl(stiffness=3.0, coulomb=0.5) + hs.Dashpot(c=0.2), WAVES)
     table = hs.compare({"law": hs.Dahl, "damper": hs.Sum.structure(hs.Dahl, hs.Dashpot)}, record, cross_validate=None)
