@@ -58,6 +58,9 @@ _HOME = {
     "PreisachRelays": "hysim.models.preisach",
     "Dahl": "hysim.models.dahl",
     "ColemanHodgdon": "hysim.models.coleman_hodgdon",
+    "Sum": "hysim.models.sum",
+    "Cascade": "hysim.models.cascade",
+    "Dashpot": "hysim.models.dashpot",
     "CustomLaw": "hysim.models.custom",
     "BoucWenOscillator": "hysim.models.oscillator",
     "TransferFunction": "hysim.models.transfer_function",
@@ -115,10 +118,12 @@ if TYPE_CHECKING:
     from hysim.models.baber_noori import BoucWenBaberNoori as BoucWenBaberNoori
     from hysim.models.boucwen import BoucWen as BoucWen
     from hysim.models.boucwen_inverse import BoucWenInverse as BoucWenInverse
+    from hysim.models.cascade import Cascade as Cascade
     from hysim.models.coleman_hodgdon import ColemanHodgdon as ColemanHodgdon
     from hysim.models.creep import Creep as Creep
     from hysim.models.custom import CustomLaw as CustomLaw
     from hysim.models.dahl import Dahl as Dahl
+    from hysim.models.dashpot import Dashpot as Dashpot
     from hysim.models.duhem import Duhem as Duhem
     from hysim.models.generalized_boucwen import GeneralizedBoucWen as GeneralizedBoucWen
     from hysim.models.generalized_prandtl_ishlinskii import (
@@ -145,6 +150,7 @@ if TYPE_CHECKING:
     from hysim.models.static import SingleValued as SingleValued
     from hysim.models.storage import load_model as load_model
     from hysim.models.storage import save as save
+    from hysim.models.sum import Sum as Sum
     from hysim.models.transfer_function import TransferFunction as TransferFunction
     from hysim.models.zhu_wang_boucwen import ZhuWangBoucWen as ZhuWangBoucWen
     from hysim.records import Record as Record

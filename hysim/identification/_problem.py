@@ -123,7 +123,9 @@ class Problem:
                 fixed_part[:, samples] = regressors[..., -1]
                 for place, name in enumerate(self.own.columns):
                     if name in self.own.held:
-                        fixed_part[:, samples] += self.own.held[name] * regressors[..., place]
+                        steady = part.periodic and name in self.own.state
+                        value = parameters[name][:, np.newaxis] if steady else self.own.held[name]
+                        fixed_part[:, samples] += value * regressors[..., place]
             for escaped in lost:  # there is no steady cycle
                 fixed_part[escaped, samples] = np.inf
             places = [place for place, name in enumerate(self.own.columns) if name in self.own.linear]
@@ -272,6 +274,7 @@ def _together(
         starts=box(own.starts) if own.starts.size else np.empty((len(own.starts), len(order))),
         names=(*(name for name in own.names if name not in states), *free_states),
         linear=tuple(_called(name, k) for name, k in linear),
+        drawn=own.drawn and (box(own.drawn[0]), box(own.drawn[1])),
         regions={name: (box(lower), box(upper)) for name, (lower, upper) in own.regions.items()},
         bounds={_called(name, k): own.bounds[name] for name, k in linear if name in own.bounds},
         state=free_states,

@@ -82,12 +82,13 @@ def _descended(problem: Problem, starts: FloatArray, *, exact: bool) -> Reached:
 
 
 def _uniform(space: SearchSpace, n: int, seed: int) -> FloatArray:
-    """Spread `n` points over the box by a scrambled Sobol sequence."""
+    """Spread `n` points over the box, or its part from which they are drawn, by a scrambled Sobol sequence."""
     from scipy.stats import qmc
 
     sequence = qmc.Sobol(space.lower.size, rng=np.random.default_rng(seed))
     unit = sequence.random_base2(math.ceil(math.log2(max(n, 1))))[:n]
-    return np.asarray(space.lower + unit * (space.upper - space.lower))
+    lower, upper = space.drawn or (space.lower, space.upper)
+    return np.asarray(np.clip(lower + unit * (upper - lower), space.lower, space.upper))
 
 
 def _apart(

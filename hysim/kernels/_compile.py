@@ -38,6 +38,12 @@ def signed_kernel(*signatures: Any) -> Callable[[F], F]:
     return lambda function: _compiled(function, list(signatures))
 
 
+def signed_closure(*signatures: Any) -> Callable[[F], F]:
+    """As `signed_kernel`, for a function that closes over kernels: no later process would find it in the cache."""
+    compiler: Any = numba.njit
+    return lambda function: compiler(list(signatures), nogil=True, error_model="numpy")(function)
+
+
 def signed_inlined(*signatures: Any) -> Callable[[F], F]:
     """As `inlined` for these signatures only; otherwise each constant among the arguments makes one of its own."""
     return lambda function: _compiled(function, list(signatures), forceinline=True, **_NO_ENTRY)

@@ -119,6 +119,56 @@ def columns(
                 _write(x, free, end, den, powers, first, own, k)
 
 
+@kernel
+def outputs(
+    A: FloatArray,
+    B0: FloatArray,
+    B1: FloatArray,
+    level: FloatArray,
+    rise: FloatArray,
+    first: int,
+    lag: int,
+    part: float,
+    C: FloatArray,
+    D: FloatArray,
+    at_end: bool,
+    x: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Outputs C x + D v of one plant for several inputs, each from its own state.
+
+    The matrices are those of one set in `columns`. `level` and `rise` (n_inputs, m) begin with a zero and hold every
+    stretch that still acts; that of the first sample has the place `first`. `C` is (n_inputs, n), `D` (n_inputs,),
+    `out` (n_inputs, n_samples). `x` (n_inputs, n) are the states at the first sample, and after the call at the last.
+    """
+    n_inputs, n_samples = out.shape
+    now, moved = np.empty(x.shape[1]), np.empty(x.shape[1])
+    for i in range(n_inputs):
+        now[:] = x[i]
+        for k in range(n_samples):
+            older, newer = max(0, first + k - 1 - lag), max(0, first + k - lag)
+            cut = level[i, older] + (1.0 - part) * rise[i, older]
+            end = level[i, newer] + (1.0 - part) * rise[i, newer]
+            if not at_end:
+                out[i, k] = _seen(C[i], D[i], now, cut if part > 0.0 else level[i, newer])
+            x[i] = now
+            if part > 0.0:
+                _advance(A[0], B0[0], B1[0], cut, level[i, older] + rise[i, older], now, moved)
+            _advance(A[1], B0[1], B1[1], level[i, newer], end, now, moved)
+            if at_end:
+                out[i, k] = _seen(C[i], D[i], now, end)
+
+
+@inlined
+def _seen(C: FloatArray, D: float, x: FloatArray, through: float) -> float:
+    """C x + D v; a state that overflows does not matter where it is not seen."""
+    total = D * through
+    for j in range(len(x)):
+        if C[j] != 0.0:
+            total += C[j] * x[j]
+    return total
+
+
 @inlined
 def _advance(
     A: FloatArray, B0: FloatArray, B1: FloatArray, begin: float, end: float, x: FloatArray, moved: FloatArray

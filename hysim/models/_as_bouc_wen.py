@@ -15,11 +15,12 @@ from hysim._frozen import FloatArray
 from hysim.models._memory_law import State
 from hysim.models.boucwen import BoucWen
 from hysim.models.boucwen_inverse import BoucWenInverse, InverseState
+from hysim.models.composable import Composable
 from hysim.models.limit_cycle import LimitCycle
 from hysim.models.model import CompiledLaw
 
 
-class AsBoucWen(ABC):
+class AsBoucWen(Composable, ABC):
     """What a law has from the Bouc-Wen law that it is."""
 
     @property

@@ -31,6 +31,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray, checked
 from hysim.models._clamps import Bank, check_elements, positions
+from hysim.models.composable import Composable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
@@ -91,7 +92,7 @@ class ByTheInput:
 
 
 @checked
-class ClampStructure:
+class ClampStructure(Composable):
     """A bank of plays or stops to be identified; see `PrandtlIshlinskii.structure`."""
 
     law: type[Bank]

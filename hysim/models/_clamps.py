@@ -21,6 +21,7 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, read_only
 from hysim.kernels import clamps as kernels
 from hysim.models._batch import Batch, Reduction, Sets, part_of
+from hysim.models.composable import Composable
 from hysim.models.limit_cycle import LimitCycle
 from hysim.models.model import CompiledLaw
 from hysim.models.search_space import Parameters
@@ -29,7 +30,7 @@ State = tuple[float, ...]
 """Last input, and the positions of the plays."""
 
 
-class Bank(ABC):
+class Bank(Composable, ABC):
     """Plays or stops; a law says what its thresholds and weights are called, and adds its fields."""
 
     thresholds_name: ClassVar[str]

@@ -18,6 +18,7 @@ import numpy as np
 from hysim._frozen import FloatArray, checked
 from hysim.models._clamp_search import ClampStructure
 from hysim.models._play_sums import check_dead_zones, dead_zone
+from hysim.models.composable import Composable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
@@ -25,7 +26,7 @@ _LARGEST = 4.0  # of a weight, in slopes of the record
 
 
 @checked
-class DeadZoneStructure:
+class DeadZoneStructure(Composable):
     """Plays and dead zones to be identified; see `ModifiedPrandtlIshlinskii.structure`."""
 
     law: type

@@ -4,12 +4,18 @@ With den monic the plant's states are x_j = s^j / den(s) u, j = 0 ... n - 1, in 
 coefficients of den at most one. The steps between samples are exact (`hysim.kernels.linear`).
 """
 
+from typing import NamedTuple, Self
+
 import numpy as np
+import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim._parallel import in_chunks
 from hysim.kernels import linear as kernels
 
+Indices = npt.NDArray[np.int64]
+
+_NEVER = 2.0**53  # samples
 _SAMPLES_PER_THREAD = 20_000  # a millisecond: fewer are not worth a thread
 
 
@@ -49,6 +55,78 @@ def affine_columns(
 
     in_chunks(work, n_sets, minimum=1 + _SAMPLES_PER_THREAD // u.size)
     return out
+
+
+class LinearState(NamedTuple):
+    """States (n_inputs, n) at the last sample, and the inputs (n_inputs, m) that still act, up to that sample's."""
+
+    x: FloatArray
+    past: FloatArray
+
+
+class LinearPlants(NamedTuple):
+    """Plants as they are stepped at one sample time; see `kernels.outputs` and `scaled_companion`."""
+
+    A: FloatArray
+    B0: FloatArray
+    B1: FloatArray
+    lags: Indices
+    parts: FloatArray
+    C: FloatArray
+    D: FloatArray
+    rate: FloatArray
+
+    @classmethod
+    def of(cls, monic: FloatArray, numerators: FloatArray, delays: FloatArray, sample_time: float) -> Self:
+        """From denominators (n_sets, n), numerators (n_sets, n + 1) and dead times (n_sets,), in seconds.
+
+        The denominators are without their leading one.
+        """
+        n = monic.shape[1]
+        with np.errstate(all="ignore"):
+            F, rate, _ = scaled_companion(monic, sample_time)
+            late = np.minimum(delays / sample_time, _NEVER)
+            lags, parts = np.floor(late).astype(np.int64), late % 1.0
+            A, B0, B1 = transitions(F, rate * sample_time * np.stack([parts, 1.0 - parts], axis=1))
+            D = numerators[:, 0]
+            C = (numerators[:, 1:] - D[:, np.newaxis] * monic)[:, ::-1] * rate ** -np.arange(n, 0.0, -1.0)
+        return cls(A, B0, B1, lags, parts, C, D, rate)
+
+    def filtered(self, u: FloatArray, *, hold: str, sample: str) -> FloatArray:
+        """Outputs (n_sets, n_inputs, n_samples) from rest for the inputs `u` of this shape, or (1, ...)."""
+        n_sets, n = self.C.shape
+        out = np.empty((n_sets, *u.shape[1:]))
+        rest = LinearState(np.zeros((u.shape[1], n)), np.empty((u.shape[1], 0)))
+
+        def work(start: int, stop: int) -> None:
+            for k in range(start, stop):
+                out[k] = self.continued(u[k % len(u)], rest, k, hold=hold, sample=sample)[0]
+
+        in_chunks(work, n_sets, minimum=1 + _SAMPLES_PER_THREAD // max(1, u[0].size))
+        return out
+
+    def continued(
+        self, u: FloatArray, state: LinearState, k: int = 0, *, hold: str, sample: str, free: bool = False
+    ) -> tuple[FloatArray, LinearState]:
+        """Outputs of the plant `k` for inputs `u` (n_inputs, n_samples), and the state at the last sample.
+
+        With `free` the state of the last input is a free response and its derivatives, of which the first is seen.
+        """
+        before = state.past.shape[1]
+        level = np.concatenate([np.zeros((len(u), 1)), state.past, u], axis=1)
+        rise = np.zeros_like(level)
+        if hold == "foh":
+            rise[:, 1:-1] = np.diff(level[:, 1:])
+        C, D = np.tile(self.C[k], (len(u), 1)), np.full(len(u), self.D[k])
+        if free:
+            C[-1], D[-1] = np.eye(1, C.shape[1])[0], 0.0
+        repeated = min(before, 1)  # the last sample so far, which has not acted yet
+        out, x = np.empty((len(u), u.shape[1] + repeated)), state.x.copy()
+        kernels.outputs(
+            self.A[k], self.B0[k], self.B1[k], level, rise, max(before, 1), int(self.lags[k]), float(self.parts[k]),
+            C, D, sample == "end", x, out,
+        )  # fmt: skip
+        return out[:, repeated:], LinearState(x, level[:, 1:][:, -int(self.lags[k]) - 2 :])
 
 
 def scaled_companion(monic: FloatArray, sample_time: float) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -19,6 +19,7 @@ from hysim._frozen import FloatArray, read_only
 from hysim.models import boucwen_inverse
 from hysim.models._batch import Reduction
 from hysim.models._memory_batch import Kernel, batch
+from hysim.models.composable import Composable
 from hysim.models.model import CompiledLaw
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
@@ -29,7 +30,7 @@ State = tuple[float, ...]
 _PASSES = 40
 
 
-class MemoryLaw(ABC):
+class MemoryLaw(Composable, ABC):
     """The memory, and an output that is a polynomial of u plus gain z.
 
     A law adds its fields, and says how its input coefficients are called. `memory_names` are the parameters

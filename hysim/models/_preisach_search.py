@@ -23,6 +23,7 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, checked, read_only
 from hysim.models._clamp_search import TURN, half_span, runs_clockwise
 from hysim.models._relays import RelayLaw, check_relays
+from hysim.models.composable import Composable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
@@ -31,7 +32,7 @@ _RANK = 1e-9  # of a column's length: what is left of one that others make up fo
 
 
 @checked
-class PreisachStructure:
+class PreisachStructure(Composable):
     """A bank of relays to be identified; see `Preisach.structure`."""
 
     law: type[RelayLaw]

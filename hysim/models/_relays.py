@@ -23,6 +23,7 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, read_only
 from hysim.kernels import preisach as kernels
 from hysim.models._batch import Batch, Reduction, Sets, part_of
+from hysim.models.composable import Composable
 from hysim.models.model import CompiledLaw
 from hysim.models.search_space import Parameters
 
@@ -33,7 +34,7 @@ _ROOM = 1000  # extremes that a compiled loop remembers
 _NOTHING = np.array([[0.0, 1.0]]), np.array([[0.0]])  # levels and weights of a law without any
 
 
-class RelayLaw(ABC):
+class RelayLaw(Composable, ABC):
     """A bank of weighted relays; a law says whether they are spread over their intervals, and adds its fields."""
 
     spread: ClassVar[bool]

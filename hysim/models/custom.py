@@ -24,6 +24,7 @@ from hysim._parallel import in_chunks
 from hysim.errors import SimulationError
 from hysim.kernels.custom import compile_step, drive_sets
 from hysim.kernels.stepping import Step, drive
+from hysim.models.composable import Composable
 from hysim.models.model import CompiledLaw
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
@@ -33,7 +34,7 @@ State = tuple[float, ...]
 
 
 @checked
-class CustomLaw:
+class CustomLaw(Composable):
     """A law by a scalar function of one's own.
 
     Parameters

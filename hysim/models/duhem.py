@@ -28,6 +28,7 @@ from hysim._frozen import FloatArray, read_only
 from hysim.errors import SimulationError
 from hysim.kernels import duhem as kernels
 from hysim.models import _duhem_search, _numeric_inverse
+from hysim.models.composable import Composable
 from hysim.models.duhem_runs import branches, free_runs, outputs
 from hysim.models.duhem_terms import Polynomials, Term, equation, latex, polynomials, terms_of
 from hysim.models.model import CompiledLaw, model
@@ -50,7 +51,7 @@ def _none() -> FloatArray:
 
 
 @model
-class Duhem:
+class Duhem(Composable):
     """Polynomial Duhem law, ``y = offset + feedthrough u + z`` with ``z' = u' p(u, z) + |u'| q(u, z)``.
 
     Parameters

@@ -16,6 +16,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.models import _duhem_search
+from hysim.models.composable import Composable
 from hysim.models.duhem import Duhem
 from hysim.models.duhem_terms import RATES, Term
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
@@ -26,7 +27,7 @@ _ANY = Duhem(p=np.zeros((1, 1)), q=np.zeros((1, 1)))
 
 
 @dataclass(frozen=True, kw_only=True)
-class DuhemStructure:
+class DuhemStructure(Composable):
     """The terms of a Duhem law without their coefficients; see `Duhem.structure`."""
 
     terms: tuple[Term, ...]

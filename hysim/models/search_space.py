@@ -49,6 +49,8 @@ class SearchSpace:
         has its own.
     screened : int, optional
         Random points that a search should try beside the starts, where one evaluation is dear; 0 for none.
+    drawn : tuple of two arrays, shape (n_x,) each, optional
+        Lower and upper side of the part of the box from which these points are drawn; by default all of it.
     """
 
     coordinates: tuple[str, ...]
@@ -65,6 +67,7 @@ class SearchSpace:
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     state: tuple[str, ...] = ()
     screened: int | None = None
+    drawn: tuple[FloatArray, FloatArray] | None = None
 
 
 @dataclass(frozen=True)

@@ -13,13 +13,14 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
 from hysim.kernels import stepping
+from hysim.models.composable import Composable
 from hysim.models.model import CompiledLaw, model
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
 
 @model
-class Line:
+class Line(Composable):
     """Straight line ``y = offset + slope u``.
 
     Parameters
@@ -43,6 +44,10 @@ class Line:
         """Output at the samples of `u`, shape (n,)."""
         return self.offset + self.slope * read_only(u, "u", ndim=1)
 
+    def advance(self, u: npt.ArrayLike, state: tuple[()] | None = None) -> tuple[FloatArray, tuple[()]]:
+        """Output at the samples of `u`, and a state that holds nothing."""
+        return self.response(u), ()
+
     def compiled(self, u0: float = 0.0) -> CompiledLaw:
         """The line as compiled loops take it; it has no state, whatever the input `u0` before."""
         return CompiledLaw(stepping.line, read_only([self.offset, self.slope]), np.empty(0))
@@ -51,7 +56,7 @@ class Line:
         """Nothing to search: both parameters are linear."""
         if np.ptp(record.u) == 0.0:
             raise ValueError("the input is constant: nothing can be identified from it")
-        return _linear_space(dict.fromkeys(self.columns, 0.0), freedom)
+        return linear_space(dict.fromkeys(self.columns, 0.0), freedom)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns 1, u, 0, shape (1, n_samples, 3)."""
@@ -63,7 +68,7 @@ class Line:
 
 
 @model
-class SingleValued:
+class SingleValued(Composable):
     """A function of the input alone, linear between knots and constant outside.
 
     Parameters
@@ -96,10 +101,14 @@ class SingleValued:
         """Output at the samples of `u`, shape (n,)."""
         return np.interp(read_only(u, "u", ndim=1), self.u, self.y)
 
+    def advance(self, u: npt.ArrayLike, state: tuple[()] | None = None) -> tuple[FloatArray, tuple[()]]:
+        """Output at the samples of `u`, and a state that holds nothing."""
+        return self.response(u), ()
+
     @classmethod
     def search_space(cls, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """One linear parameter for each different input of the record, ``"y(0)"``, ``"y(2.5)"``, ..."""
-        return _linear_space({_name(level): 0.0 for level in np.unique(record.u).tolist()}, freedom)
+        return linear_space({_name(level): 0.0 for level in np.unique(record.u).tolist()}, freedom)
 
     @classmethod
     def regressors(cls, parameters: Parameters, record: Record) -> FloatArray:
@@ -118,10 +127,8 @@ def _name(level: float) -> str:
     return f"y({repr(level + 0.0).removesuffix('.0')})"  # adding zero takes the sign off -0.0
 
 
-def _linear_space(
-    defaults: Mapping[str, float],
-    freedom: Freedom,
-) -> SearchSpace:
+def linear_space(defaults: Mapping[str, float], freedom: Freedom) -> SearchSpace:
+    """The space of a family whose parameters are all linear, by their defaults."""
     held = freedom.held(defaults)
     names = tuple(name for name in defaults if name not in held)
     return SearchSpace(

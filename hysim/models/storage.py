@@ -96,15 +96,20 @@ def from_document(document: Mapping[str, Any], path: str | Path) -> Any:
         known = ", ".join(sorted(every_family()))
         raise ValueError(f"{path} holds a model of the family {family!r}; there are {known}")
     try:
-        parameters = {
-            name: from_document(value, path) if is_document(value) else value for name, value in given.items()
-        }
+        parameters = {name: _value(value, path) for name, value in given.items()}
         loaded = FAMILIES[family](**parameters)
     except (AttributeError, TypeError, ValueError) as error:
         raise ValueError(f"{path} does not hold a {family}: {error}") from None
     if missing := [field.name for field in fields(loaded) if field.name not in parameters]:
         raise ValueError(f"{path} does not hold a whole {family}: {', '.join(missing)} missing")
     return loaded
+
+
+def _value(value: Any, path: str | Path) -> Any:
+    """A parameter's value from its plain form."""
+    if isinstance(value, list):
+        return [_value(each, path) for each in value]
+    return from_document(value, path) if is_document(value) else value
 
 
 def is_model(value: Any) -> bool:
@@ -122,4 +127,6 @@ def to_document(value: Any) -> Any:
     if is_model(value):
         parameters = {field.name: to_document(getattr(value, field.name)) for field in fields(value)}
         return {"family": type(value).__name__, "parameters": parameters}
-    return value.tolist() if isinstance(value, np.ndarray) else list(value) if isinstance(value, tuple) else value
+    if isinstance(value, tuple):
+        return [to_document(each) for each in value]
+    return value.tolist() if isinstance(value, np.ndarray) else value

@@ -21,9 +21,10 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, checked, read_only
 from hysim.errors import SimulationError
-from hysim.models._linear_response import affine_columns
+from hysim.models._linear_response import LinearPlants, LinearState, affine_columns
 from hysim.models._transfer_function_notes import notes
 from hysim.models._transfer_function_starts import Guess, guesses, likely_delays, sections
+from hysim.models.composable import Composable
 from hysim.models.model import model
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
@@ -38,7 +39,7 @@ _SCREENED = 64  # random points beside starts that differ
 
 
 @model
-class TransferFunction:
+class TransferFunction(Composable):
     """Continuous-time transfer function.
 
     Parameters
@@ -132,20 +133,55 @@ class TransferFunction:
         ValueError
             If `u` is not finite or has not one axis, or the sample time is not positive.
         """
+        return self.advance(u, sample_time)[0]
+
+    def advance(
+        self, u: npt.ArrayLike, sample_time: float, state: LinearState | None = None
+    ) -> tuple[FloatArray, LinearState]:
+        """Output at the samples of `u`, continued from `state`, and the state after the last sample.
+
+        Parameters
+        ----------
+        u, sample_time
+            As in `response`; the time is the same for every part of a record.
+        state : LinearState, optional
+            What an earlier call returned; by default the initial state, with no input before.
+
+        Returns
+        -------
+        y : array, shape (n,)
+            The same bits as from one uncut input.
+        state : LinearState
+            To continue from.
+
+        Raises
+        ------
+        SimulationError, ValueError
+            As `response`.
+        """
         inputs = read_only(u, "u", ndim=1)
         if not 0.0 < sample_time < np.inf:
             raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
         with np.errstate(all="ignore"):
-            monic = np.array(self.den)[np.newaxis, 1:] / self.den[0]
-            numerator = np.concatenate([np.zeros(self.order + 1 - len(self.num)), self.num]) / self.den[0]
-            coefficients = np.concatenate([numerator, self.initial_state or np.zeros(self.order)])
-            columns = affine_columns(monic, inputs, float(sample_time), self.delay, hold=self.hold, sample=self.sample)
-            used = np.flatnonzero(coefficients)  # a state that overflows does not matter where it is not seen
-            y = np.asarray(columns[0][:, used] @ coefficients[used])
+            plant = self._plant(float(sample_time))
+            begin = state
+            if begin is None:
+                free = np.array(self.initial_state or [0.0] * self.order) * plant.rate[0] ** -np.arange(self.order)
+                begin = LinearState(np.stack([np.zeros(self.order), free]), np.empty((2, 0)))
+            if not inputs.size:
+                return inputs, begin
+            both = np.stack([inputs, np.zeros_like(inputs)])
+            forced, end = plant.continued(both, begin, hold=self.hold, sample=self.sample, free=True)
+            y = forced.sum(axis=0)
         if not np.isfinite(y).all():
             k = int(np.argmin(np.isfinite(y)))
             raise SimulationError(f"the output leaves the finite numbers at sample {k}; the poles are {self.poles}")
-        return y
+        return y, end
+
+    def filtered(self, signals: FloatArray, sample_time: float) -> FloatArray:
+        """Outputs from rest for several inputs at once, (n_signals, n_samples); what is not finite stays."""
+        plant = self._plant(sample_time)
+        return np.asarray(plant.filtered(signals[np.newaxis], hold=self.hold, sample=self.sample)[0])
 
     @classmethod
     def structure(
@@ -254,9 +290,15 @@ class TransferFunction:
         ]
         return {str(structure): structure for structure in found}
 
+    def _plant(self, sample_time: float) -> LinearPlants:
+        with np.errstate(all="ignore"):
+            numerator = np.concatenate([np.zeros(self.order + 1 - len(self.num)), self.num]) / self.den[0]
+            monic = np.array(self.den[1:]) / self.den[0]
+        return LinearPlants.of(monic[np.newaxis], numerator[np.newaxis], np.array([self.delay]), sample_time)
+
 
 @checked
-class TransferFunctionStructure:
+class TransferFunctionStructure(Composable):
     """The shape of a transfer function, to be identified; see `TransferFunction.structure`.
 
     The search runs over second-order sections s^2 + 2 zeta omega s + omega^2 (and one of first order for an

@@ -1,0 +1,161 @@
+"""The search spaces of several parts as one.
+
+The names of a part begin with its label, as in ``"bouc_wen.beta"``. Coordinates stand one behind the other; the
+starts of the whole are the combinations of those of the parts. Columns of different parts that are the same whatever
+the coordinates, such as two offsets or the slopes of two lines, can be told only together: all of them but the last
+are held, unless the user says which.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.models._parts import own
+from hysim.models.search_space import Freedom, SearchSpace
+
+_SAME = 1e-12  # rounding of a column
+_MOST_STARTS = 16
+
+Space = Callable[[Freedom], SearchSpace]
+"""A part's `search_space` on a record."""
+
+
+def together(spaces: Mapping[str, SearchSpace]) -> SearchSpace:
+    """The spaces of parts by their labels, one beside the other."""
+    parts = list(spaces.items())
+
+    def named(names: Callable[[SearchSpace], Iterable[str]]) -> tuple[str, ...]:
+        return tuple(f"{label}.{name}" for label, space in parts for name in names(space))
+
+    def mapped(values: Callable[[SearchSpace], Mapping[str, Any]]) -> dict[str, Any]:
+        return {f"{label}.{name}": value for label, space in parts for name, value in values(space).items()}
+
+    cuts = np.cumsum([len(space.coordinates) for _, space in parts])[:-1]
+    box = [np.concatenate([(s.lower, s.upper)[side] for _, s in parts]) for side in (0, 1)]
+    drawn = [space.drawn or (space.lower, space.upper) for _, space in parts]
+    regions = {}
+    for k, (label, space) in enumerate(parts):
+        for name, region in space.regions.items():
+            sides = [np.split(side, cuts) for side in box]
+            for pieces, piece in zip(sides, region, strict=True):
+                pieces[k] = piece
+            regions[f"{label}.{name}"] = (np.concatenate(sides[0]), np.concatenate(sides[1]))
+
+    def parameters(x: FloatArray) -> dict[str, FloatArray]:
+        pieces = np.split(np.atleast_2d(x), cuts, axis=1)
+        return {
+            f"{label}.{name}": values
+            for (label, space), piece in zip(parts, pieces, strict=True)
+            for name, values in space.parameters(piece).items()
+        }
+
+    screened = [space.screened for _, space in parts if space.coordinates]
+    return SearchSpace(
+        coordinates=named(lambda space: space.coordinates),
+        lower=box[0],
+        upper=box[1],
+        starts=_starts([space for _, space in parts]),
+        names=named(lambda space: space.names),
+        columns=named(lambda space: space.columns),
+        linear=named(lambda space: space.linear),
+        held=mapped(lambda space: space.held),
+        parameters=parameters,
+        redundant=tuple(tuple(f"{label}.{name}" for name in group) for label, s in parts for group in s.redundant),
+        regions=regions,
+        bounds=mapped(lambda space: space.bounds),
+        state=named(lambda space: space.state),
+        screened=None if None in screened else max((n for n in screened if n is not None), default=0),
+        drawn=(np.concatenate([low for low, _ in drawn]), np.concatenate([high for _, high in drawn])),
+    )
+
+
+def declared(spaces: Mapping[str, Space], freedom: Freedom) -> dict[str, SearchSpace]:
+    """Each part's space with its share of what the user says.
+
+    Raises
+    ------
+    ValueError
+        If a name is unknown, or a part refuses; the message names the part.
+    """
+    asked = {label: space(replace(freedom, fixed={}, free=(), bounds={})) for label, space in spaces.items()}
+    known = [f"{label}.{name}" for label, space in asked.items() for name in (*space.names, *space.held)]
+    given = {"fixed": freedom.fixed, "free": freedom.free, "bounds": freedom.bounds}
+    for argument, names in given.items():
+        for name in names:
+            if name not in known:
+                raise ValueError(f"{argument} names {name!r}; the parameters are {', '.join(known)}")
+    return {label: _of_part(label, space, freedom) for label, space in spaces.items()}
+
+
+def _of_part(label: str, space: Space, freedom: Freedom) -> SearchSpace:
+    share = replace(
+        freedom,
+        fixed=own(freedom.fixed, label),
+        free=tuple(own(dict.fromkeys(freedom.free), label)),
+        bounds=own(freedom.bounds, label),
+    )
+    try:
+        return space(share)
+    except ValueError as error:
+        raise ValueError(f"{label}: {error}") from None
+
+
+def without_repetition(
+    space: SearchSpace, columns: Callable[[FloatArray], FloatArray], values: Mapping[str, float], freedom: Freedom
+) -> SearchSpace:
+    """The space with linear parameters held of which others have the same column.
+
+    Parameters
+    ----------
+    space : SearchSpace
+        Of all parts together.
+    columns : callable
+        Coordinates (n_sets, n_x) to the columns (n_sets, n_samples, n_columns).
+    values : mapping
+        What each linear parameter is held at; zero where it is not named.
+    freedom : Freedom
+        Names that are free or bounded are not held.
+    """
+    points = np.stack([space.lower + share * (space.upper - space.lower) for share in (0.45, 0.55)])
+    shapes = np.concatenate(columns(points), axis=0)  # two places in the box: what moves with neither is the same
+    chosen = {*freedom.free, *freedom.bounds}
+    held = dict(space.held)
+    for group in _alike(space, shapes):
+        free = [name for name in group if name not in held]
+        candidates = [name for name in free if name not in chosen]
+        held |= {name: values.get(name, 0.0) for name in candidates[: len(free) - 1]}
+    return replace(
+        space,
+        names=tuple(name for name in space.names if name not in held),
+        linear=tuple(name for name in space.linear if name not in held),
+        held=held,
+        bounds={name: pair for name, pair in space.bounds.items() if name not in held},
+    )
+
+
+def _alike(space: SearchSpace, shapes: FloatArray) -> list[list[str]]:
+    """Groups of linear parameters whose columns (n, n_columns) are multiples of each other."""
+    finite = np.isfinite(shapes).all(axis=0)
+    norms = np.linalg.norm(np.where(finite, shapes, 0.0), axis=0)
+    unit = np.where(finite, shapes, 0.0) / np.where(norms > 0.0, norms, 1.0)
+    groups: list[tuple[FloatArray, list[str]]] = []
+    for name, column, norm in zip(space.columns, unit.T, norms, strict=True):
+        if norm == 0.0:
+            continue
+        like = [names for other, names in groups if abs(abs(float(other @ column)) - 1.0) < _SAME]
+        if like:
+            like[0].append(name)
+        else:
+            groups.append((column, [name]))
+    return [names for _, names in groups if len(names) > 1]
+
+
+def _starts(spaces: Sequence[SearchSpace]) -> FloatArray:
+    """Combinations of the parts' starts, the first ones of each first; the middle of the box where there are none."""
+    choices = [space.starts if len(space.starts) else 0.5 * (space.lower + space.upper)[np.newaxis] for space in spaces]
+    ranked = sorted(product(*(range(len(rows)) for rows in choices)), key=sum)[:_MOST_STARTS]
+    return np.array([np.concatenate([rows[k] for rows, k in zip(choices, places, strict=True)]) for places in ranked])

@@ -1,0 +1,130 @@
+"""What is searched of a sum: the parts' own spaces side by side (`hysim.models._joint_space`).
+
+What is linear in a part is linear in the sum. A part that cannot be identified adds an output that is known.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from hysim._frozen import FloatArray, checked
+from hysim.models._joint_space import declared, together, without_repetition
+from hysim.models._parts import checked_tuple, labels, own, response_of
+from hysim.models.composable import Composable
+from hysim.models.model import needs_time
+from hysim.models.search_space import ALL_FREE, Freedom, Identifiable, Parameters, SearchSpace
+from hysim.records import Record
+
+
+def started(parts: Sequence[Any]) -> tuple[Any, ...]:
+    """The parts, of a class the model with its defaults."""
+    return tuple(part() if isinstance(part, type) else part for part in parts)
+
+
+def is_identifiable(part: Any) -> bool:
+    """Whether a part declares a search."""
+    return all(callable(getattr(part, name, None)) for name in ("search_space", "regressors", "assemble"))
+
+
+def time_of(part: Any, record: Record) -> float | None:
+    """The sample time where the part needs one."""
+    return record.sample_time if needs_time(part) else None
+
+
+@checked
+class SumStructure(Composable):
+    """Parts to be identified side by side; see `hysim.Sum.structure`."""
+
+    parts: tuple[Any, ...]
+
+    def __post_init__(self) -> None:
+        parts = started(checked_tuple(self.parts, "parts"))
+        for part in parts:
+            if not (is_identifiable(part) or callable(getattr(part, "response", None))):
+                raise TypeError(f"parts must hold models or structures, got {type(part).__name__}")
+        object.__setattr__(self, "parts", parts)
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """The parts' spaces side by side; of columns that repeat each other one is free.
+
+        Raises
+        ------
+        ValueError
+            If a name is unknown, or as a part's `search_space`.
+        """
+        found = self._identified
+        spaces = declared(
+            {label: lambda free, part=part: part.search_space(record, free) for label, part in found.items()},  # type: ignore[misc]
+            freedom,
+        )
+        whole = together(spaces)
+        return without_repetition(
+            whole,
+            lambda x: self.regressors(whole.parameters(x), record)[..., :-1],
+            self._values(whole.columns),
+            freedom,
+        )
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """The parts' columns one after the other, and the sum of what is known."""
+        found = self._identified
+        known = [part for part in self.parts if not is_identifiable(part)]
+        fixed = sum((response_of(part, record.u, time_of(part, record)) for part in known), np.zeros(len(record)))
+        blocks = [part.regressors(own(parameters, label), record) for label, part in found.items()]
+        n_sets = max([len(block) for block in blocks], default=1)
+        whole = [np.broadcast_to(block, (n_sets, *block.shape[1:])) for block in blocks]
+        last = sum((block[..., -1:] for block in whole), np.broadcast_to(fixed[:, np.newaxis], (n_sets, fixed.size, 1)))
+        return np.concatenate([*(block[..., :-1] for block in whole), last], axis=-1)
+
+    def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
+        """The parameters with the parts' states in the steady cycle of which `record` is one period or more.
+
+        Raises
+        ------
+        ValueError
+            If a part has a state whose steady cycle cannot be computed.
+        """
+        states: dict[str, Any] = {}
+        for label, part in self._identified.items():
+            if callable(steady := getattr(part, "steady", None)):
+                found = steady(own(parameters, label), record)
+                states |= {f"{label}.{name}": value for name, value in found.items()}
+            elif part.search_space(record).state:
+                raise ValueError(f'{label} has no steady cycle that could be computed: use initial="free"')
+        return {**parameters, **states}
+
+    def assemble(self, parameters: Mapping[str, float]) -> Any:
+        """The sum with these parameters."""
+        from hysim.models.sum import Sum
+
+        found = zip(labels(self.parts), self.parts, strict=True)
+        return Sum(
+            parts=tuple(
+                part.assemble(own(parameters, label)) if is_identifiable(part) else part for label, part in found
+            )
+        )
+
+    def notes(self, record: Record, model: Any) -> tuple[str, ...]:
+        """What the laws among the parts say of themselves."""
+        return tuple(
+            f"{label}: {note}"
+            for label, part, found in zip(labels(self.parts), self.parts, model.parts, strict=True)
+            if callable(getattr(part, "notes", None)) and not needs_time(found)
+            for note in part.notes(record, found)
+        )
+
+    @property
+    def _identified(self) -> dict[str, Identifiable]:
+        return {
+            label: part for label, part in zip(labels(self.parts), self.parts, strict=True) if is_identifiable(part)
+        }
+
+    def _values(self, columns: Sequence[str]) -> dict[str, float]:
+        """The numbers that models have for linear parameters of theirs."""
+        return {
+            f"{label}.{name}": value
+            for label, part in self._identified.items()
+            for name in own(dict.fromkeys(columns), label)
+            if isinstance(value := getattr(part, name, None), float)
+        }

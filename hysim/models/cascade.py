@@ -1,0 +1,165 @@
+"""Models one behind the other.
+
+    u -> stage 1 -> stage 2 -> ... -> y
+
+A law in front of linear dynamics is Hammerstein's structure, linear dynamics in front of a law are Wiener's, both
+with a memory in place of the usual curve. The input of a stage at the samples is the output of the stage before, and
+each stage takes it between the samples as it takes any input.
+"""
+
+from functools import reduce
+from typing import Any
+
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, read_only
+from hysim.kernels.composed import one_behind_the_other
+from hysim.models._cascade_search import CascadeStructure
+from hysim.models._composite import Composite, State, continued
+from hysim.models._parts import check_parts, compiled_law, compiled_pair, labels, response_of
+from hysim.models.model import CompiledLaw, model
+
+__all__ = ["Cascade", "CascadeStructure"]
+
+
+@model
+class Cascade(Composite):
+    """Models one behind the other; ``first >> second`` is short for it.
+
+    Parameters
+    ----------
+    stages : tuple of models
+        Laws, such as `PrandtlIshlinskii`, and plants that move in time, such as `TransferFunction`, from the input on.
+
+    Raises
+    ------
+    TypeError
+        If a stage is not a model with a response.
+    ValueError
+        If there is none.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> stack = hs.BoucWen(feedthrough=1.0, gain=-0.3) >> hs.mode(2.0, 0.1)
+    >>> stack.response([0.0, 1.0, 1.0], sample_time=0.5).round(6).tolist()
+    [0.0, 0.0, 0.348853]
+    """
+
+    stages: tuple[Any, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "stages", check_parts(self.stages, "stages"))
+
+    @classmethod
+    def structure(cls, *stages: Any) -> CascadeStructure:
+        """What `hysim.identify` and `hysim.compare` take: classes, structures, and models as starts.
+
+        Parameters
+        ----------
+        *stages : model classes, structures or models
+            From the input on; see `hysim.models._cascade_search` for which of them are identified.
+
+        Returns
+        -------
+        CascadeStructure
+
+        Examples
+        --------
+        >>> import numpy as np, hysim as hs
+        >>> u = hs.signals.triangle(-1.0, 1.0, cycles=3, samples_per_cycle=40)
+        >>> true = hs.Play(threshold=0.3, gain=2.0) >> hs.TransferFunction(num=(3.0,), den=(1.0, 3.0))
+        >>> rec = hs.Record(u=u, y=true.response(u, 0.1), t=0.1 * np.arange(u.size))
+        >>> structure = hs.Cascade.structure(hs.Play, hs.TransferFunction.structure(poles=1, zeros=0))
+        >>> fit = hs.identify(structure, rec)
+        >>> round(fit.estimates["play.gain"], 6), round(fit.estimates["transfer_function.den[1]"], 6)
+        (2.0, 3.0)
+        """
+        return CascadeStructure(stages=stages)
+
+    @property
+    def members(self) -> tuple[Any, ...]:
+        """The stages."""
+        return self.stages
+
+    def response(self, u: npt.ArrayLike, sample_time: float | None = None) -> FloatArray:
+        """Output of the last stage at the samples of `u`.
+
+        Parameters
+        ----------
+        u : array, shape (n,)
+            Input of the first stage.
+        sample_time : float, optional
+            Time between two samples [s]; a cascade of laws needs none.
+
+        Returns
+        -------
+        array, shape (n,)
+
+        Raises
+        ------
+        SimulationError
+            If a stage leaves the finite numbers.
+        ValueError
+            If `u` is not finite or has not one axis, or no time is given where one is needed.
+        """
+        return reduce(lambda v, stage: response_of(stage, v, sample_time), self.stages, read_only(u, "u", ndim=1))
+
+    def advance(
+        self, u: npt.ArrayLike, state: State | None = None, *, sample_time: float | None = None
+    ) -> tuple[FloatArray, State]:
+        """Output at the samples of `u`, continued from `state`, and the state after the last sample.
+
+        Parameters
+        ----------
+        u, sample_time
+            As in `response`; the time is the same for every part of a record.
+        state : tuple, optional
+            The states of the stages; by default the first sample finds each at its begin.
+
+        Returns
+        -------
+        y : array, shape (n,)
+            The same bits as from one uncut input.
+        state : tuple
+            To continue from.
+
+        Raises
+        ------
+        TypeError
+            If a stage cannot be continued.
+        SimulationError, ValueError
+            As `response`.
+        """
+        signal, ends = read_only(u, "u", ndim=1), []
+        states: State = (None,) * len(self.stages) if state is None else state
+        if not signal.size:
+            return signal, states
+        for stage, begin in zip(self.stages, states, strict=True):
+            signal, end = continued(stage, signal, sample_time, begin)
+            ends.append(end)
+        return signal, tuple(ends)
+
+    def signals(self, u: npt.ArrayLike, sample_time: float | None = None) -> dict[str, FloatArray]:
+        """Output ``"y"`` and those of the stages by name, such as ``"bouc_wen"``; see `response`."""
+        signal, found = read_only(u, "u", ndim=1), {}
+        for label, stage in zip(labels(self.stages), self.stages, strict=True):
+            signal = found[label] = response_of(stage, signal, sample_time)
+        return {"y": signal, **found}
+
+    def compiled(self, u0: float = 0.0) -> CompiledLaw:
+        """The cascade as compiled loops take it; the state is that of a first sample at the input `u0`.
+
+        Raises
+        ------
+        TypeError
+            If a stage is not a law that can be stepped.
+        """
+        laws, level = [], u0
+        for stage in self.stages:
+            laws.append(compiled_law(stage, level))
+            level = float(stage.response([level])[0])
+        return reduce(lambda first, second: compiled_pair(one_behind_the_other, first, second), laws)
+
+    def _structure(self) -> CascadeStructure:
+        return CascadeStructure(stages=self.stages)

@@ -1,0 +1,169 @@
+"""Models side by side under one input, such as a law with a dashpot beside it.
+
+    y = y_1 + y_2 + ...
+
+Without a part that moves in time a sum is a law: rate-independent, and usable where laws are. Magnetorheological
+dampers are Bouc-Wen's law, a dashpot and a spring (B. F. Spencer et al., J. Eng. Mech. 123, 1997).
+"""
+
+from functools import reduce
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, read_only
+from hysim.kernels.composed import side_by_side
+from hysim.models._composite import Composite, State, continued
+from hysim.models._parts import check_parts, compiled_law, compiled_pair, labels, response_of
+from hysim.models._sum_search import SumStructure
+from hysim.models.model import CompiledLaw, model
+from hysim.models.search_space import Parameters
+from hysim.records import Record
+
+__all__ = ["Sum", "SumStructure"]
+
+
+@model
+class Sum(Composite):
+    """Models side by side, whose outputs are added; ``first + second`` is short for it.
+
+    Parameters
+    ----------
+    parts : tuple of models
+        Laws, such as `BoucWen` or `Line`, and plants that move in time, such as `Dashpot` or `TransferFunction`.
+
+    Raises
+    ------
+    TypeError
+        If a part is not a model with a response.
+    ValueError
+        If there is none.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> damper = hs.BoucWen() + hs.Dashpot(c=2.0)
+    >>> damper.response([0.0, 1.0, 1.0], sample_time=0.5).round(6).tolist()
+    [0.0, 4.632121, 0.632121]
+    >>> twice = hs.Play(threshold=0.25) + hs.Line(slope=1.0)
+    >>> twice.inverse_response(twice.response([0.0, 1.0, 0.75, 0.0])).round(9).tolist()
+    [0.0, 1.0, 0.75, 0.0]
+    """
+
+    parts: tuple[Any, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "parts", check_parts(self.parts, "parts"))
+
+    @classmethod
+    def structure(cls, *parts: Any) -> SumStructure:
+        """What `hysim.identify` and `hysim.compare` take: classes, structures, and models as starts.
+
+        Parameters
+        ----------
+        *parts : model classes, structures or models
+            A model that cannot be identified is taken as it is.
+
+        Returns
+        -------
+        SumStructure
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> fit = hs.identify(hs.Sum.structure(hs.Play, hs.Line), hs.datasets.table1())
+        >>> fit.free_names
+        ('play.threshold', 'play.gain', 'play.z0', 'line.offset', 'line.slope')
+        """
+        return SumStructure(parts=parts)
+
+    @property
+    def members(self) -> tuple[Any, ...]:
+        """The parts."""
+        return self.parts
+
+    def response(self, u: npt.ArrayLike, sample_time: float | None = None) -> FloatArray:
+        """Output at the samples of `u`: the sum of the parts' responses, in their order.
+
+        Parameters
+        ----------
+        u : array, shape (n,)
+            Input, as each part takes it between the samples.
+        sample_time : float, optional
+            Time between two samples [s]; a sum of laws needs none.
+
+        Returns
+        -------
+        array, shape (n,)
+
+        Raises
+        ------
+        SimulationError
+            If a part leaves the finite numbers.
+        ValueError
+            If `u` is not finite or has not one axis, or no time is given where one is needed.
+        """
+        inputs = read_only(u, "u", ndim=1)
+        return _total([response_of(part, inputs, sample_time) for part in self.parts])
+
+    def advance(
+        self, u: npt.ArrayLike, state: State | None = None, *, sample_time: float | None = None
+    ) -> tuple[FloatArray, State]:
+        """Output at the samples of `u`, continued from `state`, and the state after the last sample.
+
+        Parameters
+        ----------
+        u, sample_time
+            As in `response`; the time is the same for every part of a record.
+        state : tuple, optional
+            The states of the parts; by default the first sample finds each at its begin.
+
+        Returns
+        -------
+        y : array, shape (n,)
+            The same bits as from one uncut input.
+        state : tuple
+            To continue from.
+
+        Raises
+        ------
+        TypeError
+            If a part cannot be continued.
+        SimulationError, ValueError
+            As `response`.
+        """
+        inputs = read_only(u, "u", ndim=1)
+        states: State = (None,) * len(self.parts) if state is None else state
+        if not inputs.size:
+            return inputs, states
+        pairs = [continued(part, inputs, sample_time, each) for part, each in zip(self.parts, states, strict=True)]
+        return _total([y for y, _ in pairs]), tuple(end for _, end in pairs)
+
+    def signals(self, u: npt.ArrayLike, sample_time: float | None = None) -> dict[str, FloatArray]:
+        """Output ``"y"`` and those of the parts by name, such as ``"dashpot"``; see `response`."""
+        inputs = read_only(u, "u", ndim=1)
+        own = [response_of(part, inputs, sample_time) for part in self.parts]
+        return {"y": _total(own), **dict(zip(labels(self.parts), own, strict=True))}
+
+    def compiled(self, u0: float = 0.0) -> CompiledLaw:
+        """The sum as compiled loops take it; the state is that of a first sample at the input `u0`.
+
+        Raises
+        ------
+        TypeError
+            If a part is not a law that can be stepped.
+        """
+        laws = [compiled_law(part, u0) for part in self.parts]
+        return reduce(lambda first, second: compiled_pair(side_by_side, first, second), laws)
+
+    def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
+        """The parameters with the parts' states in the steady cycle of which `record` is one period or more."""
+        return self._structure().steady(parameters, record)
+
+    def _structure(self) -> SumStructure:
+        return SumStructure(parts=self.parts)
+
+
+def _total(outputs: list[FloatArray]) -> FloatArray:
+    return np.asarray(reduce(np.add, outputs))
