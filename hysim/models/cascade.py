@@ -43,7 +43,7 @@ class Cascade(Composite):
     >>> import hysim as hs
     >>> stack = hs.BoucWen(feedthrough=1.0, gain=-0.3) >> hs.mode(2.0, 0.1)
     >>> stack.response([0.0, 1.0, 1.0], sample_time=0.5).round(6).tolist()
-    [0.0, 0.0, 0.348853]
+    [0.0, 0.0, 0.34929]
     """
 
     stages: tuple[Any, ...]

@@ -66,7 +66,7 @@ class ColemanHodgdon(AsBoucWen):
     >>> import hysim as hs
     >>> law = hs.ColemanHodgdon(alpha=1.0, c=3.1635, B=0.345)
     >>> law.response([0.0, 6.5, -6.5]).round(6).tolist()
-    [0.0, 17.748488, -17.744262]
+    [0.0, 17.748487, -17.744263]
     """
 
     alpha: float = 1.0

@@ -161,8 +161,6 @@ class Dahl(AsBoucWen):
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns 1, what is left of a force of one, and F from zero, shape (n_sets, n_samples, 3)."""
         left, force = self._left_and_driven(parameters, record.u)
-        if "z0" in parameters:  # it is affine in the initial force, unless that is known: of a steady cycle
-            force = force + np.ravel(parameters["z0"])[:, np.newaxis] * left
         return np.stack([np.ones_like(left), left, force], axis=-1)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, npt.ArrayLike]:
