@@ -199,7 +199,7 @@ class _Search:
         controller = within(self.template.controller(x), self.loop.limits[0])
         found = self.specification.judge(controller)
         value = self.loop.value(controller) if found.max_sensitivity < math.inf else math.inf
-        self.trials.append(Trial(controller, *found, value))
+        self.trials.append(Trial(controller=controller, objective=value, **found._asdict()))
         return value * (1.0 + _BARRIER * self.specification.excess(found))
 
     def descend(self, start: FloatArray) -> None:

@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import Any
 
 from hysim._frozen import frozen
 
 
-class Trial(NamedTuple):
+@frozen
+class Trial:
     """A controller that was tried.
 
     Parameters

@@ -112,10 +112,12 @@ class Cascade(Composite):
 
         Parameters
         ----------
-        u, sample_time
-            As in `response`; the time is the same for every part of a record.
+        u : array, shape (n,)
+            As in `response`.
         state : tuple, optional
             The states of the stages; by default the first sample finds each at its begin.
+        sample_time : float, optional
+            As in `response`, the same for every part of a record [s].
 
         Returns
         -------
