@@ -175,7 +175,12 @@ def test_the_margins_do_not_depend_on_the_sign_of_the_law():
 
 def test_the_trials_are_what_it_chose_from():
     found = tuned("mode")
-    chosen = hs.control.Trial(found.controller, found.max_sensitivity, found.voltage_noise, found.objective)
+    chosen = hs.control.Trial(
+        controller=found.controller,
+        max_sensitivity=found.max_sensitivity,
+        voltage_noise=found.voltage_noise,
+        objective=found.objective,
+    )
     assert chosen in found.trials
     assert found.objective == min(trial.objective for trial in found.trials if trial.max_sensitivity <= 2.0)
     assert f"{len(found.trials)} loops simulated" in found.message
