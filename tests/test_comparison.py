@@ -151,9 +151,8 @@ def test_a_family_says_itself_what_is_tried(monkeypatch, few):
     class Declared:
         candidates = staticmethod(lambda: {"gentle": hs.Line(slope=0.1), "steep": hs.Line(slope=9.0)})
 
-    monkeypatch.setattr(
-        registry, "every_family", lambda: {"BoucWen": Declared} | {name: FAMILIES[name] for name in QUICK}
-    )
+    families = {"BoucWen": Declared} | {name: FAMILIES[name] for name in QUICK}
+    monkeypatch.setattr(registry, "every_family", lambda: families)
     assert list(registry.candidates()) == ["gentle", "steep", "Play", "Dahl", "Line", "SingleValued"]
 
 

@@ -52,6 +52,11 @@ class Cascade(Composite):
         object.__setattr__(self, "stages", check_parts(self.stages, "stages"))
 
     @classmethod
+    def candidates(cls) -> dict[str, Any]:
+        """What `hysim.compare` tries of this family: nothing, a cascade has the stages that it is given."""
+        return {}
+
+    @classmethod
     def structure(cls, *stages: Any) -> CascadeStructure:
         """What `hysim.identify` and `hysim.compare` take: classes, structures, and models as starts.
 

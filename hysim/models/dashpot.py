@@ -8,7 +8,7 @@ sample the input rests.
 """
 
 from collections.abc import Mapping
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -40,6 +40,11 @@ class Dashpot(Composable):
     c: float = 1.0
 
     dynamic: ClassVar[bool] = True
+
+    @classmethod
+    def candidates(cls) -> dict[str, Any]:
+        """What `hysim.compare` tries of this family: nothing, it is a part of sums."""
+        return {}
 
     def response(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
         """Output at the samples of `u`, by the difference to the sample before.

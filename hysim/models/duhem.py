@@ -172,6 +172,11 @@ class Duhem(Composable):
             half[k, : slope.shape[0], : slope.shape[1]] = 0.5 * slope
         return cls(p=half[0] + half[1], q=half[0] - half[1], feedthrough=feedthrough, offset=offset, y0=y0)
 
+    @classmethod
+    def candidates(cls) -> "dict[str, DuhemStructure]":
+        """What `hysim.compare` tries of this family: polynomials of the first and of the second degree."""
+        return {f"Duhem, degree {degree}": cls.structure(degree=degree) for degree in (1, 2)}
+
     @staticmethod
     def structure(*, degree: int | None = None, terms: Sequence[str] | None = None) -> "DuhemStructure":
         """What `hysim.identify` takes: the terms of a law between u and y, without their coefficients.

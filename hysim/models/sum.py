@@ -57,6 +57,11 @@ class Sum(Composite):
         object.__setattr__(self, "parts", check_parts(self.parts, "parts"))
 
     @classmethod
+    def candidates(cls) -> dict[str, Any]:
+        """What `hysim.compare` tries of this family: nothing, a sum has the parts that it is given."""
+        return {}
+
+    @classmethod
     def structure(cls, *parts: Any) -> SumStructure:
         """What `hysim.identify` and `hysim.compare` take: classes, structures, and models as starts.
 
