@@ -2,11 +2,13 @@
 
 from hysim.control._assessment import (
     HysteresisAssessment,
+    OpenLoop,
     SquareWaveAssessment,
     StepAssessment,
     assess_hysteresis,
     assess_square_wave,
     assess_step,
+    open_loop,
 )
 from hysim.control._c_export import CSource, to_c
 from hysim.control._feedforward import InverseFeedforward, ModeInverse, Shaper
@@ -28,6 +30,7 @@ __all__ = [
     "LinearLoop",
     "ModeInverse",
     "Notch",
+    "OpenLoop",
     "Shaper",
     "SquareWaveAssessment",
     "StepAssessment",
@@ -37,6 +40,7 @@ __all__ = [
     "assess_square_wave",
     "assess_step",
     "close_loop",
+    "open_loop",
     "to_c",
     "to_control",
     "tune",
