@@ -14,7 +14,7 @@ import numpy.typing as npt
 from hysim import signals
 from hysim._frozen import FloatArray, frozen, read_only
 from hysim.control._drive import secant_gain, without_memory
-from hysim.control._loop import ClosedLoop, Controller, RestingPlant, as_actuator, close_loop
+from hysim.control._loop import ClosedLoop, Controller, RestingPlant, as_actuator, close_loop, preview
 from hysim.errors import SimulationError
 from hysim.metrics import LoopMetrics, VibrationReduction, loop_metrics, reduction_percent, rmse, vibration_reduction
 from hysim.models.actuator import Actuator
@@ -284,6 +284,7 @@ def assess_step(
     sample_time: float,
     u0: float = 0.0,
     hold: float = 0.0,
+    known_ahead: bool = False,
 ) -> StepAssessment:
     """Let a loop follow a step, and measure what is left of the vibration.
 
@@ -302,6 +303,10 @@ def assess_step(
     hold : float
         Time before the step, in which the closed loop comes to rest where the plant is [s]: for a controller whose
         model is wrong, which takes another voltage for that displacement.
+    known_ahead : bool
+        A controller with preview moves before the reference does. By default nobody knows of the step before it
+        comes: the open loop is given its own when the controller is told. Where the reference is known ahead, the open
+        loop steps in the reference's time, and all times are still from when the controller is told.
 
     Returns
     -------
@@ -325,12 +330,14 @@ def assess_step(
     """
     actuator = as_actuator(plant)
     before, after = round(hold / sample_time), round(duration / sample_time) + 1
+    ahead = preview(controller, sample_time)
     t = sample_time * np.arange(before + after)
     rest = _resting_displacement(actuator, u0)
-    reference = rest + np.repeat([0.0, step], [before, after])
+    reference = rest + np.where(np.arange(t.size) < before + ahead, 0.0, step)
     closed = close_loop(actuator, controller, t, reference, u0=u0)
     gain = secant_gain(actuator, np.array([rest, rest + step]))
-    open_y = _held(actuator, np.full(after, u0 + step / gain), sample_time, u0)
+    waits = np.arange(after) < (ahead if known_ahead else 0)
+    open_y = _held(actuator, u0 + np.where(waits, 0.0, step / gain), sample_time, u0)
     return StepAssessment(
         reduction=vibration_reduction(t[:after], open_y, closed.y[before:], decay_rate=_decay_rate(actuator)),
         open_y=open_y,
