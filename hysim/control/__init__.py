@@ -10,6 +10,7 @@ from hysim.control._assessment import (
     assess_step,
     open_loop,
 )
+from hysim.control._bandwidth import bandwidth
 from hysim.control._c_export import CSource, to_c
 from hysim.control._feedforward import InverseFeedforward, ModeInverse, Shaper
 from hysim.control._filters import DampingLoop, Notch
@@ -39,6 +40,7 @@ __all__ = [
     "assess_hysteresis",
     "assess_square_wave",
     "assess_step",
+    "bandwidth",
     "close_loop",
     "open_loop",
     "to_c",
