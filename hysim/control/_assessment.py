@@ -266,7 +266,7 @@ def open_loop(plant: Any, reference: npt.ArrayLike, sample_time: float, samples_
     creeping = None if actuator.creep is None else cycles
     gain = secant_gain(actuator, r[-samples_per_cycle - 1 :], sample_time, creeping)
     return OpenLoop(
-        t=sample_time * np.arange(r.size),
+        t=read_only(sample_time * np.arange(r.size)),
         reference=r,
         u=r / gain,
         y=_held(actuator, r / gain, sample_time, 0.0),

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._frozen import read_only
 from hysim.control._loop import Controller, RestingPlant, as_actuator
 from hysim.errors import SimulationError
 
@@ -108,7 +108,7 @@ def _describing(
     h = resting.sample_time
     before = math.ceil(transient / h)
     fitted = max(_FEWEST, math.ceil(2.0 * math.pi * _PERIODS / (frequency * h)))
-    t: FloatArray = h * np.arange(before + fitted)
+    t = read_only(h * np.arange(before + fitted))
     sine = np.sin(frequency * t)
     found = resting.run(controller, resting.y0 + amplitude * sine)
     if found.lost >= 0:

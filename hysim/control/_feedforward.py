@@ -7,9 +7,9 @@ Shaping. Impulses A_i at the samples t_i leave no vibration of a mode with the p
 Half a period pi / w_d is seldom a whole number of samples. Three impulses, at 0 and at the two samples around it,
 satisfy both equations exactly (zero vibration, ZV); the same twice over does for the derivative by the frequency too
 (ZVD), three times over for the second one (ZVDD); several modes take one shaper behind the other. So does one mode
-whose frequency is known to be in a band: with the zeros at Chebyshev's points of it, the residual is nowhere in the band
-larger than need be (extra-insensitive, EI). Two moving averages in a row make a step of the reference a motion of
-constant acceleration and deceleration.
+whose frequency is known to be in a band: with the zeros at Chebyshev's points of it, the residual is nowhere in the
+band larger than need be (extra-insensitive, EI). Two moving averages in a row make a step of the reference a motion
+of constant acceleration and deceleration.
 
 The mode's inverse. Under the hold a mode is A(z) y = B(z) w with B(z) = b_1 z + b_2 and a zero -b_2 / b_1 close to
 -1, so that its inverse rings. With the reference known two samples ahead
