@@ -93,7 +93,7 @@ def draw(rows: list[Row]) -> Figure:
     places = np.arange(len(rows))
     for ax, measure, label in (
         (left, "hysteresis_reduction_percent", "Width left [%]"),
-        (right, "residual_rms_reduction_percent", "Residual vibration left [%]"),
+        (right, "residual_rms_reduction_percent", "Residual left [%]"),
     ):
         for prefix, style, name in (("", "full", "true"), ("measured_", "none", "measured")):
             values = [row[prefix + measure] for row in rows]

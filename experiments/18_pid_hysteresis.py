@@ -38,7 +38,9 @@ def plants() -> dict[str, hs.Actuator]:
     return {"law": replace(creeping, creep=None), "law, creep": creeping, "law, creep, mode": whole}
 
 
-def largest_integral(loop: hs.control.LinearLoop, slopes: tuple[float, float], bound: float) -> hs.PID:
+def largest_integral(
+    loop: hs.control.LinearLoop, slopes: tuple[float, float], bound: float, evaluations: int
+) -> hs.PID:
     """The PID of the largest ki within the bound on the maximum sensitivity."""
 
     def within(pid: hs.PID) -> bool:
@@ -56,7 +58,9 @@ def largest_integral(loop: hs.control.LinearLoop, slopes: tuple[float, float], b
         return hs.PID(kp=kp, ki=float(np.exp(low)), kd=kd, derivative_filter=FILTER)
 
     found = [
-        minimize(lambda gains: -np.log1p(fastest(gains).ki), start, method="Nelder-Mead", options={"maxfev": 60})
+        minimize(
+            lambda gains: -np.log1p(fastest(gains).ki), start, method="Nelder-Mead", options={"maxfev": evaluations}
+        )
         for start in STARTS
     ]
     return fastest(min(found, key=lambda each: each.fun).x)
@@ -66,13 +70,13 @@ def main(smoke: bool = False) -> list[Row]:
     """Design, measure, print and write table, figure and result."""
     slopes = extreme_slopes(reference_plant())
     frequencies = np.union1d(np.geomspace(1.0, np.pi / H, 150), FREQUENCY * np.linspace(0.9, 1.1, 41))
-    bounds, rates, cycles = ((2.0,), (50.0,), 2) if smoke else (BOUNDS, RATES, 10)
+    bounds, rates, cycles, evaluations = ((2.0,), (50.0,), 2, 3) if smoke else (BOUNDS, RATES, 10, 60)
     chosen = dict(list(plants().items())[:1]) if smoke else plants()
     rows: list[Row] = []
     for name, plant in chosen.items():
         loop = hs.control.LinearLoop(plant, H, frequencies)
         for bound in bounds:
-            pid = replace(largest_integral(loop, slopes, bound), limits=LIMITS)
+            pid = replace(largest_integral(loop, slopes, bound, evaluations), limits=LIMITS)
             for rate in rates:
                 wave = {"low": LOW, "high": HIGH, "period": 1.0 / rate, "sample_time": H, "cycles": cycles}
                 found = hs.control.assess_hysteresis(plant, pid, **wave)
