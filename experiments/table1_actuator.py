@@ -69,9 +69,9 @@ def robust_controllers(plant: hs.Actuator) -> dict[str, hs.TrackingController]:
     """Model-following with a fast PID behind a broad notch, a damping loop, and different motions of the reference."""
     inverted = replace(
         controllers(plant)["model-following"],
-        feedback=hs.PID(kp=4.0, ki=3e4),
-        notch=hs.Notch(natural_frequency=FREQUENCY, damping_ratio=0.1),
-        damping=hs.DampingLoop(gain=10.0, frequency=FREQUENCY / 2.0),
+        feedback=hs.PID(kp=16.0, ki=5.5e4),
+        notch=hs.Notch(natural_frequency=FREQUENCY, damping_ratio=0.2),
+        damping=hs.DampingLoop(gain=20.0, frequency=FREQUENCY / 3.0),
     )
     shaped = {
         "ZV": hs.Shaper.zv(FREQUENCY, DAMPING),
