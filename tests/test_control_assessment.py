@@ -348,3 +348,49 @@ def test_a_creeping_plant_is_judged_over_the_cycles_that_it_is_driven():
     assert found.hysteresis_reduction_percent > 100.0 - 1e-9
     # the hold is a sample late, so that the last cycle of both is one sample of a hundred apart
     assert found.secant_gain == pytest.approx(np.ptp(found.open_y[-100:]) / np.ptp(found.open_u[-100:]), rel=0.02)
+
+
+def test_the_open_loop_by_itself_is_that_of_the_assessment():
+    pid, reference = hs.PID(ki=4.0), hs.signals.triangle(0.0, 1.0, cycles=10, samples_per_cycle=200)
+    found, opened = assess_hysteresis(LAW, pid, **TRIANGLE), hs.control.open_loop(LAW, reference, 0.05, 200)
+    assert np.array_equal(opened.y, found.open_y)
+    assert np.array_equal(opened.u, found.open_u)
+    assert opened.reduction_percent(found.closed.y) == found.hysteresis_reduction_percent
+    assert opened.loop.max_width == found.open_width
+
+
+@pytest.mark.parametrize("samples", [0, 150])
+def test_a_reference_of_no_whole_cycles_is_refused(samples):
+    with pytest.raises(ValueError, match="whole cycles"):
+        hs.control.open_loop(LAW, np.ones(samples + 1), 0.05, 200)
+
+
+SHAPED = hs.TrackingController(feedforward=hs.InverseFeedforward(), shaper=hs.Shaper(smoothing=2.0), preview=True)
+STEP = {"step": 1.0, "duration": 60.0, "sample_time": 0.05}
+
+
+def test_a_controller_that_is_right_holds_without_moving():
+    mode = hs.mode(2.0, 0.1)
+    at_once, held = (assess_step(mode, SHAPED, hold=hold, **STEP) for hold in (0.0, 5.0))
+    assert held.closed.y.size == at_once.closed.y.size + 100
+    assert np.abs(held.closed.y[100:] - at_once.closed.y).max() < 1e-12
+    assert np.array_equal(held.open_y, at_once.open_y)
+
+
+def test_a_controller_that_is_wrong_comes_to_rest_before_the_step():
+    """Its inverse takes the law at 1 V to be elsewhere, which a hold lets the integral put right."""
+    wrong = hs.TrackingController(
+        feedforward=hs.InverseFeedforward(law=replace(LAW, offset=0.3)), feedback=hs.PID(ki=2)
+    )
+    held = assess_step(LAW, wrong, u0=1.0, hold=30.0, **STEP).closed
+    before = held.y[:600]
+    assert np.abs(before - before[0]).max() > 0.1
+    assert np.abs(before[-10:] - before[0]).max() < 1e-6
+
+
+def test_a_step_that_is_known_ahead_comes_to_the_open_loop_when_it_comes_to_the_reference():
+    mode, ahead = hs.mode(2.0, 0.1), SHAPED.ahead(0.05)
+    told, known = (assess_step(mode, SHAPED, known_ahead=known, **STEP) for known in (False, True))
+    assert np.array_equal(told.closed.y, known.closed.y)
+    assert np.argmax(known.closed.reference > 0.5) == ahead > 0
+    assert np.array_equal(known.open_y[ahead:], told.open_y[:-ahead])

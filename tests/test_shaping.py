@@ -37,6 +37,27 @@ def test_repeats_take_the_residual_to_a_higher_order(frequency, ratio):
     assert twice == pytest.approx(once**2, rel=1e-6)
 
 
+def test_the_extra_insensitive_shaper_bounds_the_residual_over_its_band():
+    """By (pi / 2 tolerance)^zeros / 2^(zeros - 1), for the residual is pi / 2 times a polynomial of least size."""
+    frequency, band = 3e3, np.linspace(0.9, 1.1, 41)
+    for zeros in (1, 2, 3):
+        shaper = hs.Shaper.ei(frequency, 0.0, tolerance=0.1, zeros=zeros)
+        largest = max(residual(shaper, factor * frequency, 0.0) for factor in band)
+        bound = (0.05 * math.pi) ** zeros / 2.0 ** (zeros - 1)
+        assert largest == pytest.approx(bound, rel=0.2)  # zeros at 0.9 of the frequency have longer half periods
+
+
+def test_a_zero_of_third_order_is_three_times_the_shaper():
+    once, three = (residual(make(3e3, 0.0), 3.1e3, 0.0) for make in (hs.Shaper.zv, hs.Shaper.zvdd))
+    assert three == pytest.approx(once**3, rel=1e-6)
+
+
+@pytest.mark.parametrize("wrong", [{"tolerance": 1.0}, {"tolerance": -0.1}, {"zeros": 0}, {"zeros": 1.0}])
+def test_a_band_that_is_none_is_refused(wrong):
+    with pytest.raises(ValueError, match=next(iter(wrong))):
+        hs.Shaper.ei(3e3, 0.01, **wrong)
+
+
 def test_several_modes_are_shaped_together():
     modes = ((3e3, 8e3, 2e4), (0.01, 0.02, 0.1))
     shaper = hs.Shaper.zv(*modes)

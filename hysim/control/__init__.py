@@ -2,12 +2,15 @@
 
 from hysim.control._assessment import (
     HysteresisAssessment,
+    OpenLoop,
     SquareWaveAssessment,
     StepAssessment,
     assess_hysteresis,
     assess_square_wave,
     assess_step,
+    open_loop,
 )
+from hysim.control._bandwidth import bandwidth
 from hysim.control._c_export import CSource, to_c
 from hysim.control._feedforward import InverseFeedforward, ModeInverse, Shaper
 from hysim.control._filters import DampingLoop, Notch
@@ -29,6 +32,7 @@ __all__ = [
     "LinearLoop",
     "ModeInverse",
     "Notch",
+    "OpenLoop",
     "Shaper",
     "SquareWaveAssessment",
     "StepAssessment",
@@ -38,7 +42,9 @@ __all__ = [
     "assess_hysteresis",
     "assess_square_wave",
     "assess_step",
+    "bandwidth",
     "close_loop",
+    "open_loop",
     "to_c",
     "to_control",
     "tune",

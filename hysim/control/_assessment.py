@@ -9,15 +9,63 @@ import math
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from hysim import signals
-from hysim._frozen import FloatArray, frozen
+from hysim._frozen import FloatArray, frozen, read_only
 from hysim.control._drive import secant_gain, without_memory
-from hysim.control._loop import ClosedLoop, Controller, RestingPlant, as_actuator, close_loop
+from hysim.control._loop import ClosedLoop, Controller, RestingPlant, as_actuator, close_loop, preview
+from hysim.errors import SimulationError
 from hysim.metrics import LoopMetrics, VibrationReduction, loop_metrics, reduction_percent, rmse, vibration_reduction
 from hysim.models.actuator import Actuator
 
 _FEWEST = 10  # samples of which a step is measured
+
+
+@frozen
+class OpenLoop:
+    """What a periodic reference comes to without a controller; every signal has shape (n,).
+
+    Parameters
+    ----------
+    t, reference : array
+        Times [s], and the reference [unit of y].
+    u, y : array
+        Voltage reference / secant gain [unit of u], and the true displacement just before each [unit of y].
+    secant_gain : float
+        Stroke over span of its own last cycle, which is the steady one without creep [unit of y / unit of u].
+    samples_per_cycle : int
+        Of the reference.
+    """
+
+    t: FloatArray
+    reference: FloatArray
+    u: FloatArray
+    y: FloatArray
+    secant_gain: float
+    samples_per_cycle: int
+
+    @property
+    def cycle(self) -> FloatArray:
+        """The reference's last cycle, both of its ends included."""
+        return self.last(self.reference)
+
+    @property
+    def loop(self) -> LoopMetrics:
+        """The open loop's measures."""
+        return self.loop_of(self.y)
+
+    def last(self, signal: FloatArray) -> FloatArray:
+        """The last cycle of a signal, both of its ends included."""
+        return signal[-self.samples_per_cycle - 1 :]
+
+    def loop_of(self, y: FloatArray) -> LoopMetrics:
+        """The measures of a displacement against the reference, in the last cycle."""
+        return loop_metrics(self.cycle, self.last(y))
+
+    def reduction_percent(self, y: FloatArray) -> float:
+        """100 (1 - W closed / W open), W the largest width over the stroke [%]."""
+        return reduction_percent(self.loop.relative_width, self.loop_of(y).relative_width)
 
 
 @frozen
@@ -72,7 +120,7 @@ class StepAssessment:
     open_y : array, shape (n,)
         The open loop, its voltage stepping to where the step ends.
     closed : ClosedLoop
-        The closed one, with its conditions.
+        The closed one, with its conditions; before the step, it holds the resting displacement as long as asked for.
     """
 
     reduction: VibrationReduction
@@ -155,36 +203,88 @@ def assess_hysteresis(
     actuator = as_actuator(plant)
     samples = _whole("a period", period, sample_time)
     reference = signals.triangle(low, high, cycles=cycles, samples_per_cycle=samples)
-    last = slice(-samples - 1, None)
-    cycle = reference[last]
-    gain = secant_gain(actuator, cycle, sample_time, None if actuator.creep is None else cycles)
-    line = without_memory(actuator, cycle / gain)
-    t = sample_time * np.arange(reference.size)
-    closed = close_loop(actuator, controller, t, reference)
-    lag = close_loop(line, controller, t, reference)
-    open_u = reference / gain
-    open_y = _held(actuator, open_u, sample_time, 0.0)
-    before, after = loop_metrics(cycle, open_y[last]), loop_metrics(cycle, closed.y[last])
-    reduction = reduction_percent(before.relative_width, after.relative_width)
+    opened = open_loop(actuator, reference, sample_time, samples)
+    line = without_memory(actuator, opened.cycle / opened.secant_gain)
+    closed = close_loop(actuator, controller, opened.t, reference)
+    reduction, after = opened.reduction_percent(closed.y), opened.loop_of(closed.y)
     has_law = actuator.hysteresis is not None
     return HysteresisAssessment(
         hysteresis_reduction_percent=reduction if has_law else math.nan,
         lag_reduction_percent=math.nan if has_law else reduction,
-        open_width=before.max_width,
+        open_width=opened.loop.max_width,
         closed_width=after.max_width,
-        open_lag_width=_width(cycle, _held(line, open_u, sample_time, 0.0)[last]),
-        lag_width=_width(cycle, lag.y[last]),
-        tracking_rms=rmse(cycle, closed.y[last]),
+        open_lag_width=opened.loop_of(_held(line, opened.u, sample_time, 0.0)).max_width,
+        lag_width=opened.loop_of(_followed(line, controller, sample_time, reference)).max_width,
+        tracking_rms=rmse(opened.cycle, opened.last(closed.y)),
         closure_gap=after.closure_gap,
-        secant_gain=gain,
-        open_u=open_u,
-        open_y=open_y,
+        secant_gain=opened.secant_gain,
+        open_u=opened.u,
+        open_y=opened.y,
         closed=closed,
     )
 
 
+def open_loop(plant: Any, reference: npt.ArrayLike, sample_time: float, samples_per_cycle: int) -> OpenLoop:
+    """Drive a plant along a periodic reference by the voltage reference / secant gain.
+
+    Parameters
+    ----------
+    plant : Actuator, law or linear plant
+        At rest at no voltage before the first sample.
+    reference : array, shape (n,)
+        Whole cycles, and the sample at which the last one ends [unit of y].
+    sample_time : float
+        [s]
+    samples_per_cycle : int
+        Of the reference.
+
+    Returns
+    -------
+    OpenLoop
+
+    Raises
+    ------
+    SimulationError
+        If the plant leaves the finite numbers.
+    ValueError
+        If the reference does not hold whole cycles, or the plant has no gain.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> triangle = hs.signals.triangle(0.0, 1.0, cycles=2, samples_per_cycle=100)
+    >>> opened = hs.control.open_loop(hs.Line(slope=2.0), triangle, 0.1, 100)
+    >>> opened.secant_gain, opened.loop.max_width
+    (2.0, 0.0)
+    """
+    actuator, r = as_actuator(plant), read_only(reference, "reference", ndim=1)
+    cycles, rest = divmod(r.size - 1, samples_per_cycle)
+    if rest or not cycles:
+        raise ValueError(
+            f"reference must hold whole cycles of {samples_per_cycle} samples and a last one, got {r.size} samples"
+        )
+    creeping = None if actuator.creep is None else cycles
+    gain = secant_gain(actuator, r[-samples_per_cycle - 1 :], sample_time, creeping)
+    return OpenLoop(
+        t=read_only(sample_time * np.arange(r.size)),
+        reference=r,
+        u=r / gain,
+        y=_held(actuator, r / gain, sample_time, 0.0),
+        secant_gain=gain,
+        samples_per_cycle=samples_per_cycle,
+    )
+
+
 def assess_step(
-    plant: Any, controller: Controller, *, step: float, duration: float, sample_time: float, u0: float = 0.0
+    plant: Any,
+    controller: Controller,
+    *,
+    step: float,
+    duration: float,
+    sample_time: float,
+    u0: float = 0.0,
+    hold: float = 0.0,
+    known_ahead: bool = False,
 ) -> StepAssessment:
     """Let a loop follow a step, and measure what is left of the vibration.
 
@@ -200,6 +300,13 @@ def assess_step(
         Of the record, long enough for the open loop to come to rest, and of the controller [s].
     u0 : float
         Voltage before the first sample.
+    hold : float
+        Time before the step, in which the closed loop comes to rest where the plant is [s]: for a controller whose
+        model is wrong, which takes another voltage for that displacement.
+    known_ahead : bool
+        A controller with preview moves before the reference does. By default nobody knows of the step before it
+        comes: the open loop is given its own when the controller is told. Where the reference is known ahead, the open
+        loop steps in the reference's time, and all times are still from when the controller is told.
 
     Returns
     -------
@@ -222,13 +329,17 @@ def assess_step(
     (100, 84)
     """
     actuator = as_actuator(plant)
-    t = sample_time * np.arange(round(duration / sample_time) + 1)
+    before, after = round(hold / sample_time), round(duration / sample_time) + 1
+    ahead = preview(controller, sample_time)
+    t = sample_time * np.arange(before + after)
     rest = _resting_displacement(actuator, u0)
-    closed = close_loop(actuator, controller, t, np.full(t.size, rest + step), u0=u0)
+    reference = rest + np.where(np.arange(t.size) < before + ahead, 0.0, step)
+    closed = close_loop(actuator, controller, t, reference, u0=u0)
     gain = secant_gain(actuator, np.array([rest, rest + step]))
-    open_y = _held(actuator, np.full(t.size, u0 + step / gain), sample_time, u0)
+    waits = np.arange(after) < (ahead if known_ahead else 0)
+    open_y = _held(actuator, u0 + np.where(waits, 0.0, step / gain), sample_time, u0)
     return StepAssessment(
-        reduction=vibration_reduction(t, open_y, closed.y, decay_rate=_decay_rate(actuator)),
+        reduction=vibration_reduction(t[:after], open_y, closed.y[before:], decay_rate=_decay_rate(actuator)),
         open_y=open_y,
         closed=closed,
     )
@@ -308,9 +419,12 @@ def _whole(what: str, duration: float, sample_time: float) -> int:
     return samples
 
 
-def _width(reference: FloatArray, y: FloatArray) -> float:
-    loop: LoopMetrics = loop_metrics(reference, y)
-    return loop.max_width
+def _followed(actuator: Actuator, controller: Controller, sample_time: float, reference: FloatArray) -> FloatArray:
+    """Displacements of a closed loop of which nothing else is asked."""
+    found = RestingPlant(actuator, sample_time).run(controller, reference)
+    if found.lost >= 0:
+        raise SimulationError(f"the loop without memory is unstable: it is lost at t = {sample_time * found.lost:g}")
+    return found.y
 
 
 def _held(actuator: Actuator, u: FloatArray, sample_time: float, u0: float) -> FloatArray:

@@ -1,7 +1,8 @@
 """The open loop that a closed one is judged against: the voltage reference / secant gain.
 
-The secant gain of a steady cycle is its stroke over its voltage's span. It depends on the span itself, so
-that it is found by iteration: the gain at which the cycle that it drives has this gain.
+The secant gain of a steady cycle is its stroke over its voltage's span. It depends on the span itself, so that it
+is a fixed point: the gain g at which the cycle driven by ``cycle / g`` has the gain f(g) = g. It is found by the
+secant rule in the logarithms, which keeps the sign, and by g <- f where f is no contraction.
 """
 
 import math
@@ -16,6 +17,7 @@ from hysim.models.static import Line
 _ITERATIONS = 60
 _CONVERGED = 1e-12  # of the gain
 _ACCEPTED = 1e-9  # where rounding keeps it from that
+_CONTRACTION = 0.5  # largest slope of the map at which the secant rule is trusted
 _PERIODS = 96  # at most, until a driven cycle is steady
 _STEADY = 1e-12  # of the stroke
 
@@ -37,16 +39,19 @@ def secant_gain(
     span = float(np.ptp(cycle))
     if actuator.hysteresis is None and sample_time is None:
         return _usable(actuator.dc_gain)
-    gain, change = _usable(actuator.dc_gain * _slope(actuator, 1.0)), math.inf
+    gain = _usable(actuator.dc_gain * _slope(actuator, 1.0))
+    before: tuple[float, float] | None = None
     for _ in range(_ITERATIONS):
         y = steady_cycle(actuator, cycle / gain, sample_time, periods)
-        following = _usable(math.copysign(float(np.ptp(y)), gain) / (span / abs(gain)))
-        change, gain = abs(following / gain - 1.0), following
+        found = _usable(float(np.ptp(y)) / span * gain)
+        change = abs(found / gain - 1.0)
         if change <= _CONVERGED:
-            break
+            return found
+        now = gain, found
+        gain, before = found if before is None else _secant(before, now), now
     if change > _ACCEPTED:
         raise ValueError(f"no voltage drives the plant along the reference: its secant gain wanders about {gain:g}")
-    return gain
+    return found
 
 
 def steady_cycle(actuator: Actuator, u: FloatArray, sample_time: float | None, driven: int | None = None) -> FloatArray:
@@ -104,6 +109,13 @@ def _slope(actuator: Actuator, rise: float) -> float:
         return 1.0
     low, high = Actuator(hysteresis=actuator.hysteresis).level(np.array([0.0, rise]))
     return float(high - low) / rise
+
+
+def _secant(before: tuple[float, float], now: tuple[float, float]) -> float:
+    """Where, in log g and log f, the line through two points meets the diagonal; f where the map is no contraction."""
+    (gain, found), run = now, math.log(now[0] / before[0])
+    slope = math.log(found / before[1]) / run if run else math.inf
+    return gain * (found / gain) ** (1.0 / (1.0 - slope)) if abs(slope) < _CONTRACTION else found
 
 
 def _usable(gain: float) -> float:

@@ -6,8 +6,10 @@ Shaping. Impulses A_i at the samples t_i leave no vibration of a mode with the p
 
 Half a period pi / w_d is seldom a whole number of samples. Three impulses, at 0 and at the two samples around it,
 satisfy both equations exactly (zero vibration, ZV); the same twice over does for the derivative by the frequency too
-(ZVD); several modes take one shaper behind the other. Two moving averages in a row make a step of the reference
-a motion of constant acceleration and deceleration.
+(ZVD), three times over for the second one (ZVDD); several modes take one shaper behind the other. So does one mode
+whose frequency is known to be in a band: with the zeros at Chebyshev's points of it, the residual is nowhere in the
+band larger than need be (extra-insensitive, EI). Two moving averages in a row make a step of the reference a motion
+of constant acceleration and deceleration.
 
 The mode's inverse. Under the hold a mode is A(z) y = B(z) w with B(z) = b_1 z + b_2 and a zero -b_2 / b_1 close to
 -1, so that its inverse rings. With the reference known two samples ahead
@@ -16,11 +18,13 @@ The mode's inverse. Under the hold a mode is A(z) y = B(z) w with B(z) = b_1 z +
 
 which has no phase and no vibration: y is the reference through the weights b_1 b_2, b_1^2 + b_2^2, b_1 b_2.
 
-Sources: N. C. Singer and W. P. Seering, J. Dyn. Sys. Meas. Control 112 (1990), for shaping; M. Tomizuka, same
-journal 109 (1987), for the inverse without phase.
+Sources: N. C. Singer and W. P. Seering, J. Dyn. Sys. Meas. Control 112 (1990), for shaping; W. E. Singhose,
+W. P. Seering and N. C. Singer, J. Mech. Design 116 (1994), for residuals bounded over a band; M. Tomizuka, J. Dyn. Sys.
+Meas. Control 109 (1987), for the inverse without phase.
 """
 
 import math
+from dataclasses import replace
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -120,6 +124,42 @@ class Shaper:
             damping_ratios=tuple(np.atleast_1d(damping_ratios)),
             repeats=2,
         )
+
+    @classmethod
+    def zvdd(cls, natural_frequencies: npt.ArrayLike, damping_ratios: npt.ArrayLike) -> Self:
+        """As `zvd`, and zero second derivative."""
+        return replace(cls.zvd(natural_frequencies, damping_ratios), repeats=3)
+
+    @classmethod
+    def ei(cls, natural_frequency: float, damping_ratio: float, tolerance: float = 0.1, zeros: int = 2) -> Self:
+        """Least residual of one mode whose frequency lies in a band.
+
+        Parameters
+        ----------
+        natural_frequency, damping_ratio : float
+            [rad/s], [1]
+        tolerance : float
+            By which part of it the frequency may be off either way.
+        zeros : int
+            Frequencies in the band at which nothing vibrates, each taking half a period.
+
+        Raises
+        ------
+        ValueError
+            If the tolerance is not from 0 to below 1, there is no zero, or as the constructor.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> hs.Shaper.ei(100.0, 0.01, tolerance=0.1, zeros=1) == hs.Shaper.zv(100.0, 0.01)
+        True
+        """
+        if not 0.0 <= tolerance < 1.0:
+            raise ValueError(f"tolerance must be from 0 to below 1, got {tolerance}")
+        if not isinstance(zeros, int) or zeros < 1:
+            raise ValueError(f"zeros must be an integer of at least 1, got {zeros}")
+        places = np.sin(np.pi * (np.arange(zeros) - 0.5 * (zeros - 1)) / zeros)
+        return cls.zv(natural_frequency * (1.0 + tolerance * places), np.full(zeros, damping_ratio))
 
     def impulses(self, sample_time: float) -> FloatArray:
         """Weights of the reference now, a sample ago, and so on.

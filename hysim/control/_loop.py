@@ -166,7 +166,7 @@ class RestingPlant:
     def run(self, controller: Controller, reference: FloatArray, progress: Progress | None = None) -> Signals:
         """Close the loop around it."""
         compiled = CompiledController(*controller.compiled(self.sample_time, self.u0, self.y0))
-        given = _known_ahead(reference, _preview(controller, self.sample_time))
+        given = _known_ahead(reference, preview(controller, self.sample_time))
         return self.chain.run(compiled, self.state, given, progress)[0]
 
     def voltages(self, signals: Signals) -> FloatArray:
@@ -203,7 +203,7 @@ def as_actuator(plant: Any) -> Actuator:
     raise TypeError(f"plant must be an Actuator, a law or a linear plant, got {type(plant).__name__}")
 
 
-def _preview(controller: Controller, sample_time: float) -> int:
+def preview(controller: Controller, sample_time: float) -> int:
     """By how many samples a controller gets the reference ahead of its time."""
     ahead = getattr(controller, "ahead", None)
     return int(ahead(sample_time)) if callable(ahead) else 0
@@ -227,7 +227,7 @@ def _conditions(
         "sample_time": plant.sample_time,
         "substeps": plant.chain.substeps,
         "delay": plant.chain.delay + sensor.delay,
-        "preview": _preview(controller, plant.sample_time) * plant.sample_time,
+        "preview": preview(controller, plant.sample_time) * plant.sample_time,
         "limits": getattr(controller, "limits", None),
         "amplifier_limits": amplifier.limits,
         "sensor_quantum": sensor.quantum,

@@ -1,0 +1,94 @@
+"""Up to which rate does compensation hold?
+
+The compensation matrix's actuator follows a sine from 0.1 to 2.5 um: a triangle has no meaning beyond a fraction of the
+resonance, whose corners no controller follows. At least ten cycles and half a second, of which the last cycle is
+measured. The open loop's width grows with the rate, since its lag opens the loop too; what is left in closed loop is
+told by the rms error, too. Below the resonance's tenth the widths are hysteresis and creep, above it they are lag.
+"""
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import hysim as hs
+from hysim.plot import Figure, figure
+
+sys.path.insert(0, str(Path(__file__).parent))
+from results_folder import write_results
+from table1_actuator import HIGH, LOW, H, controllers, reference_plant
+
+RESULTS = Path(__file__).parent / "results" / "rate_sweep"
+FREQUENCIES = (0.1, 0.5, 1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 250.0, 400.0, 500.0)  # Hz
+SHOWN = ("PID", "inverse + creep inverse", "... + PID", "... + PID + mode-inverse + preview", "model-following")
+
+Row = dict[str, float | str | None]
+
+
+def rows_at(frequency: float, chosen: dict[str, hs.TrackingController], lasting: float) -> list[Row]:
+    """The measures of the open loop and of every controller at one frequency."""
+    plant, samples = reference_plant(), round(1.0 / (frequency * H))
+    cycles = max(10, math.ceil(lasting * frequency))
+    phase = 2.0 * math.pi * np.arange(cycles * samples + 1) / samples
+    reference = 0.5 * (LOW + HIGH) - 0.5 * (HIGH - LOW) * np.cos(phase)
+    opened = hs.control.open_loop(plant, reference, H, samples)
+    rows = [row("open loop", frequency, opened, opened.y, opened.u)]
+    for name, controller in chosen.items():
+        run = hs.close_loop(plant, controller, opened.t, reference)
+        rows.append(row(name, frequency, opened, run.y, run.u))
+    return rows
+
+
+def row(name: str, frequency: float, opened: hs.control.OpenLoop, y: np.ndarray, u: np.ndarray) -> Row:
+    """One loop at one frequency."""
+    return {
+        "controller": name,
+        "frequency_hz": frequency,
+        "hysteresis_reduction_percent": opened.reduction_percent(y),
+        "tracking_rms_um": float(hs.metrics.rmse(opened.cycle, opened.last(y))),
+        "peak_voltage": float(opened.last(u).max()),
+    }
+
+
+def main(smoke: bool = False) -> list[Row]:
+    """Sweep, print and write table, figure and result."""
+    known = controllers(reference_plant())
+    chosen = {name: known[name] for name in (SHOWN[-1:] if smoke else SHOWN)}
+    frequencies, lasting = ((100.0, 500.0), 0.1) if smoke else (FREQUENCIES, 0.5)
+    rows = [each for frequency in frequencies for each in rows_at(frequency, chosen, lasting)]
+    for each in rows:
+        print(
+            f"{each['frequency_hz']:6.1f} Hz {each['controller']:<36} {each['hysteresis_reduction_percent']:8.2f} %, "
+            f"rms {1e3 * float(each['tracking_rms_um']):8.2f} nm, {each['peak_voltage']:6.1f} V"
+        )
+    if not smoke:
+        write_results(RESULTS, rows, draw, {"low_um": LOW, "high_um": HIGH})
+    return rows
+
+
+def draw(rows: list[Row]) -> Figure:
+    """What is left of the loop's width, rms error and peak voltage, against the frequency."""
+    canvas = figure(height=6.5)
+    for ax, key, label in zip(
+        canvas.subplots(3, 1, sharex=True),
+        ("hysteresis_reduction_percent", "tracking_rms_um", "peak_voltage"),
+        ("Width left [%]", "Rms error [um]", "Peak voltage [V]"),
+        strict=True,
+    ):
+        for name in ("open loop", *SHOWN):
+            line = [each for each in rows if each["controller"] == name]
+            values = [100.0 - float(each[key]) if "percent" in key else float(each[key]) for each in line]
+            ax.plot([each["frequency_hz"] for each in line], values, "o-", markersize=3, label=name)
+        ax.set_xscale("log")
+        ax.set_ylabel(label)
+        if key != "peak_voltage":
+            ax.set_yscale("log")
+    ax.set_xlabel("Frequency of the reference [Hz]")
+    handles, names = ax.get_legend_handles_labels()
+    canvas.legend(handles, names, loc="outside lower center", ncols=2)
+    return canvas
+
+
+if __name__ == "__main__":
+    main()

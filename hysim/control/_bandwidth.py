@@ -1,0 +1,118 @@
+"""The bandwidth of a loop, found by running it.
+
+A sine r = y0 + a sin(w t) about a resting displacement y0 is followed by the whole loop: law, limits, sampling and all.
+Behind its transient the true displacement is fitted by least squares as
+
+    y = c + a Re(G) sin(w t) + a Im(G) cos(w t)
+
+G is the loop's describing function, its frequency response where the loop is linear. The bandwidth is the frequency at
+which |G| first leaves 1 / sqrt(2) to sqrt(2), 3 dB either way: frequencies are tried upwards, then halved between.
+"""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from hysim._frozen import read_only
+from hysim.control._loop import Controller, RestingPlant, as_actuator
+from hysim.errors import SimulationError
+
+_PER_DECADE = 24  # frequencies tried
+_BISECTIONS = 10
+_PERIODS = 4  # of which G is fitted, at least
+_FEWEST = 64  # samples of which G is fitted, at least
+_SHORTEST = 2.5  # samples of a period
+
+
+def bandwidth(
+    plant: Any,
+    controller: Controller,
+    *,
+    sample_time: float,
+    amplitude: float,
+    lowest: float,
+    transient: float,
+    u0: float = 0.0,
+) -> float:
+    """Frequency up to which the true displacement follows a small sine within 3 dB.
+
+    Parameters
+    ----------
+    plant : Actuator, law or linear plant
+        At rest at `u0` before the first sample; the noise of its sensor is left out.
+    controller : PID, TrackingController, or anything with its ``compiled``
+        What closes the loop.
+    sample_time : float
+        Of the controller [s].
+    amplitude : float
+        Of the sine about the resting displacement [unit of y].
+    lowest : float
+        Frequency from which on it is looked for [rad/s].
+    transient : float
+        After which the response is taken to be periodic [s].
+    u0 : float
+        Voltage before the first sample.
+
+    Returns
+    -------
+    float
+        [rad/s]; zero if the loop does not follow at the lowest frequency, infinite if it follows up to the highest,
+        2.5 samples a period.
+
+    Raises
+    ------
+    SimulationError
+        If the loop is lost.
+    ValueError
+        If the amplitude or the lowest frequency is not positive.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> lag = hs.TransferFunction(num=(1.0,), den=(1.0, 1.0))
+    >>> sine = dict(sample_time=1e-3, amplitude=1.0, lowest=0.1, transient=5.0)
+    >>> round(hs.control.bandwidth(lag, hs.PID(kp=9.0, ki=9.0), **sine), 1)  # 9 / s in open loop
+    9.0
+    """
+    if not (amplitude > 0.0 and lowest > 0.0):
+        raise ValueError(f"amplitude and lowest must be positive, got {amplitude} and {lowest}")
+    actuator = as_actuator(plant)
+    if actuator.sensor is not None:
+        actuator = replace(actuator, sensor=replace(actuator.sensor, noise=0.0))
+    resting = RestingPlant(actuator, sample_time, u0)
+
+    def follows(frequency: float) -> bool:
+        gain = abs(_describing(resting, controller, frequency, amplitude, transient))
+        return 1.0 <= math.sqrt(2.0) * gain <= 2.0
+
+    highest = 2.0 * math.pi / (_SHORTEST * sample_time)
+    tried = np.geomspace(lowest, highest, 1 + math.ceil(_PER_DECADE * math.log10(highest / lowest))).tolist()
+    lost = next((k for k, frequency in enumerate(tried) if not follows(frequency)), None)
+    if lost is None:
+        return math.inf
+    if not lost:
+        return 0.0
+    within, beyond = tried[lost - 1], tried[lost]
+    for _ in range(_BISECTIONS):
+        middle = math.sqrt(within * beyond)
+        within, beyond = (middle, beyond) if follows(middle) else (within, middle)
+    return math.sqrt(within * beyond)
+
+
+def _describing(
+    resting: RestingPlant, controller: Controller, frequency: float, amplitude: float, transient: float
+) -> complex:
+    """From the reference to the true displacement, at a frequency."""
+    h = resting.sample_time
+    before = math.ceil(transient / h)
+    fitted = max(_FEWEST, math.ceil(2.0 * math.pi * _PERIODS / (frequency * h)))
+    t = read_only(h * np.arange(before + fitted))
+    sine = np.sin(frequency * t)
+    found = resting.run(controller, resting.y0 + amplitude * sine)
+    if found.lost >= 0:
+        raise SimulationError(f"the loop is unstable: it is lost at t = {h * found.lost:g}")
+    columns = np.stack([sine, np.cos(frequency * t), np.ones_like(t)], axis=1)[before:]
+    real, imaginary, _ = np.linalg.lstsq(columns, found.y[before:])[0] / amplitude
+    return complex(real, imaginary)
