@@ -9,6 +9,9 @@ import pytest
 EXPERIMENTS = sorted((Path(__file__).parent.parent / "experiments").glob("[0-9]*.py"))
 
 
+README = " ".join((EXPERIMENTS[0].parent.parent / "README.md").read_text().split())
+
+
 @pytest.mark.parametrize("path", EXPERIMENTS, ids=lambda path: path.stem)
 def test_smoke(path, monkeypatch, tmp_path):
     spec = importlib.util.spec_from_file_location(path.stem, path)
@@ -173,3 +176,77 @@ def test_a_closed_loop_is_300_times_as_fast_as_in_python_control():
     for row in peers:
         assert row["times_hysim_q1"] > 300.0
         assert row["largest_difference_um"] < 1e-11
+
+
+def rows_of(name):
+    return json.loads((EXPERIMENTS[0].parent / "results" / name / "result.json").read_text())["rows"]
+
+
+def the(rows, **wanted):
+    """The one row with these values."""
+    (row,) = [row for row in rows if all(row[key] == value for key, value in wanted.items())]
+    return row
+
+
+def test_the_readme_quotes_how_far_controllers_can_be_trusted():
+    best = the(rows_of("robustness"), controller="robust, EI", exponent="held")
+    assert best["draws"] >= 1000
+    assert min(best["hysteresis_reduction_percent_p5"], best["residual_rms_reduction_percent_known_ahead_p5"]) >= 95.0
+    told = (
+        f"keeps {best['hysteresis_reduction_percent_p5']:.1f} % of hysteresis reduction and, for a step known ahead, "
+    )
+    told += (
+        f"{best['residual_rms_reduction_percent_known_ahead_p5']:.1f} % of residual reduction in the 5th percentile "
+    )
+    told += f"of {best['draws']} draws, {best['residual_rms_reduction_percent_p5']:.1f} % for one that is not; "
+    assert told + f"{best['unstable']} are unstable" in README
+    pixels = rows_of("pixel_sensor")
+    camera, pid = the(pixels, controller="inverse + creep inverse"), the(pixels, controller="PID")
+    assert f"takes {camera['hysteresis_reduction_percent']:.1f} % of the true hysteresis away" in README
+    assert f"and the camera shows {camera['measured_hysteresis_reduction_percent']:.1f} %" in README
+    assert pid["hysteresis_reduction_percent"] < 0.0
+    fast = [row for row in rows_of("rate_sweep") if row["frequency_hz"] == 100.0]
+    followed = the(fast, controller="model-following")["hysteresis_reduction_percent"]
+    assert f"At 100 Hz model-following still takes {followed:.1f} % away" in README
+    assert the(fast, controller="PID")["hysteresis_reduction_percent"] < 0.0
+
+
+def test_the_readme_quotes_what_a_pid_leaves_and_what_a_step_does():
+    rows = [row for row in rows_of("pid_hysteresis") if row["max_sensitivity"] == 2.0]
+    slow, faster = (the(rows, plant="law, creep, mode", frequency_hz=hertz) for hertz in (1.0, 10.0))
+    assert f"takes {slow['hysteresis_reduction_percent']:.1f} % away at 1 Hz" in README
+    assert f"and {faster['hysteresis_reduction_percent']:.1f} % at 10 Hz" in README
+    assert min(row["lag_share_percent"] for row in rows) > 95.0
+    steps = [row for row in rows_of("vibration") if row["controller"] == "model-following"]
+    one, large = (the(steps, step_um=size)["residual_rms_reduction_percent"] for size in (1.0, 1.5))
+    assert f"takes {one:.1f} % of the residual away after 1 um, {large:.1f} % after 1.5 um" in README
+
+
+def test_the_readme_quotes_the_speed_of_a_loop():
+    rows = rows_of("closed_loop_speed")
+    peer = the(rows, name="python-control alone")
+    slowest = 0.2 * max(row["microseconds_per_sample"] for row in rows if row["kind"] == "controller")
+    assert f"takes {peer['times_hysim']:.0f} times as long" in README
+    assert f"10 s at 20 kHz with the slowest controller take {slowest:.1f} s here" in README
+
+
+def test_the_readme_quotes_the_comparison_of_all_families():
+    result = json.loads((EXPERIMENTS[0].parent / "results" / "all_families" / "result.json").read_text())
+    best = the(result["rows"], model=result["winner"])
+    assert f"{result['winner']} predicts left-out points best, to {1e3 * best['loo_rmse']:.1f} nm" in README
+    assert f"{len(result['undecided'])} others cannot be told from it" in README
+
+
+def test_the_readme_quotes_the_classical_families():
+    read = the(rows_of("preisach"), curves=12)
+    assert f"12 curves leave {read['read_error_percent']:.2f} % where the table is read" in README
+    assert f"{read['fitted_error_percent']:.2f} % where it is fitted" in README
+    worn = [row for row in rows_of("wear_and_pinching") if row["law"] == "worn and pinched"]
+    coarse, fine = (the(worn, steps=steps)["backward_euler_percent"] for steps in (40, 1000))
+    assert f"is {coarse:.1f} % wrong at 40 steps a cycle and {fine:.2f} % at 1000" in README
+    rows = rows_of("dashpot")
+    whole, alone = (
+        max(row["error_percent"] for row in rows if row["model"] == model)
+        for model in ("law, dashpot and spring", "the law alone")
+    )
+    assert f"the sum is at most {whole:.2f} % off, the law alone {alone:.0f} %" in README
