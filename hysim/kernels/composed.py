@@ -18,6 +18,8 @@ _SIGNATURE = float64(CONSTANTS, VECTOR, float64)
 _POINTS = 16  # of a way at which the output is looked at
 _DOUBLINGS = 1100  # more than there are between the smallest number and the largest
 _HALVINGS = 200
+_RESOLVED = 1e-13
+"""Of the largest output so far: shorter ways rise in steps of rounding, and are taken to be straight."""
 
 
 def side_by_side(first: Step, second: Step) -> Step:
@@ -74,10 +76,16 @@ def inverse(
     `trial` is as long as `state`. A way is doubled until its end is beyond, and then halved, by regula falsi (Illinois)
     where that is faster.
     """
-    rising = math.copysign(1.0, slope)
+    rising, largest = math.copysign(1.0, slope), 0.0
     for k in range(y.size):
         wanted = y[k]
         if wanted == reached:
+            u[k] = here
+            continue
+        largest = max(largest, abs(wanted), abs(reached), abs(slope * here))
+        if abs(wanted - reached) <= _RESOLVED * largest:
+            here += (wanted - reached) / slope
+            reached = step(parameters, state, here)
             u[k] = here
             continue
         side = math.copysign(1.0, wanted - reached)
