@@ -184,7 +184,7 @@ def load_sweep(path: str | Path) -> Sweep:
     ...     hs.load_sweep(f"{folder}/study.sqlite")["value"].tolist()
     [3.0, 4.0, 6.0, 8.0]
     """
-    with opened(path, mode="ro") as store:
+    with opened(path, to_read=True) as store:
         finished, layout, space = store.finished(), store.layout(), store.space()
         n_tasks, seed = store.n_tasks, store.seed
     table = Table(n_tasks, space.columns)

@@ -253,8 +253,8 @@ class Store:
 
 
 @contextmanager
-def opened(path: str | Path, *, mode: Literal["rw", "ro"] = "rw") -> Iterator[Store]:
-    """The store in a file, which is made if there is none; SQLite's errors become built-in ones.
+def opened(path: str | Path, *, to_read: bool = False) -> Iterator[Store]:
+    """The store in a file, which is made if it is missing and to be written; SQLite's errors become built-in ones.
 
     Raises
     ------
@@ -264,12 +264,12 @@ def opened(path: str | Path, *, mode: Literal["rw", "ro"] = "rw") -> Iterator[St
         If the file is something else.
     """
     path = Path(path)
-    if mode == "ro" and not path.is_file():
+    if to_read and not path.is_file():
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
     with _built_in_errors(path):
-        database = _connected(path, mode)
+        database = _connected(path, "rw" if to_read else "rwc")
         try:
-            if mode == "ro":
+            if to_read:
                 database.execute("BEGIN")  # everything that is read is of one moment
             yield Store(path, database)
         finally:
@@ -277,9 +277,9 @@ def opened(path: str | Path, *, mode: Literal["rw", "ro"] = "rw") -> Iterator[St
 
 
 def _connected(path: Path, mode: str) -> sqlite3.Connection:
-    uri = f"{path.resolve().as_uri()}?mode={'ro' if mode == 'ro' else 'rwc'}"
-    timeout = _FOR_A_COMMIT if mode == "ro" else _FOR_A_WRITER
-    return sqlite3.connect(uri, uri=True, timeout=timeout, isolation_level=None)
+    """A connection; also a reader may write, because what a killed writer left half done is first taken back."""
+    timeout = _FOR_A_WRITER if mode == "rwc" else _FOR_A_COMMIT
+    return sqlite3.connect(f"{path.resolve().as_uri()}?mode={mode}", uri=True, timeout=timeout, isolation_level=None)
 
 
 @contextmanager
