@@ -145,6 +145,13 @@ def test_another_version_is_refused_or_kept(path, monkeypatch):
         assert np.array_equal(kept["seconds"], first["seconds"])
 
 
+def bound_to_itself():
+    def factorial(n):
+        return n * factorial(n - 1) if n else 1
+
+    return factorial
+
+
 def test_what_is_bound_to_a_task_belongs_to_its_study(path):
     def times(factor):
         return lambda a, b: factor * a * b
@@ -153,6 +160,9 @@ def test_what_is_bound_to_a_task_belongs_to_its_study(path):
     hs.sweep(times(2.0), GRID, store=path)
     with pytest.raises(ValueError, match="what is bound to it has changed"):
         hs.sweep(times(3.0), GRID, store=path)
+    factorial = path.with_name("factorial.sqlite")
+    for _ in range(2):
+        hs.sweep(bound_to_itself(), {"n": [3, 4]}, store=factorial)
     u = np.linspace(0.0, 1.0, 5)
     laws = path.with_name("laws.sqlite")
     for _ in range(2):
@@ -311,7 +321,7 @@ def test_the_command_is_interrupted_and_goes_on(study, path, capsys):
     out, err = capsys.readouterr()
     assert out.startswith("100 of 100 tasks: 99 succeeded, 1 failed\n  1 x ValueError: seven\n")
     assert not err  # no terminal, no progress
-    assert main(["sweep", "--show", str(path), "--csv", "-"]) == 1
+    assert main(["sweep", "--show", str(path), "--csv", "-"]) == 0
     assert capsys.readouterr().out.count("\n") == 101
     (study.parent / "task.py").write_text(TASK.replace("seven", "sieben"))
     assert main(["sweep", str(study), "--out", str(path), "--resume"]) == 2

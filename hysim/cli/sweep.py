@@ -47,12 +47,13 @@ def run(options: argparse.Namespace) -> int:
     if options.show is not None:
         if options.study or options.out:
             raise ValueError("--show takes a database and computes nothing: leave the study and --out out")
-        result = load_sweep(options.show)
+        result, code = load_sweep(options.show), SUCCESS
     else:
         result = _computed(options)
+        code = SOME_FAILED if result.errors else SUCCESS
     texts = {options.csv: result.to_csv()} if options.csv else {}
     outputs.write(texts if is_taken else {**texts, "-": result.summary() + "\n"})
-    return SOME_FAILED if result.errors else SUCCESS
+    return code
 
 
 def _computed(options: argparse.Namespace) -> Any:

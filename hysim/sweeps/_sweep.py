@@ -93,7 +93,7 @@ def sweep(
     ...     return {"width": hs.loop_metrics(u, hs.BoucWen(beta=beta, n=n).response(u)).max_width}
     >>> result = hs.sweep(width, {"beta": [0.2, 0.5], "n": [1.0, 1.5, 2.0]})
     >>> result["width"].round(3).tolist()
-    [0.186, 0.132, 0.101, 0.425, 0.3, 0.231]
+    [0.337, 0.299, 0.264, 0.509, 0.442, 0.378]
     """
     if on_change not in ON_CHANGE:
         raise ValueError(f"on_change must be one of {', '.join(ON_CHANGE)}, got {on_change!r}")
