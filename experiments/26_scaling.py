@@ -73,8 +73,9 @@ def timed(work: Callable[[], object], repeats: int) -> float:
 
 def in_a_loop(task: Callable[..., Any], n_tasks: int) -> None:
     """The same calls without a sweep."""
-    for a in space(n_tasks)["a"].tolist():
-        for b in space(n_tasks)["b"]:
+    axes = space(n_tasks)
+    for a in axes["a"].tolist():
+        for b in axes["b"]:
             task(a, b)
 
 
@@ -144,11 +145,11 @@ def main(smoke: bool = False) -> list[Row]:
     with cluster() as dask:
         everywhere = {**own, **dask}
         rows = [
-            *measured("microsecond", product, 200_000, everywhere, 5),
-            *measured("10 ms in kernels", simulated, 200, everywhere, 3),
-            *measured("fit", fitted, 24, everywhere, 2),
+            *measured("microsecond", product, 100_000, everywhere, 3),
+            *measured("10 ms in kernels", simulated, 100, everywhere, 3),
+            *measured("fit", fitted, 12, everywhere, 2),
         ]
-    rows += [stored(200_000, 5), million(1_000_000, 5)]
+    rows += [stored(100_000, 3), million(1_000_000, 3)]
     write_results(RESULTS, rows, draw, {"cores": os.cpu_count()})
     return rows
 

@@ -42,6 +42,8 @@ _HOME = {
     "Sample": "hysim.sweeps",
     "response_task": "hysim.sweeps",
     "load_sweep": "hysim.sweeps",
+    "sobol_indices": "hysim.sweeps",
+    "SobolIndices": "hysim.sweeps",
     "loop_metrics": "hysim.metrics",
     "LoopMetrics": "hysim.metrics",
     "BoucWen": "hysim.models.boucwen",
@@ -152,9 +154,11 @@ if TYPE_CHECKING:
     from hysim.simulation import Simulation as Simulation
     from hysim.simulation import simulate as simulate
     from hysim.sweeps import Sample as Sample
+    from hysim.sweeps import SobolIndices as SobolIndices
     from hysim.sweeps import Sweep as Sweep
     from hysim.sweeps import load_sweep as load_sweep
     from hysim.sweeps import response_task as response_task
+    from hysim.sweeps import sobol_indices as sobol_indices
     from hysim.sweeps import sweep as sweep
 else:
 

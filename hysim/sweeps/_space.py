@@ -16,7 +16,7 @@ Value = float | int | bool | str
 OWN_NAMES = ("task", "seed", "seconds", "error")
 """Columns of the result that are no parameters."""
 
-_DESIGNS = ("sobol", "latin_hypercube")
+_DESIGNS = ("sobol", "latin_hypercube", "saltelli")
 
 
 class Space(NamedTuple):
@@ -45,9 +45,11 @@ class Sample:
         Name of a parameter to its distribution: one of `scipy.stats` with its arguments, such as
         ``scipy.stats.norm(1.0, 0.1)``, or a pair ``(low, high)`` for the uniform one between them.
     n : int
-        Number of tasks; for ``"sobol"`` a power of 2.
-    method : {"sobol", "latin_hypercube"}
-        Scrambled Sobol sequence, or Latin hypercube; both of `scipy.stats.qmc`.
+        Number of tasks; for ``"sobol"`` a power of 2. For ``"saltelli"`` a power of 2 too, and the tasks of d
+        parameters are n (d + 2).
+    method : {"sobol", "latin_hypercube", "saltelli"}
+        Scrambled Sobol sequence, or Latin hypercube, both of `scipy.stats.qmc`; or the sample that `sobol_indices`
+        takes.
     seed : int
         Of the sample. The tasks' own seeds come from that of `sweep`.
 
@@ -70,7 +72,7 @@ class Sample:
 
     distributions: Mapping[str, Any]
     n: int
-    method: Literal["sobol", "latin_hypercube"] = "sobol"
+    method: Literal["sobol", "latin_hypercube", "saltelli"] = "sobol"
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -80,7 +82,7 @@ class Sample:
             raise ValueError(f"n must be an integer of at least 1, got {self.n!r}")
         if self.method not in _DESIGNS:
             raise ValueError(f"method must be one of {', '.join(_DESIGNS)}, got {self.method!r}")
-        if self.method == "sobol" and self.n & (self.n - 1):
+        if self.method != "latin_hypercube" and self.n & (self.n - 1):
             above = 1 << self.n.bit_length()
             raise ValueError(
                 f"a Sobol sequence is balanced for powers of 2 only, got n = {self.n}: take {above // 2} or {above}"
@@ -89,23 +91,32 @@ class Sample:
             _quantiles(name, distribution)
 
     def draw(self) -> dict[str, FloatArray]:
-        """The values of each parameter, shape (n,).
+        """The values of each parameter, shape (n_tasks,).
 
         Raises
         ------
         ValueError
             If a distribution gives a value that is not finite.
         """
-        from scipy.stats import qmc
-
-        design = {"sobol": qmc.Sobol, "latin_hypercube": qmc.LatinHypercube}[self.method]
-        points = design(len(self.distributions), rng=np.random.default_rng(self.seed)).random(self.n)
         drawn = {}
-        for (name, distribution), fractions in zip(self.distributions.items(), points.T, strict=True):
+        for (name, distribution), fractions in zip(self.distributions.items(), self._fractions().T, strict=True):
             drawn[name] = np.asarray(_quantiles(name, distribution)(fractions), dtype=float)
             if not np.isfinite(drawn[name]).all():
                 raise ValueError(f"the distribution of {name} gave a value that is not finite")
         return drawn
+
+    def _fractions(self) -> FloatArray:
+        """Points of the unit cube, shape (n_tasks, d)."""
+        from scipy.stats import qmc
+
+        rng, d = np.random.default_rng(self.seed), len(self.distributions)
+        if self.method == "latin_hypercube":
+            return np.asarray(qmc.LatinHypercube(d, rng=rng).random(self.n))
+        if self.method == "sobol":
+            return np.asarray(qmc.Sobol(d, rng=rng).random(self.n))
+        a, b = np.hsplit(qmc.Sobol(2 * d, rng=rng).random(self.n), 2)
+        mixed = [np.where(np.arange(d) == k, b, a) for k in range(d)]
+        return np.concatenate([a, b, *mixed])
 
 
 def space_of(space: Any) -> Space:
