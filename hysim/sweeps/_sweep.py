@@ -206,13 +206,13 @@ class _Study:
         """Judge, write, enter and report what is finished, in the order of the tasks until the layout is known."""
         outcomes, lost = {}, None
         for future in list(self.running):
-            if not future.done():
-                if self.table.layout is None:
-                    break
-            elif future.cancelled() or future.exception() is not None:
-                lost = future
-            else:
+            if future.done() and not future.cancelled() and future.exception() is None:
                 outcomes[future] = self.table.judged(future.result())
+                continue
+            if future.done():
+                lost = future
+            if self.table.layout is None:
+                break
         if outcomes and self.store is not None:
             self.store.commit(list(outcomes.values()), self.table.layout, self.space, self.seeds)
         for future, outcome in outcomes.items():
