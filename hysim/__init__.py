@@ -37,6 +37,13 @@ _HOME = {
     "to_control": "hysim.control",
     "compare": "hysim.comparison",
     "Comparison": "hysim.comparison",
+    "sweep": "hysim.sweeps",
+    "Sweep": "hysim.sweeps",
+    "Sample": "hysim.sweeps",
+    "response_task": "hysim.sweeps",
+    "load_sweep": "hysim.sweeps",
+    "sobol_indices": "hysim.sweeps",
+    "SobolIndices": "hysim.sweeps",
     "loop_metrics": "hysim.metrics",
     "LoopMetrics": "hysim.metrics",
     "BoucWen": "hysim.models.boucwen",
@@ -156,6 +163,13 @@ if TYPE_CHECKING:
     from hysim.records import Record as Record
     from hysim.simulation import Simulation as Simulation
     from hysim.simulation import simulate as simulate
+    from hysim.sweeps import Sample as Sample
+    from hysim.sweeps import SobolIndices as SobolIndices
+    from hysim.sweeps import Sweep as Sweep
+    from hysim.sweeps import load_sweep as load_sweep
+    from hysim.sweeps import response_task as response_task
+    from hysim.sweeps import sobol_indices as sobol_indices
+    from hysim.sweeps import sweep as sweep
 else:
 
     def __getattr__(name: str) -> Any:

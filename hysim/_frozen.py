@@ -133,7 +133,7 @@ def _compared(value: Any) -> tuple[Any, ...]:
 
 def _key(value: Any) -> Any:
     if isinstance(value, np.ndarray):
-        return value.shape, (value + 0.0).tobytes()
+        return value.shape, (value + 0.0 if value.dtype.kind == "f" else value).tobytes()
     if isinstance(value, Mapping):
         return tuple((name, _key(item)) for name, item in sorted(value.items()))
     if isinstance(value, (tuple, list)):

@@ -326,7 +326,7 @@ def test_a_frame_holds_the_columns_of_the_csv(quick, monkeypatch):
 
 def test_a_missing_pandas_is_named_with_the_extra_that_brings_it(quick, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(ImportError, match="extra 'frames'"):
+    with pytest.raises(ImportError, match="extra 'tables'"):
         quick.to_frame()
 
 

@@ -237,7 +237,7 @@ class Comparison:
         Raises
         ------
         ImportError
-            If pandas is not installed: it comes with the extra ``frames`` only.
+            If pandas is not installed: it comes with the extra ``tables`` only.
         """
         return _tables.to_frame(self, timings=timings)
 

@@ -122,7 +122,7 @@ def to_frame(comparison: "Comparison", *, timings: bool) -> Any:
         import pandas
     except ImportError as error:
         raise ImportError(
-            "to_frame needs pandas, which hysim does not install by itself: install hysim with the extra 'frames', "
+            "to_frame needs pandas, which hysim does not install by itself: install hysim with the extra 'tables', "
             "or take to_csv"
         ) from error
     return pandas.DataFrame(to_columns(comparison, timings=timings))

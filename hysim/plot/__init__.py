@@ -14,6 +14,7 @@ from hysim.plot._identifications import identification
 from hysim.plot._records import history, loop, response, traces
 from hysim.plot._style import figure, house_style, panels
 from hysim.plot._svg import save_svg, to_svg
+from hysim.plot._sweeps import heat_map, parallel_coordinates, quantile_bands, sensitivities
 from hysim.plot._tunings import trade_off
 
 __all__ = [
@@ -21,16 +22,20 @@ __all__ = [
     "Figure",
     "comparison",
     "figure",
+    "heat_map",
     "history",
     "house_style",
     "identification",
     "loop",
     "loops",
     "panels",
+    "parallel_coordinates",
+    "quantile_bands",
     "residuals",
     "response",
     "save_svg",
     "selection",
+    "sensitivities",
     "to_svg",
     "traces",
     "trade_off",

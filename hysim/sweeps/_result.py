@@ -1,0 +1,216 @@
+"""What `sweep` returns: a table with one row for each task."""
+
+import csv
+import io
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, frozen
+from hysim.sweeps._seeds import seeds
+from hysim.sweeps._space import Column
+from hysim.sweeps._store import opened
+from hysim.sweeps._table import Table
+
+
+@frozen
+class Sweep:
+    """A study as a table; ``result["name"]`` is a column of it.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Name to values, shape (n,).
+    outputs : mapping
+        Name to the numbers that the tasks returned, shape (n,); nan where a task failed.
+    arrays : mapping
+        Name to the arrays that the tasks returned, shape (n, ...); nan where a task failed.
+    task : array, shape (n,)
+        Places of the tasks in the study, increasing.
+    seed : array, shape (n,)
+        Seeds of the tasks.
+    seconds : array, shape (n,)
+        Time that each took [s]; of tasks that went through a batch form together, the mean.
+    errors : mapping
+        Place of a task that failed to its message.
+    n_tasks : int
+        Number of tasks of the study; more than there are rows where it was interrupted.
+    axes : mapping, optional
+        Of a grid, name of a parameter to the values along its axis.
+    """
+
+    parameters: Mapping[str, Column]
+    outputs: Mapping[str, FloatArray]
+    arrays: Mapping[str, FloatArray]
+    task: npt.NDArray[np.int64]
+    seed: npt.NDArray[np.int64]
+    seconds: FloatArray
+    errors: Mapping[int, str]
+    n_tasks: int
+    axes: Mapping[str, Column] | None = None
+
+    def __len__(self) -> int:
+        return self.task.size
+
+    def __getitem__(self, name: str) -> Column:
+        columns = {**self.columns, **self.arrays}
+        if name not in columns:
+            raise KeyError(f"no column {name!r}: there are {', '.join(columns)}")
+        return columns[name]
+
+    @property
+    def columns(self) -> dict[str, Column]:
+        """Parameters, outputs that are numbers, seed, seconds and error, each shape (n,), by name."""
+        return {
+            **self.parameters,
+            **self.outputs,
+            "seed": self.seed,
+            "seconds": self.seconds,
+            "error": self.error,
+        }
+
+    @property
+    def error(self) -> Column:
+        """Messages, shape (n,), empty where a task succeeded."""
+        messages = np.full(len(self), "", dtype=object)
+        for place, message in self.errors.items():
+            messages[np.searchsorted(self.task, place)] = message
+        messages.setflags(write=False)
+        return messages
+
+    def to_csv(self) -> str:
+        """The columns as comma-separated values, every digit kept; arrays are left out."""
+        buffer = io.StringIO()
+        writer = csv.writer(buffer, lineterminator="\n")
+        writer.writerow(["task", *self.columns])
+        values = [self.task, *self.columns.values()]
+        writer.writerows(zip(*(column.tolist() for column in values), strict=True))
+        return buffer.getvalue()
+
+    def to_frame(self) -> Any:
+        """The columns as a `pandas.DataFrame`, its index the tasks; arrays are left out.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise ImportError("to_frame needs pandas: pip install 'hysim[tables]'") from None
+        return pandas.DataFrame(self.columns, index=pandas.Index(self.task, name="task"))
+
+    def to_xarray(self) -> Any:
+        """The result as an `xarray.Dataset`: along the axes of a grid, or along the tasks; nan where there is no row.
+
+        Axis k of an array beyond these is called after it, ``name_k``.
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError:
+            raise ImportError("to_xarray needs xarray: pip install 'hysim[tables]'") from None
+        own = {"seed": self.seed, "seconds": self.seconds, "error": self.error}
+        if self.axes is None:
+            dims: tuple[str, ...] = ("task",)
+            coordinates = {"task": self.task, **{name: ("task", column) for name, column in self.parameters.items()}}
+        else:
+            dims, coordinates = tuple(self.axes), dict(self.axes)
+        variables = {
+            name: ((*dims, *(f"{name}_{k}" for k in range(values.ndim - 1))), self._along_axes(values))
+            for name, values in {**self.outputs, **self.arrays, **own}.items()
+        }
+        return xarray.Dataset(variables, coords=coordinates)
+
+    def summary(self) -> str:
+        """How many tasks are done and how many failed, why, and the range of every output."""
+        n = len(self)
+        lines = [f"{n} of {self.n_tasks} tasks: {n - len(self.errors)} succeeded, {len(self.errors)} failed"]
+        for message, number in Counter(self.errors.values()).most_common(5):
+            lines.append(f"  {number} x {message}")
+        for name, values in self.outputs.items():
+            known = values[np.isfinite(values)]
+            if known.size:
+                low, middle, high = np.quantile(known, [0.0, 0.5, 1.0])
+                lines.append(f"{name}: {low:.4g} to {high:.4g}, median {middle:.4g}, {n - known.size} not finite")
+        return "\n".join(lines)
+
+    def _along_axes(self, values: Column) -> Column:
+        if self.axes is None:
+            return values
+        shape = tuple(len(axis) for axis in self.axes.values())
+        missing: Any = "" if values.dtype == object else 0 if values.dtype.kind == "i" else np.nan
+        whole = np.full((self.n_tasks, *values.shape[1:]), missing, dtype=values.dtype)
+        whole[self.task] = values
+        return whole.reshape(*shape, *values.shape[1:])
+
+
+def load_sweep(path: str | Path) -> Sweep:
+    """Read what a store holds, of a study that is finished, interrupted or still running.
+
+    Parameters
+    ----------
+    path : path
+        The store that was given to `sweep`.
+
+    Returns
+    -------
+    Sweep
+        With the rows that are there.
+
+    Raises
+    ------
+    OSError
+        If the store cannot be read.
+    ValueError
+        If it is not one.
+
+    Examples
+    --------
+    >>> import tempfile, hysim as hs
+    >>> def product(a, b):
+    ...     return a * b
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = hs.sweep(product, {"a": [1, 2], "b": [3.0, 4.0]}, store=f"{folder}/study.sqlite")
+    ...     hs.load_sweep(f"{folder}/study.sqlite")["value"].tolist()
+    [3.0, 4.0, 6.0, 8.0]
+    """
+    with opened(path, to_read=True) as store:
+        finished, layout, space = store.finished(), store.layout(), store.space()
+        n_tasks, seed = store.n_tasks, store.seed
+    table = Table(n_tasks, space.columns)
+    if layout:
+        table.begin(layout)
+    table.enter(finished)
+    return result_of(table, space.columns, space.axes, seeds(seed, finished.places))
+
+
+def result_of(
+    table: Table, parameters: Mapping[str, Column], axes: Mapping[str, Column] | None, of_tasks: Column
+) -> Sweep:
+    """The rows of the tasks that are done, of which `parameters` and seeds, shape (n,), are given."""
+    places = np.flatnonzero(table.done)
+    kept = {name: values[places] for name, values in table.values.items()}
+    for column in (places, of_tasks, *parameters.values(), *kept.values()):
+        column.setflags(write=False)
+    shapes = dict(table.layout or ())
+    return Sweep(
+        parameters=parameters,
+        outputs={name: values for name, values in kept.items() if not shapes[name]},
+        arrays={name: values for name, values in kept.items() if shapes[name]},
+        task=places,
+        seed=of_tasks,
+        seconds=table.seconds[places],
+        errors=dict(sorted(table.errors.items())),
+        n_tasks=table.done.size,
+        axes=axes,
+    )

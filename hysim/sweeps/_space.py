@@ -1,0 +1,204 @@
+"""Which tasks a study has: a grid, a list, or a sample of distributions, as one column for each parameter."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, frozen
+
+Column = npt.NDArray[Any]
+"""Values of one parameter, shape (n_tasks,): float64, int64, bool or strings."""
+
+Value = float | int | bool | str
+OWN_NAMES = ("task", "seed", "seconds", "error")
+"""Columns of the result that are no parameters."""
+
+_DESIGNS = ("sobol", "latin_hypercube", "saltelli")
+
+
+class Space(NamedTuple):
+    """The tasks of a study.
+
+    `columns` are the parameters, one value for each task. `axes` are the values along each axis of a grid, the
+    last parameter changing fastest, or None for what is no grid.
+    """
+
+    columns: Mapping[str, Column]
+    axes: Mapping[str, Column] | None
+
+    @property
+    def n_tasks(self) -> int:
+        """Number of tasks."""
+        return len(next(iter(self.columns.values())))
+
+
+@frozen
+class Sample:
+    """Tasks drawn from distributions, spread evenly over them.
+
+    Parameters
+    ----------
+    distributions : mapping
+        Name of a parameter to its distribution: one of `scipy.stats` with its arguments, such as
+        ``scipy.stats.norm(1.0, 0.1)``, or a pair ``(low, high)`` for the uniform one between them.
+    n : int
+        Number of tasks; for ``"sobol"`` a power of 2. For ``"saltelli"`` a power of 2 too, and the tasks of d
+        parameters are n (d + 2).
+    method : {"sobol", "latin_hypercube", "saltelli"}
+        Scrambled Sobol sequence, or Latin hypercube, both of `scipy.stats.qmc`; or the sample that `sobol_indices`
+        takes.
+    seed : int
+        Of the sample. The tasks' own seeds come from that of `sweep`.
+
+    Raises
+    ------
+    TypeError
+        If a distribution is neither a pair of numbers nor one of `scipy.stats`.
+    ValueError
+        If there is nothing to draw, a pair is not in order, or the number does not suit the method.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> from scipy import stats
+    >>> sample = hs.Sample(distributions={"beta": (0.2, 2.0), "n": stats.uniform(1.0, 1.0)}, n=64)
+    >>> drawn = sample.draw()
+    >>> {name: values.shape for name, values in drawn.items()}
+    {'beta': (64,), 'n': (64,)}
+    """
+
+    distributions: Mapping[str, Any]
+    n: int
+    method: Literal["sobol", "latin_hypercube", "saltelli"] = "sobol"
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if not self.distributions:
+            raise ValueError("a sample needs at least one distribution")
+        if isinstance(self.n, bool) or not isinstance(self.n, int) or self.n < 1:
+            raise ValueError(f"n must be an integer of at least 1, got {self.n!r}")
+        if self.method not in _DESIGNS:
+            raise ValueError(f"method must be one of {', '.join(_DESIGNS)}, got {self.method!r}")
+        if self.method != "latin_hypercube" and self.n & (self.n - 1):
+            above = 1 << self.n.bit_length()
+            raise ValueError(
+                f"a Sobol sequence is balanced for powers of 2 only, got n = {self.n}: take {above // 2} or {above}"
+            )
+        for name, distribution in self.distributions.items():
+            _quantiles(name, distribution)
+
+    def draw(self) -> dict[str, FloatArray]:
+        """The values of each parameter, shape (n_tasks,).
+
+        Raises
+        ------
+        ValueError
+            If a distribution gives a value that is not finite.
+        """
+        drawn = {}
+        for (name, distribution), fractions in zip(self.distributions.items(), self._fractions().T, strict=True):
+            drawn[name] = np.asarray(_quantiles(name, distribution)(fractions), dtype=float)
+            if not np.isfinite(drawn[name]).all():
+                raise ValueError(f"the distribution of {name} gave a value that is not finite")
+        return drawn
+
+    def _fractions(self) -> FloatArray:
+        """Points of the unit cube, shape (n_tasks, d)."""
+        from scipy.stats import qmc
+
+        rng, d = np.random.default_rng(self.seed), len(self.distributions)
+        if self.method == "latin_hypercube":
+            return np.asarray(qmc.LatinHypercube(d, rng=rng).random(self.n))
+        if self.method == "sobol":
+            return np.asarray(qmc.Sobol(d, rng=rng).random(self.n))
+        a, b = np.hsplit(qmc.Sobol(2 * d, rng=rng).random(self.n), 2)
+        mixed = [np.where(np.arange(d) == k, b, a) for k in range(d)]
+        return np.concatenate([a, b, *mixed])
+
+
+def space_of(space: Any) -> Space:
+    """The tasks that a mapping (a grid), a list of mappings or a `Sample` stands for.
+
+    Raises
+    ------
+    TypeError
+        If it is none of these, or a value is not a number, a string or a boolean.
+    ValueError
+        If there is no task, the mappings of a list have different names, a name is one of the result's own, or a
+        value is nan.
+    """
+    if isinstance(space, Sample):
+        return Space(_checked(space.draw()), None)
+    if isinstance(space, Mapping):
+        axes = _checked({name: _column(name, values) for name, values in space.items()})
+        return Space(_product(axes), axes)
+    if isinstance(space, Iterable) and not isinstance(space, str):
+        return Space(_checked(_listed(list(space))), None)
+    raise TypeError(
+        f"a space is a mapping of names to values, a list of mappings or a hs.Sample, got {type(space).__name__}"
+    )
+
+
+def _quantiles(name: str, distribution: Any) -> Any:
+    if isinstance(distribution, Sequence) and not isinstance(distribution, str) and len(distribution) == 2:
+        low, high = (float(limit) for limit in distribution)
+        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            raise ValueError(f"the limits of {name} must be finite and in order, got ({low}, {high})")
+        return lambda fractions: low + (high - low) * fractions
+    quantiles = getattr(distribution, "ppf", None) or getattr(distribution, "icdf", None)
+    if not callable(quantiles):
+        raise TypeError(
+            f"the distribution of {name} must be a pair (low, high) or one of scipy.stats with its arguments, "
+            f"got {distribution!r}"
+        )
+    return quantiles
+
+
+def _column(name: str, values: Any) -> Column:
+    if isinstance(values, (str, bytes)) or not isinstance(values, Iterable):
+        raise TypeError(f"the values of {name} must be a sequence, got {values!r}: [{values!r}] for one value")
+    plain = [value.item() if isinstance(value, np.generic) else value for value in values]
+    kinds = {type(value) for value in plain}
+    for kinds_of_column, dtype in (({bool}, bool), ({str}, str), ({int}, np.int64), ({int, float}, np.float64)):
+        if kinds <= kinds_of_column:
+            return np.array(plain, dtype=dtype)
+    names = ", ".join(sorted(kind.__name__ for kind in kinds))
+    raise TypeError(f"the values of {name} must be all numbers, all strings or all booleans, got {names}")
+
+
+def _product(axes: Mapping[str, Column]) -> dict[str, Column]:
+    lengths = [len(values) for values in axes.values()]
+    places = np.unravel_index(np.arange(math.prod(lengths)), lengths)
+    return {name: _held(values[place]) for (name, values), place in zip(axes.items(), places, strict=True)}
+
+
+def _listed(tasks: list[Any]) -> dict[str, Column]:
+    if not tasks:
+        raise ValueError("there is no task in the list")
+    for k, task in enumerate(tasks):
+        if not isinstance(task, Mapping):
+            raise TypeError(f"task {k} of the list must be a mapping of names to values, got {type(task).__name__}")
+        if task.keys() != tasks[0].keys():
+            raise ValueError(f"task {k} of the list has {', '.join(task)}, the first has {', '.join(tasks[0])}")
+    return {name: _column(name, [task[name] for task in tasks]) for name in tasks[0]}
+
+
+def _checked(columns: Mapping[str, Column]) -> dict[str, Column]:
+    if not columns:
+        raise ValueError("a space needs at least one parameter")
+    for name, values in columns.items():
+        if not isinstance(name, str) or name in OWN_NAMES:
+            raise ValueError(f"a parameter cannot be called {name!r}: the result has a column of its own for it")
+        if not len(values):
+            raise ValueError(f"there is no value of {name}")
+        if values.dtype.kind == "f" and np.isnan(values).any():
+            raise ValueError(f"the values of {name} must be numbers, got nan")
+    return {name: _held(values) for name, values in columns.items()}
+
+
+def _held(values: Column) -> Column:
+    values.setflags(write=False)
+    return values

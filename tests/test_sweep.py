@@ -1,0 +1,331 @@
+"""`sweep`: the same table whatever computes it, failures as rows, and seeds of each task's own."""
+
+import concurrent.futures
+import importlib.util
+import math
+import sys
+
+import numpy as np
+import pytest
+import sweep_tasks
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+
+import hysim as hs
+from hysim.sweeps import _sweep
+from hysim.sweeps._seeds import seeds
+
+
+def bits(result):
+    """Every column but the seconds, to the bit."""
+    columns = {name: values for name, values in result.columns.items() if name not in ("seconds", "error")}
+    numbers = {name: (v.dtype.str, v.tobytes()) for name, v in {**columns, **result.arrays}.items()}
+    return {**numbers, "task": result.task.tolist(), "error": result.error.tolist()}
+
+
+@pytest.fixture(scope="module")
+def serial():
+    return hs.sweep(sweep_tasks.noisy, sweep_tasks.SPACE, workers=1)
+
+
+@pytest.mark.parametrize("executor", ["threads", "processes"])
+def test_workers_do_not_change_a_bit(serial, executor):
+    assert bits(hs.sweep(sweep_tasks.noisy, sweep_tasks.SPACE, executor=executor, workers=3)) == bits(serial)
+
+
+@pytest.mark.parametrize("size", [1, 7, 1000])
+def test_chunks_do_not_change_a_bit(serial, size, monkeypatch):
+    monkeypatch.setattr(_sweep._Study, "_size", lambda self, remaining, number: min(size, remaining))
+    assert bits(hs.sweep(sweep_tasks.noisy, sweep_tasks.SPACE)) == bits(serial)
+
+
+class LastFirst(concurrent.futures.Executor):
+    """Computes what was submitted last first, when asked for a result."""
+
+    def __init__(self):
+        self.waiting = []
+
+    def submit(self, function, /, *args, **kwargs):
+        future = concurrent.futures.Future()
+        self.waiting.append((future, function, args, kwargs))
+        if len(self.waiting) == 3:
+            self.flush()
+        return future
+
+    def flush(self):
+        while self.waiting:
+            future, function, args, kwargs = self.waiting.pop()
+            future.set_result(function(*args, **kwargs))
+
+
+def test_any_executor_will_do_and_its_order_does_not_matter(serial, monkeypatch):
+    backwards = LastFirst()
+    monkeypatch.setattr(_sweep, "wait", lambda *args, **kwargs: backwards.flush())
+    assert bits(hs.sweep(sweep_tasks.noisy, sweep_tasks.SPACE, executor=backwards, workers=2)) == bits(serial)
+
+
+def test_a_dask_client_is_taken_by_its_executor(serial):
+    class Client:
+        def __init__(self, pool):
+            self.pool = pool
+
+        def get_executor(self):
+            return self.pool
+
+        def nthreads(self):
+            return {"tcp://one": 2, "tcp://two": 1}
+
+    with concurrent.futures.ThreadPoolExecutor(3) as pool:
+        assert bits(hs.sweep(sweep_tasks.noisy, sweep_tasks.SPACE, executor=Client(pool))) == bits(serial)
+
+
+def test_the_last_parameter_of_a_grid_changes_fastest(serial):
+    assert len(serial) == serial.n_tasks == 120
+    assert serial["a"][:7].tolist() == [0.1] * 6 + [serial["a"][6]]
+    assert serial["b"][:6].tolist() == [1, 1, 2, 2, 3, 3]
+    assert serial["way"][:3].tolist() == ["up", "down", "up"]
+    assert serial["path"].shape == (120, 5)
+    assert np.array_equal(np.isnan(serial["odd"]), serial["b"] == 2)
+    assert not serial.errors
+
+
+@given(seed=st.integers(0, 2**200), place=st.integers(0, 2**31))
+def test_seeds_are_those_of_numpys_spawned_sequences(seed, place):
+    spawned = np.random.SeedSequence(seed, spawn_key=(place,)).generate_state(1, np.uint64)[0] >> np.uint64(1)
+    assert seeds(seed, np.array([place]))[0] == spawned
+
+
+def test_another_seed_gives_other_numbers_and_the_same_one_the_same(serial):
+    same, other = (hs.sweep(sweep_tasks.noisy, sweep_tasks.SPACE, seed=seed) for seed in (0, 1))
+    assert np.array_equal(same["last"], serial["last"])
+    assert not np.isin(other["last"], serial["last"]).any()
+
+
+def test_a_batch_form_gives_the_same_bits_and_gets_columns():
+    space = {"a": np.linspace(0.0, 1.0, 30), "b": [1.0, 3.0]}
+    singly, together = hs.sweep(sweep_tasks.product, space), hs.sweep(sweep_tasks.with_batch, space)
+    assert bits(singly) == bits(together)
+
+
+@pytest.mark.parametrize("n", [1.0, 1.5])
+def test_a_response_task_gives_the_measures_of_single_responses(n):
+    rec = hs.datasets.table1()
+    law = hs.BoucWen(A=0.02, beta=0.02, gamma=-0.01, n=n, feedthrough=0.02, offset=0.1)
+    space = {"beta": np.linspace(0.01, 0.05, 9), "feedthrough": [0.02, 0.03]}
+    result = hs.sweep(hs.response_task(law, rec.u, rec.y), space)
+    for k in range(len(result)):
+        y = hs.BoucWen(
+            A=0.02, gamma=-0.01, n=n, offset=0.1, beta=result["beta"][k], feedthrough=result["feedthrough"][k]
+        ).response(rec.u)
+        # squares and their sum in another order: some ulps
+        assert result["rmse"][k] == pytest.approx(hs.metrics.rmse(rec.y, y), rel=1e-14)
+    outputs = hs.sweep(hs.response_task(law, rec.u, measure="response"), space)["response"]
+    assert np.array_equal(outputs[-1], y)
+
+
+def test_a_batch_that_fails_leaves_the_rows_that_do_not():
+    u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=20)
+    result = hs.sweep(hs.response_task(hs.BoucWen, u, measure="area"), {"n": [1.0, 2.0, -1.0, 3.0], "beta": [0.5, 0.7]})
+    assert list(result.errors) == [4, 5]
+    assert all("n must be" in message for message in result.errors.values())
+    assert np.isfinite(np.delete(result["area"], [4, 5])).all()
+
+
+def test_a_law_that_escapes_is_inf_and_no_error():
+    u = np.linspace(0.0, 100.0, 50)
+    result = hs.sweep(
+        hs.response_task(hs.BoucWen(gamma=-2.0, n=2.0), u, measure="final"), [{"beta": 0.5}, {"beta": 3.0}]
+    )
+    assert result["final"][0] == math.inf
+    assert math.isfinite(result["final"][1])
+    assert not result.errors
+
+
+@pytest.mark.parametrize("executor", ["threads", "processes"])
+def test_a_failing_task_is_a_row_with_its_error(executor):
+    result = hs.sweep(sweep_tasks.failing, {"a": [3, 1, 2, 3], "b": [0, 2]}, executor=executor, workers=2)
+    assert result.errors == {
+        0: "ValueError: no 3", 1: "ValueError: no 3", 2: "ZeroDivisionError: division by zero",
+        4: "ZeroDivisionError: division by zero", 6: "ValueError: no 3", 7: "ValueError: no 3",
+    }  # fmt: skip
+    assert result["value"][[3, 5]].tolist() == [0.5, 1.0]
+    assert np.isnan(np.delete(result["value"], [3, 5])).all()
+    assert result["error"][3] == ""
+    assert result.summary().splitlines()[:2] == ["8 of 8 tasks: 2 succeeded, 6 failed", "  4 x ValueError: no 3"]
+
+
+def test_the_first_task_that_succeeds_says_what_a_row_is_and_not_the_fastest():
+    import threading
+
+    others = threading.Barrier(2)
+
+    def task(k):
+        if k == 0:
+            raise RuntimeError("no layout")
+        if k in (1, 2):
+            others.wait()  # both are computed before either is settled
+        return {2: {"y": [1.0]}, 3: {"x": 1.0}, 4: "one", 5: {"y": [3.0, 4.0], "w": 1.0}}.get(
+            k, {"w": 0.5, "y": [1.0, 2.0]}
+        )
+
+    result = hs.sweep(task, {"k": range(7)}, workers=2)
+    assert result["w"][[1, 5, 6]].tolist() == [0.5, 1.0, 0.5]
+    assert result["y"][5].tolist() == [3.0, 4.0]
+    assert result.errors == {
+        0: "RuntimeError: no layout",
+        2: "ValueError: the task returned y of shape (1,), where the first that succeeded returned the number w, "
+        "y of shape (2,)",
+        3: "ValueError: the task returned the number x, where the first that succeeded returned the number w, "
+        "y of shape (2,)",
+        4: "TypeError: a task returns numbers and arrays of numbers, got str for value",
+    }
+    assert np.isnan(result["y"][2]).all()
+
+
+def test_where_every_task_fails_there_are_only_errors():
+    result = hs.sweep(lambda k: 1 / 0, {"k": range(50)})
+    assert len(result.errors) == 50
+    assert not result.outputs
+
+
+def test_a_task_may_use_its_array_again():
+    own = np.empty(3)
+
+    def task(k):
+        own[:] = k
+        return own
+
+    assert hs.sweep(task, {"k": range(10)}, workers=1)["value"][:, 0].tolist() == list(range(10))
+
+
+def test_a_list_has_its_own_tasks():
+    result = hs.sweep(sweep_tasks.product, [{"a": 1, "b": 2.0}, {"a": 3, "b": 4.5}])
+    assert result["value"].tolist() == [2.0, 13.5]
+    assert result["a"].dtype == np.int64
+
+
+@pytest.mark.parametrize("method", ["sobol", "latin_hypercube"])
+def test_a_sample_follows_its_distributions_and_its_seed(method):
+    sample = hs.Sample(distributions={"a": (2.0, 4.0), "b": stats.norm(1.0, 0.5)}, n=256, method=method, seed=3)
+    result = hs.sweep(sweep_tasks.product, sample)
+    for name, fractions in {"a": (result["a"] - 2.0) / 2.0, "b": stats.norm(1.0, 0.5).cdf(result["b"])}.items():
+        counts = np.histogram(fractions, bins=256, range=(0.0, 1.0))[0]
+        assert (counts == 1).all(), name  # one in each of n slices, which both designs promise
+    again = hs.Sample(distributions={"a": (2.0, 4.0), "b": stats.norm(1.0, 0.5)}, n=256, method=method, seed=4)
+    assert not np.isin(again.draw()["a"], result["a"]).any()
+
+
+@pytest.mark.parametrize(
+    ("space", "error", "words"),
+    [
+        ({}, ValueError, "at least one parameter"),
+        ({"a": [], "b": [1]}, ValueError, "no value of a"),
+        ({"a": [math.nan], "b": [1]}, ValueError, "got nan"),
+        ({"a": [1, "x"], "b": [1]}, TypeError, "all numbers, all strings"),
+        ({"a": 1.0, "b": [1]}, TypeError, "must be a sequence"),
+        ({"a": [1]}, TypeError, "does not take the parameters a"),
+        ({"a": [1], "seed": [1]}, ValueError, "cannot be called 'seed'"),
+        ([], ValueError, "no task"),
+        ([{"a": 1, "b": 2}, {"a": 1}], ValueError, "task 1 of the list has a, the first has a, b"),
+        ("ab", TypeError, "a space is"),
+    ],
+)
+def test_a_wrong_space_is_refused(space, error, words):
+    with pytest.raises(error, match=words):
+        hs.sweep(sweep_tasks.product, space)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "words"),
+    [
+        ({"executor": "dusk"}, ValueError, "executor must be"),
+        ({"executor": 3}, TypeError, "method submit"),
+        ({"workers": 0}, ValueError, "workers must be"),
+        ({"seed": -1}, ValueError, "at least 0"),
+        ({"seed": 1.5}, TypeError, "an integer"),
+        ({"on_change": "ask"}, ValueError, "on_change must be"),
+    ],
+)
+def test_a_wrong_option_is_refused(options, error, words):
+    with pytest.raises(error, match=words):
+        hs.sweep(sweep_tasks.product, {"a": [1], "b": [1]}, **options)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"n": 100}, "take 64 or 128"),
+        ({"n": 0, "method": "latin_hypercube"}, "at least 1"),
+        ({"n": 4, "method": "random"}, "one of sobol"),
+        ({"n": 4, "distributions": {"a": (1.0, 0.0)}}, "in order"),
+        ({"n": 4, "distributions": {}}, "at least one"),
+    ],
+)
+def test_a_wrong_sample_is_refused(arguments, words):
+    with pytest.raises(ValueError, match=words):
+        hs.Sample(**{"distributions": {"a": (0.0, 1.0)}, **arguments})
+
+
+@pytest.mark.parametrize(
+    ("law", "arguments", "error", "words"),
+    [
+        (hs.BoucWen, {"measure": "rmse"}, ValueError, "take y"),
+        (hs.BoucWen, {"measure": "width"}, ValueError, "one of rmse"),
+        (hs.BoucWen, {"y": [1.0]}, ValueError, "equal lengths"),
+        (hs.Line, {"y": [1.0, 2.0]}, TypeError, "Line computes no many laws"),
+    ],
+)
+def test_a_wrong_response_task_is_refused(law, arguments, error, words):
+    with pytest.raises(error, match=words):
+        hs.response_task(law, [0.0, 1.0], **arguments)
+
+
+def test_an_output_cannot_have_the_name_of_a_parameter():
+    with pytest.raises(ValueError, match="the task returned a, which is the name of another column"):
+        hs.sweep(lambda a: {"a": a}, {"a": [1.0]})
+
+
+def test_progress_ends_at_the_total():
+    seen = []
+    hs.sweep(
+        sweep_tasks.product, {"a": range(30), "b": [1, 2]}, progress=lambda done, total: seen.append((done, total))
+    )
+    assert seen[0] == (0, 60)
+    assert seen[-1] == (60, 60)
+    assert seen == sorted(seen)
+
+
+def test_the_table_as_text_keeps_every_digit(serial):
+    header, first, *rest = serial.to_csv().splitlines()
+    assert header == "task,a,b,way,last,odd,seed,seconds,error"
+    assert len(rest) == 119
+    assert float(first.split(",")[4]) == serial["last"][0]
+    with pytest.raises(KeyError, match="no column 'width'"):
+        _ = serial["width"]
+
+
+@pytest.mark.parametrize(("library", "view"), [("pandas", "to_frame"), ("xarray", "to_xarray")])
+def test_a_view_says_what_it_needs(serial, library, view, monkeypatch):
+    monkeypatch.setitem(sys.modules, library, None)
+    with pytest.raises(ImportError, match=rf"{view} needs {library}: pip install 'hysim\[tables\]'"):
+        getattr(serial, view)()
+
+
+@pytest.mark.skipif(importlib.util.find_spec("pandas") is None, reason="needs the extra tables")
+def test_the_frame_has_a_column_for_each_name(serial):
+    frame = serial.to_frame()
+    assert list(frame.columns) == list(serial.columns)
+    assert np.array_equal(frame["last"].to_numpy(), serial["last"])
+
+
+@pytest.mark.skipif(importlib.util.find_spec("xarray") is None, reason="needs the extra tables")
+def test_the_dataset_has_the_axes_of_the_grid(serial):
+    data = serial.to_xarray()
+    assert data["last"].dims == ("a", "b", "way")
+    assert data["path"].dims == ("a", "b", "way", "path_0")
+    row = int(np.flatnonzero((serial["b"] == 3) & (serial["way"] == "down"))[0])
+    assert data["last"].sel(a=0.1, b=3, way="down").item() == serial["last"][row]
+    listed = hs.sweep(sweep_tasks.product, [{"a": 1, "b": 2.0}, {"a": 3, "b": 4.5}]).to_xarray()
+    assert listed["value"].dims == ("task",)
+    assert listed["b"].to_numpy().tolist() == [2.0, 4.5]
