@@ -27,7 +27,7 @@ from hysim.kernels.stepping import Step
 from hysim.models import _boucwen_conversions, _boucwen_search
 from hysim.models._asymmetric import SteppedLaw
 from hysim.models.model import model
-from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.search_space import ALL_FREE, Freedom, Holding, Parameters, SearchSpace
 from hysim.records import Record
 
 _PINCHING = ("zeta_s", "q", "p", "psi", "delta_psi", "lambda_")
@@ -116,6 +116,11 @@ class BoucWenBaberNoori(SteppedLaw):
             for name, value in sums.items():
                 if value <= 0.0:
                     raise ValueError(f"{name} must be positive in a law that pinches, got {value}")
+
+    @classmethod
+    def candidates(cls) -> dict[str, Holding]:
+        """What `hysim.compare` tries of this family: the law with n = 1, which few records tell from another n."""
+        return {f"{cls.__name__} with n = 1": Holding(cls(), {"n": 1.0})}
 
     @classmethod
     def from_opensees(

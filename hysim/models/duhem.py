@@ -175,7 +175,7 @@ class Duhem(Composable):
     @classmethod
     def candidates(cls) -> "dict[str, DuhemStructure]":
         """What `hysim.compare` tries of this family: polynomials of the first and of the second degree."""
-        return {f"Duhem, degree {degree}": cls.structure(degree=degree) for degree in (1, 2)}
+        return {f"Duhem of degree {degree}": cls.structure(degree=degree) for degree in (1, 2)}
 
     @staticmethod
     def structure(*, degree: int | None = None, terms: Sequence[str] | None = None) -> "DuhemStructure":

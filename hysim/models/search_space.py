@@ -6,7 +6,7 @@ affine are not searched: for given others, the best ones are the solution of a l
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 from hysim._frozen import FloatArray, frozen
@@ -158,3 +158,30 @@ class Identifiable(Protocol):
     def assemble(self, parameters: Mapping[str, float]) -> Any:
         """Build the model from the user's parameters."""
         ...
+
+
+@dataclass(frozen=True)
+class Holding:
+    """Something identifiable, some of its parameters held at values unless the user says more of them."""
+
+    whole: Identifiable
+    values: Mapping[str, float]
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """That of the whole, in less space."""
+        held = {name: value for name, value in self.values.items() if name not in freedom.free}
+        return self.whole.search_space(record, replace(freedom, fixed={**held, **freedom.fixed}))
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """Those of the whole."""
+        return self.whole.regressors(parameters, record)
+
+    def assemble(self, parameters: Mapping[str, float]) -> Any:
+        """The model from the user's parameters."""
+        return self.whole.assemble(parameters)
+
+    def __getattr__(self, name: str) -> Any:
+        """The two methods that a family may offer more."""
+        if name not in ("steady", "notes"):
+            raise AttributeError(name)
+        return getattr(self.whole, name)
