@@ -43,6 +43,14 @@ AT_ZERO = [
     hs.Stop(threshold=0.2),
     hs.PrandtlIshlinskii(thresholds=(0.0, 0.1, 0.4), weights=(1.0, 0.5, 0.3)),
     hs.MaxwellSlip(stiffness=(1.0, 0.5), slips=(0.1, 0.4)),
+    hs.ModifiedPrandtlIshlinskii(
+        thresholds=(0.0, 0.2), weights=(1.0, 0.5), dead_zones=(0.0, 0.3), dead_zone_weights=(1.0, 0.4)
+    ),
+    hs.GeneralizedPrandtlIshlinskii(thresholds=(0.0, 0.2), weights=(1.0, 0.5), left=(1.0, 1.0, 0.0, 0.0, 0.5)),
+    hs.ColemanHodgdon(alpha=0.8, c=1.0, B=0.5),
+    hs.BoucWenBaberNoori(delta_nu=0.2, delta_eta=0.1),
+    hs.Dahl() + hs.Line(slope=0.5) + hs.Play(threshold=0.1),
+    hs.Play(threshold=0.1) >> hs.Dahl(),
     hs.CustomLaw(step=slipping, parameters={"gain": 2.0, "r": 0.25}, state={"z": 0.0}),
 ]
 ELSEWHERE = [
@@ -50,6 +58,8 @@ ELSEWHERE = [
     hs.BoucWen(beta=0.6, gamma=0.3, n=1.6, feedthrough=0.5, gain=0.4, offset=-0.1, z0=0.2),
     hs.PrandtlIshlinskii(thresholds=(0.0, 0.3), weights=(1.0, 0.5), offset=0.1, z0=0.2),
     hs.Duhem.from_terms({"u'": 0.9, "|u'| y": -0.3}, y0=0.1),
+    hs.Preisach(levels=(-2.0, -0.5, 1.0, 3.0), weights=(1.0, 0.5, 1.0, 0.2, 0.3, 0.4)),
+    hs.PreisachRelays(levels=(-1.0, 0.5, 1.0), weights=(1.0, 0.5, 1.0)),
 ]
 
 

@@ -152,9 +152,8 @@ def _names(chain: Chain, state: ChainState) -> list[str]:
 
 
 def _memory_names(law: Any, state: FloatArray) -> list[str]:
-    """The state that a law's `advance` hands on is the begin of its compiled one, of which the rest is scratch."""
-    advance = getattr(law, "advance", None)
-    size = len(advance(state[:1])[1]) if callable(advance) else state.size
+    """What a law with a memory z hands on is the begin of its compiled state, the rest scratch; others need all."""
+    size = len(law.advance(state[:1])[1]) if callable(getattr(law, "memory", None)) else state.size
     others = ["z"] if size == 2 else [f"z[{i}]" for i in range(size - 1)]
     return ["v", *others][:size]
 
