@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import bounded_laws, short_inputs
 
@@ -82,6 +82,7 @@ def rising_laws(draw) -> hs.Sum:
     return plays + friction + hs.Line(offset=0.2, slope=draw(st.floats(0.5, 2.0)))
 
 
+@settings(max_examples=min(15, settings.default.max_examples))
 @given(rising_laws(), short_inputs())
 def test_the_inverse_undoes_the_response(law, u):
     for model in (law, law >> hs.Line(slope=-2.0, offset=0.3)):
@@ -91,6 +92,12 @@ def test_the_inverse_undoes_the_response(law, u):
         assert model.response(back) == pytest.approx(y, abs=1e-11)
         resting = model.inverse_response(y[1:], u0=float(u[0]))
         assert resting == pytest.approx(u[1:], abs=1e-11)
+
+
+def test_a_way_that_is_shorter_than_rounding_is_gone_back_too():
+    law = hs.PrandtlIshlinskii(thresholds=(0.0, 0.1), weights=(0.5, 0.3)) + hs.Dahl() + hs.Line(offset=0.2, slope=1.0)
+    u = np.array([0.0, 1e-16, 0.3, -0.04, 0.0, 1e-16])
+    assert law.inverse_response(law.response(u), u0=0.0) == pytest.approx(u, abs=1e-15)
 
 
 def test_a_guess_that_is_short_by_rounding_is_not_doubled_away():
