@@ -80,6 +80,9 @@ def draw(rows: list[Row]) -> Figure:
             near = line["probability"] is None or line["probability"] >= 0.05
             ax.plot(scale * line[key], place, "o", color="#0072B2", markerfacecolor="#0072B2" if near else "white")
         ax.set_xlabel(name)
+    left.set_xscale("log")
+    left.set_xticks([30, 100, 300], ["30", "100", "300"])
+    left.minorticks_off()
     right.axvline(0.0, color="#777777", linewidth=0.8)
     left.set_yticks(range(len(rows)), [line["model"] for line in rows])
     left.invert_yaxis()

@@ -156,20 +156,21 @@ def main(smoke: bool = False) -> list[Row]:
 
 def draw(rows: list[Row]) -> Figure:
     """Efficiency of the tasks that take their time, and overhead of those that do not."""
-    canvas = figure(height=4.0)
+    canvas = figure(height=5.5)
     for place, (kinds, column, label) in enumerate(
         (
             (("10 ms in kernels", "fit", "laws on Table 1"), "efficiency_percent", "Efficiency [%]"),
             (("microsecond", "microsecond, stored"), "overhead_microseconds", "Overhead [us a task]"),
         )
     ):
-        ax = canvas.add_subplot(1, 2, place + 1)
+        ax = canvas.add_subplot(2, 1, place + 1)
         chosen = [line for line in rows if line["kind"] in kinds]
         ax.barh(
             [f"{line['kind']}, {line['workers']} {line['executor']}" for line in chosen],
             [line[column] for line in chosen],
         )
         ax.set(xlabel=label)
+        ax.invert_yaxis()
     return canvas
 
 
