@@ -251,3 +251,16 @@ def test_the_readme_quotes_the_classical_families():
         for model in ("law, dashpot and spring", "the law alone")
     )
     assert f"the sum is at most {whole:.2f} % off, the law alone {alone:.0f} %" in README
+
+
+def test_the_readme_quotes_the_studies():
+    rows = rows_of("sweep_study")
+    for measure in ("width", "area"):
+        strongest = max(
+            (row for row in rows if row["measure"] == measure), key=lambda row: abs(row["rank_correlation"])
+        )
+        assert strongest["parameter"] == "beta"
+    killed = json.loads((EXPERIMENTS[0].parent / "results" / "kill_and_resume" / "result.json").read_text())
+    assert all(row["in_time"] for row in killed["rows"])
+    told = f"a study of {killed['n_tasks']} tasks is killed at {len(killed['rows'])} random moments and resumed. "
+    assert told + f"{killed['columns_that_differ']} columns of its table differ" in README
