@@ -331,7 +331,6 @@ def test_a_missing_pandas_is_named_with_the_extra_that_brings_it(quick, monkeypa
 
 
 def test_the_picture_has_a_row_for_each_of_the_best_models(quick):
-    import matplotlib.pyplot as plt
 
     grid = hs.plot.comparison(quick)
     assert grid.shape == (4, 3)
@@ -342,4 +341,3 @@ def test_the_picture_has_a_row_for_each_of_the_best_models(quick):
     np.testing.assert_array_equal(chosen[0, 2].lines[1].get_ydata(), quick["Line"].loop.width)
     with pytest.raises(ValueError, match="no model to draw"):
         hs.plot.comparison(quick, [])
-    plt.close("all")

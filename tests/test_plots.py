@@ -9,7 +9,6 @@ import xml.etree.ElementTree as ET
 from types import SimpleNamespace
 
 import matplotlib
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -30,7 +29,6 @@ def settings_stay():
     before = dict(matplotlib.rcParams)
     yield
     assert dict(matplotlib.rcParams) == before
-    plt.close("all")
 
 
 @pytest.fixture(scope="module")
