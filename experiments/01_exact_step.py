@@ -124,7 +124,7 @@ def timed(method: Callable[[], np.ndarray], repeats: int) -> tuple[np.ndarray, f
 
 def main(smoke: bool = False) -> list[dict[str, float | str]]:
     """Measure, and unless it is a smoke run write table, figure and JSON."""
-    n_samples, repeats = (201, 1) if smoke else (5001, 5)
+    n_samples, repeats = (31, 1) if smoke else (5001, 5)
     u = two_tone(n_samples)
     rows: list[dict[str, float | str]] = []
     for n in (1.0, 1.5, 2.0):

@@ -16,8 +16,15 @@ import hypothesis  # noqa: E402  numba must not be imported before the cache fol
 import pytest  # noqa: E402
 
 uncompiled = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")  # a hundred times slower
-hypothesis.settings.register_profile("hysim", deadline=None, derandomize=True, max_examples=2 if uncompiled else 60)
+hypothesis.settings.register_profile("hysim", deadline=None, derandomize=True, max_examples=2 if uncompiled else 40)
 hypothesis.settings.load_profile("hysim")
+
+
+def pytest_collection_modifyitems(items):
+    """Under `--dist loadgroup` a file goes to one worker whole, and so do all files that need `reproduction`."""
+    for item in items:
+        of_paper = {"reproduction", "paper_study"} & set(item.fixturenames)
+        item.add_marker(pytest.mark.xdist_group("paper" if of_paper else item.path.stem))
 
 
 @pytest.fixture(autouse=True)
@@ -29,11 +36,17 @@ def pyplot_keeps_no_figure():
 
 
 @pytest.fixture(scope="session")
-def paper_study():
-    """The models of Table 1, identified once for all tests of the paper."""
-    from hysim.paper.study import study
+def reproduction(tmp_path_factory):
+    """The paper, reproduced once for all its tests."""
+    from hysim.paper import reproduce
 
-    return study(quick=True)
+    return reproduce(tmp_path_factory.mktemp("reproduction") / "out")
+
+
+@pytest.fixture(scope="session")
+def paper_study(reproduction):
+    """The models of Table 1."""
+    return reproduction.findings.study
 
 
 @pytest.fixture(scope="session")

@@ -13,15 +13,14 @@ from hysim.paper.reidentification import (
     information,
     printed_choices,
     printed_fits,
-    reidentify,
     time_units,
     without_means,
 )
 
 
 @pytest.fixture(scope="module")
-def found(paper_study):
-    return reidentify(paper_study.fits["tf-identified"])
+def found(reproduction):
+    return reproduction.findings.reidentification
 
 
 def test_equation_1_under_each_hold_and_sampling(found, paper_study):
