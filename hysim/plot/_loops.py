@@ -164,6 +164,10 @@ def animate(
         (behind,) = axes.plot([], [], color=line(0)["color"], linewidth=2.2)
         (point,) = axes.plot([], [], "o", color=line(1)["color"], markeredgecolor="black", markersize=7.0)
         axes.set(xlabel=label(units, "u"), ylabel=label(units, "y"))
+        engine = canvas.get_layout_engine()
+        if ax is None and engine is not None:
+            engine.execute(canvas)
+            canvas.set_layout_engine("none")  # what is laid out once need not be for every frame
 
     def move(k: int) -> tuple[Artist, ...]:
         passed = slice(tails[k], heads[k] + 1)

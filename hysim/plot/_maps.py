@@ -18,6 +18,7 @@ from hysim.records import Record
 from hysim.simulation import simulate
 
 _MOST_BINS = 40
+_SEAMLESS: dict[str, Any] = {"edgecolors": "face", "linewidth": 0.7, "antialiased": True}
 _Place = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
 _COORDINATES: dict[str, tuple[_Place, tuple[str, str]]] = {
     "thresholds": (lambda a, b: (b, a), ("Lower threshold b", "Upper threshold a")),
@@ -79,15 +80,15 @@ def residual_map(
     quantum, unit = (record.resolution, quanta) if record.resolution else (1.0, record.units.get("y", ""))
     edges, tables = _mean_residuals(record, _residual(record, model) / quantum, bins, tolerance)
     reach = max(float(np.nanmax(np.abs(table))) for table in tables if table.size) or 1.0
-    cells: dict[str, Any] = {"cmap": DIVERGING, "norm": Normalize(-reach, reach)}
+    scale: dict[str, Any] = {"cmap": DIVERGING, "norm": Normalize(-reach, reach)}
     with several(axes, 2, height=3.4, columns=2, sharey=True) as panels:
         for ax, table, name in zip(panels, tables, ("loading", "unloading"), strict=True):
             ax.grid(visible=False)
-            ax.pcolormesh(edges, np.arange(len(table) + 1) + 0.5, table, **cells)
+            ax.pcolormesh(edges, np.arange(len(table) + 1) + 0.5, table, **scale, **_SEAMLESS)
             ax.set_title(name, loc="left")
             ax.set(xlabel=label(record.units, "u"), ylabel="Cycle")
             ax.yaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
-        panels[0].figure.colorbar(ScalarMappable(**cells), ax=list(panels), label=in_unit("Residual", unit))
+        panels[0].figure.colorbar(ScalarMappable(**scale), ax=list(panels), label=in_unit("Residual", unit))
     return panels
 
 
@@ -152,16 +153,12 @@ def forc(
     with one(ax, height=4.8) as axes:
         axes.grid(visible=False)
         b, a = np.meshgrid(levels, levels)
-        cells = axes.pcolormesh(
-            *place(a, b), density, cmap=DIVERGING, norm=Normalize(-reach, reach), edgecolors="face", linewidth=0.3
-        )
+        cells = axes.pcolormesh(*place(a, b), density, cmap=DIVERGING, norm=Normalize(-reach, reach), **_SEAMLESS)
         corners = np.column_stack(place(levels[[0, -1, -1]], levels[[0, 0, -1]]))
         half = axes.add_patch(Polygon(corners, fill=False, edgecolor=GUIDE, linewidth=0.8))
         cells.set_clip_path(half)
         axes.set(**{f"{axis}label": in_unit(name, known.get("u", "")) for axis, name in zip("xy", names, strict=True)})
         axes.set(xlim=(corners[:, 0].min(), corners[:, 0].max()), ylim=(corners[:, 1].min(), corners[:, 1].max()))
-        axes.set_aspect("equal")
-        axes.locator_params(nbins=6)
         unit = f"{known['y']}/{known['u']}²" if {"u", "y"} <= known.keys() else ""
         axes.figure.colorbar(cells, ax=axes, label=in_unit("Density of relays", unit))
     return axes

@@ -92,9 +92,9 @@ def sweep(
     stop: float,
     *,
     amplitude: float,
+    mean: float = 0.0,
     n_samples: int,
     sample_time: float,
-    mean: float = 0.0,
     spacing: Literal["linear", "logarithmic"] = "linear",
 ) -> FloatArray:
     """A sine whose frequency runs from `start` to `stop`.
