@@ -1,7 +1,7 @@
 """The pictures of a page, drawn by the page's own blocks of Python.
 
-A picture that a page links in a folder is the figure that the blocks before the link have drawn last, or a file that
-they have written.
+An SVG that the page links is the figure that the blocks before the link have drawn last; another picture is a file
+that they have written.
 """
 
 import contextlib
@@ -25,6 +25,6 @@ def draw_pictures(page: Path, folder: Path) -> None:
         for part in _PARTS.finditer(page.read_text()):
             if part["block"] is not None:
                 exec(compile(part["block"], page.name, "exec"), namespace)
-            elif plt.get_fignums():
+            elif part["picture"].endswith(".svg"):
                 hs.plot.save_svg(plt.gcf(), Path(part["picture"]).name)
                 plt.close("all")
