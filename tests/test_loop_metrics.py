@@ -345,9 +345,9 @@ def test_a_line_has_its_slope_and_no_phase():
 
 def test_a_memory_that_decays_slowly_is_run_until_it_repeats():
     """Where z is nearly u the width is beta (a^2 - u^2): an area of 4 beta a^3 / 3."""
-    a, beta = 1e-4, 0.5
+    a, beta = 1e-3, 0.5
     (found,) = hs.metrics.describing_function(hs.BoucWen(beta=beta, gamma=0.0), [a])
-    assert found.imag == pytest.approx(4.0 * beta * a / (3.0 * math.pi), rel=1e-4)  # first order in beta a
+    assert found.imag == pytest.approx(4.0 * beta * a / (3.0 * math.pi), rel=1e-3)  # first order in beta a
 
 
 @pytest.mark.parametrize(
