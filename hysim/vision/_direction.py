@@ -17,7 +17,7 @@ from hysim.vision._result import Displacement
 _AXES = {"x": 0.0, "y": 90.0}
 _BESIDE_VERTICAL = 10.0  # within it, a direction that is found is positive down the picture [degree]
 _LEAST_COSINE = 0.1
-_SHARP = 0.7  # curvature of the correlation's peak, of the median one
+_SHARP = 0.8  # curvature of the correlation's peak, of the median one
 
 
 def along(
@@ -50,7 +50,7 @@ def along(
         shift=shift,
         across=scale * beside,
         quality=np.array([place.quality for place in located]),
-        status=_statuses(located),
+        status=_statuses(located, towards / np.linalg.norm(towards)),
         scale=scale,
         direction=angle,
         resolution=scale if whole else None,
@@ -110,11 +110,9 @@ def _towards(direction: FloatArray, seen: FloatArray) -> FloatArray:
     return shown / cosine**2
 
 
-def _statuses(located: Sequence[Location]) -> tuple[str, ...]:
-    sharpness = np.array([place.sharpness for place in located])
+def _statuses(located: Sequence[Location], direction: FloatArray) -> tuple[str, ...]:
+    """Blurred is a frame whose correlation has a flatter peak along the motion than the median one's."""
+    sharpness = np.array([direction @ place.sharpness[::-1, ::-1] @ direction for place in located])
     found = np.isfinite(sharpness)
-    sharp_enough = _SHARP * np.median(sharpness[found]) if found.any() else 0.0
-    return tuple(
-        "lost" if not known else "blurred" if value < sharp_enough else "ok"
-        for known, value in zip(found, sharpness, strict=True)
-    )
+    least = _SHARP * np.median(sharpness[found]) if found.any() else 0.0
+    return tuple("ok" if value >= least else "blurred" if value < least else "lost" for value in sharpness)

@@ -162,4 +162,4 @@ class Displacement:
         if (place < 0).any():
             k = int(np.argmax(place < 0))
             raise ValueError(f"frame {k} at {at[k]:g} is before the voltages, which begin at {log[0]:g}")
-        return voltages[place]
+        return np.asarray(voltages[place])

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from hysim._frozen import FloatArray
 from hysim.vision._locate import LOST, Location, locate
 from hysim.vision._template import Picture, Reference, Region
 
@@ -30,7 +31,7 @@ def against(reference: Reference, pictures: Iterable[Picture]) -> Iterator[Locat
 def running(reference: Reference, pictures: Iterable[Picture]) -> Iterator[Location]:
     """The same, with references that are taken anew; the first picture is the first reference."""
     region, guess, best = reference.region, np.zeros(2), 0.0
-    start = Location(np.zeros(2), np.zeros((2, 2)), 1.0, np.nan, 1.0)
+    start = replace(LOST, shift=np.zeros(2), covariance=np.zeros((2, 2)))
     last: tuple[Picture, Location] | None = None
     for k, picture in enumerate(pictures):
         found = _find(reference, picture, guess)
@@ -46,7 +47,7 @@ def running(reference: Reference, pictures: Iterable[Picture]) -> Iterator[Locat
         yield found
 
 
-def _find(reference: Reference, picture: Picture, guess: np.ndarray) -> Location:
+def _find(reference: Reference, picture: Picture, guess: FloatArray) -> Location:
     for start in (guess, np.zeros(2)):
         found = locate(reference, picture, start)
         if found.quality >= _FOUND:
@@ -56,7 +57,7 @@ def _find(reference: Reference, picture: Picture, guess: np.ndarray) -> Location
 
 def _moved(region: Region, place: Location, picture: Picture) -> Region:
     """The region where its content now is, as far as the picture goes."""
-    top, left = np.rint((region.top, region.left) + place.shift).astype(int)
+    top, left = np.rint(np.add((region.top, region.left), place.shift)).astype(int)
     return replace(
         region,
         top=int(np.clip(top, 0, picture.shape[0] - region.height)),

@@ -34,4 +34,4 @@ def window(length: int, cut: int, shift: float) -> FloatArray:
     high = length - 1 - _MARGIN - max(cut, 0) + shift
     x = np.arange(length)
     inside = np.minimum(x - low, high - x) / (_FLANK * (high - low))
-    return np.sin(0.5 * np.pi * inside.clip(0.0, 1.0)) ** 2
+    return np.asarray(np.sin(0.5 * np.pi * inside.clip(0.0, 1.0)) ** 2)
