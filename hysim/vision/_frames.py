@@ -3,8 +3,10 @@
 Colours become luminance, 0.2125 red + 0.7154 green + 0.0721 blue (ITU-R BT.709); an opacity is left out.
 """
 
+import logging
 import re
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +42,7 @@ class FrameSource:
     n_frames: int | None
 
     def __iter__(self) -> Iterator[Picture]:
-        frames = (frame for file in self.files for frame in _frames_of(file, single=self.path.is_dir()))
+        frames = (frame for file in self.files for frame in _frames_of(file))
         return grey_pictures(frames, self._name)
 
     def __length_hint__(self) -> int:
@@ -144,37 +146,61 @@ def _imageio() -> Any:
 
 
 def _count(file: Path) -> int | None:
+    """Frames in a file; None where it does not say. A file that does not open as what it is called is refused."""
     library, reader = _imageio(), _READERS[file.suffix.lower()]
     if reader == "pillow":
         return 1
-    try:
-        if reader == "tifffile":
-            with library.imopen(file, "r", plugin=reader) as opened:
-                return len(opened._fh.pages)
-        found = library.improps(file, plugin=reader, format=None).shape[0]
-    except Exception as error:  # each library has failures of its own kind
-        raise ValueError(f"{file}: cannot be read: {_line(error)}") from None
-    return int(found) if found > 0 else None
+    with _reading(file), library.imopen(file, "r", plugin=reader) as opened:
+        pages = {"page": ...} if reader == "tifffile" else {}
+        return opened.properties(index=..., **pages).n_images or None
 
 
-def _frames_of(file: Path, *, single: bool) -> Iterator[npt.NDArray[Any]]:
+def _frames_of(file: Path) -> Iterator[npt.NDArray[Any]]:
     library, reader = _imageio(), _READERS[file.suffix.lower()]
-    k, total = 0, _count(file)
-    try:
-        for frame in library.imiter(file, plugin=reader, **_video_format(library, file, reader)):
+    total, k = _count(file), 0
+    with _reading(file), library.imopen(file, "r", plugin=reader) as opened:
+        for frame in _opened(opened, reader):
             yield frame
             k += 1
-    except Exception as error:  # as above
-        raise ValueError(f"{file}: frame {k} cannot be read: {_line(error)}") from None
     if total is not None and k < total:
-        raise ValueError(f"{file}: ends after {k} of {total} frames: the file is truncated")
+        raise ValueError(f"{file}: the file is truncated: it ends after {k} of {total} frames")
 
 
-def _video_format(library: Any, file: Path, reader: str) -> dict[str, Any]:
-    if reader != "pyav":
-        return {}
-    stored = library.immeta(file, plugin=reader).get("pix_fmt", "")
-    return {"format": None if _GREY_VIDEO.fullmatch(stored) else "rgb24"}
+def _opened(opened: Any, reader: str) -> Iterable[npt.NDArray[Any]]:
+    if reader == "pillow":
+        frames: Iterable[npt.NDArray[Any]] = [opened.read(index=0)]
+    elif reader == "tifffile":
+        frames = opened.iter_pages()
+    else:
+        is_grey = _GREY_VIDEO.fullmatch(opened.metadata().get("video_format", ""))
+        frames = opened.iter(format=None if is_grey else "rgb24")
+    return frames
+
+
+class _Complaints(logging.Handler):
+    """Keeps what a log is told."""
+
+    def __init__(self, level: int) -> None:
+        super().__init__(level)
+        self.told: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.told.append(record.getMessage())
+
+
+@contextmanager
+def _reading(file: Path) -> Iterator[None]:
+    """Failures of the libraries, and what tifffile only tells its log, as one error that names the file."""
+    log, complaints = logging.getLogger("tifffile"), _Complaints(logging.ERROR)
+    log.addHandler(complaints)
+    try:
+        yield
+    except Exception as error:  # each library has failures of its own kinds
+        raise ValueError(f"{file}: not a readable {file.suffix} file: {_line(error)}") from None
+    finally:
+        log.removeHandler(complaints)
+    if complaints.told:
+        raise ValueError(f"{file}: the file is damaged or truncated: {complaints.told[0]}")
 
 
 def _line(error: Exception) -> str:

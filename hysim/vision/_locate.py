@@ -67,8 +67,8 @@ def locate(reference: Reference, frame: Picture, guess: FloatArray) -> Location:
         if not is_near:
             jump = reference.seen @ _jump(reference, view)
             is_near = float(np.abs(jump).max()) < _KNOWN
-            shift = shift + jump
             if np.abs(jump).max() > _NEAR:
+                shift = shift + jump
                 continue
         for _ in range(_STEPS):
             step, found = _step(reference, view, shift)
@@ -119,7 +119,7 @@ def _jump(reference: Reference, view: _View) -> FloatArray:
         space="fourier",
         normalization=None,
     )
-    return -scale * back - view.shift
+    return np.asarray(-scale * back - view.shift)
 
 
 def _step(reference: Reference, view: _View, shift: FloatArray) -> tuple[FloatArray, Location]:

@@ -76,8 +76,8 @@ class Grid:
         self.small = min(self.shape[0], _THUMBNAIL), min(self.shape[1], _THUMBNAIL)
         self.down = 2.0 * np.pi * np.fft.fftfreq(self.shape[0])
         self.right = 2.0 * np.pi * np.fft.rfftfreq(self.shape[1])
-        twice = np.where(self.right > 0.0, 2.0, 1.0) * (self.right < np.pi)
-        self.weights = np.outer(np.abs(self.down) < np.pi, twice / np.prod(self.shape)).astype(np.float32)
+        half = np.where((self.right > 0.0) & (self.right < np.pi), 2.0, 1.0)
+        self.weights = (half / np.prod(self.shape)).astype(np.float32)
 
     def spectrum(self, patch: Picture) -> Spectrum:
         """Half plane of a real patch."""
@@ -120,7 +120,9 @@ class Reference:
         light = [W * r, W, W * _centred(self.region.height)[:, None], W * _centred(self.region.width)]
         h = _without([W * slope for slope in self._smooth], light)
         flanks = [r * np.gradient(down, axis=0) * right, r * down * np.gradient(right)]
-        inverse = np.linalg.pinv(self.seen @ _products(h, [W * slope for slope in self._slopes]) @ self.seen)
+        inverse: FloatArray = np.linalg.pinv(
+            self.seen @ _products(h, [W * slope for slope in self._slopes]) @ self.seen
+        )
         noise = [W * one for one in h]
         spectrum, weights = self.grid.spectrum(W * r), self.grid.weights
         return Template(
