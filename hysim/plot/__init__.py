@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from hysim.plot._comparisons import comparison, loops, residuals, widths
 from hysim.plot._discoveries import selection
+from hysim.plot._frames import displacement
 from hysim.plot._identifications import identification
 from hysim.plot._records import history, loop, response, traces
 from hysim.plot._style import figure, house_style, panels
@@ -21,6 +22,7 @@ __all__ = [
     "Axes",
     "Figure",
     "comparison",
+    "displacement",
     "figure",
     "heat_map",
     "history",

@@ -79,9 +79,9 @@ def _found(shift: FloatArray, covariance: FloatArray, seen: FloatArray) -> float
         found = np.isfinite(shift[:, 0])
         if not found.any():
             return 0.0
-        off = shift[found] - shift[found].mean(axis=0)
-        values, vectors = np.linalg.eigh(off.T @ off / found.sum() - covariance[found].mean(axis=0))
-        if values[1] <= 0.0:
+        off, noise = shift[found] - shift[found].mean(axis=0), covariance[found].mean(axis=0)
+        values, vectors = np.linalg.eigh(off.T @ off / found.sum() - noise)
+        if values[1] <= np.trace(noise):
             return 0.0
         vector = vectors[:, 1]
     angle = math.degrees(math.atan2(vector[1], vector[0]))

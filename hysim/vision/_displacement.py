@@ -87,8 +87,8 @@ def displacement(
     >>> import numpy as np, hysim as hs
     >>> rows, columns = np.mgrid[0.0:64.0, 0.0:64.0]
     >>> frames = [np.exp(-((rows - 30.0) ** 2 + (columns - 30.0 - d) ** 2) / 50.0) for d in (0.0, 0.25, 1.5)]
-    >>> hs.vision.displacement(frames, scale=0.0763, direction="x").y.round(4).tolist()
-    [0.0, 0.0191, 0.1144]
+    >>> hs.vision.displacement(frames, scale=0.0763, direction="x").y[1:].round(4).tolist()
+    [0.0191, 0.1144]
     """
     if method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")

@@ -80,20 +80,18 @@ def read_frames(path: str | Path) -> FrameSource:
     --------
     >>> import hysim as hs
     >>> try:
-    ...     hs.vision.read_frames("stairs.txt")
-    ... except ValueError as error:
+    ...     hs.vision.read_frames("stairs.avi")
+    ... except FileNotFoundError as error:
     ...     print(error)
-    stairs.txt: frames are read from a folder of PNG or TIFF files, or from a PNG, TIFF, AVI or MP4 file
+    stairs.avi: there is no such file or folder
     """
     source = Path(path)
-    if source.suffix.lower() not in _READERS and not source.is_dir():
-        if source.exists() or source.suffix:
-            raise ValueError(
-                f"{source}: frames are read from a folder of PNG or TIFF files, or from a PNG, TIFF, AVI or MP4 file"
-            )
-        raise FileNotFoundError(f"{source}: there is no such file or folder")
     if not source.exists():
         raise FileNotFoundError(f"{source}: there is no such file or folder")
+    if source.suffix.lower() not in _READERS and not source.is_dir():
+        raise ValueError(
+            f"{source}: frames are read from a folder of PNG or TIFF files, or from a PNG, TIFF, AVI or MP4 file"
+        )
     if not source.is_dir():
         return FrameSource(path=source, files=(source,), n_frames=_count(source))
     files = sorted((file for file in source.iterdir() if file.suffix.lower() in _STILL), key=_natural)
@@ -120,12 +118,15 @@ def _grey(frame: npt.NDArray[Any], name: str) -> Picture:
     if frame.dtype.kind not in "buif":
         raise TypeError(f"{name} must hold real numbers, got {frame.dtype}")
     if frame.ndim == 3 and frame.shape[2] in (3, 4):
-        return np.asarray(frame[:, :, :3].astype(np.float32) @ _LUMINANCE)
-    if frame.ndim == 3 and frame.shape[2] in (1, 2):
+        frame = frame[:, :, :3].astype(np.float32) @ _LUMINANCE
+    elif frame.ndim == 3 and frame.shape[2] in (1, 2):
         frame = frame[:, :, 0]
     if frame.ndim != 2:
         raise ValueError(f"{name} must have the shape (height, width) or (height, width, 3 or 4), got {frame.shape}")
-    return frame.astype(np.float32)
+    picture = frame.astype(np.float32)
+    if not np.isfinite(picture.sum()):
+        raise ValueError(f"{name} must be finite: it holds nan or infinity")
+    return picture
 
 
 def _size(shape: tuple[int, ...]) -> str:

@@ -68,6 +68,19 @@ class Displacement:
     def __len__(self) -> int:
         return self.y.size
 
+    def summary(self) -> str:
+        """Frames by status, the range of the displacement and its median standard error, in words."""
+        counts = ", ".join(f"{n} {status}" for status in STATUSES if (n := self.status.count(status)))
+        lines = [f"{len(self)} frames: {counts}", f"direction {self.direction:.2f} degrees from the right, downwards"]
+        found = np.isfinite(self.y)
+        if found.any():
+            error = float(np.median(self.uncertainty[found]))
+            lines += [
+                f"displacement from {self.y[found].min():.6g} to {self.y[found].max():.6g} {self.units['y']}",
+                f"standard error {error:.2g} {self.units['y']}, {error / self.scale:.2g} pixel",
+            ]
+        return "\n".join(lines)
+
     def record(
         self,
         u: npt.ArrayLike,

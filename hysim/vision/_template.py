@@ -32,7 +32,7 @@ _SMOOTHING = 1.5  # of the templates [pixel]
 _SLOPE = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0  # derivative over unit steps, of the sixth order
 _NOISE_SLOPE = 1.0 / (8.0 * np.pi * _SMOOTHING**4)  # energy of the smoothed slope of white noise of unit variance
 _NOISE_OR_FINE = 0.5  # of the structure across: what is stronger is no noise, but as fine as noise
-_TEMPLATES = 16  # kept at a time
+_TEMPLATES = 8  # kept at a time
 
 
 @dataclass(frozen=True)
@@ -120,9 +120,8 @@ class Reference:
         light = [W * r, W, W * _centred(self.region.height)[:, None], W * _centred(self.region.width)]
         h = _without([W * slope for slope in self._smooth], light)
         flanks = [r * np.gradient(down, axis=0) * right, r * down * np.gradient(right)]
-        inverse: FloatArray = np.linalg.pinv(
-            self.seen @ _products(h, [W * slope for slope in self._slopes]) @ self.seen
-        )
+        steepness = self.seen @ _products(h, [W * slope for slope in self._slopes]) @ self.seen
+        inverse = np.asarray(np.linalg.pinv(steepness), dtype=np.float64)
         noise = [W * one for one in h]
         spectrum, weights = self.grid.spectrum(W * r), self.grid.weights
         return Template(
