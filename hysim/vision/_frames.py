@@ -42,7 +42,10 @@ class FrameSource:
     n_frames: int | None
 
     def __iter__(self) -> Iterator[Picture]:
-        frames = (frame for file in self.files for frame in _frames_of(file))
+        if self.path.is_dir():
+            frames = (frame for file in self.files for frame in _frames_of(file, 1))
+        else:
+            frames = _frames_of(self.path, self.n_frames)
         return grey_pictures(frames, self._name)
 
     def __length_hint__(self) -> int:
@@ -156,15 +159,16 @@ def _count(file: Path) -> int | None:
         return opened.properties(index=..., **pages).n_images or None
 
 
-def _frames_of(file: Path) -> Iterator[npt.NDArray[Any]]:
+def _frames_of(file: Path, expected: int | None) -> Iterator[npt.NDArray[Any]]:
     library, reader = _imageio(), _READERS[file.suffix.lower()]
-    total, k = _count(file), 0
+    k = 0
     with _reading(file), library.imopen(file, "r", plugin=reader) as opened:
-        for frame in _opened(opened, reader):
+        for k, frame in enumerate(_opened(opened, reader), start=1):
             yield frame
-            k += 1
-    if total is not None and k < total:
-        raise ValueError(f"{file}: the file is truncated: it ends after {k} of {total} frames")
+    if expected == 1 and k > 1:
+        raise ValueError(f"{file}: there are {k} frames in this file: in a folder each file is one frame")
+    if expected is not None and k < expected:
+        raise ValueError(f"{file}: the file is truncated: it ends after {k} of {expected} frames")
 
 
 def _opened(opened: Any, reader: str) -> Iterable[npt.NDArray[Any]]:

@@ -139,7 +139,7 @@ def _step(reference: Reference, view: _View, shift: FloatArray) -> tuple[FloatAr
     found = Location(
         shift=shift + step,
         covariance=variance * template.spread,
-        quality=correlation / math.sqrt(template.energy * view.energy),
+        quality=min(correlation / math.sqrt(template.energy * view.energy), 1.0),
         sharpness=template.inverse @ curvature / gain,
         overlap=view.overlap,
     )
