@@ -42,11 +42,8 @@ class FrameSource:
     n_frames: int | None
 
     def __iter__(self) -> Iterator[Picture]:
-        if self.path.is_dir():
-            frames = (frame for file in self.files for frame in _frames_of(file, 1))
-        else:
-            frames = _frames_of(self.path, self.n_frames)
-        return grey_pictures(frames, self._name)
+        expected = 1 if self.path.is_dir() else self.n_frames
+        return grey_pictures((frame for file in self.files for frame in _frames_of(file, expected)), self._name)
 
     def __length_hint__(self) -> int:
         return NotImplemented if self.n_frames is None else self.n_frames
@@ -163,7 +160,8 @@ def _frames_of(file: Path, expected: int | None) -> Iterator[npt.NDArray[Any]]:
     library, reader = _imageio(), _READERS[file.suffix.lower()]
     k = 0
     with _reading(file), library.imopen(file, "r", plugin=reader) as opened:
-        for k, frame in enumerate(_opened(opened, reader), start=1):
+        for frame in _opened(opened, reader):
+            k += 1
             yield frame
     if expected == 1 and k > 1:
         raise ValueError(f"{file}: there are {k} frames in this file: in a folder each file is one frame")
