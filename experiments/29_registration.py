@@ -162,7 +162,7 @@ def stream(n: int, size: int, spent: list[float]) -> Iterator[npt.NDArray[np.uin
 
 
 def timed(n: int, size: int) -> dict[str, float]:
-    """Frames a second of processor time without that to make them, and the most memory that the process has had [MiB]."""
+    """Frames a second of processor time, without that to make them, and the most memory of the process [MiB]."""
     import resource
 
     hs.vision.displacement(stream(3, size, []), 1.0)

@@ -115,6 +115,8 @@ def _source(frames: Any) -> tuple[Iterable[Any], int]:
         raise ValueError(
             f"frames must have the shape (n, height, width) or (n, height, width, 3 or 4), got {frames.shape}"
         )
+    if not isinstance(frames, Iterable):
+        raise TypeError(f"frames must be an array, a path or give one frame after the other, got {frames!r}")
     return frames, operator.length_hint(frames)
 
 
@@ -136,10 +138,11 @@ def _pictures(frames: Iterable[Any], reference: Any) -> tuple[Picture, Iterator[
 
 
 def _region(sides: tuple[int, int, int, int] | None, shape: tuple[int, int]) -> Region:
-    top, bottom, left, right = (0, shape[0], 0, shape[1]) if sides is None else map(operator.index, sides)
+    inside = (0, shape[0], 0, shape[1]) if sides is None else tuple(map(operator.index, sides))
+    top, bottom, left, right = inside if len(inside) == 4 else (-1, 0, 0, 0)
     if not (0 <= top < bottom <= shape[0] and 0 <= left < right <= shape[1]):
         raise ValueError(
-            f"region must be (top, bottom, left, right) inside {shape[0]} x {shape[1]} pixels, got {tuple(sides or ())}"
+            f"region must be (top, bottom, left, right) inside {shape[0]} x {shape[1]} pixels, got {inside}"
         )
     if min(bottom - top, right - left) < _SMALLEST:
         raise ValueError(

@@ -18,6 +18,7 @@ _ROUNDS = 8
 _STEPS = 3  # in one position of the windows
 _SETTLED = 0.02  # a step that is smaller leaves less than a thousandth [pixel]
 _NEAR = 0.25  # as far as steps go before the windows follow [pixel]
+_ASTRAY = 1.0  # steps that lead further go elsewhere [pixel]
 _KNOWN = 2.0  # after a jump that is shorter the thumbnails have said what they can [pixel]
 _PARTS = 4  # of a pixel in which the thumbnails look
 _OVERLAP = 0.5  # of the region's length, the least
@@ -56,6 +57,10 @@ class _View:
     shift: FloatArray
     overlap: float
 
+    def distance(self, shift: FloatArray) -> float:
+        """From the place of the windows, along the axis on which it is larger [pixel]."""
+        return float(np.abs(shift - self.origin - self.shift).max())
+
 
 def locate(reference: Reference, frame: Picture, guess: FloatArray) -> Location:
     """The shift of the reference's region in the frame, looked for within half the region of the guess."""
@@ -70,16 +75,25 @@ def locate(reference: Reference, frame: Picture, guess: FloatArray) -> Location:
             if np.abs(jump).max() > _NEAR:
                 shift = shift + jump
                 continue
-        for _ in range(_STEPS):
-            step, found = _step(reference, view, shift)
-            shift = shift + step
-            if np.abs(step).max() < _SETTLED:
-                return found
-            if not np.abs(shift - view.origin - view.shift).max() < _NEAR:
-                break
-        if not np.abs(step).max() < 1.0:
+        found, is_settled = _settle(reference, view, shift)
+        if is_settled:
+            return found
+        shift = found.shift
+        if not view.distance(shift) < _ASTRAY:
             return LOST
     return LOST
+
+
+def _settle(reference: Reference, view: _View, shift: FloatArray) -> tuple[Location, bool]:
+    """Steps until one is small enough, which is True, or the windows should follow."""
+    for _ in range(_STEPS):
+        found = _step(reference, view, shift)
+        if np.abs(found.shift - shift).max() < _SETTLED:
+            return found, True
+        shift = found.shift
+        if not view.distance(shift) < _NEAR:
+            break
+    return found, False
 
 
 def _view(reference: Reference, frame: Picture, shift: FloatArray) -> _View | None:
@@ -122,7 +136,8 @@ def _jump(reference: Reference, view: _View) -> FloatArray:
     return np.asarray(-scale * back - view.shift)
 
 
-def _step(reference: Reference, view: _View, shift: FloatArray) -> tuple[FloatArray, Location]:
+def _step(reference: Reference, view: _View, shift: FloatArray) -> Location:
+    """Where one step from the shift leads."""
     grid, template = reference.grid, view.template
     down, right = grid.phases(shift - view.origin)
     steep = np.stack([right, 1j * grid.right * right], axis=1).astype(np.complex64)
@@ -132,15 +147,14 @@ def _step(reference: Reference, view: _View, shift: FloatArray) -> tuple[FloatAr
     curvature = np.array([[((1j * grid.down * down) @ row[:, 0]).real, (down @ row[:, 1]).real] for row in rows])
     gain = correlation / template.energy
     if not gain > 0.0:
-        return np.full(2, np.nan), LOST
+        return LOST
     behind = shift - view.origin - view.shift
     step = -template.inverse @ (scores / gain - template.flanks @ behind)
     variance = max(view.energy - correlation**2 / template.energy, 0.0) / template.weight / gain**2
-    found = Location(
+    return Location(
         shift=shift + step,
         covariance=variance * template.spread,
         quality=min(correlation / math.sqrt(template.energy * view.energy), 1.0),
         sharpness=template.inverse @ curvature / gain,
         overlap=view.overlap,
     )
-    return step, found

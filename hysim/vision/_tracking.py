@@ -36,9 +36,10 @@ def running(reference: Reference, pictures: Iterable[Picture]) -> Iterator[Locat
     for k, picture in enumerate(pictures):
         found = _find(reference, picture, guess)
         if last is not None and (found.quality < _CHANGED * best or found.overlap < _LEFT_OVER):
-            old, start = last
-            reference, guess, best, last = Reference(old, _moved(region, start, old)), np.zeros(2), 0.0, None
-            found = _find(reference, picture, guess)
+            anew = Reference(last[0], _moved(region, last[1], last[0]))
+            again = _find(anew, picture, np.zeros(2))
+            if again.is_found:
+                reference, start, found, best, last = anew, last[1], again, 0.0, None
         if found.is_found:
             guess = found.shift
             found = replace(found, shift=start.shift + found.shift, covariance=start.covariance + found.covariance)
