@@ -205,7 +205,7 @@ def draw(rows: list[Row]) -> Figure:
             ax.semilogy([r["snr_db"] for r in own], [r["rms_px"] for r in own], style, markersize=4, label=method)
         ax.plot((30, 20), (0.02, 0.05), "_", color="#333333", markersize=16, label="asked for")
         ax.set(title=kind, xlabel="Picture over noise [dB]", ylabel="rms error [pixel]")
-    lines[0].legend(fontsize=8)
+    canvas.legend(*lines[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return canvas
 
 
