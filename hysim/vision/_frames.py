@@ -75,6 +75,8 @@ def read_frames(path: str | Path) -> FrameSource:
     ValueError
         If there are no frames, a file is no picture or video, or is truncated, or, while iterating, a frame has
         another size than the first one. The message is one line that names the file and the frame.
+    ImportError
+        If imageio is not installed.
 
     Examples
     --------
@@ -142,7 +144,7 @@ def _imageio() -> Any:
     try:
         import imageio.v3
     except ImportError:
-        raise ValueError("reading frames needs imageio: pip install 'hysim[vision]'") from None
+        raise ImportError("reading frames needs imageio: pip install 'hysim[vision]'") from None
     return imageio.v3
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.vision._template import Picture, Reference, Spectrum, Template, without_mean
+from hysim.vision._template import Picture, Reference, Spectrum, Template, without_plane
 from hysim.vision._windows import cut
 
 _ROUNDS = 8
@@ -110,7 +110,7 @@ def _view(reference: Reference, frame: Picture, shift: FloatArray) -> _View | No
     if overlap < _OVERLAP:
         return None
     down, right = reference.windows(cuts, rest)
-    patch = without_mean(region.of(frame, (offset[0], offset[1])), down, right) * down * right
+    patch = without_plane(region.of(frame, (offset[0], offset[1])), down, right) * down * right
     energy = float(np.vdot(patch, patch))
     if energy <= 0.0:
         return None

@@ -29,7 +29,7 @@ class Displacement:
     across : array, shape (n,)
         Displacement across the direction, a quarter turn on [``units["y"]``]; nan where the picture cannot show it.
     quality : array, shape (n,)
-        Correlation with the reference, 1 where the frame is the same but for gain and offset.
+        Correlation with the reference, 1 where the frame is the same but for gain, offset and slope of the light.
     status : tuple of str
         ``"ok"``, ``"blurred"`` or ``"lost"``, for each frame.
     scale : float

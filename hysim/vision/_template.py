@@ -32,6 +32,7 @@ _SMOOTHING = 1.5  # of the templates [pixel]
 _SLOPE = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0  # derivative over unit steps, of the sixth order
 _NOISE_SLOPE = 1.0 / (8.0 * np.pi * _SMOOTHING**4)  # energy of the smoothed slope of white noise of unit variance
 _NOISE_OR_FINE = 0.5  # of the structure across: what is stronger is no noise, but as fine as noise
+_FAINT = 1e-3  # of the structure across, the least: what digits and pixels make of a straight edge is less
 _TEMPLATES = 8  # kept at a time
 
 
@@ -54,8 +55,8 @@ class Region:
 class Template:
     """The reference under one window; the spectra are conjugated and weighted for sums over the half plane.
 
-    `patch` is W r, of some `energy`; `slopes` are the h_i; `inverse` is J^-1 where the region has structure and zero
-    across, `flanks` is Q, `spread` is J^-1 M J^-T, and `weight` is the sum of W^2.
+    `patch` is W r, r without its plane, and has some `energy`; `slopes` are the h_i; `inverse` is J^-1 where the region
+    has structure and zero across; `flanks` is Q, `spread` is J^-1 M J^-T, and `weight` is the sum of W^2.
     """
 
     patch: Spectrum
@@ -116,8 +117,8 @@ class Reference:
 
     def _template(self, cuts: tuple[int, int]) -> Template:
         down, right = self.windows(cuts, np.zeros(2))
-        W, r = down * right, without_mean(self._patch, down, right)
-        light = [W * r, W, W * _centred(self.region.height)[:, None], W * _centred(self.region.width)]
+        W, r = down * right, without_plane(self._patch, down, right)
+        light = [W * r, W, W * _centred(down[:, 0])[:, None], W * _centred(right)]
         h = _without([W * slope for slope in self._smooth], light)
         flanks = [r * np.gradient(down, axis=0) * right, r * down * np.gradient(right)]
         steepness = self.seen @ _products(h, [W * slope for slope in self._slopes]) @ self.seen
@@ -144,14 +145,20 @@ class Reference:
         if not values[1] > 0.0:
             raise ValueError("the region of the reference is of one grey: there is nothing that can be seen to move")
         noise = _NOISE_SLOPE * _noise_variance(self._patch) * float(np.vdot(W, W))
-        kept = vectors[:, (values > 2.0 * noise) | (values > _NOISE_OR_FINE * values[1])]
+        floor = max(2.0 * noise, _FAINT * values[1])
+        kept = vectors[:, values > min(floor, _NOISE_OR_FINE * values[1])]
         return np.asarray(kept @ kept.T)
 
 
-def without_mean(patch: Picture, down: Picture, right: Picture) -> Picture:
-    """The patch without its mean under the window."""
+def without_plane(patch: Picture, down: Picture, right: Picture) -> Picture:
+    """The patch without the plane that is nearest to it under the window."""
     rows, columns = down[:, 0] ** 2, right**2
-    return patch - np.float32((rows @ patch @ columns) / (rows.sum() * columns.sum()))
+    y, x = _centred(rows), _centred(columns)
+    sums = np.stack([rows, rows * y]) @ patch @ np.stack([columns, columns * x], axis=1)
+    up = sums[1, 0] / (rows @ y**2 * columns.sum())
+    along = sums[0, 1] / (rows.sum() * (columns @ x**2))
+    plane: Picture = (sums[0, 0] / (rows.sum() * columns.sum()) + up * y)[:, None] + along * x
+    return np.asarray(patch - plane)
 
 
 def _without(pictures: list[Picture], light: list[Picture]) -> list[Picture]:
@@ -167,9 +174,10 @@ def _products(left: list[Picture], right: list[Picture]) -> FloatArray:
     return np.array([[float(np.vdot(a, b)) for b in right] for a in left])
 
 
-def _centred(length: int) -> Picture:
-    """Places along an axis from -1 to 1."""
-    return np.linspace(-1.0, 1.0, length, dtype=np.float32)
+def _centred(weights: Picture) -> Picture:
+    """Places along an axis from the centre of the weights [pixel]."""
+    places = np.arange(weights.size, dtype=np.float32)
+    return np.asarray(places - np.float32(weights @ places / weights.sum()))
 
 
 def _noise_variance(patch: Picture) -> float:
