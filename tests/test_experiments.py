@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 EXPERIMENTS = sorted((Path(__file__).parent.parent / "experiments").glob("[0-9]*.py"))
+NEEDS = {"29_registration": "skimage"}  # experiments that need an extra
 
 
 README = " ".join((EXPERIMENTS[0].parent.parent / "README.md").read_text().split())
@@ -14,6 +15,8 @@ README = " ".join((EXPERIMENTS[0].parent.parent / "README.md").read_text().split
 
 @pytest.mark.parametrize("path", EXPERIMENTS, ids=lambda path: path.stem)
 def test_smoke(path, monkeypatch, tmp_path):
+    if path.stem in NEEDS:
+        pytest.importorskip(NEEDS[path.stem])
     spec = importlib.util.spec_from_file_location(path.stem, path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

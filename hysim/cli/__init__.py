@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from hysim import __version__
-from hysim.cli import compare, discover, identify, metrics, plot, reproduce, simulate, sweep
+from hysim.cli import compare, discover, identify, measure, metrics, plot, reproduce, simulate, sweep
 from hysim.errors import SimulationError
 
-COMMANDS = (identify, discover, compare, metrics, simulate, plot, sweep, reproduce)
+COMMANDS = (identify, discover, compare, metrics, simulate, plot, sweep, measure, reproduce)
 
 
 class _Parser(argparse.ArgumentParser):

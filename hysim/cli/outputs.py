@@ -77,12 +77,13 @@ def loop_svg(*results: "Record | Simulation") -> str:
 
 
 def progress() -> Callable[[int, int], None] | None:
-    """A counter on the standard error, if that is a terminal."""
+    """A counter on the standard error, if that is a terminal; a total of 0 is one that is not known."""
     if not sys.stderr.isatty():
         return None
 
     def show(done: int, total: int) -> None:
-        print(f"\r{done}/{total}", end="\n" if done >= total else "", file=sys.stderr, flush=True)
+        text = f"{done}/{total}" if total else f"{done}"
+        print(f"\r{text}", end="\n" if 0 < total <= done else "", file=sys.stderr, flush=True)
 
     return show
 

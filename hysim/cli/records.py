@@ -52,9 +52,9 @@ def read(options: argparse.Namespace) -> Record:
         source = getattr(sys.stdin, "buffer", sys.stdin)
     record: Record = load(
         source,
-        u=_column(options.u),
-        y=_column(getattr(options, "y", options.u)),
-        t=None if options.t is None else _column(options.t),
+        u=column(options.u),
+        y=column(getattr(options, "y", options.u)),
+        t=None if options.t is None else column(options.t),
         on_missing=options.on_missing,
         delimiter=_DELIMITERS.get(options.delimiter, options.delimiter),
         decimal=options.decimal,
@@ -80,5 +80,6 @@ def unit(text: str) -> tuple[str, str]:
     return signal, label
 
 
-def _column(text: str) -> str | int:
+def column(text: str) -> str | int:
+    """A column by its name, or by its number from 0."""
     return int(text) if text.isascii() and text.isdigit() else text

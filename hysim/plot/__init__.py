@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from hysim.plot._comparisons import comparison, loops, residuals, widths
 from hysim.plot._discoveries import selection
+from hysim.plot._frames import displacement
 from hysim.plot._harmonics import describing_function
 from hysim.plot._identifications import identification
 from hysim.plot._loops import animate, minor_loops, width
@@ -28,6 +29,7 @@ __all__ = [
     "animate",
     "comparison",
     "describing_function",
+    "displacement",
     "figure",
     "forc",
     "heat_map",

@@ -1,0 +1,178 @@
+"""What `displacement` returns."""
+
+from collections.abc import Mapping
+from dataclasses import field
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, frozen, read_only
+from hysim.records import Record
+
+STATUSES = ("ok", "blurred", "lost")
+_ROUNDING = 1e-9  # of a log's span: a frame at the very time of a switch sees the new voltage
+
+
+@frozen
+class Displacement:
+    """How far the picture has moved, frame by frame.
+
+    Parameters
+    ----------
+    y : array, shape (n,)
+        Displacement along the direction from where the reference is [``units["y"]``]; nan where a frame is lost.
+    uncertainty : array, shape (n,)
+        Its standard error, from the noise in both frames [``units["y"]``].
+    shift : array, shape (n, 2)
+        The same to the right and down [pixel].
+    across : array, shape (n,)
+        Displacement across the direction, a quarter turn on [``units["y"]``]; nan where the picture cannot show it.
+    quality : array, shape (n,)
+        Correlation with the reference, 1 where the frame is the same but for gain, offset and slope of the light.
+    status : tuple of str
+        ``"ok"``, ``"blurred"`` or ``"lost"``, for each frame.
+    scale : float
+        Length of a pixel [``units["y"]``].
+    direction : float
+        Direction in which `y` is positive: 0 to the right, 90 down the picture [degree].
+    resolution : float or None
+        The scale, where shifts are whole pixels; None where they are not.
+    units : mapping
+        Label of the unit of ``"y"``.
+
+    Raises
+    ------
+    ValueError
+        If the lengths differ.
+    """
+
+    y: FloatArray
+    uncertainty: FloatArray
+    shift: FloatArray
+    across: FloatArray
+    quality: FloatArray
+    status: tuple[str, ...]
+    scale: float
+    direction: float
+    resolution: float | None = None
+    units: Mapping[str, str] = field(default_factory=lambda: {"y": "um"})
+
+    def __post_init__(self) -> None:
+        lengths = {
+            name: len(getattr(self, name)) for name in ("y", "uncertainty", "shift", "across", "quality", "status")
+        }
+        if len(set(lengths.values())) > 1:
+            raise ValueError(f"a displacement has one value of each kind for each frame, got {lengths}")
+
+    def __len__(self) -> int:
+        return self.y.size
+
+    def summary(self) -> str:
+        """Frames by status, the range of the displacement and its median standard error, in words."""
+        counts = ", ".join(f"{n} {status}" for status in STATUSES if (n := self.status.count(status)))
+        lines = [f"{len(self)} frames: {counts}", f"direction {self.direction:.2f} degrees from the right, downwards"]
+        found = np.isfinite(self.y)
+        if found.any():
+            error = float(np.median(self.uncertainty[found]))
+            lines += [
+                f"displacement from {self.y[found].min():.6g} to {self.y[found].max():.6g} {self.units['y']}",
+                f"standard error {error:.2g} {self.units['y']}, {error / self.scale:.2g} pixel",
+            ]
+        return "\n".join(lines)
+
+    def record(
+        self,
+        u: npt.ArrayLike,
+        t: npt.ArrayLike | None = None,
+        *,
+        frame_times: npt.ArrayLike | None = None,
+        u_times: npt.ArrayLike | None = None,
+        on_lost: Literal["error", "drop"] = "error",
+        units: Mapping[str, str] | None = None,
+        name: str = "",
+    ) -> Record:
+        """Join the voltages that were applied, frame by frame or by the time of a log.
+
+        Parameters
+        ----------
+        u : array, shape (n,) or (m,)
+            Voltages: one for each frame, or those of a log.
+        t : array, shape (n,), optional
+            Times of the frames for the record [``units["t"]``].
+        frame_times : array, shape (n,), optional
+            Times of the frames in the clock of the log [``units["t"]``]; the record's times too, unless `t` is given.
+        u_times : array, shape (m,), optional
+            Increasing times of the log. A frame has the last voltage that was logged at or before its time.
+        on_lost : {"error", "drop"}
+            What to do where a frame is lost: raise, or leave it out.
+        units : mapping, optional
+            Labels of the units of ``"t"`` and ``"u"``; by default s and V.
+        name : str, optional
+            Name of the record.
+
+        Returns
+        -------
+        Record
+            With the displacement's unit and resolution.
+
+        Raises
+        ------
+        ValueError
+            If there are fewer or more voltages than frames, a frame comes before the log begins, or a frame is lost.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> moved = hs.vision.Displacement(
+        ...     y=[0.0, 0.1, 0.3], uncertainty=[0.0, 0.01, 0.01], shift=[[0, 0], [1, 0], [3, 0]], across=[0, 0, 0],
+        ...     quality=[1, 0.99, 0.99], status=("ok", "ok", "ok"), scale=0.1, direction=0.0,
+        ... )
+        >>> rec = moved.record(u=[0.0, 5.0], u_times=[0.0, 1.0], frame_times=[0.5, 1.0, 1.5])
+        >>> rec.u.tolist(), rec.t.tolist()
+        ([0.0, 5.0, 5.0], [0.5, 1.0, 1.5])
+        """
+        if on_lost not in ("error", "drop"):
+            raise ValueError(f'on_lost must be "error" or "drop", got {on_lost!r}')
+        at = None if frame_times is None else self._per_frame(frame_times, "frame_times")
+        voltages = self._voltages(u, at, u_times)
+        times = at if t is None else self._per_frame(t, "t")
+        found = np.isfinite(self.y)
+        if on_lost == "error" and not found.all():
+            raise ValueError(
+                f"frame {int(np.argmin(found))} is lost, and {int((~found).sum())} of {len(self)} are: "
+                'on_lost="drop" leaves them out'
+            )
+        return Record(
+            u=voltages[found],
+            y=self.y[found],
+            t=None if times is None else times[found],
+            units={"u": "V", "t": "s", **(units or {}), **self.units},
+            resolution=self.resolution,
+            name=name,
+        )
+
+    def _per_frame(self, values: npt.ArrayLike, name: str) -> FloatArray:
+        array = read_only(values, name, ndim=1)
+        if array.size != len(self):
+            raise ValueError(f"{name} must have one value for each of the {len(self)} frames, got {array.size}")
+        return array
+
+    def _voltages(self, u: npt.ArrayLike, at: FloatArray | None, u_times: npt.ArrayLike | None) -> FloatArray:
+        voltages = read_only(u, "u", ndim=1)
+        if u_times is None:
+            if voltages.size != len(self):
+                raise ValueError(
+                    f"there are {voltages.size} voltages for {len(self)} frames: give one for each frame, or the times "
+                    "of both as u_times and frame_times"
+                )
+            return voltages
+        if at is None:
+            raise ValueError("u_times are given without frame_times: give both to join by time")
+        log = Record(u=voltages, y=voltages, t=read_only(u_times, "u_times", ndim=1)).t
+        assert log is not None
+        place = np.searchsorted(log, at + _ROUNDING * (log[-1] - log[0]), side="right") - 1
+        if (place < 0).any():
+            k = int(np.argmax(place < 0))
+            raise ValueError(f"frame {k} at {at[k]:g} is before the voltages, which begin at {log[0]:g}")
+        return np.asarray(voltages[place])
