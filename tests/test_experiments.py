@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 EXPERIMENTS = sorted((Path(__file__).parent.parent / "experiments").glob("[0-9]*.py"))
-NEEDS = {"29_registration": "skimage"}  # experiments that need an extra
+NEEDS = {"29_registration": "skimage", "30_virtual_rig": "skimage"}  # experiments that need an extra
 
 
 README = " ".join((EXPERIMENTS[0].parent.parent / "README.md").read_text().split())

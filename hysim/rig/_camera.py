@@ -169,7 +169,7 @@ class Camera:
         if self.read_noise:
             electrons += self.read_noise * rng.standard_normal(self.shape)
         largest = 2**self.bits - 1
-        counts = np.clip(np.floor(electrons * (largest / self.full_well) + 0.5), 0, largest)
+        counts: FloatArray = np.clip(np.floor(electrons * (largest / self.full_well) + 0.5), 0, largest)
         return counts.astype(np.uint8) if self.bits == 8 else counts.astype(np.uint16)
 
     def frames(self, t: npt.ArrayLike, y: npt.ArrayLike, at: npt.ArrayLike | None = None) -> "Frames":

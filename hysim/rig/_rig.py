@@ -2,7 +2,7 @@
 
 from dataclasses import field
 from math import pi
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -138,10 +138,10 @@ class Experiment:
 
     def measure(
         self,
-        method: str = "subpixel",
+        method: Literal["subpixel", "whole-pixel"] = "subpixel",
         *,
-        region: tuple[slice, slice] | None = None,
-        reference: str = "first",
+        region: tuple[int, int, int, int] | None = None,
+        reference: Literal["first", "running"] = "first",
         progress: Progress | None = None,
     ) -> "Displacement":
         """The displacement that the frames show, by `hysim.vision.displacement`; needs the extra ``vision``.
@@ -178,7 +178,12 @@ class Experiment:
             progress=progress,
         )
 
-    def record(self, method: str = "subpixel", *, take: str = "mean") -> Record:
+    def record(
+        self,
+        method: Literal["truth", "subpixel", "whole-pixel"] = "subpixel",
+        *,
+        take: Literal["mean", "last"] = "mean",
+    ) -> Record:
         """The table of the experiment: voltage, displacement from the first row on, and time.
 
         Parameters

@@ -67,7 +67,7 @@ class Scene:
 
     def moved(self, shifts: FloatArray) -> FloatArray:
         """Mean of the picture moved by each of some shifts, shape (m, 2), rows down and columns right [pixel]."""
-        whole = np.rint(shifts.mean(axis=0))
+        whole = np.floor(shifts.mean(axis=0) + 0.5)
         rest, times = np.unique(shifts - whole, axis=0, return_counts=True)
         frequencies = fft.fftfreq(self.period[0]), fft.rfftfreq(self.period[1])
         down, right = (np.exp(-2j * np.pi * np.outer(part, f)) for part, f in zip(rest.T, frequencies, strict=True))
