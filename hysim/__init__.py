@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
 
-_MODULES = ("benchmarks", "control", "datasets", "metrics", "plot", "signals", "vision")
+_MODULES = ("benchmarks", "control", "datasets", "metrics", "plot", "rig", "signals", "vision")
 _HOME = {
     "Record": "hysim.records",
     "load": "hysim.files",
@@ -93,6 +93,7 @@ if TYPE_CHECKING:
     from hysim import datasets as datasets
     from hysim import metrics as metrics
     from hysim import plot as plot
+    from hysim import rig as rig
     from hysim import signals as signals
     from hysim import vision as vision
     from hysim.comparison import Comparison as Comparison

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 EXPERIMENTS = sorted((Path(__file__).parent.parent / "experiments").glob("[0-9]*.py"))
-NEEDS = {"29_registration": "skimage"}  # experiments that need an extra
+NEEDS = {"29_registration": "skimage", "30_virtual_rig": "skimage"}  # experiments that need an extra
 
 
 README = " ".join((EXPERIMENTS[0].parent.parent / "README.md").read_text().split())
@@ -267,3 +267,17 @@ def test_the_readme_quotes_the_studies():
     assert all(row["in_time"] for row in killed["rows"])
     told = f"a study of {killed['n_tasks']} tasks is killed at {len(killed['rows'])} random moments and resumed. "
     assert told + f"{killed['columns_that_differ']} columns of its table differ" in README
+
+
+def test_parts_of_a_pixel_tell_the_loop_and_whole_ones_scatter_as_table_1():
+    result = json.loads((EXPERIMENTS[0].parent / "results" / "virtual_rig" / "result.json").read_text())
+    fine, dim, whole, shaken, paper = result["summary"]
+    for line in (fine, dim):
+        assert max(abs(line["width_error_percent"][end]) for end in ("least", "most")) < 1.0
+        assert line["width_covers"] >= 17  # of 20 intervals at 95 %: fewer in 1.6 % of such counts
+    assert whole["width_covers"] == shaken["width_covers"] == 20
+    for key in ("fit_percent", "residual_rms_pixels", "fpe", "linear_fit_percent", "linear_fpe", "width_um"):
+        assert shaken[key]["least"] <= paper[key]["median"] <= shaken[key]["most"], key
+    # an inverse is as good as the law it comes from
+    assert whole["hysteresis_reduction_percent"]["median"] + 5.0 < result["true_law_reduction_percent"]
+    assert abs(fine["hysteresis_reduction_percent"]["least"] - result["true_law_reduction_percent"]) < 0.1

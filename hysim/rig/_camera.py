@@ -1,0 +1,266 @@
+"""A camera on a microscope: what its frames show of a displacement, and with what noise.
+
+    light     = (1 + gain_drift s) scene(moved by shift) + offset_drift s,    s = sin(2 pi t / drift_period)
+    electrons = Poisson(full_well <light>) + read_noise gauss                 < > the mean over the exposure
+    counts    = the nearest integer to (2^bits - 1) electrons / full_well, within 0 and 2^bits - 1
+
+A frame's noise is a function of the seed and the frame's number alone: frames can be had in any order.
+"""
+
+import math
+import operator
+from collections.abc import Iterator
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, checked, read_only
+from hysim.datasets import PIXEL
+from hysim.rig._scene import Scene
+
+Counts = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
+
+
+@checked
+class Camera:
+    """A camera on a microscope, and the textured end of the actuator that it looks at.
+
+    Parameters
+    ----------
+    shape : (int, int)
+        Rows and columns of a frame.
+    scale : float
+        Displacement of a pixel [um]; the paper's is 0.0763.
+    direction : float
+        Of a growing displacement: 0 to the right, 90 down [degree].
+    blur : float
+        Standard deviation of the point spread, of optics and pixel together [pixel].
+    grain, contrast : float
+        Size of the texture's grains [pixel], and their rms brightness in parts of the full scale.
+    bits : {8, 12}
+        Of a count.
+    full_well : float
+        Electrons of the largest count.
+    shot_noise : bool
+        Whether electrons come one by one.
+    read_noise : float
+        Its rms value [electron].
+    frame_rate : float
+        Frames in a second.
+    exposure : float
+        Time in which a frame collects light, at most a frame's [s].
+    subsamples : int
+        Moments of an exposure whose pictures are averaged.
+    gain_drift, offset_drift, drift_period : float
+        Amplitudes of the illumination's slow change, of the light and of stray light in parts of the full scale, and
+        the period of both [s].
+    jitter : float
+        Rms motion of the microscope from frame to frame, in each direction [pixel].
+    texture, seed : int
+        Seeds of the texture and of the noise.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a number is outside its range.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> camera = hs.rig.Camera(shape=(64, 96), bits=12)
+    >>> frame = camera.frame(0.5 * camera.scale, number=7)  # half a pixel to the right
+    >>> frame.shape, frame.dtype.name, bool((frame == camera.frame(0.5 * camera.scale, number=7)).all())
+    ((64, 96), 'uint16', True)
+    """
+
+    shape: tuple[int, int] = (256, 256)
+    scale: float = PIXEL
+    direction: float = 0.0
+    blur: float = 1.5
+    grain: float = 2.0
+    contrast: float = 0.12
+    bits: int = 8
+    full_well: float = 10_000.0
+    shot_noise: bool = True
+    read_noise: float = 10.0
+    frame_rate: float = 30.0
+    exposure: float = 0.01
+    subsamples: int = 8
+    gain_drift: float = 0.0
+    offset_drift: float = 0.0
+    drift_period: float = 60.0
+    jitter: float = 0.0
+    texture: int = 0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if len(self.shape) != 2 or min(operator.index(size) for size in self.shape) < 1:
+            raise ValueError(f"shape must be (rows, columns), got {self.shape}")
+        for name in ("scale", "full_well", "frame_rate", "drift_period"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+        for name in ("blur", "grain", "contrast", "read_noise", "exposure", "jitter"):
+            if getattr(self, name) < 0.0:
+                raise ValueError(f"{name} must not be negative, got {getattr(self, name)}")
+        if self.bits not in (8, 12):
+            raise ValueError(f"bits must be 8 or 12, got {self.bits}")
+        if self.exposure * self.frame_rate > 1.0:
+            raise ValueError(f"exposure must be at most a frame's time, {1 / self.frame_rate:g} s, got {self.exposure}")
+        for name, least in (("subsamples", 1), ("texture", 0), ("seed", 0)):
+            if operator.index(getattr(self, name)) < least:
+                raise ValueError(f"{name} must be at least {least}, got {getattr(self, name)}")
+
+    @cached_property
+    def _scene(self) -> Scene:
+        return Scene.textured_edge(
+            self.shape,
+            direction=self._direction,
+            blur=self.blur,
+            grain=self.grain,
+            contrast=self.contrast,
+            seed=self.texture,
+        )
+
+    @property
+    def _direction(self) -> tuple[float, float]:
+        """Unit vector (down, right), whose zeros are zero."""
+        angle = math.radians(self.direction)
+        return round(math.sin(angle), 15), round(math.cos(angle), 15)
+
+    def light(self, y: npt.ArrayLike, t: float = 0.0) -> FloatArray:
+        """What a frame would show without noise, counts or jitter.
+
+        Parameters
+        ----------
+        y : float, or array, shape (m,)
+            Displacement, or those of the moments of an exposure, of whose pictures this is the mean [um].
+        t : float
+            Time, which the illumination's drift depends on [s].
+
+        Returns
+        -------
+        array, shape `shape`
+            In parts of the full scale.
+        """
+        return self._lit(np.outer(read_only(np.atleast_1d(y), "y", ndim=1) / self.scale, self._direction), t)
+
+    def frame(self, y: npt.ArrayLike, number: int = 0, t: float = 0.0) -> Counts:
+        """One frame.
+
+        Parameters
+        ----------
+        y, t
+            As in `light`.
+        number : int
+            Of the frame, not negative: with the seed it determines the noise.
+
+        Returns
+        -------
+        array of uint8 or uint16, shape `shape`
+        """
+        rng = np.random.default_rng((self.seed, number))
+        shifts = np.outer(read_only(np.atleast_1d(y), "y", ndim=1) / self.scale, self._direction)
+        if self.jitter:
+            shifts = shifts + self.jitter * rng.standard_normal(2)
+        electrons = self.full_well * np.maximum(self._lit(shifts, t), 0.0)
+        if self.shot_noise:
+            electrons = rng.poisson(electrons).astype(float)
+        if self.read_noise:
+            electrons += self.read_noise * rng.standard_normal(self.shape)
+        largest = 2**self.bits - 1
+        counts: FloatArray = np.clip(np.floor(electrons * (largest / self.full_well) + 0.5), 0, largest)
+        return counts.astype(np.uint8) if self.bits == 8 else counts.astype(np.uint16)
+
+    def frames(self, t: npt.ArrayLike, y: npt.ArrayLike, at: npt.ArrayLike | None = None) -> "Frames":
+        """Frames of a displacement in time, each rendered when it is asked for.
+
+        Parameters
+        ----------
+        t, y : array, shape (n,)
+            Increasing times [s] and displacements, linear between them [um].
+        at : array, shape (n_frames,), optional
+            Times at which exposures begin [s]; by default the frame rate's, as long as exposures end within `t`.
+
+        Returns
+        -------
+        Frames
+
+        Raises
+        ------
+        ValueError
+            If lengths differ, the times do not increase, or an exposure is not within them.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> frames = hs.rig.Camera(shape=(32, 32), frame_rate=10.0).frames([0.0, 1.0], [0.0, 0.3])
+        >>> len(frames), frames[-1].shape
+        (10, (32, 32))
+        """
+        times, displacements = read_only(t, "t", ndim=1), read_only(y, "y", ndim=1)
+        if times.size != displacements.size or not times.size or not (np.diff(times) > 0.0).all():
+            raise ValueError(
+                f"t must increase and be as long as y, got {times.size} times and {displacements.size} displacements"
+            )
+        if at is None:
+            last = math.floor((times[-1] - times[0] - self.exposure) * self.frame_rate + 1e-9)
+            at = times[0] + np.arange(last + 1.0) / self.frame_rate
+        starts = read_only(at, "at", ndim=1)
+        if starts.size and (starts.min() < times[0] or starts.max() + self.exposure > times[-1] + 1e-9):
+            raise ValueError(
+                f"exposures must be within {times[0]:g} to {times[-1]:g} s, got {starts.min():g} to "
+                f"{starts.max() + self.exposure:g} s"
+            )
+        return Frames(self, times, displacements, starts)
+
+    @property
+    def signal_to_noise(self) -> float:
+        """Rms of the picture about its mean over the rms noise of a pixel, with that of its count [dB]."""
+        light = self.light(0.0)
+        electrons = self.full_well * float(light.mean()) if self.shot_noise else 0.0
+        count = self.full_well / (2**self.bits - 1)
+        noise = math.sqrt(electrons + self.read_noise**2 + count**2 / 12.0)
+        return 20.0 * math.log10(self.full_well * float(light.std()) / noise)
+
+    def _lit(self, shifts: FloatArray, t: float) -> FloatArray:
+        """Light of the scene moved by shifts, shape (m, 2) [pixel]."""
+        swing = math.sin(2.0 * math.pi * t / self.drift_period)
+        return (1.0 + self.gain_drift * swing) * self._scene.moved(shifts) + self.offset_drift * swing
+
+
+class Frames:
+    """Frames of a displacement, rendered one at a time: a sequence whose memory does not grow with its length.
+
+    Parameters
+    ----------
+    camera : Camera
+        That takes them.
+    t, y : array, shape (n,)
+        Times [s] and displacements [um].
+    at : array, shape (n_frames,)
+        Times at which exposures begin [s].
+    """
+
+    def __init__(self, camera: Camera, t: FloatArray, y: FloatArray, at: FloatArray) -> None:
+        self.camera, self.t, self.y, self.at = camera, t, y, at
+
+    def __len__(self) -> int:
+        return self.at.size
+
+    def __getitem__(self, number: int) -> Counts:
+        k = range(len(self))[operator.index(number)]
+        return self.camera.frame(self._exposed(k), k, float(self.at[k]))
+
+    def __iter__(self) -> Iterator[Counts]:
+        return (self[k] for k in range(len(self)))
+
+    @property
+    def seen(self) -> FloatArray:
+        """Mean displacement of each exposure, shape (n_frames,) [um]: what a perfect measurement would find."""
+        return np.array([self._exposed(k).mean() for k in range(len(self))])
+
+    def _exposed(self, k: int) -> FloatArray:
+        """Displacements at the moments of an exposure."""
+        moments = (np.arange(self.camera.subsamples) + 0.5) / self.camera.subsamples
+        return np.asarray(np.interp(self.at[k] + self.camera.exposure * moments, self.t, self.y))
