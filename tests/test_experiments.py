@@ -269,6 +269,21 @@ def test_the_readme_quotes_the_studies():
     assert told + f"{killed['columns_that_differ']} columns of its table differ" in README
 
 
+def test_the_readme_quotes_the_registration():
+    result = json.loads((EXPERIMENTS[0].parent / "results" / "registration" / "result.json").read_text())
+    own = [row for row in result["rows"] if row["method"] == "hysim"]
+    fine, coarse = (max(row["rms_px"] for row in own if row["snr_db"] == snr) for snr in (30, 20))
+    bias = max(row["largest_bias_px"] for row in own if row["snr_db"] >= 20)
+    assert fine <= 0.02
+    assert coarse <= 0.05
+    assert bias <= 0.01
+    assert f"at most {fine:.2g} pixels rms at 30 dB and {coarse:.2g} at 20 dB, no bias above 0.008" in README
+    assert 0.007 < bias < 0.008
+    speed = result["speed_and_memory"]
+    assert f"at {min(row['frames_per_second'] for row in speed):.0f} frames a second of one core" in README
+    assert max(row["peak_mib"] for row in speed) < 1.02 * min(row["peak_mib"] for row in speed)
+
+
 def test_parts_of_a_pixel_tell_the_loop_and_whole_ones_scatter_as_table_1():
     result = json.loads((EXPERIMENTS[0].parent / "results" / "virtual_rig" / "result.json").read_text())
     fine, dim, whole, shaken, paper = result["summary"]
@@ -281,3 +296,9 @@ def test_parts_of_a_pixel_tell_the_loop_and_whole_ones_scatter_as_table_1():
     # an inverse is as good as the law it comes from
     assert whole["hysteresis_reduction_percent"]["median"] + 5.0 < result["true_law_reduction_percent"]
     assert abs(fine["hysteresis_reduction_percent"]["least"] - result["true_law_reduction_percent"]) < 0.1
+    off = max(abs(line["width_error_percent"][end]) for line in (fine, dim) for end in ("least", "most"))
+    assert f"the loop's width comes back within {off:.2f} %" in README
+    assert f"takes {fine['hysteresis_reduction_percent']['median']:.1f} % of the true hysteresis away" in README
+    ends = f"{whole['width_lower_um']['median']:.3f} to {whole['width_upper_um']['median']:.3f} um"
+    reached = f"from whole pixels {whole['hysteresis_reduction_percent']['median']:.1f} %, with a width of {ends}"
+    assert f"{reached} about the true {result['true_width_um']:.3f}" in README
