@@ -45,7 +45,8 @@ def words_and_numbers(text: str) -> tuple[list[str], list[float]]:
 
 def labels(drawing: Path) -> list[str]:
     """What is written in a figure, but for numbers."""
-    return [" ".join(words) for words, _ in map(words_and_numbers, _TEXT.findall(drawing.read_text())) if words != ["#"]]
+    texts = [" ".join(words_and_numbers(text)[0]) for text in _TEXT.findall(drawing.read_text())]
+    return [text for text in texts if text != "#"]
 
 
 def refresh(page: Path) -> None:
