@@ -1,21 +1,32 @@
 """The Python blocks of the documentation run, page by page, without what builds the pages."""
 
-import re
+import importlib.util
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-PAGES = sorted((Path(__file__).parent.parent / "docs").glob("*.md"))
+DOCS = Path(__file__).parent.parent / "docs"
+PAGES = sorted(DOCS.glob("*.md"))
 NEEDS = {"camera": "skimage"}  # pages that need an extra
+
+_spec = importlib.util.spec_from_file_location("page_runs", DOCS / "page_runs.py")
+page_runs = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(page_runs)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_python_blocks_of_a_page_run_in_order(page, tmp_path, monkeypatch):
+def test_python_blocks_of_a_page_run_in_order_and_print_and_draw_what_it_shows(page, tmp_path, monkeypatch):
     if page.stem in NEEDS:
         pytest.importorskip(NEEDS[page.stem])
-    blocks = re.findall(r"^```python\n(.*?)^```", page.read_text(), flags=re.MULTILINE | re.DOTALL)
-    assert blocks
     monkeypatch.chdir(tmp_path)
-    namespace = {}
-    for block in blocks:
-        exec(compile(block, page.name, "exec"), namespace)
+    blocks = page_runs.printed_by(page)
+    assert blocks
+    for printed, shown in blocks:
+        if shown is not None:
+            words, numbers = page_runs.words_and_numbers(printed)
+            shown_words, shown_numbers = page_runs.words_and_numbers(shown)
+            assert words == shown_words
+            np.testing.assert_allclose(numbers, shown_numbers, rtol=1e-2, atol=1e-9)  # other machines round otherwise
+    for name, figure in page_runs.figures_of(page).items():
+        assert page_runs.labels(tmp_path / name) == page_runs.labels(figure)
