@@ -11,7 +11,6 @@ RESULTS = HERE.parent / "experiments" / "results"
 sys.path.insert(0, str(HERE))
 
 from front_door import write_reference  # noqa: E402  from beside this file
-from gallery import draw_pictures  # noqa: E402
 
 project = "hysim"
 version = release = hysim.__version__
@@ -127,4 +126,3 @@ myst_substitutions = {
 }
 
 write_reference(HERE / "reference")
-draw_pictures(HERE / "plots.md", HERE / "plots")

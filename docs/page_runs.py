@@ -1,5 +1,7 @@
 """The Python blocks of a page run in order; what they print and draw is what the page shows.
 
+A figure is the file that a block has written under its name, or else what pyplot has drawn last when it is shown.
+
     python docs/page_runs.py tutorial
 
 runs a page, and writes the text under its blocks and its figures anew. The tests run every page and compare.
@@ -13,10 +15,15 @@ import sys
 import tempfile
 from pathlib import Path
 
+import matplotlib.pyplot as plt
+
+import hysim as hs
+
 HERE = Path(__file__).parent
 
 _BLOCK = re.compile(r"^```python\n(.*?)^```\n(?:\n```text\n(.*?)^```\n)?", flags=re.MULTILINE | re.DOTALL)
-_FIGURE = re.compile(r"!\[[^\]]*\]\((figures/([\w-]+\.svg))\)")
+_FIGURE = re.compile(r"!\[[^\]]*\]\((figures/([\w-]+\.(?:svg|gif)))\)")
+_PART = re.compile(f"{_BLOCK.pattern}|{_FIGURE.pattern}", flags=re.MULTILINE | re.DOTALL)
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?!\w)")
 _TEXT = re.compile(r"<text\b[^>]*>([^<]*)</text>")
 
@@ -25,10 +32,15 @@ def printed_by(page: Path) -> list[tuple[str, str | None]]:
     """What each block of a page prints, run in the current folder, and the text that the page shows under it."""
     namespace: dict[str, object] = {}
     found = []
-    for block in _BLOCK.finditer(page.read_text()):
-        with contextlib.redirect_stdout(io.StringIO()) as printed:
-            exec(compile(block[1], page.name, "exec"), namespace)
-        found.append((printed.getvalue(), block[2]))
+    for part in _PART.finditer(page.read_text()):
+        block, shown, _, figure = part.groups()
+        if figure is not None and not Path(figure).exists():
+            hs.plot.save_svg(plt.gcf(), figure)
+            plt.close("all")
+        if block is not None:
+            with contextlib.redirect_stdout(io.StringIO()) as printed:
+                exec(compile(block, page.name, "exec"), namespace)
+            found.append((printed.getvalue(), shown))
     return found
 
 
@@ -44,7 +56,9 @@ def words_and_numbers(text: str) -> tuple[list[str], list[float]]:
 
 
 def labels(drawing: Path) -> list[str]:
-    """What is written in a figure, but for numbers."""
+    """What is written in a figure, but for numbers; of a GIF nothing."""
+    if drawing.suffix == ".gif":
+        return []
     texts = [" ".join(words_and_numbers(text)[0]) for text in _TEXT.findall(drawing.read_text())]
     return [text for text in texts if text != "#"]
 
