@@ -50,6 +50,7 @@ def folder(tmp_path_factory) -> Path:
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
+@settings(max_examples=30)
 @given(rec=records())
 def test_a_saved_record_comes_back_to_the_bit(folder, ending, rec):
     path = folder / f"loop{ending}"

@@ -233,7 +233,7 @@ def test_units_that_are_others_are_refused(units, message):
         record(t=None).convert({"t": "ms"})
 
 
-@settings(max_examples=10)  # a Fourier transform each
+@settings(max_examples=6)  # two Fourier transforms each
 @given(st.sampled_from([0.1, 0.0763, 5.0, 1e-3, 2.0**-10, 3e7]), st.integers(0, 9), st.floats(-1.0, 1.0))
 def test_the_quantum_of_a_sensor_is_found(quantum, seed, shift):
     levels = np.unique(np.random.default_rng(seed).integers(-200, 200, 60))
