@@ -8,17 +8,15 @@ import pytest
 
 DOCS = Path(__file__).parent.parent / "docs"
 PAGES = sorted(DOCS.glob("*.md"))
-NEEDS = {"camera": "skimage"}  # pages that need an extra
+NEEDS = {"camera": pytest.mark.extra("skimage")}
 
 _spec = importlib.util.spec_from_file_location("page_runs", DOCS / "page_runs.py")
 page_runs = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(page_runs)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", [pytest.param(page, id=page.stem, marks=NEEDS.get(page.stem, ())) for page in PAGES])
 def test_python_blocks_of_a_page_run_in_order_and_print_and_draw_what_it_shows(page, tmp_path, monkeypatch):
-    if page.stem in NEEDS:
-        pytest.importorskip(NEEDS[page.stem])
     monkeypatch.chdir(tmp_path)
     blocks = page_runs.printed_by(page)
     assert blocks

@@ -7,16 +7,14 @@ from pathlib import Path
 import pytest
 
 EXPERIMENTS = sorted((Path(__file__).parent.parent / "experiments").glob("[0-9]*.py"))
-NEEDS = {"29_registration": "skimage", "30_virtual_rig": "skimage"}  # experiments that need an extra
-
-
+NEEDS = dict.fromkeys(("29_registration", "30_virtual_rig"), pytest.mark.extra("skimage"))
 README = " ".join((EXPERIMENTS[0].parent.parent / "README.md").read_text().split())
 
 
-@pytest.mark.parametrize("path", EXPERIMENTS, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", [pytest.param(path, id=path.stem, marks=NEEDS.get(path.stem, ())) for path in EXPERIMENTS]
+)
 def test_smoke(path, monkeypatch, tmp_path):
-    if path.stem in NEEDS:
-        pytest.importorskip(NEEDS[path.stem])
     spec = importlib.util.spec_from_file_location(path.stem, path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

@@ -218,8 +218,8 @@ def test_what_does_not_fit_together_is_refused():
         experiment.record("truth", take="first")
 
 
+@pytest.mark.extra("skimage")
 def test_frames_give_the_displacement_back():
-    pytest.importorskip("skimage", reason="needs the extra vision")
     rig = hs.rig.table1(texture=11)
     experiment = rig.run(hs.rig.staircase_drive(step=25.0, dwell=0.5))
     scale, truth = rig.camera.scale, experiment.record("truth").y

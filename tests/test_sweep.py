@@ -1,7 +1,6 @@
 """`sweep`: the same table whatever computes it, failures as rows, and seeds of each task's own."""
 
 import concurrent.futures
-import importlib.util
 import math
 import sys
 
@@ -312,14 +311,14 @@ def test_a_view_says_what_it_needs(serial, library, view, monkeypatch):
         getattr(serial, view)()
 
 
-@pytest.mark.skipif(importlib.util.find_spec("pandas") is None, reason="needs the extra tables")
+@pytest.mark.extra("pandas")
 def test_the_frame_has_a_column_for_each_name(serial):
     frame = serial.to_frame()
     assert list(frame.columns) == list(serial.columns)
     assert np.array_equal(frame["last"].to_numpy(), serial["last"])
 
 
-@pytest.mark.skipif(importlib.util.find_spec("xarray") is None, reason="needs the extra tables")
+@pytest.mark.extra("xarray")
 def test_the_dataset_has_the_axes_of_the_grid(serial):
     data = serial.to_xarray()
     assert data["last"].dims == ("a", "b", "way")

@@ -1,6 +1,5 @@
 """A dask cluster of processes on the loopback: a worker that is killed costs nothing but time."""
 
-import importlib.util
 import os
 import signal
 import subprocess
@@ -14,8 +13,7 @@ from test_sweep import bits
 import hysim as hs
 
 pytestmark = [
-    pytest.mark.dask,
-    pytest.mark.skipif(importlib.util.find_spec("distributed") is None, reason="needs the extra dask"),
+    pytest.mark.extra("distributed"),
     pytest.mark.filterwarnings("default"),  # what a cluster that loses a worker warns of is not ours
 ]
 

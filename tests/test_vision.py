@@ -8,8 +8,8 @@ import pytest
 import hysim as hs
 from hysim.cli import main
 
-pytest.importorskip("skimage")
 iio = pytest.importorskip("imageio.v3")
+pytestmark = pytest.mark.extra("skimage")
 SIZE = 80
 
 

@@ -9,6 +9,7 @@ from hysim.cli import outputs, records
 
 if TYPE_CHECKING:
     from hysim.metrics import LoopMetrics
+    from hysim.records import Record
 
 
 def add_to(commands: Any) -> None:
@@ -37,7 +38,8 @@ def run(options: argparse.Namespace) -> int:
     record = records.read(options)
     tolerance = {} if options.tolerance is None else {"tolerance": options.tolerance}
     loop = loop_metrics(record.u, record.y, cycles=options.cycles, **tolerance)
-    text = outputs.to_json(_document(loop, record.units)) if options.json else "\n".join(_lines(loop, record.units))
+    lines = [*_lines(loop, record.units), *_step(record)]
+    text = outputs.to_json(_document(loop, record.units)) if options.json else "\n".join(lines)
     outputs.write({records.STANDARD: text.rstrip("\n") + "\n"})
     return 0
 
@@ -66,3 +68,10 @@ def _lines(loop: "LoopMetrics", units: Mapping[str, str]) -> Iterator[str]:
     }
     width = max(map(len, values))
     yield from (f"{name:<{width}}  {value.rstrip()}" for name, value in values.items())
+
+
+def _step(record: "Record") -> Iterator[str]:
+    """What the outputs show of the sensor, where nothing is said of it."""
+    if record.resolution is None and (step := record.detect_resolution()) is not None:
+        unit = record.units.get("y", "")
+        yield f"the output has steps of {f'{step:.6g} {unit}'.rstrip()}: --resolution {records.DETECT} takes them"

@@ -11,19 +11,24 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser(
         "simulate",
         help="drive a model with the input in a file of your own",
-        description="Simulate a model in free run, and write its signals as comma-separated columns: t if there is "
-        "a time, u, y, the memory z of a law, and what else a plant has.",
+        description="Simulate a model in free run, and write its signals as columns: t if there is a time, u, y, the "
+        "memory z of a law, and what else a plant has. The ending of the file says its format: .csv, .tsv, .npz, "
+        ".mat, .h5; the standard output gets comma-separated text.",
     )
     parser.add_argument("model", metavar="MODEL.json", help="as identify writes it, or - for the standard input")
     records.add_to(parser, output=False)
-    parser.add_argument("--out", metavar="OUT.csv", default=records.STANDARD, help="default: the standard output")
+    parser.add_argument("--out", metavar="OUT", default=records.STANDARD, help="default: the standard output")
     parser.add_argument("--plot", metavar="LOOP.svg", help="draw the loop")
     parser.set_defaults(command=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Simulate and write."""
+    from hysim.files import Notes, ending, save_columns
+
     outputs.check(options.out, pictures=[options.plot])
+    if options.out != records.STANDARD:
+        ending(options.out)
     if options.model == options.file == records.STANDARD:
         raise ValueError("the standard input holds the model or the record, not both")
     model, units = models.read(options.model)
@@ -31,8 +36,11 @@ def run(options: argparse.Namespace) -> int:
     known = units | {signal: unit for signal, unit in record.units.items() if signal != "y"} | dict(options.unit)
     run = models.simulated(model, record, known)
     columns = {name: run.signals[name] for name in ("t", "u", "y", "z") if name in run.signals}
-    texts = {options.out: outputs.to_csv(columns | dict(run.signals), known)}
-    if options.plot:
-        texts[options.plot] = outputs.loop_svg(run)
+    columns |= dict(run.signals)
+    texts = {options.plot: outputs.loop_svg(run)} if options.plot else {}
+    if options.out == records.STANDARD:
+        texts[options.out] = outputs.to_csv(columns, known)
+    else:
+        save_columns(columns, options.out, Notes({name: known[name] for name in columns if name in known}))
     outputs.write(texts)
     return 0
