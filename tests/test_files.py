@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from malformed import MAT73_TITLE, U, Y, corpus, corrupt, hdf5, mat, npy, npz, whole
+from malformed import HAS_H5PY, MAT73_TITLE, U, Y, corpus, corrupt, hdf5, mat, npy, npz, whole
 from scipy.io import loadmat
 
 import hysim as hs
