@@ -173,6 +173,7 @@ def corpus() -> dict[str, tuple[bytes, str]]:
     files = {
         "empty.csv": (b"", "the file is empty"),
         "image.csv": (b"\x89PNG\r\n\x1a\n\xff", "is not a UTF-8 text file"),
+        "old.mat": (struct.pack("<5I", 0, 9, 1, 0, 2) + b"u\0" + U.tobytes() + b"\xff", "does not begin as NPZ"),
         "zeros.csv": (b"u,y\n0,\0\n", "is not a text file: it holds zero bytes"),
         "mixed.csv": (b"u,y\n0,1\n2;3\n4\t5\n6 7\n", r"line \d: expected \d cells, got \d"),
         "nan.csv": (b"u,y\n0,1\nnan,3\n", "line 3, column 'u': the value is missing"),
