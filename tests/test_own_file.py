@@ -193,7 +193,7 @@ def test_progress_is_shown_on_a_terminal_only(monkeypatch):
 
 CORPUS = {
     "empty": (b"", "the file is empty"),
-    "binary": (bytes(range(256)), "not a text file"),
+    "binary": (bytes(range(256)), "not a UTF-8 text file"),
     "zero bytes": (b"u,y\n0,\0\n", "not a text file"),
     "truncated": (b"u,y\n0,1\n1,2\n2", "line 4: expected 2 cells, got 1"),
     "mixed delimiters": (b"u,y\n0,1\n1;2\n2,3\n", "line 3: expected 2 cells, got 1"),

@@ -20,7 +20,7 @@ def text_of(content: str | bytes, name: str, encoding: str | None) -> str:
     """
     text = content if isinstance(content, str) else _decoded(content, name, encoding)
     if "\0" in text:
-        raise ValueError(_no_text(name))
+        raise ValueError(_no_text(name, "text"))
     return text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
 
 
@@ -32,7 +32,7 @@ def _decoded(content: bytes, name: str, encoding: str | None) -> str:
         raise ValueError(f"{name}: encoding must be one that Python knows, got {encoding!r}") from None
     except UnicodeError as error:
         if encoding is None and marked == "utf-8" and b"\0" in content:
-            raise ValueError(_no_text(name)) from None
+            raise ValueError(_no_text(name, "UTF-8 text")) from None
         reason = f"{error.reason} at byte {error.start}" if isinstance(error, UnicodeDecodeError) else str(error)
         raise ValueError(
             f"{name} is not a {(encoding or marked).upper()} text file: {reason}; say in which encoding it is, "
@@ -40,8 +40,8 @@ def _decoded(content: bytes, name: str, encoding: str | None) -> str:
         ) from None
 
 
-def _no_text(name: str) -> str:
+def _no_text(name: str, kind: str) -> str:
     return (
-        f"{name} is not a text file: it holds zero bytes; and it does not begin as NPZ, NPY, MAT (-v7, -v7.3) or HDF5 "
+        f"{name} is not a {kind} file: it holds zero bytes; and it does not begin as NPZ, NPY, MAT (-v7, -v7.3) or HDF5 "
         "files do (or say in which encoding it is)"
     )
