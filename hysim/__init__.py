@@ -83,6 +83,7 @@ _HOME = {
     "save": "hysim.models.storage",
     "load_model": "hysim.models.storage",
     "SimulationError": "hysim.errors",
+    "show_versions": "hysim._versions",
 }
 
 __all__ = ["__version__", *_MODULES, *_HOME]
@@ -94,6 +95,7 @@ if TYPE_CHECKING:
     from hysim import metrics as metrics
     from hysim import plot as plot
     from hysim import signals as signals
+    from hysim._versions import show_versions as show_versions
     from hysim.comparison import Comparison as Comparison
     from hysim.comparison import compare as compare
     from hysim.control import PID as PID

@@ -10,7 +10,8 @@ import hysim
 PACKAGE = Path(hysim.__file__).parent
 
 RANKS = {
-    -2: ("_frozen", "_atomic", "errors"),  # tools of the language, which know nothing of hysteresis
+    # tools of the language, which know nothing of hysteresis
+    -2: ("_frozen", "_atomic", "_words", "_versions", "errors"),
     -1: ("_cycles",),  # the turning points of an input, which records and measures share
     0: ("signals", "records", "metrics", "kernels", "_parallel"),
     1: ("datasets", "files", "models", "vision"),
