@@ -70,8 +70,9 @@ def value_in_words(value: Any) -> str:
         size = " x ".join(map(str, value.shape)) or "1"
         return f"{size} values, {extent(value)}"
     if isinstance(value, tuple):
-        listed = [value_in_words(each) for each in value]
-        return f"({', '.join(listed)})" if len(listed) <= 4 else f"({', '.join(listed[:3])}, ... {len(listed)} in all)"
+        if len(value) > 4 and all(isinstance(each, float) for each in value):
+            return value_in_words(np.array(value))
+        return f"({', '.join(map(value_in_words, value))})"
     if isinstance(value, float):
         return f"{value:.6g}"
     return repr(value) if isinstance(value, str) else str(value)

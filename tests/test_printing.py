@@ -58,7 +58,7 @@ def results():
         (PLANT, ["hysteresis", "BoucWen (beta = 0.03", "noise = 0.001"]),
         (hs.TrackingController(feedback=hs.PID(ki=2.0), limits=(0.0, 1.0)), ["limits = (0, 1)", "PID (ki = 2)"]),
         (hs.SingleValued(u=np.arange(200.0), y=np.arange(200.0)), ["200 values, 0 to 199"]),
-        (hs.Preisach(levels=np.linspace(0.0, 1.0, 60), weights=np.ones(1770)), ["1770 in all"]),
+        (hs.Preisach(levels=np.linspace(0.0, 1.0, 60), weights=np.ones(1770)), ["1770 values, 1"]),
     ]  # fmt: skip
 
 

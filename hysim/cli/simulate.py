@@ -17,7 +17,7 @@ def add_to(commands: Any) -> None:
     parser.add_argument("model", metavar="MODEL.json", help="as identify writes it, or - for the standard input")
     records.add_to(parser, output=False)
     parser.add_argument("--out", metavar="OUT.csv", default=records.STANDARD, help="default: the standard output")
-    parser.add_argument("--plot", metavar="LOOP.svg", help="draw the loop")
+    parser.add_argument("--plot", metavar="LOOP.svg", help=f"draw the loop; {outputs.PICTURE}")
     parser.set_defaults(command=run)
 
 
@@ -31,8 +31,8 @@ def run(options: argparse.Namespace) -> int:
     known = units | {signal: unit for signal, unit in record.units.items() if signal != "y"} | dict(options.unit)
     run = models.simulated(model, record, known)
     columns = {name: run.signals[name] for name in ("t", "u", "y", "z") if name in run.signals}
-    texts = {options.out: outputs.to_csv(columns | dict(run.signals), known)}
+    texts: dict[str | None, Any] = {options.out: outputs.to_csv(columns | dict(run.signals), known)}
     if options.plot:
-        texts[options.plot] = outputs.loop_svg(run)
+        texts[options.plot] = outputs.loop(run)
     outputs.write(texts)
     return 0

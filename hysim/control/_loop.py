@@ -214,7 +214,28 @@ def is_controller(value: Any) -> bool:
 
 
 def as_actuator(plant: Any) -> Actuator:
-    """Any plant as the chain that loops run."""
+    """Any plant as the chain that loops run.
+
+    Parameters
+    ----------
+    plant : Actuator, law or linear plant
+        A law becomes an actuator's hysteresis, a linear plant its vibration.
+
+    Returns
+    -------
+    Actuator
+
+    Raises
+    ------
+    TypeError
+        If it is none of these.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> hs.control.as_actuator(hs.Line(slope=2.0)) == hs.Actuator(hysteresis=hs.Line(slope=2.0))
+    True
+    """
     if isinstance(plant, Actuator):
         return plant
     if is_law(plant):

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from hysim.plot._comparisons import comparison, loops, residuals, widths
 from hysim.plot._discoveries import selection
 from hysim.plot._identifications import identification
+from hysim.plot._pictures import FORMATS, to_bytes
 from hysim.plot._records import history, loop, response, traces
 from hysim.plot._style import figure, house_style, panels
 from hysim.plot._svg import save_svg, to_svg
@@ -18,6 +19,7 @@ from hysim.plot._sweeps import heat_map, parallel_coordinates, quantile_bands, s
 from hysim.plot._tunings import trade_off
 
 __all__ = [
+    "FORMATS",
     "Axes",
     "Figure",
     "comparison",
@@ -36,6 +38,7 @@ __all__ = [
     "save_svg",
     "selection",
     "sensitivities",
+    "to_bytes",
     "to_svg",
     "traces",
     "trade_off",
