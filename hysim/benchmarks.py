@@ -29,6 +29,7 @@ from hysim.models.boucwen import BoucWen
 from hysim.models.oscillator import BoucWenOscillator
 from hysim.models.resampling import decimated, interpolated
 from hysim.records import Record
+from hysim.signals import multisine
 
 SAMPLE_RATE = 750.0
 PERIOD = 8192
@@ -123,7 +124,8 @@ def noel_schoukens(
         lead, n_samples = 0, SWEEP_LENGTH
     else:
         lead, n_samples = PERIOD * (initial == "periodic"), PERIOD * periods
-        force = np.tile(level * _unit_multisine(phases), periods + 1 + (initial == "periodic"))
+        period = multisine(LINES, rms=1.0, samples_per_period=_OVERSAMPLING * PERIOD, seed=phases)
+        force = np.tile(level * period, periods + 1 + (initial == "periodic"))
     y = noel_schoukens_plant().response(force, 1.0 / (SAMPLE_RATE * _OVERSAMPLING))
     if noise > 0.0:
         y += noise * _band_limited_noise(y.size, disturbances)
@@ -193,14 +195,6 @@ def simulate_official(
 def _check_kind(kind: str) -> None:
     if kind not in _STAGES:
         raise ValueError(f'kind must be "multisine" or "sweep", got {kind!r}')
-
-
-def _unit_multisine(rng: np.random.Generator) -> FloatArray:
-    """One period at 15 kHz, root mean square 1."""
-    spectrum = np.zeros(_OVERSAMPLING * PERIOD // 2 + 1, dtype=complex)
-    spectrum[LINES] = np.exp(2j * np.pi * rng.random(LINES.size))
-    period = np.fft.irfft(spectrum)
-    return np.asarray(period / period.std())
 
 
 def _unit_sweep(n_samples: int) -> FloatArray:

@@ -301,3 +301,75 @@ def test_shifting_changes_the_place_only(loop, du, dy):
     one, shifted = hs.loop_metrics(u, y), hs.loop_metrics(u + du, y + dy)
     assert shifted.width_at(one.u + du) == pytest.approx(one.width, abs=ROUNDING, nan_ok=True)
     assert (shifted.area, shifted.max_width) == pytest.approx((one.area, one.max_width), abs=ROUNDING)
+
+
+@given(st.floats(0.01, 10.0), st.floats(0.1, 10.0), st.floats(0.1, 5.0), st.floats(-2.0, 2.0))
+def test_the_describing_function_of_a_play_is_the_closed_form(radius, excess, gain, mean):
+    """Its kinks lie between two samples of 2000: an error of (2 pi / 2000)^2 / 12 of the slope at most."""
+    a = radius + excess
+    s = 1.0 - 2.0 * radius / a
+    closed = (math.pi / 2 + math.asin(s) + s * math.sqrt(1 - s * s)) / math.pi - 4j * radius * excess / (
+        math.pi * a * a
+    )
+    law = hs.Play(threshold=radius, gain=gain, offset=3.0)
+    (found,) = hs.metrics.describing_function(law, [a], mean=mean)
+    assert abs(found - gain * closed) < 1e-6 * gain
+    (stop,) = hs.metrics.describing_function(hs.Stop(threshold=radius, gain=gain), [a], mean=mean)
+    assert abs(stop - gain * (1.0 - closed)) < 1e-6 * gain
+
+
+def test_the_describing_function_of_a_relay_is_the_closed_form():
+    """Its jump lies between two samples of 2000: an error of 4 / 2000 of the gain at most."""
+    a = np.array([1.1, 2.0, 10.0])
+    relay = hs.PreisachRelays(levels=(-1.0, 1.0), weights=(2.0,))
+    closed = 8.0 / (math.pi * a) * np.exp(-1j * np.arcsin(1.0 / a))
+    assert hs.metrics.describing_function(relay, a) == pytest.approx(closed, rel=2e-3)
+
+
+@given(st.floats(0.05, 2.0), st.floats(-0.9, 1.0), st.floats(0.3, 10.0), st.integers(10, 100))
+def test_the_imaginary_part_is_the_area_of_the_loop(beta, gamma_ratio, a, quarter):
+    law = hs.BoucWen(beta=beta, gamma=gamma_ratio * beta, feedthrough=0.3)
+    n = 4 * quarter
+    cycle = hs.signals.sine(a, cycles=2, samples_per_cycle=n)[3 * quarter :][: n + 1]
+    _, steady = law.advance([a, -a] * 2000)
+    loop = hs.loop_metrics(cycle, law.advance(cycle, steady)[0])
+    (found,) = hs.metrics.describing_function(law, [a], samples_per_cycle=n)
+    polygon = math.sin(2 * math.pi / n) / (2 * math.pi / n)
+    assert found.imag * polygon == pytest.approx(loop.energy / (math.pi * a**2), abs=1e-11)  # how steady it is
+
+
+def test_a_line_has_its_slope_and_no_phase():
+    found = hs.metrics.describing_function(hs.Line(offset=1.0, slope=2.0), [0.5, 1.0], mean=3.0)
+    assert found == pytest.approx([2.0, 2.0], abs=1e-13)  # rounding of outputs up to 9
+
+
+def test_a_memory_that_decays_slowly_is_run_until_it_repeats():
+    """Where z is nearly u the width is beta (a^2 - u^2): an area of 4 beta a^3 / 3."""
+    a, beta = 1e-4, 0.5
+    (found,) = hs.metrics.describing_function(hs.BoucWen(beta=beta, gamma=0.0), [a])
+    assert found.imag == pytest.approx(4.0 * beta * a / (3.0 * math.pi), rel=1e-4)  # first order in beta a
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "error", "message"),
+    [
+        ((hs.TransferFunction(num=(1.0,), den=(1.0, 1.0)), [1.0]), {}, TypeError, "without time, got TransferFunction"),
+        ((3.0, [1.0]), {}, TypeError, "without time, got float"),
+        ((hs.Play(), [0.0]), {}, ValueError, r"must be positive, and the mean finite, got \[0.0\]"),
+        ((hs.Play(), [1.0]), {"mean": math.inf}, ValueError, "mean finite"),
+        ((hs.Play(), [1.0]), {"samples_per_cycle": 7}, ValueError, "even, and at least 4, got 7"),
+    ],
+)
+def test_what_has_no_describing_function_is_refused(arguments, options, error, message):
+    with pytest.raises(error, match=message):
+        hs.metrics.describing_function(*arguments, **options)
+
+
+def test_a_law_that_never_repeats_has_no_describing_function():
+    class Drift:
+        def advance(self, u, state=0.0):
+            y = state + np.cumsum(np.ones(len(u)))
+            return y, y[-1]
+
+    with pytest.raises(hs.SimulationError, match="does not repeat after 262128 cycles of amplitude 2"):
+        hs.metrics.describing_function(Drift(), [2.0])

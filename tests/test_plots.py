@@ -11,11 +11,13 @@ from types import SimpleNamespace
 import matplotlib
 import numpy as np
 import pytest
+from PIL import Image
 
 import hysim as hs
 from hysim.paper import figures
 
 LAW = hs.BoucWen(beta=0.03, gamma=0.02, gain=0.01, feedthrough=0.015)
+UNITS = {"t": "s", "u": "V", "y": "um"}
 DISCOVERY = SimpleNamespace(
     scores={"fit_percent": 96.0, "bic": -340.0, "n_terms": 3},
     path_n_terms=np.array([5.0, 4.0, 3.0, 2.0]),
@@ -281,3 +283,203 @@ def test_a_response_shows_the_measurement_where_it_differs():
     lines = hs.plot.response(noisy, hs.plot.figure().add_subplot()).get_lines()
     assert [line.get_label() for line in lines] == ["reference", "displacement", "measurement"]
     assert np.array_equal(lines[2].get_ydata(), run.y + 0.1)
+
+
+def coloured(ax):
+    """Lines of an Axes with their lightness, by which they are told apart in grey."""
+    weights = np.array([0.299, 0.587, 0.114])
+    return [(line, float(weights @ matplotlib.colors.to_rgb(line.get_color()))) for line in ax.lines]
+
+
+def test_minor_loops_are_the_cycles_of_the_result_the_smaller_the_darker():
+    u = hs.signals.decaying_sine(60.0, mean=60.0, cycles=6, samples_per_cycle=40)
+    simulation = hs.simulate(LAW, None, u, units=UNITS)
+    ax = hs.plot.minor_loops(simulation)
+    assert len(ax.lines) == 6
+    lightness = [each for _, each in coloured(ax)]
+    assert lightness == sorted(lightness, reverse=True)
+    assert lightness[0] < 0.8  # seen on white
+    drawn = np.concatenate([line.get_xydata() for line in ax.lines])
+    assert {tuple(point) for point in drawn} == set(zip(simulation.u, simulation.y, strict=True))
+    assert [line.get_xdata().max() for line in ax.lines] == [120.0, 110.0, 100.0, 90.0, 80.0, 70.0]
+    bar = ax.figure.axes[1]
+    assert (ax.get_xlabel(), bar.get_ylabel(), bar.get_ylim()) == ("Voltage [V]", "Amplitude [V]", (0.0, 60.0))
+
+
+def test_each_reversal_curve_is_a_minor_loop():
+    u = hs.signals.reversal_curves(0.0, 3.0, curves=3, samples_per_step=4)
+    ax = hs.plot.minor_loops(hs.Record(u=u, y=LAW.response(u)), hs.plot.figure().add_subplot())
+    curves = [line.get_xdata() for line in ax.lines]
+    assert [(x[0], x.max(), x[-1]) for x in curves] == [(0.0, 3.0, 0.0), (0.0, 2.0, 0.0), (0.0, 1.0, 0.0)]
+    growing = hs.signals.growing_sine(4.0, cycles=4, samples_per_cycle=8)[2:]  # begins with a way down
+    ax = hs.plot.minor_loops(hs.Record(u=growing, y=growing), hs.plot.figure().add_subplot())
+    assert [line.get_xdata().max() for line in ax.lines] == [4.0, 3.0, 2.0, 1.0]
+    with pytest.raises(ValueError, match="stands still"):
+        hs.plot.minor_loops(hs.Record(u=[1.0, 1.0], y=[0.0, 0.0]))
+
+
+def test_history_of_a_simulation_shows_its_memory():
+    t = hs.signals.sample_times(41, 0.1)
+    simulation = hs.simulate(LAW, t, hs.signals.sine(5.0, cycles=2, samples_per_cycle=20), units=UNITS)
+    axes = hs.plot.history(simulation, hold="foh")
+    assert [ax.get_ylabel() for ax in axes] == ["Displacement [µm]", "Voltage [V]", "Memory z"]
+    assert axes[-1].get_xlabel() == "Time [s]"
+    for ax, values in zip(axes, (simulation.y, None, simulation.z), strict=True):
+        if values is not None:
+            np.testing.assert_array_equal(ax.lines[0].get_xydata(), np.column_stack([t, values]))
+            assert ax.lines[0].get_marker() == "None"
+    assert len(hs.plot.history(simulation, hs.plot.figure().subplots(2))) == 2
+    assert len(hs.plot.history(hs.simulate(hs.Line(slope=1.0), t, simulation.u))) == 2
+
+
+def test_widths_of_records_simulations_and_loops(record):
+    simulations = [hs.simulate(law, record.t, record.u) for law in (LAW, hs.BoucWen(gain=0.1))]
+    measured = hs.loop_metrics(record.u, 1.1 * record.y)
+    ax = hs.plot.width(record, *simulations, measured)
+    names = ["Table 1", "simulation 1", "simulation 2", "loopmetrics"]
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == names
+    for name, result in zip(names, (record, *simulations, measured), strict=True):
+        loop = result if result is measured else hs.loop_metrics(result.u, result.y)
+        np.testing.assert_array_equal(labelled(ax, name).get_xydata(), np.column_stack([loop.u, loop.width]))
+    assert labelled(ax, "Table 1").get_linestyle() == "None"
+    dashes = {str(labelled(ax, name)._unscaled_dash_pattern) for name in names[1:]}
+    assert len(dashes) == 3
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("Voltage [V]", "Loop width [µm]")
+    with pytest.raises(ValueError, match="nothing to draw"):
+        hs.plot.width()
+
+
+def test_a_residual_map_holds_the_mean_of_each_branch_in_each_interval():
+    u = hs.signals.triangle(0.0, 8.0, cycles=3, samples_per_cycle=16)
+    residual = np.arange(u.size) / 10.0
+    simulated = hs.simulate(LAW, None, u)
+    record = hs.Record(u=u, y=simulated.y + residual, units=UNITS)
+    axes = hs.plot.residual_map(record, simulated, bins=4)
+    for ax, begin in zip(axes, (0, 8), strict=True):
+        cells = ax.collections[0].get_array()
+        assert cells.shape == (3, 4)
+        rows = [residual[begin + 16 * k : begin + 16 * k + 9] for k in range(3)]
+        by_input = [row[::-1] if begin else row for row in rows]
+        means = [[row[2 * j : 2 * j + 2 + (j == 3)].mean() for j in range(4)] for row in by_input]
+        assert np.asarray(cells) == pytest.approx(np.array(means), abs=1e-14)  # rounding of the sum
+        largest = residual[47:49].mean()  # where the last way down ends
+        assert ax.collections[0].get_clim() == pytest.approx((-largest, largest))
+    assert [ax.get_title(loc="left") for ax in axes] == ["loading", "unloading"]
+    assert axes[0].figure.axes[2].get_ylabel() == "Residual [µm]"
+
+
+def test_a_residual_map_takes_what_can_be_simulated(record):
+    fit = hs.identify(hs.Line, record)
+    maps = [hs.plot.residual_map(record, model) for model in (fit, fit.model, hs.simulate(fit.model, None, record.u))]
+    loading = [np.asarray(axes[0].collections[0].get_array()) for axes in maps]
+    assert np.array_equal(loading[0], loading[1])
+    assert np.array_equal(loading[0], loading[2])
+    assert loading[0].shape == (1, 13)
+    assert maps[0][0].figure.axes[2].get_ylabel() == "Residual [quanta]"
+    perfect = hs.Record(u=record.u, y=fit.model.response(record.u))
+    assert hs.plot.residual_map(perfect, fit.model)[0].collections[0].get_clim() == (-1.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("draw", "message"),
+    [
+        (lambda rec: hs.plot.residual_map(rec, hs.simulate(LAW, None, rec.u[1:])), "52 samples, got 51"),
+        (lambda rec: hs.plot.residual_map(rec, LAW, bins=0), "bins must be at least 1, got 0"),
+        (lambda rec: hs.plot.residual_map(hs.Record(u=[0, 0], y=[0, 0]), LAW), "stands still"),
+        (lambda rec: hs.plot.forc(hs.Preisach()), "the law has no relays"),
+        (lambda rec: hs.plot.forc(rec, coordinates="polar"), '"thresholds" or "centre"'),
+        (lambda rec: hs.plot.animate(rec, frames=1), "at least 2 frames"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(record, draw, message):
+    with pytest.raises(ValueError, match=message):
+        draw(record)
+
+
+def test_the_density_of_relays_is_weight_over_area():
+    law = hs.Preisach(levels=(0.0, 1.0, 3.0), weights=(1.0, 6.0, -4.0))
+    ax = hs.plot.forc(law, units={"u": "V", "y": "um"})
+    cells = ax.collections[0]
+    assert np.ma.filled(cells.get_array(), np.nan) == pytest.approx(np.array([[2.0, np.nan], [3.0, -2.0]]), nan_ok=True)
+    assert cells.get_clim() == (-3.0, 3.0)
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("Lower threshold b [V]", "Upper threshold a [V]")
+    assert ax.figure.axes[1].get_ylabel() == "Density of relays [µm/V²]"
+
+
+def test_a_density_is_read_from_reversal_curves_and_drawn_about_the_middle():
+    law = hs.Preisach.from_density(np.linspace(-1.0, 1.0, 6), lambda a, b: 1.0 + a * b)
+    u = hs.signals.reversal_curves(-1.0, 1.0, curves=5, samples_per_step=3)
+    record = hs.Record(u=u, y=law.response(u), units=UNITS)
+    drawn = [hs.plot.forc(source, coordinates="centre") for source in (law, record)]
+    known, read = (ax.collections[0].get_array() for ax in drawn)
+    assert np.ma.filled(read, 0.0) == pytest.approx(np.ma.filled(known, 0.0), abs=1e-12)  # differences over 0.16
+    assert drawn[1].get_xlabel() == "Half the distance (a - b)/2 [V]"
+    assert (drawn[0].get_xlim(), drawn[0].get_ylim()) == ((0.0, 1.0), (-1.0, 1.0))
+
+
+def test_colours_of_signed_quantities_grow_lighter_all_the_way():
+    weights = np.array([0.299, 0.587, 0.114])
+    for colours in (hs.plot.DIVERGING, hs.plot.SEQUENTIAL):
+        lightness = colours(np.linspace(0.0, 1.0, 256))[:, :3] @ weights
+        assert (np.diff(lightness) >= 0.0).all()
+        assert lightness[0] < 0.15 < 0.7 < lightness[-1]
+    low, middle, high = (hs.plot.DIVERGING(np.array([0.0, 0.5, 1.0]))[:, :3]) @ weights
+    assert min(middle - low, high - middle) > 0.35
+
+
+def test_gain_and_phase_are_those_of_the_describing_function():
+    amplitudes = [0.5, 1.0, 2.0, 5.0]
+    laws = {"play": hs.Play(threshold=1.0), "law": LAW}
+    upper, lower = hs.plot.describing_function(laws, amplitudes, units=UNITS)
+    for name, law in laws.items():
+        found = hs.metrics.describing_function(law, amplitudes)
+        assert np.array_equal(labelled(upper, name).get_xydata(), np.column_stack([amplitudes, np.abs(found)]))
+        phase = labelled(lower, name).get_ydata()
+        assert np.array_equal(np.isnan(phase), found == 0.0)
+        assert np.array_equal(phase[found != 0.0], np.degrees(np.angle(found[found != 0.0])))
+    assert (upper.get_ylabel(), lower.get_xlabel()) == ("Gain [µm/V]", "Amplitude [V]")
+    (alone,) = hs.plot.describing_function(LAW, amplitudes)[0].lines
+    assert alone.get_label() == "BoucWen"
+
+
+def test_an_animation_runs_from_the_first_sample_to_the_last(record, tmp_path):
+    running = hs.plot.animate(record, frames=6, trail=0.5)
+    ax = running._fig.axes[0]
+    path, behind, point = ax.lines
+    running.save(tmp_path / "loop.gif", writer="pillow", dpi=40)
+    with Image.open(tmp_path / "loop.gif") as film:
+        assert film.n_frames == 6
+        assert film.info["duration"] == 40
+    np.testing.assert_array_equal(path.get_xydata(), np.column_stack([record.u, record.y]))
+    running._draw_frame(0)
+    assert point.get_xydata().tolist() == [[record.u[0], record.y[0]]]
+    assert behind.get_xdata().tolist() == [record.u[0]]
+    running._draw_frame(5)
+    assert point.get_xydata().tolist() == [[record.u[-1], record.y[-1]]]
+    assert len(behind.get_xdata()) == 26  # half of 51 s: from sample 25.5 on
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("Voltage [V]", "Displacement [µm]")
+
+
+@hs.plot.house_style()
+def more_drawn(record):
+    axes = {name: hs.plot.figure(height=5.7) for name in ("minor", "history", "width", "map", "gain", "forc")}
+    u = hs.signals.decaying_sine(5.0, cycles=3, samples_per_cycle=20)
+    simulation = hs.simulate(LAW, None, u, units=UNITS)
+    hs.plot.minor_loops(simulation, axes["minor"].add_subplot())
+    hs.plot.history(simulation, hs.plot.panels(axes["history"], 3))
+    hs.plot.width(record, hs.simulate(LAW, None, record.u), ax=axes["width"].add_subplot())
+    hs.plot.residual_map(record, LAW, axes["map"].subplots(1, 2))
+    hs.plot.describing_function({"law": LAW, "play": hs.Play()}, [0.5, 2.0, 4.0], hs.plot.panels(axes["gain"], 2))
+    hs.plot.forc(hs.Preisach(levels=(0.0, 1.0, 2.0), weights=(1.0, 2.0, 3.0)), axes["forc"].add_subplot())
+    return axes
+
+
+def test_pictures_of_loops_are_the_same_bytes_and_nothing_is_clipped(record):
+    once, again = more_drawn(record), more_drawn(record)
+    for name, figure in once.items():
+        assert hs.plot.to_svg(figure, name=name) == hs.plot.to_svg(again[name], name=name)
+        inside = figure.bbox.padded(0.5)
+        for ax in figure.axes:
+            box = ax.get_tightbbox()
+            assert inside.contains(box.x0, box.y0), name
+            assert inside.contains(box.x1, box.y1), name

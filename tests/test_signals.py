@@ -1,9 +1,11 @@
 """Signals hit their extremes exactly, and every cycle has the same bits."""
 
+import itertools
 import math
 
 import numpy as np
 import pytest
+import scipy.signal
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -61,9 +63,146 @@ def test_a_sine_is_exact_where_its_value_is():
     assert np.array_equal(u[50:], -u[:51])
 
 
+@given(LEVEL, st.floats(0.01, 10.0), CYCLES, st.integers(2, 50))
+def test_a_sawtooth_hits_both_ends_of_every_line(low, span, cycles, n):
+    u = hs.signals.sawtooth(low, low + span, cycles=cycles, samples_per_cycle=n).reshape(cycles, n)
+    assert (u == u[0]).all()
+    assert (u[0, 0], u[0, -1]) == (low, low + span)
+    assert np.diff(u[0]) == pytest.approx((low + span - low) / (n - 1), abs=1e-13)  # rounding of levels up to 110
+
+
+@given(LEVEL, st.floats(0.01, 10.0), CYCLES, st.integers(1, 20))
+def test_a_square_wave_has_two_values(low, span, cycles, half):
+    u = hs.signals.square(low, low + span, cycles=cycles, samples_per_half=half).reshape(cycles, 2, half)
+    assert (u[:, 0] == low).all()
+    assert (u[:, 1] == low + span).all()
+
+
+@given(st.floats(0.01, 10.0), LEVEL, st.integers(1, 6), st.integers(1, 20), st.none() | st.floats(0.1, 1.0))
+def test_cycles_of_a_fading_sine_are_sines_with_their_own_extremes(amplitude, mean, cycles, quarter, ratio):
+    n, k = 4 * quarter, np.arange(cycles)
+    amplitudes = amplitude * ((cycles - k) / cycles if ratio is None else ratio**k)
+    options = {"mean": mean, "cycles": cycles, "samples_per_cycle": n, "ratio": ratio}
+    fading, growing = hs.signals.decaying_sine(amplitude, **options), hs.signals.growing_sine(amplitude, **options)
+    for u, swings in ((fading, amplitudes), (growing, amplitudes[::-1])):
+        assert u.size == cycles * n + 1
+        assert u[-1] == mean
+        for cycle, swing in zip(u[:-1].reshape(cycles, n), swings, strict=True):
+            assert (cycle[0], cycle[quarter], cycle[3 * quarter]) == (mean, mean + swing, mean - swing)
+            assert (cycle.max(), cycle.min()) == (mean + swing, mean - swing)
+            sine = hs.signals.sine(swing, mean=mean, cycles=1, samples_per_cycle=n)
+            assert np.array_equal(cycle, sine[:-1])
+
+
+@given(st.lists(LEVEL, min_size=2, max_size=8), st.floats(0.1, 50.0))
+def test_lines_between_extremes_hit_them_and_step_evenly(levels, max_step):
+    u = hs.signals.extremes(levels, max_step=max_step)
+    counts = [max(1, math.ceil(abs(b - a) / max_step * (1 - 1e-12))) for a, b in itertools.pairwise(levels)]
+    places = np.cumsum([0, *counts])
+    assert u.size == places[-1] + 1
+    assert u[places].tolist() == levels
+    assert np.abs(np.diff(u)).max() <= max_step * (1 + 1e-11) + 1e-13  # a step that fits to rounding is not divided
+    assert np.array_equal(u, hs.signals.extremes(levels, samples_per_line=counts))
+
+
+def test_the_other_signals_are_lines_between_extremes():
+    triangle = hs.signals.triangle(-1.0, 2.0, cycles=2, samples_per_cycle=10)
+    assert hs.signals.extremes([-1.0, 2.0, -1.0, 2.0, -1.0], samples_per_line=5) == pytest.approx(triangle, abs=1e-15)
+    curves = hs.signals.reversal_curves(0.0, 1.0, curves=2, samples_per_step=3)
+    assert hs.signals.extremes([0.0, 0.5, 0.0, 1.0, 0.0], max_step=0.5 / 3) == pytest.approx(curves, abs=1e-15)
+
+
+@given(
+    st.sets(st.integers(1, 31), min_size=1).map(sorted),
+    st.floats(0.01, 100.0),
+    LEVEL,
+    st.integers(1, 3),
+    st.sampled_from([64, 65, 100]),
+    st.sampled_from(["random", "schroeder"]),
+)
+def test_a_multisine_has_its_lines_and_no_others(lines, rms, mean, periods, n, phases):
+    u = hs.signals.multisine(lines, rms=rms, mean=mean, periods=periods, samples_per_period=n, phases=phases, seed=4)
+    period = u[:n]
+    assert np.array_equal(u, np.tile(period, periods))
+    spectrum = np.abs(np.fft.rfft(period)) / n
+    expected = np.zeros(n // 2 + 1)
+    expected[lines] = rms / math.sqrt(2 * len(lines))
+    expected[0] = abs(mean)
+    assert spectrum == pytest.approx(expected, abs=1e-12 * (rms + abs(mean)))  # rounding of values of this size
+    assert math.sqrt(np.mean((period - mean) ** 2)) == pytest.approx(rms, abs=1e-12 * (rms + abs(mean)))
+
+
+def test_phases_come_from_the_seed_or_from_schroeder():
+    options = {"rms": 1.0, "samples_per_period": 512}
+    band = np.arange(1, 101)
+    one, same, other = (hs.signals.multisine(band, seed=seed, **options) for seed in (1, np.random.default_rng(1), 2))
+    assert np.array_equal(one, same)
+    assert not np.array_equal(one, other)
+    low = hs.signals.multisine(band, phases="schroeder", **options)
+    assert np.abs(low).max() < 1.8 < 2.5 < min(np.abs(one).max(), np.abs(other).max())  # crest: 1.7, against about 3
+
+
+@pytest.mark.parametrize(("spacing", "method"), [("linear", "linear"), ("logarithmic", "logarithmic")])
+@pytest.mark.parametrize(("start", "stop"), [(1.0, 40.0), (40.0, 1.0)])
+def test_a_sweep_is_that_of_scipy(spacing, method, start, stop):
+    n, sample_time = 5000, 1e-3
+    u = hs.signals.sweep(start, stop, amplitude=2.0, mean=1.0, n_samples=n, sample_time=sample_time, spacing=spacing)
+    t = np.arange(n) / 1000.0
+    expected = 1.0 + 2.0 * scipy.signal.chirp(t, start, n * sample_time, stop, method=method, phi=-90.0)
+    assert u[0] == 1.0
+    assert u == pytest.approx(expected, abs=1e-11)  # rounding of 100 turns, twice over
+
+
+def test_a_sweep_of_one_frequency_is_a_sine():
+    u = hs.signals.sweep(5.0, 5.0, amplitude=1.0, n_samples=201, sample_time=0.001)
+    assert u == pytest.approx(hs.signals.sine(1.0, cycles=1, samples_per_cycle=200), abs=1e-14)
+
+
+@given(st.integers(1, 10_000))
+def test_times_are_the_nearest_numbers_to_the_decimal_ones(rate):
+    t = hs.signals.sample_times(1000, 1.0 / rate)
+    assert np.array_equal(t, np.arange(1000) / rate)
+
+
+def test_times_of_any_step_are_rounded_once():
+    t = hs.signals.sample_times(1001, 0.007)
+    assert t[1000] == 1000 * 0.007
+    assert hs.Record(u=t, y=t, t=t).sample_time == pytest.approx(0.007, rel=1e-15)
+
+
+SIGNALS = hs.signals
+LINES = {"rms": 1.0, "samples_per_period": 8}
+SWEEP = {"amplitude": 1.0, "n_samples": 10, "sample_time": 0.1}
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
+        (lambda: SIGNALS.sawtooth(0, 1, cycles=1, samples_per_cycle=1), "at least 2, one for each end"),
+        (lambda: SIGNALS.square(1, 1, cycles=1, samples_per_half=1), "high must be above low"),
+        (lambda: SIGNALS.square(0, 1, cycles=1, samples_per_half=0), "samples_per_half must be at least 1"),
+        (lambda: SIGNALS.decaying_sine(-1, cycles=1, samples_per_cycle=4), "amplitude must be positive"),
+        (lambda: SIGNALS.growing_sine(1, mean=math.inf, cycles=1, samples_per_cycle=4), "mean must be finite"),
+        (lambda: SIGNALS.decaying_sine(1, cycles=1, samples_per_cycle=4, ratio=1.5), "above 0 and at most 1, got 1.5"),
+        (lambda: SIGNALS.extremes([1.0], max_step=1), "two levels, got 1"),
+        (lambda: SIGNALS.extremes([0.0, 1.0]), "either samples_per_line or max_step"),
+        (lambda: SIGNALS.extremes([0.0, 1.0], samples_per_line=1, max_step=1.0), "either samples_per_line or"),
+        (lambda: SIGNALS.extremes([0.0, 1.0], samples_per_line=[1, 1]), "one for each of 1 lines, got 2"),
+        (lambda: SIGNALS.extremes([0.0, 1.0], samples_per_line=0), "at least 1, got 0"),
+        (lambda: SIGNALS.extremes([0.0, 1.0], max_step=0.0), "max_step must be positive"),
+        (lambda: SIGNALS.extremes([0.0, 1.0], max_step=1e-300), r"1e\+300 steps, more than 1e\+08"),
+        (lambda: SIGNALS.multisine([4], **LINES), "below half of 8 samples, got 4 to 4"),
+        (lambda: SIGNALS.multisine([2, 1], **LINES), "increasing"),
+        (lambda: SIGNALS.multisine([], **LINES), "whole numbers"),
+        (lambda: SIGNALS.multisine([1], rms=0.0, samples_per_period=8), "rms must be positive"),
+        (lambda: SIGNALS.multisine([1], phases="zero", **LINES), '"random" or "schroeder"'),
+        (lambda: SIGNALS.sweep(1.0, 5.0, **SWEEP), "stop must be from 0 to below half the sampling rate, got 5.0"),
+        (lambda: SIGNALS.sweep(1.0, 2.0, **SWEEP | {"amplitude": 0.0}), "amplitude must be positive"),
+        (lambda: SIGNALS.sweep(1.0, 2.0, **SWEEP | {"sample_time": 0.0}), "sample_time must be positive"),
+        (lambda: SIGNALS.sweep(0.0, 2.0, spacing="logarithmic", **SWEEP), "two different positive frequencies"),
+        (lambda: SIGNALS.sweep(1.0, 2.0, spacing="square", **SWEEP), '"linear" or "logarithmic"'),
+        (lambda: SIGNALS.sample_times(0, 1.0), "n_samples must be at least 1"),
+        (lambda: SIGNALS.sample_times(1, math.nan), "sample_time must be positive"),
         (lambda: hs.signals.staircase(0, 10, 3), "divide the span 10, got 3: 3.33333 steps"),
         (lambda: hs.signals.staircase(0, 1, 2), "divide the span"),
         (lambda: hs.signals.staircase(0, 1, -1), "step must be positive"),
@@ -77,7 +216,7 @@ def test_a_sine_is_exact_where_its_value_is():
     ],
 )
 def test_impossible_signals_are_refused(make, message):
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises((ValueError, TypeError), match=message):
         make()
 
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray
 from hysim._words import LETTERS, extent, quantity
 from hysim.cli.designs import CYCLES, Task
+from hysim.cli.outputs import Curve
 from hysim.control import HysteresisAssessment, StepAssessment, Tuning
 from hysim.metrics import StepMetrics, rmse
 from hysim.models.actuator import Actuator
@@ -46,13 +46,6 @@ class Design(NamedTuple):
         """Over the last cycle of the triangle, driven by reference / secant gain."""
         last = slice(-self.task.samples_per_cycle - 1, None)
         return rmse(self.triangle.closed.reference[last], self.triangle.open_y[last])
-
-
-class _Curve(NamedTuple):
-    u: FloatArray
-    y: FloatArray
-    name: str
-    units: Mapping[str, str]
 
 
 def controller_json(design: Design) -> str:
@@ -176,7 +169,7 @@ def picture(design: Design) -> "Figure":
     with plot.house_style():
         canvas = plot.figure(height=6.4)
         upper, lower = canvas.subplots(2)
-        plot.loop(*(_Curve(reference, np.asarray(y)[last], name, own) for name, y in pairs), ax=upper)
+        plot.loop(*(Curve(reference, np.asarray(y)[last], None, name, own) for name, y in pairs), ax=upper)
         upper.set_xlabel("Reference" + "".join(upper.get_ylabel().partition(" [")[1:]))
         t = design.step.closed.t
         steps = {"open loop": (t, design.step.open_y), "closed loop": (t, design.step.closed.y)}

@@ -8,7 +8,8 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hysim._atomic import write_all
 from hysim.cli.records import STANDARD
@@ -82,13 +83,25 @@ def to_csv(columns: Mapping[str, "FloatArray"], units: Mapping[str, str]) -> str
     return buffer.getvalue()
 
 
-def loop(*results: "Record | Simulation") -> "Figure":
-    """Picture of loops."""
+class Curve(NamedTuple):
+    """What pictures take: input, output and time, with a name and units."""
+
+    u: "FloatArray"
+    y: "FloatArray"
+    t: "FloatArray | None" = None
+    name: str = ""
+    units: Mapping[str, str] = MappingProxyType({})
+
+
+def loop(*results: "Record | Simulation", model: Any = None) -> "Figure":
+    """Picture of loops; the last is of a `model`, and has its family's name."""
     from hysim import plot
 
+    *others, last = results
+    run = last if model is None else Curve(last.u, last.y, last.t, type(model).__name__, last.units)
     with plot.house_style():
         canvas = plot.figure()
-        plot.loop(*results, ax=canvas.add_subplot())
+        plot.loop(*others, run, ax=canvas.add_subplot())
     return canvas
 
 

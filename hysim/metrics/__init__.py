@@ -1,5 +1,6 @@
 """Arrays to numbers: the measures of loops, of fits and of responses to a step, each defined once."""
 
+from hysim.metrics._describing import describing_function
 from hysim.metrics._fit import aic, bic, fit_percent, fpe, nrmse, rmse
 from hysim.metrics._loop import LoopMetrics, loop_metrics, width_rmse
 from hysim.metrics._steps import (
@@ -16,6 +17,7 @@ __all__ = [
     "VibrationReduction",
     "aic",
     "bic",
+    "describing_function",
     "fit_percent",
     "fpe",
     "loop_metrics",

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hysim._frozen import FloatArray
 from hysim.comparison import Comparison, ComparisonRow
-from hysim.plot._style import GUIDE, MEASURED, POINTS, AxesArray, label, line, one, printed, several
+from hysim.plot._style import GUIDE, MEASURED, POINTS, AxesArray, in_unit, label, line, one, printed, several
 
 _FILLED: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 3.8, "markeredgewidth": 0.8}
 _TIGHT: dict[str, Any] = {"borderaxespad": 0.1, "columnspacing": 1.0, "handlelength": 1.2, "handletextpad": 0.3}
@@ -199,7 +199,7 @@ def _draw_residual(ax: Axes, comparison: Comparison, row: ComparisonRow, quanta:
             ax.axhline(-size, color=GUIDE, linewidth=0.8, linestyle=dashes)
     ax.plot(record.u[rising], residual[rising], color=MEASURED, label="loading", **_FILLED)
     ax.plot(record.u[~rising], residual[~rising], color=MEASURED, label="unloading", **_OPEN)
-    ax.set(xlabel=label(record.units, "u"), ylabel=f"Residual [{unit}]" if unit else "Residual")
+    ax.set(xlabel=label(record.units, "u"), ylabel=in_unit("Residual", unit))
     ax.margins(y=0.2)
 
 
@@ -207,7 +207,7 @@ def _draw_width(ax: Axes, comparison: Comparison) -> None:
     """The measured width, under the lines of the models."""
     units, loop = comparison.record.units, comparison.loop
     ax.plot(loop.u, loop.width, color=MEASURED, label="measured", zorder=3, **_FILLED)
-    ax.set(xlabel=label(units, "u"), ylabel=f"Loop width [{printed(units['y'])}]" if "y" in units else "Loop width")
+    ax.set(xlabel=label(units, "u"), ylabel=in_unit("Loop width", units.get("y", "")))
 
 
 def _quantum(comparison: Comparison, quanta: str) -> tuple[float, str]:

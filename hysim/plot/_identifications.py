@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from hysim import metrics
 from hysim._frozen import FloatArray
 from hysim.identification import Identification
-from hysim.plot._style import GUIDE, MEASURED, POINTS, AxesArray, label, line, printed, several
+from hysim.plot._style import GUIDE, MEASURED, POINTS, AxesArray, in_unit, label, line, several
 from hysim.records import Record
 
 _MEASURED: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 3.8, "color": POINTS}
@@ -82,13 +82,13 @@ def _loop(ax: Axes, u: FloatArray, y: FloatArray, fit: Identification, cuts: lis
 
 def _residuals(ax: Axes, u: FloatArray, fit: Identification, record: Record) -> None:
     quanta = fit.residual_quanta
-    unit = printed(record.units.get("y", "")) if quanta is None else "quanta"
+    unit = record.units.get("y", "") if quanta is None else "quanta"
     ax.axhline(0.0, color=GUIDE, linewidth=0.8)
     if quanta is not None:
         for size in (-1.0, 1.0):
             ax.axhline(size, color=GUIDE, linewidth=0.8, linestyle="dashed")
     ax.plot(u, fit.residual if quanta is None else quanta, **{**_MEASURED, "color": MEASURED})
-    ax.set(xlabel=label(record.units, "u"), ylabel=f"Residual [{unit}]" if unit else "Residual")
+    ax.set(xlabel=label(record.units, "u"), ylabel=in_unit("Residual", unit))
     ax.margins(y=0.15)
 
 

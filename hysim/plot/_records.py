@@ -7,11 +7,11 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from hysim._frozen import FloatArray
-from hysim.plot._style import MEASURED, POINTS, AxesArray, label, line, one, several
+from hysim.plot._results import InputOutput, names_of, units_of
+from hysim.plot._style import MARKERS, MEASURED, POINTS, AxesArray, label, line, one, several
 from hysim.records import Record
 
 _DRAWN = {"zoh": "steps-post", "foh": "default"}
-_MARKERS = "os^D"
 _POINTS: dict[str, Any] = {
     "color": POINTS,
     "linewidth": 0.8,
@@ -20,15 +20,6 @@ _POINTS: dict[str, Any] = {
     "markeredgecolor": MEASURED,
 }
 _ARROW = 0.03  # its length along the input, of the span
-
-
-class InputOutput(Protocol):
-    """What can be drawn as a loop: a Record, a Simulation or the like, with `units` and `name` if it has them."""
-
-    @property
-    def u(self) -> FloatArray: ...
-    @property
-    def y(self) -> FloatArray: ...
 
 
 class Response(Protocol):
@@ -74,36 +65,38 @@ def loop(*results: InputOutput, ax: Axes | None = None) -> Axes:
     """
     if not results:
         raise ValueError("there is nothing to draw: give at least one result with u and y")
-    records = [result for result in results if isinstance(result, Record)]
-    others = [result for result in results if not isinstance(result, Record)]
+    named = list(zip(results, names_of(results), strict=True))
+    records = [(result, name) for result, name in named if isinstance(result, Record)]
+    others = [(result, name) for result, name in named if not isinstance(result, Record)]
     with one(ax) as axes:
-        for k, record in enumerate(records):
-            axes.plot(record.u, record.y, label=_name(record), marker=_MARKERS[k % len(_MARKERS)], **_POINTS)
-        for k, result in enumerate(others):
-            (drawn,) = axes.plot(result.u, result.y, label=_name(result), **line(k))
+        for k, (record, name) in enumerate(records):
+            axes.plot(record.u, record.y, label=name, marker=MARKERS[k % len(MARKERS)], **_POINTS)
+        for k, (result, name) in enumerate(others):
+            (drawn,) = axes.plot(result.u, result.y, label=name, **line(k))
             _arrows(axes, result, drawn.get_color())
-        units = _units(results)
+        units = units_of(results)
         axes.set(xlabel=label(units, "u"), ylabel=label(units, "y"))
         if len(results) > 1:
             axes.legend()
     return axes
 
 
-def history(record: Record, axes: Sequence[Axes] | AxesArray | None = None, *, hold: str = "zoh") -> AxesArray:
-    """Draw output and input against time, one over the other.
+def history(result: InputOutput, axes: Sequence[Axes] | AxesArray | None = None, *, hold: str = "zoh") -> AxesArray:
+    """Draw output, input and, where there is one, memory against time, one over the other.
 
     Parameters
     ----------
-    record : Record
-        Without a time it is drawn against the sample's number.
-    axes : two Axes, optional
-        For the output and for the input.
+    result : Record, Simulation or anything with `u` and `y`
+        A record's output is drawn as points, any other as a line. Without a time it is drawn against the sample's
+        number.
+    axes : two or three Axes, optional
+        For the output, for the input and for the memory z, which is left out where there are two.
     hold : {"zoh", "foh"}
         How the input runs between samples: held, which makes steps, or along a straight line.
 
     Returns
     -------
-    array of Axes, shape (2,)
+    array of Axes, shape (2,) or (3,)
 
     Raises
     ------
@@ -119,15 +112,21 @@ def history(record: Record, axes: Sequence[Axes] | AxesArray | None = None, *, h
     """
     if hold not in _DRAWN:
         raise ValueError(f'hold must be "zoh" or "foh", got {hold!r}')
-    t = np.arange(float(record.u.size)) if record.t is None else record.t
-    end = 2.0 * t[-1] - t[-2]
-    with several(axes, 2, height=2.1) as (upper, lower):
-        upper.plot(t, record.y, marker="o", **_POINTS)
-        lower.plot(np.append(t, end), np.append(record.u, record.u[-1]), color=MEASURED, drawstyle=_DRAWN[hold])
-        upper.set_ylabel(label(record.units, "y"))
-        lower.set_ylabel(label(record.units, "u"))
-        lower.set_xlabel("Sample" if record.t is None else label(record.units, "t"))
-    return np.array([upper, lower])
+    time, z = getattr(result, "t", None), getattr(result, "z", None)
+    t = np.arange(float(result.u.size)) if time is None else time
+    end = 2.0 * t[-1] - t[-2] if t.size > 1 else t[-1]
+    units = units_of([result])
+    style = {"marker": "o", **_POINTS} if isinstance(result, Record) else line(0)
+    n = 2 if z is None or (axes is not None and np.size(np.asarray(axes)) == 2) else 3
+    with several(axes, n, height=2.1 if n == 2 else 1.9) as panels:
+        panels[0].plot(t, result.y, **style)
+        panels[1].plot(np.append(t, end), np.append(result.u, result.u[-1]), color=MEASURED, drawstyle=_DRAWN[hold])
+        if n == 3:
+            panels[2].plot(t, z, **line(1))
+        for ax, signal in zip(panels, "yuz", strict=False):
+            ax.set_ylabel(label(units, signal))
+        panels[-1].set_xlabel("Sample" if time is None else label(units, "t"))
+    return panels
 
 
 def traces(
@@ -206,15 +205,3 @@ def _arrows(ax: Axes, result: InputOutput, colour: Any) -> None:
             away = np.abs(u[:head] - u[head]) >= _ARROW * np.ptp(u)
             tail = np.flatnonzero(away)[-1] if away.any() else head - 1
             ax.annotate("", xy=(u[head], y[head]), xytext=(u[tail], y[tail]), arrowprops=style)
-
-
-def _name(result: Any) -> str:
-    return getattr(result, "name", "") or type(result).__name__.lower()
-
-
-def _units(results: Sequence[Any]) -> dict[str, str]:
-    """The units of all results, those of the first one that has them."""
-    units: dict[str, str] = {}
-    for result in results:
-        units = dict(getattr(result, "units", {})) | units
-    return units

@@ -13,6 +13,7 @@ import matplotlib.style
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap, ListedColormap
 from matplotlib.figure import Figure
 
 AxesArray = npt.NDArray[np.object_]
@@ -23,6 +24,16 @@ WIDTH = 6.0
 MEASURED = "#333333"
 POINTS = "#b0b0b0"
 GUIDE = "#777777"
+
+MARKERS = "os^D"
+
+SEQUENTIAL = ListedColormap(matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, 256)), "hysim_sequential")
+"""From dark to light; its light end is still seen on white."""
+
+DIVERGING = LinearSegmentedColormap.from_list(
+    "hysim_diverging", ["#0a1f4d", "#27569a", "#888888", "#d8ad45", "#fff3b0"]
+)
+"""From dark blue over grey, which is zero, to light yellow: lightness rises all the way, so that it reads in grey."""
 
 _LINES = (
     ("#0072B2", "solid"),
@@ -71,7 +82,7 @@ _QUANTITIES = {
     **dict.fromkeys(("mN", "N", "kN"), "Force"),
     **dict.fromkeys(("us", "µs", "ms", "s"), "Time"),
 }
-_NAMES = {"t": "Time", "u": "Input", "y": "Output"}
+_NAMES = {"t": "Time", "u": "Input", "y": "Output", "z": "Memory z"}
 
 
 @contextmanager
@@ -166,7 +177,13 @@ def label(units: Mapping[str, str], signal: str) -> str:
     if signal not in units:
         return _NAMES[signal]
     unit = units[signal]
-    return f"{_QUANTITIES.get(unit, _NAMES[signal])} [{printed(unit)}]"
+    quantity = _NAMES[signal] if signal == "z" else _QUANTITIES.get(unit, _NAMES[signal])
+    return f"{quantity} [{printed(unit)}]"
+
+
+def in_unit(name: str, unit: str) -> str:
+    """`Loop width [µm]` of a name and a unit; the name alone without one."""
+    return f"{name} [{printed(unit)}]" if unit else name
 
 
 def printed(unit: str) -> str:

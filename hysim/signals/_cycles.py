@@ -1,15 +1,11 @@
-"""Inputs for loop studies, exact to the bit at their extremes.
-
-Each returns the samples of a signal, without time: a cycle starts at its lowest value (a sine at its mean),
-and every cycle has the same bits.
-"""
+"""Signals of which every cycle has the same bits."""
 
 import math
-import operator
 
 import numpy as np
 
 from hysim._frozen import FloatArray
+from hysim.signals._parts import checked_count, checked_span, unit_sine
 
 
 def staircase(low: float, high: float, step: float, *, cycles: int = 1, samples_per_step: int = 1) -> FloatArray:
@@ -42,15 +38,15 @@ def staircase(low: float, high: float, step: float, *, cycles: int = 1, samples_
     >>> hs.signals.staircase(0, 10, 5).tolist()
     [0.0, 5.0, 10.0, 10.0, 5.0, 0.0]
     """
-    span = _span(low, high)
+    span = checked_span(low, high)
     if not (math.isfinite(step) and step > 0):
         raise ValueError(f"step must be positive and finite, got {step}")
     n_steps = round(span / step)
     if n_steps < 1 or not math.isclose(n_steps * step, span, rel_tol=1e-9):
         raise ValueError(f"step must divide the span {span}, got {step}: {span / step:.6g} steps")
     up = np.linspace(low, high, n_steps + 1)
-    cycle = np.repeat(np.append(up, up[::-1]), _count("samples_per_step", samples_per_step))
-    return np.tile(cycle, _count("cycles", cycles))
+    cycle = np.repeat(np.append(up, up[::-1]), checked_count("samples_per_step", samples_per_step))
+    return np.tile(cycle, checked_count("cycles", cycles))
 
 
 def triangle(low: float, high: float, *, cycles: int, samples_per_cycle: int) -> FloatArray:
@@ -81,11 +77,11 @@ def triangle(low: float, high: float, *, cycles: int, samples_per_cycle: int) ->
     >>> hs.signals.triangle(0.0, 1.0, cycles=1, samples_per_cycle=4).tolist()
     [0.0, 0.5, 1.0, 0.5, 0.0]
     """
-    _span(low, high)
-    if _count("samples_per_cycle", samples_per_cycle) % 2:
+    checked_span(low, high)
+    if checked_count("samples_per_cycle", samples_per_cycle) % 2:
         raise ValueError(f"samples_per_cycle must be even, so that a sample lies on the peak, got {samples_per_cycle}")
     up = np.linspace(low, high, samples_per_cycle // 2 + 1)
-    return np.append(np.tile(np.append(up[:-1], up[:0:-1]), _count("cycles", cycles)), low)
+    return np.append(np.tile(np.append(up[:-1], up[:0:-1]), checked_count("cycles", cycles)), low)
 
 
 def sine(amplitude: float, *, mean: float = 0.0, cycles: int, samples_per_cycle: int) -> FloatArray:
@@ -118,31 +114,63 @@ def sine(amplitude: float, *, mean: float = 0.0, cycles: int, samples_per_cycle:
     """
     if not (math.isfinite(amplitude) and amplitude > 0 and math.isfinite(mean)):
         raise ValueError(f"amplitude must be positive, and it and the mean finite, got {amplitude} and {mean}")
-    n = _count("samples_per_cycle", samples_per_cycle)
-    from_zero = n / 4 - np.abs((np.arange(n) + n / 4) % n - n / 2)  # the phase, folded into the middle half turn
-    period = mean + amplitude * np.sin(2 * np.pi * from_zero / n)
-    return np.append(np.tile(period, _count("cycles", cycles)), mean)
+    period = mean + amplitude * unit_sine(checked_count("samples_per_cycle", samples_per_cycle))
+    return np.append(np.tile(period, checked_count("cycles", cycles)), mean)
 
 
-def reversal_curves(low: float, high: float, *, curves: int, samples_per_step: int = 1) -> FloatArray:
-    """First-order reversal curves: up from low to one level after the other, and back each time.
+def sawtooth(low: float, high: float, *, cycles: int, samples_per_cycle: int) -> FloatArray:
+    """Straight lines from low to high, and back at once, sampled evenly.
 
-    The levels divide the span evenly, and the highest one is last. With N curves and m samples for the way from
-    one level to the next, sampled evenly, curve k = 1 ... N takes 2 k m samples.
+    Back takes one step from sample to sample, as long as any other. Reversed, ``[::-1]``, the signal falls along the
+    lines and rises at once.
 
     Parameters
     ----------
     low, high : float
         Extremes, both hit exactly [unit of u].
-    curves : int
-        Number N of levels above low from which a curve falls.
-    samples_per_step : int
-        Samples m from level to level; every level is hit exactly.
+    cycles : int
+        Number of lines.
+    samples_per_cycle : int
+        Samples of a line, both ends among them; at least 2.
 
     Returns
     -------
-    array, shape (curves * (curves + 1) * samples_per_step + 1,) [unit of u]
-        Starts and ends at low.
+    array, shape (cycles * samples_per_cycle,) [unit of u]
+        Starts at low and ends at high.
+
+    Raises
+    ------
+    ValueError
+        If high is not above low, `cycles` is below 1, or `samples_per_cycle` below 2.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> hs.signals.sawtooth(0.0, 1.0, cycles=2, samples_per_cycle=3).tolist()
+    [0.0, 0.5, 1.0, 0.0, 0.5, 1.0]
+    """
+    checked_span(low, high)
+    if checked_count("samples_per_cycle", samples_per_cycle) < 2:
+        raise ValueError("samples_per_cycle must be at least 2, one for each end of the line, got 1")
+    return np.tile(np.linspace(low, high, samples_per_cycle), checked_count("cycles", cycles))
+
+
+def square(low: float, high: float, *, cycles: int, samples_per_half: int) -> FloatArray:
+    """Low and high in turn, each held as long.
+
+    Parameters
+    ----------
+    low, high : float
+        The two values [unit of u].
+    cycles : int
+        Number of periods.
+    samples_per_half : int
+        How often each value is sampled before the other follows.
+
+    Returns
+    -------
+    array, shape (2 * cycles * samples_per_half,) [unit of u]
+        Starts at low and ends at high.
 
     Raises
     ------
@@ -152,23 +180,10 @@ def reversal_curves(low: float, high: float, *, curves: int, samples_per_step: i
     Examples
     --------
     >>> import hysim as hs
-    >>> hs.signals.reversal_curves(0.0, 1.0, curves=2).tolist()
-    [0.0, 0.5, 0.0, 0.5, 1.0, 0.5, 0.0]
+    >>> hs.signals.square(18.0, 50.0, cycles=2, samples_per_half=2).tolist()
+    [18.0, 18.0, 50.0, 50.0, 18.0, 18.0, 50.0, 50.0]
     """
-    _span(low, high)
-    m = _count("samples_per_step", samples_per_step)
-    up = np.linspace(low, high, _count("curves", curves) * m + 1)
-    ways = [np.append(up[: k * m], up[k * m : 0 : -1]) for k in range(1, curves + 1)]
-    return np.append(np.concatenate(ways), low)
-
-
-def _span(low: float, high: float) -> float:
-    if not (math.isfinite(high - low) and high > low):
-        raise ValueError(f"high must be above low, and both finite, got low {low} and high {high}")
-    return high - low
-
-
-def _count(name: str, value: int) -> int:
-    if operator.index(value) < 1:
-        raise ValueError(f"{name} must be at least 1, got {value}")
-    return value
+    checked_span(low, high)
+    return np.tile(
+        np.repeat([low, high], checked_count("samples_per_half", samples_per_half)), checked_count("cycles", cycles)
+    )

@@ -1,0 +1,28 @@
+"""What the signals share: one period of a sine, and the checks of their arguments."""
+
+import math
+import operator
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+
+
+def unit_sine(n: int) -> FloatArray:
+    """One period from 0, n samples; symmetric to the bit."""
+    from_zero = n / 4 - np.abs((np.arange(n) + n / 4) % n - n / 2)  # the phase, folded into the middle half turn
+    return np.asarray(np.sin(2 * np.pi * from_zero / n))
+
+
+def checked_span(low: float, high: float) -> float:
+    """What lies between the extremes, which must be finite and in order."""
+    if not (math.isfinite(high - low) and high > low):
+        raise ValueError(f"high must be above low, and both finite, got low {low} and high {high}")
+    return high - low
+
+
+def checked_count(name: str, value: int) -> int:
+    """A whole number from 1 on."""
+    if operator.index(value) < 1:
+        raise ValueError(f"{name} must be at least 1, got {value}")
+    return value
