@@ -139,10 +139,12 @@ def _response(response: StepMetrics) -> str:
 
 
 def _conditions(design: Design) -> Iterator[str]:
+    """What all of this holds for, the model being the plant."""
     known, u, y = design.triangle.closed.conditions, design.units.get("u", ""), design.units.get("y", "")
     within = "none" if known["limits"] is None else extent(known["limits"], u)
+    yield "conditions  simulated, with the model as the plant"
     yield (
-        f"conditions  sample time {known['sample_time']:.4g} s, delay {known['delay']:.4g} s, preview "
+        f"            sample time {known['sample_time']:.4g} s, delay {known['delay']:.4g} s, preview "
         f"{known['preview']:.4g} s, limits {within}"
     )
     yield (

@@ -65,9 +65,8 @@ def run(options: argparse.Namespace) -> int:
     )
     texts: dict[str | None, Any] = {options.out: to_json(found.model, units=record.units)}
     if options.plot:
-        texts[options.plot] = outputs.loop(
-            record, models.simulated(found.model, record, dict(record.units)), model=found.model
-        )
+        run = models.simulated(found.model, record, dict(record.units))
+        texts[options.plot] = outputs.loop(record, run, model=found.model)
     if not is_taken:
         texts[records.STANDARD] = found.to_json() if options.json else found.summary() + "\n"
     outputs.write(texts)

@@ -90,9 +90,8 @@ def run(options: argparse.Namespace) -> int:
     )
     texts: dict[str | None, Any] = {options.out: to_json(fit.model, units=record.units)}
     if options.plot:
-        texts[options.plot] = outputs.loop(
-            record, models.simulated(fit.model, record, dict(record.units)), model=fit.model
-        )
+        run = models.simulated(fit.model, record, dict(record.units))
+        texts[options.plot] = outputs.loop(record, run, model=fit.model)
     if not is_taken:
         texts[records.STANDARD] = outputs.to_json(_document(fit)) if options.json else fit.summary() + "\n"
     outputs.write(texts)

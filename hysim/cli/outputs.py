@@ -57,8 +57,7 @@ def write(contents: "Mapping[str | None, str | Figure]") -> None:
     made = {path: _content(path, content) for path, content in contents.items() if path is not None}
     write_all({path: content for path, content in made.items() if path != STANDARD})
     if STANDARD in made:
-        sys.stdout.write(made[STANDARD].decode())
-        sys.stdout.flush()
+        print(made[STANDARD].decode(), end="", flush=True)
 
 
 def _content(path: str, content: "str | Figure") -> bytes:

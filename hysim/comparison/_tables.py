@@ -68,7 +68,8 @@ def to_text(comparison: "Comparison", *, timings: bool) -> str:
     """The short table for a terminal, what could not be compared, and the verdict."""
     lines = _aligned(_short(comparison, timings))
     notes = [f"not compared: {name}: {reason}" for name, reason in comparison.failed.items()] + [comparison.verdict]
-    wrapped = [line for note in notes if note for line in textwrap.wrap(note, _WIDE, subsequent_indent="  ")]
+    folded = textwrap.TextWrapper(_WIDE, subsequent_indent="  ", break_on_hyphens=False)
+    wrapped = [line for note in notes if note for line in folded.wrap(note)]
     return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:], *wrapped])
 
 
@@ -82,7 +83,9 @@ def to_words(comparison: "Comparison") -> str:
     more, many = len(best) - _PRINTED, len(comparison.rows)
     head = f"Comparison of {many} model{'' if many == 1 else 's'} on {comparison.record.name or 'a record'}, "
     notes = [f"  ... and {more} more"] if more > 0 else []
-    notes += textwrap.wrap(comparison.verdict, LETTERS, initial_indent="  ", subsequent_indent="  ")
+    notes += textwrap.wrap(
+        comparison.verdict, LETTERS, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False
+    )
     return words([f"{head}{len(comparison.record)} samples", *(f"  {line}" for line in _aligned(table)), *notes])
 
 
