@@ -52,17 +52,17 @@ def check(*paths: str | None, pictures: Iterable[str | None] = (), printed: bool
     return STANDARD in given
 
 
-def write(contents: "Mapping[str | None, str | Figure]") -> None:
-    """Write each text or figure to its path, to the standard output, or nowhere: all of the files or none."""
+def write(contents: "Mapping[str | None, str | bytes | Figure]") -> None:
+    """Write each content or figure to its path, to the standard output, or nowhere: all of the files or none."""
     made = {path: _content(path, content) for path, content in contents.items() if path is not None}
     write_all({path: content for path, content in made.items() if path != STANDARD})
     if STANDARD in made:
         print(made[STANDARD].decode(), end="", flush=True)
 
 
-def _content(path: str, content: "str | Figure") -> bytes:
-    if isinstance(content, str):
-        return content.encode()
+def _content(path: str, content: "str | bytes | Figure") -> bytes:
+    if isinstance(content, str | bytes):
+        return content.encode() if isinstance(content, str) else content
     from hysim import plot
 
     return plot.to_bytes(content, "svg" if path == STANDARD else Path(path).suffix[1:].lower(), name="picture")
