@@ -62,7 +62,10 @@ def _run(arguments: list[str]) -> int:
     if not named:
         parser.print_help(sys.stderr)
         return BAD_INPUT
-    return int(options.command(options))
+    import numpy as np
+
+    with np.errstate(all="ignore"):  # what overflows is inf or nan in the result, and null in JSON
+        return int(options.command(options))
 
 
 def _failed(code: int, text: str) -> int:
