@@ -38,7 +38,7 @@ def write_reference(folder: Path) -> None:
 
 def _home(value: Any) -> str:
     """Second part of the module's name: hysim.identification._identify is of the identification."""
-    return str(value.__module__).split(".")[1]
+    return str(value.__module__).split(".")[1].strip("_")
 
 
 def _members(module: ModuleType) -> Iterable[str]:

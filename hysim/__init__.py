@@ -84,6 +84,7 @@ _HOME = {
     "save": "hysim.models.storage",
     "load_model": "hysim.models.storage",
     "SimulationError": "hysim.errors",
+    "show_versions": "hysim._versions",
 }
 
 __all__ = ["__version__", *_MODULES, *_HOME]
@@ -97,6 +98,7 @@ if TYPE_CHECKING:
     from hysim import rig as rig
     from hysim import signals as signals
     from hysim import vision as vision
+    from hysim._versions import show_versions as show_versions
     from hysim.comparison import Comparison as Comparison
     from hysim.comparison import compare as compare
     from hysim.control import PID as PID

@@ -2,8 +2,8 @@
 
 import os
 import secrets
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import IO, Any
 
@@ -16,17 +16,37 @@ def write_text(path: str | Path, text: str) -> None:
     OSError
         If the folder cannot be written to.
     """
-    with whole(path, "x", encoding="utf-8", newline="\n") as file:
-        file.write(text)
+    write_all({path: text})
+
+
+def write_all(contents: Mapping[str | Path, str | bytes]) -> None:
+    """Write texts and bytes to their paths as `write_text` does, and rename none before all are written.
+
+    Raises
+    ------
+    OSError
+        If a folder cannot be written to.
+    """
+    with ExitStack() as files:
+        for path, content in contents.items():
+            data = content.encode() if isinstance(content, str) else content
+            file = files.enter_context(whole(path, "xb"))
+            file.write(data)
+            file.flush()
 
 
 @contextmanager
 def whole(path: str | Path, mode: str, **options: Any) -> Iterator[IO[Any]]:
     """A file beside `path` to write to, which takes its place at the end of the block; a failure leaves what was there.
 
-    `mode` is ``"x"`` or ``"xb"``, and the `options` are those of `open`.
+    `mode` is ``"x"`` or ``"xb"``, and the `options` are those of `open`. A link leads to what is renamed; a device or
+    a pipe is written to as it is.
     """
-    target = Path(path)
+    target = Path(os.path.realpath(path))
+    if target.exists() and not target.is_file():
+        with open(target, mode.replace("x", "w"), **options) as file:
+            yield file
+        return
     beside = target.with_name(f".{target.name}.{secrets.token_hex(8)}")
     try:
         with open(beside, mode, **options) as file:

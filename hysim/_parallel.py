@@ -13,7 +13,7 @@ import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
-from contextvars import ContextVar
+from contextvars import ContextVar, copy_context
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -76,6 +76,8 @@ def map_on_threads(
     _check(workers)
     n_threads = min(workers or _most.get() or cores(), n_items)
 
+    here = copy_context()  # of which numpy's error state is a part
+
     def alone(k: int) -> T:
         with at_most(1 if n_threads > 1 else None):
             return work(k)
@@ -83,7 +85,7 @@ def map_on_threads(
     results = []
     with ThreadPoolExecutor(n_threads) as pool:
         try:
-            for result in pool.map(alone, range(n_items)):
+            for result in pool.map(lambda k: here.copy().run(alone, k), range(n_items)):
                 results.append(result)
                 if progress is not None:
                     progress(len(results), n_items)

@@ -17,6 +17,7 @@ from hysim._drift import drift
 from hysim._frozen import FloatArray, checked
 from hysim._prefixes import power_of_ten
 from hysim._quanta import output_quantum
+from hysim._words import extent, printed, quantity, words
 
 T = TypeVar("T", float, FloatArray)
 
@@ -24,6 +25,7 @@ _MOST_SAMPLES = 100_000_000  # of a resampled record: 2.4 GB
 _ROUNDING = 1e-9  # of a number of steps
 
 
+@printed
 @checked
 class Record:
     """An input-output record.
@@ -85,6 +87,27 @@ class Record:
             raise ValueError(f'units are labels of "t", "u" and "y", got {sorted(unknown)}')
         if self.resolution is not None and self.resolution <= 0:
             raise ValueError(f"resolution must be positive, got {self.resolution}")
+
+    def __str__(self) -> str:
+        t, u, y = (self.units.get(signal, "") for signal in ("t", "u", "y"))
+        turns = int(self.reversals().size)
+        quantum = "" if self.resolution is None else f", resolution {quantity(self.resolution, y)}"
+        time = "" if self.t is None else f"{extent(self.t, t)}, {self._step_in_words(t)}"
+        return words(
+            [f"Record {self.name}".rstrip() + f": {self.u.size} samples" + (", no time" if self.t is None else "")],
+            {
+                "t": time,
+                "u": f"{extent(self.u, u)}, {turns} reversal{'' if turns == 1 else 's'}",
+                "y": extent(self.y, y) + quantum,
+            },
+        )
+
+    def _step_in_words(self, unit: str) -> str:
+        try:
+            return f"every {quantity(self.sample_time, unit)}"
+        except ValueError:
+            steps = np.diff(np.asarray(self.t))
+            return f"steps of {extent(steps, unit)}"
 
     def __len__(self) -> int:
         return self.u.size

@@ -8,10 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen, read_only
+from hysim._words import extent, printed, words
 from hysim.models.model import needs_time
 from hysim.records import Record
 
 
+@printed
 @frozen
 class Simulation:
     """What was simulated.
@@ -36,6 +38,13 @@ class Simulation:
     z: FloatArray | None = None
     signals: Mapping[str, FloatArray] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        known = {"t": self.t, "u": self.u, "y": self.y, "z": self.z, **self.signals}
+        return words(
+            [f"Simulation: {self.u.size} samples"],
+            {name: extent(values, self.units.get(name, "")) for name, values in known.items() if values is not None},
+        )
 
 
 def simulate(

@@ -10,7 +10,8 @@ import hysim
 PACKAGE = Path(hysim.__file__).parent
 
 RANKS = {
-    -3: ("_frozen", "_atomic", "errors"),  # tools of the language, which know nothing of hysteresis
+    # tools of the language, which know nothing of hysteresis
+    -3: ("_frozen", "_atomic", "_words", "_versions", "errors"),
     -2: ("_cycles", "_quanta", "_prefixes"),  # the turning points of an input, the quantum of a sensor, units
     -1: ("_drift",),  # what cycles that follow each other say
     0: ("signals", "records", "metrics", "kernels", "_parallel"),

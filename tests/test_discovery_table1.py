@@ -60,3 +60,11 @@ def test_neither_units_nor_the_seed_decide_what_is_found(found, table1):
     # Every number is scaled before it is used; rounding differs, and the descent ends within 1e-6 of the optimum.
     assert rescaled.coefficients["u'"] == pytest.approx(1e-12 * found.coefficients["u'"], rel=1e-6)
     assert np.isnan(rescaled.cv_rmse)
+
+
+def test_it_is_printed_with_its_equation_and_its_verdict(found):
+    text = str(found)
+    for word in (found.verdict, found.equation[:60], "held-out rmse", f"{found.scores['fit_percent']:.2f} %"):
+        assert word in text
+    assert text.count("\n") < 10
+    assert max(map(len, text.splitlines())) <= 100

@@ -8,42 +8,84 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from difflib import get_close_matches
 from typing import NoReturn
 
 from hysim import __version__
-from hysim.cli import compare, discover, identify, measure, metrics, plot, reproduce, simulate, sweep
+from hysim.cli import compare, control, discover, identify, measure, metrics, plot, reproduce, simulate, sweep
 from hysim.errors import SimulationError
 
-COMMANDS = (identify, discover, compare, metrics, simulate, plot, sweep, measure, reproduce)
+COMMANDS = (metrics, identify, discover, compare, simulate, control, plot, sweep, measure, reproduce)
+DONE, BAD_INPUT, INTERRUPTED = 0, 2, 130
 
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        self.exit(2, f"{self.prog}: error: {' '.join(message.split())} (see {self.prog} --help)\n")
+        self.exit(BAD_INPUT, f"{self.prog}: error: {' '.join(message.split())} (see {self.prog} --help)\n")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
-    parser = _Parser(prog="hysim", description="Simulate, identify, discover and compare hysteretic actuators.")
+    try:
+        try:
+            return _run(sys.argv[1:] if arguments is None else list(arguments))
+        finally:
+            print(end="", flush=True)
+    except KeyboardInterrupt:
+        return _failed(INTERRUPTED, "interrupted")
+    except BrokenPipeError:  # who reads the output has had enough of it
+        return _discard(DONE)
+    except MemoryError:
+        return _failed(BAD_INPUT, "error: there is not enough memory for this")
+    except (ValueError, TypeError, OSError, ImportError, SimulationError) as error:
+        return _failed(BAD_INPUT, f"error: {_line(error)}")
+
+
+def parsers() -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParser]]:
+    """The parser of the whole command line, and that of each command."""
+    parser = _Parser(prog="hysim", description="Simulate, identify, discover, compare and compensate hysteresis.")
     parser.add_argument("--version", action="version", version=f"hysim {__version__}")
-    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND")
     for command in COMMANDS:
         command.add_to(commands)
+    return parser, dict(commands.choices)
+
+
+def _run(arguments: list[str]) -> int:
+    parser, commands = parsers()
+    named = [argument for argument in arguments if not argument.startswith("-")][:1]
+    if named and named[0] not in commands:
+        near = get_close_matches(named[0], commands, n=1)
+        mend = f"did you mean {near[0]}?" if near else f"there are {', '.join(commands)}"
+        parser.error(f"there is no command {named[0]!r}: {mend}")
     options = parser.parse_args(arguments)
-    try:
+    if not named:
+        parser.print_help(sys.stderr)
+        return BAD_INPUT
+    import numpy as np
+
+    with np.errstate(all="ignore"):  # what overflows is inf or nan in the result, and null in JSON
         return int(options.command(options))
-    except KeyboardInterrupt:
-        print("hysim: interrupted", file=sys.stderr)
-        return 130
-    except BrokenPipeError:  # who reads the output has had enough of it
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
-    except (ValueError, OSError, SimulationError) as error:
-        print(f"hysim: error: {_line(error)}", file=sys.stderr)
-        return 2
+
+
+def _failed(code: int, text: str) -> int:
+    """Say in one line what happened, over a line of progress if there is one."""
+    start = "\r\x1b[K" if sys.stderr.isatty() else ""
+    print(f"{start}hysim: {text}", file=sys.stderr)
+    try:
+        print(end="", flush=True)
+    except OSError:
+        return _discard(code)
+    return code
+
+
+def _discard(code: int) -> int:
+    """Let the interpreter write to nowhere what it still holds of the output, which nobody takes."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return code
 
 
 def _line(error: BaseException) -> str:
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
-    return " ".join(str(error).split())
+    return " ".join(str(error).split()) or type(error).__name__

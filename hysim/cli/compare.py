@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,8 @@ from hysim.cli.identify import folds
 
 if TYPE_CHECKING:
     from hysim.comparison import Comparison
+    from hysim.plot import Figure
+    from hysim.records import Record
 
 
 def add_to(commands: Any) -> None:
@@ -41,7 +44,9 @@ def add_to(commands: Any) -> None:
     parser.add_argument("--timings", action="store_true", help="add the seconds of each fit to the tables")
     for form in ("csv", "markdown", "latex"):
         parser.add_argument(f"--{form}", metavar="PATH", help="write the table there, - for the standard output")
-    parser.add_argument("--plot", metavar="LOOPS.svg", help="draw the best models, - for the standard output")
+    parser.add_argument("--out", metavar="MODEL.json", help="write the model that predicts best, as identify does")
+    parser.add_argument("--plot", metavar="LOOPS.svg", help=f"draw the best models; {outputs.PICTURE}")
+    parser.add_argument("--json", action="store_true", help="print the whole table as JSON")
     parser.set_defaults(command=run)
 
 
@@ -49,7 +54,8 @@ def run(options: argparse.Namespace) -> int:
     """Compare, write the files that are asked for, and print the table."""
     from hysim.comparison import compare
 
-    is_taken = outputs.check(options.csv, options.markdown, options.latex, pictures=[options.plot])
+    tables = options.csv, options.markdown, options.latex
+    is_taken = outputs.check(options.out, *tables, pictures=[options.plot], printed=options.json)
     record, test = records.read(options), options.test_cycles
     if options.test is not None:
         test = records.read(argparse.Namespace(**{**vars(options), "file": options.test}))
@@ -61,7 +67,8 @@ def run(options: argparse.Namespace) -> int:
         seed=options.seed,
         progress=outputs.progress(),
     )
-    texts = {
+    texts: dict[str | None, Any] = {
+        options.out: _best(table, record) if options.out else "",
         options.csv: table.to_csv(timings=options.timings),
         options.markdown: table.to_markdown(timings=options.timings) + "\n",
         options.latex: table.to_latex(timings=options.timings) + "\n",
@@ -69,7 +76,8 @@ def run(options: argparse.Namespace) -> int:
     if options.plot:
         texts[options.plot] = _picture(table)
     if not is_taken:
-        texts[records.STANDARD] = table.to_text(timings=options.timings) + "\n"
+        text = table.to_text(timings=options.timings) + "\n"
+        texts[records.STANDARD] = outputs.to_json(_document(table, options.timings)) if options.json else text
     outputs.write(texts)
     return 0
 
@@ -91,12 +99,36 @@ def _chosen(names: list[str]) -> Mapping[str, Any] | None:
     return chosen
 
 
-def _picture(table: "Comparison") -> str:
-    """Picture of the best models, the same bytes each time."""
+def _best(table: "Comparison", record: "Record") -> str:
+    """The model that predicts best; of one without errors of prediction, that of the least rmse."""
+    from hysim.models.storage import to_json
+
+    ranked = table.ranked() or table.ranked("rmse")
+    if not ranked:
+        raise ValueError(f"no model could be compared: {'; '.join(table.failed.values())}")
+    return to_json(ranked[0].model, units=record.units)
+
+
+def _document(table: "Comparison", timings: bool) -> dict[str, Any]:
+    rows = [{field.name: getattr(row, field.name) for field in fields(row)} for row in table.rows]
+    told = [{name: value for name, value in row.items() if isinstance(value, (str, int, float))} for row in rows]
+    return {
+        "record": table.record.name,
+        "units": table.record.units,
+        "winner": table.winner,
+        "undecided": table.undecided,
+        "verdict": table.verdict,
+        "rows": [{name: value for name, value in row.items() if timings or name != "seconds"} for row in told],
+        "failed": table.failed,
+    }
+
+
+def _picture(table: "Comparison") -> "Figure":
+    """Picture of the best models."""
     from hysim import plot
 
     with plot.house_style():
         rows = min(4, len(table.rows))
         canvas = plot.figure(width=9.0, height=2.2 * rows)
         plot.comparison(table, axes=plot.panels(canvas, 3 * rows, columns=3))
-    return plot.to_svg(canvas, name="comparison") + "\n"
+    return canvas

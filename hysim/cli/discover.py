@@ -29,14 +29,16 @@ def add_to(commands: Any) -> None:
     )
     parser.add_argument("--degree", type=int, default=2, help="of the library's monomials (default: %(default)s)")
     parser.add_argument("--symmetry", choices=("odd", "even"), help="of the response")
-    for name in ("mass", "damping", "stiffness"):
-        parser.add_argument(f"--{name}", type=float, help=f"{name} of the oscillator, where it is known")
+    for name, unit in (("mass", "u s^2/y"), ("damping", "u s/y"), ("stiffness", "u/y")):
+        parser.add_argument(
+            f"--{name}", metavar="VALUE", type=float, help=f"of the oscillator, where it is known [units of {unit}]"
+        )
     parser.add_argument(
         "--cross-validate", metavar="loo|K", type=_folds, help="leave one sample out at a time, or one of K blocks"
     )
     parser.add_argument("--seed", type=int, default=0, help="of the random restarts (default: %(default)s)")
     parser.add_argument("--out", metavar="MODEL.json", help="write the law, - for the standard output")
-    parser.add_argument("--plot", metavar="LOOP.svg", help="draw the record and the law, - for the standard output")
+    parser.add_argument("--plot", metavar="LOOP.svg", help=f"draw the record and the law; {outputs.PICTURE}")
     parser.add_argument("--json", action="store_true", help="print the whole result as JSON")
     parser.set_defaults(command=run)
 
@@ -61,9 +63,10 @@ def run(options: argparse.Namespace) -> int:
         seed=options.seed,
         progress=outputs.progress(),
     )
-    texts = {options.out: to_json(found.model, units=record.units)}
+    texts: dict[str | None, Any] = {options.out: to_json(found.model, units=record.units)}
     if options.plot:
-        texts[options.plot] = outputs.loop_svg(record, models.simulated(found.model, record, dict(record.units)))
+        run = models.simulated(found.model, record, dict(record.units))
+        texts[options.plot] = outputs.loop(record, run, model=found.model)
     if not is_taken:
         texts[records.STANDARD] = found.to_json() if options.json else found.summary() + "\n"
     outputs.write(texts)

@@ -22,13 +22,23 @@ def add_to(commands: Any) -> None:
     records.add_to(parser)
     models.add_to(parser)
     parser.add_argument(
-        "--fix", metavar="NAME=VALUE", type=_value, action="append", default=[], help="parameter that is not free: n=1"
+        "--fix",
+        metavar="NAME=VALUE",
+        type=_value,
+        action="append",
+        default=[],
+        help="parameter that is not free: n=1 [unit of the parameter]",
     )
     parser.add_argument(
         "--free", metavar="NAME", action="append", default=[], help="parameter to free that is held by default"
     )
     parser.add_argument(
-        "--bounds", metavar="NAME=LOW:HIGH", type=_bounds, action="append", default=[], help="limits: beta=0:2"
+        "--bounds",
+        metavar="NAME=LOW:HIGH",
+        type=_bounds,
+        action="append",
+        default=[],
+        help="limits: beta=0:2 [unit of the parameter]",
     )
     parser.add_argument(
         "--initial", choices=("free", "rest", "periodic"), help="state at the first sample; else as the family says"
@@ -53,7 +63,7 @@ def add_to(commands: Any) -> None:
     )
     parser.add_argument("--seed", type=int, default=0, help="of the random starts (default: %(default)s)")
     parser.add_argument("--out", metavar="MODEL.json", help="write the model, - for the standard output")
-    parser.add_argument("--plot", metavar="LOOP.svg", help="draw the record and the model, - for the standard output")
+    parser.add_argument("--plot", metavar="LOOP.svg", help=f"draw the record and the model; {outputs.PICTURE}")
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
     parser.set_defaults(command=run)
 
@@ -78,9 +88,10 @@ def run(options: argparse.Namespace) -> int:
         seed=options.seed,
         progress=outputs.progress(),
     )
-    texts = {options.out: to_json(fit.model, units=record.units)}
+    texts: dict[str | None, Any] = {options.out: to_json(fit.model, units=record.units)}
     if options.plot:
-        texts[options.plot] = outputs.loop_svg(record, models.simulated(fit.model, record, dict(record.units)))
+        run = models.simulated(fit.model, record, dict(record.units))
+        texts[options.plot] = outputs.loop(record, run, model=fit.model)
     if not is_taken:
         texts[records.STANDARD] = outputs.to_json(_document(fit)) if options.json else fit.summary() + "\n"
     outputs.write(texts)

@@ -7,6 +7,7 @@ from hysim.cli import outputs, records
 
 if TYPE_CHECKING:
     from hysim._frozen import FloatArray
+    from hysim.plot import Figure
     from hysim.records import Record
     from hysim.vision import Displacement
 
@@ -19,13 +20,13 @@ def add_to(commands: Any) -> None:
         "measure",
         help="measure the displacement in camera frames",
         description="Measure how far the picture has moved in each frame, to a fraction of a pixel, and write it as "
-        "comma-separated columns: t if there is a time, u if there are voltages, y, its standard error and the "
+        "columns: t if there is a time, u if there are voltages, y, its standard error and the "
         "correlation with the reference.",
     )
     parser.add_argument("frames", metavar="FRAMES", help=_FRAMES)
-    parser.add_argument("--scale", metavar="LENGTH", type=float, required=True, help="of a pixel")
+    parser.add_argument("--scale", metavar="LENGTH", type=float, required=True, help="length of a pixel [unit of y]")
     parser.add_argument("--unit", metavar="UNIT", default="um", help="of the scale (default: %(default)s)")
-    parser.add_argument("--region", metavar="T,B,L,R", type=_region, help="rows and columns of the moving part")
+    parser.add_argument("--region", metavar="T,B,L,R", type=_region, help="rows and columns of the moving part [pixel]")
     parser.add_argument(
         "--direction", metavar="x|y|DEGREES", type=_direction, help="in which y is positive; else that of the motion"
     )
@@ -39,7 +40,9 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--method", choices=("subpixel", "whole-pixel"), default="subpixel", help="(default: %(default)s)"
     )
-    parser.add_argument("--frame-rate", metavar="HZ", type=float, help="frame k is at the time k / HZ")
+    parser.add_argument(
+        "--frame-rate", metavar="HZ", type=float, help="frames in a second: frame k is at the time k / HZ [Hz]"
+    )
     log = parser.add_argument_group("voltages")
     log.add_argument("--voltage", metavar="FILE", help="text file: a line for each frame, or a log with times")
     log.add_argument("--u", metavar="COLUMN", help="voltage: name of its column, or number from 0")
@@ -47,8 +50,8 @@ def add_to(commands: Any) -> None:
     log.add_argument(
         "--on-lost", choices=("error", "drop"), default="error", help="frames that are lost (default: %(default)s)"
     )
-    parser.add_argument("--out", metavar="OUT.csv", required=True, help="- for the standard output")
-    parser.add_argument("--plot", metavar="DISPLACEMENT.svg", help="draw the displacement")
+    parser.add_argument("--out", metavar="OUT", required=True, help=f"table, {outputs.TABLE}")
+    parser.add_argument("--plot", metavar="DISPLACEMENT.svg", help=f"draw the displacement; {outputs.PICTURE}")
     parser.add_argument("--json", action="store_true", help="print the summary as JSON")
     parser.set_defaults(command=run)
 
@@ -57,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
     """Measure, write the table and the picture, and print the summary."""
     from hysim.vision import displacement
 
-    is_taken = outputs.check(options.out, pictures=[options.plot], printed=options.json)
+    is_taken = outputs.check(table=options.out, pictures=[options.plot], printed=options.json)
     log = _log(options)
     try:
         moved = displacement(
@@ -72,12 +75,13 @@ def run(options: argparse.Namespace) -> int:
         )
     except ImportError as error:
         raise ValueError(str(error)) from None
-    texts = {options.out: _table(options, moved, log)}
+    contents: dict[str | None, Any] = {options.out: outputs.table(options.out, *_table(options, moved, log))}
     if options.plot:
-        texts[options.plot] = _svg(moved)
+        contents[options.plot] = _picture(moved)
     if not is_taken:
-        texts[records.STANDARD] = outputs.to_json(_document(moved)) if options.json else moved.summary() + "\n"
-    outputs.write(texts)
+        told = outputs.to_json(_document(moved)) if options.json else moved.summary() + "\n"
+        contents[records.STANDARD] = told
+    outputs.write(contents)
     return 0
 
 
@@ -97,7 +101,10 @@ def _log(options: argparse.Namespace) -> "Record | None":
     return record
 
 
-def _table(options: argparse.Namespace, moved: "Displacement", log: "Record | None") -> str:
+def _table(
+    options: argparse.Namespace, moved: "Displacement", log: "Record | None"
+) -> tuple[dict[str, "FloatArray"], dict[str, str]]:
+    """Columns and their units."""
     import numpy as np
 
     times = None if options.frame_rate is None else np.arange(len(moved)) / options.frame_rate
@@ -105,7 +112,7 @@ def _table(options: argparse.Namespace, moved: "Displacement", log: "Record | No
     units = {"t": "s", "y": options.unit, "uncertainty": options.unit}
     if log is None:
         columns = {"y": moved.y, **further}
-        return outputs.to_csv(columns if times is None else {"t": times, **columns}, units)
+        return (columns if times is None else {"t": times, **columns}), units
     by_time = log.t is not None and times is not None
     joined = moved.record(
         log.u,
@@ -119,16 +126,16 @@ def _table(options: argparse.Namespace, moved: "Displacement", log: "Record | No
     found = np.isfinite(moved.y)
     kept = {name: values[found] for name, values in further.items()}
     columns = {name: values for name, values in signals.items() if values is not None}
-    return outputs.to_csv(columns | kept, units | dict(joined.units))
+    return columns | kept, units | dict(joined.units)
 
 
-def _svg(moved: "Displacement") -> str:
+def _picture(moved: "Displacement") -> "Figure":
     from hysim import plot
 
     with plot.house_style():
         canvas = plot.figure()
         plot.displacement(moved, ax=canvas.add_subplot())
-    return plot.to_svg(canvas, name="displacement") + "\n"
+    return canvas
 
 
 def _document(moved: "Displacement") -> dict[str, Any]:

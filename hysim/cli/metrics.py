@@ -25,7 +25,7 @@ def add_to(commands: Any) -> None:
         "--tolerance",
         metavar="FRACTION",
         type=float,
-        help="of the input's span: reversals smaller than that are noise (default: 0.01)",
+        help="of the input's span: reversals smaller than that are noise [1] (default: 0.01)",
     )
     parser.add_argument("--json", action="store_true", help="print them as JSON")
     parser.set_defaults(command=run)

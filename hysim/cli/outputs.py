@@ -4,57 +4,95 @@ import csv
 import io
 import json
 import math
+import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from hysim._atomic import write_text
+from hysim._atomic import write_all
 from hysim.cli.records import STANDARD
 
 if TYPE_CHECKING:
     from hysim._frozen import FloatArray
+    from hysim.plot import Figure
     from hysim.records import Record
     from hysim.simulation import Simulation
 
+PICTURE = "written as SVG, PNG or PDF by its ending; - writes SVG to the standard output"
+TABLE = "written as .csv, .tsv, .npz, .mat or .h5 by its ending; - writes comma-separated text to the standard output"
+_ENDINGS = (".svg", ".png", ".pdf")
 
-def check(*paths: str | None, pictures: Iterable[str | None] = (), printed: bool = False) -> bool:
+
+def check(
+    *paths: str | None, pictures: Iterable[str | None] = (), table: str | None = None, printed: bool = False
+) -> bool:
     """Refuse what cannot be written, before anything is computed; whether a path is the standard output.
 
     Raises
     ------
     ValueError
-        If a folder does not exist, a picture is not called .svg, or two results would go to one place, such as
-        the standard output beside what is `printed` there.
+        If a folder does not exist or may not be written to, a picture or a table has another ending than those known,
+        or two results would go to one place, such as the standard output beside what is `printed` there.
     """
     drawn = [path for path in pictures if path is not None]
-    given = [path for path in paths if path is not None] + drawn
+    given = [path for path in (*paths, table) if path is not None] + drawn
     for path in given:
-        if path != STANDARD and (Path(path).is_dir() or not Path(path).parent.is_dir()):
+        if path == STANDARD:
+            continue
+        if Path(path).is_dir() or not Path(path).parent.is_dir():
             raise ValueError(f"cannot write {path}: it is a folder, or its folder does not exist")
+        if not os.access(Path(path).parent, os.W_OK):
+            raise ValueError(f"cannot write {path}: its folder may not be written to")
+    if table not in (None, STANDARD):
+        from hysim.files import ending
+
+        ending(str(table))
     for path in drawn:
-        if path != STANDARD and Path(path).suffix.lower() != ".svg":
-            raise ValueError(f"pictures are SVG: call the file .svg, got {path}")
+        if path != STANDARD and Path(path).suffix.lower() not in _ENDINGS:
+            raise ValueError(f"pictures are SVG, PNG or PDF: call the file .svg, .png or .pdf, got {path}")
     if given.count(STANDARD) + printed > 1:
         raise ValueError("two results would go to the standard output: give one of them a file, or leave it out")
-    if len(set(given)) < len(given):
+    if len({os.path.realpath(path) for path in given}) < len(given):
         raise ValueError(f"two results would go to one file, {given[0]}")
     return STANDARD in given
 
 
-def write(texts: Mapping[str | None, str]) -> None:
-    """Write each text to its path, to the standard output, or nowhere."""
-    for path, text in texts.items():
-        if path == STANDARD:
-            sys.stdout.write(text)
-            sys.stdout.flush()
-        elif path is not None:
-            write_text(path, text)
+def write(contents: "Mapping[str | None, str | bytes | Figure]") -> None:
+    """Write each content or figure to its path, to the standard output, or nowhere: all of the files or none."""
+    made = {path: _content(path, content) for path, content in contents.items() if path is not None}
+    write_all({path: content for path, content in made.items() if path != STANDARD})
+    if STANDARD in made:
+        print(made[STANDARD].decode(), end="", flush=True)
+
+
+def _content(path: str, content: "str | bytes | Figure") -> bytes:
+    if isinstance(content, str | bytes):
+        return content.encode() if isinstance(content, str) else content
+    from hysim import plot
+
+    return plot.to_bytes(content, "svg" if path == STANDARD else Path(path).suffix[1:].lower(), name="picture")
 
 
 def to_json(document: Mapping[str, Any]) -> str:
     """JSON with null for numbers that are not finite."""
     return json.dumps(_plain(document), indent=2, allow_nan=False) + "\n"
+
+
+def table(path: str, columns: Mapping[str, "FloatArray"], units: Mapping[str, str]) -> str | bytes:
+    """Columns in the format that the ending of their path names; the standard output gets comma-separated text.
+
+    Raises
+    ------
+    ValueError
+        If the ending names none, or its format needs an extra.
+    """
+    if path == STANDARD:
+        return to_csv(columns, units)
+    from hysim.files import Notes, packed
+
+    return packed(columns, path, Notes({name: units[name] for name in columns if name in units}))
 
 
 def to_csv(columns: Mapping[str, "FloatArray"], units: Mapping[str, str]) -> str:
@@ -66,14 +104,26 @@ def to_csv(columns: Mapping[str, "FloatArray"], units: Mapping[str, str]) -> str
     return buffer.getvalue()
 
 
-def loop_svg(*results: "Record | Simulation") -> str:
-    """Picture of loops, the same bytes each time."""
+class Curve(NamedTuple):
+    """What pictures take: input, output and time, with a name and units."""
+
+    u: "FloatArray"
+    y: "FloatArray"
+    t: "FloatArray | None" = None
+    name: str = ""
+    units: Mapping[str, str] = MappingProxyType({})
+
+
+def loop(*results: "Record | Simulation", model: Any = None) -> "Figure":
+    """Picture of loops; the last is of a `model`, and has its family's name."""
     from hysim import plot
 
+    *others, last = results
+    run = last if model is None else Curve(last.u, last.y, last.t, type(model).__name__, last.units)
     with plot.house_style():
         canvas = plot.figure()
-        plot.loop(*results, ax=canvas.add_subplot())
-    return plot.to_svg(canvas, name="loop") + "\n"
+        plot.loop(*others, run, ax=canvas.add_subplot())
+    return canvas
 
 
 def progress() -> Callable[[int, int], None] | None:

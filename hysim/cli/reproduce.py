@@ -6,8 +6,11 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
+from hysim.cli import outputs, records
+
 if TYPE_CHECKING:
     from hysim.paper.claims import Claim
+    from hysim.paper.study import Study
 
 SUCCESS, NOT_CONVERGED = 0, 1
 
@@ -24,6 +27,7 @@ def add_to(commands: Any) -> None:
         "--out", metavar="DIR", default="reproduction", help="folder to write into (default: %(default)s)"
     )
     parser.add_argument("--quick", action="store_true", help="leave the cross-validation out")
+    parser.add_argument("--json", action="store_true", help="print summary.json in place of the short table")
     parser.set_defaults(command=run)
 
 
@@ -31,7 +35,10 @@ def run(options: argparse.Namespace) -> int:
     """Reproduce, and print the short table."""
     from hysim.paper import reproduce
 
-    done = reproduce(options.out, quick=options.quick, progress=_progress)
+    done = reproduce(options.out, quick=options.quick, progress=_progress if sys.stderr.isatty() else None)
+    if options.json:
+        outputs.write({records.STANDARD: (done.folder / "summary.json").read_text(encoding="utf-8")})
+        return _code(done.findings.study)
     study = done.findings.study
     comparison, loop = study.comparison, study.comparison.loop
     print(
@@ -46,6 +53,10 @@ def run(options: argparse.Namespace) -> int:
     for line in _verdicts(done.findings.claims):
         print(line)
     print(f"report: {done.folder / 'report.html'}")
+    return _code(study)
+
+
+def _code(study: "Study") -> int:
     return SUCCESS if all(fit.success for fit in study.fits.values()) else NOT_CONVERGED
 
 

@@ -12,23 +12,20 @@ def add_to(commands: Any) -> None:
         "simulate",
         help="drive a model with the input in a file of your own",
         description="Simulate a model in free run, and write its signals as columns: t if there is a time, u, y, the "
-        "memory z of a law, and what else a plant has. The ending of the file says its format: .csv, .tsv, .npz, "
-        ".mat, .h5; the standard output gets comma-separated text.",
+        "memory z of a law, and what else a plant has.",
     )
     parser.add_argument("model", metavar="MODEL.json", help="as identify writes it, or - for the standard input")
     records.add_to(parser, output=False)
-    parser.add_argument("--out", metavar="OUT", default=records.STANDARD, help="default: the standard output")
-    parser.add_argument("--plot", metavar="LOOP.svg", help="draw the loop")
+    parser.add_argument(
+        "--out", metavar="OUT", default=records.STANDARD, help=f"{outputs.TABLE} (default: %(default)s)"
+    )
+    parser.add_argument("--plot", metavar="LOOP.svg", help=f"draw the loop; {outputs.PICTURE}")
     parser.set_defaults(command=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Simulate and write."""
-    from hysim.files import Notes, ending, save_columns
-
-    outputs.check(options.out, pictures=[options.plot])
-    if options.out != records.STANDARD:
-        ending(options.out)
+    outputs.check(table=options.out, pictures=[options.plot])
     if options.model == options.file == records.STANDARD:
         raise ValueError("the standard input holds the model or the record, not both")
     model, units = models.read(options.model)
@@ -36,11 +33,9 @@ def run(options: argparse.Namespace) -> int:
     known = units | {signal: unit for signal, unit in record.units.items() if signal != "y"} | dict(options.unit)
     run = models.simulated(model, record, known)
     columns = {name: run.signals[name] for name in ("t", "u", "y", "z") if name in run.signals}
-    columns |= dict(run.signals)
-    texts = {options.plot: outputs.loop_svg(run)} if options.plot else {}
-    if options.out == records.STANDARD:
-        texts[options.out] = outputs.to_csv(columns, known)
-    else:
-        save_columns(columns, options.out, Notes({name: known[name] for name in columns if name in known}))
-    outputs.write(texts)
+    table = outputs.table(options.out, columns | dict(run.signals), known)
+    contents: dict[str | None, Any] = {options.out: table}
+    if options.plot:
+        contents[options.plot] = outputs.loop(run)
+    outputs.write(contents)
     return 0

@@ -26,6 +26,7 @@ distributions.n = {name = "norm", loc = 1.5, scale = 0.1}       of scipy.stats
 
 import importlib
 import importlib.util
+import math
 import sys
 import tomllib
 from collections.abc import Callable, Mapping
@@ -138,7 +139,10 @@ def _values(values: Any) -> Any:
     import numpy as np
 
     _check(values, {"from", "to", "number"}, "values of a parameter")
-    return np.linspace(values["from"], values["to"], values["number"])
+    first, last = float(values["from"]), float(values["to"])
+    if not math.isfinite(last - first):
+        raise ValueError(f"values go from one finite number to another, got {first:g} to {last:g}")
+    return np.linspace(first, last, values["number"])
 
 
 def _distribution(given: Any) -> Any:

@@ -6,9 +6,14 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hysim.cli import outputs, studies
+from hysim.cli.records import STANDARD
+
+if TYPE_CHECKING:
+    from hysim.plot import Figure
+    from hysim.sweeps import Sweep
 
 SUCCESS, SOME_FAILED = 0, 1
 
@@ -36,6 +41,11 @@ def add_to(commands: Any) -> None:
     parser.add_argument("--workers", metavar="N", type=int, help="threads or processes; else one for each core")
     parser.add_argument("--show", metavar="RESULTS.sqlite", help="compute nothing: say what is in a database")
     parser.add_argument("--csv", metavar="TABLE.csv", help="write the rows, - for the standard output")
+    parser.add_argument(
+        "--plot", metavar="LINES.svg", help=f"draw every row as a line over its parameters; {outputs.PICTURE}"
+    )
+    parser.add_argument("--of", metavar="OUTPUT", help="output whose size colours the lines (default: the first)")
+    parser.add_argument("--json", action="store_true", help="print the summary and the ranges as JSON")
     parser.set_defaults(command=run)
 
 
@@ -43,7 +53,7 @@ def run(options: argparse.Namespace) -> int:
     """Compute or show, write the table that is asked for, and print the summary."""
     from hysim.sweeps import load_sweep
 
-    is_taken = outputs.check(options.csv)
+    is_taken = outputs.check(options.csv, pictures=[options.plot], printed=options.json)
     if options.show is not None:
         if options.study or options.out:
             raise ValueError("--show takes a database and computes nothing: leave the study and --out out")
@@ -51,9 +61,43 @@ def run(options: argparse.Namespace) -> int:
     else:
         result = _computed(options)
         code = SOME_FAILED if result.errors else SUCCESS
-    texts = {options.csv: result.to_csv()} if options.csv else {}
-    outputs.write(texts if is_taken else {**texts, "-": result.summary() + "\n"})
+    texts: dict[str | None, Any] = {options.csv: result.to_csv() if options.csv else ""}
+    if options.plot:
+        texts[options.plot] = _picture(result, options.of)
+    if not is_taken:
+        texts[STANDARD] = outputs.to_json(_document(result)) if options.json else result.summary() + "\n"
+    outputs.write(texts)
     return code
+
+
+def _document(result: "Sweep") -> dict[str, Any]:
+    import numpy as np
+
+    known = {name: values[np.isfinite(values)] for name, values in result.outputs.items()}
+    return {
+        "n_tasks": result.n_tasks,
+        "n_done": len(result),
+        "parameters": list(result.parameters),
+        "errors": {str(place): message for place, message in result.errors.items()},
+        "outputs": {
+            name: dict(zip(("lowest", "median", "highest"), np.quantile(values, [0.0, 0.5, 1.0]).tolist(), strict=True))
+            | {"not_finite": len(result) - values.size}
+            for name, values in known.items()
+            if values.size
+        },
+    }
+
+
+def _picture(result: "Sweep", output: str | None) -> "Figure":
+    from hysim import plot
+
+    name = output or next(iter(result.outputs), None)
+    if name is None or name not in result.outputs:
+        raise ValueError(f"no output {name!r} to draw: there are {', '.join(result.outputs) or 'none'}")
+    with plot.house_style():
+        canvas = plot.figure()
+        plot.parallel_coordinates(result, name, ax=canvas.add_subplot())
+    return canvas
 
 
 def _computed(options: argparse.Namespace) -> Any:

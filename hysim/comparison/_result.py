@@ -6,12 +6,15 @@ from dataclasses import field
 from typing import Any
 
 from hysim._frozen import FloatArray, frozen
+from hysim._words import printed, words
 from hysim.comparison import _tables
 from hysim.comparison._verdict import LEVEL, probability
 from hysim.metrics import LoopMetrics
+from hysim.models.model import in_brief
 from hysim.records import Record
 
 
+@printed
 @frozen
 class ComparisonRow:
     """One model on the record.
@@ -86,7 +89,20 @@ class ComparisonRow:
     message: str = ""
     seconds: float = field(default=float("nan"), compare=False)
 
+    def __str__(self) -> str:
+        return words(
+            [f"ComparisonRow {self.name}: fit {self.fit_percent:.2f} %, rmse {self.rmse:.4g}"],
+            {
+                "left out": "" if math.isnan(self.cv_rmse) else f"rmse {self.cv_rmse:.4g}",
+                "largest width": f"{self.max_width:.4g} at {self.max_width_at:.6g}, {self.width_error_percent:+.1f} %",
+                "parameters": f"{self.n_parameters}, BIC {self.bic:.1f}",
+                "model": in_brief(self.model),
+                "search": self.message,
+            },
+        )
 
+
+@printed
 @frozen
 class Comparison:
     """Models side by side.
@@ -110,6 +126,12 @@ class Comparison:
     rows: tuple[ComparisonRow, ...]
     failed: Mapping[str, str] = field(default_factory=dict)
     test: Record | None = None
+
+    def __str__(self) -> str:
+        return _tables.to_words(self)
+
+    def _repr_html_(self) -> str:
+        return _tables.to_html(self)
 
     def __getitem__(self, name: str) -> ComparisonRow:
         for row in self.rows:

@@ -1,6 +1,7 @@
 """A comparison as text, CSV, Markdown, LaTeX and columns: one list of columns, and how each form writes them."""
 
 import csv
+import html
 import io
 import math
 import re
@@ -9,11 +10,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from hysim._words import LETTERS, words
+
 if TYPE_CHECKING:
     from hysim.comparison._result import Comparison, ComparisonRow
 
 Value = str | int | float | bool
 _WIDE = 110  # letters in a line of text
+_PRINTED = 5  # rows in words
 
 
 @dataclass(frozen=True)
@@ -62,15 +66,35 @@ def columns(comparison: "Comparison", *, timings: bool) -> list[Column]:
 
 def to_text(comparison: "Comparison", *, timings: bool) -> str:
     """The short table for a terminal, what could not be compared, and the verdict."""
-    table = _short(comparison, timings)
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    lines = [
-        "  ".join([cells[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(cells[1:], widths[1:], strict=True))])
-        for cells in table
-    ]
+    lines = _aligned(_short(comparison, timings))
     notes = [f"not compared: {name}: {reason}" for name, reason in comparison.failed.items()] + [comparison.verdict]
-    wrapped = [line for note in notes if note for line in textwrap.wrap(note, _WIDE, subsequent_indent="  ")]
+    folded = textwrap.TextWrapper(_WIDE, subsequent_indent="  ", break_on_hyphens=False)
+    wrapped = [line for note in notes if note for line in folded.wrap(note)]
     return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:], *wrapped])
+
+
+def to_words(comparison: "Comparison") -> str:
+    """The rows that predict best, and the verdict."""
+    best = [*comparison.ranked(), *(row for row in comparison.rows if row.cv_rmse != row.cv_rmse)]
+    wanted = ("model", "parameters", "fit [%]", "rmse", "cv rmse", "max width")
+    chosen = [column for column in columns(comparison, timings=False) if column.heading.startswith(wanted)]
+    table = [["", *(column.heading for column in chosen[1:])]]
+    table += [[_printed(column.value(row), column.digits) for column in chosen] for row in best[:_PRINTED]]
+    more, many = len(best) - _PRINTED, len(comparison.rows)
+    head = f"Comparison of {many} model{'' if many == 1 else 's'} on {comparison.record.name or 'a record'}, "
+    notes = [f"  ... and {more} more"] if more > 0 else []
+    notes += textwrap.wrap(
+        comparison.verdict, LETTERS, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False
+    )
+    return words([f"{head}{len(comparison.record)} samples", *(f"  {line}" for line in _aligned(table)), *notes])
+
+
+def to_html(comparison: "Comparison") -> str:
+    """The short table for a notebook, and the verdict."""
+    header, *rows = ([html.escape(cell) for cell in cells] for cells in _short(comparison, timings=False))
+    head = "".join(f"<th>{cell}</th>" for cell in header)
+    body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>" for cells in rows)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table><p>{html.escape(comparison.verdict)}</p>"
 
 
 def to_markdown(comparison: "Comparison", *, timings: bool) -> str:
@@ -126,6 +150,15 @@ def to_frame(comparison: "Comparison", *, timings: bool) -> Any:
             "or take to_csv"
         ) from error
     return pandas.DataFrame(to_columns(comparison, timings=timings))
+
+
+def _aligned(table: Sequence[Sequence[str]]) -> list[str]:
+    """Lines of cells, the first column to the left, the others to the right."""
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    return [
+        "  ".join([cells[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(cells[1:], widths[1:], strict=True))])
+        for cells in table
+    ]
 
 
 def _short(comparison: "Comparison", timings: bool) -> list[list[str]]:

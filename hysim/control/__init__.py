@@ -14,7 +14,7 @@ from hysim.control._bandwidth import bandwidth
 from hysim.control._c_export import CSource, to_c
 from hysim.control._feedforward import InverseFeedforward, ModeInverse, Shaper
 from hysim.control._filters import DampingLoop, Notch
-from hysim.control._loop import ClosedLoop, close_loop
+from hysim.control._loop import ClosedLoop, as_actuator, close_loop
 from hysim.control._margins import LinearLoop
 from hysim.control._pid import PID
 from hysim.control._to_control import to_control
@@ -39,6 +39,7 @@ __all__ = [
     "TrackingController",
     "Trial",
     "Tuning",
+    "as_actuator",
     "assess_hysteresis",
     "assess_square_wave",
     "assess_step",

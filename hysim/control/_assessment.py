@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from hysim import signals
 from hysim._frozen import FloatArray, frozen, read_only
+from hysim._words import extent, printed, words
 from hysim.control._drive import secant_gain, without_memory
 from hysim.control._loop import ClosedLoop, Controller, RestingPlant, as_actuator, close_loop, preview
 from hysim.errors import SimulationError
@@ -22,6 +23,7 @@ from hysim.models.actuator import Actuator
 _FEWEST = 10  # samples of which a step is measured
 
 
+@printed
 @frozen
 class OpenLoop:
     """What a periodic reference comes to without a controller; every signal has shape (n,).
@@ -44,6 +46,9 @@ class OpenLoop:
     y: FloatArray
     secant_gain: float
     samples_per_cycle: int
+
+    def __str__(self) -> str:
+        return words([f"OpenLoop: {self.t.size} samples, secant gain {self.secant_gain:.4g}", str(self.loop)])
 
     @property
     def cycle(self) -> FloatArray:
@@ -68,6 +73,7 @@ class OpenLoop:
         return reduction_percent(self.loop.relative_width, self.loop_of(y).relative_width)
 
 
+@printed
 @frozen
 class HysteresisAssessment:
     """A triangle, followed in open and in closed loop.
@@ -108,7 +114,23 @@ class HysteresisAssessment:
     open_y: FloatArray
     closed: ClosedLoop
 
+    def __str__(self) -> str:
+        is_lag = math.isnan(self.hysteresis_reduction_percent)
+        what = "lag" if is_lag else "hysteresis"
+        reduction = self.lag_reduction_percent if is_lag else self.hysteresis_reduction_percent
+        return words(
+            [f"HysteresisAssessment: {what} reduction {reduction:.2f} %, tracking rms {self.tracking_rms:.4g}"],
+            {
+                "open width": f"{self.open_width:.4g}, without the memory {self.open_lag_width:.4g}",
+                "closed width": f"{self.closed_width:.4g}, without the memory {self.lag_width:.4g}",
+                "closure gap": f"{self.closure_gap:.4g}",
+                "secant gain": f"{self.secant_gain:.4g}",
+                "voltage": extent(self.closed.u),
+            },
+        )
 
+
+@printed
 @frozen
 class StepAssessment:
     """A step, in open and in closed loop.
@@ -127,7 +149,12 @@ class StepAssessment:
     open_y: FloatArray
     closed: ClosedLoop
 
+    def __str__(self) -> str:
+        way = f"from {self.closed.y[0]:.4g} to {self.closed.reference[-1]:.4g}"
+        return words([f"StepAssessment {way}, voltage {extent(self.closed.u)}", f"  {self.reduction}"])
 
+
+@printed
 @frozen
 class SquareWaveAssessment:
     """A square wave in its periodic steady state, in open and in closed loop.
@@ -154,6 +181,15 @@ class SquareWaveAssessment:
     reduction: VibrationReduction | None
     open_y: FloatArray
     closed: ClosedLoop
+
+    def __str__(self) -> str:
+        return words(
+            [
+                f"SquareWaveAssessment: tracking rms {self.tracking_rms:.4g}, open loop {self.open_tracking_rms:.4g}",
+                f"  peak excess {self.peak_excess_percent:.2f} %, open loop {self.open_peak_excess_percent:.2f} %",
+                "" if self.reduction is None else f"  {self.reduction}",
+            ],
+        )
 
 
 def assess_hysteresis(

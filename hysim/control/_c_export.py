@@ -20,6 +20,7 @@ import numpy as np
 import hysim
 from hysim._atomic import write_text
 from hysim._frozen import FloatArray, frozen
+from hysim._words import printed, words
 from hysim.control import _c_fragments as pieces
 from hysim.control._pid import PID
 from hysim.control._tracking import TrackingController
@@ -31,6 +32,7 @@ _RANGES = {"double": (2.0**-1022, sys.float_info.max), "float": (2.0**-126, (2.0
 _PID = ("KP", "KI_H", "DERIVATIVE_RATE", "DERIVATIVE_KEPT", "SETPOINT_WEIGHT", "DERIVATIVE_WEIGHT", "UNWINDING")
 
 
+@printed
 @frozen
 class CSource:
     """A controller in C99.
@@ -55,6 +57,11 @@ class CSource:
     header: str
     source: str
     sketch: str
+
+    def __str__(self) -> str:
+        texts = {".h": self.header, ".c": self.source, ".ino": self.sketch}
+        rows = {f"{self.name}{end}": f"{text.count(chr(10))} lines" for end, text in texts.items()}
+        return words([f"CSource {self.name}: C99 with math.h alone"], rows)
 
     def write(self, folder: str | Path) -> None:
         """Write name.h, name.c, and the sketch under the folder's name, as Arduino has it; the folder is made.

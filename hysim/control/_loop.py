@@ -10,10 +10,11 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen, read_only
 from hysim._parallel import Progress
+from hysim._words import extent, printed, quantity, words
 from hysim.errors import SimulationError
 from hysim.models.actuator import Actuator, is_law
 from hysim.models.chain import Signals
-from hysim.models.model import CompiledController
+from hysim.models.model import CompiledController, in_brief
 from hysim.models.sampled import Vibration
 from hysim.models.state_space import linear_plant
 from hysim.records import Record
@@ -27,6 +28,7 @@ class Controller(Protocol):
         ...
 
 
+@printed
 @frozen
 class ClosedLoop:
     """A loop that was closed; every signal has shape (n,).
@@ -67,6 +69,26 @@ class ClosedLoop:
     measurement: FloatArray
     conditions: Mapping[str, Any] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        t, u, y = (self.units.get(signal, unit) for signal, unit in (("t", "s"), ("u", ""), ("y", "")))
+        rms = float(np.sqrt(np.mean((self.reference - self.y) ** 2)))
+        known = self.conditions
+        return words(
+            [f"ClosedLoop: {self.t.size} samples to {quantity(self.t[-1], t)}, tracking rms {quantity(rms, y)}"],
+            {
+                "reference": extent(self.reference, y),
+                "displacement": extent(self.y, y),
+                "voltage": f"{extent(self.u, u)}, limited at {known.get('limited_samples', 'unknown')} samples",
+                "plant": in_brief(known["plant"]) if "plant" in known else "",
+                "controller": in_brief(known["controller"]) if "controller" in known else "",
+                "conditions": ", ".join(
+                    f"{name.replace('_', ' ')} {known[name]:.4g}"
+                    for name in ("sample_time", "delay", "preview", "noise", "sensor_quantum", "voltage_noise_rms")
+                    if known.get(name)
+                ),
+            },
+        )
 
 
 def close_loop(
@@ -192,7 +214,28 @@ def is_controller(value: Any) -> bool:
 
 
 def as_actuator(plant: Any) -> Actuator:
-    """Any plant as the chain that loops run."""
+    """Any plant as the chain that loops run.
+
+    Parameters
+    ----------
+    plant : Actuator, law or linear plant
+        A law becomes an actuator's hysteresis, a linear plant its vibration.
+
+    Returns
+    -------
+    Actuator
+
+    Raises
+    ------
+    TypeError
+        If it is none of these.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> hs.control.as_actuator(hs.Line(slope=2.0)) == hs.Actuator(hysteresis=hs.Line(slope=2.0))
+    True
+    """
     if isinstance(plant, Actuator):
         return plant
     if is_law(plant):

@@ -5,6 +5,8 @@ from collections.abc import Iterable
 from typing import Any
 
 from hysim._frozen import frozen
+from hysim._words import printed, words
+from hysim.models.model import in_brief
 
 
 @frozen
@@ -29,6 +31,7 @@ class Trial:
     objective: float
 
 
+@printed
 @frozen
 class Tuning:
     """What `tune` found.
@@ -68,6 +71,22 @@ class Tuning:
     trials: tuple[Trial, ...]
     success: bool
     message: str
+
+    def __str__(self) -> str:
+        bounds = "within" if self.success else "NOT within"
+        return words(
+            [
+                f"Tuning: {type(self.controller).__name__} {bounds} its bounds, objective {self.objective:.4g} of the "
+                "reference's span"
+            ],
+            {
+                "controller": in_brief(self.controller),
+                "sensitivity": f"at most {self.max_sensitivity:.4g}",
+                "margins": f"gain {self.gain_margin:.4g}, phase {self.phase_margin:.4g} degrees",
+                "noise": f"{self.voltage_noise:.4g} rms of voltage" if self.voltage_noise else "",
+                "search": self.message,
+            },
+        )
 
 
 def front(trials: Iterable[Trial]) -> tuple[Trial, ...]:

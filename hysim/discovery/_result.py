@@ -5,11 +5,13 @@ from collections.abc import Mapping
 from typing import Any, Self
 
 from hysim._frozen import FloatArray, frozen
+from hysim._words import printed, words, wrapped
 from hysim.discovery._judgement import Judgement
 from hysim.identification import json_forms
 from hysim.models.duhem_terms import latex
 
 
+@printed
 @frozen
 class Discovery:
     """A law that was found in records.
@@ -81,6 +83,24 @@ class Discovery:
     def latex(self) -> str:
         """The law for LaTeX, without dollar signs."""
         return latex(self.equation)
+
+    def __str__(self) -> str:
+        scores = self.scores
+        numbers = [f"{name} {value:.4g}{self._spread(name)}" for name, value in self._numbers.items()]
+        return words(
+            [
+                f"Discovery: {self.verdict}, fit {scores['fit_percent']:.2f} %, rmse {scores['rmse']:.4g}, "
+                f"{self.n_parameters} parameters",
+                f"  {self.equation}",
+                wrapped(numbers),
+            ],
+            {
+                "route": self.route,
+                "held-out rmse": ", ".join(f"{name} {value:.4g}" for name, value in self.judgement.held_out.items()),
+                "cross-validated": "" if math.isnan(self.cv_rmse) else f"rmse {self.cv_rmse:.4g}",
+                "search": self.message,
+            },
+        )
 
     def summary(self) -> str:
         """The result in a few lines."""

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hysim._atomic import whole
+from hysim._atomic import write_all
 from hysim._frozen import FloatArray
 from hysim.files._table import Notes
 from hysim.records import Record
@@ -62,26 +62,22 @@ def save_record(record: Record, path: str | Path) -> None:
     if not isinstance(record, Record):
         raise TypeError(f"save_record takes a Record, got {type(record).__name__}")
     columns = {"u": record.u, "y": record.y} if record.t is None else {"t": record.t, "u": record.u, "y": record.y}
-    save_columns(columns, path, Notes(record.units, record.resolution, record.name))
+    write_all({path: packed(columns, path, Notes(record.units, record.resolution, record.name))})
 
 
-def save_columns(columns: Mapping[str, FloatArray], path: str | Path, notes: Notes) -> None:
-    """Save columns of equal lengths to a file, in the format that its ending names.
+def packed(columns: Mapping[str, FloatArray], path: str | Path, notes: Notes) -> bytes:
+    """Columns of equal lengths as the content of a file, in the format that the ending of its path names.
 
     Raises
     ------
     ValueError
-        If the ending is none of these, or HDF5 is asked for without h5py.
-    OSError
-        If the folder cannot be written to.
+        If the ending is none of these, HDF5 is asked for without h5py, or a name or a unit cannot be written.
     """
     write = _WRITERS[ending(path)]
     for text in (notes.name or "", *notes.units.values()):
         if "\0" in text or text.encode("utf-8", "replace").decode() != text:
             raise ValueError(f"names and units must be letters that can be written, got {text!r}")
-    content = write(columns, notes)
-    with whole(path, "xb") as file:
-        file.write(content)
+    return write(columns, notes)
 
 
 def ending(path: str | Path) -> str:

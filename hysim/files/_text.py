@@ -42,6 +42,6 @@ def _decoded(content: bytes, name: str, encoding: str | None) -> str:
 
 def _no_text(name: str, kind: str) -> str:
     return (
-        f"{name} is not a {kind} file: it holds zero bytes; and it does not begin as NPZ, NPY, MAT (-v7, -v7.3) or HDF5 "
-        "files do (or say in which encoding it is)"
+        f"{name} is not a {kind} file: it holds zero bytes; and it does not begin as NPZ, NPY, MAT (-v7, -v7.3) or "
+        "HDF5 files do (or say in which encoding it is)"
     )

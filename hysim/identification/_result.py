@@ -7,6 +7,7 @@ from typing import Any, Self
 import numpy as np
 
 from hysim._frozen import FloatArray, frozen
+from hysim._words import printed, words, wrapped
 from hysim.identification import json_forms
 from hysim.identification._profile import Profile
 
@@ -42,6 +43,7 @@ class Width:
     upper: float
 
 
+@printed
 @frozen
 class Identification:
     """Parameters of a model, identified on one or several records.
@@ -158,6 +160,26 @@ class Identification:
     def residual_quanta(self) -> FloatArray | None:
         """The residual in quanta of the sensor, shape (n,); None where no resolution is known."""
         return None if self.resolution is None else self.residual / self.resolution
+
+    def __str__(self) -> str:
+        state = "" if self.success else ", NOT converged"
+        free = [f"{name} {self.estimates[name]:.4g} +- {self.stderr[name]:.2g}" for name in self.free_names]
+        held = [f"{name} {value:.4g}" for name, value in self.estimates.items() if name not in self.free_names]
+        width = self.loop_width
+        return words(
+            [
+                f"Identification of {type(self.model).__name__}: fit {self.fit_percent:.2f} %, rmse {self.rmse:.4g}, "
+                f"{self.n_parameters} parameters{state}",
+                wrapped(free, most=4),
+                wrapped(held, most=1, first="  held: "),
+            ],
+            {
+                "residual": f"{self._residual_in_words()}, {self.residual.size} samples",
+                "loop width": f"{width.value:.4g}, from {width.lower:.4g} to {width.upper:.4g}" if width else "",
+                "cross-validated": "" if np.isnan(self.cv_rmse) else f"rmse {self.cv_rmse:.4g}",
+                "search": self.message,
+            },
+        )
 
     def summary(self) -> str:
         """The result in a few lines."""

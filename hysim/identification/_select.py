@@ -14,6 +14,7 @@ from typing import Any
 
 from hysim._frozen import frozen
 from hysim._parallel import Progress
+from hysim._words import printed, words
 from hysim.identification._identify import identify
 from hysim.identification._result import Identification
 from hysim.records import Record
@@ -21,6 +22,7 @@ from hysim.records import Record
 CRITERIA = ("bic", "aic", "fpe", "cv_rmse")
 
 
+@printed
 @frozen
 class Selection:
     """Candidates that were identified on the same records, ranked.
@@ -43,6 +45,9 @@ class Selection:
     def best(self) -> Identification:
         """The fit of the best candidate."""
         return self.fits[self.name]
+
+    def __str__(self) -> str:
+        return words([f"Selection: {self.name} is the best of {len(self.fits)} by {self.criterion}", self.to_text()])
 
     def to_text(self) -> str:
         """The table for a terminal, the best first."""

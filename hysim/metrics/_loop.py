@@ -34,8 +34,10 @@ import numpy.typing as npt
 
 from hysim._cycles import ROUNDING, TOLERANCE, last_cycles, settled
 from hysim._frozen import FloatArray, frozen, read_only
+from hysim._words import extent, printed, words
 
 
+@printed
 @frozen
 class LoopMetrics:
     """The measures of one loop.
@@ -91,6 +93,21 @@ class LoopMetrics:
     loading: FloatArray
     unloading: FloatArray
     width: FloatArray
+
+    def __str__(self) -> str:
+        cycles = "the last cycle" if self.n_cycles == 1 else f"the mean of {self.n_cycles} cycles"
+        return words(
+            [f"LoopMetrics: {self.orientation} loop, {cycles}, largest width {self.max_width:.4g}"],
+            {
+                "largest width": f"{self.max_width:.4g} at u = {self.max_width_at:.6g}, "
+                f"{100.0 * self.relative_width:.2f} % of the stroke",
+                "mean width": f"{self.mean_width:.4g}, at mid span {self.mid_width:.4g}",
+                "stroke": f"{self.stroke:.4g} over u of {extent(self.u)}",
+                "area": f"{self.area:.4g}, energy {self.energy:.4g}",
+                "closure gap": f"{self.closure_gap:.4g}",
+                "stiffness": f"{self.secant_stiffness:.4g}, equivalent damping {100.0 * self.equivalent_damping:.2f} %",
+            },
+        )
 
     @overload
     def width_at(self, u: float) -> float: ...

@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from hysim._cycles import ROUNDING
 from hysim._frozen import FloatArray, frozen, read_only
+from hysim._words import printed, words
 
 SETTLED = 0.02
 """How near to its final value a response has settled."""
@@ -50,6 +51,7 @@ class StepMetrics:
     t98: float
 
 
+@printed
 @frozen
 class VibrationReduction:
     """What a loop takes away from the vibration after a step, always three figures together.
@@ -67,6 +69,23 @@ class VibrationReduction:
     settling_time_reduction_percent: float
     open: StepMetrics
     closed: StepMetrics
+
+    def __str__(self) -> str:
+        return words(
+            [
+                f"VibrationReduction: overshoot {self.overshoot_reduction_percent:.2f} %, residual rms "
+                f"{self.residual_rms_reduction_percent:.2f} %, settling time "
+                f"{self.settling_time_reduction_percent:.2f} %"
+            ],
+            {"open loop": _in_words(self.open), "closed loop": _in_words(self.closed)},
+        )
+
+
+def _in_words(response: StepMetrics) -> str:
+    return (
+        f"overshoot {response.overshoot:.2f} %, settled after {response.settling_time:.4g}, 98 % after "
+        f"{response.t98:.4g}"
+    )
 
 
 def step_metrics(t: npt.ArrayLike, y: npt.ArrayLike) -> StepMetrics:

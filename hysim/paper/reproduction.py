@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hysim._atomic import write_text
+from hysim._atomic import write_all
 from hysim._frozen import frozen
 from hysim._parallel import second_process
 from hysim.comparison import Comparison
@@ -81,10 +81,9 @@ def reproduce(
         pass
     computed = find(quick=quick, progress=progress)
     files = contents(computed)
-    for name, text in files.items():
-        path = folder / name
-        path.parent.mkdir(exist_ok=True)
-        write_text(path, text)
+    for name in files:
+        (folder / name).parent.mkdir(exist_ok=True)
+    write_all({folder / name: text for name, text in files.items()})
     return Reproduction(folder=folder, files=tuple(files), findings=computed)
 
 

@@ -15,6 +15,7 @@ from hysim.plot._harmonics import describing_function
 from hysim.plot._identifications import identification
 from hysim.plot._loops import animate, minor_loops, width
 from hysim.plot._maps import forc, residual_map
+from hysim.plot._pictures import FORMATS, to_bytes
 from hysim.plot._records import history, loop, response, traces
 from hysim.plot._style import DIVERGING, SEQUENTIAL, figure, house_style, panels
 from hysim.plot._svg import save_svg, to_svg
@@ -23,6 +24,7 @@ from hysim.plot._tunings import trade_off
 
 __all__ = [
     "DIVERGING",
+    "FORMATS",
     "SEQUENTIAL",
     "Axes",
     "Figure",
@@ -48,6 +50,7 @@ __all__ = [
     "save_svg",
     "selection",
     "sensitivities",
+    "to_bytes",
     "to_svg",
     "traces",
     "trade_off",

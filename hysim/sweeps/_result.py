@@ -11,12 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen
+from hysim._words import printed, words
 from hysim.sweeps._seeds import seeds
 from hysim.sweeps._space import Column
 from hysim.sweeps._store import opened
 from hysim.sweeps._table import Table
 
 
+@printed
 @frozen
 class Sweep:
     """A study as a table; ``result["name"]`` is a column of it.
@@ -52,6 +54,9 @@ class Sweep:
     errors: Mapping[int, str]
     n_tasks: int
     axes: Mapping[str, Column] | None = None
+
+    def __str__(self) -> str:
+        return words([f"Sweep of {', '.join(self.parameters)}; {self.summary()}"])
 
     def __len__(self) -> int:
         return self.task.size

@@ -14,11 +14,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from hysim._frozen import FloatArray, frozen
+from hysim._words import printed, words
 from hysim.sweeps._result import Sweep
 
 _RESAMPLES = 200
 
 
+@printed
 @frozen
 class SobolIndices:
     """Shares of the variance of outputs, by parameter.
@@ -38,6 +40,10 @@ class SobolIndices:
     total_order: Mapping[str, FloatArray]
     first_order_interval: Mapping[str, FloatArray]
     total_order_interval: Mapping[str, FloatArray]
+
+    def __str__(self) -> str:
+        many = f"{len(self.first_order)} outputs by {len(self.parameters)} parameters"
+        return words([f"SobolIndices: {many}", self.summary()])
 
     def summary(self) -> str:
         """The indices as a table."""

@@ -1,0 +1,96 @@
+"""What results say when they are printed: what matters in at most ten lines of at most a hundred letters.
+
+A result says it by ``__str__``, and its first line alone is its ``repr``; notebooks show all of it. No array is listed.
+"""
+
+import textwrap
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+LINES, LETTERS = 10, 100
+
+T = TypeVar("T")
+
+
+def printed(cls: type[T]) -> type[T]:
+    """Give a class that has a ``__str__`` a ``repr`` of one line, and a notebook all of it."""
+    cls.__repr__ = _first_line  # type: ignore[method-assign]
+    return shown(cls)
+
+
+def shown(cls: type[T]) -> type[T]:
+    """Let notebooks show what ``str`` says."""
+    cls._repr_mimebundle_ = _bundle  # type: ignore[attr-defined]
+    return cls
+
+
+def words(lines: Iterable[str], rows: Mapping[str, str] | None = None) -> str:
+    """Lines, and rows of a name and what there is to say of it, as far as there is room."""
+    width = max(map(len, rows or {}), default=0)
+    named = [_cut(f"  {name:<{width}}  ", text) for name, text in (rows or {}).items() if text]
+    every = [part for line in [*lines, *named] for part in line.splitlines()]
+    if len(every) > LINES:
+        every = [*every[: LINES - 1], f"  ... and {len(every) - LINES + 1} lines more"]
+    return "\n".join(line if len(line) <= LETTERS else line[: LETTERS - 4].rstrip() + " ..." for line in every)
+
+
+def wrapped(parts: Iterable[str], *, most: int = 3, first: str = "  ") -> str:
+    """Short parts behind each other, over at most as many lines; how many more there are is said."""
+    given = [part.replace(" ", "\0") for part in parts]
+    indent = " " * len(first)
+    for number in range(len(given), 0, -1):
+        more = len(given) - number
+        text = ", ".join(given[:number]) + (f", and\0{more}\0more" if more else "")
+        lines = textwrap.wrap(text, LETTERS, initial_indent=first, subsequent_indent=indent, break_on_hyphens=False)
+        if len(lines) <= most:
+            return "\n".join(lines).replace("\0", " ")
+    return ""
+
+
+def quantity(value: float, unit: str = "") -> str:
+    """A number with its unit."""
+    return f"{value:.4g} {unit}".rstrip()
+
+
+def extent(values: npt.ArrayLike, unit: str = "") -> str:
+    """From the least to the largest of some values."""
+    array = np.asarray(values)
+    if not array.size:
+        return "no values"
+    low, high = float(array.min()), float(array.max())
+    return quantity(low, unit) if low == high else f"{low:.4g} to {quantity(high, unit)}"
+
+
+def value_in_words(value: Any) -> str:
+    """A parameter, an array by its shape and extent alone."""
+    if isinstance(value, np.ndarray):
+        size = " x ".join(map(str, value.shape)) or "1"
+        return f"{size} values, {extent(value)}"
+    if isinstance(value, tuple):
+        if len(value) > 4 and all(isinstance(each, float) for each in value):
+            return value_in_words(np.array(value))
+        return f"({', '.join(map(value_in_words, value))})"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return repr(value) if isinstance(value, str) else str(value)
+
+
+def _cut(name: str, text: str) -> str:
+    """A row over at most two lines."""
+    indent = " " * len(name)
+    lines = textwrap.wrap(
+        text, LETTERS, initial_indent=name, subsequent_indent=indent, max_lines=2, placeholder=" ...",
+        break_on_hyphens=False,
+    )  # fmt: skip
+    return "\n".join(lines)
+
+
+def _first_line(self: object) -> str:
+    return f"<{str(self).partition(chr(10))[0]}>"
+
+
+def _bundle(self: object, include: object = None, exclude: object = None) -> dict[str, str]:
+    return {"text/plain": str(self)}
