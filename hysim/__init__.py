@@ -13,6 +13,7 @@ _MODULES = ("benchmarks", "control", "datasets", "metrics", "plot", "signals")
 _HOME = {
     "Record": "hysim.records",
     "load": "hysim.files",
+    "save_record": "hysim.files",
     "simulate": "hysim.simulation",
     "Simulation": "hysim.simulation",
     "identify": "hysim.identification",
@@ -116,6 +117,7 @@ if TYPE_CHECKING:
     from hysim.discovery import discover as discover
     from hysim.errors import SimulationError as SimulationError
     from hysim.files import load as load
+    from hysim.files import save_record as save_record
     from hysim.identification import Identification as Identification
     from hysim.identification import Selection as Selection
     from hysim.identification import identify as identify

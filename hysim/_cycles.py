@@ -9,6 +9,7 @@ divided in its middle, half to each branch; a sample in the very middle belongs 
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 
@@ -84,6 +85,14 @@ def turns(u: FloatArray, tolerance: float) -> Turns:
     starts = [plateaus[0][0], *((first + last + 1) // 2 for first, last in plateaus[1:-1])]
     stops = [*((first + last) // 2 + 1 for first, last in plateaus[1:-1]), plateaus[-1][1] + 1]
     return Turns(plateaus, [slice(*ends) for ends in zip(starts, stops, strict=True)] if len(plateaus) > 1 else [])
+
+
+def settled(u: FloatArray) -> npt.NDArray[np.intp]:
+    """The samples of a branch in the order of their inputs, of several at one input the last."""
+    order = np.argsort(u, kind="stable")
+    x = u[order]
+    kept: npt.NDArray[np.intp] = order[np.append(x[1:] > x[:-1], True)]
+    return kept
 
 
 def _too_few(asked: int, found: int, levels: FloatArray) -> str:

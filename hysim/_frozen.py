@@ -61,6 +61,8 @@ def read_only(
 def _as_float_array(values: npt.ArrayLike, name: str) -> FloatArray:
     if np.iscomplexobj(values):
         raise TypeError(f"{name} must be real numbers, got complex ones")
+    if getattr(getattr(values, "dtype", None), "kind", "f") in "mM":  # which NumPy would take for counts of their unit
+        raise TypeError(f"{name} must be numbers, got dates or times: give seconds from the first one")
     try:
         return np.array(values, dtype=np.float64, order="C")
     except (TypeError, ValueError) as error:

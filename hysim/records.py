@@ -6,14 +6,20 @@ The sample axis is axis 0. A record never changes; a slice of it carries its uni
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import field
-from typing import Self
+from itertools import pairwise
+from typing import Self, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._cycles import TOLERANCE, complete_cycles, turns
+from hysim._drift import drift
 from hysim._frozen import FloatArray, checked
+from hysim._prefixes import power_of_ten
+from hysim._quanta import output_quantum
 from hysim._words import extent, printed, quantity, words
+
+T = TypeVar("T", float, FloatArray)
 
 _MOST_SAMPLES = 100_000_000  # of a resampled record: 2.4 GB
 _ROUNDING = 1e-9  # of a number of steps
@@ -265,3 +271,163 @@ class Record:
         t = self.t[0] + sample_time * np.arange(int(span / sample_time * (1 + _ROUNDING)) + 1)
         u, y = (np.interp(t, self.t, values) for values in (self.u, self.y))
         return dataclasses.replace(self, t=t, u=u, y=y)
+
+    def detrend(self, order: int = 1, *, tolerance: float = TOLERANCE) -> Self:
+        """The record without the drift of its output; the loop itself stays.
+
+        The output is taken as a loop that repeats itself from cycle to cycle plus a polynomial of the time, or of
+        the sample's number where there is no time. The polynomial is fitted to the differences between the complete
+        cycles at the same inputs of the same branch, so that the loop's slope and width do not enter, as they would
+        in a straight line through all samples (`scipy.signal.detrend`). What is taken off is the polynomial less
+        its mean over the complete cycles: their mean output stays. The input is left as it is. A first cycle that
+        begins on another curve than the others looks like drift: cut it off before.
+
+        Parameters
+        ----------
+        order : int
+            Degree of the polynomial.
+        tolerance : float
+            Retreats up to this fraction of the input's span are ignored when cycles are looked for.
+
+        Returns
+        -------
+        Record
+
+        Raises
+        ------
+        ValueError
+            If the order is not at least 1, or there are fewer than ``order + 1`` complete cycles to compare.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import hysim as hs
+        >>> u = hs.signals.triangle(0.0, 1.0, cycles=4, samples_per_cycle=40)
+        >>> drifting = hs.BoucWen(beta=2.0).response(u) + 0.001 * np.arange(u.size)
+        >>> rec = hs.Record(u=u, y=drifting)[80:]
+        >>> gaps = [hs.loop_metrics(part.u, part.y).closure_gap for part in (rec, rec.detrend())]
+        >>> [round(abs(gap), 3) for gap in gaps]
+        [0.04, 0.0]
+        """
+        if order < 1:
+            raise ValueError(f"order must be at least 1, got {order}")
+        cycles = complete_cycles(self.u, tolerance)
+        if len(cycles) <= order:
+            raise ValueError(
+                f"a drift of order {order} needs {order + 1} complete cycles to tell it from the loop, the record has "
+                f"{len(cycles)}"
+            )
+        times = np.arange(float(len(self))) if self.t is None else self.t
+        return dataclasses.replace(self, y=self.y - drift(cycles, self.u, self.y, times, order))
+
+    def split(self, *places: float) -> tuple[Self, ...]:
+        """The record cut in two or more, such as one part to identify from and one to test on.
+
+        Parameters
+        ----------
+        *places : int or float
+            Where to cut, increasing: a whole number is the first sample of the next part, a fraction between 0 and
+            1 is that of the samples.
+
+        Returns
+        -------
+        tuple of Record
+            They share no sample. A law begins each with a memory of its own: that of the first sample's past.
+
+        Raises
+        ------
+        ValueError
+            If no place is given, or a part has fewer than 2 samples.
+        TypeError
+            If a place is not a number.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> train, test = hs.Record(u=range(10), y=range(10)).split(0.7)
+        >>> len(train), test.u.tolist()
+        (7, [7.0, 8.0, 9.0])
+        """
+        if not places:
+            raise ValueError("split needs a place: a fraction such as 0.7, or a sample's number")
+        cuts = [0, *(self._sample_at(place) for place in places), len(self)]
+        if min(np.diff(cuts)) < 2:
+            raise ValueError(f"each part needs at least 2 samples, got {np.diff(cuts).tolist()} of them")
+        return tuple(self[start:stop] for start, stop in pairwise(cuts))
+
+    def convert(self, units: Mapping[str, str]) -> Self:
+        """The record in other units, which differ from its own by an SI prefix.
+
+        Parameters
+        ----------
+        units : mapping
+            New units of ``"t"``, ``"u"`` or ``"y"``: ``{"y": "nm"}`` for an output in um.
+
+        Returns
+        -------
+        Record
+            With its values, and the resolution if it is the output, multiplied by a power of ten.
+
+        Raises
+        ------
+        ValueError
+            If a signal has no unit or no values, or its unit and the new one differ by more than a prefix.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> rec = hs.Record(u=[0.0, 1.0], y=[0.0, 0.079], units={"y": "um"}, resolution=0.001)
+        >>> rec.convert({"y": "nm"}).y.tolist(), rec.convert({"y": "nm"}).resolution
+        ([0.0, 79.0], 1.0)
+        """
+        changed = self
+        for signal, unit in units.items():
+            values = getattr(changed, signal) if signal in ("t", "u", "y") else None
+            if values is None or signal not in changed.units:
+                raise ValueError(f"the record has no {signal!r} with a unit to convert: give it units first")
+            power = power_of_ten(changed.units[signal], unit)
+            resolution = changed.resolution
+            if signal == "y" and resolution is not None:
+                resolution = _scaled(resolution, power)
+            changed = dataclasses.replace(
+                changed,
+                **{signal: _scaled(values, power)},
+                units={**changed.units, signal: unit},
+                resolution=resolution,
+            )
+        return changed
+
+    def detect_resolution(self) -> float | None:
+        """The quantum of the output, as its values show it [unit of y].
+
+        It is the greatest step of which all outputs are whole multiples, up to a constant and to a tenth of the step
+        (rounding, a crooked sensor), if values without a quantum would hardly do as well. Values printed with three
+        decimals are multiples of 0.001, and this is what they have if there is nothing coarser: of a sensor whose
+        steps are finer than the decimals, nothing else is left. A record that is even in itself, such as a noise-free
+        triangle, has a step too: this is an offer, not a judgement.
+
+        Returns
+        -------
+        float or None
+            None if no step is found down to 1/65536 of the outputs' span: they are not quantised, or too few to tell.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> hs.datasets.table1().detect_resolution()
+        0.0763
+        """
+        return output_quantum(self.y)
+
+    def _sample_at(self, place: float) -> int:
+        if isinstance(place, (int, np.integer)) and not isinstance(place, bool):
+            return int(place)
+        if isinstance(place, (float, np.floating)) and 0.0 < place < 1.0:
+            return round(place * len(self))
+        raise TypeError(f"a place is a sample's number or a fraction between 0 and 1, got {place!r}")
+
+
+def _scaled(values: T, power: int) -> T:
+    """Values times a power of ten, each rounded once."""
+    scaled: T = values * 10.0**power if power >= 0 else values / 10.0**-power
+    return scaled

@@ -11,8 +11,9 @@ PACKAGE = Path(hysim.__file__).parent
 
 RANKS = {
     # tools of the language, which know nothing of hysteresis
-    -2: ("_frozen", "_atomic", "_words", "_versions", "errors"),
-    -1: ("_cycles",),  # the turning points of an input, which records and measures share
+    -3: ("_frozen", "_atomic", "_words", "_versions", "errors"),
+    -2: ("_cycles", "_quanta", "_prefixes"),  # the turning points of an input, the quantum of a sensor, units
+    -1: ("_drift",),  # what cycles that follow each other say
     0: ("signals", "records", "metrics", "kernels", "_parallel"),
     1: ("datasets", "files", "models", "vision"),
     2: ("simulation", "benchmarks"),

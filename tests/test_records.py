@@ -7,7 +7,7 @@ import pickle
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hysim as hs
@@ -175,3 +175,107 @@ def test_a_step_that_does_not_fit_the_record_is_refused(step):
         record().resample(step)
     with pytest.raises(ValueError, match="no time to resample"):
         record(t=None).resample(0.1)
+
+
+@given(st.floats(-0.01, 0.01), st.floats(-1e-5, 1e-5), st.booleans())
+def test_a_drift_is_taken_off_and_the_loop_stays(slope, curvature, has_time):
+    u = np.sin(np.linspace(0.0, 10.0 * np.pi, 251) - np.pi / 2)
+    loop = u + 0.3 * np.cos(np.linspace(0.0, 10.0 * np.pi, 251) - np.pi / 2)
+    k = np.arange(251.0)
+    drifting = hs.Record(u=u, y=loop + slope * k + curvature * k**2, t=0.1 * k if has_time else None, units={"y": "um"})
+    flat = drifting.detrend(2)
+    assert np.ptp(flat.y - loop) < 1e-9  # rounding of the fit: the periods are the same to the last digits only
+    assert flat.y.mean() == pytest.approx(drifting.y.mean(), abs=1e-9)  # all samples are in complete cycles
+    assert (flat.u.tolist(), dict(flat.units)) == (drifting.u.tolist(), {"y": "um"})
+
+
+def test_a_drift_needs_cycles_to_be_told_from_the_loop():
+    with pytest.raises(ValueError, match="order 1 needs 2 complete cycles to tell it from the loop, the record has 1"):
+        hs.datasets.table1().detrend()
+    with pytest.raises(ValueError, match="order must be at least 1, got 0"):
+        hs.datasets.table1().detrend(0)
+
+
+def test_a_record_is_split_at_samples_and_fractions():
+    rec = hs.Record(u=range(10), y=range(10), units={"u": "V"}, name="loop")
+    assert [part.u.tolist() for part in rec.split(3, 0.8)] == [[0, 1, 2], [3, 4, 5, 6, 7], [8, 9]]
+    assert {(part.name, part.units["u"]) for part in rec.split(np.int64(3), np.float64(0.8))} == {("loop", "V")}
+    for places, message in (((), "needs a place"), ((9,), r"got \[9, 1\]"), ((5, 4), r"got \[5, -1, 6\]")):
+        with pytest.raises(ValueError, match=message):
+            rec.split(*places)
+    for place in (True, 1.0, "half", math.nan):
+        with pytest.raises(TypeError, match="a place is a sample's number or a fraction"):
+            rec.split(place)
+
+
+def test_units_change_by_their_prefix():
+    rec = hs.datasets.table1()
+    other = rec.convert({"y": "nm", "u": "kV", "t": "ms"})
+    assert (other.y[1], other.u[1], other.t[1], other.resolution) == (79.0, 0.005, 1000.0, 0.0763 * 1000)
+    assert dict(other.units) == {"t": "ms", "u": "kV", "y": "nm"}
+    assert rec.convert({"y": "\u00b5m"}).y.tolist() == rec.convert({"y": "\u03bcm"}).y.tolist() == rec.y.tolist()
+    assert hs.Record(u=[0, 1], y=[0, 3], units={"y": "mm"}).convert({"y": "m"}).y[1] == 0.003
+
+
+@pytest.mark.parametrize(
+    ("units", "message"),
+    [
+        ({"y": "V"}, "'um' cannot become 'V': only the prefix of a unit can change"),
+        ({"y": "px"}, "'px' is no unit with an SI prefix that is known"),
+        ({"y": ""}, "'' is no unit"),
+        ({"z": "m"}, "the record has no 'z' with a unit to convert"),
+    ],
+)
+def test_units_that_are_others_are_refused(units, message):
+    with pytest.raises(ValueError, match=message):
+        hs.datasets.table1().convert(units)
+    with pytest.raises(ValueError, match="no 't' with a unit"):
+        record(t=None).convert({"t": "ms"})
+
+
+@settings(max_examples=6)  # two Fourier transforms each
+@given(st.sampled_from([0.1, 0.0763, 5.0, 1e-3, 2.0**-10, 3e7]), st.integers(0, 9), st.floats(-1.0, 1.0))
+def test_the_quantum_of_a_sensor_is_found(quantum, seed, shift):
+    levels = np.unique(np.random.default_rng(seed).integers(-200, 200, 60))
+    if math.gcd(*np.diff(levels).tolist()) == 1:
+        rec = hs.Record(u=levels, y=quantum * (levels + shift))
+        assert rec.detect_resolution() == pytest.approx(quantum, rel=1e-12)  # rounding of the products
+        off = 0.05 * np.sin(levels)  # steps
+        crooked = hs.Record(u=levels, y=quantum * (levels + shift + off)).detect_resolution()
+        assert crooked == pytest.approx(quantum, rel=0.05 / levels.size**0.5)  # of a mean of so many
+
+
+def test_the_camera_of_table_1_is_found_below_its_decimals():
+    table1 = hs.datasets.table1()
+    assert table1.detect_resolution() == table1.resolution == 0.0763
+    assert hs.Record(u=table1.u, y=table1.u).detect_resolution() == 5.0
+    noise = np.random.default_rng(0).normal(size=500)
+    assert hs.Record(u=noise, y=np.round(noise, 3)).detect_resolution() == 0.001  # nothing but the decimals
+
+
+@pytest.mark.parametrize("n", [2, 3, 5, 50, 5000])
+def test_values_without_a_quantum_have_none(n):
+    noise = np.random.default_rng(n).normal(size=n)
+    for y in (noise, np.full(n, 2.0), 1e300 * noise, 1e-310 * noise, noise.astype("f4"), 1e9 + 1e-6 * noise):
+        assert hs.Record(u=noise, y=y).detect_resolution() is None
+
+
+def test_pandas_columns_with_any_index_are_arrays():
+    pd = pytest.importorskip("pandas")
+    frame = pd.DataFrame({"u": [0.0, 1.0, 0.5, 0.0], "y": [0.0, 0.9, 0.6, 0.1]}, index=[7, 3, 3, -1])
+    u, y = frame["u"].to_numpy(), frame["y"].to_numpy()
+    law = hs.BoucWen(feedthrough=1.0)
+    for kind in ("float64", "Float64", object):
+        columns = frame.astype(kind)
+        assert hs.Record(u=columns["u"], y=columns["y"]) == hs.Record(u=u, y=y)
+        assert hs.loop_metrics(columns["u"], columns["y"]) == hs.loop_metrics(u, y)
+        assert hs.simulate(hs.Line(slope=1.0), None, columns["u"]).y.tolist() == u.tolist()
+        assert law.inverse_response(columns["y"]).tolist() == law.inverse_response(y).tolist()
+        assert hs.metrics.rmse(columns["y"], columns["u"]) == hs.metrics.rmse(y, u)
+    missing = pd.Series([0.0, None, 1.0], dtype="Float64")
+    with pytest.raises((ValueError, TypeError), match=r"y must be finite, got nan at index 1|y must be numbers"):
+        hs.Record(u=[0, 1, 2], y=missing)
+    dates = pd.Series(pd.to_datetime(["2020-01-01", "2020-01-02"]))
+    for times in (dates, dates.to_numpy(), dates.diff()):
+        with pytest.raises(TypeError, match="t must be numbers, got dates or times: give seconds"):
+            hs.Record(u=[0, 1], y=[0, 1], t=times)

@@ -9,6 +9,7 @@ from hysim.cli import outputs, records
 
 if TYPE_CHECKING:
     from hysim.metrics import LoopMetrics
+    from hysim.records import Record
 
 
 def add_to(commands: Any) -> None:
@@ -26,6 +27,8 @@ def add_to(commands: Any) -> None:
         type=float,
         help="of the input's span: reversals smaller than that are noise [1] (default: 0.01)",
     )
+    parser.add_argument("--out", metavar="PATH", help="write what is printed into a file too")
+    parser.add_argument("--plot", metavar="LOOP.svg", help=f"draw the loop; {outputs.PICTURE}")
     parser.add_argument("--json", action="store_true", help="print them as JSON")
     parser.set_defaults(command=run)
 
@@ -34,11 +37,18 @@ def run(options: argparse.Namespace) -> int:
     """Measure and print."""
     from hysim.metrics import loop_metrics
 
+    is_taken = outputs.check(options.out, pictures=[options.plot])
     record = records.read(options)
     tolerance = {} if options.tolerance is None else {"tolerance": options.tolerance}
     loop = loop_metrics(record.u, record.y, cycles=options.cycles, **tolerance)
-    text = outputs.to_json(_document(loop, record.units)) if options.json else "\n".join(_lines(loop, record.units))
-    outputs.write({records.STANDARD: text.rstrip("\n") + "\n"})
+    lines = [*_lines(loop, record.units), *_step(record)]
+    text = outputs.to_json(_document(loop, record.units)) if options.json else "\n".join(lines)
+    contents: dict[str | None, Any] = {options.plot: outputs.loop(record) if options.plot else ""}
+    told = text.rstrip("\n") + "\n"
+    contents[options.out] = told
+    if not is_taken:
+        contents[records.STANDARD] = told
+    outputs.write(contents)
     return 0
 
 
@@ -66,3 +76,10 @@ def _lines(loop: "LoopMetrics", units: Mapping[str, str]) -> Iterator[str]:
     }
     width = max(map(len, values))
     yield from (f"{name:<{width}}  {value.rstrip()}" for name, value in values.items())
+
+
+def _step(record: "Record") -> Iterator[str]:
+    """What the outputs show of the sensor, where nothing is said of it."""
+    if record.resolution is None and (step := record.detect_resolution()) is not None:
+        unit = record.units.get("y", "")
+        yield f"the output has steps of {f'{step:.6g} {unit}'.rstrip()}: --resolution {records.DETECT} takes them"

@@ -6,6 +6,7 @@ import re
 import numpy as np
 
 from hysim._frozen import FloatArray
+from hysim.files._table import shown
 
 MISSING = frozenset({"", "nan", "na", "n/a", "null", "none"})
 """Cells that stand for a missing value, in upper or lower case."""
@@ -74,12 +75,8 @@ def _number(cell: str, line: int, label: str, decimal: str) -> float:
     value = parse(cell, decimal)
     if value is None or not math.isfinite(value):
         mend = _mend(cell, decimal)
-        raise ValueError(f"line {line}, column {label!r}: expected a finite number, got {_shown(cell)}{mend}")
+        raise ValueError(f"line {line}, column {shown(label)}: expected a finite number, got {shown(cell)}{mend}")
     return value
-
-
-def _shown(cell: str) -> str:
-    return repr(cell if len(cell) <= 40 else cell[:37] + "...")
 
 
 def _mend(cell: str, decimal: str) -> str:

@@ -15,6 +15,7 @@ from collections import Counter
 from typing import NamedTuple, TypeVar
 
 from hysim.files._cells import MISSING, parse
+from hysim.files._table import Column
 
 DELIMITERS = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "white space"}
 DECIMALS = (".", ",")
@@ -25,15 +26,6 @@ T = TypeVar("T")
 _LOOKED_AT = 100  # lines, of which the first half is from the top and the others are spread over the file
 _HEADING = re.compile(r"(?P<name>.*\S)\s*[\[(](?P<unit>[^\[\]()]*)[\])]")
 _WORD = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\[\]()]*[\])])?|\S+")
-_UNIT = re.compile(r"[\[(]?\s*(.*?)\s*[\])]?")
-
-
-class Column(NamedTuple):
-    """A column's place in a row, its name, and its unit or an empty string."""
-
-    place: int
-    label: str
-    unit: str
 
 
 class Layout(NamedTuple):
@@ -165,7 +157,7 @@ def _words(line: str) -> list[str]:
 def _heads(rows: list[list[str]], below: list[list[str]], line: int, width: int, decimal: str) -> tuple[bool, bool]:
     """Whether the first line is a header, and whether the second one holds units."""
     kinds = [[_kind(row[place], decimal) for row in below] for place in range(width)]
-    numeric = [place for place, found in enumerate(kinds) if found.count("number") >= max(1, found.count("text"))]
+    numeric = {place for place, found in enumerate(kinds) if found.count("number") >= max(1, found.count("text"))}
     if not numeric:  # nothing below to compare with
         kinds_above = [_kind(cell, decimal) for cell in rows[0]]
         return "text" in kinds_above or "number" not in kinds_above, False
@@ -206,8 +198,8 @@ def _column(place: int, label: str) -> Column:
 
 
 def _unit(cell: str) -> str:
-    parts = _UNIT.fullmatch(cell.strip())
-    unit = parts[1] if parts else cell.strip()
+    text = cell.strip()
+    unit = text.removeprefix("[").removeprefix("(").removesuffix("]").removesuffix(")").strip()
     return "" if unit == "-" else unit
 
 

@@ -1,11 +1,11 @@
-"""The verb `load`: a record from a text file.
+"""The verb `load`: a record from a file.
 
-A file is read in three steps: bytes become text, the text's lines become columns of cells, and the cells of the
-chosen columns become numbers, or gaps where a value is missing.
+A file is read in three steps: its first bytes say its format; the format gives a table of named columns; and the
+numbers of the chosen columns become a record, or several, with gaps where a value is missing.
 """
 
-import operator
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Literal, overload
 
@@ -13,90 +13,110 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
-from hysim.files._cells import numbers, table
-from hysim.files._layout import DECIMALS, Column, Layout, layout
-from hysim.files._text import Source, read
+from hysim._quanta import output_quantum
+from hysim.files._delimited import delimited
+from hysim.files._hdf5 import hdf5
+from hysim.files._layout import DECIMALS
+from hysim.files._mat import mat
+from hysim.files._npz import npy, npz
+from hysim.files._source import Opened, Source, opened
+from hysim.files._table import Column, Table, check_gaps, check_time, pieces
+from hysim.files._text import text_of
 from hysim.records import Record
 
 ON_MISSING = ("error", "drop", "split")
+SIGNALS = {"u": "input", "y": "output"}
 
 
 @overload
 def load(
     path: Source,
     *,
-    u: str | int,
-    y: str | int,
+    u: str | int | None = None,
+    y: str | int | None = None,
     t: str | int | None = None,
     on_missing: Literal["error", "drop"] = "error",
     delimiter: str | None = None,
     decimal: Literal[".", ","] | None = None,
     encoding: str | None = None,
     units: Mapping[str, str] | None = None,
-    resolution: float | None = None,
+    resolution: float | Literal["detect"] | None = None,
     name: str | None = None,
 ) -> Record: ...
 @overload
 def load(
     path: Source,
     *,
-    u: str | int,
-    y: str | int,
+    u: str | int | None = None,
+    y: str | int | None = None,
     t: str | int | None = None,
     on_missing: Literal["split"],
     delimiter: str | None = None,
     decimal: Literal[".", ","] | None = None,
     encoding: str | None = None,
     units: Mapping[str, str] | None = None,
-    resolution: float | None = None,
+    resolution: float | Literal["detect"] | None = None,
     name: str | None = None,
 ) -> tuple[Record, ...]: ...
 def load(
     path: Source,
     *,
-    u: str | int,
-    y: str | int,
+    u: str | int | None = None,
+    y: str | int | None = None,
     t: str | int | None = None,
     on_missing: Literal["error", "drop", "split"] = "error",
     delimiter: str | None = None,
     decimal: Literal[".", ","] | None = None,
     encoding: str | None = None,
     units: Mapping[str, str] | None = None,
-    resolution: float | None = None,
+    resolution: float | Literal["detect"] | None = None,
     name: str | None = None,
 ) -> Record | tuple[Record, ...]:
-    """Load a record from a text file with one sample a line.
+    """Load a record from a file: text, NPZ, NPY, MAT or HDF5.
 
-    Blank lines and lines that begin with ``#`` or ``%`` are skipped. The delimiter and the decimal sign are those
-    under which most cells of the file are numbers. A first line of text over columns of numbers is the header; if
-    there is none, a comment right above the samples that names as many columns is taken for it, as
-    `numpy.savetxt` writes one. A unit in brackets is split off: under ``voltage [V]`` or ``voltage (V)`` the
-    column is `voltage`, and its unit V. A second line of text holds the units of all columns. Only the chosen
-    columns have to be numbers. Cells may be quoted; a quoted cell ends on its line. Missing values are empty
-    cells, nan, na, n/a, null and none.
+    The format is read from the file's first bytes. In text, one sample a line, blank lines and lines that begin
+    with ``#`` or ``%`` are skipped. The delimiter and the decimal sign are those under which most cells of the file
+    are numbers. A first line of text over columns of numbers is the header; if there is none, a comment right above
+    the samples that names as many columns is taken for it, as `numpy.savetxt` writes one. A unit in brackets is
+    split off: under ``voltage [V]`` or ``voltage (V)`` the column is `voltage`, and its unit V. A second line of
+    text holds the units of all columns. Only the chosen columns have to be numbers. Cells may be quoted; a quoted
+    cell ends on its line. Missing values are empty cells, nan, na, n/a, null and none.
+
+    In the other formats a column is an array, called by its name: a variable, a field of a struct (``rec.u``), a
+    dataset (``group/displacement``). Of an array with several axes the first is that of the samples, and a column
+    is called ``x[2]`` or ``x[0,1]``. Its unit is an attribute `units` in HDF5, or a text beside it called
+    ``u_units``. A missing value is nan. Files of HDF5, and MATLAB's ``-v7.3``, need h5py.
+
+    What `hysim.save_record` wrote comes back whole, resolution and name too, without further arguments.
 
     Parameters
     ----------
     path : str, path or open file
-        Windows and old Macintosh line ends are read as well.
-    u, y, t : str or int
-        Columns of input, output and time, by name or by number from 0. Without `t` the record has no time.
+        An open file of text or of bytes is read from where it stands. A text, or an open file, may have 0.5 GB; an
+        array 2 GB.
+    u, y : str or int, optional
+        Columns of input and output, by name or by number from 0: of the columns of a text or of a single array, of
+        the arrays in their order otherwise (HDF5: of their names). By default those called u and y.
+    t : str or int, optional
+        Column of time. By default that called t, if there is one; False leaves it out. A record without it has
+        no time.
     on_missing : {"error", "drop", "split"}
         What to do where a chosen column has no value: raise, leave the sample out, or cut the record there
         into several.
     delimiter : str, optional
-        One character between the cells, or a blank for any white space. By default found among tab, semicolon,
-        comma and white space.
+        One character between the cells of a text, or a blank for any white space. By default found among tab,
+        semicolon, comma and white space.
     decimal : {".", ","}, optional
-        Sign before the decimals; by default found. There is none between thousands.
+        Sign before the decimals of a text; by default found. There is none between thousands.
     encoding : str, optional
-        By default UTF-8, or UTF-16 or UTF-32 where the file begins with their byte order mark.
+        Of a text; by default UTF-8, or UTF-16 or UTF-32 where the file begins with their byte order mark.
     units : mapping, optional
-        Labels of the units of ``"t"``, ``"u"`` and ``"y"``, before those of the header.
-    resolution : float, optional
-        Quantum of the output's sensor [unit of y].
+        Labels of the units of ``"t"``, ``"u"`` and ``"y"``, before those of the file.
+    resolution : float or "detect", optional
+        Quantum of the output's sensor [unit of y], before that of the file; ``"detect"`` takes what
+        `Record.detect_resolution` finds in the output.
     name : str, optional
-        Name of the record; by default the file's name without its ending.
+        Name of the record; by default what the file says, or the file's name without its ending.
 
     Returns
     -------
@@ -107,10 +127,13 @@ def load(
     ------
     FileNotFoundError
         If there is no such file.
+    TypeError
+        If `path` is neither a path nor an open file.
     ValueError
-        If the file is not text, is empty or has no samples; a column is unknown; or a row is too long or short,
-        a cell is not a finite number, a value is missing or the time does not increase. The message is one line
-        that names the file, the line and the column, and says what to do.
+        If the file is damaged, too large, empty or has no samples; a column is unknown; or a row is too long or
+        short, a value is missing or not finite, columns have unequal lengths, or the time does not increase. The
+        message is one line that names the file, the line or sample, and the column, and says what to do. Also if an
+        argument that is for text comes with another format.
 
     Examples
     --------
@@ -127,81 +150,92 @@ def load(
         raise ValueError(f"delimiter must be one character, got {delimiter!r}")
     if decimal is not None and decimal not in DECIMALS:
         raise ValueError(f'decimal must be "." or ",", got {decimal!r}')
-    source, text = read(path, encoding)
-    wanted = {"u": u, "y": y} if t is None else {"u": u, "y": y, "t": t}
-    try:
-        found = layout(text, delimiter, decimal)
-        lines = found.numbers
-        chosen = {signal: _column(found.columns, key) for signal, key in wanted.items()}
-        values = _values(found, list(chosen.values()))
-        is_gap = np.asarray(np.isnan(values).any(axis=0))
-        if on_missing == "error" and is_gap.any():
-            raise ValueError(_gap(lines, list(chosen.values()), values))
-        pieces = _pieces(is_gap, cut=on_missing == "split")
-        if t is not None:
-            _check_time(lines, values[-1], pieces)
-        labels = {signal: column.unit for signal, column in chosen.items() if column.unit} | dict(units or {})
-        title = Path(source).stem if name is None else name
+    if isinstance(resolution, str) and resolution != "detect":
+        raise ValueError(f'resolution must be a number or "detect", got {resolution!r}')
+    said = {"delimiter": delimiter, "decimal": decimal, "encoding": encoding}
+    with opened(path) as source, _line_named(source):
+        with _table(source, said) as table:
+            chosen = _chosen(table, {"u": u, "y": y, "t": t})
+            labels = _units(table, chosen) | dict(units or {})
+            values = table.values(list(chosen.values()))
+        parts = _parts(table, chosen, values, on_missing)
+        if resolution == "detect":
+            resolution = output_quantum(values[1, np.concatenate(parts)])
+        elif resolution is None and chosen["y"].label == "y":
+            resolution = table.notes.resolution
+        if name is None:
+            name = Path(source.name).stem if table.notes.name is None else table.notes.name
         records = tuple(
-            Record(**dict(zip(chosen, values[:, piece], strict=True)), units=labels, resolution=resolution, name=title)
-            for piece in pieces
+            Record(**dict(zip(chosen, values[:, part], strict=True)), units=labels, resolution=resolution, name=name)
+            for part in parts
         )
-    except ValueError as error:
-        raise ValueError(f"{source}: {error}") from None
     return records if on_missing == "split" else records[0]
 
 
-def _column(header: list[Column], key: str | int) -> Column:
-    if not isinstance(key, str):
-        place = operator.index(key)
-        if not 0 <= place < len(header):
-            raise ValueError(f"no column {place}, there are columns 0 to {len(header) - 1}")
-        return header[place]
-    found = [column for column in header if key in (column.label, f"{column.label} [{column.unit}]")]
-    if len(found) == 1:
-        return found[0]
-    if found:
-        places = ", ".join(str(column.place) for column in found)
-        raise ValueError(f"{len(found)} columns are called {key!r}: choose one of the numbers {places}")
-    there = ", ".join(column.label for column in header)
-    raise ValueError(f"no column {key!r}, the columns are: {there}")
+@contextmanager
+def _line_named(source: Opened) -> Iterator[None]:
+    """What is wrong with a file is said in one line that names it."""
+    try:
+        yield
+    except ValueError as error:
+        line = " ".join(str(error).split())
+        raise ValueError(line if line.startswith(source.name) else f"{source.name}: {line}") from None
 
 
-def _values(found: Layout, columns: list[Column]) -> FloatArray:
-    """The numbers of the columns, shape (n_columns, n_samples), nan where one is missing."""
-    quick = table(found.lines, [column.place for column in columns], found.delimiter, found.decimal)
-    if quick is not None:
-        return quick
-    rows = found.rows()
-    return np.stack([numbers([row[c.place] for row in rows], found.numbers, c.label, found.decimal) for c in columns])
+@contextmanager
+def _table(source: Opened, said: Mapping[str, str | None]) -> Iterator[Table]:
+    """The table that a source holds, open to be read from."""
+    if isinstance(source.content, (str, bytes)):
+        text = text_of(source.content, source.name, said["encoding"])
+        yield delimited(text, said["delimiter"], said["decimal"])
+        return
+    for argument, value in said.items():
+        if value is not None:
+            raise ValueError(f"{argument} is for text, this is a file of the format {source.format}: leave it out")
+    if source.format in ("hdf5", "mat7.3"):
+        with hdf5(source.content, source.path, matlab=source.format != "hdf5") as table:
+            yield table
+    else:
+        yield _READERS[source.format](source.content)
 
 
-def _gap(lines: list[int], columns: list[Column], values: FloatArray) -> str:
-    k, j = np.argwhere(np.isnan(values.T))[0]
-    return (
-        f'line {lines[k]}, column {columns[j].label!r}: the value is missing; on_missing="drop" leaves '
-        'such samples out, on_missing="split" cuts the record there'
-    )
+_READERS = {"npz": npz, "npy": npy, "mat": mat}
 
 
-def _pieces(is_gap: npt.NDArray[np.bool_], *, cut: bool) -> list[npt.NDArray[np.intp]]:
-    """Places of the samples of each record."""
-    kept = np.flatnonzero(~is_gap)
-    cuts = np.flatnonzero(np.diff(kept) > 1) + 1 if cut else kept[:0]
-    pieces = np.split(kept, cuts)
-    long_enough = [piece for piece in pieces if piece.size >= 2]
-    if not long_enough:
-        longest = max(piece.size for piece in pieces)
-        raise ValueError(f"a record needs at least 2 samples, there are {longest}{' in a row' if cut else ''}")
-    return long_enough
+def _chosen(table: Table, asked: Mapping[str, str | int | None]) -> dict[str, Column]:
+    """The columns of the signals: those asked for, or those called like them."""
+    chosen = {signal: _column(table, signal, asked[signal]) for signal in ("u", "y")}
+    key = "t" if asked["t"] is None and table.has("t") else asked["t"]
+    if key is not None and key is not False:
+        chosen["t"] = table.column(key)
+    return chosen
 
 
-def _check_time(lines: list[int], times: FloatArray, pieces: list[npt.NDArray[np.intp]]) -> None:
-    for piece in pieces:
-        back = np.flatnonzero(np.diff(times[piece]) <= 0)
-        if back.size:
-            before, k = piece[back[0]], piece[back[0] + 1]
-            raise ValueError(
-                f"line {lines[k]}: time must increase, got {times[k]} after {times[before]}; sort the lines, leave "
-                "repeated ones out, or load without t"
-            )
+def _column(table: Table, signal: str, key: str | int | None) -> Column:
+    if key is not None or table.has(signal):
+        return table.column(signal if key is None else key)
+    try:
+        return table.column(signal)
+    except ValueError as error:
+        raise ValueError(f"{error}; say which one is the {SIGNALS[signal]} by {signal}=") from None
+
+
+def _parts(
+    table: Table, chosen: Mapping[str, Column], values: FloatArray, on_missing: str
+) -> list[npt.NDArray[np.intp]]:
+    """The samples of each record, checked."""
+    if on_missing == "error":
+        check_gaps(table, list(chosen.values()), values)
+    parts = pieces(np.asarray(np.isnan(values).any(axis=0)), cut=on_missing == "split")
+    if "t" in chosen:
+        check_time(table, values[-1], parts)
+    return parts
+
+
+def _units(table: Table, chosen: Mapping[str, Column]) -> dict[str, str]:
+    """Units of the signals where the file has any."""
+    said = table.notes.units
+    units = {signal: said.get(column.label, column.unit or None) for signal, column in chosen.items()}
+    if "t" not in chosen and not table.has("t"):
+        units["t"] = said.get("t")
+    return {signal: unit for signal, unit in units.items() if unit is not None}

@@ -32,7 +32,7 @@ from typing import Literal, overload
 import numpy as np
 import numpy.typing as npt
 
-from hysim._cycles import ROUNDING, TOLERANCE, last_cycles
+from hysim._cycles import ROUNDING, TOLERANCE, last_cycles, settled
 from hysim._frozen import FloatArray, frozen, read_only
 from hysim._words import extent, printed, words
 
@@ -252,14 +252,6 @@ def width_rmse(a: LoopMetrics, b: LoopMetrics) -> float:
 def _curve(u: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     kept = settled(u)
     return u[kept], y[kept]
-
-
-def settled(u: FloatArray) -> npt.NDArray[np.intp]:
-    """The samples of a branch in the order of their inputs, of several at one input the last."""
-    order = np.argsort(u, kind="stable")
-    x = u[order]
-    kept: npt.NDArray[np.intp] = order[np.append(x[1:] > x[:-1], True)]
-    return kept
 
 
 def common_inputs(inputs: list[FloatArray]) -> FloatArray:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hysim._cycles import TOLERANCE, last_cycles
+from hysim._cycles import TOLERANCE, last_cycles, settled
 from hysim._frozen import FloatArray
-from hysim.metrics._loop import common_inputs, settled, signed_area
+from hysim.metrics._loop import common_inputs, signed_area
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,31 @@
+"""Units with SI prefixes: micrometres are 1e-6 metres."""
+
+_POWERS = {
+    "": 0, "y": -24, "z": -21, "a": -18, "f": -15, "p": -12, "n": -9, "u": -6, "\u00b5": -6, "\u03bc": -6, "m": -3,
+    "c": -2, "d": -1, "da": 1, "h": 2, "k": 3, "M": 6, "G": 9, "T": 12, "P": 15, "E": 18, "Z": 21, "Y": 24,
+}  # fmt: skip
+_BASES = frozenset(
+    {"m", "g", "s", "A", "K", "V", "N", "Pa", "Hz", "rad", "W", "J", "C", "F", "T", "H", "Wb", "ohm", "\u03a9", "L"}
+)
+
+
+def power_of_ten(old: str, new: str) -> int:
+    """The power of ten by which a value in the old unit is multiplied to be in the new one.
+
+    Raises
+    ------
+    ValueError
+        If one of them is not a prefix and a unit, or they are of different units.
+    """
+    (before, base), (after, other) = _parts(old), _parts(new)
+    if base != other:
+        raise ValueError(f"{old!r} cannot become {new!r}: only the prefix of a unit can change")
+    return before - after
+
+
+def _parts(unit: str) -> tuple[int, str]:
+    """The power of a unit's prefix, and its base: m is a metre, mm a thousandth of it."""
+    for prefix, power in _POWERS.items():
+        if unit.startswith(prefix) and unit[len(prefix) :] in _BASES:
+            return power, unit[len(prefix) :]
+    raise ValueError(f"{unit!r} is no unit with an SI prefix that is known: scale the values, or give units anew")

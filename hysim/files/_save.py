@@ -1,0 +1,180 @@
+"""The verb `save_record`: a record into a file, in the format that its ending names."""
+
+import csv
+import io
+import json
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hysim._atomic import write_all
+from hysim._frozen import FloatArray
+from hysim.files._table import Notes
+from hysim.records import Record
+
+_PLAIN_UNIT = re.compile(r"[^\[\]()\s,;\"#%]+(?: [^\[\]()\s,;\"#%]+)*")
+
+
+def save_record(record: Record, path: str | Path) -> None:
+    """Save a record to a file, whose ending says the format.
+
+    Stored are `u`, `y` and, if there is one, `t`, every bit of them; and where they are known the units, the
+    resolution and the name. `hysim.load` gives an equal record back from the path alone.
+
+    - ``.csv``, ``.tsv``: a header ``t [s],u [V],y [um]``, below comments ``# name:`` and ``# resolution:``;
+    - ``.npz``: arrays `t`, `u`, `y`, `resolution`, and texts `name`, ``u_units`` and so on;
+    - ``.mat``: the same as variables, numbers in columns, compressed; version 5, which MATLAB and Octave load;
+    - ``.h5``, ``.hdf5``: datasets with an attribute `units`; attributes `resolution` and `name` of the file.
+
+    The file appears whole or not at all, with the same bytes each time.
+
+    Parameters
+    ----------
+    record : Record
+        What to save.
+    path : str or path
+        Where to, with one of these endings.
+
+    Raises
+    ------
+    ValueError
+        If the ending is another one, HDF5 is asked for without h5py, or a name or a unit cannot be written.
+    TypeError
+        If it is no record.
+    OSError
+        If the folder cannot be written to.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import hysim as hs
+    >>> rec = hs.datasets.table1()
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "table1.npz"
+    ...     hs.save_record(rec, path)
+    ...     print(hs.load(path) == rec)
+    True
+    """
+    if not isinstance(record, Record):
+        raise TypeError(f"save_record takes a Record, got {type(record).__name__}")
+    columns = {"u": record.u, "y": record.y} if record.t is None else {"t": record.t, "u": record.u, "y": record.y}
+    save_columns(columns, path, Notes(record.units, record.resolution, record.name))
+
+
+def save_columns(columns: Mapping[str, FloatArray], path: str | Path, notes: Notes) -> None:
+    """Save columns of equal lengths to a file, in the format that its ending names.
+
+    Raises
+    ------
+    ValueError
+        If the ending is none of these, or HDF5 is asked for without h5py.
+    OSError
+        If the folder cannot be written to.
+    """
+    write_all({path: columns_as(columns, path, notes)})
+
+
+def columns_as(columns: Mapping[str, FloatArray], path: str | Path, notes: Notes) -> bytes:
+    """What `save_columns` writes.
+
+    Raises
+    ------
+    ValueError
+        As `save_columns`.
+    """
+    write = _WRITERS[ending(path)]
+    for text in (notes.name or "", *notes.units.values()):
+        if "\0" in text or text.encode("utf-8", "replace").decode() != text:
+            raise ValueError(f"names and units must be letters that can be written, got {text!r}")
+    return write(columns, notes)
+
+
+def ending(path: str | Path) -> str:
+    """The ending of a path, which names a format to save in.
+
+    Raises
+    ------
+    ValueError
+        If it names none.
+    """
+    found = Path(path).suffix.lower()
+    if found not in _WRITERS:
+        raise ValueError(f"{Path(path).name}: the ending must be one of {', '.join(_WRITERS)}, got {found!r}")
+    return found
+
+
+def _csv(columns: Mapping[str, FloatArray], notes: Notes) -> bytes:
+    return _text(columns, notes, ",")
+
+
+def _tsv(columns: Mapping[str, FloatArray], notes: Notes) -> bytes:
+    return _text(columns, notes, "\t")
+
+
+def _text(columns: Mapping[str, FloatArray], notes: Notes, delimiter: str) -> bytes:
+    buffer = io.StringIO()
+    for what, value in (("name", notes.name), ("resolution", notes.resolution)):
+        if value:
+            buffer.write(f"# {what}: {json.dumps(value)}\n")
+    plain = {label: unit for label, unit in notes.units.items() if label in columns and _PLAIN_UNIT.fullmatch(unit)}
+    if dict(notes.units) != plain:
+        buffer.write(f"# units: {json.dumps(dict(notes.units))}\n")
+    writer = csv.writer(buffer, delimiter=delimiter, lineterminator="\n")
+    writer.writerow([f"{label} [{plain[label]}]" if label in plain else label for label in columns])
+    writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
+    return buffer.getvalue().encode()
+
+
+def _arrays(columns: Mapping[str, FloatArray], notes: Notes) -> dict[str, Any]:
+    """What formats without attributes hold: the notes beside the columns."""
+    texts = {f"{label}_units": unit for label, unit in notes.units.items()}
+    named = {"name": notes.name} if notes.name else {}
+    quantum = {} if notes.resolution is None else {"resolution": np.asarray(notes.resolution)}
+    return {**columns, **texts, **named, **quantum}
+
+
+def _npz(columns: Mapping[str, FloatArray], notes: Notes) -> bytes:
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **_arrays(columns, notes))
+    return buffer.getvalue()
+
+
+def _mat(columns: Mapping[str, FloatArray], notes: Notes) -> bytes:
+    from scipy.io import savemat
+
+    buffer = io.BytesIO()
+    savemat(buffer, _arrays(columns, notes), do_compression=True, oned_as="column")
+    return _MAT_TITLE + buffer.getvalue()[len(_MAT_TITLE) :]  # in place of one that holds the time
+
+
+_MAT_TITLE = b"MATLAB 5.0 MAT-file, saved by hysim".ljust(116)
+
+
+def _hdf5(columns: Mapping[str, FloatArray], notes: Notes) -> bytes:
+    try:
+        import h5py
+    except ImportError:
+        raise ValueError("a file of HDF5 needs h5py: pip install 'hysim[io]'") from None
+    buffer = io.BytesIO()
+    with h5py.File(buffer, "w") as root:
+        for label, values in columns.items():
+            root[label] = values
+        for label, unit in notes.units.items():
+            if label in columns:
+                root[label].attrs["units"] = unit
+            else:
+                root.attrs[f"{label}_units"] = unit
+        if notes.name:
+            root.attrs["name"] = notes.name
+        if notes.resolution is not None:
+            root.attrs["resolution"] = notes.resolution
+    return buffer.getvalue()
+
+
+_WRITERS: dict[str, Callable[[Mapping[str, FloatArray], Notes], bytes]] = {
+    ".csv": _csv, ".tsv": _tsv, ".npz": _npz, ".mat": _mat, ".h5": _hdf5, ".hdf5": _hdf5,
+}  # fmt: skip
