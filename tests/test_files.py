@@ -3,6 +3,7 @@
 import dataclasses
 import io
 import struct
+import sys
 import tracemalloc
 from pathlib import Path
 
@@ -10,11 +11,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from malformed import HAS_H5PY, MAT73_TITLE, U, Y, corpus, corrupt, hdf5, mat, npy, npz, whole
 from scipy.io import loadmat
 
 import hysim as hs
 from hysim.cli import main
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "experiments"))
+from malformed_files import HAS_H5PY, MAT73_TITLE, U, Y, corpus, corrupt, hdf5, mat, npy, npz, whole
 
 CORPUS = corpus()
 ENDINGS = [".csv", ".tsv", ".npz", ".mat", *([".h5"] if HAS_H5PY else [])]

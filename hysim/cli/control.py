@@ -4,8 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hysim.cli import models, outputs
-from hysim.cli.records import STANDARD
+from hysim.cli import models, outputs, records
 
 if TYPE_CHECKING:
     from hysim.cli.achievements import Design
@@ -112,8 +111,8 @@ def _add_task(group: Any) -> None:
     group.add_argument(
         "--record", metavar="FILE", help="measured loop, whose input's extremes are the limits; the model is compared"
     )
-    group.add_argument("--u", metavar="COLUMN", default="0", help="input of the record: name or number (default: 0)")
-    group.add_argument("--y", metavar="COLUMN", default="1", help="output of the record: name or number (default: 1)")
+    group.add_argument("--u", metavar="COLUMN", help="input of the record: name or number (default: u)")
+    group.add_argument("--y", metavar="COLUMN", help="output of the record: name or number (default: y)")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -130,7 +129,7 @@ def run(options: argparse.Namespace) -> int:
         contents[options.plot] = achievements.picture(found)
     if not is_taken:
         told = outputs.to_json(achievements.document(found)) if options.json else achievements.text(found)
-        contents[STANDARD] = told
+        contents[records.STANDARD] = told
     outputs.write(contents)
     return SUCCESS if found.tuning is None or found.tuning.success else NOT_WITHIN_BOUNDS
 
@@ -192,11 +191,7 @@ def _record(options: argparse.Namespace) -> "Record | None":
 
     if options.record is None:
         return None
-    return load(options.record, u=_column(options.u), y=_column(options.y))
-
-
-def _column(text: str) -> str | int:
-    return int(text) if text.isascii() and text.isdigit() else text
+    return load(options.record, u=records.column(options.u), y=records.column(options.y))
 
 
 def _c_code(options: argparse.Namespace, controller: Any) -> "CSource":

@@ -27,6 +27,8 @@ def add_to(commands: Any) -> None:
         type=float,
         help="of the input's span: reversals smaller than that are noise [1] (default: 0.01)",
     )
+    parser.add_argument("--out", metavar="PATH", help="write what is printed into a file too")
+    parser.add_argument("--plot", metavar="LOOP.svg", help=f"draw the loop; {outputs.PICTURE}")
     parser.add_argument("--json", action="store_true", help="print them as JSON")
     parser.set_defaults(command=run)
 
@@ -35,12 +37,18 @@ def run(options: argparse.Namespace) -> int:
     """Measure and print."""
     from hysim.metrics import loop_metrics
 
+    is_taken = outputs.check(options.out, pictures=[options.plot])
     record = records.read(options)
     tolerance = {} if options.tolerance is None else {"tolerance": options.tolerance}
     loop = loop_metrics(record.u, record.y, cycles=options.cycles, **tolerance)
     lines = [*_lines(loop, record.units), *_step(record)]
     text = outputs.to_json(_document(loop, record.units)) if options.json else "\n".join(lines)
-    outputs.write({records.STANDARD: text.rstrip("\n") + "\n"})
+    contents: dict[str | None, Any] = {options.plot: outputs.loop(record) if options.plot else ""}
+    told = text.rstrip("\n") + "\n"
+    contents[options.out] = told
+    if not is_taken:
+        contents[records.STANDARD] = told
+    outputs.write(contents)
     return 0
 
 

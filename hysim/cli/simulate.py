@@ -1,9 +1,13 @@
 """`hysim simulate`: a model in a file, driven by an input in a file."""
 
 import argparse
-from typing import Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from hysim.cli import models, outputs, records
+
+if TYPE_CHECKING:
+    from hysim._frozen import FloatArray
 
 
 def add_to(commands: Any) -> None:
@@ -20,6 +24,9 @@ def add_to(commands: Any) -> None:
         "--out", metavar="OUT", default=records.STANDARD, help=f"{outputs.TABLE} (default: %(default)s)"
     )
     parser.add_argument("--plot", metavar="LOOP.svg", help=f"draw the loop; {outputs.PICTURE}")
+    parser.add_argument(
+        "--json", action="store_true", help="print the columns as JSON, beside a file if --out is given"
+    )
     parser.set_defaults(command=run)
 
 
@@ -33,9 +40,16 @@ def run(options: argparse.Namespace) -> int:
     known = units | {signal: unit for signal, unit in record.units.items() if signal != "y"} | dict(options.unit)
     run = models.simulated(model, record, known)
     columns = {name: run.signals[name] for name in ("t", "u", "y", "z") if name in run.signals}
-    table = outputs.table(options.out, columns | dict(run.signals), known)
-    contents: dict[str | None, Any] = {options.out: table}
+    columns |= dict(run.signals)
+    contents: dict[str | None, Any] = {options.out: outputs.table(options.out, columns, known)}
+    if options.json:
+        contents[records.STANDARD] = _json(columns, known)
     if options.plot:
         contents[options.plot] = outputs.loop(run)
     outputs.write(contents)
     return 0
+
+
+def _json(columns: Mapping[str, "FloatArray"], known: Mapping[str, str]) -> str:
+    values = {name: column.tolist() for name, column in columns.items()}
+    return outputs.to_json({"units": {name: known[name] for name in columns if name in known}, "columns": values})

@@ -53,7 +53,9 @@ def run(options: argparse.Namespace) -> int:
     """Compute or show, write the table that is asked for, and print the summary."""
     from hysim.sweeps import load_sweep
 
-    is_taken = outputs.check(options.csv, pictures=[options.plot], printed=options.json)
+    if options.out == STANDARD:
+        raise ValueError("the rows are kept in a database: give --out a file")
+    is_taken = outputs.check(options.out, options.csv, pictures=[options.plot], printed=options.json)
     if options.show is not None:
         if options.study or options.out:
             raise ValueError("--show takes a database and computes nothing: leave the study and --out out")
