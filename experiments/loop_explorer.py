@@ -42,7 +42,7 @@ with app.setup:
     }
     EQUATIONS = {
         "Bouc-Wen": r"z' = A u' - |z|^n (\gamma u' + \beta |u'| \operatorname{sign} z)",
-        "Prandtl-Ishlinskii": r"y = w_0 u + \sum_i w_i z_i",
+        "Prandtl-Ishlinskii": r"y = w_0 u + \sum_i w_i \operatorname{play}_{r_i}(u)",
         "Dahl": r"F' = \mathrm{stiffness}\,(u' - |u'| F / \mathrm{coulomb})",
     }
     INPUT = {
@@ -148,11 +148,11 @@ def table(heading, rows):
 
 @app.function
 def code_of(law, turns):
-    """Python that gives the same loop."""
+    """Python that gives the same loop; every law here starts at rest."""
     changed = {
         field.name: getattr(law, field.name)
         for field in dataclasses.fields(law)
-        if getattr(law, field.name) != field.default
+        if field.name != "z0" and getattr(law, field.name) != field.default
     }
     arguments = ", ".join(f"{name}={value!r}" for name, value in changed.items())
     return "\n".join(
@@ -162,7 +162,8 @@ def code_of(law, turns):
             "",
             *textwrap.wrap(f"law = hs.{type(law).__name__}({arguments})", 80, subsequent_indent="    "),
             *textwrap.wrap(f"turns = {turns.tolist()}", 80, subsequent_indent="    "),
-            f"u = np.interp(np.arange({SAMPLES} * (len(turns) - 1) + 1) / {SAMPLES}, range(len(turns)), turns)",
+            f"steps = np.arange({SAMPLES} * (len(turns) - 1) + 1) / {SAMPLES}",
+            "u = np.interp(steps, range(len(turns)), turns)",
             "y = law.response(u)",
             "print(hs.loop_metrics(u, y).max_width)",
         ]

@@ -118,7 +118,14 @@ def page(tmp_path):
         free.bind(("127.0.0.1", 0))
         address = f"http://127.0.0.1:{free.getsockname()[1]}"
     serve = ["run", "--headless", "--no-token", "--host", "127.0.0.1", "--port", address.rpartition(":")[2]]
-    quiet = ["--headless", "--disable-gpu", "--no-first-run", "--window-size=1366,1100", "--remote-debugging-port=0"]
+    quiet = [
+        "--headless",
+        "--disable-gpu",
+        "--no-first-run",
+        "--disable-background-networking",
+        "--window-size=1366,1100",
+        "--remote-debugging-port=0",
+    ]
     if os.geteuid() == 0:
         quiet.append("--no-sandbox")  # which the browser does not start for root
     port = tmp_path / "DevToolsActivePort"
