@@ -150,10 +150,12 @@ class Camera:
 
         Parameters
         ----------
-        y, t
-            As in `light`.
+        y : float, or array, shape (m,)
+            Displacement, or those of the moments of an exposure [um].
         number : int
             Of the frame, not negative: with the seed it determines the noise.
+        t : float
+            Time, which the illumination's drift depends on [s].
 
         Returns
         -------
