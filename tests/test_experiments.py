@@ -264,3 +264,11 @@ def test_the_readme_quotes_the_studies():
     assert all(row["in_time"] for row in killed["rows"])
     told = f"a study of {killed['n_tasks']} tasks is killed at {len(killed['rows'])} random moments and resumed. "
     assert told + f"{killed['columns_that_differ']} columns of its table differ" in README
+
+
+def test_ten_thousand_damaged_inputs_end_in_an_exit_code_and_at_most_one_line():
+    result = json.loads((EXPERIMENTS[0].parent / "results" / "fuzz" / "result.json").read_text())
+    assert result["inputs"] == 10_000 == sum(result[end] for end in ("exit 0", "exit 1", "exit 2"))
+    assert result["broken"] == 0
+    assert {row["damaged"] for row in result["rows"]} == {"record", "model", "study", "options"}
+    assert sum(row["exit 0"] for row in result["rows"]) > 1000
