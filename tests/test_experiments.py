@@ -300,3 +300,11 @@ def test_parts_of_a_pixel_tell_the_loop_and_whole_ones_scatter_as_table_1():
     ends = f"{whole['width_lower_um']['median']:.3f} to {whole['width_upper_um']['median']:.3f} um"
     reached = f"from whole pixels {whole['hysteresis_reduction_percent']['median']:.1f} %, with a width of {ends}"
     assert f"{reached} about the true {result['true_width_um']:.3f}" in README
+
+
+def test_ten_thousand_damaged_inputs_end_in_an_exit_code_and_at_most_one_line():
+    result = json.loads((EXPERIMENTS[0].parent / "results" / "fuzz" / "result.json").read_text())
+    assert result["inputs"] == 10_000 == sum(result[end] for end in ("exit 0", "exit 1", "exit 2"))
+    assert result["broken"] == 0
+    assert {row["damaged"] for row in result["rows"]} == {"record", "model", "study", "options"}
+    assert sum(row["exit 0"] for row in result["rows"]) > 1000

@@ -15,7 +15,10 @@ from hysim import __version__
 from hysim.cli import compare, control, discover, identify, measure, metrics, plot, reproduce, simulate, sweep
 from hysim.errors import SimulationError
 
-COMMANDS = (metrics, identify, discover, compare, simulate, control, plot, sweep, measure, reproduce)
+_MODULES = (metrics, identify, discover, compare, simulate, control, plot, sweep, measure, reproduce)
+COMMANDS = {module.__name__.rpartition(".")[2]: module for module in _MODULES}
+"""Every command by its name."""
+
 DONE, BAD_INPUT, INTERRUPTED = 0, 2, 130
 
 
@@ -41,25 +44,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _failed(BAD_INPUT, f"error: {_line(error)}")
 
 
-def parsers() -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParser]]:
-    """The parser of the whole command line, and that of each command."""
+def parsers(only: str | None = None) -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParser]]:
+    """The parser of the whole command line, and that of each command, or of one alone."""
     parser = _Parser(prog="hysim", description="Simulate, identify, discover, compare and compensate hysteresis.")
     parser.add_argument("--version", action="version", version=f"hysim {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND")
-    for command in COMMANDS:
-        command.add_to(commands)
+    for name, command in COMMANDS.items():
+        if only in (None, name):
+            command.add_to(commands)
     return parser, dict(commands.choices)
 
 
 def _run(arguments: list[str]) -> int:
-    parser, commands = parsers()
-    named = [argument for argument in arguments if not argument.startswith("-")][:1]
-    if named and named[0] not in commands:
-        near = get_close_matches(named[0], commands, n=1)
-        mend = f"did you mean {near[0]}?" if near else f"there are {', '.join(commands)}"
-        parser.error(f"there is no command {named[0]!r}: {mend}")
+    named = next((argument for argument in arguments if not argument.startswith("-")), None)
+    parser, _ = parsers(named if named in COMMANDS and arguments[0] == named else None)
+    if named is not None and named not in COMMANDS:
+        near = get_close_matches(named, COMMANDS, n=1)
+        mend = f"did you mean {near[0]}?" if near else f"there are {', '.join(COMMANDS)}"
+        parser.error(f"there is no command {named!r}: {mend}")
     options = parser.parse_args(arguments)
-    if not named:
+    if named is None:
         parser.print_help(sys.stderr)
         return BAD_INPUT
     import numpy as np
