@@ -308,3 +308,4 @@ def test_ten_thousand_damaged_inputs_end_in_an_exit_code_and_at_most_one_line():
     assert result["broken"] == 0
     assert {row["damaged"] for row in result["rows"]} == {"record", "model", "study", "options"}
     assert sum(row["exit 0"] for row in result["rows"]) > 1000
+    assert f"each handed to a command. {result['broken']} of them end in a traceback" in README
