@@ -17,7 +17,7 @@ import hypothesis  # noqa: E402  numba must not be imported before the cache fol
 import pytest  # noqa: E402
 
 uncompiled = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")  # a hundred times slower
-hypothesis.settings.register_profile("hysim", deadline=None, derandomize=True, max_examples=2 if uncompiled else 40)
+hypothesis.settings.register_profile("hysim", deadline=None, derandomize=True, max_examples=2 if uncompiled else 30)
 hypothesis.settings.load_profile("hysim")
 
 

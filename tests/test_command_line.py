@@ -17,7 +17,7 @@ FIGURES = [
 ]  # fmt: skip
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def again(tmp_path_factory) -> tuple[Path, str, str]:
     """The command in a process of its own: folder, stdout, stderr."""
     folder = tmp_path_factory.mktemp("again") / "out"
