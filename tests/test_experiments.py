@@ -267,6 +267,22 @@ def test_the_readme_quotes_the_studies():
     assert told + f"{killed['columns_that_differ']} columns of its table differ" in README
 
 
+def test_the_readme_quotes_the_scaling():
+    rows = [row for row in rows_of("scaling") if row["workers"] == 2]
+    kernels = the(rows, kind="10 ms in a kernel", executor="threads")["efficiency_percent"]
+    fits = the(rows, kind="fit", executor="processes")["efficiency_percent"]
+    assert min(kernels, fits) >= 90.0
+    assert (
+        f"Two threads are {kernels:.0f} % efficient on tasks of 10 ms in kernels, two processes {fits:.0f} %" in README
+    )
+    short = the(rows, kind="microsecond", executor="threads", tasks=100_000)["overhead_microseconds"]
+    one, other = (the(rows, kind=f"laws on Table 1, n = {n}")["seconds"] for n in ("1", "1.5"))
+    assert max(one, other) < 3.0
+    assert (
+        f"costs {short:.0f} us, a million laws on the paper's points {one:.1f} s with n = 1 and {other:.1f} s" in README
+    )
+
+
 def test_the_readme_quotes_the_registration():
     result = json.loads((EXPERIMENTS[0].parent / "results" / "registration" / "result.json").read_text())
     own = [row for row in result["rows"] if row["method"] == "hysim"]
