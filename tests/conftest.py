@@ -22,16 +22,11 @@ hypothesis.settings.load_profile("hysim")
 
 
 def pytest_collection_modifyitems(items):
-    """Under `--dist loadgroup` a file goes to one worker whole, and so does all that needs `reproduction`.
-
-    A test that is marked as needing optional packages is skipped where one is missing.
-    """
+    """A test that is marked as needing optional packages is skipped where one is missing."""
     for item in items:
         wanted = {package for mark in item.iter_markers("extra") for package in mark.args}
         if missing := sorted(package for package in wanted if find_spec(package) is None):
             item.add_marker(pytest.mark.skip(reason=f"needs {', '.join(missing)}"))
-        of_paper = {"reproduction", "paper_study"} & set(item.fixturenames)
-        item.add_marker(pytest.mark.xdist_group("paper" if of_paper else item.path.stem))
 
 
 @pytest.fixture(autouse=True)
