@@ -73,12 +73,10 @@ def pairs(rival: Callable[[], object], work: Callable[[], object], repeats: int)
     return statistics.median(loops), statistics.median(sweeps), statistics.median(a / b for a, b in times)
 
 
-def measured(
-    kind: str, task: Callable[..., Any], n_tasks: int, executor: Any, workers: int, repeats: int, **more: Any
-) -> Row:
+def measured(kind: str, task: Callable[..., Any], n_tasks: int, executor: Any, workers: int, repeats: int) -> Row:
     """One kind of task, so many of them, on one executor."""
     reports: list[int] = []
-    run = partial(hs.sweep, task, space(n_tasks), executor=executor, workers=workers, **more)
+    run = partial(hs.sweep, task, space(n_tasks), executor=executor, workers=workers)
     times = pairs(partial(loop, task, n_tasks), lambda: run(progress=lambda done, total: reports.append(done)), repeats)
     name = executor if isinstance(executor, str) else "dask"
     return row(kind, name, workers, n_tasks, len(reports) // (repeats + 1) - 1, times)
