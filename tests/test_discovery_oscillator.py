@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 
 import hysim as hs
 from hysim.discovery._memory_terms import RELAXATION, MemoryTerm, bouc_wen_terms, cases, law, memory_terms
-from hysim.discovery._oscillator import FoundOscillator, oscillator, recorded
+from hysim.discovery._oscillator import oscillator
+from hysim.discovery._oscillator_records import recorded
+from hysim.discovery._oscillator_result import FoundOscillator
 from hysim.kernels import hidden
 
 COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"

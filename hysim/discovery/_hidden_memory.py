@@ -78,13 +78,11 @@ class HiddenMemory:
         found = [each for start in starts if (each := self._descended(terms, start)) is not None]
         return min(found, key=lambda each: each.error, default=None)
 
-    def nearest(self) -> Regressed:
-        """The law of Bouc and Wen's with a whole n, or the linear relaxation, that leaves the smallest error."""
+    def nearest(self) -> Regressed | None:
+        """The Bouc-Wen law with a whole n, or the linear relaxation, of the smallest error; None if all diverge."""
         laws = [bouc_wen_terms(n) for n in POWERS] + [(bouc_wen_terms(1.0)[0], RELAXATION)]
         found = [each for terms in laws if (each := self.fit(terms)) is not None]
-        if not found:
-            raise ValueError("no law of the library stays finite along this displacement")
-        return min(found, key=lambda each: each.error)
+        return min(found, key=lambda each: each.error, default=None)
 
     def regression(self, library: Sequence[MemoryTerm]) -> TermRegression:
         """The regression of what a linear spring leaves on all terms, whose slopes are those about z = A y."""

@@ -29,10 +29,16 @@ OTHERS = ("n", "feedthrough", "offset", "gain")
 
 
 class Found(NamedTuple):
-    """A law: a model for each record, its coefficients by term, standard errors by name, and the law as text."""
+    """A law: a model for each record, its numbers and their standard errors by name, and the law as text.
+
+    `parameters` are the numbers that are no coefficients, `initial_states` the memory at the first sample of each
+    record, in the letter of the equation.
+    """
 
     models: tuple[Any, ...]
     coefficients: dict[str, float]
+    parameters: dict[str, float]
+    initial_states: tuple[dict[str, float], ...]
     stderr: dict[str, float]
     equation: str
 
@@ -47,8 +53,10 @@ def found(candidate: Candidate[Any], records: Sequence[Record], letter: str) -> 
         for y0, record in zip(unknowns[structure.size :], records, strict=True)
     )
     terms = _coefficients(values)
-    shifts = {name: values[name] for name in ("feedthrough", "gain", "offset") if name in values}
-    return Found(models, terms, _stderr(candidate, numbers), equation(terms, letter, **shifts))
+    parameters = {name: value for name, value in values.items() if name in OTHERS}
+    shifts = {name: value for name, value in parameters.items() if name != "n"}
+    states = tuple({f"{letter}0": float(m.memory(r.u[:1])[0])} for m, r in zip(models, records, strict=True))
+    return Found(models, terms, parameters, states, _stderr(candidate, numbers), equation(terms, letter, **shifts))
 
 
 def coefficients(structure: Terms, unknowns: FloatArray, letter: str) -> dict[str, float]:

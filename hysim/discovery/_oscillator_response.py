@@ -21,6 +21,7 @@ from hysim._parallel import in_chunks
 from hysim.discovery._hidden_memory import PLANT
 from hysim.discovery._marquardt import descended
 from hysim.discovery._memory_terms import MemoryTerm, law
+from hysim.discovery._oscillator_models import State
 from hysim.discovery._term_regression import BLOCKS, FLOOR, TermRegression, term_regression
 from hysim.kernels import hidden as kernels
 from hysim.models.oscillator_structure import OscillatorStructure
@@ -52,6 +53,11 @@ class Response:
         return np.concatenate([record.y for record in self.records])
 
     @cached_property
+    def floor(self) -> float:
+        """Residual below which nothing counts as evidence [unit of y]."""
+        return FLOOR * float(np.sqrt(np.mean(self.measured**2)))
+
+    @cached_property
     def free(self) -> tuple[str, ...]:
         """The plant's free parameters."""
         return tuple(name for name in PLANT if name not in self.known)
@@ -76,22 +82,36 @@ class Response:
         in_chunks(work, len(oscillators), minimum=1)
         return found
 
+    def initial_states(self, oscillator: Oscillator) -> tuple[State, ...]:
+        """State at the first sample of each record: rest, or that of the steady motion under a periodic input."""
+        if self.structure.period is None:
+            return (State(0.0, 0.0, 0.0),) * len(self.records)
+        found = []
+        for force, h in self._inputs:
+            run = self._run(oscillator, force, h)
+            found.append(State(*([np.nan] * 3 if run is None else run[1].tolist())))
+        return tuple(found)
+
     def _simulated(self, oscillator: Oscillator, force: FloatArray, h: float) -> FloatArray | None:
+        run = self._run(oscillator, force, h)
+        return None if run is None else self.structure.sampled(run[0])
+
+    def _run(self, oscillator: Oscillator, force: FloatArray, h: float) -> tuple[FloatArray, FloatArray] | None:
+        """Displacement at the ends of the steps, and the last state, in a steady motion that of the first sample."""
         degree = max((int(term.power) for term in oscillator.coefficients if term.whole), default=0)
         polynomial, extra, power, relaxation = law(oscillator.coefficients, degree)
         plant = np.array([*(oscillator.plant[name] for name in PLANT), relaxation, power])
         state = np.zeros(3)
         if self.structure.period is None:
             y = np.zeros(force.size)
-            whole = kernels.motion(plant, polynomial, extra, force, h, state, y[1:])
-            return self.structure.sampled(y) if whole else None
+            return (y, state) if kernels.motion(plant, polynomial, extra, force, h, state, y[1:]) else None
         y, force = np.empty(force.size), np.append(force, force[0])
         for _ in range(_MOST_PERIODS):
             before = state.copy()
             if not kernels.motion(plant, polynomial, extra, force, h, state, y):
                 return None
             if np.all(np.abs(state - before) <= _STEADY * np.maximum(np.abs(state), np.abs(before))):
-                return self.structure.sampled(np.roll(y, 1))
+                return np.roll(y, 1), state
         return None
 
     def slopes(self, oscillator: Oscillator, terms: Sequence[MemoryTerm]) -> FloatArray:
@@ -160,8 +180,7 @@ class Response:
         n_plant = len(self.free)
         values = np.array([oscillator.coefficients.get(term, 0.0) for term in terms])
         target = residual + slopes[:, n_plant:] @ values
-        noise = FLOOR * float(np.sqrt(np.mean(self.measured**2)))
-        return term_regression(terms, slopes[:, :n_plant], slopes[:, n_plant:], target, noise, self._blocks)
+        return term_regression(terms, slopes[:, :n_plant], slopes[:, n_plant:], target, self.floor, self._blocks)
 
     @cached_property
     def _blocks(self) -> list[slice]:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import field
 from typing import Any, Self
 
 from hysim._frozen import FloatArray, frozen
@@ -18,10 +19,11 @@ class Discovery:
 
     Parameters
     ----------
-    model : BoucWen, Duhem or BoucWenOscillator
-        The law, refined by simulation error, with the initial memory of the first record.
+    model : BoucWen, Duhem, BoucWenOscillator, TransferFunction or None
+        The law of `equation`, refined by simulation error, from the initial state of the first record. None where hysim
+        has no model of this law; `warnings` says why.
     models : tuple of model
-        One for each record: they differ in the state at the first sample.
+        One for each record: they differ in the state at the first sample. Empty where there is no model.
     coefficients : mapping
         Term to coefficient, for instance ``"|u'| z"``. With a feedthrough the scale of the memory is open, and a
         Bouc-Wen law has that in which ``"u'"`` has the coefficient 1.
@@ -40,7 +42,7 @@ class Discovery:
         ``"n_terms"``; of the search: ``"threshold"``, the largest one whose structure still has all terms of the law,
         ``"n_structures"`` refined, ``"condition"`` of the regression.
     n_parameters : int
-        What was fitted: the numbers of the law, and y0 of each record.
+        Fitted numbers: those of the law, and the initial state of each record where it is free.
     judgement : Judgement
         What the verdict rests on: the linear rival, errors on data that neither was fitted to, loop widths at other
         rates, the dissipation.
@@ -59,9 +61,19 @@ class Discovery:
         How the search ended; empty where there is nothing to add.
     warnings : tuple of str
         Reasons to doubt the law or its scores, one plain sentence each; empty where there are none.
+    parameters : mapping
+        Numbers of the law that are no coefficients: ``"n"`` where it was searched, ``"feedthrough"``, ``"gain"``,
+        ``"offset"``; of an oscillator ``"mass"``, ``"damping"`` and ``"stiffness"``.
+    initial : {"free", "held", "rest", "periodic"}
+        Where the initial states come from. ``"free"``: they were fitted, and count as parameters. ``"held"``: the
+        first measured output is taken as exact. ``"rest"`` and ``"periodic"``, of an oscillator: the records begin at
+        rest, or in the steady motion under a periodic input.
+    initial_states : tuple of mapping
+        The state at the first sample of each record, in the letters of `equation`: ``"z0"`` or ``"y0"``; of an
+        oscillator ``"y0"``, ``"y'0"`` and ``"z0"``.
     """
 
-    model: Any
+    model: Any | None
     models: tuple[Any, ...]
     coefficients: Mapping[str, float]
     stderr: Mapping[str, float]
@@ -81,6 +93,9 @@ class Discovery:
     path_bic: FloatArray
     message: str = ""
     warnings: tuple[str, ...] = ()
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    initial: str = "free"
+    initial_states: tuple[Mapping[str, float], ...] = ()
 
     @property
     def latex(self) -> str:
@@ -98,6 +113,7 @@ class Discovery:
                 wrapped(numbers),
             ],
             {
+                "initial state": self._initial_state("{:.4g}"),
                 "route": self.route,
                 "held-out rmse": ", ".join(f"{name} {value:.4g}" for name, value in self.judgement.held_out.items()),
                 "cross-validated": "" if math.isnan(self.cv_rmse) else f"rmse {self.cv_rmse:.4g}",
@@ -112,9 +128,10 @@ class Discovery:
         lines = [
             f"{self.equation}",
             f"  {self.verdict}; route {self.route}, fit {scores['fit_percent']:.2f} %, rmse {scores['rmse']:.4g}, "
-            f"BIC {scores['bic']:.1f}, {self.n_parameters} parameters",
+            f"BIC {scores['bic']:.1f}, {self.n_parameters} parameters{self._counted}",
         ]
         lines += [f"  {name} = {value:.6g}{self._spread(name)}" for name, value in self._numbers.items()]
+        lines += [f"  initial state ({self.initial}): {self._initial_state('{:.6g}')}"] * bool(self.initial_states)
         errors = [f"{name} {value:.4g}" for name, value in judged.held_out.items()]
         lines.append(f"  held-out rmse: {', '.join(errors)}")
         lines += [
@@ -130,8 +147,24 @@ class Discovery:
 
     @property
     def _numbers(self) -> dict[str, float]:
-        others = {name: getattr(self.model, name) for name in self.stderr if name not in self.coefficients}
-        return {**self.coefficients, **others}
+        return {**self.coefficients, **self.parameters}
+
+    @property
+    def _counted(self) -> str:
+        """How many of the parameters are initial states."""
+        if self.initial != "free" or not self.initial_states:
+            return ""
+        n = sum(map(len, self.initial_states))
+        return f", {n} of them {'an initial state' if n == 1 else 'initial states'}"
+
+    def _initial_state(self, form: str) -> str:
+        """The initial states in words, those of several records one after the other."""
+        states = self.initial_states
+        if all(state == states[0] for state in states):
+            states = states[:1]
+        return "; ".join(
+            ", ".join(f"{name} = {form.format(value)}" for name, value in state.items()) for state in states
+        )
 
     def _spread(self, name: str) -> str:
         value = self.stderr.get(name, math.nan)
