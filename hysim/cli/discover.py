@@ -1,11 +1,17 @@
 """`hysim discover`: the law of a memory from a record in a file."""
 
 import argparse
-from typing import Any
+import sys
+from typing import TYPE_CHECKING, Any
 
 from hysim.cli import models, outputs, records
 
+if TYPE_CHECKING:
+    from hysim.discovery import Discovery
+    from hysim.records import Record
+
 SUCCESS = 0
+NO_MODEL = 1
 
 
 def add_to(commands: Any) -> None:
@@ -28,13 +34,16 @@ def add_to(commands: Any) -> None:
         "--library", metavar="NAME|TERM,...", type=_library, help="bouc-wen, duhem, or terms: \"u',|u'| z,u' |z|\""
     )
     parser.add_argument("--degree", type=int, default=2, help="of the library's monomials (default: %(default)s)")
-    parser.add_argument("--symmetry", choices=("odd", "even"), help="of the response")
+    parser.add_argument("--symmetry", choices=("odd", "even"), help="of the response; an oscillator's may be odd")
     for name, unit in (("mass", "u s^2/y"), ("damping", "u s/y"), ("stiffness", "u/y")):
         parser.add_argument(
-            f"--{name}", metavar="VALUE", type=float, help=f"of the oscillator, where it is known [units of {unit}]"
+            f"--{name}", metavar="VALUE", type=float, help=f"of an oscillator, where it is known [units of {unit}]"
         )
     parser.add_argument(
-        "--cross-validate", metavar="loo|K", type=_folds, help="leave one sample out at a time, or one of K blocks"
+        "--cross-validate",
+        metavar="loo|K",
+        type=_folds,
+        help="leave one sample out at a time, or one of K blocks; not for an oscillator",
     )
     parser.add_argument("--seed", type=int, default=0, help="of the random restarts (default: %(default)s)")
     parser.add_argument("--out", metavar="MODEL.json", help="write the law, - for the standard output")
@@ -46,9 +55,9 @@ def add_to(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Discover, write the files that are asked for, and print the result."""
     from hysim.discovery import discover
-    from hysim.models.storage import to_json
 
     is_taken = outputs.check(options.out, pictures=[options.plot], printed=options.json)
+    _check(options)
     record = records.read(options)
     found = discover(
         record,
@@ -63,14 +72,44 @@ def run(options: argparse.Namespace) -> int:
         seed=options.seed,
         progress=outputs.progress(),
     )
+    texts = _files(options, found, record)
+    if not is_taken:
+        texts[records.STANDARD] = found.to_json() if options.json else found.summary() + "\n"
+    outputs.write(texts)
+    if found.model is None and (options.out or options.plot):
+        print(f"hysim: {' and '.join(_unwritten(options))} not written: {found.warnings[0]}", file=sys.stderr)
+        return NO_MODEL
+    return SUCCESS
+
+
+def _check(options: argparse.Namespace) -> None:
+    """Refuse options that the route does not use, in the words of the shell."""
+    from hysim.discovery import arguments
+
+    named = {name: getattr(options, name) for name in arguments.DEFAULTS if name in options}
+    arguments.routes(options.route, arguments.given(named), called=_option)
+
+
+def _option(name: str, value: Any) -> str:
+    option = f"--{name.replace('_', '-')}"
+    return f"{option} {value}" if isinstance(value, str) else option
+
+
+def _files(options: argparse.Namespace, found: "Discovery", record: "Record") -> dict[str | None, Any]:
+    """The model and its picture for the files that are asked for; nothing where there is no model."""
+    from hysim.models.storage import to_json
+
+    if found.model is None:
+        return {}
     texts: dict[str | None, Any] = {options.out: to_json(found.model, units=record.units)}
     if options.plot:
         run = models.simulated(found.model, record, dict(record.units))
         texts[options.plot] = outputs.loop(record, run, model=found.model)
-    if not is_taken:
-        texts[records.STANDARD] = found.to_json() if options.json else found.summary() + "\n"
-    outputs.write(texts)
-    return SUCCESS
+    return texts
+
+
+def _unwritten(options: argparse.Namespace) -> list[str]:
+    return [name for name, path in (("--out", options.out), ("--plot", options.plot)) if path]
 
 
 def _library(text: str) -> str | list[str]:
@@ -79,6 +118,6 @@ def _library(text: str) -> str | list[str]:
 
 
 def _folds(text: str) -> str | int:
-    if text != "loo" and not text.isdigit():
-        raise argparse.ArgumentTypeError(f"expected loo or a number of blocks, got {text!r}")
+    if text != "loo" and not (text.isdigit() and int(text) > 1):
+        raise argparse.ArgumentTypeError(f"expected loo or a number of blocks from 2 on, got {text!r}")
     return int(text) if text.isdigit() else text

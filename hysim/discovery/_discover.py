@@ -18,7 +18,7 @@ import numpy as np
 from hysim import metrics
 from hysim._frozen import FloatArray
 from hysim._parallel import Progress
-from hysim.discovery import _laws, _pysindy
+from hysim.discovery import _laws, _pysindy, arguments
 from hysim.discovery._exponent import or_any_exponent
 from hysim.discovery._judgement import HYSTERESIS, UNSTABLE, Judgement, judge
 from hysim.discovery._library import FORMS, duhem_terms, memory_terms, named_terms, signs_of, symmetric
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
 
 _POOR = 80.0  # fit of a law without dynamics [%] below which an oscillator is tried
 _STAGES = 4  # hidden memory, other libraries, any exponent, judgement
-ROUTES = ("auto", "memory", "output", "oscillator")
 
 
 def discover(
@@ -72,31 +71,32 @@ def discover(
     route : {"auto", "memory", "output", "oscillator"}
         What is measured: the memory itself, y = z; an output, y = offset + feedthrough u + gain z; or force u and
         displacement y of a mass on a hysteretic spring, m y'' + c y' + k y + z = u. By default the first two are
-        tried, and a Duhem law, and the one of lowest BIC is taken; where linear dynamics run better than any of
-        these, the third is tried too.
+        tried, and a Duhem law, and the one of lowest BIC is taken; where all of these explain little, the third is
+        tried too. Only routes that use all given arguments are tried: with `mass`, only the oscillator.
     library : {"bouc-wen", "duhem"} or sequence of str, optional
         ``"bouc-wen"``, for z: ``u'`` and ``|u'|`` times z^j, and times ``|z|`` z^(j-1), j up to `degree`.
         ``"duhem"``, for y: ``u'`` and ``|u'|`` times u^i y^j, i + j up to `degree`. Or the names of the terms:
         ``["u'", "|u'| z", "u' |z|"]``.
     degree : int
-        Of the library's monomials; an oscillator's goes one higher, to 3 at most.
+        Of the library's monomials; an oscillator's goes one higher, to 3 at most. Not with a library of names.
     symmetry : {None, "odd", "even"}
-        Of the response: only terms that leave it so. Loops about the origin are odd, butterflies even.
+        Of the response: only terms that leave it so. Loops about the origin are odd, butterflies even. An oscillator's
+        may be odd.
     signs : mapping, optional
-        Term to 1 or -1, the sign that its coefficient must have.
+        Term to 1 or -1, the sign that its coefficient must have. Not for an oscillator.
     optimizer : {"STLSQ", "SR3", "SSR", "FROLS"}
-        PySINDy's optimizer that makes the path.
+        PySINDy's optimizer that makes the path. Not for an oscillator.
     derivative : {"auto", "smoothed", "weak"}
         Slopes of smoothed branches, or the integral form, which needs none; by default the one whose regressions run
-        nearest to samples that they have not seen.
+        nearest to samples that they have not seen. Not for an oscillator.
     structure : OscillatorStructure, optional
         How an oscillator's records were made, from ``BoucWenOscillator.structure(...)``; by default a record whose
-        input repeats itself is taken as steady, any other as beginning at rest.
+        input repeats itself is taken as steady, any other as beginning at rest. Only for an oscillator.
     mass, damping, stiffness : float, optional
-        Of the oscillator, where they are known [u per unit of y''; y'; y].
+        Of the oscillator, where they are known [u per unit of y''; y'; y]. Only for an oscillator.
     cross_validate : {None, "loo"} or int, optional
         ``"loo"`` leaves one output sample out at a time, an int that many blocks of samples; the input and the
-        structure are kept, the numbers fitted anew. Fills `Discovery.cv_rmse`, but for an oscillator, which is tried on
+        structure are kept, the numbers fitted anew. Fills `Discovery.cv_rmse`. Not for an oscillator, which is tried on
         blocks of the record in any case (`Judgement.held_out`).
     seed : int
         Of random restarts, and of the ensemble.
@@ -120,8 +120,9 @@ def discover(
     Raises
     ------
     ValueError
-        If an option is unknown, an input or output is constant, the input never reverses, its branches are too short
-        to have a slope, there are no more samples than terms, or an oscillator's record has no even time.
+        If an option is unknown or not used by the route, an input or output is constant, the input never reverses, its
+        branches are too short to have a slope, there are no more samples than terms, or an oscillator's record has no
+        even time.
     TypeError
         If the first argument is not a record or a sequence of them.
     ImportError
@@ -150,9 +151,25 @@ def discover(
         folds(cross_validate, sum(map(len, records)), name="cross_validate")
     if derivative not in ("auto", *FORMS):
         raise ValueError(f'derivative must be "auto", "smoothed" or "weak", got {derivative!r}')
+    if symmetry not in (None, "odd", "even"):
+        raise ValueError(f'symmetry must be None, "odd" or "even", got {symmetry!r}')
     plant: dict[str, Any] = {"structure": structure, "mass": mass, "damping": damping, "stiffness": stiffness}
-    if route == "oscillator":
-        return _in_an_oscillator(records, library, degree, symmetry, signs, plant, seed, progress)
+    given = arguments.given(
+        {
+            "library": library,
+            "degree": degree,
+            "symmetry": symmetry,
+            "signs": signs,
+            "optimizer": optimizer,
+            "derivative": derivative,
+            "cross_validate": cross_validate,
+            **plant,
+        }
+    )
+    routes = arguments.routes(route, given)
+    vibrating = {"degree": _oscillators_degree(degree), "symmetry": symmetry or "none", "seed": seed, **plant}
+    if routes == ("oscillator",):
+        return _as_oscillator(records, progress=progress, **vibrating)
     hidden, *shown = _libraries(route, library, degree, symmetry)
     options: dict[str, Any] = {
         "signs": signs_of([term for each in (hidden, *shown) for term in each.terms], signs),
@@ -163,11 +180,15 @@ def discover(
     report = progress or (lambda done, total: None)
     outcomes = _searched(records, (hidden,), options)
     report(1, _STAGES)
-    if route == "auto":
-        moving = _moving(records, outcomes[0].candidate, plant, seed)
-        if moving is not None:
-            report(_STAGES, _STAGES)
-            return moving
+    warnings: tuple[str, ...] = ()
+    if route == "auto" and _may_move(records, outcomes[0].candidate):
+        if "oscillator" in routes:
+            moving = _moving(records, outcomes[0].candidate, vibrating)
+            if moving is not None:
+                report(_STAGES, _STAGES)
+                return moving
+        else:
+            warnings = (arguments.not_tried("oscillator", given),)
     outcomes += _searched(records, shown, options, outcomes[0].searched.bic)
     report(2, _STAGES)
     outcome = min(outcomes, key=lambda each: each.candidate.bic)
@@ -177,19 +198,19 @@ def discover(
     report(3, _STAGES)
     found = _discovery(records, outcome, candidate, cross_validate, seed)
     report(_STAGES, _STAGES)
-    return found
+    return replace(found, warnings=(*found.warnings, *warnings)) if warnings else found
 
 
-def _moving(
-    records: tuple[Record, ...], candidate: Candidate[Any], plant: Mapping[str, Any], seed: int
-) -> Discovery | None:
-    """An oscillator's hysteresis, where a law without dynamics explains little and the oscillator more."""
-    static = _scores(candidate, records)
-    if static["fit_percent"] > _POOR or not all(_is_even(record) for record in records):
-        return None
+def _may_move(records: tuple[Record, ...], candidate: Candidate[Any]) -> bool:
+    """Whether the records may be an oscillator's: their time is even, and a law without dynamics explains little."""
+    return _scores(candidate, records)["fit_percent"] <= _POOR and all(_is_even(record) for record in records)
+
+
+def _moving(records: tuple[Record, ...], candidate: Candidate[Any], options: Mapping[str, Any]) -> Discovery | None:
+    """An oscillator's hysteresis, where the oscillator explains more than a law without dynamics."""
     with contextlib.suppress(ValueError):  # no mass on springs is near
-        found = _as_oscillator(records, seed=seed, **plant)
-        if found.verdict == HYSTERESIS and found.scores["rmse"] < static["rmse"]:
+        found = _as_oscillator(records, **options)
+        if found.verdict == HYSTERESIS and found.scores["rmse"] < _scores(candidate, records)["rmse"]:
             return found
     return None
 
@@ -198,23 +219,11 @@ def _is_even(record: Record) -> bool:
     return record.t is not None and float(np.ptp(np.diff(record.t))) < 1e-6 * float(np.ptp(record.t))
 
 
-def _in_an_oscillator(
-    records: tuple[Record, ...],
-    library: str | Sequence[str] | None,
-    degree: int,
-    symmetry: str | None,
-    signs: Mapping[str, int] | None,
-    plant: Mapping[str, Any],
-    seed: int,
-    progress: Progress | None,
-) -> Discovery:
-    if library not in (None, "bouc-wen") or signs:
-        raise ValueError("an oscillator's library is bouc-wen, all of it: give neither names of terms nor signs")
-    if symmetry not in (None, "odd"):
-        raise ValueError(f'symmetry of an oscillator must be None or "odd", got {symmetry!r}')
-    return _as_oscillator(
-        records, degree=min(degree + 1, 3), symmetry=symmetry or "none", seed=seed, progress=progress, **plant
-    )
+def _oscillators_degree(degree: int) -> int:
+    """The highest power of z in an oscillator's library."""
+    if isinstance(degree, bool) or not isinstance(degree, int) or degree < 0:
+        raise ValueError(f"degree must be a whole number from 0 up, got {degree!r}")
+    return min(degree + 1, 3)
 
 
 def _as_oscillator(records: tuple[Record, ...], **options: Any) -> Discovery:
@@ -241,9 +250,7 @@ def _libraries(
     route: str, library: str | Sequence[str] | None, degree: int, symmetry: str | None
 ) -> tuple[Library, ...]:
     """The libraries that a route looks into, the cheaper first."""
-    feedthrough = {"auto": "may", "memory": "no", "output": "must"}.get(route)
-    if feedthrough is None:
-        raise ValueError(f"route must be one of {', '.join(ROUTES)}, got {route!r}")
+    feedthrough = {"auto": "may", "memory": "no", "output": "must"}[route]
     hidden = Library(symmetric(memory_terms(degree), symmetry), "z", feedthrough, offset=route != "memory")
     shown = Library(symmetric(duhem_terms(degree), symmetry), "y", complete=True)
     if library is None:
@@ -259,7 +266,7 @@ def _libraries(
         of_z = any("z" in name for name in library)
         chosen = replace(hidden, terms=terms) if of_z else Library(terms, "y")
     if chosen.letter == "y" and route == "output":
-        raise ValueError('a library in u and y has its feedthrough in the terms: give it with route="memory"')
+        raise ValueError("a library in u and y has its feedthrough in the terms: take the memory route for it")
     return (chosen,)
 
 
@@ -309,7 +316,7 @@ def _discovery(
         },
         n_parameters=candidate.n_parameters,
         parameters=found.parameters,
-        initial="free" if candidate.n_parameters > structure.size else "held",
+        initial="free" if candidate.n_parameters > structure.size else "rest",
         initial_states=found.initial_states,
         judgement=judgement,
         cv_rmse=math.nan if cross_validate is None else left_out_rmse(records, candidate, cross_validate),

@@ -9,8 +9,9 @@
 3. It is refined by simulation error (`hysim.identify`).
 4. About the refined law the whole library is regressed, the law's own terms like all others: PySINDy's STLSQ and plain
    elimination from dense to sparse, one structure by BIC, inclusion by bagging (`_oscillator_response`). Terms that are
-   not chosen leave the law, which is refined again. If terms come in, three more laws are refined: the Bouc-Wen law
-   with n free, that with n at the nearest whole number, and the law of these terms.
+   not chosen leave the law, which is refined again. If terms come in, the Bouc-Wen law is refined with n free and with
+   n at the nearest whole number, and where terms come in about the best of these too, the law of these terms. All this
+   is done for each way in which the records may have been made.
 5. Of all refined laws that do not diverge, the linear spring among them, the one of the lowest BIC is taken:
 
        BIC = N ln(V + floor^2) + d ln N

@@ -16,7 +16,6 @@ from hysim.discovery._memory_terms import RELAXATION, MemoryTerm, bouc_wen_terms
 from hysim.discovery._oscillator_models import (
     RATE_DEPENDENT,
     SPRING,
-    Model,
     State,
     diverges,
     exponent,
@@ -41,6 +40,10 @@ _AT_BOUND = 1e-3  # relative distance from a bound below which a parameter is at
 _STEPS = 5
 _ROUNDS = 5  # of choosing terms about a law of any terms
 _LAW = ("A", "beta", "gamma")
+_NO_MODEL = (
+    "There is no model of this law: the memory of an oscillator is simulated where it is a Bouc-Wen law or a linear "
+    "relaxation."
+)
 _DIVERGES = "A law of lower BIC diverges on cycles over the measured range, and is left out."
 
 
@@ -116,22 +119,27 @@ class Search(NamedTuple):
         if not refined:
             return self._described(first, elastic, {}, tuple(failures[:1]))
         best, fitted = min(refined, key=lambda each: float(each[1].residual @ each[1].residual))
-        return best._chosen(fitted, elastic, nearest)
+        first = best._tried(fitted)
+        candidates = [(best, each) for each in best._candidates(first)]
+        if first.beyond:  # a law that is not the one decided how the records were made
+            candidates += [pair for search, _ in refined if search is not best for pair in search._again(candidates)]
+        return _chosen(candidates, elastic, nearest)
 
     def _made(self, structure: OscillatorStructure) -> "Search":
         """The same search with another belief about how the records were made."""
         return self._replace(structure=structure, response=replace(self.response, structure=structure))
 
-    def _chosen(self, fitted: _Fitted, elastic: _Fitted, nearest: Regressed) -> FoundOscillator:
-        """Step 5: the law of the lowest BIC of those that do not diverge, or none."""
-        candidates = self._candidates(self._tried(fitted))
-        lowest = min(candidates, key=self._bic)
-        stable = [each for each in candidates if not self._diverges(each.fitted)]
-        best = min(stable, key=self._bic, default=lowest._replace(fitted=elastic))
-        warnings = (_DIVERGES,) if self._bic(lowest) < min(self._bic(best), elastic.bic(self._floor)) else ()
-        if self._bic(best) >= elastic.bic(self._floor):
-            best = best._replace(fitted=elastic)
-        return self._described(best, elastic, nearest.coefficients, warnings)
+    def _again(self, candidates: "Sequence[tuple[Search, _Tried]]") -> "list[tuple[Search, _Tried]]":
+        """Candidates by this belief about how the records were made; none if it suits the best Bouc-Wen law less."""
+        laws = [each for _, each in candidates if each.fitted.verdict == HYSTERESIS]
+        if not laws:
+            return []
+        law = min(laws, key=self._bic).fitted
+        with contextlib.suppress(ValueError):  # the candidates by the other belief stay
+            begun = self._bouc_wen(law.terms if _is_whole(law.terms) else ())
+            if begun.bic(self._floor) < law.bic(self._floor):
+                return [(self, each) for each in self._candidates(self._tried(begun))]
+        return []
 
     @property
     def _floor(self) -> float:
@@ -168,17 +176,20 @@ class Search(NamedTuple):
 
     def _candidates(self, first: _Tried) -> list[_Tried]:
         """Step 4: the first law; where it lacks terms, also n free, n at the nearest whole number, and these terms."""
-        found = self._pruned(first)
-        if not found[-1].beyond:
+        found, is_free = self._pruned(first), not _is_whole(first.fitted.terms)
+        if not found[-1].beyond and not is_free:
             return found
         with contextlib.suppress(ValueError):  # the first law stays
-            free = self._tried(self._bouc_wen(()))
+            free = first if is_free else self._tried(self._bouc_wen(()))
+            found += [] if is_free else [free]
             n = float(max(round(exponent(free.fitted.terms) or 1.0), 1))
-            found.append(free)
             if n != exponent(first.fitted.terms):
                 found += self._pruned(self._tried(self._bouc_wen(bouc_wen_terms(n))))
+        if not min(found, key=self._bic).beyond:
+            return found
         lacking = [each for each in found if each.beyond and _is_whole(each.chosen)]
-        return found + [more for each in lacking if (more := self._extended(each)) is not None]
+        more = self._extended(min(lacking, key=self._bic)) if lacking else None
+        return found if more is None else [*found, more]
 
     def _pruned(self, tried: _Tried) -> list[_Tried]:
         """A Bouc-Wen law, and the same without those of its terms that are not chosen."""
@@ -284,7 +295,8 @@ class Search(NamedTuple):
         states = self.response.initial_states(fitted.oscillator)
         models = [model(plant, law, self.structure, state) for state in states]
         structures = tried.structures
-        warnings = (*warnings, *fitted.warnings, *_warnings(tried, inclusion, models[0]))
+        nothing = (_NO_MODEL,) if models[0] is None else ()
+        warnings = (*nothing, *warnings, *fitted.warnings, *_warnings(tried, inclusion))
         self.progress(_STEPS, _STEPS)
         return FoundOscillator(
             model=models[0],
@@ -318,6 +330,18 @@ class Search(NamedTuple):
         )
 
 
+def _chosen(candidates: Sequence[tuple[Search, _Tried]], elastic: _Fitted, nearest: Regressed) -> FoundOscillator:
+    """Step 5: the law of the lowest BIC of those that do not diverge, or none."""
+    ranked = sorted(candidates, key=lambda each: each[0]._bic(each[1]))
+    search, lowest = ranked[0]
+    linear = elastic.bic(search._floor)
+    for rank, (believed, each) in enumerate(ranked):
+        if believed._bic(each) < linear and not believed._diverges(each.fitted):
+            return believed._described(each, elastic, nearest.coefficients, (_DIVERGES,) if rank else ())
+    lost = (_DIVERGES,) if search._bic(lowest) < linear else ()
+    return search._described(lowest._replace(fitted=elastic), elastic, nearest.coefficients, lost)
+
+
 def _tried(fitted: _Fitted, regression: TermRegression) -> _Tried:
     law = tuple(term for term in regression.terms if term in fitted.terms)
     paths = {*regression.thresholded(), *regression.eliminated(), *([law] if law else [])}
@@ -343,14 +367,9 @@ def _message(fitted: _Fitted, warnings: Sequence[str]) -> str:
     return "" if warnings else "every term is needed, and no other"
 
 
-def _warnings(tried: _Tried, inclusion: Mapping[str, float], found: Model | None) -> tuple[str, ...]:
+def _warnings(tried: _Tried, inclusion: Mapping[str, float]) -> tuple[str, ...]:
     """Reasons to doubt the law, the gravest first."""
     parts = []
-    if found is None:
-        parts.append(
-            "model is None because hysim does not simulate this law: the memory of its oscillators is a Bouc-Wen law, "
-            "or a linear relaxation."
-        )
     if tried.fitted.verdict != NO_STRUCTURE and tried.beyond:
         parts.append(f"The records ask for more terms: {', '.join(term.name for term in sorted(tried.beyond))}.")
     doubtful = [term.name for term in tried.fitted.terms if inclusion.get(term.name, 0.0) < _SURE]

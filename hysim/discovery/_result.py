@@ -64,10 +64,10 @@ class Discovery:
     parameters : mapping
         Numbers of the law that are no coefficients: ``"n"`` where it was searched, ``"feedthrough"``, ``"gain"``,
         ``"offset"``; of an oscillator ``"mass"``, ``"damping"`` and ``"stiffness"``.
-    initial : {"free", "held", "rest", "periodic"}
-        Where the initial states come from. ``"free"``: they were fitted, and count as parameters. ``"held"``: the
-        first measured output is taken as exact. ``"rest"`` and ``"periodic"``, of an oscillator: the records begin at
-        rest, or in the steady motion under a periodic input.
+    initial : {"free", "rest", "periodic"}
+        Where the initial states come from. ``"free"``: they were fitted. ``"rest"``: the
+        memory is held at zero at the first sample, an oscillator at rest. ``"periodic"``, of an oscillator: the records
+        begin in the steady motion under a periodic input. Only free ones count as parameters.
     initial_states : tuple of mapping
         The state at the first sample of each record, in the letters of `equation`: ``"z0"`` or ``"y0"``; of an
         oscillator ``"y0"``, ``"y'0"`` and ``"z0"``.
