@@ -1,5 +1,6 @@
 """What `discover` is told: library, symmetry, signs, optimizer, form of the slope; and what it refuses."""
 
+import inspect
 import itertools
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from discovered import CYCLES, DAHL, LAW, TRUTH, duhem, multisine, record_of, zigzag
 
 import hysim as hs
+from hysim.discovery import arguments
 
 RECORD = record_of(LAW.memory, multisine(200), noise=0.01)
 NAMES = list(TRUTH)
@@ -135,11 +137,67 @@ def test_a_monotone_loading_is_refused_in_every_form():
         ({"derivative": "spline"}, 'derivative must be "auto", "smoothed" or "weak"'),
         ({"cross_validate": 1}, 'cross_validate must be "loo"'),
         ({"cross_validate": "all"}, 'cross_validate must be "loo"'),
+        (
+            {"route": "memory", "mass": 3.0},
+            "mass is not used by route='memory': leave it out, or use route='oscillator'$",
+        ),
+        ({"route": "output", "damping": 3.0}, "damping is not used by route='output'"),
+        ({"route": "memory", "stiffness": 0.0}, "stiffness is not used by route='memory'"),
+        ({"route": "memory", "structure": hs.BoucWenOscillator.structure()}, "structure is not used by route='memory'"),
+        (
+            {"route": "oscillator", "optimizer": "SR3"},
+            "optimizer='SR3' is not used by route='oscillator': leave it out, or use route='memory' or route='output'",
+        ),
+        ({"route": "oscillator", "derivative": "weak"}, "derivative='weak' is not used by route='oscillator'"),
+        ({"route": "oscillator", "cross_validate": 5}, "cross_validate is not used by route='oscillator'"),
+        ({"route": "oscillator", "library": "duhem"}, "library='duhem' is not used by route='oscillator'"),
+        ({"route": "oscillator", "library": NAMES}, "library is not used by route='oscillator'"),
+        ({"route": "oscillator", "symmetry": "even"}, "symmetry='even' is not used by route='oscillator'"),
+        ({"route": "oscillator", "signs": {"u'": 1}}, "signs is not used by route='oscillator'"),
+        ({"route": "oscillator", "degree": -1}, "degree must be a whole number from 0 up, got -1"),
+        ({"library": NAMES, "degree": 3}, "degree is not used with a library of names: leave it out"),
+        ({"mass": 3.0, "cross_validate": 5}, "no route uses both cross_validate and mass: the first is for"),
+        ({"mass": 3.0, "signs": {"u'": 1}}, "leave one of them out"),
     ],
 )
 def test_options_are_checked(options, message):
     with pytest.raises(ValueError, match=message):
         hs.discover(RECORD, **options)
+
+
+def test_the_table_of_arguments_is_that_of_the_verb():
+    own = {"record_or_records", "route", "seed", "progress"}
+    declared = inspect.signature(hs.discover).parameters
+    assert {name: declared[name].default for name in declared.keys() - own} == arguments.DEFAULTS
+
+
+def test_arguments_at_their_defaults_are_not_given():
+    assert arguments.given(dict(arguments.DEFAULTS)) == {}
+    assert arguments.given({"signs": {}, "mass": 0.0, "degree": 3}) == {"mass": 0.0, "degree": 3}
+
+
+@pytest.mark.parametrize(
+    ("given", "tried"),
+    [
+        ({}, ("memory", "output", "oscillator")),
+        ({"mass": 2.0}, ("oscillator",)),
+        ({"symmetry": "odd", "library": "bouc-wen"}, ("memory", "output", "oscillator")),
+        ({"symmetry": "even"}, ("memory", "output")),
+        ({"cross_validate": 3}, ("memory", "output")),
+    ],
+)
+def test_the_automatic_route_tries_the_routes_that_use_all_arguments(given, tried):
+    assert arguments.routes("auto", given) == tried
+
+
+def test_a_route_that_an_argument_rules_out_is_named_where_the_others_explain_little():
+    t = np.arange(300) / 750.0
+    u = 60.0 * np.sin(2.0 * np.pi * (20.0 + 40.0 * t) * t)
+    plant = hs.BoucWenOscillator(mass=2.0, damping=10.0, stiffness=5e4, law=hs.BoucWen(A=5e4, beta=800.0, gamma=-300.0))
+    record = hs.Record(u=u, y=plant.response(u, t[1]), t=t)
+    found = hs.discover(record, library=NAMES)
+    assert found.route != "oscillator"
+    assert "The oscillator route was not tried, because it does not use library" in " ".join(found.warnings)
 
 
 @pytest.mark.parametrize("given", [CYCLES, [], [CYCLES], None, {"u": CYCLES, "y": CYCLES}])
@@ -164,5 +222,6 @@ def test_a_gap_is_refused_where_the_record_is_made():
 @pytest.mark.parametrize("library", [NAMES, "duhem"])
 def test_progress_counts_up_to_its_total(library):
     calls = []
-    hs.discover(RECORD, library=library, degree=1, progress=lambda done, total: calls.append((done, total)))
+    degree = {"degree": 1} if library == "duhem" else {}
+    hs.discover(RECORD, library=library, **degree, progress=lambda done, total: calls.append((done, total)))
     assert calls == [(k, len(calls)) for k in range(1, len(calls) + 1)]

@@ -258,7 +258,10 @@ class Search(NamedTuple):
         J = self.response.slopes(found, terms)
         size = np.linalg.norm(J, axis=0)
         if not (np.isfinite(residual).all() and (size > 0.0).all()):
-            raise ValueError("the oscillator nearest to the records diverges: check the units, and the sign of u and y")
+            raise ValueError(
+                "the oscillator nearest to the records diverges, or does not become steady: check the units, the time, "
+                "and the sign of u and y"
+            )
         variance = float(residual @ residual) / max(residual.size - size.size, 1)
         errors = np.sqrt(variance * np.diag(np.linalg.pinv((J / size).T @ (J / size)))) / size
         names = (*self.response.free, *(term.name for term in terms))
