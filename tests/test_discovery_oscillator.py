@@ -9,10 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hysim as hs
+from hysim.discovery import _oscillator_search
+from hysim.discovery._hidden_memory import HiddenMemory
 from hysim.discovery._memory_terms import RELAXATION, MemoryTerm, bouc_wen_terms, cases, law, memory_terms
 from hysim.discovery._oscillator import oscillator
+from hysim.discovery._oscillator_models import diverges
 from hysim.discovery._oscillator_records import recorded
 from hysim.discovery._oscillator_result import FoundOscillator
+from hysim.identification import identify
 from hysim.kernels import hidden
 
 COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
@@ -98,6 +102,47 @@ def test_terms_that_a_law_has_not_are_left_out_and_n_is_found():
 
 
 @needs_compiled
+@pytest.mark.parametrize(("n", "beta", "gamma"), [(1.0, 800.0, -300.0), (1.5, 140.0, -50.0)])
+def test_the_exponent_is_freed_only_where_the_bic_is_lower(n, beta, gamma, monkeypatch):
+    """The exponent with which the regression begins does not decide."""
+    given = record(noise=0.01, n_samples=300, beta=beta, gamma=gamma, n=n)
+    monkeypatch.setattr(HiddenMemory, "nearest", lambda self: self.fit(bouc_wen_terms(2.0)))
+    found = oscillator([given])
+    held, free = (identify(hs.BoucWenOscillator.structure(), given, fixed=fixed).bic for fixed in ({"n": 1.0}, {}))
+    assert (held < free) == (n == 1.0) == ("n" not in found.stderr)
+    assert found.scores["bic"] == pytest.approx(min(held, free), abs=0.01)  # the floor adds 1e-6 of the variance to it
+    assert found.model.law.n == n if n == 1.0 else found.model.law.n == pytest.approx(n, abs=0.2)
+    # the same d counts on the path: the law is on it, with its terms as the regression leaves them
+    assert found.scores["bic"] == pytest.approx(found.path_bic[found.path_n_terms == 3].min(), abs=0.5)
+
+
+@needs_compiled
+def test_the_law_itself_is_among_the_structures_that_are_compared(noisy):
+    assert set(TRUTH) in [set(terms.split(", ")) for terms in noisy.path_terms]
+
+
+@needs_compiled
+def test_a_law_that_diverges_is_no_structure(monkeypatch):
+    monkeypatch.setattr(_oscillator_search, "diverges", lambda found, y: True)
+    found = oscillator([record(noise=0.01, n_samples=300)])
+    assert found.verdict == "no structure found"
+    assert found.coefficients == {}
+    assert found.warnings[0].startswith("A law of lower BIC diverges")
+    monkeypatch.setattr(HiddenMemory, "nearest", lambda self: None)
+    found = oscillator([record(noise=0.01, n_samples=300)])
+    assert (found.verdict, found.model.law.A) == ("no structure found", 0.0)
+    assert "diverges along the measured displacement" in found.warnings[0]
+
+
+def test_a_memory_without_bound_diverges_over_a_wide_range_alone():
+    law = hs.BoucWen(A=1.0, beta=-0.5, gamma=-0.5, n=2.0)  # it grows without bound after a stroke of pi / 2
+    plant = hs.BoucWenOscillator(mass=1.0, damping=1.0, stiffness=1.0, law=law)
+    assert diverges(plant, np.array([-2.0, 2.0]))
+    assert not diverges(plant, np.array([-0.1, 0.1]))
+    assert diverges(hs.TransferFunction(num=(1.0,), den=(1.0, -1.0)), np.array([-0.1, 0.1]))
+
+
+@needs_compiled
 def test_a_relaxation_is_no_hysteresis():
     u = record().u
     m, c, k = PLANT.values()
@@ -114,6 +159,8 @@ def test_a_relaxation_is_no_hysteresis():
     found = oscillator([hs.Record(u=u, y=y, t=STEP * np.arange(u.size))])
     assert found.verdict == "linear lag"
     assert found.coefficients["z"] == pytest.approx(-100.0, rel=0.05)
+    y_of_model = found.model.response(u, STEP)
+    assert np.sqrt(np.mean((y_of_model - y) ** 2)) == pytest.approx(found.scores["rmse"], rel=1e-3)  # its own steps
 
 
 def test_how_a_record_was_made_is_seen():

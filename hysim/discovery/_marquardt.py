@@ -27,6 +27,8 @@ def descended(
         if residual is None:
             return x
         J, sizes = slopes(x)
+        if not (sizes > 0.0).all():  # the slope along an unknown diverges, or is none
+            return x
         J, cost = J / sizes, float(residual @ residual)
         for _ in range(_TRIALS):
             tried = x + np.linalg.solve(J.T @ J + damping * np.eye(x.size), J.T @ residual) / sizes

@@ -275,7 +275,8 @@ class Search(NamedTuple):
         law = fitted.oscillator.coefficients
         same = {(term.rectified, term.even) for term in law if not (term.whole or term.relaxing)}
         library = [term for term in self.library if not term.power or (term.rectified, term.even) not in same]
-        return _tried(fitted, self.response.regression(fitted.oscillator, fitted.residual, library))
+        regression = self.response.regression(fitted.oscillator, fitted.residual, library)
+        return _tried(fitted, regression if _is_whole(fitted.terms) else replace(regression, n_others=1))
 
     def _diverges(self, fitted: _Fitted) -> bool:
         plant, law = fitted.oscillator

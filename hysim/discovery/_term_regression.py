@@ -26,7 +26,8 @@ class TermRegression:
 
     `features` (n_samples, n_terms) and `target` are without what the plant explains, and scaled by `units`, the
     standard errors of the coefficients of all terms together. `dependent` are the terms left out since their slopes
-    are combinations of the plant's and of those of lower degree.
+    are combinations of the plant's and of those of lower degree. `n_others` counts fitted numbers that are neither the
+    plant's nor coefficients, such as an exponent.
     """
 
     terms: tuple[MemoryTerm, ...]
@@ -38,6 +39,7 @@ class TermRegression:
     floor: float
     n_plant: int
     blocks: list[slice]
+    n_others: int = 0
 
     @cached_property
     def triangle(self) -> FloatArray:
@@ -93,7 +95,7 @@ class TermRegression:
         """Bayesian information criterion of a structure, [squared unit of y]."""
         n = self.target.size
         variance = self.squares(terms) / n * self.sigma**2 + self.floor**2
-        return float(n * np.log(variance) + (self.n_plant + len(terms)) * np.log(n))
+        return float(n * np.log(variance) + (self.n_plant + self.n_others + len(terms)) * np.log(n))
 
     def held_out_rmse(self, terms: Sequence[MemoryTerm]) -> float:
         """Root mean square error on each block of a structure that the other blocks have fitted [unit of y]."""
