@@ -197,9 +197,14 @@ def test_a_state_is_zero_at_rest_and_not_in_a_steady_motion(kinds):
     assert min(map(abs, state)) > 0.0
 
 
-def test_free_initial_states_are_counted_as_parameters(kinds):
+def test_initial_states_are_counted_as_parameters_where_they_are_free(kinds):
     found = kinds["memory"][0]
-    assert found.initial == "free"
-    assert found.n_parameters == len(TRUTH) + 1
-    assert f"{found.n_parameters} parameters, 1 of them an initial state" in found.summary()
-    assert "initial state" not in kinds["n held"][0].summary().splitlines()[1]
+    assert found.n_parameters == len(TRUTH) + (found.initial == "free")
+    free = replace(found, initial="free")
+    assert f"{free.n_parameters} parameters, 1 of them an initial state\n" in free.summary()
+    two = replace(free, initial_states=({"z0": 0.5}, {"z0": -1.0}))
+    assert f"{free.n_parameters} parameters, 2 of them initial states\n" in two.summary()
+    assert "initial state (free): z0 = 0.5; z0 = -1\n" in two.summary()
+    rest = replace(found, initial="rest").summary()
+    assert f"{free.n_parameters} parameters\n" in rest
+    assert "initial state (rest): z0 = " in rest
