@@ -1,6 +1,7 @@
 """A hidden memory's law is found from an oscillator's input and output, and none is found where there is none."""
 
 import os
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 import hysim as hs
 from hysim.discovery import _oscillator_search
 from hysim.discovery._hidden_memory import HiddenMemory
+from hysim.discovery._marquardt import descended
 from hysim.discovery._memory_terms import RELAXATION, MemoryTerm, bouc_wen_terms, cases, law, memory_terms
 from hysim.discovery._oscillator import oscillator
 from hysim.discovery._oscillator_models import diverges
@@ -161,6 +163,24 @@ def test_a_relaxation_is_no_hysteresis():
     assert found.coefficients["z"] == pytest.approx(-100.0, rel=0.05)
     y_of_model = found.model.response(u, STEP)
     assert np.sqrt(np.mean((y_of_model - y) ** 2)) == pytest.approx(found.scores["rmse"], rel=1e-3)  # its own steps
+
+
+@needs_compiled
+def test_a_short_record_ends_in_a_result_and_in_no_warning_of_another_library():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = hs.discover(record(n_samples=200)[:40], route="oscillator")
+    assert found.summary()
+    assert hs.Discovery.from_json(found.to_json()) == found
+
+
+def test_a_descent_ends_where_a_slope_diverges():
+    """A slope that diverges is called zero, by which the step would be divided."""
+    start = np.array([1.0, 2.0])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = descended(lambda x: np.ones(3), lambda x: (np.eye(3, 2) * [1.0, 0.0], np.array([1.0, 0.0])), start)
+    assert np.array_equal(found, start)
 
 
 def test_how_a_record_was_made_is_seen():
