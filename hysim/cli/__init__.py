@@ -1,14 +1,18 @@
 """The command line: `hysim COMMAND ...`.
 
-Exit codes: 0 done, 1 a search did not converge, 2 bad input, 130 interrupted. Results go to the standard
-output, progress and errors to the standard error, an error in one line.
+Exit codes: 0 done, 1 a search did not converge, 2 bad input, 130 interrupted, 143 or 129 ended by SIGTERM or
+SIGHUP. Results go to the standard output, progress and errors to the standard error, an error in one line.
 """
 
 import argparse
 import os
+import signal
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from difflib import get_close_matches
+from types import FrameType
 from typing import NoReturn
 
 from hysim import __version__
@@ -20,6 +24,15 @@ COMMANDS = {module.__name__.rpartition(".")[2]: module for module in _MODULES}
 """Every command by its name."""
 
 DONE, BAD_INPUT, INTERRUPTED = 0, 2, 130
+_ENDED = 128  # and the number of the signal, as shells have it
+
+
+class _Ended(BaseException):
+    """A signal asks the process to end: what is half written is removed on the way out, as after Ctrl-C."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.number = number
 
 
 class _Parser(argparse.ArgumentParser):
@@ -31,17 +44,39 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     try:
         try:
-            return _run(sys.argv[1:] if arguments is None else list(arguments))
+            with _signals_end_it_in_order():
+                return _run(sys.argv[1:] if arguments is None else list(arguments))
         finally:
             print(end="", flush=True)
     except KeyboardInterrupt:
         return _failed(INTERRUPTED, "interrupted")
+    except _Ended as request:
+        return _failed(_ENDED + request.number, f"ended by {signal.Signals(request.number).name}")
     except BrokenPipeError:  # who reads the output has had enough of it
         return _discard(DONE)
     except MemoryError:
         return _failed(BAD_INPUT, "error: there is not enough memory for this")
     except (ValueError, TypeError, OSError, ImportError, SimulationError) as error:
         return _failed(BAD_INPUT, f"error: {_line(error)}")
+
+
+@contextmanager
+def _signals_end_it_in_order() -> Iterator[None]:
+    """Make signals that would end the process at once raise an exception, unless someone else handles them."""
+    names = ("SIGTERM", "SIGHUP") if threading.current_thread() is threading.main_thread() else ()
+    wanted = [signal.Signals[name] for name in names if name in signal.Signals.__members__]
+    ours = [number for number in wanted if signal.getsignal(number) is signal.SIG_DFL]
+    for number in ours:
+        signal.signal(number, _end)
+    try:
+        yield
+    finally:
+        for number in ours:
+            signal.signal(number, signal.SIG_DFL)
+
+
+def _end(number: int, _: FrameType | None) -> NoReturn:
+    raise _Ended(number)
 
 
 def parsers(only: str | None = None) -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParser]]:

@@ -250,7 +250,7 @@ class CustomLaw(Composable):
             with np.errstate(all="ignore"):
                 drive_sets(step, table, state, u, out, start, stop)
 
-        in_chunks(work, n_sets)
+        in_chunks(work, n_sets, n_samples=u.size)
         return out
 
 
