@@ -1,16 +1,20 @@
 """How a kernel is compiled: one decorator, so that every kernel is compiled alike.
 
 The compiled code is cached beside the source file, or in the user's cache folder. Where neither is
-writable the function is compiled anew in each process. It releases the interpreter lock, and it
-follows IEEE 754 (a division by zero is an infinity): kernels raise nothing, they return codes.
+writable, the disk is full or a file of the cache is damaged, the function is compiled anew. It releases
+the interpreter lock, and it follows IEEE 754 (a division by zero is an infinity): kernels raise nothing,
+they return codes.
 """
 
+import contextlib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 import numba
 from numba.core import cgutils
+from numba.core.caching import FunctionCache
+from numba.core.dispatcher import Dispatcher
 from numba.extending import intrinsic
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -25,12 +29,12 @@ def kernel(function: F) -> F:
 
 def inner(function: F) -> F:
     """As `kernel`, for a function that only kernels call: it has no entry from Python, which takes long to compile."""
-    return _compiled(function, **_NO_ENTRY)
+    return _compiled(function, (), **_NO_ENTRY)
 
 
 def inlined(function: F) -> F:
     """As `inner`, compiled into each of its callers, which saves the time of a call and costs that of a copy."""
-    return _compiled(function, forceinline=True, **_NO_ENTRY)
+    return _compiled(function, (), forceinline=True, **_NO_ENTRY)
 
 
 def signed_kernel(*signatures: Any) -> Callable[[F], F]:
@@ -49,14 +53,45 @@ def signed_inlined(*signatures: Any) -> Callable[[F], F]:
     return lambda function: _compiled(function, list(signatures), forceinline=True, **_NO_ENTRY)
 
 
-def _compiled(function: F, *signature: Any, **others: Any) -> F:
+def _compiled(function: F, signatures: Sequence[Any] = (), **others: bool) -> F:
     compiler: Any = numba.njit
-    options = {"nogil": True, "error_model": "numpy", **others}
-    try:
-        compiled: F = compiler(*signature, cache=True, **options)(function)
-    except RuntimeError:  # numba found no writable folder for its cache
-        compiled = compiler(*signature, **options)(function)
-    return compiled
+    cache: Any = _Cache
+    compiled: Any = compiler(nogil=True, error_model="numpy", **others)(function)
+    if isinstance(compiled, Dispatcher):  # and not the function itself, where numba is told to compile nothing
+        with contextlib.suppress(OSError, RuntimeError):  # numba found no writable folder
+            compiled._cache = cache(function)
+        for signature in signatures:
+            compiled.compile(signature)
+        if signatures:
+            compiled.disable_compile()
+    result: F = compiled
+    return result
+
+
+class _Cache(FunctionCache):
+    """numba's cache of a function, which is as if it were empty where it cannot be read, and is left where it is full.
+
+    In place of numba's own ``cache=True``, which ends in an error there.
+    """
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The compiled code for a signature, or None."""
+        load: Any = super().load_overload
+        try:
+            return load(sig, target_context)
+        except Exception:  # what unpickling raises depends on where the file was cut
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep the compiled code for a signature, if that is possible."""
+        save: Any = super().save_overload
+        empty: Any = super().flush
+        with contextlib.suppress(Exception):
+            try:
+                save(sig, data)
+            except Exception:
+                empty()  # a damaged index, to which nothing can be added
+                save(sig, data)
 
 
 def borrowed(array: Any) -> Any:
