@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
     from hysim.discovery import discover
     from hysim.models.storage import to_json
 
-    is_taken = outputs.check(options.out, pictures=[options.plot], printed=options.json)
+    is_taken = outputs.check(options.out, inputs=[options.file], pictures=[options.plot], printed=options.json)
     record = records.read(options)
     found = discover(
         record,

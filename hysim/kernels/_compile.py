@@ -57,7 +57,8 @@ def _compiled(function: F, signatures: Sequence[Any] = (), **others: bool) -> F:
     compiler: Any = numba.njit
     cache: Any = _Cache
     compiled: Any = compiler(nogil=True, error_model="numpy", **others)(function)
-    if isinstance(compiled, Dispatcher):  # and not the function itself, where numba is told to compile nothing
+    is_compiled = isinstance(compiled, Dispatcher)  # and not the function, where numba is told to compile nothing
+    if is_compiled:
         with contextlib.suppress(OSError, RuntimeError):  # numba found no writable folder
             compiled._cache = cache(function)
         for signature in signatures:
