@@ -9,6 +9,7 @@ the threads that are still at work, and processes are terminated. A process also
 started it, however that one ends.
 """
 
+import contextlib
 import ctypes
 import itertools
 import multiprocessing
@@ -29,6 +30,7 @@ T = TypeVar("T")
 
 _LONGEST = 2_000_000  # samples to begin with, which take some tenths of a second
 _PIECE, _GROWTH = 0.2, 16.0  # seconds of a call of a kernel, and how much longer a call may be than the last
+GLANCE = 0.1  # seconds of a wait after which signals are looked for
 _PATIENCE = 0.3  # seconds to wait for threads that have been told to stop
 
 _most: ContextVar[int | None] = ContextVar("most threads", default=None)
@@ -77,7 +79,7 @@ def in_chunks(
         running = [pool.submit(_piece_by_piece, work, *chunk, minimum) for chunk in others]
         _piece_by_piece(work, *own, minimum)
         for chunk in running:
-            chunk.result()
+            awaited(chunk)
 
 
 def _piece_by_piece(work: Callable[[int, int], None], start: int, stop: int, size: int) -> None:
@@ -117,8 +119,8 @@ def map_on_threads(
 
     results = []
     with threads(n_threads) as pool:
-        for result in pool.map(lambda k: here.copy().run(alone, k), range(n_items)):
-            results.append(result)
+        for item in [pool.submit(here.copy().run, alone, k) for k in range(n_items)]:
+            results.append(awaited(item))
             if progress is not None:
                 progress(len(results), n_items)
     return results
@@ -138,6 +140,18 @@ def at_most(workers: int | None) -> Iterator[None]:
 def _check(workers: int | None) -> None:
     if workers is not None and (not isinstance(workers, int) or workers < 1):
         raise ValueError(f"workers must be an integer of at least 1, got {workers}")
+
+
+def awaited(future: Future[T]) -> T:
+    """The result of a future, for which an interrupt is never waited longer than `GLANCE`.
+
+    One that comes between Python's last look for signals and the moment when a thread begins to wait without an end
+    is not seen before that wait is over: the more threads ask for the interpreter lock, the more often.
+    """
+    while not future.done():
+        with contextlib.suppress(TimeoutError):
+            future.exception(timeout=GLANCE)
+    return future.result()
 
 
 @contextmanager
@@ -188,7 +202,8 @@ class _Threads(Executor):
         for _ in self._threads:
             self._work.put(None)
         for thread in self._threads if wait else ():
-            thread.join()
+            while thread.is_alive():
+                thread.join(GLANCE)
 
     def stop(self, patience: float) -> None:
         """Take back what has not begun, raise an exception in every thread, and wait so many seconds for them."""

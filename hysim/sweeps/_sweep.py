@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hysim._parallel import Progress
+from hysim._parallel import GLANCE, Progress
 from hysim.sweeps._chunks import Chunk, Outcome, part_of
 from hysim.sweeps._executors import Workers, workers_of
 from hysim.sweeps._identity import identity
@@ -197,10 +197,9 @@ class _Study:
 
     def _wait(self) -> None:
         """Until a chunk can be settled; before the layout is known, that is the first one."""
-        if self.table.layout is None:
-            wait([next(iter(self.running))])
-        else:
-            wait(self.running, return_when=FIRST_COMPLETED)
+        futures = [next(iter(self.running))] if self.table.layout is None else [*self.running]
+        while not wait(futures, timeout=GLANCE, return_when=FIRST_COMPLETED).done:  # and look for an interrupt
+            pass
 
     def _settle(self) -> None:
         """Judge, write, enter and report what is finished, in the order of the tasks until the layout is known."""
