@@ -43,28 +43,35 @@ def group(leader):
     return sorted(members)
 
 
-def started(*arguments, **options):
-    return subprocess.Popen(
-        [sys.executable, *map(str, arguments)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join([os.path.dirname(os.path.dirname(__file__)), *sys.path])},
-        **options,
-    )
+@pytest.fixture
+def started():
+    """Start Python in a group of processes of its own, of which nothing is left after the test, failed or not."""
+    children = []
+
+    def start(*arguments):
+        child = subprocess.Popen(
+            [sys.executable, *map(str, arguments)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join([os.path.dirname(os.path.dirname(__file__)), *sys.path])},
+        )
+        children.append(child)
+        return child
+
+    yield start
+    for child in children:
+        with child, contextlib.suppress(ProcessLookupError):
+            os.killpg(child.pid, signal.SIGKILL)
 
 
 def ended(child, number, *, group_too=False):
     """Send a signal, and return what the process wrote, and the seconds until all of its group had ended."""
     begin = time.monotonic()
     (os.killpg if group_too else os.kill)(child.pid, number)
-    try:
-        out, err = child.communicate(timeout=PROMISED + BUSY)  # which needs the end of both outputs
-        until(lambda: not group(child.pid), PROMISED + BUSY)
-    finally:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(child.pid, signal.SIGKILL)
+    out, err = child.communicate(timeout=PROMISED + BUSY)  # which needs the end of both outputs
+    until(lambda: not group(child.pid), PROMISED + BUSY)
     return out, err, time.monotonic() - begin
 
 
@@ -78,7 +85,7 @@ def ended(child, number, *, group_too=False):
     ],
 )
 @pytest.mark.skipif(_parallel.cores() < 2, reason="on one core there is no second process")
-def test_reproduce_ends_with_its_second_process(tmp_path, number, code, said):
+def test_reproduce_ends_with_its_second_process(started, tmp_path, number, code, said):
     child = started("-m", "hysim", "reproduce", "--quick", "--out", tmp_path / "out")
     until(lambda: len(group(child.pid)) == 2)
     out, err, _ = ended(child, number, group_too=number == signal.SIGINT)
@@ -110,7 +117,7 @@ LOOP, SLEEP = "while True: k += 1", "time.sleep(600)"
         ("threads", SLEEP, signal.SIGINT),
     ],
 )
-def test_a_study_ends_with_its_threads_and_processes(executor, body, number):
+def test_a_study_ends_with_its_threads_and_processes(started, executor, body, number):
     child = started("-c", BUSY_TASK.format(executor=executor, body=body))
     assert child.stdout.readline().startswith("at work")  # and maybe the other at once
     _, err, _ = ended(child, number, group_too=number == signal.SIGINT)
