@@ -30,6 +30,7 @@ T = TypeVar("T")
 
 _LONGEST = 2_000_000  # samples to begin with, which take some tenths of a second
 _PIECE, _GROWTH = 0.2, 16.0  # seconds of a call of a kernel, and how much longer a call may be than the last
+_STRETCH = 500_000  # samples of one path
 GLANCE = 0.1  # seconds of a wait after which signals are looked for
 _PATIENCE = 0.3  # seconds to wait for threads that have been told to stop
 
@@ -80,6 +81,19 @@ def in_chunks(
         _piece_by_piece(work, *own, minimum)
         for chunk in running:
             awaited(chunk)
+
+
+def in_pieces(work: Callable[[slice], int], n_samples: int) -> int:
+    """Call `work` for one stretch of samples after the other, short enough for an interrupt to come between them.
+
+    It returns -1, or the first sample that failed, counted from the start of its stretch; so does this, counted from
+    the first of all. The work carries its state from a stretch to the next.
+    """
+    for start in range(0, n_samples, _STRETCH):
+        failed = work(slice(start, min(start + _STRETCH, n_samples)))
+        if failed >= 0:
+            return start + failed
+    return -1
 
 
 def _piece_by_piece(work: Callable[[int, int], None], start: int, stop: int, size: int) -> None:
@@ -289,6 +303,7 @@ def _without_signals() -> Iterator[None]:
 
 def _begin(begin: Callable[..., None], arguments: tuple[Any, ...]) -> None:
     """An interrupt is the parent's alone, a request to end is obeyed at once, and no process outlives its parent."""
+    signal.set_wakeup_fd(-1)  # which is the parent's
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     if sys.platform != "win32":

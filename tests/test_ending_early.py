@@ -291,3 +291,30 @@ def test_a_command_runs_in_another_thread_too(tmp_path, capsys):
     thread.start()
     thread.join()
     assert codes == [2]
+
+
+STUCK = """
+import sys, time
+from hysim.cli import main
+
+def stuck(*_, **__):
+    try:
+        print("at work", flush=True)
+        time.sleep(600)
+    except BaseException:
+        time.sleep(600)  # as one call of a compiled library would go on
+
+sys.modules["hysim.metrics"] = __import__("types").SimpleNamespace(loop_metrics=stuck)
+sys.exit(main(["metrics", sys.argv[1]]))
+"""
+
+
+@linux
+@pytest.mark.parametrize(("number", "said"), [(signal.SIGINT, "interrupted"), (signal.SIGTERM, "ended by SIGTERM")])
+def test_a_command_that_cannot_end_in_order_is_ended(started, tmp_path, number, said):
+    (tmp_path / "loop.csv").write_text("u,y\n0,0\n1,1\n0,0.1\n")
+    child = started("-c", STUCK, tmp_path / "loop.csv")
+    assert child.stdout.readline() == "at work\n"
+    _, err, seconds = ended(child, number)
+    assert (child.returncode, err) == (128 + number, f"hysim: {said}\n")
+    assert seconds > 1.5  # it was given the time to end by itself

@@ -8,31 +8,19 @@ import argparse
 import os
 import signal
 import sys
-import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from difflib import get_close_matches
-from types import FrameType
 from typing import NoReturn
 
 from hysim import __version__
-from hysim.cli import compare, control, discover, identify, measure, metrics, plot, reproduce, simulate, sweep
+from hysim.cli import compare, control, discover, identify, measure, metrics, plot, reproduce, signals, simulate, sweep
 from hysim.errors import SimulationError
 
 _MODULES = (metrics, identify, discover, compare, simulate, control, plot, sweep, measure, reproduce)
 COMMANDS = {module.__name__.rpartition(".")[2]: module for module in _MODULES}
 """Every command by its name."""
 
-DONE, BAD_INPUT, INTERRUPTED = 0, 2, 130
-_ENDED = 128  # and the number of the signal, as shells have it
-
-
-class _Ended(BaseException):
-    """A signal asks the process to end: what is half written is removed on the way out, as after Ctrl-C."""
-
-    def __init__(self, number: int) -> None:
-        super().__init__(number)
-        self.number = number
+DONE, BAD_INPUT = 0, 2
 
 
 class _Parser(argparse.ArgumentParser):
@@ -44,39 +32,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     try:
         try:
-            with _signals_end_it_in_order():
+            with signals.heeded():
                 return _run(sys.argv[1:] if arguments is None else list(arguments))
         finally:
             print(end="", flush=True)
     except KeyboardInterrupt:
-        return _failed(INTERRUPTED, "interrupted")
-    except _Ended as request:
-        return _failed(_ENDED + request.number, f"ended by {signal.Signals(request.number).name}")
+        return _failed(signals.INTERRUPTED, signals.words(signal.SIGINT))
+    except signals.Ended as request:
+        return _failed(128 + request.number, signals.words(request.number))
     except BrokenPipeError:  # who reads the output has had enough of it
         return _discard(DONE)
     except MemoryError:
         return _failed(BAD_INPUT, "error: there is not enough memory for this")
     except (ValueError, TypeError, OSError, ImportError, SimulationError) as error:
         return _failed(BAD_INPUT, f"error: {_line(error)}")
-
-
-@contextmanager
-def _signals_end_it_in_order() -> Iterator[None]:
-    """Make signals that would end the process at once raise an exception, unless someone else handles them."""
-    names = ("SIGTERM", "SIGHUP") if threading.current_thread() is threading.main_thread() else ()
-    wanted = [signal.Signals[name] for name in names if name in signal.Signals.__members__]
-    ours = [number for number in wanted if signal.getsignal(number) is signal.SIG_DFL]
-    for number in ours:
-        signal.signal(number, _end)
-    try:
-        yield
-    finally:
-        for number in ours:
-            signal.signal(number, signal.SIG_DFL)
-
-
-def _end(number: int, _: FrameType | None) -> NoReturn:
-    raise _Ended(number)
 
 
 def parsers(only: str | None = None) -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParser]]:

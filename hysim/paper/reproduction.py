@@ -92,7 +92,8 @@ def contents(computed: Findings) -> dict[str, str]:
     with second_process() as beside:
         of_models = beside.submit(_model_drawings, computed.study.comparison, computed.study.discovery)
         drawn = _paper_drawings(computed)
-        drawn |= awaited(of_models)
+        elsewhere = awaited(of_models)
+        drawn |= elsewhere
     summary = _summary(computed)
     return {
         **{f"figures/{name}.svg": svg for name, svg in drawn.items()},
