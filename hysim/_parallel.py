@@ -30,7 +30,7 @@ T = TypeVar("T")
 
 _LONGEST = 2_000_000  # samples to begin with, which take some tenths of a second
 _PIECE, _GROWTH = 0.2, 16.0  # seconds of a call of a kernel, and how much longer a call may be than the last
-_STRETCH = 500_000  # samples of one path
+_STRETCH = 100_000  # samples of one path: some hundredths of a second
 GLANCE = 0.1  # seconds of a wait after which signals are looked for
 _PATIENCE = 0.3  # seconds to wait for threads that have been told to stop
 
