@@ -55,12 +55,11 @@ def signed_inlined(*signatures: Any) -> Callable[[F], F]:
 
 def _compiled(function: F, signatures: Sequence[Any] = (), **others: bool) -> F:
     compiler: Any = numba.njit
-    cache: Any = _Cache
     compiled: Any = compiler(nogil=True, error_model="numpy", **others)(function)
     is_compiled = isinstance(compiled, Dispatcher)  # and not the function, where numba is told to compile nothing
     if is_compiled:
         with contextlib.suppress(OSError, RuntimeError):  # numba found no writable folder
-            compiled._cache = cache(function)
+            compiled._cache = _cache(function)
         for signature in signatures:
             compiled.compile(signature)
         if signatures:
@@ -69,30 +68,31 @@ def _compiled(function: F, signatures: Sequence[Any] = (), **others: bool) -> F:
     return result
 
 
-class _Cache(FunctionCache):
+def _cache(function: Any) -> Any:
     """numba's cache of a function, which is as if it were empty where it cannot be read, and is left where it is full.
 
     In place of numba's own ``cache=True``, which ends in an error there.
     """
+    maker: Any = FunctionCache
+    cache = maker(function)
+    load, save = cache.load_overload, cache.save_overload
 
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The compiled code for a signature, or None."""
-        load: Any = super().load_overload
+    def loaded(signature: Any, context: Any) -> Any:
         try:
-            return load(sig, target_context)
+            return load(signature, context)
         except Exception:  # what unpickling raises depends on where the file was cut
             return None
 
-    def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep the compiled code for a signature, if that is possible."""
-        save: Any = super().save_overload
-        empty: Any = super().flush
+    def saved(signature: Any, data: Any) -> None:
         with contextlib.suppress(Exception):
             try:
-                save(sig, data)
+                save(signature, data)
             except Exception:
-                empty()  # a damaged index, to which nothing can be added
-                save(sig, data)
+                cache.flush()  # a damaged index, to which nothing can be added
+                save(signature, data)
+
+    cache.load_overload, cache.save_overload = loaded, saved
+    return cache
 
 
 def borrowed(array: Any) -> Any:

@@ -198,8 +198,8 @@ class _Study:
     def _wait(self) -> None:
         """Until a chunk can be settled; before the layout is known, that is the first one."""
         futures = [next(iter(self.running))] if self.table.layout is None else [*self.running]
-        while not wait(futures, timeout=GLANCE, return_when=FIRST_COMPLETED).done:  # and look for an interrupt
-            pass
+        while not any(future.done() for future in futures):
+            wait(futures, timeout=GLANCE, return_when=FIRST_COMPLETED)  # and look for an interrupt
 
     def _settle(self) -> None:
         """Judge, write, enter and report what is finished, in the order of the tasks until the layout is known."""
