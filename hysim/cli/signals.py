@@ -17,7 +17,7 @@ from typing import NoReturn
 INTERRUPTED = 128 + signal.SIGINT
 """Exit code after Ctrl-C; after another signal it is 128 and its number too, as shells have it."""
 
-PATIENCE = 1.7
+PATIENCE = 1.3
 """Seconds in which a command can end in order."""
 
 _NAMES = ("SIGINT", "SIGTERM", "SIGHUP")

@@ -29,7 +29,7 @@ _CHUNK, _SHORTEST = 0.075, 0.002  # seconds
 _WITH_ARRAYS = 0.5  # seconds; a shard for each
 _MOST_A_SECOND = 500  # chunks: a scheduler takes a millisecond for each
 _GROWTH = 4
-_PATIENCE = 1.0  # seconds, after an interrupt, for what is being computed
+_PATIENCE = 0.6  # seconds, after an interrupt, for what is being computed
 
 
 def sweep(
