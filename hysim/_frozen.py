@@ -7,6 +7,7 @@ copying. `checked` is the stricter form for specifications (models, records): ev
 import dataclasses
 import functools
 import math
+import sys
 import typing
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
@@ -17,6 +18,8 @@ import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
 T = TypeVar("T")
+
+_TOO_LARGE = f"a number beyond {sys.float_info.max:.2g}"
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True)
@@ -41,7 +44,7 @@ def read_only(
     TypeError
         If the values are not real numbers.
     ValueError
-        If the number of axes is not `ndim`, or (with `finite`) an element is not finite.
+        If an element is masked, the number of axes is not `ndim`, or (with `finite`) an element is not finite.
     """
     array = _as_float_array(values, name)
     if ndim is not None and array.ndim != ndim:
@@ -59,14 +62,25 @@ def read_only(
 
 
 def _as_float_array(values: npt.ArrayLike, name: str) -> FloatArray:
+    if _is_masked(values):
+        raise ValueError(f"{name} must have no masked element: leave these samples out, or fill them with filled()")
     if np.iscomplexobj(values):
         raise TypeError(f"{name} must be real numbers, got complex ones")
     if getattr(getattr(values, "dtype", None), "kind", "f") in "mM":  # which NumPy would take for counts of their unit
         raise TypeError(f"{name} must be numbers, got dates or times: give seconds from the first one")
     try:
         return np.array(values, dtype=np.float64, order="C")
-    except (TypeError, ValueError) as error:
+    except OverflowError:
+        raise ValueError(f"{name} must be finite, got {_TOO_LARGE}") from None
+    except (TypeError, ValueError, RecursionError) as error:
         raise TypeError(f"{name} must be numbers, got {type(values).__name__}: {error}") from None
+
+
+def _is_masked(values: Any) -> bool:
+    """Whether an element is masked, of which NumPy would keep the number under the mask, or make nan with a warning."""
+    if isinstance(values, (list, tuple)):
+        return any(isinstance(each, np.ma.MaskedArray) and np.ma.is_masked(each) for each in values)
+    return bool(np.ma.is_masked(values))
 
 
 def _freeze(cls: type[T], *, finite: bool) -> type[T]:
@@ -104,10 +118,14 @@ def _coercions(cls: type, finite: bool) -> dict[str, Callable[[Any, str], Any]]:
 
 
 def _as_float(value: Any, name: str, *, finite: bool) -> float:
-    if isinstance(value, (str, bytes, bool)) or np.ndim(value) != 0:
+    if isinstance(value, (str, bytes, bool, list, tuple, Mapping)) or np.ndim(value) != 0:
         raise TypeError(f"{name} must be a number, got {value!r}")
+    if np.ma.is_masked(value):
+        raise ValueError(f"{name} must be a number, got a masked one")
     try:
         number = float(value)
+    except OverflowError:
+        raise ValueError(f"{name} must be finite, got {_TOO_LARGE}") from None
     except (TypeError, ValueError):
         raise TypeError(f"{name} must be a number, got {value!r}") from None
     if finite and not math.isfinite(number):
@@ -116,7 +134,8 @@ def _as_float(value: Any, name: str, *, finite: bool) -> float:
 
 
 def _as_float_tuple(values: Any, name: str, *, finite: bool) -> tuple[float, ...]:
-    return tuple(read_only(np.atleast_1d(values), name, ndim=1, finite=finite).tolist())
+    several = isinstance(values, (list, tuple)) or np.ndim(values) != 0
+    return tuple(read_only(values if several else [values], name, ndim=1, finite=finite).tolist())
 
 
 def _as_mapping(values: Mapping[Any, Any], name: str) -> Mapping[Any, Any]:

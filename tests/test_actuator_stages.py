@@ -263,3 +263,24 @@ def test_readings_are_steps_of_noisy_displacements():
 def test_wrong_arguments_are_named(call, error, message):
     with pytest.raises(error, match=message):
         call()
+
+
+HALVES = [-2.5, -1.5, -0.5, 0.5, 1.5, 2.5]
+
+
+def test_a_displacement_halfway_between_two_readings_gives_the_upper_one():
+    """The quantum is a power of two: halves of it are exact, and no rounding decides."""
+    y = 0.25 * np.array(HALVES)
+    upper = 0.25 * np.array([-2.0, -1.0, 0.0, 1.0, 2.0, 3.0])
+    assert hs.Sensor(quantum=0.25).measure(y).tolist() == upper.tolist()
+    assert hs.Sensor(quantum=0.25).measure(y - 1e-12).tolist() == (upper - 0.25).tolist()
+
+
+@pytest.mark.parametrize("half", HALVES)
+def test_the_loop_reads_the_same_steps_as_the_sensor(half):
+    plant = hs.Actuator(hysteresis=hs.Line(slope=1.0), sensor=hs.Sensor(quantum=0.25))
+    for u0 in (0.25 * half, 0.25 * half - 1e-12, 0.25 * half + 0.1):
+        run = hs.close_loop(plant, hs.PID(kp=0.5), np.arange(4.0), np.zeros(4), u0=u0)
+        assert run.y[0] == u0
+        assert run.measurement[0] == hs.Sensor(quantum=0.25).measure([u0])[0]
+        assert np.array_equal(run.measurement, plant.sensor.measure(run.y))

@@ -145,3 +145,37 @@ def test_what_is_asked_wrongly_is_named(table1, options, error, message):
 def test_an_exponent_that_is_not_positive_is_refused(table1, n):
     with pytest.raises(ValueError, match="n must be positive"):
         hs.identify(hs.BoucWen, table1, fixed={"n": n})
+
+
+MASKED = np.ma.array([1.0, 2.0, 3.0], mask=[False, True, False])
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        lambda u: hs.Record(u=u, y=[1.0, 2.0, 3.0]),
+        lambda u: hs.Record(u=[1.0, 2.0, 3.0], y=u),
+        lambda u: hs.Record(u=[1.0, 2.0, 3.0], y=[1.0, 2.0, 3.0], t=u),
+        lambda u: hs.simulate(hs.BoucWen(), None, u),
+        lambda u: hs.BoucWen().response(u),
+        lambda u: hs.BoucWen.responses({"beta": u}, [0.0, 1.0]),
+        lambda u: hs.TransferFunction(num=(1.0,), den=(1.0, 1.0)).response(u, 1.0),
+        lambda u: hs.TransferFunction(num=u, den=(1.0, 1.0, 1.0, 1.0)),
+        lambda u: hs.PrandtlIshlinskii(thresholds=(0.0, 1.0, 2.0), weights=u),
+        lambda u: hs.loop_metrics(u, [1.0, 2.0, 3.0]),
+        lambda u: hs.metrics.rmse(u, [1.0, 2.0, 3.0]),
+        lambda u: hs.Sensor().measure(u),
+        lambda u: hs.Amplifier().voltage(u),
+        lambda u: hs.BoucWen(A=u[1]),
+    ],
+)
+@pytest.mark.parametrize("masked", [MASKED, list(MASKED)], ids=["array", "list"])
+def test_masked_values_are_refused_and_not_taken_for_numbers(use, masked):
+    with pytest.raises(ValueError, match="masked"):
+        use(masked)
+
+
+def test_a_mask_that_hides_nothing_changes_nothing():
+    u = np.ma.array([1.0, 2.0, 4.0])
+    assert hs.Record(u=u, y=u) == hs.Record(u=u.data, y=u.data)
+    assert type(hs.Record(u=u, y=u).u) is np.ndarray

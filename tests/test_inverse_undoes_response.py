@@ -1,6 +1,7 @@
 """The inverse of a law gives back the input, and the law gives back the output, to rounding."""
 
 import pickle
+from dataclasses import replace
 
 import numba
 import numpy as np
@@ -257,3 +258,58 @@ def test_the_inverse_is_a_plant_of_its_own():
     run = hs.close_loop(STACK.inverse(), hs.PID(ki=60.0), t, reference)
     assert np.abs(run.error[-100:]).max() < 0.1  # an integrator's lag, 2/60 of the amplitude, and a sample
     assert run.y[1:] == pytest.approx(STACK.inverse_response(np.append(0.0, run.u))[1:-1], abs=1e-13)
+
+
+FLAT_AT_ZERO = {"A": 1.0, "beta": 0.2, "gamma": 0.6, "gain": -1.0, "feedthrough": 0.95}  # a slope of -0.05 at z = 0
+
+
+def rising_inverse(law, y):
+    """Inputs on the branches on which the output rises with them, nan where there is none."""
+    compiled = replace(law.inverse(), increasing=True).compiled(u0=0.0)
+    return [compiled.step(compiled.parameters, compiled.state, each) for each in y.tolist()]
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_crossing_of_zero_between_two_samples_is_looked_at(side):
+    """The slope is positive at both samples, 0.15 and 0.35, and negative where the memory is zero in between."""
+    law = hs.BoucWen(**FLAT_AT_ZERO, z0=-0.5 * side)
+    u = np.array([0.0, 1.2 * side])
+    z = law.memory(u)
+    assert z[0] * z[1] < 0.0
+    slopes = law.tangent(side, z)
+    assert (slopes > 0.1).all()
+    assert np.isnan(rising_inverse(law, law.response(u))).tolist() == [False, True]
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_where_the_memory_keeps_its_sign_the_slope_at_zero_is_of_no_account(side):
+    law = hs.BoucWen(**FLAT_AT_ZERO, z0=0.5 * side)
+    u = side * np.array([0.0, 0.3, 0.5, 0.4, 0.9])
+    assert (law.memory(u) * side > 0.0).all()
+    assert rising_inverse(law, law.response(u)) == pytest.approx(u, abs=1e-14)
+
+
+@pytest.mark.parametrize(("A", "beta", "gamma"), [(0.3, 0.7, 0.2), (1.1, 0.1, 0.05), (0.7, 2.3, 0.9), (1e3, 0.3, 0.1)])
+def test_a_slope_of_zero_on_the_way_back_is_no_negative_one(A, beta, gamma):
+    """Where the law is saturated its slope back is f - 2 A beta / (gamma + beta), f the feedthrough."""
+    u = np.array([0.0, 1000.0, 1001.0, 1005.0])
+    flat = 2.0 * A * beta / (gamma + beta)
+
+    def found(excess):
+        law = hs.BoucWen(A=A, beta=beta, gamma=gamma, gain=-1.0, feedthrough=flat * (1.0 + excess))
+        return law.inverse_response(law.response(u), u0=0.0)
+
+    for roundings in (-4, -1, 0, 1, 4):
+        assert found(roundings * 2.0**-52) == pytest.approx(u, rel=1e-13)
+    for excess in (-1e-10, -1e-6):
+        with pytest.raises(hs.SimulationError, match="not positive"):
+            found(excess)
+
+
+@pytest.mark.parametrize("law", [STACK, ASYMMETRIC, hs.BoucWen(n=1.5, gain=0.5, feedthrough=0.2, offset=3.0)])
+def test_the_output_is_reached_to_a_few_roundings_of_its_terms(law):
+    u = 0.8 * walk(np.random.default_rng(3), 300 if numba.config.DISABLE_JIT else 3000) / 10.0
+    y = law.response(u)
+    again = law.response(law.inverse_response(y))
+    terms = np.abs(y) + np.abs(law.offset) + np.abs(law.gain * law.memory(u)) + np.abs(u)
+    assert (np.abs(again - y) <= 4.0 * 2.0**-52 * terms).all()  # 1.2 is measured

@@ -259,3 +259,14 @@ def test_wrong_arguments_are_named(changes, error, message):
 def test_a_sample_time_that_is_none_is_refused(sample_time):
     with pytest.raises(ValueError, match="sample_time must be positive"):
         plant().response([0.0, 1.0], sample_time)
+
+
+@pytest.mark.parametrize(
+    ("method", "closed"), [("split", 1e-9), ("runge-kutta", 1e-7), ("newmark", 1e-12), ("strang", 2e-4)]
+)
+@pytest.mark.parametrize("gain", [0.7, 2.5, -0.4])
+def test_the_energy_that_the_law_takes_is_that_of_its_gain(method, closed, gain):
+    """By every method; the tolerances are 50 times what is measured at the coarser of the two steps."""
+    law = replace(LAWS["benchmark"], gain=gain, A=2e4)
+    shaken = plant(law, method=method, substeps=64 if COMPILED else 16)
+    assert imbalance(shaken.signals(noise(120 if COMPILED else 15), 1.0 / RATE)) < closed

@@ -1,25 +1,26 @@
 """The command line: `hysim COMMAND ...`.
 
-Exit codes: 0 done, 1 a search did not converge, 2 bad input, 130 interrupted. Results go to the standard
-output, progress and errors to the standard error, an error in one line.
+Exit codes: 0 done, 1 a search did not converge, 2 bad input, 130 interrupted, 143 or 129 ended by SIGTERM or
+SIGHUP. Results go to the standard output, progress and errors to the standard error, an error in one line.
 """
 
 import argparse
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
 from typing import NoReturn
 
 from hysim import __version__
-from hysim.cli import compare, control, discover, identify, measure, metrics, plot, reproduce, simulate, sweep
+from hysim.cli import compare, control, discover, identify, measure, metrics, plot, reproduce, signals, simulate, sweep
 from hysim.errors import SimulationError
 
 _MODULES = (metrics, identify, discover, compare, simulate, control, plot, sweep, measure, reproduce)
 COMMANDS = {module.__name__.rpartition(".")[2]: module for module in _MODULES}
 """Every command by its name."""
 
-DONE, BAD_INPUT, INTERRUPTED = 0, 2, 130
+DONE, BAD_INPUT = 0, 2
 
 
 class _Parser(argparse.ArgumentParser):
@@ -31,11 +32,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     try:
         try:
-            return _run(sys.argv[1:] if arguments is None else list(arguments))
+            with signals.heeded():
+                return _run(sys.argv[1:] if arguments is None else list(arguments))
         finally:
             print(end="", flush=True)
     except KeyboardInterrupt:
-        return _failed(INTERRUPTED, "interrupted")
+        return _failed(signals.INTERRUPTED, signals.words(signal.SIGINT))
+    except signals.Ended as request:
+        return _failed(128 + request.number, signals.words(request.number))
     except BrokenPipeError:  # who reads the output has had enough of it
         return _discard(DONE)
     except MemoryError:

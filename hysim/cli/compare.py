@@ -55,7 +55,8 @@ def run(options: argparse.Namespace) -> int:
     from hysim.comparison import compare
 
     tables = options.csv, options.markdown, options.latex
-    is_taken = outputs.check(options.out, *tables, pictures=[options.plot], printed=options.json)
+    inputs = [options.file, options.test, *options.model]
+    is_taken = outputs.check(options.out, *tables, inputs=inputs, pictures=[options.plot], printed=options.json)
     record, test = records.read(options), options.test_cycles
     if options.test is not None:
         test = records.read(argparse.Namespace(**{**vars(options), "file": options.test}))

@@ -139,7 +139,8 @@ def _check(options: argparse.Namespace) -> bool:
     if options.c is not None and Path(options.c).suffix != ".c":
         raise ValueError(f"C code is a file and its header beside it: call the file .c, got {options.c}")
     header = None if options.c is None else str(Path(options.c).with_suffix(".h"))
-    return outputs.check(options.out, options.c, header, pictures=[options.plot], printed=options.json)
+    inputs = [options.model, options.record, options.reference]
+    return outputs.check(options.out, options.c, header, inputs=inputs, pictures=[options.plot], printed=options.json)
 
 
 def _designed(options: argparse.Namespace) -> "Design":

@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
     """Discover, write the files that are asked for, and print the result."""
     from hysim.discovery import discover
 
-    is_taken = outputs.check(options.out, pictures=[options.plot], printed=options.json)
+    is_taken = outputs.check(options.out, inputs=[options.file], pictures=[options.plot], printed=options.json)
     _check(options)
     record = records.read(options)
     found = discover(

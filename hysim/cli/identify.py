@@ -73,7 +73,9 @@ def run(options: argparse.Namespace) -> int:
     from hysim.identification import identify
     from hysim.models.storage import to_json
 
-    is_taken = outputs.check(options.out, pictures=[options.plot], printed=options.json)
+    is_taken = outputs.check(
+        options.out, inputs=[options.file, options.model], pictures=[options.plot], printed=options.json
+    )
     family, record = models.family(options), records.read(options)
     fit = identify(
         family,

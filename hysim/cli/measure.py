@@ -60,7 +60,9 @@ def run(options: argparse.Namespace) -> int:
     """Measure, write the table and the picture, and print the summary."""
     from hysim.vision import displacement
 
-    is_taken = outputs.check(table=options.out, pictures=[options.plot], printed=options.json)
+    is_taken = outputs.check(
+        table=options.out, inputs=[options.frames, options.voltage], pictures=[options.plot], printed=options.json
+    )
     log = _log(options)
     try:
         moved = displacement(

@@ -37,7 +37,7 @@ def run(options: argparse.Namespace) -> int:
     """Measure and print."""
     from hysim.metrics import loop_metrics
 
-    is_taken = outputs.check(options.out, pictures=[options.plot])
+    is_taken = outputs.check(options.out, inputs=[options.file], pictures=[options.plot])
     record = records.read(options)
     tolerance = {} if options.tolerance is None else {"tolerance": options.tolerance}
     loop = loop_metrics(record.u, record.y, cycles=options.cycles, **tolerance)

@@ -1,12 +1,13 @@
 """What commands write: whole files, text on the standard output, progress on a terminal."""
 
+import contextlib
 import csv
 import io
 import json
 import math
 import os
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -26,7 +27,11 @@ _ENDINGS = (".svg", ".png", ".pdf")
 
 
 def check(
-    *paths: str | None, pictures: Iterable[str | None] = (), table: str | None = None, printed: bool = False
+    *paths: str | None,
+    inputs: Iterable[str | None],
+    pictures: Iterable[str | None] = (),
+    table: str | None = None,
+    printed: bool = False,
 ) -> bool:
     """Refuse what cannot be written, before anything is computed; whether a path is the standard output.
 
@@ -34,7 +39,8 @@ def check(
     ------
     ValueError
         If a folder does not exist or may not be written to, a picture or a table has another ending than those known,
-        or two results would go to one place, such as the standard output beside what is `printed` there.
+        two results would go to one place, such as the standard output beside what is `printed` there, or a result
+        would take the place of one of the `inputs`.
     """
     drawn = [path for path in pictures if path is not None]
     given = [path for path in (*paths, table) if path is not None] + drawn
@@ -56,7 +62,31 @@ def check(
         raise ValueError("two results would go to the standard output: give one of them a file, or leave it out")
     if len({os.path.realpath(path) for path in given}) < len(given):
         raise ValueError(f"two results would go to one file, {given[0]}")
+    keep(inputs, given)
     return STANDARD in given
+
+
+def keep(inputs: Iterable[str | None], results: Iterable[str | None]) -> None:
+    """Refuse results that would take the place of an input, by whatever path or link.
+
+    Raises
+    ------
+    ValueError
+        If there is one.
+    """
+    targets = {path: os.stat(path) for path in results if path not in (None, STANDARD) and os.path.isfile(path)}
+    for source in inputs:
+        for path, target in targets.items():
+            if source is not None and any(os.path.samestat(target, each) for each in _files(source)):
+                raise ValueError(f"{path} is an input of this command, and would be overwritten: give another file")
+
+
+def _files(source: str) -> Iterator[os.stat_result]:
+    """What an input consists of: a file, the files of a folder, or what the standard input is read from."""
+    paths = [os.path.join(source, name) for name in os.listdir(source)] if os.path.isdir(source) else [source]
+    for path in paths:
+        with contextlib.suppress(OSError, ValueError):  # what cannot be read is said where it is read
+            yield os.fstat(sys.stdin.fileno()) if path == STANDARD else os.stat(path)
 
 
 def write(contents: "Mapping[str | None, str | bytes | Figure]") -> None:

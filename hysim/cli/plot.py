@@ -135,8 +135,8 @@ def add_to(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Draw and write."""
-    outputs.check(pictures=[options.out])
     kind, files = KINDS[options.kind], [options.file, *options.others]
+    outputs.check(inputs=[*files, *options.model], pictures=[options.out])
     for what, number, (least, most) in (("file", files, kind.records), ("--model", options.model, kind.models)):
         if not least <= len(number) <= most:
             wanted = str(least) if least == most else f"at least {least}"

@@ -32,7 +32,7 @@ def add_to(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Simulate and write."""
-    outputs.check(table=options.out, pictures=[options.plot])
+    outputs.check(table=options.out, inputs=[options.model, options.file], pictures=[options.plot])
     if options.model == options.file == records.STANDARD:
         raise ValueError("the standard input holds the model or the record, not both")
     model, units = models.read(options.model)

@@ -39,11 +39,12 @@ _SPACES = ("grid", "list", "sample")
 
 
 class Study(NamedTuple):
-    """What `sweep` takes."""
+    """What `sweep` takes, and the files that were read for it."""
 
     task: Callable[..., Any]
     space: Any
     seed: int
+    files: tuple[str, ...]
 
 
 def read(path: str) -> Study:
@@ -62,10 +63,17 @@ def read(path: str) -> Study:
         task, space = _one_of(document, ("task", "response")), _one_of(document, _SPACES)
         folder = Path(path).resolve().parent
         made = _named_task(document["task"], folder) if task == "task" else _response(document["response"], folder)
-        return Study(made, _space(space, document[space]), document.get("seed", 0))
+        files = _files(document[task], folder)
+        return Study(made, _space(space, document[space]), document.get("seed", 0), files)
     except (ValueError, TypeError, KeyError, AttributeError, ImportError) as error:
         missing = f"{error} is missing" if isinstance(error, KeyError) else str(error)
         raise ValueError(f"{path}: {missing}") from error
+
+
+def _files(source: Any, folder: Path) -> tuple[str, ...]:
+    """The files that a task or a response is read from."""
+    names = [source["law"], source["record"]] if isinstance(source, Mapping) else [source.rpartition(":")[0]]
+    return tuple(str(folder / name) for name in names)
 
 
 class FileTask:

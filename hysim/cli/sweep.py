@@ -55,7 +55,9 @@ def run(options: argparse.Namespace) -> int:
 
     if options.out == STANDARD:
         raise ValueError("the rows are kept in a database: give --out a file")
-    is_taken = outputs.check(options.out, options.csv, pictures=[options.plot], printed=options.json)
+    is_taken = outputs.check(
+        *(options.out, options.csv), inputs=[options.study, options.show], pictures=[options.plot], printed=options.json
+    )
     if options.show is not None:
         if options.study or options.out:
             raise ValueError("--show takes a database and computes nothing: leave the study and --out out")
@@ -109,7 +111,8 @@ def _computed(options: argparse.Namespace) -> Any:
         raise ValueError("give a study and --out RESULTS.sqlite, or --show RESULTS.sqlite")
     if Path(options.out).exists() and not options.resume:
         raise ValueError(f"{options.out} exists: --resume goes on with it; else give another --out")
-    task, space, seed = studies.read(options.study)
+    task, space, seed, files = studies.read(options.study)
+    outputs.keep(files, [options.out, options.csv, options.plot])
     with _executor(options) as executor:
         return sweep(
             task,

@@ -1,16 +1,20 @@
 """How a kernel is compiled: one decorator, so that every kernel is compiled alike.
 
 The compiled code is cached beside the source file, or in the user's cache folder. Where neither is
-writable the function is compiled anew in each process. It releases the interpreter lock, and it
-follows IEEE 754 (a division by zero is an infinity): kernels raise nothing, they return codes.
+writable, the disk is full or a file of the cache is damaged, the function is compiled anew. It releases
+the interpreter lock, and it follows IEEE 754 (a division by zero is an infinity): kernels raise nothing,
+they return codes.
 """
 
+import contextlib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 import numba
 from numba.core import cgutils
+from numba.core.caching import FunctionCache
+from numba.core.dispatcher import Dispatcher
 from numba.extending import intrinsic
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -25,12 +29,12 @@ def kernel(function: F) -> F:
 
 def inner(function: F) -> F:
     """As `kernel`, for a function that only kernels call: it has no entry from Python, which takes long to compile."""
-    return _compiled(function, **_NO_ENTRY)
+    return _compiled(function, (), **_NO_ENTRY)
 
 
 def inlined(function: F) -> F:
     """As `inner`, compiled into each of its callers, which saves the time of a call and costs that of a copy."""
-    return _compiled(function, forceinline=True, **_NO_ENTRY)
+    return _compiled(function, (), forceinline=True, **_NO_ENTRY)
 
 
 def signed_kernel(*signatures: Any) -> Callable[[F], F]:
@@ -49,14 +53,46 @@ def signed_inlined(*signatures: Any) -> Callable[[F], F]:
     return lambda function: _compiled(function, list(signatures), forceinline=True, **_NO_ENTRY)
 
 
-def _compiled(function: F, *signature: Any, **others: Any) -> F:
+def _compiled(function: F, signatures: Sequence[Any] = (), **others: bool) -> F:
     compiler: Any = numba.njit
-    options = {"nogil": True, "error_model": "numpy", **others}
-    try:
-        compiled: F = compiler(*signature, cache=True, **options)(function)
-    except RuntimeError:  # numba found no writable folder for its cache
-        compiled = compiler(*signature, **options)(function)
-    return compiled
+    compiled: Any = compiler(nogil=True, error_model="numpy", **others)(function)
+    is_compiled = isinstance(compiled, Dispatcher)  # and not the function, where numba is told to compile nothing
+    if is_compiled:
+        with contextlib.suppress(OSError, RuntimeError):  # numba found no writable folder
+            compiled._cache = _cache(function)
+        for signature in signatures:
+            compiled.compile(signature)
+        if signatures:
+            compiled.disable_compile()
+    result: F = compiled
+    return result
+
+
+def _cache(function: Any) -> Any:
+    """numba's cache of a function, which is as if it were empty where it cannot be read, and is left where it is full.
+
+    In place of numba's own ``cache=True``, which ends in an error there.
+    """
+    maker: Any = FunctionCache
+    cache = maker(function)
+    load, save = cache.load_overload, cache.save_overload
+
+    def loaded(signature: Any, context: Any) -> Any:
+        try:
+            return load(signature, context)
+        except Exception:  # what unpickling raises depends on where the file was cut
+            return None
+
+    def saved(signature: Any, data: Any) -> None:
+        with contextlib.suppress(Exception):
+            try:
+                save(signature, data)
+            except Exception:
+                cache.flush()  # a damaged index, to which nothing can be added
+                save(signature, data)
+
+    cache.load_overload, cache.save_overload = loaded, saved
+    return cache
 
 
 def borrowed(array: Any) -> Any:

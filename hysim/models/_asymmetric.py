@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
+from hysim._parallel import in_pieces
 from hysim.errors import SimulationError
 from hysim.kernels.batches import drive_each
 from hysim.kernels.stepping import Step, drive
@@ -116,7 +117,7 @@ class SteppedLaw(PolynomialInput):
         law = self._compiled(_MEMORY_ITSELF, state)
         z = np.empty(u.size)
         with np.errstate(all="ignore"):
-            escaped = drive(law.step, law.parameters, law.state, u, z)
+            escaped = in_pieces(lambda k: drive(law.step, law.parameters, law.state, u[k], z[k]), u.size)
         if escaped >= 0:
             what = "is too stiff to be followed" if np.isnan(z[escaped]) else "escapes to infinity"
             raise SimulationError(f"the memory {what} at sample {escaped} (u = {u[escaped]:g})")

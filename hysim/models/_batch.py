@@ -48,7 +48,7 @@ class Batch(NamedTuple):
             self.compute(slice(start, stop), self._inputs(slice(start, stop)), y[start:stop])
 
         if self.order is None:
-            in_chunks(work, self.n_sets, workers=workers)
+            in_chunks(work, self.n_sets, workers=workers, n_samples=self.u.shape[1])
         else:
             self._in_blocks(y.__setitem__, workers)
         return y
@@ -101,7 +101,7 @@ class Batch(NamedTuple):
                 self.compute(sets, self._inputs(sets), part)
                 keep(sets, part)
 
-        in_chunks(work, self.n_sets, workers=workers)
+        in_chunks(work, self.n_sets, workers=workers, n_samples=self.u.shape[1])
 
     def _inputs(self, sets: Sets) -> FloatArray:
         return self.u if len(self.u) == 1 else part_of(self.u, sets)

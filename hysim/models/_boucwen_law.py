@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
+from hysim._parallel import in_pieces
 from hysim.errors import SimulationError
 from hysim.kernels import boucwen as kernels
 from hysim.kernels.charts import N_WORK
@@ -226,16 +227,20 @@ class BoucWenLaw(MemoryLaw):
 
     def _memory(self, u: FloatArray, state: State) -> tuple[FloatArray, State]:
         z = np.empty(u.size)
-        law = self.A, self.beta, self.gamma
-        start = float(state[0]), float(state[1])
-        if self.n == 1.0:
-            escaped = kernels.linear_path(*law, *start, u, z)
-        elif self.n == 2.0:
-            escaped = kernels.quadratic_path(*law, *start, u, z)
-        else:
-            work = np.empty(N_WORK)
-            kernels.prepare(*law, self.n, 0.0, work)
-            escaped = kernels.power_path(*law, self.n, *start, u, work, z)
+        law, tables = (self.A, self.beta, self.gamma), np.empty(N_WORK)
+        if self.n not in (1.0, 2.0):
+            kernels.prepare(*law, self.n, 0.0, tables)
+
+        def path(piece: slice) -> int:
+            k = piece.start
+            start = (float(u[k - 1]), float(z[k - 1])) if k else (float(state[0]), float(state[1]))
+            if self.n == 1.0:
+                return int(kernels.linear_path(*law, *start, u[piece], z[piece]))
+            if self.n == 2.0:
+                return int(kernels.quadratic_path(*law, *start, u[piece], z[piece]))
+            return int(kernels.power_path(*law, self.n, *start, u[piece], tables, z[piece]))
+
+        escaped = in_pieces(path, u.size)
         if escaped >= 0:
             raise SimulationError(
                 f"the memory escapes to infinity at sample {escaped} (u = {u[escaped]:g}): with beta + gamma = "

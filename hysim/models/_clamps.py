@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
+from hysim._parallel import in_pieces
 from hysim.kernels import clamps as kernels
 from hysim.models._batch import Batch, Reduction, Sets, part_of
 from hysim.models.composable import Composable
@@ -88,7 +89,13 @@ class ClampLaw(Bank):
         inputs = read_only(u, "u", ndim=1)
         thresholds, _, z0 = self.elements
         z = np.empty((inputs.size, thresholds.size))
-        kernels.positions(thresholds, z0.copy(), inputs, z)
+        moving = z0.copy()
+
+        def path(piece: slice) -> int:
+            kernels.positions(thresholds, moving, inputs[piece], z[piece])
+            return -1
+
+        in_pieces(path, inputs.size)
         return z if self.bank else z[:, 0]
 
     def response(self, u: npt.ArrayLike) -> FloatArray:
@@ -139,7 +146,13 @@ class ClampLaw(Bank):
         if z.size != thresholds.size:
             raise ValueError(f"the state must hold {1 + thresholds.size} numbers, got {len(start)}")
         y = np.empty(inputs.size)
-        kernels.path(thresholds, weights, self._output(), z, np.empty(z.size), inputs, y)
+        output, terms = self._output(), np.empty(z.size)
+
+        def path(piece: slice) -> int:
+            kernels.path(thresholds, weights, output, z, terms, inputs[piece], y[piece])
+            return -1
+
+        in_pieces(path, y.size)
         return y, (float(inputs[-1]), *z.tolist()) if y.size else start
 
     def compiled(self, u0: float = 0.0) -> CompiledLaw:

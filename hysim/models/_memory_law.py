@@ -231,7 +231,7 @@ class MemoryLaw(Composable, ABC):
         [0.41, 0.595, 0.746]
         """
         sets = cls._to_scalars(parameters)
-        template = cls._from_scalars({name: float(np.ravel(values)[0]) for name, values in sets.items()})
+        template = cls._from_scalars({name: float(read_only(values, name).ravel()[0]) for name, values in sets.items()})
         columns, inputs = template._columns(sets, u)
         output = np.stack([columns[name] for name in ("gain", "offset", *template.coefficient_names)], axis=1)
         laws = batch(template._table(columns), read_only(output), inputs, template._batch)

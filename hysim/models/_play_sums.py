@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
+from hysim._parallel import in_pieces
 from hysim.errors import SimulationError
 from hysim.kernels import play_sums as kernels
 from hysim.kernels.custom import drive_sets
@@ -40,7 +41,7 @@ class PlaySteps(NamedTuple):
         start = (float(inputs[0]) if inputs.size else 0.0, *self.z0.tolist()) if state is None else state
         moving = self._moving(start)
         y = np.empty(inputs.size)
-        drive(kernels.step, self.parameters, moving, inputs, y)
+        in_pieces(lambda k: drive(kernels.step, self.parameters, moving, inputs[k], y[k]), y.size)
         return y, tuple(moving.tolist()) if y.size else start
 
     def widened(self, u: npt.ArrayLike, widening: FloatArray) -> FloatArray:
@@ -81,7 +82,8 @@ class PlaySteps(NamedTuple):
         else:
             start = state
         u = np.empty(wanted.size)
-        lost = drive(kernels.inverse_step, self.parameters, self._moving(start), wanted, u)
+        moving = self._moving(start)
+        lost = in_pieces(lambda k: drive(kernels.inverse_step, self.parameters, moving, wanted[k], u[k]), u.size)
         if lost >= 0:
             raise SimulationError(f"no input gives the output at sample {lost} (y = {wanted[lost]:g})")
         return u

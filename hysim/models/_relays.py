@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
+from hysim._parallel import in_pieces
 from hysim.kernels import preisach as kernels
 from hysim.models._batch import Batch, Reduction, Sets, part_of
 from hysim.models.composable import Composable
@@ -97,7 +98,13 @@ class RelayLaw(Composable, ABC):
         parameters, x, outputs, d = self._begun(past, inputs.size)
         y = np.empty(inputs.size)
         before = float(x[d]) if state is None else state[0]
-        d = kernels.path(parameters, x, outputs, d, inputs, y)
+
+        def path(piece: slice) -> int:
+            nonlocal d
+            d = kernels.path(parameters, x, outputs, d, inputs[piece], y[piece])
+            return -1
+
+        in_pieces(path, y.size)
         return y, (float(inputs[-1]) if y.size else before, *x[1 : d + 1].tolist())
 
     def staircase(self, u: npt.ArrayLike) -> FloatArray:

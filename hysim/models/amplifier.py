@@ -163,7 +163,7 @@ class Amplifier:
     def voltage(self, u: npt.ArrayLike) -> FloatArray:
         """Voltage that a command comes to when it is held, in the shape of `u`."""
         lowest, highest = self.limits or (-math.inf, math.inf)
-        return np.clip(self.gain * np.asarray(u, dtype=float) + self.offset, lowest, highest)
+        return np.clip(self.gain * read_only(u, "u", finite=False) + self.offset, lowest, highest)
 
     def compiled(self, step: float, u0: float = 0.0) -> CompiledAmplifier:
         """The amplifier as compiled loops take it, for sub-steps of this length [s], at rest at the command `u0`."""

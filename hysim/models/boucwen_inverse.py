@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen, read_only
+from hysim._parallel import in_pieces
 from hysim.errors import SimulationError
 from hysim.kernels import boucwen_inverse as kernels
 from hysim.kernels.stepping import drive
@@ -124,7 +125,9 @@ class BoucWenInverse:
         compiled = self._compiled(start)
         u = np.empty(samples.size)
         with np.errstate(all="ignore"):  # a bracket may reach where the memory overflows
-            failed = drive(compiled.step, compiled.parameters, compiled.state, samples, u)
+            failed = in_pieces(
+                lambda k: drive(compiled.step, compiled.parameters, compiled.state, samples[k], u[k]), u.size
+            )
         if failed >= 0:
             raise SimulationError(self._failure(failed, samples[failed], *compiled.state[1:3]))
         last_y, last_u, z = compiled.state[[0, kernels.N_OWN, kernels.N_OWN + 1]].tolist()

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, checked, read_only
-from hysim._parallel import in_chunks
+from hysim._parallel import in_chunks, in_pieces
 from hysim.errors import SimulationError
 from hysim.kernels.custom import compile_step, drive_sets
 from hysim.kernels.stepping import Step, drive
@@ -160,7 +160,7 @@ class CustomLaw(Composable):
             raise ValueError(f"the state must hold {compiled.state.size} numbers, got {memory.size}")
         y = np.empty(inputs.size)
         with np.errstate(all="ignore"):
-            lost = drive(compiled.step, compiled.parameters, memory, inputs, y)
+            lost = in_pieces(lambda k: drive(compiled.step, compiled.parameters, memory, inputs[k], y[k]), y.size)
         if lost >= 0:
             raise SimulationError(f"the output leaves the finite numbers at sample {lost} (u = {inputs[lost]:g})")
         return y, tuple(memory.tolist())
@@ -250,7 +250,7 @@ class CustomLaw(Composable):
             with np.errstate(all="ignore"):
                 drive_sets(step, table, state, u, out, start, stop)
 
-        in_chunks(work, n_sets)
+        in_chunks(work, n_sets, n_samples=u.size)
         return out
 
 

@@ -25,6 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
+from hysim._parallel import in_pieces
 from hysim.errors import SimulationError
 from hysim.kernels import duhem as kernels
 from hysim.models import _duhem_search, _numeric_inverse
@@ -461,8 +462,15 @@ class Duhem(Composable):
         if not u.size:
             return z
         last_u, start = self._start(float(u[0])) if state is None else map(float, state)
+        laws = branches(self._parts)
+
+        def path(piece: slice) -> int:
+            k = piece.start
+            before = (float(u[k - 1]), float(z[k - 1])) if k else (last_u, start)
+            return int(kernels.path(laws, *before, u[piece], kernels.LARGEST, z[piece]))
+
         with np.errstate(all="ignore"):  # an escape overflows, and uncompiled kernels would warn of it
-            lost = kernels.path(branches(self._parts), last_u, start, u, kernels.LARGEST, z)
+            lost = in_pieces(path, u.size)
         if lost >= 0:
             what = "is too stiff to be followed" if np.isnan(z[lost]) else "escapes to infinity"
             raise SimulationError(f"the output {what} at sample {lost} (u = {u[lost]:g}): {self.equation}")

@@ -8,7 +8,7 @@ The noise is gaussian and white from sample to sample, a function of the seed an
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, read_only
 from hysim.models.model import model
 
 
@@ -61,6 +61,6 @@ class Sensor:
 
     def measure(self, y: npt.ArrayLike) -> FloatArray:
         """Readings of displacements that are as old as the delay has them, shape (n,)."""
-        seen = np.asarray(y, dtype=float)
+        seen = read_only(y, "y", finite=False)
         noisy = seen + self.noise_samples(seen.size)
         return self.quantum * np.floor(noisy / self.quantum + 0.5) if self.quantum else noisy

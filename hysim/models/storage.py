@@ -4,7 +4,8 @@ A model inside another, such as the law of an actuator, is a family with its par
 """
 
 import json
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,9 @@ import numpy as np
 import hysim
 from hysim._atomic import write_text
 from hysim.models.model import FAMILIES, every_family
+
+_DEEPEST = 100  # lists and mappings in each other: a chain of chains takes three for a model
+_LONGEST, _BRIEF = 1000, 60  # signs of a message, and of a value in it
 
 
 def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None) -> None:
@@ -32,6 +36,8 @@ def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None
     ------
     TypeError
         If `model` is not a model.
+    ValueError
+        If it holds models in models, more than `load_model` takes.
     OSError
         If the file cannot be written.
 
@@ -51,6 +57,7 @@ def to_json(model: Any, *, units: Mapping[str, str] | None = None) -> str:
     if not is_model(model):
         raise TypeError(f"save takes a model of hysim, got {type(model).__name__}")
     document = {"hysim": hysim.__version__, **to_document(model), "units": dict(units or {})}
+    _check_depth(document)
     return json.dumps(document, indent=2, allow_nan=False) + "\n"
 
 
@@ -79,27 +86,57 @@ def load_model(path: str | Path) -> Any:
 def from_json(text: str | bytes, source: str | Path) -> tuple[Any, dict[str, str]]:
     """The model that `to_json` wrote, and the units; errors call the text by the name of its `source`."""
     try:
-        document = json.loads(text)
+        document = json.loads(text, object_pairs_hook=_each_name_once)
+        _check_depth(document)
         head = {"family": document["family"], "parameters": {**document["parameters"]}}
         units = {str(name): str(unit) for name, unit in document.get("units", {}).items()}
     except (AttributeError, KeyError, TypeError, ValueError, RecursionError) as error:
-        raise ValueError(f"{source} does not hold a model of hysim: {type(error).__name__}: {error}") from None
+        raise ValueError(
+            f"{source} does not hold a model of hysim: {type(error).__name__}: {_one_line(error)}"
+        ) from None
     return from_document(head, source), units
+
+
+def _each_name_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A mapping of JSON, of which a name that stands there twice would keep the last value only."""
+    mapping = dict(pairs)
+    if len(mapping) < len(pairs):
+        twice = next(name for name, number in Counter(name for name, _ in pairs).items() if number > 1)
+        raise ValueError(f"{twice!r} is there twice")
+    return mapping
+
+
+def _check_depth(document: Any) -> None:
+    """Refuse values nested so deeply that neither Python nor NumPy would take them."""
+    layer = [document]
+    for _ in range(_DEEPEST):
+        layer = [item for each in layer for item in _members(each)]
+        if not layer:
+            return
+    raise ValueError(f"lists and mappings are nested more than {_DEEPEST} deep")
+
+
+def _members(value: Any) -> Iterable[Any]:
+    return value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
 
 
 def from_document(document: Mapping[str, Any], path: str | Path) -> Any:
     """The model of a family with its parameters, models among them; `path` is what the messages call its place."""
-    family, given = str(document["family"]), document["parameters"]
+    family, given = document["family"], document["parameters"]
+    if not isinstance(family, str):
+        raise ValueError(f"{path} does not hold a model of hysim: the family must be a name, got {_shown(family)}")
+    if not isinstance(given, Mapping):
+        raise ValueError(f"{path} does not hold a {family}: parameters must be a mapping, got {_shown(given)}")
     if family in hysim.__all__:
         getattr(hysim, family)  # loads its module, which enters it into the families
     if family not in FAMILIES:
         known = ", ".join(sorted(every_family()))
-        raise ValueError(f"{path} holds a model of the family {family!r}; there are {known}")
+        raise ValueError(f"{path} holds a model of the family {_shown(family)}; there are {known}")
     try:
         parameters = {name: _value(value, path) for name, value in given.items()}
         loaded = FAMILIES[family](**parameters)
-    except (AttributeError, TypeError, ValueError) as error:
-        raise ValueError(f"{path} does not hold a {family}: {error}") from None
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        raise ValueError(f"{path} does not hold a {family}: {_one_line(error)}") from None
     if missing := [field.name for field in fields(loaded) if field.name not in parameters]:
         raise ValueError(f"{path} does not hold a whole {family}: {', '.join(missing)} missing")
     return loaded
@@ -110,6 +147,16 @@ def _value(value: Any, path: str | Path) -> Any:
     if isinstance(value, list):
         return [_value(each, path) for each in value]
     return from_document(value, path) if is_document(value) else value
+
+
+def _one_line(error: Exception) -> str:
+    text = " ".join(str(error).split())
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4]} ..."
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= _BRIEF else f"{text[: _BRIEF - 4]} ..."
 
 
 def is_model(value: Any) -> bool:

@@ -5,7 +5,7 @@ from concurrent.futures import Future
 from typing import Any
 
 from hysim._frozen import frozen
-from hysim._parallel import second_process
+from hysim._parallel import awaited, second_process
 from hysim.models.actuator import Actuator
 from hysim.models.transfer_function import TransferFunction
 from hysim.paper.approximations import Approximation, approximations
@@ -70,9 +70,9 @@ def find(*, quick: bool = False, progress: Progress | None = None) -> Findings:
                 begun["loops"] = beside.submit(loops, fit.model)
 
         steps = _Steps(progress)
-        models = study(quick=quick, progress=steps.inner, found=begin, asymmetric=lambda _: asymmetric.result())
+        models = study(quick=quick, progress=steps.inner, found=begin, asymmetric=lambda _: awaited(asymmetric))
         steps.next("closed loops")
-        reidentification, closed = begun["reidentification"].result(), begun["loops"].result()
+        reidentification, closed = awaited(begun["reidentification"]), awaited(begun["loops"])
     steps.next("claims")
     law = models.fits["bouc-wen"].model
     return Findings(

@@ -17,7 +17,7 @@ import numpy as np
 
 from hysim._atomic import write_all
 from hysim._frozen import frozen
-from hysim._parallel import second_process
+from hysim._parallel import awaited, second_process
 from hysim.comparison import Comparison
 from hysim.datasets import table2
 from hysim.discovery import Discovery
@@ -92,7 +92,8 @@ def contents(computed: Findings) -> dict[str, str]:
     with second_process() as beside:
         of_models = beside.submit(_model_drawings, computed.study.comparison, computed.study.discovery)
         drawn = _paper_drawings(computed)
-        drawn |= of_models.result()
+        elsewhere = awaited(of_models)
+        drawn |= elsewhere
     summary = _summary(computed)
     return {
         **{f"figures/{name}.svg": svg for name, svg in drawn.items()},

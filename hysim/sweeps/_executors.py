@@ -3,18 +3,12 @@
 The only contract is that of `concurrent.futures.Executor`; a dask client gives one by its `get_executor`.
 """
 
-import multiprocessing
-import multiprocessing.connection
-import os
-import signal
-import sys
-import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import Future
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
-from hysim._parallel import cores
+from hysim._parallel import cores, processes, threads
 from hysim.sweeps._chunks import Chunk, Outcome, Task, computed
 
 _of_process: list[Task] = []  # the task of the study that this process was started for
@@ -41,10 +35,10 @@ def workers_of(executor: Any, number: int | None, task: Task) -> Iterator[Worker
     if number is not None and (isinstance(number, bool) or not isinstance(number, int) or number < 1):
         raise ValueError(f"workers must be an integer of at least 1, got {number!r}")
     if executor in (None, "threads"):
-        with _ended(ThreadPoolExecutor(number or cores())) as pool:
+        with threads(number or cores()) as pool:
             yield Workers(lambda chunk: pool.submit(computed, task, chunk), lambda: number or cores())
     elif executor == "processes":
-        with _ended(_processes(number or cores(), task)) as pool:
+        with processes(number or cores(), _begin, task) as pool:
             yield Workers(lambda chunk: pool.submit(_computed_here, chunk), lambda: number or cores())
     elif isinstance(executor, str):
         raise ValueError(f'executor must be "threads", "processes", an Executor or a dask client, got {executor!r}')
@@ -61,38 +55,8 @@ def workers_of(executor: Any, number: int | None, task: Task) -> Iterator[Worker
         raise TypeError(f"executor must have the method submit of concurrent.futures.Executor, got {executor!r}")
 
 
-@contextmanager
-def _ended(pool: Executor) -> Iterator[Executor]:
-    """A pool that ends with the block: processes at once if it fails, threads after their chunk."""
-    before = {*multiprocessing.active_children()}
-    try:
-        yield pool
-    except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        for process in {*multiprocessing.active_children()} - before:
-            process.terminate()
-        raise
-    pool.shutdown()
-
-
-def _processes(number: int, task: Task) -> ProcessPoolExecutor:
-    """Processes that are given the task once: forked where that is usual, so that it need not be pickled."""
-    context = multiprocessing.get_context("fork" if sys.platform.startswith("linux") else None)
-    return ProcessPoolExecutor(number, mp_context=context, initializer=_begin, initargs=(task,))
-
-
 def _begin(task: Task) -> None:
-    """An interrupt is the parent's alone, and no process outlives it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
     _of_process[:] = [task]
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        multiprocessing.connection.wait([parent.sentinel])
-        os._exit(1)
 
 
 def _computed_here(chunk: Chunk) -> Outcome:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hysim._parallel import Progress
+from hysim._parallel import GLANCE, Progress
 from hysim.sweeps._chunks import Chunk, Outcome, part_of
 from hysim.sweeps._executors import Workers, workers_of
 from hysim.sweeps._identity import identity
@@ -29,7 +29,7 @@ _CHUNK, _SHORTEST = 0.075, 0.002  # seconds
 _WITH_ARRAYS = 0.5  # seconds; a shard for each
 _MOST_A_SECOND = 500  # chunks: a scheduler takes a millisecond for each
 _GROWTH = 4
-_PATIENCE = 1.0  # seconds, after an interrupt, for what is being computed
+_PATIENCE = 0.6  # seconds, after an interrupt, for what is being computed
 
 
 def sweep(
@@ -197,10 +197,9 @@ class _Study:
 
     def _wait(self) -> None:
         """Until a chunk can be settled; before the layout is known, that is the first one."""
-        if self.table.layout is None:
-            wait([next(iter(self.running))])
-        else:
-            wait(self.running, return_when=FIRST_COMPLETED)
+        futures = [next(iter(self.running))] if self.table.layout is None else [*self.running]
+        while not any(future.done() for future in futures):
+            wait(futures, timeout=GLANCE, return_when=FIRST_COMPLETED)  # and look for an interrupt
 
     def _settle(self) -> None:
         """Judge, write, enter and report what is finished, in the order of the tasks until the layout is known."""

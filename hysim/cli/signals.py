@@ -1,0 +1,93 @@
+"""How a command ends on Ctrl-C, SIGTERM or SIGHUP: in order if it can, and in any case soon.
+
+Python raises an exception between two steps of its own, never inside a call of a compiled library: what such a call
+computes for long would keep a signal waiting. A thread therefore looks after `PATIENCE` whether the command has
+ended, and ends the process if it has not.
+"""
+
+import contextlib
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from types import FrameType
+from typing import NoReturn
+
+INTERRUPTED = 128 + signal.SIGINT
+"""Exit code after Ctrl-C; after another signal it is 128 and its number too, as shells have it."""
+
+PATIENCE = 1.3
+"""Seconds in which a command can end in order."""
+
+_NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
+
+
+class Ended(BaseException):
+    """A signal asks the process to end: what is half written is removed on the way out, as after Ctrl-C."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.number = number
+
+
+def words(number: int) -> str:
+    """What is said of the end by a signal."""
+    return "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
+
+
+@contextlib.contextmanager
+def heeded() -> Iterator[None]:
+    """Make signals that would end the process at once raise an exception, unless someone else handles them.
+
+    In another thread than the main one, where Python lets nobody say what happens on a signal, this does nothing.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    wanted = [signal.Signals[name] for name in _NAMES if name in signal.Signals.__members__]
+    ours = [number for number in wanted if signal.getsignal(number) is signal.SIG_DFL]
+    watched = [*ours, *(number for number in wanted if signal.getsignal(number) is signal.default_int_handler)]
+    for number in ours:
+        signal.signal(number, _raise)
+    try:
+        with _watched(frozenset(watched)):
+            yield
+    finally:
+        for number in ours:
+            signal.signal(number, signal.SIG_DFL)
+
+
+def _raise(number: int, _: FrameType | None) -> NoReturn:
+    raise Ended(number)
+
+
+@contextlib.contextmanager
+def _watched(numbers: frozenset[int]) -> Iterator[None]:
+    """Let a thread read which signals come, as they come, and end the process if the block does not end in time."""
+    if sys.platform == "win32":  # where only a socket could be written to
+        yield
+        return
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    is_over = threading.Event()
+    thread = threading.Thread(target=_watch, args=(reader, numbers, is_over), daemon=True)
+    before = signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
+    thread.start()
+    try:
+        yield
+    finally:
+        is_over.set()
+        signal.set_wakeup_fd(before)
+        os.close(writer)
+        thread.join()
+        os.close(reader)
+
+
+def _watch(reader: int, numbers: frozenset[int], is_over: threading.Event) -> None:
+    """Wait for a signal, and then for the end; the other side of the pipe is closed at the end."""
+    while came := os.read(reader, 1):
+        if came[0] in numbers and not is_over.wait(PATIENCE):
+            start = b"\r\x1b[K" if sys.stderr is not None and sys.stderr.isatty() else b""
+            os.write(2, start + f"hysim: {words(came[0])}\n".encode())
+            os._exit(128 + came[0])

@@ -1,0 +1,125 @@
+"""A cache of compiled code that is damaged, full or forbidden costs time, and neither the run nor a digit."""
+
+import errno
+import importlib.util
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import pytest
+from numba.core.caching import IndexDataCacheFile
+
+compiled = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
+
+SOURCE = """
+from numba import float64
+
+from hysim.kernels._compile import kernel, signed_kernel
+
+
+@kernel
+def twice(x):
+    return 2.0 * x
+
+
+@signed_kernel(float64(float64))
+def thrice(x):
+    return twice(x) + x
+"""
+
+
+@pytest.fixture
+def kernels(tmp_path, monkeypatch):
+    """Load the kernels anew, as a process of its own would."""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "cache"))
+    (tmp_path / "own_kernels.py").write_text(SOURCE)
+
+    def load():
+        spec = importlib.util.spec_from_file_location("own_kernels", tmp_path / "own_kernels.py")
+        module = importlib.util.module_from_spec(spec)
+        sys.modules["own_kernels"] = module
+        spec.loader.exec_module(module)
+        assert (module.twice(1.5), module.thrice(1.5)) == (3.0, 4.5)
+        return module
+
+    yield load
+    sys.modules.pop("own_kernels", None)
+
+
+def hits(module):
+    return [sum(each.stats.cache_hits.values()) for each in (module.twice, module.thrice)]
+
+
+@compiled
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+@pytest.mark.parametrize("kept", [0.0, 0.5, 0.99])
+def test_a_file_that_is_cut_is_written_anew(kernels, tmp_path, ending, kept):
+    assert hits(kernels()) == [0, 0]
+    files = sorted(tmp_path.rglob(f"*.{ending}"))
+    assert len(files) == 2
+    for file in files:
+        content = file.read_bytes()
+        file.write_bytes(content[: int(kept * len(content))])
+    assert hits(kernels()) == [0, 0]
+    assert hits(kernels()) == [1, 1]
+
+
+@compiled
+@pytest.mark.parametrize("content", [b"no pickle", b"cos\\nnothing\\n.", b"\x80\x04\x8c\xff", b"\x80\x05N."])
+def test_a_file_that_holds_something_else_is_written_anew(kernels, tmp_path, content):
+    kernels()
+    for file in tmp_path.rglob("*.nb?"):
+        file.write_bytes(content)
+    assert hits(kernels()) == [0, 0]
+    assert hits(kernels()) == [1, 1]
+
+
+@compiled
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EACCES, errno.EROFS, errno.EDQUOT])
+def test_a_disk_that_takes_nothing_is_done_without(kernels, tmp_path, monkeypatch, number):
+    def refused(*_):
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(IndexDataCacheFile, "_open_for_write", refused)
+    assert hits(kernels()) == [0, 0]
+    assert not list(tmp_path.rglob("*.nb?"))
+
+
+@compiled
+def test_a_cache_that_may_not_be_read_is_done_without(kernels, tmp_path):
+    kernels()
+    for file in tmp_path.rglob("*.nb?"):
+        file.unlink()
+        file.mkdir()  # which fails whoever asks, the superuser too
+    assert hits(kernels()) == [0, 0]
+
+
+@compiled
+def test_a_file_where_the_folder_should_be_is_done_without(kernels, tmp_path, monkeypatch):
+    (tmp_path / "cache").write_text("in the way")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    assert hits(kernels()) == [0, 0]
+    assert (tmp_path / "cache").read_text() == "in the way"
+
+
+@compiled
+def test_a_process_that_may_write_no_byte_computes(tmp_path):
+    (tmp_path / "own_kernels.py").write_text(SOURCE)
+    run = "import own_kernels; print(own_kernels.thrice(1.5))"
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", run],
+        cwd=tmp_path,
+        env={
+            **os.environ,
+            "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+            "PYTHONPATH": os.pathsep.join([str(tmp_path), str(Path(__file__).parent.parent), *sys.path]),
+        },
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0)),
+        capture_output=True,
+        text=True,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "4.5\n", "")
+    assert not [file for file in tmp_path.rglob("*.nb?") if file.stat().st_size]
