@@ -245,7 +245,7 @@ def test_the_width_error_is_the_rms_difference_of_signed_widths():
         ([0, 1, 0], [0, 1, math.inf], "y must be finite, got inf at index 2"),
         ([0, 1, 2, 3], [0, 1, 2, 3], "found 0: it turns at 0, 3"),
         ([0, 1, 0.5], [0, 1, 0], "found 0: it turns at 0, 1, 0.5"),
-        (np.sin(np.linspace(0, 2 * np.pi, 50)), np.zeros(50), "one and a half periods"),
+        ([0, 3, -3, -1], [0, 1, -1, 0], "a level to one extreme or to both and back to the level, such as 0, max"),
     ],
 )
 def test_what_is_no_loop_is_refused(u, y, message):
