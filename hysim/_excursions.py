@@ -5,11 +5,11 @@ each side, are a cycle; an excursion without a partner on the other side, as in 
 its own. What lies ahead of the first excursion belongs to no cycle, nor does the last excursion of a record whose
 excursions alternate, which is half a cycle.
 
-The level is the input at the first sample if as many branches reach it as reach any other level; otherwise the middle
-of the widest range of levels that most branches reach. The record's first and last branch do not count there, since
-they may be cut off. A turning point within the tolerance of the level counts as at
-the level. Between two samples the input is linear, and a cycle begins and ends between them where the level is passed.
-Of several passages in one branch (noise, a pause) the middle one is taken.
+The level is the input at the first sample, where tests begin at rest, or else the middle of the levels that the
+branches of the greatest total length reach: whichever gives cycles of the larger total span. The record's first and
+last branch do not count there, since they may be cut off. A turning point within the tolerance of the level counts as
+at the level. Between two samples the input is linear, and a cycle begins and ends between them where the level is
+passed. Of several passages in one branch (noise, a pause) the middle one is taken.
 
 Source: ATC-24, Guidelines for Cyclic Seismic Testing of Components of Steel Structures, Applied Technology Council,
 1992, glossary ("excursion", "cycle"); FEMA 461 (2007) and ISO 16670 (2003) count their protocols in the same cycles.
@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hysim._cycles import NEAR, Cycle, complete_cycles, too_few, turns
+from hysim._cycles import NEAR, ROUNDING, Cycle, complete_cycles, too_few, turns
 from hysim._frozen import FloatArray
 
 _FULL = 1.0 - 2.0 * NEAR
@@ -102,39 +102,57 @@ def full_amplitude(u: FloatArray, found: Protocol) -> list[int]:
 
 
 def protocol(u: FloatArray, tolerance: float, level: float | None = None) -> Protocol:
-    """The cycles about a level, by default the one that most branches reach, in the order of time."""
+    """The cycles about a level, by default the one that gives the widest cycles, in the order of time."""
     plateaus = turns(u, tolerance).plateaus
     reach = tolerance * float(np.ptp(u))
     levels = u[[first for first, _ in plateaus]]
-    middle = _level(levels, float(u[0]), reach) if level is None else level
-    sides = np.sign(np.where(np.abs(levels - middle) > reach, levels - middle, 0.0)).astype(np.int64)
-    excursions = _excursions(u - middle, plateaus, sides)
-    pairs = _paired(excursions, *_around(excursions, sides)) if excursions else []
+    candidates = [level] if level is not None else _candidates(levels, float(u[0]), reach)
+    attempts = [(middle, _pairs_about(middle, u, plateaus, levels, reach)) for middle in candidates]
+    middle, pairs = max(attempts, key=lambda attempt: _total_span(attempt[0], attempt[1], levels))
     spans = [(pair[0].begin, pair[-1].end) for pair in pairs]
     cuts = [place for span in spans for place in span]
     places = np.union1d(np.arange(float(u.size)), cuts)
-    cycles = [_cycle(places, plateaus, levels, pair) for pair in pairs]
-    return Protocol(middle, spans, Loops(places, cycles), [any(len(part.turns) > 1 for part in pair) for pair in pairs])
+    return Protocol(
+        level=middle,
+        spans=spans,
+        loops=Loops(places, [_cycle(places, plateaus, levels, pair) for pair in pairs]),
+        has_inner_turns=[any(len(part.turns) > 1 for part in pair) for pair in pairs],
+    )
 
 
-def _level(levels: FloatArray, first: float, reach: float) -> float:
-    """The first input if as many branches reach it as any other level, or else the middle of those most reach.
+def _candidates(levels: FloatArray, first: float, reach: float) -> list[float]:
+    """The first input, and unless it is among them the middle of the levels that most of the branches' length reaches.
 
     The record's first and last branch, which may be parts of a branch, are not counted.
     """
-    inner = levels[1:-1]
-    if inner.size < 2:
-        return first
-    lows = np.sort(np.minimum(inner[1:], inner[:-1]) - reach)
-    highs = np.sort(np.maximum(inner[1:], inner[:-1]) + reach)
-    candidates = np.append(lows, first)
-    counts = np.searchsorted(lows, candidates, side="right") - np.searchsorted(highs, candidates, side="left")
-    if counts[-1] == counts.max():
-        return first
-    begins = candidates[counts == counts.max()]
-    ends = highs[np.searchsorted(highs, begins)]
-    widest = int(np.argmax(ends - begins))
-    return float(begins[widest] + ends[widest]) / 2.0
+    ends = np.sort(np.column_stack([levels[1:-2], levels[2:-1]]), axis=1)
+    if not ends.size:
+        return [first]
+    lengths = np.diff(ends)[:, 0]
+    lows, highs = ends[:, 0] - reach, ends[:, 1] + reach
+    edges = np.unique(np.concatenate([lows, highs, [first]]))
+    entered, left = (np.zeros(edges.size) for _ in range(2))
+    np.add.at(entered, np.searchsorted(edges, lows), lengths)
+    np.add.at(left, np.searchsorted(edges, highs), lengths)
+    reached = np.cumsum(entered) - np.cumsum(left) + left
+    is_most = reached >= (1.0 - ROUNDING) * reached.max()
+    if is_most[np.searchsorted(edges, first)]:
+        return [first]
+    begin = int(np.argmax(is_most))
+    return [first, float(edges[begin] + edges[begin + np.argmax(left[begin:] > 0.0)]) / 2.0]
+
+
+def _pairs_about(
+    level: float, u: FloatArray, plateaus: list[tuple[int, int]], levels: FloatArray, reach: float
+) -> list[list[_Excursion]]:
+    sides = np.sign(np.where(np.abs(levels - level) > reach, levels - level, 0.0)).astype(np.int64)
+    excursions = _excursions(u - level, plateaus, sides)
+    return _paired(excursions, *_around(excursions, sides)) if excursions else []
+
+
+def _total_span(level: float, pairs: list[list[_Excursion]], levels: FloatArray) -> float:
+    """Of all cycles, the sum of the largest distances from the level to either side."""
+    return sum(max(abs(float(levels[turn]) - level) for turn in part.turns) for pair in pairs for part in pair)
 
 
 def _excursions(v: FloatArray, plateaus: list[tuple[int, int]], sides: npt.NDArray[np.int64]) -> list[_Excursion]:
@@ -155,9 +173,11 @@ def _excursions(v: FloatArray, plateaus: list[tuple[int, int]], sides: npt.NDArr
 def _visit(v: FloatArray, begin: int, end: int, near: list[tuple[int, int]]) -> float | None:
     """Where the input is at zero from one sample to another; else at the turning point there that is nearest."""
     part = v[begin : end + 1]
-    at = np.flatnonzero(part == 0.0).astype(float)
+    at = np.flatnonzero(part == 0.0)
+    pauses = np.split(at, np.flatnonzero(np.diff(at) > 1) + 1) if at.size else []
     k = np.flatnonzero(np.sign(part[:-1]) * np.sign(part[1:]) < 0.0)
-    passed = np.sort(np.append(at, k + part[k] / (part[k] - part[k + 1])))
+    middles = [float((pause[0] + pause[-1]) // 2) for pause in pauses]
+    passed = np.sort(np.append(k + part[k] / (part[k] - part[k + 1]), middles))
     if passed.size:
         return float(begin + passed[(passed.size - 1) // 2])
     if near:

@@ -263,8 +263,8 @@ def cycle_metrics(
     y : array, shape (n,)
         Output.
     level : float, optional
-        Input at which cycles begin and end [unit of u]; by default the first input if as many branches reach it as
-        reach any other level, otherwise the middle of the levels that most branches reach.
+        Input at which cycles begin and end [unit of u]; by default the first input, or else the middle of the
+        levels that most of the branches' length reaches: whichever gives cycles of the larger total span.
     tolerance : float
         Reversals of the input smaller than this fraction of its span are ignored, and a turning point this near to
         the level counts as at the level: noise. Larger reversals inside a half cycle do not divide it: the energy is
