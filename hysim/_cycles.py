@@ -42,16 +42,6 @@ class Turns(NamedTuple):
     branches: list[slice]
 
 
-def last_cycles(u: FloatArray, cycles: int, tolerance: float) -> list[Cycle]:
-    """The last complete cycles that share no branch, the latest first."""
-    if cycles < 1:
-        raise ValueError(f"cycles must be at least 1, got {cycles}")
-    found = complete_cycles(u, tolerance)
-    if len(found) < cycles:
-        raise ValueError(too_few(u, tolerance, cycles, len(found)))
-    return found[:cycles]
-
-
 def complete_cycles(u: FloatArray, tolerance: float) -> list[Cycle]:
     """Every complete cycle that shares no branch with a later one, the latest first."""
     plateaus, branches = turns(u, tolerance)

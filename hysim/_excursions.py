@@ -49,6 +49,10 @@ class Loops(NamedTuple):
         inserted: FloatArray = (1.0 - part) * values[..., below] + part * values[..., above]
         return inserted
 
+    def first_sample(self, cycle: Cycle) -> int:
+        """The record's sample at which a cycle begins, or the next one."""
+        return cycle.path.start if self.places is None else int(np.ceil(self.places[cycle.path.start]))
+
 
 class Protocol(NamedTuple):
     """The cycles about a level: where each begins and ends, in samples, and whether minor loops lie inside."""

@@ -101,9 +101,9 @@ class CycleMetrics:
         Slope of the line through the loop's ends [unit of y / unit of u].
     equivalent_damping : array
         Damping ratio of the viscous oscillator of that stiffness that dissipates the magnitude of the energy at its
-        resonance, at least 0 whatever the orientation [1]; nan where the stiffness is not positive. It stays the same
-        where u and y change places: for a counterclockwise loop it is the ratio with u as the force and y as the
-        displacement.
+        resonance, at least 0 whatever the orientation [1]; nan where the stiffness is not positive. Where u and y
+        have their extremes together, it is the same with u as the force and y as the displacement, for which a
+        counterclockwise loop dissipates.
     closure_gap : array
         Output at the cycle's end minus output at its start [unit of y].
     orientation : tuple of {"counterclockwise", "clockwise", "none"}

@@ -21,7 +21,7 @@ smallest displacement (the mean of the two branches there) and D half the span o
 
 The last is the damping ratio of the viscous oscillator that dissipates as much at its resonance. Energy and ratio are
 negative for a counterclockwise loop, as a piezo has: there y lags u, and the loss is the integral of u dy. The ratio's
-magnitude is the same whichever of u and y is taken as the force.
+magnitude is the same whichever of u and y is taken as the force, where both have their extremes together.
 
 Sources: L. S. Jacobsen, Trans. ASME 52 (1930) 169, for the equivalence; FEMA 356 (2000), section 2.8.4, and
 ASCE 41 for the secant stiffness between the extremes of displacement, not of force.
