@@ -181,6 +181,21 @@ def test_noise_at_every_sample_makes_no_cycles():
     assert noisy.amplitude == pytest.approx(clean.amplitude, abs=0.009)
 
 
+def test_of_several_passages_in_one_branch_the_middle_one_is_taken():
+    u = np.array([2.0, 0.01, -0.01, 0.01, -0.01, -2.0, 2.0, -2.0, 2.0])  # passes 0 at 1.5, 2.5, 3.5; 5.5; 6.5; 7.5
+    table = hs.cycle_metrics(u, np.arange(9.0), level=0.0)
+    assert table.closure_gap.tolist() == [pytest.approx(6.5 - 2.5, rel=ROUNDING)]
+    assert (table.start.tolist(), table.stop.tolist()) == ([2], [8])
+
+
+def test_many_small_branches_away_from_the_others_do_not_make_the_level():
+    """A record that begins elsewhere: six branches of 0.4 about 9.7, then four of 4 about 0."""
+    u = path(10.0, *[9.5, 9.9] * 3, -2.0, 2.0, -2.0, 2.0, -2.0, 0.0)
+    table = hs.cycle_metrics(u, slip(u))
+    assert table.level == pytest.approx(0.0, abs=1e-9)
+    assert table.amplitude == pytest.approx([2.0, 2.0], rel=ROUNDING)
+
+
 def test_minor_loops_inside_a_half_cycle_belong_to_it():
     u = path(0.0, 3.0, 1.0, 3.0, -3.0, 0.0)
     table = hs.cycle_metrics(u, slip(u))
