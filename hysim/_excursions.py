@@ -175,7 +175,7 @@ def _excursions(v: FloatArray, plateaus: list[tuple[int, int]], sides: npt.NDArr
 
 
 def _visit(v: FloatArray, begin: int, end: int, near: list[tuple[int, int]]) -> float | None:
-    """Where the input is at zero from one sample to another; else at the turning point there that is nearest."""
+    """Where the input is at zero from one sample to another; else at the turning point there that is near to it."""
     part = v[begin : end + 1]
     at = np.flatnonzero(part == 0.0)
     pauses = np.split(at, np.flatnonzero(np.diff(at) > 1) + 1) if at.size else []
@@ -184,8 +184,8 @@ def _visit(v: FloatArray, begin: int, end: int, near: list[tuple[int, int]]) -> 
     passed = np.sort(np.append(k + part[k] / (part[k] - part[k + 1]), middles))
     if passed.size:
         return float(begin + passed[(passed.size - 1) // 2])
-    if near:
-        first, last = min(near, key=lambda plateau: abs(v[plateau[0]]))
+    if near:  # one alone: two are further apart than the tolerance, so that the level is passed between them
+        first, last = near[0]
         return float((first + last) // 2)
     return None
 
