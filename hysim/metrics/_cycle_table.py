@@ -286,7 +286,7 @@ def cycle_metrics(
     >>> u = [0, 1, 0, -1, 0, 2, 0, -2, 0]
     >>> table = hs.cycle_metrics(u, hs.Stop(threshold=0.5).response(u))
     >>> table.amplitude.tolist(), table.energy.tolist(), table.stop.tolist()
-    ([1.0, 2.0], [0.75, 2.5], [5, 9])
+    ([1.0, 2.0], [0.75, 2.0], [5, 9])
     """
     inputs, outputs = samples_of_a_loop(u, y)
     if level is not None and not math.isfinite(level):
