@@ -47,6 +47,8 @@ _HOME = {
     "SobolIndices": "hysim.sweeps",
     "loop_metrics": "hysim.metrics",
     "LoopMetrics": "hysim.metrics",
+    "cycle_metrics": "hysim.metrics",
+    "CycleMetrics": "hysim.metrics",
     "BoucWen": "hysim.models.boucwen",
     "PolynomialBoucWen": "hysim.models.polynomial_boucwen",
     "ZhuWangBoucWen": "hysim.models.zhu_wang_boucwen",
@@ -124,7 +126,9 @@ if TYPE_CHECKING:
     from hysim.identification import Selection as Selection
     from hysim.identification import identify as identify
     from hysim.identification import select as select
+    from hysim.metrics import CycleMetrics as CycleMetrics
     from hysim.metrics import LoopMetrics as LoopMetrics
+    from hysim.metrics import cycle_metrics as cycle_metrics
     from hysim.metrics import loop_metrics as loop_metrics
     from hysim.models.actuator import Actuator as Actuator
     from hysim.models.amplifier import Amplifier as Amplifier

@@ -24,11 +24,14 @@ TOLERANCE = 0.01
 """Reversals of the input that are ignored by default, as a fraction of its span."""
 
 
+Samples = slice | npt.NDArray[np.intp]
+
+
 class Cycle(NamedTuple):
     """The samples of a cycle's branches, and those of both in the order of time."""
 
-    loading: slice
-    unloading: slice
+    loading: Samples
+    unloading: Samples
     path: slice
 
 
@@ -37,17 +40,6 @@ class Turns(NamedTuple):
 
     plateaus: list[tuple[int, int]]
     branches: list[slice]
-
-
-def last_cycles(u: FloatArray, cycles: int, tolerance: float) -> list[Cycle]:
-    """The last complete cycles that share no branch, the latest first."""
-    if cycles < 1:
-        raise ValueError(f"cycles must be at least 1, got {cycles}")
-    found = complete_cycles(u, tolerance)
-    if len(found) < cycles:
-        plateaus = turns(u, tolerance).plateaus
-        raise ValueError(_too_few(cycles, len(found), u[[first for first, _ in plateaus]]))
-    return found[:cycles]
 
 
 def complete_cycles(u: FloatArray, tolerance: float) -> list[Cycle]:
@@ -95,12 +87,15 @@ def settled(u: FloatArray) -> npt.NDArray[np.intp]:
     return kept
 
 
-def _too_few(asked: int, found: int, levels: FloatArray) -> str:
+def too_few(u: FloatArray, tolerance: float, asked: int, found: int) -> str:
+    """The message where a record has fewer cycles than asked for."""
+    levels = u[[first for first, _ in turns(u, tolerance).plateaus]]
     shown = ", ".join(f"{level:.6g}" for level in levels[:8]) + (", ..." if levels.size > 8 else "")
     return (
         f"asked for {asked} complete cycle(s) of the input, found {found}: it turns at {shown}. A cycle goes from "
-        f"one extreme to the other and back, each within {NEAR:.0%} of the span (a sine from mid height needs one "
-        "and a half periods). Give a longer record, or a larger tolerance if noise makes the input turn"
+        f"one extreme to the other and back, each within {NEAR:.0%} of the span, or from a level to one extreme or to "
+        "both and back to the level, such as 0, max, min, 0. Give a longer record, or a larger tolerance if noise "
+        "makes the input turn; hysim.cycle_metrics measures cycles with minor loops and of every amplitude"
     )
 
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from hysim._cycles import TOLERANCE, complete_cycles, turns
 from hysim._drift import drift
+from hysim._excursions import full_amplitude, protocol
 from hysim._frozen import FloatArray, checked
 from hysim._prefixes import power_of_ten
 from hysim._quanta import output_quantum
@@ -210,6 +211,10 @@ class Record:
         as `hysim.loop_metrics` has it: the last one is what that measures. Cycles are counted from the end and
         share no branch, so that the initial rise of a record falls away.
 
+        Where there is none, as in 0 -> max -> min -> 0 and in growing protocols, the cycles of full amplitude about
+        a level are taken, each with the fewest samples that hold it. The smaller ones of a growing protocol are in
+        ``hysim.cycle_metrics(rec.u, rec.y)``: cycle k is ``rec[table.start[k]:table.stop[k]]``.
+
         Parameters
         ----------
         tolerance : float
@@ -231,8 +236,13 @@ class Record:
         >>> u = hs.signals.triangle(0.0, 1.0, cycles=3, samples_per_cycle=4)
         >>> [cycle.u.tolist() for cycle in hs.Record(u=u, y=u).cycles()][0]
         [0.0, 0.5, 1.0, 0.5, 0.0]
+        >>> [cycle.u.tolist() for cycle in hs.Record(u=[0, 2, -2, 0, 1], y=[0, 2, -1, 0, 1]).cycles()]
+        [[0.0, 2.0, -2.0, 0.0]]
         """
-        return tuple(self[cycle.path] for cycle in reversed(complete_cycles(self.u, tolerance)))
+        if between_extremes := complete_cycles(self.u, tolerance):
+            return tuple(self[cycle.path] for cycle in reversed(between_extremes))
+        found = protocol(self.u, tolerance)
+        return tuple(self[found.slices[k]] for k in full_amplitude(self.u, found))
 
     def resample(self, sample_time: float) -> Self:
         """The record at even times from its first one on, by straight lines between the samples.

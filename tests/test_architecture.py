@@ -13,7 +13,7 @@ RANKS = {
     # tools of the language, which know nothing of hysteresis
     -3: ("_frozen", "_atomic", "_words", "_versions", "errors"),
     -2: ("_cycles", "_quanta", "_prefixes"),  # the turning points of an input, the quantum of a sensor, units
-    -1: ("_drift",),  # what cycles that follow each other say
+    -1: ("_drift", "_excursions"),  # the drift between cycles, and cycles about a level of the input
     0: ("signals", "records", "metrics", "kernels", "_parallel"),
     1: ("datasets", "files", "models", "vision"),
     2: ("simulation", "benchmarks"),

@@ -301,6 +301,17 @@ def test_the_last_cycles_are_kept_from_every_fit():
         hs.compare({"line": hs.Line}, hs.Record(u=u, y=y), test="last")
 
 
+def test_a_growing_protocol_is_compared_and_its_last_cycle_kept():
+    turns = [0.0, 1.0, -1.0, 2.0, -2.0, 0.0]
+    u = np.interp(np.linspace(0.0, 5.0, 201), np.arange(6.0), turns)
+    rec = hs.Record(u=u, y=hs.Play(threshold=0.25).response(u))
+    table = hs.compare({"line": hs.Line}, rec, test=1)
+    begin = int(hs.cycle_metrics(rec.u, rec.y).stop[0])  # the last one begins where the one before ends
+    assert len(table.record) == begin
+    assert table.loop == hs.loop_metrics(rec.u[:begin], rec.y[:begin])
+    assert table["line"].test_rmse > 0.0
+
+
 def test_another_record_begins_with_a_state_of_its_own():
     """The state at the first sample is the record's and not the model's; all else is from the training."""
     u = hs.signals.triangle(0.0, 1.0, cycles=2, samples_per_cycle=40)

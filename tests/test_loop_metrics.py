@@ -1,6 +1,7 @@
 """Loops of known width and area are measured as what they are."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -8,6 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hysim as hs
+from hysim._cycles import TOLERANCE, complete_cycles
+from hysim.metrics.rows import LoopRows
 
 ROUNDING = 1e-12  # relative; sums of some hundred terms of order one
 
@@ -245,12 +248,109 @@ def test_the_width_error_is_the_rms_difference_of_signed_widths():
         ([0, 1, 0], [0, 1, math.inf], "y must be finite, got inf at index 2"),
         ([0, 1, 2, 3], [0, 1, 2, 3], "found 0: it turns at 0, 3"),
         ([0, 1, 0.5], [0, 1, 0], "found 0: it turns at 0, 1, 0.5"),
-        (np.sin(np.linspace(0, 2 * np.pi, 50)), np.zeros(50), "one and a half periods"),
+        ([0, 3, -3, -1], [0, 1, -1, 0], "a level to one extreme or to both and back to the level, such as 0, max"),
     ],
 )
 def test_what_is_no_loop_is_refused(u, y, message):
     with pytest.raises(ValueError, match=message):
         hs.loop_metrics(u, y)
+
+
+@pytest.mark.parametrize("flip", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("levels", "path"),
+    [
+        ([0, 100, 0, 95, 0], (2, 5)),  # the middle at exactly 5 %
+        ([0, 100, 0, 94.9, 0], (0, 3)),
+        ([0, 100, 5, 100, 5], (2, 5)),  # the outer ones
+        ([0, 100, 5.1, 100, 5.1, 100], None),
+        ([0, 100, 0, 100, 5.1], (1, 4)),
+        ([50, 100, 5, 97, 0], (2, 5)),
+    ],
+)
+def test_a_cycle_turns_within_five_percent_of_the_extremes(levels, path, flip):
+    u = flip * np.array(levels, dtype=float)
+    found = complete_cycles(u, TOLERANCE)
+    assert (found[0].path if found else None) == (None if path is None else slice(*path))
+    y = np.arange(u.size, dtype=float) ** 2
+    if path is not None:
+        inside = y[slice(*path)]
+        assert hs.loop_metrics(u, y).closure_gap == inside[-1] - inside[0]
+        assert hs.loop_metrics(u, y).stroke == np.ptp(inside)
+
+
+def test_measures_are_over_the_span_of_the_cycle_and_not_of_the_record():
+    """A cycle from 0 to 96, after one to 100; and one from 0 by 100 to 4, whose branches share 4 to 100."""
+    u = np.array([0.0, 100.0, 0.0, 48.0, 96.0, 48.0, 0.0])
+    y = np.array([0.0, 50.0, 0.0, 3.0, 9.0, 7.0, 0.0])
+    loop = hs.loop_metrics(u, y)
+    assert loop.area == pytest.approx(96.0 * 4.0 / 2.0, rel=ROUNDING)
+    assert loop.mean_width == pytest.approx(loop.area / 96.0, rel=ROUNDING)
+    assert (loop.mid_width, loop.stroke) == (4.0, 9.0)
+    assert loop.secant_stiffness == pytest.approx(9.0 / 96.0, rel=ROUNDING)
+    assert loop.equivalent_damping == pytest.approx(-192.0 * 2.0 / (math.pi * 9.0 / 96.0 * 96.0**2), rel=ROUNDING)
+    open_ended = hs.loop_metrics([0.0, 50.0, 100.0, 52.0, 4.0], [0.0, 1.0, 4.0, 5.0, 2.0])
+    assert open_ended.u[[0, -1]].tolist() == [4.0, 100.0]
+    assert open_ended.mean_width == pytest.approx(open_ended.area / 100.0, rel=ROUNDING)
+    assert open_ended.mid_width == pytest.approx(2.0 + 3.0 * 46.0 / 48.0 - 1.0, rel=ROUNDING)  # at 50
+    assert open_ended.secant_stiffness == pytest.approx(((4.0 - 0.08) + (4.0 - 2.0)) / 2.0 / 96.0, rel=ROUNDING)
+    stiffness = open_ended.secant_stiffness
+    ratio = open_ended.energy * 2.0 / (math.pi * stiffness * 100.0**2)
+    assert open_ended.equivalent_damping == pytest.approx(ratio, rel=ROUNDING)
+
+
+@pytest.mark.parametrize(("retreat", "counts"), [(0.99, False), (1.0, False), (1.01, True)])
+def test_a_reversal_counts_above_one_percent_of_the_span(retreat, counts):
+    u = np.array([0.0, 50.0, 50.0 - retreat, 100.0, 0.0])
+    assert (len(complete_cycles(u, TOLERANCE)) == 0) == counts
+    assert len(hs.Record(u=u, y=u).reversals(tolerance=TOLERANCE)) == (3 if counts else 1)
+
+
+@pytest.mark.parametrize(
+    "levels",
+    [
+        [0, 2, -2, 0],
+        [0, -2, 2, 0],
+        [0, 1, -1, 2, -2, 0],
+        [0, 1, -1, 1.75, -1.75, 2, -2, 0],
+        [2, -1.5, 1, -0.5],  # fades
+        [1, 4, -1, 1.5],
+    ],
+)
+def test_a_protocol_that_begins_and_ends_at_a_level_has_its_last_cycle_of_full_amplitude(levels):
+    lines = [np.linspace(a, b, 41)[1:] for a, b in pairwise(levels)]
+    u = np.concatenate([[float(levels[0])], *lines])
+    y = play(u, 0.25)
+    assert complete_cycles(u, TOLERANCE) == []
+    loop, table = hs.loop_metrics(u, y), hs.cycle_metrics(u, y)
+    assert loop == table[int(np.argmax(table.amplitude))]
+    (*_, last) = hs.Record(u=u, y=y).cycles()
+    k = int(np.argmax(table.amplitude))
+    assert (last.u[0], len(last)) == (u[table.start[k]], table.stop[k] - table.start[k])
+    assert loop.mid_width == pytest.approx(0.5, rel=1e-9)  # twice the play's radius
+    for rows, value in (
+        (LoopRows(u).max_width(y[np.newaxis]), loop.max_width),
+        (LoopRows(u).area(y[np.newaxis]), loop.area),
+    ):
+        assert rows.tolist() == [pytest.approx(value, rel=ROUNDING)]
+
+
+@pytest.mark.parametrize(("smaller", "is_full"), [(1.63, True), (1.62, False)])
+def test_cycles_of_full_amplitude_have_nine_tenths_of_the_widest_span(smaller, is_full):
+    """Between 3.38 and 3.37 of 3.75, and none within 5 % of both extremes of the record."""
+    u = np.array([0.0, 2.0, -1.75, 0.0, smaller, 0.0, -1.75, 0.0])
+    y = np.array([0.0, 2.0, -1.0, 0.0, 3.0, 1.0, -1.0, 0.0])
+    assert complete_cycles(u, TOLERANCE) == []
+    table = hs.cycle_metrics(u, y)
+    assert hs.loop_metrics(u, y) == table[1 if is_full else 0]
+    assert len(hs.Record(u=u, y=y).cycles()) == (2 if is_full else 1)
+    if is_full:
+        mean = hs.loop_metrics(u, y, cycles=2)
+        assert mean.n_cycles == 2
+        assert mean.closure_gap == pytest.approx(table.closure_gap.mean(), abs=ROUNDING)
+    else:
+        with pytest.raises(ValueError, match=r"asked for 2 .* found 1"):
+            hs.loop_metrics(u, y, cycles=2)
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ import io
 import json
 import re
 import xml.etree.ElementTree as ET
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -84,6 +85,61 @@ def test_metrics_have_units_and_are_those_of_loop_metrics(run, folder):
     document = json.loads(run("metrics", "loop.csv", *COLUMNS, "--json", "--unit", "y=nm")[1])
     assert document["area"] == loop.area
     assert document["units"] == {"u": "V", "y": "nm"}
+
+
+def growing(law=None):
+    """Text of a record 0, 1, -1, 2, -2, 0."""
+    u = np.concatenate([np.linspace(a, b, 10, endpoint=False) for a, b in pairwise([0, 1, -1, 2, -2, 0])] + [[0.0]])
+    y = u if law is None else law.response(u)
+    return "".join(["u [mm],y [kN]\n", *(f"{a!r},{b!r}\n" for a, b in zip(u.tolist(), y.tolist(), strict=True))])
+
+
+def test_every_cycle_has_a_row_in_text_csv_and_json(run, tmp_path):
+    text = growing(hs.Stop(threshold=0.5))
+    (tmp_path / "growing.csv").write_text(text)
+    rec = hs.load(tmp_path / "growing.csv")
+    table = hs.cycle_metrics(rec.u, rec.y)
+    command = ("metrics", "-", "--u", "u", "--y", "y", "--cycles")
+    code, out, err = run(*command, "--csv", tmp_path / "cycles.csv", "--out", tmp_path / "cycles.txt", stdin=text)
+    assert (code, err) == (0, "")
+    assert out.startswith(table.to_text(rec.units))
+    assert max(map(len, out.splitlines())) <= 100
+    assert (tmp_path / "cycles.txt").read_text() == out
+    assert (tmp_path / "cycles.csv").read_text() == table.to_csv(rec.units)
+    assert run(*command, "--csv", "-", stdin=text)[1] == table.to_csv(rec.units)
+    document = json.loads(run(*command, "--json", stdin=text)[1])
+    assert [row["energy"] for row in document["cycles"]] == table.energy.tolist()
+    assert (document["level"], document["units"]) == (0.0, {"u": "mm", "y": "kN"})
+    assert document["sign_convention"] == table.sign_convention
+    one = json.loads(run(*command[:-1], "--json", stdin=text)[1])
+    assert one["energy"] == table.energy[-1]
+    assert len(run(*command, "--tolerance", "0.3", stdin=text)[1].splitlines()) == len(out.splitlines()) - 1
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--csv", "x.csv"), "--csv writes the table of every cycle: give --cycles without a number too"),
+        (("--cycles", "0"), "expected a number of cycles, at least 1, got '0'"),
+        (("--cycles", "loop.csv"), "for the table put the file before --cycles"),
+        (("--cycles", "3"), "asked for 3 complete cycle(s) of the input, found 1"),
+        (("--cycles", "--csv", "-", "--out", "-"), "two results would go to the standard output"),
+    ],
+)
+def test_options_of_cycles_that_make_no_sense_are_refused(run, options, message):
+    code, out, err = run("metrics", "-", "--u", "u", "--y", "y", *options, stdin=growing())
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert message in err
+
+
+def test_a_piezos_damping_is_printed_without_a_sign_and_the_sign_is_explained(run):
+    code, out, _ = run("metrics", "-", "--u", "u", "--y", "y", stdin=growing(hs.Play(threshold=0.25)))
+    assert code == 0
+    assert re.search(r"equivalent damping +\d", out)
+    assert "The loop runs counterclockwise, as a piezo's displacement over its voltage" in out
+    assert max(map(len, out.splitlines())) <= 100
+    clockwise = run("metrics", "-", "--u", "u", "--y", "y", stdin=growing(hs.Stop(threshold=0.5)))[1]
+    assert "piezo" not in clockwise
 
 
 def test_numbers_that_do_not_exist_are_null(run):

@@ -477,7 +477,7 @@ def test_other_loops_are_judged_otherwise(monkeypatch, name, value, changed):
 
 
 def test_a_loop_that_is_slower_than_the_plant_is_said_to_be(monkeypatch):
-    faster = {**controller._open_step(), "RiseTime": 0.1}
+    faster = replace(controller._open_step(), rise_time=0.1)
     monkeypatch.setattr(controller, "_open_step", lambda: faster)
     assert by_id(controller_claims())["proportional-rise-time"] == NO
 

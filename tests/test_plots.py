@@ -349,6 +349,16 @@ def test_widths_of_records_simulations_and_loops(record):
         hs.plot.width()
 
 
+def test_the_width_of_zero_max_min_zero_and_of_a_growing_protocol_is_drawn():
+    for levels in ([0.0, 2.0, -2.0, 0.0], [0.0, 1.0, -1.0, 2.0, -2.0, 0.0]):
+        u = np.interp(np.linspace(0.0, len(levels) - 1.0, 40 * (len(levels) - 1) + 1), np.arange(len(levels)), levels)
+        sim = hs.simulate(hs.Play(threshold=0.25), None, u)
+        drawn = hs.plot.width(sim, ax=hs.plot.figure().add_subplot()).lines[-1]
+        loop = hs.loop_metrics(sim.u, sim.y)
+        assert drawn.get_xdata().tolist() == loop.u.tolist()
+        assert drawn.get_ydata().max() == loop.max_width == pytest.approx(0.5)
+
+
 def test_a_residual_map_holds_the_mean_of_each_branch_in_each_interval():
     u = hs.signals.triangle(0.0, 8.0, cycles=3, samples_per_cycle=16)
     residual = np.arange(u.size) / 10.0

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from hysim import metrics
-from hysim._cycles import TOLERANCE, last_cycles
+from hysim._cycles import TOLERANCE
+from hysim._excursions import measured_cycles
 from hysim._frozen import FloatArray
 from hysim._parallel import Progress, map_on_threads
 from hysim.comparison._result import Comparison, ComparisonRow
@@ -217,7 +218,8 @@ def _trial(record: Record, test: Record | int | None) -> _Trial | None:
         return _Trial(training=record, drive=test, begin=0, own_state=True)
     if not isinstance(test, int) or isinstance(test, bool):
         raise TypeError(f"test takes a Record or a number of last cycles, got {test!r}")
-    begin = last_cycles(record.u, test, TOLERANCE)[-1].path.start + 1
+    loops = measured_cycles(record.u, test, TOLERANCE)
+    begin = loops.first_sample(loops.cycles[-1]) + 1
     if begin < 3:
         raise ValueError(f"a test on {test} of the record's cycles leaves nothing to identify from")
     return _Trial(training=record[:begin], drive=record, begin=begin, own_state=False)

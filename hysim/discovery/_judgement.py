@@ -174,10 +174,10 @@ def _width(law: Law, record: Record) -> float:
 
 
 def _rival_widths(linear: Rival | None, k: int, record: Record) -> tuple[float, ...]:
-    cycles = record.cycles()
+    cycles = complete_cycles(record.u, TOLERANCE)  # between the extremes: one about a level is no steady cycle
     if linear is None or not cycles:
         return (math.nan,) * len(RATES)
-    return tuple(steady_width(linear.plants[k], cycles[-1], rate) for rate in RATES)
+    return tuple(steady_width(linear.plants[k], record[cycles[0].path], rate) for rate in RATES)
 
 
 def _areas(law: Law, u: FloatArray) -> FloatArray:

@@ -1,5 +1,6 @@
 """Arrays to numbers: the measures of loops, of fits and of responses to a step, each defined once."""
 
+from hysim.metrics._cycle_table import CycleMetrics, cycle_metrics
 from hysim.metrics._describing import describing_function
 from hysim.metrics._fit import aic, bic, fit_percent, fpe, nrmse, rmse
 from hysim.metrics._loop import LoopMetrics, loop_metrics, width_rmse
@@ -12,11 +13,13 @@ from hysim.metrics._steps import (
 )
 
 __all__ = [
+    "CycleMetrics",
     "LoopMetrics",
     "StepMetrics",
     "VibrationReduction",
     "aic",
     "bic",
+    "cycle_metrics",
     "describing_function",
     "fit_percent",
     "fpe",

@@ -19,7 +19,9 @@ smallest displacement (the mean of the two branches there) and D half the span o
     secant_stiffness   = (y+ - y-) / (max u - min u)
     equivalent_damping = energy / (4 pi E_S),    E_S = secant_stiffness D^2 / 2
 
-The last is the damping ratio of the viscous oscillator that dissipates as much at its resonance.
+The last is the damping ratio of the viscous oscillator that dissipates as much at its resonance. Energy and ratio are
+negative for a counterclockwise loop, as a piezo has: there y lags u, and the loss is the integral of u dy. The ratio's
+magnitude is the same whichever of u and y is taken as the force, where both have their extremes together.
 
 Sources: L. S. Jacobsen, Trans. ASME 52 (1930) 169, for the equivalence; FEMA 356 (2000), section 2.8.4, and
 ASCE 41 for the secant stiffness between the extremes of displacement, not of force.
@@ -32,9 +34,16 @@ from typing import Literal, overload
 import numpy as np
 import numpy.typing as npt
 
-from hysim._cycles import ROUNDING, TOLERANCE, last_cycles, settled
+from hysim._cycles import ROUNDING, TOLERANCE, Cycle, settled
+from hysim._excursions import measured_cycles
 from hysim._frozen import FloatArray, frozen, read_only
 from hysim._words import extent, printed, words
+
+COUNTERCLOCKWISE = (
+    "counterclockwise, as a piezo's displacement over its voltage: the integral of y du is negative, and "
+    "the damping is that of its magnitude."
+)
+FORCE = "Energy is the integral of y du: what a force y on a displacement u dissipates."
 
 
 @printed
@@ -68,8 +77,9 @@ class LoopMetrics:
     secant_stiffness : float
         Slope of the line through the loop's ends [unit of y / unit of u].
     equivalent_damping : float
-        Damping ratio of the viscous oscillator of that stiffness that dissipates as much at its resonance; nan
-        where the stiffness is not positive.
+        Damping ratio of the viscous oscillator of that stiffness that dissipates as much at its resonance, with the
+        sign of the energy: printed is the magnitude, with the sign convention in words. nan where the stiffness is
+        not positive.
     u : array, shape (m,)
         Increasing inputs: every input of either branch, over their common range [unit of u].
     loading, unloading, width : array, shape (m,)
@@ -105,9 +115,16 @@ class LoopMetrics:
                 "stroke": f"{self.stroke:.4g} over u of {extent(self.u)}",
                 "area": f"{self.area:.4g}, energy {self.energy:.4g}",
                 "closure gap": f"{self.closure_gap:.4g}",
-                "stiffness": f"{self.secant_stiffness:.4g}, equivalent damping {100.0 * self.equivalent_damping:.2f} %",
+                "stiffness": f"{self.secant_stiffness:.4g}, equivalent damping "
+                f"{100.0 * abs(self.equivalent_damping):.2f} %",
+                "sign": self.sign_convention if self.orientation == "counterclockwise" else "",
             },
         )
+
+    @property
+    def sign_convention(self) -> str:
+        """How the sign of the energy is to be read, in a sentence."""
+        return f"The loop runs {COUNTERCLOCKWISE}" if self.orientation == "counterclockwise" else FORCE
 
     @overload
     def width_at(self, u: float) -> float: ...
@@ -142,7 +159,14 @@ def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, toleran
 
     A cycle is three consecutive turning points of the input, the outer two within 5 % of the input's span of
     one extreme of the record, the middle one within 5 % of the other: min-max-min or max-min-max. The record's
-    ends count as turning points. A plateau at a turning point is divided in its middle, half to each branch (a
+    ends count as turning points. Between the outer two the path may miss being closed by those 5 %, and its energy
+    the part beyond: in a protocol that grows by 4 % of the largest amplitude a cycle, 2.3 % of a Bouc-Wen law's loop.
+
+    Where the record has fewer such cycles than asked for, as 0 -> max -> min -> 0 and growing protocols, the cycles are
+    those of `hysim.cycle_metrics`, which begin and end at one level of the input, as far as they have at least 90 % of
+    the widest one's span and no minor loops. They are closed in u.
+
+    A plateau at a turning point is divided in its middle, half to each branch (a
     sample in the very middle to both); at the record's ends it belongs to the cycle as a whole. Of several
     samples of a branch at one input the last, settled one is taken. The samples of a branch are sorted by
     input, so that wiggles below the tolerance do not break the interpolation.
@@ -167,7 +191,7 @@ def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, toleran
     ------
     ValueError
         If lengths differ, a value is not finite, there are fewer than 3 samples, the input is constant, or it
-        has fewer complete cycles than asked for.
+        has fewer cycles of either kind than asked for.
 
     Examples
     --------
@@ -177,8 +201,14 @@ def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, toleran
     >>> round(loop.max_width, 3), loop.max_width_at, round(loop.mean_width, 4), loop.orientation
     (0.232, 35.0, 0.1407, 'counterclockwise')
     """
-    inputs, outputs = _samples_of_a_loop(u, y)
-    found = last_cycles(inputs, cycles, tolerance)
+    inputs, outputs = samples_of_a_loop(u, y)
+    loops = measured_cycles(inputs, cycles, tolerance)
+    return measure(loops.of(inputs), loops.of(outputs), loops.cycles)
+
+
+def measure(inputs: FloatArray, outputs: FloatArray, found: list[Cycle]) -> LoopMetrics:
+    """The measures of one cycle, or of the mean of several."""
+    cycles = len(found)
     loadings = [_curve(inputs[cycle.loading], outputs[cycle.loading]) for cycle in found]
     unloadings = [_curve(inputs[cycle.unloading], outputs[cycle.unloading]) for cycle in found]
     grid = common_inputs([x for x, _ in loadings + unloadings])
@@ -279,7 +309,7 @@ def _orientation(area: float, rounding: float) -> Literal["counterclockwise", "c
     return "counterclockwise" if area > 0 else "clockwise"
 
 
-def _samples_of_a_loop(u: npt.ArrayLike, y: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+def samples_of_a_loop(u: npt.ArrayLike, y: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
     inputs, outputs = read_only(u, "u", ndim=1), read_only(y, "y", ndim=1)
     if inputs.size != outputs.size:
         raise ValueError(f"u and y must have equal lengths, got {inputs.size} and {outputs.size}")

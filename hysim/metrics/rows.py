@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hysim._cycles import TOLERANCE, last_cycles, settled
+from hysim._cycles import TOLERANCE, settled
+from hysim._excursions import measured_cycles
 from hysim._frozen import FloatArray
 from hysim.metrics._loop import common_inputs, signed_area
 
@@ -21,20 +22,22 @@ class LoopRows:
 
     def max_width(self, y: FloatArray) -> FloatArray:
         """Largest magnitude of the width of each row, shape (n_sets,)."""
-        cycle = last_cycles(self.u, 1, TOLERANCE)[0]
-        branches = [(part, settled(self.u[part])) for part in (cycle.unloading, cycle.loading)]
-        inputs = [self.u[part][kept] for part, kept in branches]
+        loops = measured_cycles(self.u, 1, TOLERANCE)
+        u, rows = loops.of(self.u), loops.of(y)
+        branches = [(part, settled(u[part])) for part in (loops.cycles[0].unloading, loops.cycles[0].loading)]
+        inputs = [u[part][kept] for part, kept in branches]
         grid = common_inputs(inputs)
         outputs = [
-            _interpolated(grid, x, y[:, part][:, kept]) for x, (part, kept) in zip(inputs, branches, strict=True)
+            _interpolated(grid, x, rows[:, part][:, kept]) for x, (part, kept) in zip(inputs, branches, strict=True)
         ]
         widths: FloatArray = np.abs(outputs[0] - outputs[1]).max(axis=1)
         return widths
 
     def area(self, y: FloatArray) -> FloatArray:
         """Enclosed area of each row, shape (n_sets,)."""
-        path = last_cycles(self.u, 1, TOLERANCE)[0].path
-        return np.abs(signed_area(self.u[path], np.ascontiguousarray(y[:, path])))
+        loops = measured_cycles(self.u, 1, TOLERANCE)
+        path = loops.cycles[0].path
+        return np.abs(signed_area(loops.of(self.u)[path], np.ascontiguousarray(loops.of(y)[:, path])))
 
 
 def _interpolated(grid: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:

@@ -26,6 +26,8 @@ from hysim.paper.equations import (
     unit_step,
 )
 
+_INTERVALS = 4000
+
 
 @frozen
 class Approximation:
@@ -75,9 +77,12 @@ def approximation(name: str, simpler: TransferFunction, of: str, full: TransferF
 
 
 def step_fit(full: TransferFunction, simpler: TransferFunction) -> float:
-    """Fit [%] of the simpler model's step response to the other's, until both have settled."""
-    time = np.linspace(0.0, max(settling_window(full), settling_window(simpler)), 4001)
-    return fit_percent(unit_step(full, time), unit_step(simpler, time))
+    """Fit [%] of the simpler model's step response to the other's, until both have settled.
+
+    Means over the middles of 4000 even intervals stand for means over time; finer ones change it by less than 0.001.
+    """
+    time = np.linspace(0.0, max(settling_window(full), settling_window(simpler)), 2 * _INTERVALS + 1)
+    return fit_percent(unit_step(full, time)[1::2], unit_step(simpler, time)[1::2])
 
 
 def matched_second_order(full: Characteristics) -> TransferFunction:

@@ -25,6 +25,7 @@ from hysim.control import to_control
 from hysim.models.transfer_function import TransferFunction
 from hysim.paper import printed
 from hysim.paper.printed import floats
+from hysim.paper.step_reading import step_reading
 
 EQUATION_1 = TransferFunction(num=floats(printed.NUM_1), den=floats(printed.DEN_1))
 EQUATION_4 = TransferFunction(num=floats(printed.NUM_4), den=floats(printed.DEN_4))
@@ -79,16 +80,15 @@ def characteristics(model: TransferFunction) -> Characteristics:
 
     system = to_control(model)
     frequencies, dampings, poles = control.damp(system, doprint=False)
-    time = np.linspace(0.0, settling_window(model), 8001)
-    peak_time, peak = _peak(time, unit_step(model, time) / model.dc_gain)
+    step = step_reading(system)
     return Characteristics(
         poles=tuple(complex(pole) for pole in poles),
         zeros=tuple(complex(zero) for zero in control.zeros(system)),
         dc_gain=float(control.dcgain(system)),
         natural_frequencies=tuple(float(value) for value in frequencies),
         damping_ratios=tuple(float(value) for value in dampings),
-        overshoot_percent=max(100.0 * (peak - 1.0), 0.0),
-        peak_time=peak_time,
+        overshoot_percent=step.overshoot_percent,
+        peak_time=step.peak_time,
     )
 
 
@@ -173,13 +173,3 @@ def step_response(model: TransferFunction, duration: float = 20.0) -> tuple[Floa
 def unit_step(model: TransferFunction, time: FloatArray) -> FloatArray:
     """The same at even times from zero [unit of time], exact at each: a step is held from sample to sample."""
     return replace(model, hold="zoh", sample="start").response(np.ones_like(time), float(time[1]))
-
-
-def _peak(time: FloatArray, values: FloatArray) -> tuple[float, float]:
-    """Time and height of the largest value, between samples by a parabola."""
-    k = int(values.argmax())
-    if k in (0, values.size - 1):
-        return float(time[k]), float(values[k])
-    before, at, after = values[k - 1 : k + 2]
-    shift = 0.5 * (before - after) / (before - 2.0 * at + after)
-    return float(time[k] + shift * (time[1] - time[0])), float(at - 0.25 * (before - after) * shift)

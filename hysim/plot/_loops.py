@@ -69,8 +69,8 @@ def width(*results: InputOutput | LoopMetrics, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     *results : Record, Simulation, LoopMetrics or anything with `u` and `y`
-        Of a record or simulation the last complete cycle is measured, by `hysim.loop_metrics`. A record is drawn as
-        points, anything else as a line.
+        Of a record or simulation the last complete cycle is measured, by `hysim.loop_metrics`; that of a protocol
+        such as 0 -> max -> min -> 0 begins and ends at a level. A record is drawn as points, anything else as a line.
     ax : Axes, optional
         Where to draw.
 

@@ -1,13 +1,13 @@
 """Claims of sections 2.7 and 3: what the terms of the controller do, and what its figures show."""
 
 import math
-from typing import Any
 
 import numpy as np
 
 from hysim.control import to_control
 from hysim.paper.claims._claim import Claim, decided, unseen
 from hysim.paper.equations import EQUATION_1, EQUATION_4, pid_standard
+from hysim.paper.step_reading import StepReading, step_reading
 
 LOOP_GAIN = 0.5
 """Of the loops that show what each term does, at zero frequency: (1) is stable there with any one of them."""
@@ -51,41 +51,42 @@ def _terms() -> tuple[Claim, ...]:
             "proportional-rise-time",
             "Section 2.7",
             "Proportional action shortens the rise time.",
-            holds=alone["RiseTime"] < none["RiseTime"],
-            method=f"{loop}, against (1) alone: time from 10 to 90 %",
-            recomputed=alone["RiseTime"],
+            holds=alone.rise_time < none.rise_time,
+            method=f"{loop}, against (1) alone: time from the first 10 % to the first 90 % of the final value",
+            recomputed=alone.rise_time,
             unit="s",
-            note=f"Without control {none['RiseTime']:.3f} s.",
+            note=f"Without control {none.rise_time:.3f} s.",
         ),
         decided(
             "proportional-error",
             "Section 2.7",
             "Proportional action leaves a steady error.",
-            holds=abs(1.0 - alone["SteadyStateValue"]) > TRACKS_WITHIN,
+            holds=abs(1.0 - alone.final) > TRACKS_WITHIN,
             method=f"{loop}: steady error, which has to exceed {TRACKS_WITHIN:.0%} of the reference",
-            recomputed=100.0 * (1.0 - alone["SteadyStateValue"]),
+            recomputed=100.0 * (1.0 - alone.final),
             unit="%",
         ),
         decided(
             "integral-error",
             "Section 2.7",
             "Integral action removes the steady error for a step.",
-            holds=abs(1.0 - integral["SteadyStateValue"]) < 1e-9,
+            holds=abs(1.0 - integral.final) < 1e-9,
             method=f"{loop} with Ti = {INTEGRAL_TIME:g} s: steady error, zero to rounding",
-            recomputed=100.0 * round(1.0 - integral["SteadyStateValue"], 12) + 0.0,
+            recomputed=100.0 * round(1.0 - integral.final, 12) + 0.0,
             unit="%",
-            note=f"The rise time grows to {integral['RiseTime']:.2f} s, as the paper allows.",
+            note=f"The rise time grows to {integral.rise_time:.2f} s, as the paper allows.",
         ),
         decided(
             "derivative-overshoot",
             "Section 2.7",
             "Derivative action reduces the overshoot and improves the transient.",
-            holds=derivative["Overshoot"] < alone["Overshoot"] and derivative["SettlingTime"] < alone["SettlingTime"],
+            holds=derivative.overshoot_percent < alone.overshoot_percent
+            and derivative.settling_time < alone.settling_time,
             method=f"{loop} with Td = {DERIVATIVE_TIME:g} s against Td = 0: overshoot and settling time both fall",
-            recomputed=derivative["Overshoot"],
+            recomputed=derivative.overshoot_percent,
             unit="%",
-            note=f"Without it {alone['Overshoot']:.1f} %; settling in {derivative['SettlingTime']:.1f} s against "
-            f"{alone['SettlingTime']:.1f} s.",
+            note=f"Without it {alone.overshoot_percent:.1f} %; settling in {derivative.settling_time:.1f} s against "
+            f"{alone.settling_time:.1f} s.",
         ),
     )
 
@@ -130,13 +131,11 @@ def _unseen() -> tuple[Claim, ...]:
     )  # fmt: skip
 
 
-def _open_step() -> dict[str, float]:
-    import control
-
-    return _info(control, to_control(EQUATION_1))
+def _open_step() -> StepReading:
+    return step_reading(to_control(EQUATION_1))
 
 
-def _loop_step(integral_time: float, derivative_time: float) -> dict[str, float]:
+def _loop_step(integral_time: float, derivative_time: float) -> StepReading:
     import control
 
     controller = pid_standard(
@@ -145,8 +144,4 @@ def _loop_step(integral_time: float, derivative_time: float) -> dict[str, float]
         derivative_time,
         derivative_filter=DERIVATIVE_FILTER if derivative_time else 0.0,
     )
-    return _info(control, control.feedback(controller * to_control(EQUATION_1)))
-
-
-def _info(control: Any, system: Any) -> dict[str, float]:
-    return {name: float(value) for name, value in control.step_info(system).items()}
+    return step_reading(control.feedback(controller * to_control(EQUATION_1)))

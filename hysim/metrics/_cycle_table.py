@@ -1,0 +1,335 @@
+"""The measures of every cycle of a record, one row a cycle.
+
+Cycles begin and end at a level of the input (see `hysim._excursions`), and each is measured by the code of
+`loop_metrics`. Where a cycle begins and ends at exactly the same input, which is the rule,
+
+    energy = integral of y du over the cycle = -signed area
+
+so that the energies of all cycles and `energy_outside`, the integral over the rest of the record, add up to the
+integral of y du over the whole record. A last cycle that misses the level by less than the tolerance is closed by a
+straight line, whose share is counted in `energy_outside`.
+
+    amplitude a        = (max u - min u) / 2
+    secant_stiffness k = (y at max u - y at min u) / (max u - min u)
+    equivalent_damping = |energy| / (4 pi E_S),    E_S = k a^2 / 2
+
+Sources: L. S. Jacobsen, Trans. ASME 52 (1930) 169; A. K. Chopra, Dynamics of Structures, section 3.9, for the
+equivalent damping of a cycle.
+"""
+
+import csv
+import io
+import math
+import textwrap
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._cycles import ROUNDING, TOLERANCE, too_few
+from hysim._excursions import Loops, protocol
+from hysim._frozen import FloatArray, frozen
+from hysim._words import LETTERS, extent, printed, quantity, words
+from hysim.metrics._loop import COUNTERCLOCKWISE, FORCE, LoopMetrics, measure, samples_of_a_loop
+
+
+@dataclass(frozen=True)
+class _Column:
+    """A column: its field, its heading in text and unit there, from those of u and y, and whether text has it."""
+
+    field: str
+    heading: str
+    unit: str = ""
+    in_text: bool = True
+
+    def cell(self, value: float | int) -> str:
+        """A number as text shows it."""
+        if isinstance(value, int):
+            return f"{value}"
+        return f"{100.0 * value:.2f}" if self.unit == "%" else f"{value:.4g}"
+
+    def unit_in(self, units: Mapping[str, str]) -> str:
+        """The unit, empty where that of u or y is unknown."""
+        if not {"u", "y"} & set(self.unit) <= units.keys():
+            return ""
+        return self.unit.replace("y", "\0").replace("u", units.get("u", "")).replace("\0", units.get("y", ""))
+
+
+_COLUMNS = (
+    _Column("start", "start"),
+    _Column("stop", "stop"),
+    _Column("amplitude", "amplitude", "u"),
+    _Column("mean_input", "mean", "u"),
+    _Column("lowest_input", "lowest", "u", in_text=False),
+    _Column("highest_input", "highest", "u", in_text=False),
+    _Column("max_width", "width", "y"),
+    _Column("stroke", "stroke", "y", in_text=False),
+    _Column("area", "area", "y u"),
+    _Column("energy", "energy", "y u"),
+    _Column("secant_stiffness", "stiffness", "y/u"),
+    _Column("equivalent_damping", "damping", "%"),
+    _Column("closure_gap", "gap", "y"),
+    _Column("orientation", "orientation", in_text=False),
+)
+
+
+@printed
+@frozen
+class CycleMetrics:
+    """The measures of every cycle of a record; arrays have shape (n_cycles,), in the order of time.
+
+    ``len(table)`` is the number of cycles, ``table[k]`` the `LoopMetrics` of one, with its branches.
+
+    Parameters
+    ----------
+    start, stop : array of int
+        ``u[start:stop]`` are the fewest samples that hold the cycle.
+    amplitude, mean_input : array
+        Half of the input's span, and the middle of it [unit of u].
+    lowest_input, highest_input : array
+        The input's extremes [unit of u].
+    max_width, stroke : array
+        Largest width of the loop, and largest minus smallest output [unit of y].
+    area : array
+        Enclosed area, at least 0 [unit of y times unit of u].
+    energy : array
+        Integral of y du over the cycle [unit of y times unit of u]: what a force y on a displacement u dissipates.
+        Negative for a counterclockwise loop.
+    secant_stiffness : array
+        Slope of the line through the loop's ends [unit of y / unit of u].
+    equivalent_damping : array
+        Damping ratio of the viscous oscillator of that stiffness that dissipates the magnitude of the energy at its
+        resonance, at least 0 whatever the orientation [1]; nan where the stiffness is not positive. Where u and y
+        have their extremes together, it is the same with u as the force and y as the displacement, for which a
+        counterclockwise loop dissipates.
+    closure_gap : array
+        Output at the cycle's end minus output at its start [unit of y].
+    orientation : tuple of {"counterclockwise", "clockwise", "none"}
+        Sense in which each loop runs.
+    level : float
+        Input at which the cycles begin and end [unit of u].
+    energy_outside : float
+        Integral of y du over what belongs to no cycle [unit of y times unit of u].
+    loops : tuple of LoopMetrics
+        The loop of each cycle.
+    """
+
+    start: npt.NDArray[np.intp]
+    stop: npt.NDArray[np.intp]
+    amplitude: FloatArray
+    mean_input: FloatArray
+    lowest_input: FloatArray
+    highest_input: FloatArray
+    max_width: FloatArray
+    stroke: FloatArray
+    area: FloatArray
+    energy: FloatArray
+    secant_stiffness: FloatArray
+    equivalent_damping: FloatArray
+    closure_gap: FloatArray
+    orientation: tuple[str, ...]
+    level: float
+    energy_outside: float
+    loops: tuple[LoopMetrics, ...]
+
+    def __post_init__(self) -> None:
+        for name in ("start", "stop"):
+            samples = np.array(getattr(self, name), dtype=np.intp)
+            samples.setflags(write=False)
+            object.__setattr__(self, name, samples)
+
+    def __len__(self) -> int:
+        return len(self.loops)
+
+    def __getitem__(self, k: int) -> LoopMetrics:
+        return self.loops[k]
+
+    def __iter__(self) -> Iterator[LoopMetrics]:
+        return iter(self.loops)
+
+    def __str__(self) -> str:
+        many = "1 cycle" if len(self) == 1 else f"{len(self)} cycles"
+        return words(
+            [f"CycleMetrics: {many} about u = {self.level:.6g}, energy {self.energy.sum():.4g} in all"],
+            {
+                "amplitude": extent(self.amplitude),
+                "largest width": extent(self.max_width),
+                "energy": f"{extent(self.energy)} in a cycle, {self.energy_outside:.4g} outside of the cycles",
+                "stiffness": extent(self.secant_stiffness),
+                "damping": f"{extent(self.equivalent_damping)} of the critical",
+                "sign": self.sign_convention,
+            },
+        )
+
+    @property
+    def cumulative_energy(self) -> FloatArray:
+        """Energy up to the end of each cycle, shape (n_cycles,) [unit of y times unit of u]."""
+        return np.cumsum(self.energy)
+
+    @property
+    def sign_convention(self) -> str:
+        """How the sign of the energies is to be read, in a sentence."""
+        against = [k for k, orientation in enumerate(self.orientation, start=1) if orientation == "counterclockwise"]
+        if not against:
+            return FORCE
+        if len(self) == 1:
+            return f"The loop runs {COUNTERCLOCKWISE}"
+        numbers = ", ".join(map(str, against[:8])) + (", ..." if len(against) > 8 else "")
+        which = "All loops" if len(against) == len(self) else f"The loops of some cycles ({numbers})"
+        return f"{which} run {COUNTERCLOCKWISE}"
+
+    def rows(self) -> list[dict[str, Any]]:
+        """The measures of each cycle by name, with the cycle's number from 1 as ``"cycle"``."""
+        columns = {column.field: getattr(self, column.field) for column in _COLUMNS}
+        plain = {
+            name: list(values) if isinstance(values, tuple) else values.tolist() for name, values in columns.items()
+        }
+        return [{"cycle": k + 1, **{name: values[k] for name, values in plain.items()}} for k in range(len(self))]
+
+    def to_text(self, units: Mapping[str, str] | None = None) -> str:
+        """The table for a terminal, one row a cycle, and below it how the energy's sign is to be read.
+
+        Parameters
+        ----------
+        units : mapping, optional
+            Labels of the units of ``"u"`` and ``"y"``, such as those of a `Record`.
+
+        Returns
+        -------
+        str
+        """
+        shown = [column for column in _COLUMNS if column.in_text]
+        header = ["cycle", *(column.heading for column in shown)]
+        second = ["", *(_bracketed(column.unit_in(units or {})) for column in shown)]
+        rows = [[f"{row['cycle']}", *(column.cell(row[column.field]) for column in shown)] for row in self.rows()]
+        heads = [header, second]
+        widths = [max(map(len, cells)) for cells in zip(*heads, *rows, strict=True)]
+        lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in heads + rows]
+        rule = "-" * (sum(widths) + 2 * len(widths) - 2)
+        unit = _Column("", "", "y u").unit_in(units or {})
+        notes = [
+            f"Cycles begin and end at u = {quantity(self.level, (units or {}).get('u', ''))}.",
+            f"Energy of all cycles {quantity(float(self.energy.sum()), unit)}, "
+            f"outside of the cycles {quantity(self.energy_outside, unit)}.",
+            self.sign_convention,
+        ]
+        wrapped = [line for note in notes for line in textwrap.wrap(note, LETTERS, break_on_hyphens=False)]
+        return "\n".join([*lines[: len(heads)], rule, *lines[len(heads) :], *wrapped])
+
+    def to_csv(self, units: Mapping[str, str] | None = None) -> str:
+        """Every column as comma-separated values, every digit kept; an unknown number is an empty cell.
+
+        Parameters
+        ----------
+        units : mapping, optional
+            Labels of the units of ``"u"`` and ``"y"``, which are put behind the names.
+
+        Returns
+        -------
+        str
+        """
+        buffer = io.StringIO()
+        writer = csv.writer(buffer, lineterminator="\n")
+        named = [
+            column.field if column.unit == "%" else f"{column.field} {_bracketed(column.unit_in(units or {}))}".rstrip()
+            for column in _COLUMNS
+        ]
+        writer.writerow(["cycle", *named])
+        writer.writerows([["" if value != value else value for value in row.values()] for row in self.rows()])
+        return buffer.getvalue()
+
+
+def cycle_metrics(
+    u: npt.ArrayLike, y: npt.ArrayLike, *, level: float | None = None, tolerance: float = TOLERANCE
+) -> CycleMetrics:
+    """Measure every cycle of a record: 0 -> max -> min -> 0, growing and one-sided protocols, steady cycles.
+
+    A cycle leaves a level of the input to one side, comes back to it, leaves it to the other side and comes back
+    again: two half cycles, as ATC-24 and FEMA 461 pair them. A half cycle whose neighbours lie on its own side, as in
+    0 -> 5 -> 0 -> 8 -> 0, is a cycle of its own. What is left at the record's ends, such as a last half cycle, is in
+    no row; `energy_outside` counts it. Cycles that are passed between two samples are cut there, with the output
+    linear between the samples, so that each of them is closed in u.
+
+    `loop_metrics` measures the last cycle from one extreme of the record to the other and back, which in a protocol of
+    two and more cycles an amplitude begins and ends at an extreme; the last row here begins and ends at the level.
+    Both run by the same code.
+
+    Parameters
+    ----------
+    u : array, shape (n,)
+        Input.
+    y : array, shape (n,)
+        Output.
+    level : float, optional
+        Input at which cycles begin and end [unit of u]; by default the first input, or else the middle of the
+        levels that most of the branches' length reaches: whichever gives cycles of the larger total span.
+    tolerance : float
+        Reversals of the input smaller than this fraction of its span are ignored, and a turning point this near to
+        the level counts as at the level: noise. Larger reversals inside a half cycle do not divide it: the energy is
+        that of the whole path, while the width, from branches sorted by their input, then depends on the minor loops.
+
+    Returns
+    -------
+    CycleMetrics
+
+    Raises
+    ------
+    ValueError
+        If lengths differ, a value is not finite, there are fewer than 3 samples, the input is constant, the level is
+        not finite, or there is no cycle about it.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> u = [0, 1, 0, -1, 0, 2, 0, -2, 0]
+    >>> table = hs.cycle_metrics(u, hs.Stop(threshold=0.5).response(u))
+    >>> table.amplitude.tolist(), table.energy.tolist(), table.stop.tolist()
+    ([1.0, 2.0], [0.75, 2.0], [5, 9])
+    """
+    inputs, outputs = samples_of_a_loop(u, y)
+    if level is not None and not math.isfinite(level):
+        raise ValueError(f"level must be finite, got {level}")
+    found = protocol(inputs, tolerance, None if level is None else float(level))
+    if not found.spans:
+        raise ValueError(too_few(inputs, tolerance, 1, 0))
+    at_u, at_y = found.loops.of(inputs), found.loops.of(outputs)
+    loops = tuple(measure(at_u, at_y, [cycle]) for cycle in found.loops.cycles)
+    low, high = (np.array([end(at_u[cycle.path]) for cycle in found.loops.cycles]) for end in (np.min, np.max))
+    energy = np.array([loop.energy for loop in loops])
+    return CycleMetrics(
+        start=np.array([part.start for part in found.slices]),
+        stop=np.array([part.stop for part in found.slices]),
+        amplitude=(high - low) / 2,
+        mean_input=(high + low) / 2,
+        lowest_input=low,
+        highest_input=high,
+        max_width=np.array([loop.max_width for loop in loops]),
+        stroke=np.array([loop.stroke for loop in loops]),
+        area=np.array([loop.area for loop in loops]),
+        energy=energy,
+        secant_stiffness=np.array([loop.secant_stiffness for loop in loops]),
+        equivalent_damping=np.abs([loop.equivalent_damping for loop in loops]),
+        closure_gap=np.array([loop.closure_gap for loop in loops]),
+        orientation=tuple(loop.orientation for loop in loops),
+        level=found.level,
+        energy_outside=_outside(at_u, at_y, found.loops),
+        loops=loops,
+    )
+
+
+def _outside(u: FloatArray, y: FloatArray, loops: Loops) -> float:
+    """Integral of y du over the parts between cycles, and against the lines by which cycles are closed."""
+    begins, ends = (
+        np.array(sides) for sides in zip(*((c.path.start, c.path.stop - 1) for c in loops.cycles), strict=True)
+    )
+    between = zip([0, *ends], [*begins, u.size - 1], strict=True)
+    parts = [np.trapezoid(y[begin : end + 1], u[begin : end + 1]) for begin, end in between]
+    closing = (y[begins] + y[ends]) / 2 * (u[ends] - u[begins])
+    total = math.fsum([*parts, *closing])
+    return total if abs(total) > ROUNDING * float(np.ptp(u) * np.abs(y).max()) else 0.0
+
+
+def _bracketed(unit: str) -> str:
+    return f"[{unit}]" if unit else ""
