@@ -48,6 +48,7 @@ _N_LAST = 3  # terms that are rounding where a series ends: of a symmetric one e
 _GROWTH = 4.0  # of the length tried, over the last one that served
 _WIDEST = 6.0  # disc looked at, in steps: a little wider than what serves a step of N_TERMS
 _MAX_DISCS = 40
+_ALL, _SMOOTH, _BEND = 0, 1, 2  # parts of dw/dL: together, without the term of |w|^n, this term
 _FAR = 8.0  # in X: from here on the bell, below 1e-27, is left out
 _CLEAR = 6.0  # and up to here, if it is rounding
 _VANISHED = 1e-3  # of eta: what is lost beside it did not escape
@@ -89,15 +90,20 @@ def advance(w: float, e: float, length: float, parameters: FloatArray, series: F
     for _ in range(MAX_STEPS):
         if left <= ROUNDING * length:
             return w, e
-        free = False
-        if w == 0.0 or not (n == 1.0 or n == 2.0):
+        free, whole = False, n == 1.0 or n == 2.0
+        if w == 0.0 or not whole:
             begin(w, e, True, parameters, series)
-            forcing, near = series[_SLOPE, 0], nearness(e, length, parameters, series)
+            forcing = series[_SLOPE, 0]
             if w == 0.0 and forcing == 0.0:
                 return w, e
-            free = abs(w) <= near and not (n == 1.0 or n == 2.0)
-            if free:
-                t = min(t, 2.0 * abs(w / forcing) if w * forcing < 0.0 else near / abs(forcing))
+            if not whole:
+                near, size = nearness(e, length, parameters, series)
+                largest = max(largest, size)
+                free = abs(w) <= near
+                if not free:
+                    t = short_way(w, forcing, near, n, t)
+                else:
+                    t = min(t, 2.0 * abs(w / forcing) if w * forcing < 0.0 else near / abs(forcing))
         last, fraction = expand(w, e, t, free, largest, parameters, series)
         if fraction == 0.0:
             if not math.isfinite(series[_W, 1]):
@@ -120,15 +126,28 @@ def advance(w: float, e: float, length: float, parameters: FloatArray, series: F
 
 
 @inner
-def nearness(e: float, length: float, parameters: FloatArray, series: FloatArray) -> float:
-    """How near to zero w must be that the integral of the term with ``|w|^n`` is rounding; after `begin`."""
+def nearness(e: float, length: float, parameters: FloatArray, series: FloatArray) -> tuple[float, float]:
+    """How near to zero w must be that the integral of the term with ``|w|^n`` is rounding, and beside what; after `begin`."""
     n, forcing = parameters[_N], abs(series[_SLOPE, 0])
     c = abs(parameters[_BETA]) + abs(parameters[_GAMMA])
     factor = c * abs((1.0 + parameters[1] * e) * series[_PINCH, 0] / (1.0 + parameters[2] * e))
     if forcing == 0.0 or factor == 0.0:
-        return 0.0 if forcing == 0.0 else math.inf
+        return (0.0 if forcing == 0.0 else math.inf), forcing * length
     size = min(forcing * length, (forcing / factor) ** (1.0 / n))
-    return float(0.5 * (ROUNDING * size * (n + 1.0) * forcing / factor) ** (1.0 / (n + 1.0)))
+    return float(0.5 * (ROUNDING * size * (n + 1.0) * forcing / factor) ** (1.0 / (n + 1.0))), size
+
+
+@inner
+def short_way(w: float, forcing: float, near: float, n: float, left: float) -> float:
+    """Length over which a series near w = 0 ends after about a dozen terms, or `left` if that is shorter.
+
+    The terms fall off as the powers of the fraction by which w changes, from (w / near)^(n + 1) roundings on.
+    """
+    way = 0.6 * abs(w)
+    if left * abs(forcing) < 0.3 * way:
+        return left
+    theta = min(1.0, max(0.3, (abs(w) / near) ** (-(n + 1.0) / 12.0)))
+    return min(left, theta * way / abs(forcing))
 
 
 @kernel
@@ -191,27 +210,43 @@ def expand(
 
 
 @inner
-def ends(
-    k: int, t: float, size: float, free: bool, pinches: bool, parameters: FloatArray, series: FloatArray
-) -> bool:
+def ends(k: int, t: float, size: float, free: bool, pinches: bool, parameters: FloatArray, series: FloatArray) -> bool:
     """Whether the series may end at the term k: whether the terms left out are rounding beside `size`."""
+    room = ROUNDING * size * (k + 1.0)
     flow = abs(series[_W, 1]) + 2.0 * abs(series[_W, 2]) + 3.0 * abs(series[_W, 3])
-    x = max(2.0, (8.0 * flow / (ROUNDING * size)) ** (1.0 / k)) if size > 0.0 else 2.0
-    spread = spread_within(k, x, free, pinches, parameters, series)
-    return bool(spread * t <= ROUNDING * size * (k + 1.0) * (1.0 - 1.0 / x) * x**k)
+    x, gain = 2.0, 2.0**k
+    if 64.0 * flow > gain * room:
+        gain = 64.0 * flow / room
+        x = gain ** (1.0 / k)
+    spread = spread_within(k, x, _SMOOTH if free else _ALL, pinches, parameters, series)
+    if spread * t * x <= room * gain * (x - 1.0):
+        return True
+    if free or spread < math.inf:
+        return False
+    rest = x - spread_within(k, x, _SMOOTH, pinches, parameters, series) * t * x / (room * gain) - 1.0
+    shorter = x * inside(k, x, series)
+    if not (rest > 0.0 and shorter > 1.0):
+        return False
+    spread = spread_within(k, shorter, _BEND, pinches, parameters, series)
+    return bool(spread * t * shorter <= room * shorter**k * (shorter - 1.0) * min(1.0, rest))
 
 
 @inner
-def serves(
-    t: float, size: float, free: bool, pinches: bool, parameters: FloatArray, series: FloatArray
-) -> float:
+def serves(t: float, size: float, free: bool, pinches: bool, parameters: FloatArray, series: FloatArray) -> float:
     """Fraction of t that N_TERMS terms serve, the best of a few discs."""
     x, best = _WIDEST, 0.0
     for _ in range(_MAX_DISCS):
-        spread = spread_within(N_TERMS, x, free, pinches, parameters, series)
+        spread = spread_within(N_TERMS, x, _SMOOTH if free else _ALL, pinches, parameters, series)
         share = 0.0
-        if math.isfinite(spread):
+        if spread < math.inf:
             share = x * fraction(spread * t * x, size)
+        elif not free:
+            shorter = x * inside(N_TERMS, x, series)
+            smooth = spread_within(N_TERMS, x, _SMOOTH, pinches, parameters, series)
+            bend = spread_within(N_TERMS, shorter, _BEND, pinches, parameters, series)
+            if smooth < math.inf and bend < math.inf:
+                share = x * fraction(smooth * t * x, 0.5 * size)
+                share = min(share, shorter * fraction(bend * t * shorter, 0.5 * size))
         if share >= 1.0:
             return 1.0
         if share < best:
@@ -231,36 +266,50 @@ def sum_of_sizes(series: FloatArray, row: int, last: int, x: float) -> float:
 
 
 @inner
-def spread_within(
-    last: int, x: float, free: bool, pinches: bool, parameters: FloatArray, series: FloatArray
-) -> float:
-    """Bound of ``|dw/dL - its value at 0|`` where the series go at complex distances up to x; inf where none is known.
+def inside(last: int, x: float, series: FloatArray) -> float:
+    """Part of the distance x up to which the series of w keeps away from zero."""
+    return min(1.0, 0.9 * abs(series[_W, 0]) / sum_of_sizes(series, _W, last, x))
 
-    Each factor of dw/dL is replaced by its size at 0 and the most by which it changes.
+
+@inner
+def spread_within(last: int, x: float, part: int, pinches: bool, parameters: FloatArray, series: FloatArray) -> float:
+    """Bound of ``|f - f(0)|`` where the series go at complex distances up to x; inf where none is known.
+
+    f is dw/dL, or the part of it without the term of ``|w|^n``, or this term. Each factor of f is replaced by its size
+    at 0 and the most by which it changes.
     """
     rw, re = sum_of_sizes(series, _W, last, x), sum_of_sizes(series, _ENERGY, last, x)
-    n, w, e = parameters[_N], abs(series[_W, 0]), series[_ENERGY, 0]
-    nu, eta = abs(1.0 + parameters[1] * e), abs(1.0 + parameters[2] * e)
+    n, w, e = parameters[_N], series[_W, 0], series[_ENERGY, 0]
+    growth, eta = abs(parameters[1]) * re, abs(1.0 + parameters[2] * e)
     wear = abs(parameters[2]) * re
     if not (wear < 0.9 * eta and rw < _LARGEST):
         return math.inf
-    bracket = abs(series[_BRACKET, 0]) + abs(parameters[0]) * re
-    if not free:
-        power = w**n
+    worn = abs(parameters[0]) * re
+    if part == _SMOOTH:
+        bracket = abs(parameters[_A] - parameters[0] * e)
+        changed = bracket + worn
+    else:
+        power, nu, size = series[_POWER, 0], abs(1.0 + parameters[1] * e), abs(w)
         if n == 1.0:
             rise = rw
         elif n == 2.0:
-            rise = rw * (2.0 * w + rw)
-        elif rw >= 0.95 * w:
+            rise = rw * (2.0 * size + rw)
+        elif rw >= 0.95 * size:
             return math.inf
         else:
-            rise = (w + rw) ** n - power if n > 1.0 else power - (w - rw) ** n
-        c = abs(parameters[_BETA]) + abs(parameters[_GAMMA])
-        bracket += c * (nu * rise + abs(parameters[1]) * re * (power + rise))
+            rise = (size + rw) ** n - power if n > 1.0 else power - (size - rw) ** n
+        c = abs(parameters[_GAMMA] + (parameters[_BETA] if w > 0.0 else -parameters[_BETA]))
+        if w == 0.0:
+            c = abs(parameters[_GAMMA]) + abs(parameters[_BETA])
+        change = c * (nu * rise + growth * (power + rise))
+        bracket = abs(series[_BRACKET, 0])
+        changed = bracket + worn + change
+        if part == _BEND:
+            bracket = c * nu * power
+            changed = bracket + change
     pinch = abs(series[_PINCH, 0])
-    if pinches:
-        pinch += pinch_within(rw, re, parameters, series)
-    return float(pinch * bracket / (eta - wear) - abs(series[_SLOPE, 0]))
+    deeper = pinch_within(rw, re, parameters, series) if pinches else 0.0
+    return float((pinch + deeper) * changed / (eta - wear) - pinch * bracket / eta)
 
 
 @inner
