@@ -44,7 +44,6 @@ N_STATE = _READY + 1
 MAX_STEPS = 2_000
 _LARGEST = 1.7976931348623157e308
 _LARGEST_EXPONENT = 700.0
-_N_LAST = 3  # terms that are rounding where a series ends: of a symmetric one every other term is zero
 _GROWTH = 4.0  # of the length tried, over the last one that served
 _WIDEST = 6.0  # disc looked at, in steps: a little wider than what serves a step of N_TERMS
 _MAX_DISCS = 40
@@ -191,14 +190,13 @@ def expand(
     if pinches and abs(series[_X, 0]) >= _FAR:
         pinches = False
         series[_PINCH, 0], series[_SLOPE, 0] = 1.0, series[_BRACKET, 0] / (1.0 + parameters[2] * e)
-    small, tried = 0, 0
+    tried = 0
     for k in range(1, N_TERMS + 1):
         term = t * series[_SLOPE, k - 1] / k
         series[_W, k], series[_ENERGY, k] = term, t * series[_W, k - 1] / k
         size = max(size, abs(term)) if k < 3 else size
-        small = small + 1 if abs(term) <= ROUNDING * size else 0
-        if small >= _N_LAST and k >= tried + _N_LAST:
-            tried = k
+        if abs(term) <= ROUNDING * size and k >= tried:
+            tried = k + 2
             if ends(k, t, size, free, pinches, parameters, series):
                 served = clear(k, 1.0, pinches, parameters, series)
                 if served > 0.0:
@@ -213,11 +211,10 @@ def expand(
 def ends(k: int, t: float, size: float, free: bool, pinches: bool, parameters: FloatArray, series: FloatArray) -> bool:
     """Whether the series may end at the term k: whether the terms left out are rounding beside `size`."""
     room = ROUNDING * size * (k + 1.0)
-    flow = abs(series[_W, 1]) + 2.0 * abs(series[_W, 2]) + 3.0 * abs(series[_W, 3])
-    x, gain = 2.0, 2.0**k
-    if 64.0 * flow > gain * room:
-        gain = 64.0 * flow / room
-        x = gain ** (1.0 / k)
+    flow = max(abs(series[_W, 1]), ROUNDING * size)
+    x, gain, doubling = 2.0, 2.0**k, 2.0**k
+    while gain * room < 16.0 * flow and x < _LARGEST:
+        x, gain = 2.0 * x, doubling * gain
     spread = spread_within(k, x, _SMOOTH if free else _ALL, pinches, parameters, series)
     if spread * t * x <= room * gain * (x - 1.0):
         return True
