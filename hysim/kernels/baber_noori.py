@@ -11,10 +11,14 @@ of z = 0, where c = beta + gamma for w > 0 and gamma - beta for w < 0, everythin
     dw/dL = h(w, e) (A(e) - c nu(e) |w|^n) / eta(e),    de/dL = w
 
 Its power series about the present point, L = t x, follows term by term from those of e, nu^(-1/n), exp(-p e), the
-bell exp(-X^2) and |w|^n. A step is as long as its last terms are rounding (`hysim.kernels.duhem`), and ends where w
-crosses zero. |w|^n has no series at w = 0 unless n is 1 or 2: within a distance in which the integral of its term is
-rounding it is left out. There is no closed form; this is good to 1e-12 of the range. A law that escapes is returned as
-`inf`; one that needs more than MAX_STEPS, or whose eta vanishes on the way, as `nan`.
+bell exp(-X^2) and |w|^n. A step is no longer, and a series no shorter, than the bound of what is left out allows
+(`hysim.kernels.remainder`): on a disc about the point each factor is bounded by its size there and the most by which
+it changes, the bell by the least real part of X^2. Far from the bell all its terms underflow; there it is left out,
+and a step ends before the bell could be more than rounding. A step also ends where w crosses zero. |w|^n has no series
+at w = 0 unless n is 1 or 2: within a distance in which the integral of its term is rounding it is left out, and close
+to there it is bounded on a disc of its own, shorter than that of the rest. There is no closed form; this is good to
+1e-12 of the range. A law that escapes is returned as `inf`; one that needs more than MAX_STEPS, or whose eta vanishes
+on the way, as `nan`.
 
 A law that neither wears off nor pinches takes the exact step of `hysim.kernels.boucwen`, so that z has its bits.
 """
@@ -126,7 +130,7 @@ def advance(w: float, e: float, length: float, parameters: FloatArray, series: F
 
 @inner
 def nearness(e: float, length: float, parameters: FloatArray, series: FloatArray) -> tuple[float, float]:
-    """How near to zero w must be that the integral of the term with ``|w|^n`` is rounding, and beside what; after `begin`."""
+    """Distance from zero on which the integral of the term with ``|w|^n`` is rounding, and beside what; after `begin`."""
     n, forcing = parameters[_N], abs(series[_SLOPE, 0])
     c = abs(parameters[_BETA]) + abs(parameters[_GAMMA])
     factor = c * abs((1.0 + parameters[1] * e) * series[_PINCH, 0] / (1.0 + parameters[2] * e))
@@ -225,7 +229,7 @@ def ends(k: int, t: float, size: float, free: bool, pinches: bool, parameters: F
     if not (rest > 0.0 and shorter > 1.0):
         return False
     spread = spread_within(k, shorter, _BEND, pinches, parameters, series)
-    return bool(spread * t * shorter <= room * shorter**k * (shorter - 1.0) * min(1.0, rest))
+    return bool(spread * t * shorter <= room * shorter**k * (shorter - 1.0) * rest / (x - 1.0))
 
 
 @inner
@@ -311,7 +315,7 @@ def spread_within(last: int, x: float, part: int, pinches: bool, parameters: Flo
 
 @inner
 def pinch_within(rw: float, re: float, parameters: FloatArray, series: FloatArray) -> float:
-    """Bound of ``|h - its value at 0|`` where w and e go no further than rw and re; the real part of X^2 bounds a bell."""
+    """Bound of ``|h - its value at 0|`` where w and e go no further than rw and re, by the real part of X^2."""
     deeper, farther, wider = shifts(re, parameters, series)
     x, width = abs(series[_X, 0]), abs(series[_WIDTH, 0])
     if not wider < 0.9 * width:

@@ -11,10 +11,11 @@ each solved by the power series of its flow about the present point. With u = u0
 
     z = sum t_k x^k,    (k + 1) t_(k+1) = h sum_j [a_j z^j]_k,    a_j(x) = sum_i f_ij (u0 + h x)^i
 
-The order follows the terms: the series ends where they have become rounding. Where N_TERMS do not reach
-that, the step is cut to the length at which the last of them do, at no further cost because t_k goes
-with h^k. There is no closed form and the law is not called exact: it is good to 1e-12 of the range.
-A law that escapes is returned as `inf`; one so stiff that it needs more than MAX_STEPS as `nan`.
+The order follows what is left out: the series ends where the bound of that, from the sizes of the coefficients on a
+complex disc (`hysim.kernels.remainder`), has become rounding. Where N_TERMS do not reach that, the step is cut to the
+length at which they do, at no further cost because t_k goes with h^k. There is no closed form and the law is not
+called exact: it is good to 1e-12 of the range. A law that escapes is returned as `inf`; one so stiff that it needs
+more than MAX_STEPS as `nan`.
 
 In a law with |z| a step ends where its series crosses zero, and the memory is then zero to the bit. A step is
 cut before to a length on which the series keeps away from zero or is monotone, so that its sign at the end

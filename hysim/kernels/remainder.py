@@ -17,9 +17,17 @@ with f analytic where |v| < r and |x| < R are complex numbers, and |f - f(0, 0)|
 
     tail = spread radius theta^(k + 1) / ((k + 1) (1 - theta)).
 
-A family gives r, R and spread; a step is cut to the fraction of the radius at which the tail after N_TERMS is
-rounding, and its series ends as soon as the tail is. Where the rates are small beside the decay, as in saturation,
-the radius grows as the logarithm of their ratio, so that the bound costs little there.
+The terms themselves give a disc too, often a wider one. Let P be the polynomial of the terms up to the index k. They
+are the first terms of the integral of f(P), so that the residual P' - f(P) is what f(P) has left from the power k on.
+Where P, at complex distances up to X, stays where f is known to be analytic, and spread bounds f there, Cauchy's
+estimate holds for f(P) as it did for v'. So the integral of the residual over a step of theta X is at most the tail
+above, with X in place of the radius; it is the error of the step, times the factor by which the flow parts neighbours,
+at most one where the memory decays, and of order one over a part of the radius where it grows. How far P goes is
+bounded by the sum of the sizes of its terms, abs(t_1) X + abs(t_2) X^2 + ...
+
+A family gives the domain and spread. A step is cut to a length at which the tail after N_TERMS is rounding beside the
+memory, and a series ends as soon as its tail is. Where the rates are small beside the decay, as in saturation, the
+radius grows as the logarithm of their ratio, so that the bound costs little there.
 
 Source: Cauchy's method of majorants, as in E. Hille, Ordinary Differential Equations in the Complex Domain (1976),
 chapter 2.

@@ -14,9 +14,10 @@ n = 1     closed: w + (a - c w) E_1 + d E_2,  E_1 = (1 - exp(-c L))/c,  E_2 = (L
           series near c L = 0. The place of the extremum is closed too, that of w = 0 is found by Newton's
           method in its bracket.
 other n   the power series of the flow about the present point, w = sum t_k x^k with L = h x and
-          w^n = sum g_k x^k, where w (w^n)' = n w' w^n gives g_k. A step is as long as its last terms are
-          rounding (`hysim.kernels.duhem`). At w = 0 the series do not begin, so the way from there goes
-          by a L + d L^2/2 for as long as the term left out is rounding beside the scale of the stretch.
+          w^n = sum g_k x^k, where w (w^n)' = n w' w^n gives g_k. A step is no longer than the bounds of
+          `hysim.kernels.remainder` allow. w^n is analytic up to w = 0 only, so that no step of the series gets
+          there: near zero w is a L + d L^2/2 less the integral of c (a L + d L^2/2)^n, for as long as the
+          next correction is rounding beside the scale of the stretch, on the way up and on the way down.
           This is good to 1e-12 of the range, and not called exact.
 
 A law that escapes is returned as `inf`; one so stiff that it needs more than MAX_STEPS as `nan`.
@@ -40,14 +41,12 @@ _RAMP = read_only([(-1.0) ** k / math.factorial(k + 2) for k in range(N_RAMP)]) 
 _RAMP_REACH = 0.75  # the terms left out are below 1e-18 here
 _LARGEST_EXPONENT = 709.0
 _LARGEST = 1.7976931348623157e308
-_SMALL = 2.0**-54
-_N_LAST = 3  # terms that are rounding where a series ends: of a symmetric one every other term is zero
-_GROWTH = 16.0  # of the length tried, over the last one that served
-_RETREAT = 2.0**-10  # of a length at which a term overflows
-_MAX_NEWTON = 100
+_MAX_NEWTON = 1000  # more than the largest exponent: down a growing exponential, Newton's rule goes 1/|c| at a time
 _AHEAD = 16.0  # times the length that is sure before, of a step whose terms tell how much of it they serve
 _WIDEST = 6.0  # disc looked at, in steps: a little wider than what serves a step of N_TERMS
 _MAX_DISCS = 40
+_BRISK = 0.6  # of a sure length near w = 0: the series then needs half as many terms
+_MAX_SIDES = 8
 
 
 @kernel
@@ -69,9 +68,13 @@ def advance(u: float, z: float, du: float, parameters: FloatArray, scratch: Floa
     direction = 1.0 if du > 0.0 else -1.0
     A, beta, gamma, n, delta = parameters[0], parameters[1], parameters[2], parameters[3], parameters[4]
     a, w, length = A + direction * delta * u, direction * z, abs(du)
-    begin = 0.0
-    while True:  # the forcing a + delta L changes its sign once, so there are no more than two zeros of z
+    begin, stands = 0.0, False
+    for _ in range(
+        _MAX_SIDES
+    ):  # the forcing a + delta L changes its sign once, so there are no more than two zeros of z
         left, forcing = length - begin, a + delta * begin
+        if stands:  # z left zero and came back within the rounding of the length: the forcing changes its sign here
+            forcing = 0.0
         if w != 0.0:
             side = 1.0 if w > 0.0 else -1.0
         else:
@@ -83,7 +86,9 @@ def advance(u: float, z: float, du: float, parameters: FloatArray, scratch: Floa
             w, travelled = power_side(abs(w), side * forcing, side * delta, c, n, left, scratch)
         if w != 0.0 or travelled >= left:
             return direction * side * w
+        stands = begin + travelled == begin
         begin += travelled
+    return math.nan
 
 
 # ---------------------------------------------------------------------------------- n = 1
@@ -107,7 +112,7 @@ def linear_side(w: float, a: float, d: float, c: float, length: float) -> tuple[
         value = linear_ramp(w, a, d, c, x)
         low, high = (x, high) if value >= 0.0 else (low, x)
         trial = newton(low, high, x, value, a + d * x - c * value)
-        if value == 0.0 or abs(trial - x) <= _SMALL * x:
+        if value == 0.0 or abs(trial - x) <= ROUNDING * x:
             break
         x = trial
     return 0.0, x
@@ -130,7 +135,7 @@ def linear_ramp(w: float, a: float, d: float, c: float, length: float) -> float:
 def linear_turn(slope: float, d: float, c: float) -> float:
     """Length at which w' = a + d L - c w is zero, from w' = `slope` at L = 0 on."""
     x = -c * slope / d
-    return -slope / d if abs(x) < _SMALL else math.log1p(x) / c
+    return -slope / d if abs(x) < ROUNDING else math.log1p(x) / c
 
 
 # ---------------------------------------------------------------------------------- other n
@@ -171,8 +176,10 @@ def power_side(
         if theta > 0.2:
             theta = min(theta, fraction(spread * reach, w))
         safe = min(left, theta * reach)
+        if safe < left and spread < abs(slope):
+            safe *= _BRISK
         if safe == left or spread < abs(slope):
-            w = series(w, power, forcing, d, c, n, safe, theta, spread * safe, terms)
+            w = series(w, power, forcing, d, c, n, safe, safe / reach, spread * safe, terms)
             done = length if safe == left else done + safe
             continue
         h = min(left, _AHEAD * safe)
