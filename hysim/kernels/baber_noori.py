@@ -45,7 +45,7 @@ _EXPONENT = _SERIES + _N_ROWS * (N_TERMS + 1)  # the n that its charts are made 
 _READY = _EXPONENT + 1  # 0 before the first step
 N_STATE = _READY + 1
 
-MAX_STEPS = 2_000
+MAX_STEPS = 5_000
 _LARGEST = 1.7976931348623157e308
 _LARGEST_EXPONENT = 700.0
 _GROWTH = 4.0  # of the length tried, over the last one that served
@@ -100,12 +100,12 @@ def advance(w: float, e: float, length: float, parameters: FloatArray, series: F
             if w == 0.0 and forcing == 0.0:
                 return w, e
             if not whole:
-                near, size = nearness(e, length, parameters, series)
-                largest = max(largest, size)
+                near, size, bent = nearness(e, length, parameters, series)
+                largest = max(largest, min(size, bent))
                 free = abs(w) <= near
-                if not free:
+                if not free and abs(w) < 0.5 * bent:
                     t = short_way(w, forcing, near, n, t)
-                else:
+                elif free:
                     t = min(t, 2.0 * abs(w / forcing) if w * forcing < 0.0 else near / abs(forcing))
         last, fraction = expand(w, e, t, free, largest, parameters, series)
         if fraction == 0.0:
@@ -129,15 +129,20 @@ def advance(w: float, e: float, length: float, parameters: FloatArray, series: F
 
 
 @inner
-def nearness(e: float, length: float, parameters: FloatArray, series: FloatArray) -> tuple[float, float]:
-    """Distance from zero on which the integral of the term with ``|w|^n`` is rounding, and beside what; after `begin`."""
+def nearness(e: float, length: float, parameters: FloatArray, series: FloatArray) -> tuple[float, float, float]:
+    """How near to zero w must be to leave the term with ``|w|^n`` out, and the order of what it comes to; after `begin`.
+
+    The integral of the term is rounding up to the first distance. w comes to the smaller of the other two: as far as
+    the length goes without the term, and where the term cancels the slope.
+    """
     n, forcing = parameters[_N], abs(series[_SLOPE, 0])
     c = abs(parameters[_BETA]) + abs(parameters[_GAMMA])
     factor = c * abs((1.0 + parameters[1] * e) * series[_PINCH, 0] / (1.0 + parameters[2] * e))
     if forcing == 0.0 or factor == 0.0:
-        return (0.0 if forcing == 0.0 else math.inf), forcing * length
-    size = min(forcing * length, (forcing / factor) ** (1.0 / n))
-    return float(0.5 * (ROUNDING * size * (n + 1.0) * forcing / factor) ** (1.0 / (n + 1.0))), size
+        return (0.0 if forcing == 0.0 else math.inf), forcing * length, math.inf
+    bent = (forcing / factor) ** (1.0 / n)
+    room = ROUNDING * min(forcing * length, bent) * (n + 1.0) * forcing / factor
+    return float(0.5 * room ** (1.0 / (n + 1.0))), forcing * length, bent
 
 
 @inner
@@ -150,7 +155,7 @@ def short_way(w: float, forcing: float, near: float, n: float, left: float) -> f
     if left * abs(forcing) < 0.3 * way:
         return left
     theta = min(1.0, max(0.3, (abs(w) / near) ** (-(n + 1.0) / 12.0)))
-    return min(left, theta * way / abs(forcing))
+    return float(min(left, theta * way / abs(forcing)))
 
 
 @kernel
@@ -253,7 +258,7 @@ def serves(t: float, size: float, free: bool, pinches: bool, parameters: FloatAr
         if share < best:
             break
         best = share
-        x *= 0.75 if share > 0.0 else 0.5
+        x *= 0.75 if share > 0.01 * x else 0.25
     return best
 
 
@@ -269,7 +274,7 @@ def sum_of_sizes(series: FloatArray, row: int, last: int, x: float) -> float:
 @inner
 def inside(last: int, x: float, series: FloatArray) -> float:
     """Part of the distance x up to which the series of w keeps away from zero."""
-    return min(1.0, 0.9 * abs(series[_W, 0]) / sum_of_sizes(series, _W, last, x))
+    return float(min(1.0, 0.9 * abs(series[_W, 0]) / sum_of_sizes(series, _W, last, x)))
 
 
 @inner

@@ -126,7 +126,7 @@ def serves(local: FloatArray, h: float, size: float, powers: FloatArray) -> floa
         if share < best:
             break
         best = share
-        x *= 0.75 if share > 0.0 else 0.5
+        x *= 0.75 if share > 0.01 * x else 0.25
     return best
 
 

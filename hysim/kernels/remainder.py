@@ -58,4 +58,4 @@ def fraction(spread: float, size: float) -> float:
     room = ROUNDING * size * (1.0 - _FARTHEST) * (N_TERMS + 1.0)
     if room >= spread:
         return _FARTHEST
-    return min(_FARTHEST, (room / spread) ** (1.0 / (N_TERMS + 1.0)))
+    return float(min(_FARTHEST, (room / spread) ** (1.0 / (N_TERMS + 1.0))))

@@ -311,7 +311,7 @@ def moment(a: float, d: float, n: float, length: float) -> float:
         total += factor / (n + 1.0 + k)
         if abs(factor) < 1e-11:
             break
-    return (a * length) ** n * length * total
+    return float((a * length) ** n * length * total)
 
 
 @kernel
