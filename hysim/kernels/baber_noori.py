@@ -130,7 +130,7 @@ def advance(w: float, e: float, length: float, parameters: FloatArray, series: F
 
 @inner
 def nearness(e: float, length: float, parameters: FloatArray, series: FloatArray) -> tuple[float, float, float]:
-    """How near to zero w must be to leave the term with ``|w|^n`` out, and the order of what it comes to; after `begin`.
+    """How near to zero w must be to leave out the term with ``|w|^n``, and the order of what w comes to; after `begin`.
 
     The integral of the term is rounding up to the first distance. w comes to the smaller of the other two: as far as
     the length goes without the term, and where the term cancels the slope.
