@@ -229,7 +229,7 @@ def advance(
             expand(law, above + 1, here, h, local)
         last, served = series(local, z, h, powers)
         if served == 0.0:
-            if not math.isfinite(powers[1, 1]):
+            if not math.isfinite(powers[1, 1]) or abs(h) <= ROUNDING * abs(du):  # nothing moves u any more, but z
                 return math.inf
             h *= _RETREAT
             continue
