@@ -229,7 +229,7 @@ def advance(
             expand(law, above + 1, here, h, local)
         last, served = series(local, z, h, powers)
         if served == 0.0:
-            if not math.isfinite(powers[1, 1]) or abs(h) <= ROUNDING * abs(du):  # nothing moves u any more, but z
+            if not math.isfinite(powers[1, 1]):
                 return math.inf
             h *= _RETREAT
             continue
@@ -240,6 +240,8 @@ def advance(
         for k in range(last, -1, -1):
             z = z * end + powers[1, k]
         if not abs(z) <= bound:
+            return math.inf
+        if abs(h * end) <= ROUNDING * abs(du) and abs(z) > 1.01 * abs(before) > 0.0:  # nothing moves u any more, but z
             return math.inf
         if two_sided and ((before > 0.0 and z < 0.0) or (before < 0.0 and z > 0.0)):
             end, z = zero(powers, last, end), 0.0
