@@ -304,7 +304,7 @@ def stuck(*_, **__):
     except BaseException:
         time.sleep(600)  # as one call of a compiled library would go on
 
-sys.modules["hysim.metrics"] = __import__("types").SimpleNamespace(loop_metrics=stuck)
+sys.modules["hysim.metrics"] = __import__("types").SimpleNamespace(loop_metrics=stuck, cycle_metrics=stuck)
 sys.exit(main(["metrics", sys.argv[1]]))
 """
 
