@@ -14,6 +14,7 @@ from hysim._words import LETTERS, words
 
 if TYPE_CHECKING:
     from hysim.comparison._result import Comparison, ComparisonRow
+    from hysim.comparison._verdict import Contrast
 
 Value = str | int | float | bool
 _WIDE = 110  # letters in a line of text
@@ -39,12 +40,20 @@ def columns(comparison: "Comparison", *, timings: bool) -> list[Column]:
         Column(f"test rmse{y}", lambda row: row.test_rmse, 4),
         Column("test fit [%]", lambda row: row.test_fit_percent, 2),
     ]
+    contrasts = {each.name: each for each in comparison.contrasts}
+    effect = [
+        Column("cv rmse / best", lambda row: _of(contrasts, row, "rmse_ratio"), 2),
+        Column("typical error / best", lambda row: _of(contrasts, row, "typical_ratio"), 2, short=False),
+        Column("p", lambda row: _of(contrasts, row, "probability"), 3),
+        Column("diverged", lambda row: row.name in contrasts and contrasts[row.name].diverged, short=False),
+    ]
     return [
         Column("model", lambda row: row.name),
         Column("parameters", lambda row: row.n_parameters),
         Column("fit [%]", lambda row: row.fit_percent, 2),
         Column(f"rmse{y}", lambda row: row.rmse, 4),
         Column(f"cv rmse{y}", lambda row: row.cv_rmse, 4),
+        *(effect if contrasts else []),
         *(test if comparison.test else []),
         *([Column("max residual [quanta]", lambda row: row.max_residual / quantum, 2)] if quantum else []),
         Column(f"max width{y}", lambda row: row.max_width, 3),
@@ -166,6 +175,13 @@ def _short(comparison: "Comparison", timings: bool) -> list[list[str]]:
     chosen = [column for column in columns(comparison, timings=timings) if column.short]
     rows = [[_printed(column.value(row), column.digits) for column in chosen] for row in comparison.rows]
     return [[column.heading for column in chosen], *rows]
+
+
+def _of(contrasts: "Mapping[str, Contrast]", row: "ComparisonRow", name: str) -> float:
+    """How a model compares with the best one, which compares with itself as 1."""
+    if row.name in contrasts:
+        return float(getattr(contrasts[row.name], name))
+    return 1.0 if name != "probability" and row.cv_rmse == row.cv_rmse else math.nan
 
 
 def _printed(value: Value, digits: int) -> str:

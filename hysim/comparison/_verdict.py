@@ -1,50 +1,155 @@
-"""Whether held-out samples tell two models apart.
+"""Whether left-out samples show that one model predicts worse than another.
 
-With a and b the errors of two models at N samples that neither was fitted to, d = a^2 - b^2 has the mean m, and
-neighbours along a loop are correlated, so that the variance of m is
+With a and b the errors of two models at N samples that neither was fitted to, d = |a| - |b|, and s the signed ranks of
+d, the rank of |d| with the sign of d: one huge error counts as the largest, and no more. Neighbours along a loop are
+correlated, so that the variance of the mean of s is taken from its lowest frequencies, with the cosines
 
-    v = (g_0 + 2 sum_(k=1)^L (1 - k / (L + 1)) g_k) / N,    L = floor(4 (N / 100)^(2/9))
+    c_k = sqrt(2 / N) sum_t s_t cos(pi k (t - 1/2) / N),    k = 1 ... nu,    nu = min(8, floor(0.41 N^(2/3))),
+    T = mean(s) sqrt(N) / sqrt(mean(c_k^2)).
 
-with g_k the autocovariance of d at the lag k. If both predict equally well, m / sqrt(v) has about Student's
-distribution with N - 1 degrees of freedom. The model with the least error was chosen after the fact, and several are
-held against it; both make a small probability less remarkable than it looks.
+If d is as often positive as negative, and as large, T has about Student's distribution with nu degrees of freedom.
+Differences below a thousandth of the typical error count as none. A family of m models is held against the best one
+by Holm's correction. The best one was chosen by the same errors, which makes a small probability less remarkable.
 
-Sources: F. X. Diebold and R. S. Mariano, J. Bus. Econ. Stat. 13 (1995) 253; the weights and L: W. K. Newey and
-K. D. West, Econometrica 55 (1987) 703 and Rev. Econ. Stud. 61 (1994) 631; Student's distribution: D. Harvey,
-S. Leybourne and P. Newbold, Int. J. Forecast. 13 (1997) 281.
+With normal and with heavy-tailed noise (t, 2 degrees of freedom), independent or with a correlation of neighbours up to
+0.8, equal models are called unequal in 4 to 7 % of 1000 simulated records of 52 to 1000 samples at the level of 5 %; at
+0.9 in 5 to 9 %. A mean of squared errors and 4 to 6 lags (Diebold and Mariano 1995) does so in 11 to 26 % of them.
+
+Sources: F. Wilcoxon, Biometrics Bull. 1 (1945) 80 for signed ranks; E. Lazarus, D. J. Lewis, J. H. Stock and
+M. W. Watson, J. Bus. Econ. Stat. 36 (2018) 541 for the cosines and 0.41 N^(2/3); S. Holm, Scand. J. Stat. 6 (1979) 65.
 """
 
 import math
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, frozen
 
 LEVEL = 0.05
 """Two models are told apart where the probability is below this."""
 
+DIVERGED = 10.0
+"""A fitted model diverged where a left-out error is larger than so many ranges of the measured output."""
 
-def probability(a: FloatArray, b: FloatArray) -> float:
-    """Two-sided probability of a mean difference as large as this if both models predicted equally well.
+_MOST_COSINES = 8  # more would miss correlation over a large part of the record
+_TIE = 1e-3  # of the typical error
+_ROUNDING = 1e-9  # of the output's range
 
-    It is nan where fewer than 2 samples have both errors, and 1 where the squared errors are the same.
+
+@frozen
+class Contrast:
+    """A model held against the best one, by their errors at the samples that were left out of both.
+
+    Parameters
+    ----------
+    name : str
+        What the model is called.
+    rmse_ratio : float
+        Its cross-validated rmse over that of the best model.
+    typical_ratio : float
+        Its median absolute error over that of the best model; nan where errors are unknown.
+    probability : float
+        Two-sided probability of signed ranks as one-sided as these if both predicted equally well, after Holm's
+        correction for the number of models; nan where errors are unknown.
+    has_larger_errors : bool
+        Whether its errors are the larger ones by their signed ranks.
+    diverged : bool
+        Whether a left-out error is not finite, or more than 10 times the range of the measured output.
     """
-    from scipy.stats import t
 
-    d = (a**2 - b**2)[~np.isnan(a) & ~np.isnan(b)]
-    if d.size < 2:
-        return math.nan
-    mean = float(d.mean())
-    variance = _variance_of_mean(d - mean)
+    name: str
+    rmse_ratio: float
+    typical_ratio: float
+    probability: float
+    has_larger_errors: bool
+    diverged: bool
+
+    @property
+    def is_worse(self) -> bool:
+        """Whether the model is significantly worse than the best one at 5 %, or diverged."""
+        return self.diverged or (self.probability < LEVEL and self.has_larger_errors)
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether its errors are significantly smaller by their ranks, although its rmse is larger."""
+        return not self.diverged and self.probability < LEVEL and not self.has_larger_errors
+
+
+def contrasts(
+    others: Mapping[str, FloatArray], best: FloatArray, rmses: Mapping[str, float], best_rmse: float, *,
+    span: float, fitted: Sequence[str],
+) -> tuple[Contrast, ...]:  # fmt: skip
+    """Each of the others held against the best model by its left-out errors (n,); `span` is the output's range."""
+    tests = {name: _tested(errors, best, _ROUNDING * span) for name, errors in others.items()}
+    adjusted = holm({name: p for name, (p, _) in tests.items()})
+    return tuple(
+        Contrast(
+            name=name,
+            rmse_ratio=_ratio(rmses[name], best_rmse),
+            typical_ratio=_typical_ratio(errors, best),
+            probability=adjusted[name],
+            has_larger_errors=tests[name][1] > 0.0,
+            diverged=name in fitted and diverged(errors, span),
+        )
+        for name, errors in others.items()
+    )
+
+
+def diverged(errors: FloatArray, span: float) -> bool:
+    """Whether one of the errors that are known is infinite, or far beyond the output's range."""
+    known = errors[~np.isnan(errors)]
+    return bool(known.size and np.abs(known).max() > DIVERGED * span > 0.0)
+
+
+def probability(a: FloatArray, b: FloatArray, *, tie: float = 0.0) -> float:
+    """Two-sided probability of signed ranks as one-sided as these if both models predicted equally well.
+
+    It is nan where fewer than 4 samples have both errors, and 1 where no difference is above `tie` [unit of y] and a
+    thousandth of the typical error.
+    """
+    return _tested(a, b, tie)[0]
+
+
+def holm(probabilities: Mapping[str, float]) -> dict[str, float]:
+    """The probabilities after Holm's correction for their number; nan stays nan."""
+    known = sorted((p, name) for name, p in probabilities.items() if not math.isnan(p))
+    adjusted, largest = dict(probabilities), 0.0
+    for k, (p, name) in enumerate(known):
+        largest = max(largest, min(1.0, (len(known) - k) * p))
+        adjusted[name] = largest
+    return adjusted
+
+
+def _tested(a: FloatArray, b: FloatArray, tie: float) -> tuple[float, float]:
+    """The probability, and the mean signed rank of |a| - |b|."""
+    from scipy.stats import rankdata, t
+
+    if a.shape != b.shape:
+        return math.nan, math.nan
+    known = ~np.isnan(a) & ~np.isnan(b)
+    first, second = (np.minimum(np.abs(errors[known]), 1e300) for errors in (a, b))
+    n = first.size
+    n_cosines = min(_MOST_COSINES, math.floor(0.41 * n ** (2.0 / 3.0)))
+    if n_cosines < 1:
+        return math.nan, math.nan
+    d = first - second
+    d[np.abs(d) <= max(tie, _TIE * 0.5 * float(np.median(first + second)))] = 0.0
+    signed = np.sign(d) * rankdata(np.abs(d))
+    phase = np.pi * np.outer(np.arange(1, n_cosines + 1), (np.arange(n) + 0.5) / n)
+    variance = float(np.mean((np.sqrt(2.0 / n) * np.cos(phase) @ signed) ** 2))
+    mean = float(signed.mean())
     if mean == 0.0 or variance <= 0.0:
-        return float(mean == 0.0)
-    return float(2.0 * t.sf(abs(mean) / math.sqrt(variance), d.size - 1))
+        return float(mean == 0.0), mean
+    return float(2.0 * t.sf(abs(mean) * math.sqrt(n / variance), n_cosines)), mean
 
 
-def _variance_of_mean(d: FloatArray) -> float:
-    """Of a series without its mean, by Bartlett's weights, which never make it negative."""
-    n = d.size
-    lags = min(math.floor(4.0 * (n / 100.0) ** (2.0 / 9.0)), n - 1)
-    covariances = [float(d[k:] @ d[: n - k]) / n for k in range(lags + 1)]
-    weights = [1.0, *(2.0 * (1.0 - k / (lags + 1)) for k in range(1, lags + 1))]
-    return math.fsum(weight * covariance for weight, covariance in zip(weights, covariances, strict=True)) / n
+def _typical_ratio(a: FloatArray, b: FloatArray) -> float:
+    if a.shape != b.shape:
+        return math.nan
+    known = ~np.isnan(a) & ~np.isnan(b)
+    return _ratio(float(np.median(np.abs(a[known]))), float(np.median(np.abs(b[known])))) if known.any() else math.nan
+
+
+def _ratio(value: float, best: float) -> float:
+    return value / best if best > 0.0 else 1.0 if value == 0.0 else math.inf
