@@ -118,6 +118,7 @@ def _document(table: "Comparison", timings: bool) -> dict[str, Any]:
         "winner": table.winner,
         "undecided": table.undecided,
         "verdict": table.verdict,
+        "warnings": table.warnings,
         "rows": [{name: value for name, value in row.items() if timings or name != "seconds"} for row in rows],
         "failed": table.failed,
     }

@@ -184,6 +184,7 @@ class _Protocol:
             test_rmse=test_rmse,
             success=success,
             message=message,
+            warnings=tuple(fitted.warnings) if isinstance(fitted, Identification) else (),
             seconds=seconds,
         )
 

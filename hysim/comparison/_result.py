@@ -11,6 +11,7 @@ from hysim._frozen import FloatArray, frozen
 from hysim._words import printed, words
 from hysim.comparison import _tables
 from hysim.comparison._verdict import Contrast, contrasts
+from hysim.identification.sentences import CONSTANT, SWAPPED
 from hysim.metrics import LoopMetrics
 from hysim.models.model import in_brief
 from hysim.records import Record
@@ -60,6 +61,8 @@ class ComparisonRow:
         Whether its identification converged.
     message : str
         How that ended; empty for a model that was not identified here.
+    warnings : tuple of str
+        Those of its identification; empty for a model that was not identified.
     seconds : float
         How long that took; nan where it was not done here. Rows that differ in it are equal [s].
     """
@@ -89,17 +92,20 @@ class ComparisonRow:
     test_rmse: float = float("nan")
     success: bool = True
     message: str = ""
+    warnings: tuple[str, ...] = ()
     seconds: float = field(default=float("nan"), compare=False)
 
     def __str__(self) -> str:
+        fit = "fit not defined" if math.isnan(self.fit_percent) else f"fit {self.fit_percent:.2f} %"
         return words(
-            [f"ComparisonRow {self.name}: fit {self.fit_percent:.2f} %, rmse {self.rmse:.4g}"],
+            [f"ComparisonRow {self.name}: {fit}, rmse {self.rmse:.4g}"],
             {
                 "left out": "" if math.isnan(self.cv_rmse) else f"rmse {self.cv_rmse:.4g}",
                 "largest width": f"{self.max_width:.4g} at {self.max_width_at:.6g}, {self.width_error_percent:+.1f} %",
                 "parameters": f"{self.n_parameters}, BIC {self.bic:.1f}",
                 "model": in_brief(self.model),
                 "search": self.message,
+                "warnings": "; ".join(self.warnings),
             },
         )
 
@@ -220,6 +226,21 @@ class Comparison:
             sentences.insert(0, f"{self.winner} predicts samples left out best, {rmse}; {self._undecided_in_words()}.")
             sentences[1:1] = self._exceptions_in_words()
         return " ".join(sentences)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """One sentence for each thing that should not be overlooked.
+
+        They are a constant output; the warnings of the best model, the one that predicts best, or where that is unknown
+        has the least rmse; and of the best model that doubts it, that the input and the output may be swapped. Models
+        that diverged are named in `verdict`, those that could not be compared in `failed`.
+        """
+        constant = [CONSTANT] if np.ptp(self.record.y) == 0.0 else []
+        ranked = self.ranked() or self.ranked("rmse")
+        told = [(row.name, each) for row in ranked for each in row.warnings]
+        found = [f"{name}: {each}" for name, each in told if name == ranked[0].name and each != CONSTANT]
+        doubts = [f"{name}: {each}" for name, each in told if each.startswith(SWAPPED)][:1]
+        return (*constant, *dict.fromkeys([*found, *doubts]))
 
     def _undecided_in_words(self) -> str:
         method = "(signed ranks of left-out errors, 5 % after Holm's correction)"

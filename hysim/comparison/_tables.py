@@ -70,6 +70,7 @@ def columns(comparison: "Comparison", *, timings: bool) -> list[Column]:
         *([Column("time [s]", lambda row: row.seconds, 1)] if timings else []),
         Column("converged", lambda row: row.success, short=False),
         Column("message", lambda row: row.message, short=False),
+        Column("warnings", lambda row: "; ".join(row.warnings), short=False),
     ]
 
 
@@ -79,7 +80,9 @@ def to_text(comparison: "Comparison", *, timings: bool) -> str:
     notes = [f"not compared: {name}: {reason}" for name, reason in comparison.failed.items()] + [comparison.verdict]
     folded = textwrap.TextWrapper(_WIDE, subsequent_indent="  ", break_on_hyphens=False)
     wrapped = [line for note in notes if note for line in folded.wrap(note)]
-    return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:], *wrapped])
+    inside = textwrap.TextWrapper(_WIDE, initial_indent="  ", subsequent_indent="    ", break_on_hyphens=False)
+    warned = [line for each in comparison.warnings for line in inside.wrap(each)]
+    return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:], *wrapped, *(["Warnings"] if warned else []), *warned])
 
 
 def to_words(comparison: "Comparison") -> str:
@@ -92,8 +95,9 @@ def to_words(comparison: "Comparison") -> str:
     more, many = len(best) - _PRINTED, len(comparison.rows)
     head = f"Comparison of {many} model{'' if many == 1 else 's'} on {comparison.record.name or 'a record'}, "
     notes = [f"  ... and {more} more"] if more > 0 else []
+    told = [comparison.verdict, f"Warnings: {'; '.join(comparison.warnings)}" if comparison.warnings else ""]
     notes += textwrap.wrap(
-        comparison.verdict, LETTERS, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False
+        " ".join(filter(None, told)), LETTERS, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False
     )
     return words([f"{head}{len(comparison.record)} samples", *(f"  {line}" for line in _aligned(table)), *notes])
 
@@ -103,7 +107,10 @@ def to_html(comparison: "Comparison") -> str:
     header, *rows = ([html.escape(cell) for cell in cells] for cells in _short(comparison, timings=False))
     head = "".join(f"<th>{cell}</th>" for cell in header)
     body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>" for cells in rows)
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table><p>{html.escape(comparison.verdict)}</p>"
+    listed = "".join(f"<li>{html.escape(each)}</li>" for each in comparison.warnings)
+    warned = f"<p>Warnings</p><ul>{listed}</ul>" if listed else ""
+    verdict = f"<p>{html.escape(comparison.verdict)}</p>"
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{verdict}{warned}"
 
 
 def to_markdown(comparison: "Comparison", *, timings: bool) -> str:

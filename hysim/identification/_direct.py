@@ -14,6 +14,7 @@ from hysim._frozen import FloatArray
 from hysim.identification._diagnostics import whiteness
 from hysim.identification._resampling import rms_of_known
 from hysim.identification._result import Identification, Width
+from hysim.identification.sentences import CONSTANT
 from hysim.metrics.rows import LoopRows
 from hysim.models.search_space import Direct, Freedom
 from hysim.records import Record
@@ -79,6 +80,7 @@ def identified(
         cv_residual=errors,
         cv_rmse=rms_of_known(errors),
         seed=seed,
+        warnings=() if np.ptp(y) else (CONSTANT,),
     )
 
 

@@ -16,6 +16,7 @@ from hysim.identification._resampling import bootstrap
 from hysim.identification._result import Candidate, Identification, Width
 from hysim.identification._search import PERFECT, Optimum, optima, polish
 from hysim.identification._uncertainty import Uncertainty, uncertainty
+from hysim.identification.sentences import sentences
 
 LEVEL = 0.95
 TAILS = (0.025, 0.975)
@@ -188,6 +189,14 @@ class Search:
             message="; ".join(_phrases(best.converged, whole, known, rivals, curves, notes)),
             rivals=rivals,
             seed=self.seed,
+            warnings=sentences(
+                spread=float(np.std(whole.y)),
+                rmse=chosen.rmse,
+                whiteness=whiteness(residual, len(names)),
+                stderr=dict(zip(names, stderr.tolist(), strict=True)),
+                reasons=known.reasons,
+                success=best.converged,
+            ),
         )
 
     def _draws(self, best: LocalOptimum, residual: FloatArray) -> FloatArray:

@@ -56,7 +56,7 @@ class Selection:
             [
                 name,
                 str(fit.n_parameters),
-                f"{fit.fit_percent:.2f}",
+                "-" if math.isnan(fit.fit_percent) else f"{fit.fit_percent:.2f}",
                 f"{fit.rmse:.4g}",
                 f"{getattr(fit, self.criterion):.6g}",
             ]
