@@ -59,12 +59,14 @@ def test_a_familys_own_record_is_not_suspected(law, size):
 def test_a_constant_output_is_said_once_and_no_fit_in_percent_is_printed(tmp_path, capsys):
     record = hs.Record(u=LOOP, y=np.full(LOOP.size, 2.0))
     fit = hs.identify(hs.Line, record)
-    assert sum("the output is constant" in each for each in fit.warnings) == 1
+    assert len(fit.warnings) == 1  # the residuals are rounding, whose correlation means nothing
+    assert "the output is constant" in fit.warnings[0]
     table = hs.compare({"line": hs.Line, "curve": hs.SingleValued}, record)
-    assert sum("the output is constant" in each for each in table.warnings) == 1
+    assert len(table.warnings) == 1
+    assert "the output is constant" in table.warnings[0]
     for text in (str(fit), fit.summary(), table.to_text(), str(table), table._repr_html_(), str(table.rows[0])):
         assert "nan" not in text
-        assert "output is constant" in text or "fit not defined" in text
+        assert "output is constant" in " ".join(text.split()) or "fit not defined" in text
     assert "nan" not in hs.select([hs.Line, hs.SingleValued], record).to_text()
     np.savetxt(tmp_path / "flat.csv", np.column_stack([record.u, record.y]), delimiter=",", header="u,y", comments="")
     assert main(["identify", str(tmp_path / "flat.csv"), "--u", "u", "--y", "y", "--model", "line", "--json"]) == 0
@@ -93,7 +95,15 @@ def test_correlated_residuals_are_said_where_intervals_are_quoted():
 
 
 def test_a_search_that_did_not_converge_is_said():
-    usual = {"spread": 1.0, "rmse": 0.1, "whiteness": 0.5, "stderr": {"a": 0.1}, "reasons": (), "success": True}
+    usual = {
+        "spread": 1.0,
+        "size": 2.0,
+        "rmse": 0.1,
+        "whiteness": 0.5,
+        "stderr": {"a": 0.1},
+        "reasons": (),
+        "success": True,
+    }
     assert sentences(**usual) == ()
     assert sentences(**(usual | {"success": False})) == ("the search did not converge: better parameters may exist",)
     assert sentences(**(usual | {"stderr": {"a": np.nan}})) == ("no standard error for a",)
@@ -142,13 +152,12 @@ def test_the_noise_of_rounded_data_is_what_sheppards_correction_leaves():
     assert Quantised(quantum).at_least(0.0, n).floor == 0.0
 
 
-@pytest.mark.parametrize("noise", ["gaussian", "robust"])
+@pytest.mark.parametrize("noise", ["gaussian", "quantised"])
 def test_a_bootstrap_of_few_samples_is_as_wide_as_the_standard_errors(noise):
     """Residuals of 6 samples and 2 parameters are too small by sqrt(6 / 4); drawn anew they must not be."""
     u, ratios = np.linspace(-1.0, 1.0, 6), []
     for seed in range(12):
         y = 2.0 * u + 0.1 * np.random.default_rng(seed).standard_normal(u.size)
-        fit = hs.identify(hs.Line, hs.Record(u=u, y=y), noise=noise, intervals="bootstrap")
+        fit = hs.identify(hs.Line, hs.Record(u=u, y=y, resolution=1e-3), noise=noise, intervals="bootstrap")
         ratios.append(np.ptp(fit.intervals["slope"]) / (2.0 * 1.96 * fit.stderr["slope"]))
-    print(noise, np.median(ratios), np.mean(ratios))
     assert np.median(ratios) == pytest.approx(1.0, abs=0.1)

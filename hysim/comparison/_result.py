@@ -97,11 +97,12 @@ class ComparisonRow:
 
     def __str__(self) -> str:
         fit = "fit not defined" if math.isnan(self.fit_percent) else f"fit {self.fit_percent:.2f} %"
+        excess = "" if math.isnan(self.width_error_percent) else f", {self.width_error_percent:+.1f} %"
         return words(
             [f"ComparisonRow {self.name}: {fit}, rmse {self.rmse:.4g}"],
             {
                 "left out": "" if math.isnan(self.cv_rmse) else f"rmse {self.cv_rmse:.4g}",
-                "largest width": f"{self.max_width:.4g} at {self.max_width_at:.6g}, {self.width_error_percent:+.1f} %",
+                "largest width": f"{self.max_width:.4g} at {self.max_width_at:.6g}{excess}",
                 "parameters": f"{self.n_parameters}, BIC {self.bic:.1f}",
                 "model": in_brief(self.model),
                 "search": self.message,

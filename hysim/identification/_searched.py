@@ -191,6 +191,7 @@ class Search:
             seed=self.seed,
             warnings=sentences(
                 spread=float(np.std(whole.y)),
+                size=whole.scale,
                 rmse=chosen.rmse,
                 whiteness=whiteness(residual, len(names)),
                 stderr=dict(zip(names, stderr.tolist(), strict=True)),
