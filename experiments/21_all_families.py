@@ -2,8 +2,8 @@
 
 Every family that can be identified without being told more is fitted to the same points, one sample left out at a
 time. The winner has the least leave-one-out rmse; a family whose absolute errors on the samples left out do not differ
-from the winner's, by signed ranks at 5 % after Holm's correction, is not told from it. Times are those of a second call, when everything is
-compiled.
+from the winner's, by signed ranks at 5 % after Holm's correction, is not told from it. Times are those of a second
+call, when everything is compiled.
 """
 
 import sys

@@ -263,12 +263,12 @@ def test_what_was_not_cross_validated_has_no_verdict_on_it(table1):
         table.ranked("r2")
 
 
-def test_the_paired_probability_is_that_of_the_formula():
+@pytest.mark.parametrize(("n", "cosines"), [(60, 6), (400, 8)])  # floor(0.41 * 60^(2/3)) = floor(6.28), at most 8
+def test_the_paired_probability_is_that_of_the_formula(n, cosines):
     rng = np.random.default_rng(3)
-    a, b = 1.3 * rng.standard_normal(60), rng.standard_normal(60)
+    a, b = 1.1 * rng.standard_normal(n), rng.standard_normal(n)
     d = np.abs(a) - np.abs(b)
     ranks = [np.sign(x) * sum(abs(x) >= abs(other) for other in d) for x in d]
-    n, cosines = 60, 6  # floor(0.41 * 60^(2/3)) = floor(6.28)
     c = [
         math.sqrt(2 / n) * sum(s * math.cos(math.pi * k * (t + 0.5) / n) for t, s in enumerate(ranks))
         for k in range(1, cosines + 1)
@@ -278,7 +278,7 @@ def test_the_paired_probability_is_that_of_the_formula():
     assert probability(a, a) == 1.0
     assert probability(a, a * (1.0 + 1e-4)) == 1.0  # two descents to one optimum
     assert probability(a, b) == probability(b, a)
-    a[:57] = np.nan
+    a[: n - 3] = np.nan
     assert math.isnan(probability(a, b))
 
 
