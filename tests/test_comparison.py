@@ -9,9 +9,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import signal, stats
 
 import hysim as hs
-from hysim.comparison._verdict import probability
+from hysim.comparison._verdict import contrasts, holm, probability
 from hysim.models import candidates as registry
 from hysim.models.model import FAMILIES
 
@@ -234,7 +235,9 @@ def test_the_winner_predicts_best_and_the_undecided_are_near(quick, table1):
     assert quick.winner == ranked[0].name == "Play"
     best = quick["Play"].cv_residual
     assert math.sqrt(np.mean(best**2)) == quick["Play"].cv_rmse
-    assert quick.probabilities == {row.name: probability(row.cv_residual, best) for row in ranked[1:]}
+    tie = 1e-9 * np.ptp(table1.y)
+    alone = {row.name: probability(row.cv_residual, best, tie=tie) for row in ranked[1:]}
+    assert quick.probabilities == holm(alone)
     assert quick.undecided == tuple(name for name, value in quick.probabilities.items() if value >= 0.05)
     assert f"Play predicts samples left out best, cross-validated rmse {quick['Play'].cv_rmse:.4g} um" in quick.verdict
     assert "The BIC prefers Play." in quick.verdict
@@ -244,45 +247,131 @@ def test_the_winner_predicts_best_and_the_undecided_are_near(quick, table1):
 def test_a_twin_of_the_winner_is_undecided_and_a_poor_model_is_not(table1):
     table = hs.compare({"one": hs.Play, "two": hs.Play, "poor": hs.Line(slope=1.0)}, table1)
     assert table.undecided == ("two",)
-    assert "52 samples cannot tell it from two (" in table.verdict
+    assert "52 samples show no significant difference to two (" in table.verdict
     told = hs.compare({"one": hs.Play, "poor": hs.Line(slope=1.0)}, table1)
-    assert "52 samples tell it from all others" in told.verdict
+    assert "all others are significantly worse, the nearest poor, rmse" in told.verdict
 
 
 def test_what_was_not_cross_validated_has_no_verdict_on_it(table1):
     table = hs.compare({"a": hs.Line, "b": hs.SingleValued}, table1, cross_validate=None)
     assert table.winner is None
     assert table.probabilities == {}
-    assert table.verdict == "The BIC prefers a."
+    assert table.verdict == "The BIC prefers b."
     given = hs.compare({"a": hs.Line, "given": hs.Line(slope=0.02)}, table1, cross_validate=None)
     assert (given.winner, given.verdict) == (None, "")  # the one model that has an error would win by default
     with pytest.raises(ValueError, match="criterion must be"):
         table.ranked("r2")
 
 
-def test_the_paired_probability_is_that_of_the_formula():
+@pytest.mark.parametrize("n", [60, 400])
+def test_the_paired_probability_is_that_of_the_formula(n):
     rng = np.random.default_rng(3)
-    a, b = 1.3 * rng.standard_normal(60), rng.standard_normal(60)
-    d = a**2 - b**2
-    m, n, lags = d.mean(), 60, 3  # floor(4 (60 / 100)^(2/9)) = floor(3.57)
-    g = [sum((d[i] - m) * (d[i + k] - m) for i in range(n - k)) / n for k in range(lags + 1)]
-    v = (g[0] + 2 * sum((1 - k / (lags + 1)) * g[k] for k in range(1, lags + 1))) / n
-    from scipy import stats
-
-    assert probability(a, b) == pytest.approx(2 * stats.t.sf(abs(m) / np.sqrt(v), n - 1), rel=1e-12)  # rounding
+    a, b = np.cumsum(rng.standard_normal((2, n + 3)), axis=1)
+    a, b = a[3:] - a[:-3], b[3:] - b[:-3]  # correlated with their neighbours
+    d = [abs(x) - abs(y) for x, y in zip(a, b, strict=True)]
+    typical = np.median(np.abs(a) + np.abs(b)) / 2
+    d = [0.0 if abs(x) <= 1e-3 * typical else x for x in d]
+    s = [np.sign(x) * sum(abs(x) >= abs(other) for other in d) for x in d]
+    m = sum(s) / n
+    g0, g1 = (sum((s[t] - m) * (s[t + k] - m) for t in range(n - k)) / n for k in (0, 1))
+    r = g1 / g0 + (1 + 4 * g1 / g0) / n
+    assert 0.2 < r < 0.9
+    free = n * (1 - r) / (1 + r) - 1
+    expected = 2 * stats.t.sf(abs(m) * math.sqrt(free / g0), free)
+    assert probability(a, b) == pytest.approx(expected, rel=1e-10)  # rounding
     assert probability(a, a) == 1.0
+    assert probability(a, a * (1.0 + 1e-4)) == 1.0  # two descents to one optimum
     assert probability(a, b) == probability(b, a)
-    a[:59] = np.nan
+    a[: n - 3] = np.nan
     assert math.isnan(probability(a, b))
 
 
-def test_equal_models_are_told_apart_about_as_often_as_the_level_says():
+def correlated(rng, n, correlation, draw):
+    """Records (800, n) of first-order autoregressive noise."""
+    return signal.lfilter([1.0], [1.0, -correlation], draw((800, n + 200)), axis=1)[:, 200:]
+
+
+@pytest.mark.parametrize(
+    ("n", "correlation", "heavy"), [(60, 0.0, False), (200, 0.8, False), (400, 0.9, False), (60, 0.5, True)]
+)
+def test_equal_models_are_called_unequal_about_as_often_as_the_level_says(n, correlation, heavy):
     rng = np.random.default_rng(0)
-    a, b = rng.standard_normal((2, 400, 60))
+    draw = (lambda shape: rng.standard_t(2, shape)) if heavy else rng.standard_normal
+    a, b = correlated(rng, n, correlation, draw), correlated(rng, n, correlation, draw)
     share = np.mean([probability(*pair) < 0.05 for pair in zip(a, b, strict=True)])
-    assert (
-        0.03 < share < 0.12
-    )  # 0.05 within 2 of its standard errors, 0.011; the variance of 60 samples is a little low
+    assert 0.03 <= share <= 0.08  # of 800 pairs, whose share scatters by 0.008
+
+
+def test_a_model_that_is_worse_by_a_third_is_seen_in_four_hundred_samples():
+    rng = np.random.default_rng(1)
+    a, b = 1.3 * rng.standard_normal((100, 400)), rng.standard_normal((100, 400))
+    assert np.mean([probability(*pair) < 0.05 for pair in zip(a, b, strict=True)]) > 0.9
+
+
+def test_one_outlier_does_not_hide_that_a_model_is_worse():
+    """Squared errors made of one huge error have a variance that swallows their mean."""
+    rng = np.random.default_rng(2)
+    best, other = 0.01 * rng.standard_normal(400), 0.1 * rng.standard_normal(400)
+    for value in (0.1, 1e4, np.inf):
+        other[200] = value
+        assert probability(other, best) < 1e-8
+
+
+def side_by_side(other, best, span=1.0, fitted=("other",)):
+    rmses = [float(np.sqrt(np.mean(errors**2))) for errors in (other, best)]
+    (found,) = contrasts({"other": other}, best, {"other": rmses[0]}, rmses[1], span=span, fitted=fitted)
+    return found
+
+
+def test_a_model_that_diverged_where_it_was_left_out_is_worse():
+    rng = np.random.default_rng(4)
+    best, other = rng.standard_normal((2, 400)) * 0.1
+    assert not side_by_side(other, best).is_worse
+    for value in (80.0, np.inf):
+        other[7] = value
+        assert side_by_side(other, best).diverged
+        assert side_by_side(other, best).is_worse
+    assert not side_by_side(other, best, fitted=()).diverged  # it was not fitted: it is far off, and that is all
+
+
+def test_smaller_typical_errors_with_a_larger_rmse_are_said():
+    rng = np.random.default_rng(5)
+    best, other = rng.standard_normal(400), 0.5 * rng.standard_normal(400)
+    other[:4] = 30.0
+    found = side_by_side(other, best, span=10.0)
+    assert found.rmse_ratio > 1.0 > found.typical_ratio
+    assert found.contradicts
+    assert not found.is_worse
+
+
+def test_the_verdict_says_what_diverged_and_where_ranks_and_rmse_disagree(quick, table1):
+    rng = np.random.default_rng(6)
+    errors = {
+        "Play": 0.2 * rng.standard_normal(52),
+        "Dahl": np.r_[2.0, -2.0, 0.01 * rng.standard_normal(50)],
+        "Line": np.r_[np.inf, 0.2 * rng.standard_normal(51)],
+        "SingleValued": np.full(52, 5.0),
+    }
+    rows = tuple(
+        dataclasses.replace(row, cv_residual=errors[row.name], cv_rmse=float(np.sqrt(np.mean(errors[row.name] ** 2))))
+        for row in quick.rows
+    )
+    table = dataclasses.replace(quick, rows=rows)
+    assert "Line diverged on samples left out." in table.verdict
+    assert "Dahl has significantly smaller typical errors than Play but a larger rmse" in table.verdict
+    assert "all others but Dahl are significantly worse" in table.verdict
+    assert table.undecided == ("Dahl",)
+    frame = {row["model"]: row for row in csv.DictReader(io.StringIO(table.to_csv()))}
+    assert (frame["Line"]["diverged"], frame["Dahl"]["diverged"]) == ("yes", "no")
+    assert float(frame["Dahl"]["typical error / best"]) < 1.0 < float(frame["Dahl"]["cv rmse / best"])
+    assert (frame["Play"]["cv rmse / best"], frame["Play"]["p"]) == ("1.0", "")
+
+
+def test_several_models_are_held_against_the_best_by_holms_correction():
+    found = holm({"a": 0.01, "b": 0.04, "c": 0.03, "d": math.nan})
+    assert [found[name] for name in "abc"] == pytest.approx([0.03, 0.06, 0.06])
+    assert math.isnan(found["d"])
+    assert holm({"a": 0.9, "b": 0.8}) == {"a": 1.0, "b": 1.0}
 
 
 def test_the_last_cycles_are_kept_from_every_fit():

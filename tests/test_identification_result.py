@@ -86,7 +86,8 @@ def test_a_summary_has_a_line_for_each_free_parameter(fits):
     for fit in fits.values():
         lines = fit.summary().splitlines()
         assert [line.split()[0] for line in lines[1 : 1 + fit.n_parameters]] == list(fit.free_names)
-        assert lines[-1].strip() == fit.message
+        rest = lines[lines.index(f"  {fit.message}") + 1 :]
+        assert rest == (["Warnings", *(f"  {each}" for each in fit.warnings)] if fit.warnings else [])
 
 
 def test_the_picture_shows_the_numbers_of_the_result(fits):

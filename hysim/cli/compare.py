@@ -10,7 +10,7 @@ from hysim.cli import models, outputs, records
 from hysim.cli.identify import folds
 
 if TYPE_CHECKING:
-    from hysim.comparison import Comparison
+    from hysim.comparison import Comparison, ComparisonRow, Contrast
     from hysim.plot import Figure
     from hysim.records import Record
 
@@ -111,17 +111,30 @@ def _best(table: "Comparison", record: "Record") -> str:
 
 
 def _document(table: "Comparison", timings: bool) -> dict[str, Any]:
-    rows = [{field.name: getattr(row, field.name) for field in fields(row)} for row in table.rows]
-    told = [{name: value for name, value in row.items() if isinstance(value, (str, int, float))} for row in rows]
+    contrasts = {each.name: each for each in table.contrasts}
+    rows = [_plain(row) | _effects(contrasts.get(row.name)) for row in table.rows]
     return {
         "record": table.record.name,
         "units": table.record.units,
         "winner": table.winner,
         "undecided": table.undecided,
         "verdict": table.verdict,
-        "rows": [{name: value for name, value in row.items() if timings or name != "seconds"} for row in told],
+        "warnings": table.warnings,
+        "rows": [{name: value for name, value in row.items() if timings or name != "seconds"} for row in rows],
         "failed": table.failed,
     }
+
+
+def _plain(row: "ComparisonRow") -> dict[str, Any]:
+    """The row's numbers and words."""
+    values = {field.name: getattr(row, field.name) for field in fields(row)}
+    return {name: value for name, value in values.items() if isinstance(value, (str, int, float))}
+
+
+def _effects(contrast: "Contrast | None") -> dict[str, Any]:
+    """How a model compares with the best one; null for the best one itself, and where there is none."""
+    names = ("rmse_ratio", "typical_ratio", "probability", "diverged")
+    return {name: None if contrast is None else getattr(contrast, name) for name in names}
 
 
 def _picture(table: "Comparison") -> "Figure":

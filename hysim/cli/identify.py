@@ -104,6 +104,7 @@ def _document(fit: "Identification") -> dict[str, Any]:
     names = (
         "estimates", "stderr", "intervals", "interval_method", "free_names", "n_parameters", "noise", "sigma",
         "fit_percent", "rmse", "cv_rmse", "fpe", "aic", "bic", "whiteness", "seed", "success", "message",
+        "warnings",
     )  # fmt: skip
     return {"family": type(fit.model).__name__, **{name: getattr(fit, name) for name in names}}
 

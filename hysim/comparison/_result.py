@@ -5,10 +5,13 @@ from collections.abc import Mapping
 from dataclasses import field
 from typing import Any
 
+import numpy as np
+
 from hysim._frozen import FloatArray, frozen
 from hysim._words import printed, words
 from hysim.comparison import _tables
-from hysim.comparison._verdict import LEVEL, probability
+from hysim.comparison._verdict import Contrast, contrasts
+from hysim.identification.sentences import CONSTANT, SWAPPED
 from hysim.metrics import LoopMetrics
 from hysim.models.model import in_brief
 from hysim.records import Record
@@ -58,6 +61,8 @@ class ComparisonRow:
         Whether its identification converged.
     message : str
         How that ended; empty for a model that was not identified here.
+    warnings : tuple of str
+        Those of its identification; empty for a model that was not identified.
     seconds : float
         How long that took; nan where it was not done here. Rows that differ in it are equal [s].
     """
@@ -87,17 +92,21 @@ class ComparisonRow:
     test_rmse: float = float("nan")
     success: bool = True
     message: str = ""
+    warnings: tuple[str, ...] = ()
     seconds: float = field(default=float("nan"), compare=False)
 
     def __str__(self) -> str:
+        fit = "fit not defined" if math.isnan(self.fit_percent) else f"fit {self.fit_percent:.2f} %"
+        excess = "" if math.isnan(self.width_error_percent) else f", {self.width_error_percent:+.1f} %"
         return words(
-            [f"ComparisonRow {self.name}: fit {self.fit_percent:.2f} %, rmse {self.rmse:.4g}"],
+            [f"ComparisonRow {self.name}: {fit}, rmse {self.rmse:.4g}"],
             {
                 "left out": "" if math.isnan(self.cv_rmse) else f"rmse {self.cv_rmse:.4g}",
-                "largest width": f"{self.max_width:.4g} at {self.max_width_at:.6g}, {self.width_error_percent:+.1f} %",
+                "largest width": f"{self.max_width:.4g} at {self.max_width_at:.6g}{excess}",
                 "parameters": f"{self.n_parameters}, BIC {self.bic:.1f}",
                 "model": in_brief(self.model),
                 "search": self.message,
+                "warnings": "; ".join(self.warnings),
             },
         )
 
@@ -161,9 +170,9 @@ class Comparison:
         Examples
         --------
         >>> import hysim as hs
-        >>> tab = hs.compare({"curve": hs.SingleValued, "line": hs.Line}, hs.datasets.table1())
+        >>> tab = hs.compare({"plays": hs.PrandtlIshlinskii, "one play": hs.Play}, hs.datasets.table1())
         >>> [row.name for row in tab.ranked("bic")], [row.name for row in tab.ranked("rmse")]
-        (['line', 'curve'], ['curve', 'line'])
+        (['one play', 'plays'], ['plays', 'one play'])
         """
         known = ("cv_rmse", "bic", "aic", "fpe", "rmse", "test_rmse")
         if criterion not in known:
@@ -178,45 +187,91 @@ class Comparison:
         return best[0].name if len(best) > 1 else None
 
     @property
-    def probabilities(self) -> dict[str, float]:
-        """How surprising each other model's distance from the winner would be if both predicted equally well.
-
-        Name to the two-sided probability that the mean difference of squared errors on samples left out has by
-        chance (Diebold and Mariano 1995, with the correlation of neighbours); nan where errors are unknown.
-        """
+    def contrasts(self) -> tuple[Contrast, ...]:
+        """Each other model held against the winner, by their errors on samples left out; the nearest first."""
         if self.winner is None:
-            return {}
+            return ()
         best, *others = self.ranked()
-        return {
-            row.name: probability(row.cv_residual, best.cv_residual)
-            if row.cv_residual.shape == best.cv_residual.shape
-            else float("nan")
-            for row in others
-        }
+        return contrasts(
+            {row.name: row.cv_residual for row in others},
+            best.cv_residual,
+            {row.name: row.cv_rmse for row in others},
+            best.cv_rmse,
+            span=float(np.ptp(self.record.y)),
+            fitted=[row.name for row in others if row.n_parameters],
+        )
+
+    @property
+    def probabilities(self) -> dict[str, float]:
+        """How surprising each other model's left-out errors would be if it predicted as well as the winner.
+
+        Name to the two-sided probability of signed ranks as one-sided as these, which large single errors do not
+        sway, with the correlation of neighbours and Holm's correction for the number of models; nan where errors are
+        unknown.
+        """
+        return {each.name: each.probability for each in self.contrasts}
 
     @property
     def undecided(self) -> tuple[str, ...]:
-        """Models that the record does not tell from the winner at 5 %, the nearest first."""
-        return tuple(name for name, value in self.probabilities.items() if value >= LEVEL)
+        """Models that are not significantly worse than the winner at 5 %, the nearest first."""
+        return tuple(each.name for each in self.contrasts if not (each.is_worse or math.isnan(each.probability)))
 
     @property
     def verdict(self) -> str:
-        """The winner and what the record cannot decide, in words."""
+        """The winner, what the record cannot decide, and which models diverged, in words."""
         by_bic = self.ranked("bic")
         sentences = [f"The BIC prefers {by_bic[0].name}."] if len(by_bic) > 1 else []
         if self.winner is not None:
             unit = f" {self.record.units['y']}" if "y" in self.record.units else ""
             rmse = f"cross-validated rmse {self[self.winner].cv_rmse:.4g}{unit}"
             sentences.insert(0, f"{self.winner} predicts samples left out best, {rmse}; {self._undecided_in_words()}.")
+            sentences[1:1] = self._exceptions_in_words()
         return " ".join(sentences)
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """One sentence for each thing that should not be overlooked.
+
+        They are a constant output; the warnings of the best model, the one that predicts best, or where that is unknown
+        has the least rmse; and of the best model that doubts it, that the input and the output may be swapped. Models
+        that diverged are named in `verdict`, those that could not be compared in `failed`.
+        """
+        constant = [CONSTANT] if np.ptp(self.record.y) == 0.0 else []
+        ranked = self.ranked() or self.ranked("rmse")
+        told = [(row.name, each) for row in ranked for each in row.warnings]
+        found = [f"{name}: {each}" for name, each in told if name == ranked[0].name and each != CONSTANT]
+        doubts = [f"{name}: {each}" for name, each in told if each.startswith(SWAPPED)][:1]
+        return (*constant, *dict.fromkeys([*found, *doubts]))
+
     def _undecided_in_words(self) -> str:
-        samples = f"{len(self.record)} samples"
-        if self.undecided:
-            return f"{samples} cannot tell it from {_listed(self.undecided)} (paired squared errors, 5 %)"
-        if any(math.isnan(value) for value in self.probabilities.values()):
-            return "the errors that would tell it from the others are not all known"
-        return f"{samples} tell it from all others (paired squared errors, 5 %)"
+        method = "(signed ranks of left-out errors, 5 % after Holm's correction)"
+        smaller = tuple(each.name for each in self.contrasts if each.contradicts)
+        if even := tuple(name for name in self.undecided if name not in smaller):
+            return f"{len(self.record)} samples show no significant difference to {_listed(even)} {method}"
+        if any(math.isnan(each.probability) and not each.diverged for each in self.contrasts):
+            return "the errors that would show a difference to the others are not all known"
+        if smaller:
+            return f"all others but {_listed(smaller)} are significantly worse {method}"
+        nearest = self.contrasts[0]
+        if nearest.diverged:
+            return "all others diverged or are significantly worse"
+        p = "p < 0.001" if nearest.probability < 1e-3 else f"p = {nearest.probability:.2g}"
+        nearest_in_words = f"{nearest.name}, rmse {nearest.rmse_ratio:.3g} times and typical error "
+        nearest_in_words += f"{nearest.typical_ratio:.3g} times as large, {p}"
+        return f"all others are significantly worse, the nearest {nearest_in_words} {method}"
+
+    def _exceptions_in_words(self) -> list[str]:
+        """Models that diverged, and those whose ranks and rmse disagree."""
+        lost = tuple(each.name for each in self.contrasts if each.diverged)
+        smaller = tuple(each.name for each in self.contrasts if each.contradicts)
+        sentences = [f"{_listed(lost)} diverged on samples left out."] if lost else []
+        if smaller:
+            has = "has" if len(smaller) == 1 else "have"
+            sentences.append(
+                f"{_listed(smaller)} {has} significantly smaller typical errors than {self.winner} but a larger rmse: "
+                "a few large errors decide the ranking."
+            )
+        return sentences
 
     def to_text(self, *, timings: bool = True) -> str:
         """The table for a terminal, and the verdict under it.

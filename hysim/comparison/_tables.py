@@ -14,6 +14,7 @@ from hysim._words import LETTERS, words
 
 if TYPE_CHECKING:
     from hysim.comparison._result import Comparison, ComparisonRow
+    from hysim.comparison._verdict import Contrast
 
 Value = str | int | float | bool
 _WIDE = 110  # letters in a line of text
@@ -39,12 +40,20 @@ def columns(comparison: "Comparison", *, timings: bool) -> list[Column]:
         Column(f"test rmse{y}", lambda row: row.test_rmse, 4),
         Column("test fit [%]", lambda row: row.test_fit_percent, 2),
     ]
+    contrasts = {each.name: each for each in comparison.contrasts}
+    effect = [
+        Column("cv rmse / best", lambda row: _of(contrasts, row, "rmse_ratio"), 2),
+        Column("typical error / best", lambda row: _of(contrasts, row, "typical_ratio"), 2, short=False),
+        Column("p", lambda row: _of(contrasts, row, "probability"), 3),
+        Column("diverged", lambda row: row.name in contrasts and contrasts[row.name].diverged, short=False),
+    ]
     return [
         Column("model", lambda row: row.name),
         Column("parameters", lambda row: row.n_parameters),
         Column("fit [%]", lambda row: row.fit_percent, 2),
         Column(f"rmse{y}", lambda row: row.rmse, 4),
         Column(f"cv rmse{y}", lambda row: row.cv_rmse, 4),
+        *(effect if contrasts else []),
         *(test if comparison.test else []),
         *([Column("max residual [quanta]", lambda row: row.max_residual / quantum, 2)] if quantum else []),
         Column(f"max width{y}", lambda row: row.max_width, 3),
@@ -61,6 +70,7 @@ def columns(comparison: "Comparison", *, timings: bool) -> list[Column]:
         *([Column("time [s]", lambda row: row.seconds, 1)] if timings else []),
         Column("converged", lambda row: row.success, short=False),
         Column("message", lambda row: row.message, short=False),
+        Column("warnings", lambda row: "; ".join(row.warnings), short=False),
     ]
 
 
@@ -70,7 +80,9 @@ def to_text(comparison: "Comparison", *, timings: bool) -> str:
     notes = [f"not compared: {name}: {reason}" for name, reason in comparison.failed.items()] + [comparison.verdict]
     folded = textwrap.TextWrapper(_WIDE, subsequent_indent="  ", break_on_hyphens=False)
     wrapped = [line for note in notes if note for line in folded.wrap(note)]
-    return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:], *wrapped])
+    inside = textwrap.TextWrapper(_WIDE, initial_indent="  ", subsequent_indent="    ", break_on_hyphens=False)
+    warned = [line for each in comparison.warnings for line in inside.wrap(each)]
+    return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:], *wrapped, *(["Warnings"] if warned else []), *warned])
 
 
 def to_words(comparison: "Comparison") -> str:
@@ -83,8 +95,9 @@ def to_words(comparison: "Comparison") -> str:
     more, many = len(best) - _PRINTED, len(comparison.rows)
     head = f"Comparison of {many} model{'' if many == 1 else 's'} on {comparison.record.name or 'a record'}, "
     notes = [f"  ... and {more} more"] if more > 0 else []
+    told = [comparison.verdict, f"Warnings: {'; '.join(comparison.warnings)}" if comparison.warnings else ""]
     notes += textwrap.wrap(
-        comparison.verdict, LETTERS, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False
+        " ".join(filter(None, told)), LETTERS, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False
     )
     return words([f"{head}{len(comparison.record)} samples", *(f"  {line}" for line in _aligned(table)), *notes])
 
@@ -94,7 +107,10 @@ def to_html(comparison: "Comparison") -> str:
     header, *rows = ([html.escape(cell) for cell in cells] for cells in _short(comparison, timings=False))
     head = "".join(f"<th>{cell}</th>" for cell in header)
     body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>" for cells in rows)
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table><p>{html.escape(comparison.verdict)}</p>"
+    listed = "".join(f"<li>{html.escape(each)}</li>" for each in comparison.warnings)
+    warned = f"<p>Warnings</p><ul>{listed}</ul>" if listed else ""
+    verdict = f"<p>{html.escape(comparison.verdict)}</p>"
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{verdict}{warned}"
 
 
 def to_markdown(comparison: "Comparison", *, timings: bool) -> str:
@@ -166,6 +182,13 @@ def _short(comparison: "Comparison", timings: bool) -> list[list[str]]:
     chosen = [column for column in columns(comparison, timings=timings) if column.short]
     rows = [[_printed(column.value(row), column.digits) for column in chosen] for row in comparison.rows]
     return [[column.heading for column in chosen], *rows]
+
+
+def _of(contrasts: "Mapping[str, Contrast]", row: "ComparisonRow", name: str) -> float:
+    """How a model compares with the best one, which compares with itself as 1."""
+    if row.name in contrasts:
+        return float(getattr(contrasts[row.name], name))
+    return 1.0 if name != "probability" and row.cv_rmse == row.cv_rmse else math.nan
 
 
 def _printed(value: Value, digits: int) -> str:

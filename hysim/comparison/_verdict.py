@@ -1,50 +1,164 @@
-"""Whether held-out samples tell two models apart.
+"""Whether left-out samples show that one model predicts worse than another.
 
-With a and b the errors of two models at N samples that neither was fitted to, d = a^2 - b^2 has the mean m, and
-neighbours along a loop are correlated, so that the variance of m is
+With a and b the errors of two models at N samples that neither was fitted to, d = |a| - |b|, and s the signed ranks of
+d, the rank of |d| with the sign of d: one huge error counts as the largest, and no more. Neighbours along a loop are
+correlated, so that there are fewer independent samples than N. With r_1 the correlation of neighbours in s, corrected
+for its bias, and sd the standard deviation of s,
 
-    v = (g_0 + 2 sum_(k=1)^L (1 - k / (L + 1)) g_k) / N,    L = floor(4 (N / 100)^(2/9))
+    r = r_1 + (1 + 4 r_1) / N, from 0 to 0.99,    M = N (1 - r) / (1 + r), at least 6,
+    T = mean(s) sqrt(M - 1) / sd.
 
-with g_k the autocovariance of d at the lag k. If both predict equally well, m / sqrt(v) has about Student's
-distribution with N - 1 degrees of freedom. The model with the least error was chosen after the fact, and several are
-held against it; both make a small probability less remarkable than it looks.
+If d is as often positive as negative, and as large, T has about Student's distribution with M - 1 degrees of freedom.
+With fewer than 6 independent samples no difference could be shown, however large. Differences below a thousandth of the
+typical error count as none. Several models are held against the best one by Holm's correction. The best one was chosen
+by the same errors, which makes a small probability less remarkable.
 
-Sources: F. X. Diebold and R. S. Mariano, J. Bus. Econ. Stat. 13 (1995) 253; the weights and L: W. K. Newey and
-K. D. West, Econometrica 55 (1987) 703 and Rev. Econ. Stud. 61 (1994) 631; Student's distribution: D. Harvey,
-S. Leybourne and P. Newbold, Int. J. Forecast. 13 (1997) 281.
+With normal and with heavy-tailed noise (t, 2 degrees of freedom), and a correlation of neighbours up to 0.9, equal
+models are called unequal in 4 to 8 % of 1500 simulated records of 52, 200 and 1000 samples at the level of 5 %, with
+errors along a loop in less; at 0.95 in 15 % of those with 52 samples. A mean of squared errors with 3 to 6 lags
+(Diebold and Mariano 1995) does so in up to 26 % of them, in 42 % at 0.95, and is blind where one error is huge.
+
+Sources: F. Wilcoxon, Biometrics Bull. 1 (1945) 80 for signed ranks; F. W. Zwiers and H. von Storch, J. Climate 8
+(1995) 336 for M; F. H. C. Marriott and J. A. Pope, Biometrika 41 (1954) 390 for the bias; S. Holm, Scand. J. Stat. 6
+(1979) 65.
 """
 
 import math
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, frozen
 
 LEVEL = 0.05
 """Two models are told apart where the probability is below this."""
 
+DIVERGED = 10.0
+"""A fitted model diverged where a left-out error is larger than so many ranges of the measured output."""
 
-def probability(a: FloatArray, b: FloatArray) -> float:
-    """Two-sided probability of a mean difference as large as this if both models predicted equally well.
+_MOST_CORRELATED = 0.99
+_INDEPENDENT = 6.0  # samples at least, where there are as many
+_FEWEST = 4  # samples: with fewer no correlation of neighbours can be estimated
+_TIE = 1e-3  # of the typical error
+_ROUNDING = 1e-9  # of the output's range
 
-    It is nan where fewer than 2 samples have both errors, and 1 where the squared errors are the same.
+
+@frozen
+class Contrast:
+    """A model held against the best one, by their errors at the samples that were left out of both.
+
+    Parameters
+    ----------
+    name : str
+        What the model is called.
+    rmse_ratio : float
+        Its cross-validated rmse over that of the best model.
+    typical_ratio : float
+        Its median absolute error over that of the best model; nan where errors are unknown.
+    probability : float
+        Two-sided probability of signed ranks as one-sided as these if both predicted equally well, after Holm's
+        correction for the number of models; nan where errors are unknown.
+    has_larger_errors : bool
+        Whether its errors are the larger ones by their signed ranks.
+    diverged : bool
+        Whether a left-out error is not finite, or more than 10 times the range of the measured output.
     """
-    from scipy.stats import t
 
-    d = (a**2 - b**2)[~np.isnan(a) & ~np.isnan(b)]
-    if d.size < 2:
+    name: str
+    rmse_ratio: float
+    typical_ratio: float
+    probability: float
+    has_larger_errors: bool
+    diverged: bool
+
+    @property
+    def is_worse(self) -> bool:
+        """Whether the model is significantly worse than the best one at 5 %, or diverged."""
+        return self.diverged or (self.probability < LEVEL and self.has_larger_errors)
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether its errors are significantly smaller by their ranks, although its rmse is larger."""
+        return not self.diverged and self.probability < LEVEL and not self.has_larger_errors
+
+
+def contrasts(
+    others: Mapping[str, FloatArray], best: FloatArray, rmses: Mapping[str, float], best_rmse: float, *,
+    span: float, fitted: Sequence[str],
+) -> tuple[Contrast, ...]:  # fmt: skip
+    """Each of the others held against the best model by its left-out errors (n,); `span` is the output's range."""
+    tests = {name: _tested(errors, best, _ROUNDING * span) for name, errors in others.items()}
+    adjusted = holm({name: p for name, (p, _) in tests.items()})
+    return tuple(
+        Contrast(
+            name=name,
+            rmse_ratio=_ratio(rmses[name], best_rmse),
+            typical_ratio=_typical_ratio(errors, best),
+            probability=adjusted[name],
+            has_larger_errors=tests[name][1] > 0.0,
+            diverged=name in fitted and diverged(errors, span),
+        )
+        for name, errors in others.items()
+    )
+
+
+def diverged(errors: FloatArray, span: float) -> bool:
+    """Whether one of the errors that are known is infinite, or far beyond the output's range."""
+    known = errors[~np.isnan(errors)]
+    return bool(known.size and np.abs(known).max() > DIVERGED * span > 0.0)
+
+
+def probability(a: FloatArray, b: FloatArray, *, tie: float = 0.0) -> float:
+    """Two-sided probability of signed ranks as one-sided as these if both models predicted equally well.
+
+    It is nan where fewer than 4 samples have both errors, and 1 where no difference is above `tie` [unit of y] and a
+    thousandth of the typical error.
+    """
+    return _tested(a, b, tie)[0]
+
+
+def holm(probabilities: Mapping[str, float]) -> dict[str, float]:
+    """The probabilities after Holm's correction for their number; nan stays nan."""
+    known = sorted((p, name) for name, p in probabilities.items() if not math.isnan(p))
+    adjusted, largest = dict(probabilities), 0.0
+    for k, (p, name) in enumerate(known):
+        largest = max(largest, min(1.0, (len(known) - k) * p))
+        adjusted[name] = largest
+    return adjusted
+
+
+def _tested(a: FloatArray, b: FloatArray, tie: float) -> tuple[float, float]:
+    """The probability, and the mean signed rank of |a| - |b|."""
+    from scipy.stats import rankdata, t
+
+    if a.shape != b.shape:
+        return math.nan, math.nan
+    known = ~np.isnan(a) & ~np.isnan(b)
+    first, second = (np.minimum(np.abs(errors[known]), 1e300) for errors in (a, b))
+    n = first.size
+    if n < _FEWEST:
+        return math.nan, math.nan
+    d = first - second
+    d[np.abs(d) <= max(tie, _TIE * 0.5 * float(np.median(first + second)))] = 0.0
+    signed = np.sign(d) * rankdata(np.abs(d))
+    mean = float(signed.mean())
+    off = signed - mean
+    variance = float(off @ off) / n
+    if mean == 0.0 or variance == 0.0:
+        return float(mean == 0.0), mean
+    neighbours = float(off[1:] @ off[:-1]) / n / variance
+    r = min(max(neighbours + (1.0 + 4.0 * neighbours) / n, 0.0), _MOST_CORRELATED)
+    independent = max(n * (1.0 - r) / (1.0 + r), min(_INDEPENDENT, n))
+    statistic = abs(mean) * math.sqrt((independent - 1.0) / variance)
+    return float(2.0 * t.sf(statistic, independent - 1.0)), mean
+
+
+def _typical_ratio(a: FloatArray, b: FloatArray) -> float:
+    if a.shape != b.shape:
         return math.nan
-    mean = float(d.mean())
-    variance = _variance_of_mean(d - mean)
-    if mean == 0.0 or variance <= 0.0:
-        return float(mean == 0.0)
-    return float(2.0 * t.sf(abs(mean) / math.sqrt(variance), d.size - 1))
+    known = ~np.isnan(a) & ~np.isnan(b)
+    return _ratio(float(np.median(np.abs(a[known]))), float(np.median(np.abs(b[known])))) if known.any() else math.nan
 
 
-def _variance_of_mean(d: FloatArray) -> float:
-    """Of a series without its mean, by Bartlett's weights, which never make it negative."""
-    n = d.size
-    lags = min(math.floor(4.0 * (n / 100.0) ** (2.0 / 9.0)), n - 1)
-    covariances = [float(d[k:] @ d[: n - k]) / n for k in range(lags + 1)]
-    weights = [1.0, *(2.0 * (1.0 - k / (lags + 1)) for k in range(1, lags + 1))]
-    return math.fsum(weight * covariance for weight, covariance in zip(weights, covariances, strict=True)) / n
+def _ratio(value: float, best: float) -> float:
+    return value / best if best > 0.0 else 1.0 if value == 0.0 else math.inf

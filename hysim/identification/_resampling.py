@@ -21,7 +21,7 @@ _TOLERANCE = 1e-9
 def left_out_errors(
     problem: Problem, noise: Noise, optima: FloatArray, left_out: Sequence[npt.NDArray[np.intp]]
 ) -> FloatArray:
-    """Error of each sample, shape (n,), in the fit that leaves it out; nan where none does."""
+    """Error of each sample, shape (n,), in the fit that leaves it out; nan where none does, inf where it diverged."""
     found = np.full(problem.y.size, np.nan)
     if not left_out:
         return found
@@ -31,6 +31,14 @@ def left_out_errors(
     errors = [_left_out_errors(problem, noise, starts, group) for group in groups]
     found[np.concatenate(left_out)] = np.concatenate(errors)
     return found
+
+
+def rms_of_known(errors: FloatArray) -> float:
+    """Root mean square of the errors that are not nan; nan where all are."""
+    known = errors[~np.isnan(errors)]
+    if not np.isfinite(known).all():
+        return float("inf")
+    return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
 
 
 def _left_out_errors(
@@ -43,8 +51,8 @@ def _left_out_errors(
     descent = Descent(problem, noise, problem.y[np.newaxis], np.repeat(weights, len(starts), axis=0))
     reached = descent.run(np.tile(starts, (len(left_out), 1)), tolerance=_TOLERANCE)
     best = np.arange(len(left_out)) * len(starts) + reached.loss.reshape(len(left_out), -1).argmin(axis=1)
-    errors = problem.y - descent.outputs(reached.theta[best])
-    return np.asarray(errors[weights == 0.0])
+    errors = (problem.y - descent.outputs(reached.theta[best]))[weights == 0.0]
+    return np.where(np.isfinite(errors), errors, np.inf)  # nan is for samples that no fold has
 
 
 def bootstrap(

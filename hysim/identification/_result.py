@@ -113,6 +113,9 @@ class Identification:
         Measured minus model at each sample, by the fit that leaves it out; nan where none does.
     seed : int
         Of the starts of the search.
+    warnings : tuple of str
+        One sentence for each thing that should not be overlooked: a search that did not converge, a constant output,
+        standard errors that are unknown, correlated residuals, input and output that may be swapped.
     """
 
     model: Any
@@ -148,6 +151,7 @@ class Identification:
     cv_rmse: float = float("nan")
     cv_residual: FloatArray = field(default_factory=lambda: np.empty(0))
     seed: int = 0
+    warnings: tuple[str, ...] = ()
 
     @property
     def correlation(self) -> FloatArray:
@@ -168,7 +172,7 @@ class Identification:
         width = self.loop_width
         return words(
             [
-                f"Identification of {type(self.model).__name__}: fit {self.fit_percent:.2f} %, rmse {self.rmse:.4g}, "
+                f"Identification of {type(self.model).__name__}: {self._fit_in_words()}, rmse {self.rmse:.4g}, "
                 f"{self.n_parameters} parameters{state}",
                 wrapped(free, most=4),
                 wrapped(held, most=1, first="  held: "),
@@ -178,6 +182,7 @@ class Identification:
                 "loop width": f"{width.value:.4g}, from {width.lower:.4g} to {width.upper:.4g}" if width else "",
                 "cross-validated": "" if np.isnan(self.cv_rmse) else f"rmse {self.cv_rmse:.4g}",
                 "search": self.message,
+                "warnings": "; ".join(self.warnings),
             },
         )
 
@@ -185,7 +190,7 @@ class Identification:
         """The result in a few lines."""
         family = type(self.model).__name__
         lines = [
-            f"{family}: fit {self.fit_percent:.2f} %, rmse {self.rmse:.4g}, FPE {self.fpe:.4g}, "
+            f"{family}: {self._fit_in_words()}, rmse {self.rmse:.4g}, FPE {self.fpe:.4g}, "
             f"BIC {self.bic:.1f}, {self.n_parameters} parameters from {self.residual.size} samples"
         ]
         lines += [self._line(name) for name in self.free_names]
@@ -198,11 +203,15 @@ class Identification:
         if not np.isnan(self.cv_rmse):
             lines.append(f"  cross-validated rmse {self.cv_rmse:.4g}")
         lines += [f"  best {name}: fit {best.fit_percent:.2f} %" for name, best in self.regions.items()]
-        return "\n".join([*lines, f"  {self.message}"])
+        lines.append(f"  {self.message}")
+        return "\n".join([*lines, *(["Warnings"] if self.warnings else []), *(f"  {each}" for each in self.warnings)])
 
     def _line(self, name: str) -> str:
         lower, upper = self.intervals[name]
         return f"  {name} = {self.estimates[name]:.6g} +- {self.stderr[name]:.2g}  [{lower:.5g}, {upper:.5g}]"
+
+    def _fit_in_words(self) -> str:
+        return "fit not defined" if np.isnan(self.fit_percent) else f"fit {self.fit_percent:.2f} %"
 
     def _residual_in_words(self) -> str:
         largest = float(np.abs(self.residual).max())

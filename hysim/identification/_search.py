@@ -22,6 +22,8 @@ N_DESCENDING = 64
 N_STEPS = 40
 N_POLISHED = 8
 N_POLISHING = 200
+N_BRIEF_SCREENED = 512
+N_BRIEF_DESCENDING = 12
 _LONG = 512  # samples beyond which fewer points are tried: each costs more, and longer records have fewer optima
 _APART = 0.05  # distance of two starts, in units of the box, under which the better one stands for both
 _SAME = 0.01  # likewise of two points after the descent
@@ -59,6 +61,21 @@ def optima(problem: Problem, *, seed: int, progress: Progress | None = None) -> 
     if progress is not None:
         progress(2, 2)
     return _distinct(found)
+
+
+def brief_cost(problem: Problem) -> float:
+    """The sum of squares that a short search reaches: an upper bound of the least one, inf if nothing stays finite."""
+    space = problem.space
+    if not space.coordinates:
+        return float(problem.costs(np.empty((1, 0)))[0])
+    screened = N_BRIEF_SCREENED if space.screened is None else min(space.screened, N_BRIEF_SCREENED)
+    candidates = np.concatenate([space.starts, _uniform(space, screened, seed=0)])
+    costs = problem.costs(candidates)
+    best = _apart(space, candidates, costs, _APART, N_BRIEF_DESCENDING)
+    if not len(best):
+        return math.inf
+    x = _descended(problem, best, exact=False).theta[:, : space.lower.size]
+    return float(problem.costs(x).min())
 
 
 def polish(problem: Problem, starts: FloatArray) -> list[Optimum]:

@@ -56,7 +56,7 @@ class Selection:
             [
                 name,
                 str(fit.n_parameters),
-                f"{fit.fit_percent:.2f}",
+                "-" if math.isnan(fit.fit_percent) else f"{fit.fit_percent:.2f}",
                 f"{fit.rmse:.4g}",
                 f"{getattr(fit, self.criterion):.6g}",
             ]
@@ -114,7 +114,7 @@ def select(
     >>> import hysim as hs
     >>> rec = hs.datasets.table1(dwell=1.0)
     >>> hs.select([hs.Line, hs.SingleValued], rec).name
-    'Line'
+    'SingleValued'
     """
     if criterion not in CRITERIA:
         raise ValueError(f"criterion must be one of {', '.join(CRITERIA)}, got {criterion!r}")

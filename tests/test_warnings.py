@@ -1,0 +1,163 @@
+"""Results say in a sentence each what a user should not overlook, and say nothing where nothing is wrong."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import hysim as hs
+from hysim.cli import main
+from hysim.identification._diagnostics import whiteness
+from hysim.identification._noise import Quantised
+from hysim.identification.sentences import sentences
+
+SWAPPED = "the input and the output may be swapped"
+LOOP = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=60)
+
+
+def noisy(law, size=0.01, seed=0, u=LOOP):
+    y = law.response(u)
+    return hs.Record(u=u, y=y + size * np.ptp(y) * np.random.default_rng(seed).standard_normal(u.size))
+
+
+def reverse(record):
+    return hs.Record(u=record.y, y=record.u)
+
+
+@pytest.fixture(scope="module")
+def table1():
+    return hs.datasets.table1()
+
+
+def test_columns_that_were_swapped_are_suspected(table1):
+    """The table's voltage runs to and fro by steps of 4 V; in reverse a play has to make it from the displacement."""
+    fit = hs.identify(hs.Play, reverse(table1))
+    assert any(each.startswith(SWAPPED) and "check the columns" in each for each in fit.warnings)
+    assert not any(each.startswith(SWAPPED) for each in hs.identify(hs.Play, table1).warnings)
+    table = hs.compare({"line": hs.Line, "play": hs.Play, "curve": hs.SingleValued}, reverse(table1))
+    assert any(f"play: {SWAPPED}" in each for each in table.warnings)
+    assert "Warnings\n  play: " in table.to_text()
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        hs.Stop(threshold=0.3),  # clockwise, as a force on a displacement is
+        hs.Dahl(stiffness=4.0),
+        hs.Play(threshold=0.3),
+        hs.ColemanHodgdon(),
+    ],
+)
+@pytest.mark.parametrize("size", [0.0, 0.01, 0.05])
+def test_a_familys_own_record_is_not_suspected(law, size):
+    fit = hs.identify(type(law), noisy(law, size))
+    assert not any(each.startswith(SWAPPED) for each in fit.warnings)
+
+
+def test_a_constant_output_is_said_once_and_no_fit_in_percent_is_printed(tmp_path, capsys):
+    record = hs.Record(u=LOOP, y=np.full(LOOP.size, 2.0))
+    fit = hs.identify(hs.Line, record)
+    assert len(fit.warnings) == 1  # the residuals are rounding, whose correlation means nothing
+    assert "the output is constant" in fit.warnings[0]
+    table = hs.compare({"line": hs.Line, "curve": hs.SingleValued}, record)
+    assert len(table.warnings) == 1
+    assert "the output is constant" in table.warnings[0]
+    for text in (str(fit), fit.summary(), table.to_text(), str(table), table._repr_html_(), str(table.rows[0])):
+        assert "nan" not in text
+        assert "output is constant" in " ".join(text.split()) or "fit not defined" in text
+    assert "nan" not in hs.select([hs.Line, hs.SingleValued], record).to_text()
+    np.savetxt(tmp_path / "flat.csv", np.column_stack([record.u, record.y]), delimiter=",", header="u,y", comments="")
+    assert main(["identify", str(tmp_path / "flat.csv"), "--u", "u", "--y", "y", "--model", "line", "--json"]) == 0
+    assert any("the output is constant" in each for each in json.loads(capsys.readouterr().out)["warnings"])
+
+
+def test_parameters_without_a_standard_error_are_named_with_the_reason():
+    record = noisy(hs.BoucWen(beta=1.4, gamma=-0.6, feedthrough=0.7, gain=-0.5))
+    fit = hs.identify(hs.BoucWen, record, free=("A", "gain"), fixed={"n": 1.0})
+    (sentence,) = (each for each in fit.warnings if each.startswith("no standard error for"))
+    assert "A" in sentence.split(":")[0]
+    assert "gain" in sentence.split(":")[0]
+    assert "only their product" in sentence
+    assert not any("standard error" in each for each in hs.identify(hs.Line, record).warnings)
+
+
+def test_correlated_residuals_are_said_where_intervals_are_quoted():
+    poor = hs.identify(hs.Line, noisy(hs.Play(threshold=0.3)))
+    assert "residuals are correlated (p < 0.001): the intervals are too narrow" in poor.warnings
+    assert poor.warnings[-1] in poor.summary().splitlines()[-1]
+    good = hs.identify(hs.Play, noisy(hs.Play(threshold=0.3)))
+    assert good.warnings == ()
+    assert "Warnings" not in good.summary()
+    exact = hs.identify(hs.Line, hs.Record(u=LOOP, y=3.0 * LOOP + 0.1))  # rounding is correlated too
+    assert exact.warnings == ()
+
+
+def test_a_search_that_did_not_converge_is_said():
+    usual = {
+        "spread": 1.0,
+        "size": 2.0,
+        "rmse": 0.1,
+        "whiteness": 0.5,
+        "stderr": {"a": 0.1},
+        "reasons": (),
+        "success": True,
+    }
+    assert sentences(**usual) == ()
+    assert sentences(**(usual | {"success": False})) == ("the search did not converge: better parameters may exist",)
+    assert sentences(**(usual | {"stderr": {"a": np.nan}})) == ("no standard error for a",)
+
+
+def test_warnings_survive_json_and_older_files_have_none():
+    fit = hs.identify(hs.Line, noisy(hs.Play(threshold=0.3)))
+    assert hs.Identification.from_json(fit.to_json()).warnings == fit.warnings != ()
+    document = json.loads(fit.to_json())
+    del document["identification"]["fields"]["warnings"]
+    older = hs.Identification.from_json(json.dumps(document))
+    assert older == dataclasses.replace(fit, warnings=())
+
+
+# -- what the sentences and the intervals rest on ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("n", [30, 200])
+def test_whiteness_is_the_test_of_ljung_and_box_on_as_many_degrees_of_freedom_as_lags(n):
+    residual = np.random.default_rng(8).standard_normal(n)
+    lags, r = min(20, n // 5), residual - residual.mean()
+    q = (
+        n
+        * (n + 2)
+        * sum((sum(r[t] * r[t - k] for t in range(k, n)) / (r @ r)) ** 2 / (n - k) for k in range(1, lags + 1))
+    )
+    assert whiteness(residual, 3) == pytest.approx(stats.chi2.sf(q, lags), rel=1e-10)
+
+
+def test_white_residuals_are_called_correlated_as_often_as_the_probability_says():
+    rng = np.random.default_rng(9)
+    found = np.array([whiteness(rng.standard_normal(200), 3) for _ in range(1000)])
+    # 1000 draws: the shares scatter by 0.016 and 0.010; another degree of freedom moves the first by 0.06
+    assert np.mean(found < 0.5) == pytest.approx(0.5, abs=0.05)
+    assert np.mean(found < 0.1) == pytest.approx(0.1, abs=0.03)
+
+
+def test_the_noise_of_rounded_data_is_what_sheppards_correction_leaves():
+    quantum, sigma, n = 0.2, 0.1, 40_000
+    rng = np.random.default_rng(10)
+    y = rng.uniform(0.0, 1.0, n)
+    rounded = quantum * np.round((y + sigma * rng.standard_normal(n)) / quantum)
+    floor = Quantised(quantum).at_least(float(np.sum((rounded - y) ** 2)), n).floor
+    # a variance from 40 000 samples is right to 1 %; without q^2 / 12 the floor would be 0.115
+    assert floor == pytest.approx(sigma, rel=0.02)
+    assert Quantised(quantum).at_least(0.0, n).floor == 0.0
+
+
+@pytest.mark.parametrize("noise", ["gaussian", "quantised"])
+def test_a_bootstrap_of_few_samples_is_as_wide_as_the_standard_errors(noise):
+    """Residuals of 6 samples and 2 parameters are too small by sqrt(6 / 4); drawn anew they must not be."""
+    u, ratios = np.linspace(-1.0, 1.0, 6), []
+    for seed in range(12):
+        y = 2.0 * u + 0.1 * np.random.default_rng(seed).standard_normal(u.size)
+        fit = hs.identify(hs.Line, hs.Record(u=u, y=y, resolution=1e-3), noise=noise, intervals="bootstrap")
+        ratios.append(np.ptp(fit.intervals["slope"]) / (2.0 * 1.96 * fit.stderr["slope"]))
+    assert np.median(ratios) == pytest.approx(1.0, abs=0.1)
