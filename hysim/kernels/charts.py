@@ -49,6 +49,7 @@ _CENTRE, _INVERSE, _BELOW, _ABOVE, _LENGTH, _THERE, _BACK = 0, 1, 2, 3, 4, 5, 5 
 _CELL = 5 + 2 * N_TERMS
 _SPARE = _CELLS + 2 * _N_CELLS * _CELL
 _N_TAYLOR = 32
+_TAYLOR_REACH = 0.25  # of a bound of the distance at which the series ends: 31 terms leave out 4^-32
 N_WORK = _SPARE + 2 * _N_TAYLOR
 
 
@@ -332,7 +333,7 @@ def far_step(w: float, forwards: bool, side: int, n: float, length: float, work:
         to_far = far ** (1.0 - n) * -math.expm1((1.0 - n) * math.log(w / far)) / (n - 1.0)
         return (far - w, length - to_far) if length > to_far else (power_flow(w, c, n, length) - w, 0.0)
     power = w**n
-    h = min(length, 0.5 * w / (max(n, 1.0) * (1.0 + power)))
+    h = min(length, _TAYLOR_REACH * w / (max(n, 1.0) * (1.0 + power)))
     return taylor_change(w, power, a, c, n, h, work[_SPARE:]), length - h
 
 
