@@ -20,6 +20,7 @@ _DOUBLINGS = 1100  # more than there are between the smallest number and the lar
 _HALVINGS = 200
 _RESOLVED = 1e-13
 """Of the largest output so far: shorter ways rise in steps of rounding, and are taken to be straight."""
+_SMALLEST = 2.0**-1022
 
 
 def side_by_side(first: Step, second: Step) -> Step:
@@ -73,8 +74,8 @@ def inverse(
     """Inputs for the outputs `y` into `u`: the first sample that has none, or -1.
 
     The law is at the input `here`, where its output is `reached`; `slope` is a guess of dy/du with the right sign.
-    `trial` is as long as `state`. A way is doubled until its end is beyond, and then halved, by regula falsi (Illinois)
-    where that is faster.
+    `trial` is as long as `state`. A way is doubled until its end is beyond, or halved while its end is so far that the
+    output has turned or is not finite, and then closed in on, by regula falsi (Illinois) where that is faster.
     """
     rising, largest = math.copysign(1.0, slope), 0.0
     for k in range(y.size):
@@ -83,7 +84,7 @@ def inverse(
             u[k] = here
             continue
         largest = max(largest, abs(wanted), abs(reached), abs(slope * here))
-        if abs(wanted - reached) <= _RESOLVED * largest:
+        if abs(wanted - reached) <= _RESOLVED * largest + _SMALLEST:
             here += (wanted - reached) / slope
             reached = step(parameters, state, here)
             u[k] = here
@@ -93,10 +94,17 @@ def inverse(
         low, low_error = 0.0, -abs(wanted - reached)
         high = abs((wanted - reached) / slope)
         high_error = side * (_tried(step, parameters, state, trial, here + direction * high) - wanted)
+        too_far = math.inf
         for _ in range(_DOUBLINGS):
-            if not low_error < high_error < 0.0:
+            if 0.0 <= high_error < math.inf:
                 break
-            low, low_error, high = high, high_error, 2.0 * high
+            if low_error < high_error < 0.0:
+                low, low_error = high, high_error
+            else:
+                too_far = high
+            high = 2.0 * low if too_far == math.inf else 0.5 * (low + too_far)
+            if not low < high < too_far:
+                break
             high_error = side * (_tried(step, parameters, state, trial, here + direction * high) - wanted)
         if not 0.0 <= high_error < math.inf:
             return k
