@@ -32,6 +32,7 @@ ROUNDINGS = 16.0
 LAST_SUM = 4.0
 OFF = 2.0**-36
 UNIT = 2.0**-53
+SMALLEST = 2.0**-1022
 BITS = ("Play", "Stop", "PrandtlIshlinskii", "ModifiedPrandtlIshlinskii", "MaxwellSlip", "Preisach", "PreisachRelays",
         "CustomLaw", "Line", "SingleValued")  # fmt: skip
 
@@ -272,7 +273,7 @@ def judged(case: Case, found: list[Run], errors: Spread | None) -> Verdict:
 
 
 def worst(apart: Array, allowed: Array) -> float:
-    """The largest ratio, 0 where both vanish."""
+    """The largest ratio; below the smallest normal number there are no roundings to count."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = np.where(apart == 0.0, 0.0, apart / allowed)
+        ratios = np.where(apart <= SMALLEST, 0.0, apart / allowed)
     return float(np.nan_to_num(ratios, nan=np.inf).max())

@@ -121,11 +121,13 @@ def steepened(case: Case, rng: Rng) -> Case | None:
     if isinstance(law, hs.Duhem):
         coefficients |= {"y0": law.y0 - law.feedthrough * case.before[0]}
     plain = replace(law, **coefficients)
-    inputs, memories = places(plain)
-    y, path = perturbed(case._replace(law=plain), inputs, memories, 0.0, 0.0)
+    even = np.linspace(case.before[0], case.u[-1], 65)
+    low, high = sorted(even[[0, -1]])
+    u = np.sort(np.concatenate([case.before, case.u, even, np.clip([0.0], low, high)]))
+    u = u if even[-1] >= even[0] else u[::-1]
+    _, path = perturbed(case._replace(law=plain, u=u[1:]), *places(plain), 0.0, 0.0)
     if not np.isfinite(path).all() or np.abs(path).max() > 1e100:
         return None
-    u = np.concatenate([case.before, case.u])
     states = [path[:, 0], u, *path[:, 1:].T]
     at_zero = [0.0 * u, *states[1:]]
     reach = float(np.abs(u).max())
@@ -155,7 +157,8 @@ def of_two(family: str, rng: Rng) -> tuple[Case | None, float]:
         return None, 0.0
     law, plays = case.law, DRAWS["PrandtlIshlinskii"](rng, invertible=True).law
     sign = float(np.sign(law.feedthrough))
-    plays = replace(plays, weights=tuple(sign * abs(law.feedthrough) * w / sum(plays.weights) for w in plays.weights))
+    weights = tuple(sign * abs(law.feedthrough) * w / sum(plays.weights) for w in plays.weights)
+    plays = replace(plays, weights=weights, offset=0.0)  # an offset of another size would hide the output
     joined = hs.Sum(parts=(law, plays)) if family == "Sum" else hs.Cascade(stages=(law, plays))
     slope = abs(law.feedthrough) / 50.0  # at least the part of it that the memory leaves, 0.05 / 1.05 of it
     return case._replace(law=joined), slope if family == "Sum" else slope * abs(plays.weights[0])

@@ -19,7 +19,7 @@ _POINTS = 16  # of a way at which the output is looked at
 _DOUBLINGS = 1100  # more than there are between the smallest number and the largest
 _HALVINGS = 200
 _RESOLVED = 1e-13
-"""Of the largest output so far: shorter ways rise in steps of rounding, and are taken to be straight."""
+"""Of the largest output so far: shorter ways rise in steps of rounding, and are not looked at for a turn."""
 _SMALLEST = 2.0**-1022
 
 
@@ -84,21 +84,20 @@ def inverse(
             u[k] = here
             continue
         largest = max(largest, abs(wanted), abs(reached), abs(slope * here))
-        if abs(wanted - reached) <= _RESOLVED * largest + _SMALLEST:
-            here += (wanted - reached) / slope
-            reached = step(parameters, state, here)
-            u[k] = here
-            continue
+        resolved = abs(wanted - reached) > _RESOLVED * largest
         side = math.copysign(1.0, wanted - reached)
         direction = side * rising
         low, low_error = 0.0, -abs(wanted - reached)
         high = abs((wanted - reached) / slope)
+        if high < _SMALLEST:
+            u[k] = here
+            continue
         high_error = side * (_tried(step, parameters, state, trial, here + direction * high) - wanted)
         too_far = math.inf
         for _ in range(_DOUBLINGS):
             if 0.0 <= high_error < math.inf:
                 break
-            if low_error < high_error < 0.0:
+            if low_error < high_error < 0.0 or (high_error < 0.0 and not resolved and abs(high_error) < math.inf):
                 low, low_error = high, high_error
             else:
                 too_far = high
@@ -124,16 +123,18 @@ def inverse(
                 high, high_error = way, error
                 low_error *= 0.5 if last_side > 0 else 1.0
                 last_side = 1
-        before = -abs(wanted - reached)
-        for i in range(1, _POINTS + 1):
-            error = side * (_tried(step, parameters, state, trial, here + direction * high * i / _POINTS) - wanted)
-            if not error > before:
+        if resolved:
+            before = -abs(wanted - reached)
+            for i in range(1, _POINTS + 1):
+                error = side * (_tried(step, parameters, state, trial, here + direction * high * i / _POINTS) - wanted)
+                if not error > before:
+                    return k
+                before = error
+            near = min(1.0 / _POINTS, 64.0 * _RESOLVED * largest / abs(wanted - reached))
+            back = _tried(step, parameters, state, trial, here - direction * high * near)
+            if not side * (back - reached) < 0.0:
                 return k
-            before = error
-        back = _tried(step, parameters, state, trial, here - direction * high / _POINTS)
-        if not side * (back - reached) < 0.0:
-            return k
-        slope = rising * abs((wanted - reached) / high)
+            slope = rising * abs((wanted - reached) / high)
         here += direction * high
         step(parameters, state, here)
         reached = wanted
