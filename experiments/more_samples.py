@@ -30,7 +30,7 @@ N_PIECES = 64
 SERIES = 1e-11
 ROUNDINGS = 16.0
 LAST_SUM = 4.0
-OFF = 2.0**-36
+OFF, NEAREST = 2.0**-36, 2.0**-51
 UNIT = 2.0**-53
 SMALLEST = 2.0**-1022
 BITS = ("Play", "Stop", "PrandtlIshlinskii", "ModifiedPrandtlIshlinskii", "MaxwellSlip", "Preisach", "PreisachRelays",
@@ -56,6 +56,8 @@ def draw_case(family: str, rng: Rng, **kind: Any) -> Case:
     turns *= (-1.0) ** np.arange(turns.size)
     before = np.array([origin, *(origin + turns)])
     u = pieces(rng, before[-1], before[-1] + stride)
+    if family == "GeneralizedBoucWen" and before[-1] * u[-1] < 0.0:  # it has a law for each sign, and may turn between
+        u = np.concatenate([u[u * before[-1] > 0.0], [0.0], u[u * before[-1] <= 0.0]])
     kept = np.flatnonzero(rng.random(u.size) < 0.4)
     return Case(law, before, u, np.union1d(kept, [u.size - 1]))
 
@@ -103,8 +105,8 @@ def places(law: Any) -> tuple[list[int], list[int]]:
     return [0], [1, 2] if isinstance(law, hs.BoucWenBaberNoori) else [1]
 
 
-def spread(case: Case) -> Spread:
-    """Distances of the perturbed runs from the run with all samples, scaled to one rounding in each step."""
+def spread(case: Case, off: float = OFF) -> Spread:
+    """Distances of the runs perturbed by `off` from the run with all samples, scaled to one rounding in each step."""
     if isinstance(case.law, hs.RateDependentPrandtlIshlinskii):  # its plays add up no errors
         whole = size(case.law, case.before, np.append(case.before[-1], case.u), np.zeros(1))[1:]
         return Spread(UNIT * whole, np.empty(0), np.empty(0), {False})
@@ -113,11 +115,11 @@ def spread(case: Case) -> Spread:
     escapes = {not np.isfinite(y[-1])}
     far_y, far_memory = np.zeros(y.size), np.zeros(len(memories))
     for state_sign, length_sign in ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)):
-        other, other_path = perturbed(case, inputs, memories, state_sign * OFF, length_sign * OFF)
+        other, other_path = perturbed(case, inputs, memories, state_sign * off, length_sign * off)
         escapes.add(not np.isfinite(other[-1]))
         far_y = np.fmax(far_y, np.abs(other - y))
         far_memory = np.fmax(far_memory, np.abs(other_path[-1] - path[-1]))
-    return Spread(far_y * (UNIT / OFF), far_memory * (UNIT / OFF), np.ptp(path, axis=0), escapes)
+    return Spread(far_y * (UNIT / off), far_memory * (UNIT / off), np.ptp(path, axis=0), escapes)
 
 
 def perturbed(
@@ -257,11 +259,26 @@ def judged(case: Case, found: list[Run], errors: Spread | None) -> Verdict:
     if any(escaped):
         decided = all(escaped) or errors is None or len(errors.escapes) == 1
         return Verdict(0.0 if all(escaped) or not decided else np.inf, "escaped" if decided else "edge")
+    if errors is None:
+        return Verdict(to_the_bit(case, found), "compared")
+    ratio = compared(case, found, errors)
+    if ratio > 1.0:  # close to an unstable balance, at less than 2^-36 of it, only roundings themselves go the same way
+        ratio = min(ratio, compared(case, found, spread(case, NEAREST)))
+    return Verdict(ratio, "compared")
+
+
+def to_the_bit(case: Case, found: list[Run]) -> float:
+    """0 where all runs agree in outputs and state, else infinite."""
+    coarse, some, fine = (run.y for run in found)
+    same = np.array_equal(some, fine[case.kept]) and coarse[-1] == fine[-1]
+    return 0.0 if same and found[0].state == found[1].state == found[2].state else np.inf
+
+
+def compared(case: Case, found: list[Run], errors: Spread) -> float:
+    """The largest distance of two runs over what is allowed."""
     coarse, some, fine = (run.y for run in found)
     where = np.append(case.kept, case.u.size - 1)
     apart = np.abs(np.concatenate([some - fine[case.kept], coarse - fine[-1:]]))
-    if errors is None:
-        return Verdict(0.0 if not apart.any() and found[0].state == found[2].state else np.inf, "compared")
     promised = SERIES if is_series(case.law) else 0.0
     allowed = ROUNDINGS * errors.y + LAST_SUM * UNIT * size(case.law, case.before, case.u, fine)
     ratio = worst(apart, allowed[where] + promised * float(np.ptp(fine)))
@@ -269,7 +286,7 @@ def judged(case: Case, found: list[Run], errors: Spread | None) -> Verdict:
         states = np.array([run.state[1 : 1 + errors.memory.size] for run in found])
         apart = np.abs(states[:2] - states[2]).max(axis=0)
         ratio = max(ratio, worst(apart, ROUNDINGS * errors.memory + promised * errors.memory_range))
-    return Verdict(ratio, "compared")
+    return ratio
 
 
 def worst(apart: Array, allowed: Array) -> float:

@@ -371,4 +371,6 @@ def power_flow(w: float, c: float, n: float, length: float) -> float:
     x = m * c * math.exp(exponent) * length
     if x <= -1.0:
         return math.inf if m > 0.0 else 0.0
+    if x > 1.0:  # the logarithm of w would be lost beside that of the length, and its rounding with it
+        return float((m * c * length * (1.0 + 1.0 / x)) ** (-1.0 / m))
     return w * math.exp(-math.log1p(x) / m)

@@ -18,6 +18,7 @@ _SIGNATURE = float64(CONSTANTS, VECTOR, float64)
 _POINTS = 16  # of a way at which the output is looked at
 _DOUBLINGS = 1100  # more than there are between the smallest number and the largest
 _HALVINGS = 200
+_GUESSES, _SHORTER = 4, 0.03
 _RESOLVED = 1e-13
 """Of the largest output so far: shorter ways rise in steps of rounding, and are not looked at for a turn."""
 _SMALLEST = 2.0**-1022
@@ -59,6 +60,37 @@ def _apart(here: float, direction: float, low: float, way: float, high: float) -
     return direction * (here + direction * low) < end < direction * (here + direction * high)
 
 
+@inlined
+def _bracket(
+    step: Step,
+    parameters: FloatArray,
+    state: FloatArray,
+    trial: FloatArray,
+    here: float,
+    direction: float,
+    side: float,
+    wanted: float,
+    gap: float,
+    guess: float,
+    resolved: bool,
+) -> tuple[float, float, float, float]:
+    """Two ways with their errors, of which the second is too long or, where none is found, its error not positive."""
+    low, low_error, high, too_far = 0.0, -gap, guess, math.inf
+    high_error = math.nan
+    for _ in range(_DOUBLINGS):
+        high_error = side * (_tried(step, parameters, state, trial, here + direction * high) - wanted)
+        if 0.0 <= high_error < math.inf:
+            break
+        if low_error < high_error < 0.0 or (not resolved and -math.inf < high_error < 0.0):
+            low, low_error = high, high_error
+        else:
+            too_far = high
+        high = 2.0 * low if too_far == math.inf else 0.5 * (low + too_far)
+        if not low < high < too_far:
+            break
+    return low, low_error, high, high_error
+
+
 @signed_kernel(int64(STEP, CONSTANTS, VECTOR, VECTOR, float64, float64, float64, CONSTANTS, VECTOR))
 def inverse(
     step: Step,
@@ -87,24 +119,19 @@ def inverse(
         resolved = abs(wanted - reached) > _RESOLVED * largest
         side = math.copysign(1.0, wanted - reached)
         direction = side * rising
-        low, low_error = 0.0, -abs(wanted - reached)
-        high = abs((wanted - reached) / slope)
-        if high < _SMALLEST:
+        gap, guess = abs(wanted - reached), abs((wanted - reached) / slope)
+        if guess < _SMALLEST:
             u[k] = here
             continue
-        high_error = side * (_tried(step, parameters, state, trial, here + direction * high) - wanted)
-        too_far = math.inf
-        for _ in range(_DOUBLINGS):
+        low = low_error = high = 0.0
+        high_error = math.nan
+        for _ in range(_GUESSES):  # a guess that is too long may end behind a turn, and look like one that is too short
+            low, low_error, high, high_error = _bracket(
+                step, parameters, state, trial, here, direction, side, wanted, gap, guess, resolved
+            )
             if 0.0 <= high_error < math.inf:
                 break
-            if low_error < high_error < 0.0 or (high_error < 0.0 and not resolved and abs(high_error) < math.inf):
-                low, low_error = high, high_error
-            else:
-                too_far = high
-            high = 2.0 * low if too_far == math.inf else 0.5 * (low + too_far)
-            if not low < high < too_far:
-                break
-            high_error = side * (_tried(step, parameters, state, trial, here + direction * high) - wanted)
+            guess *= _SHORTER
         if not 0.0 <= high_error < math.inf:
             return k
         last_side = 0
@@ -124,17 +151,17 @@ def inverse(
                 low_error *= 0.5 if last_side > 0 else 1.0
                 last_side = 1
         if resolved:
-            before = -abs(wanted - reached)
+            before = -gap
             for i in range(1, _POINTS + 1):
                 error = side * (_tried(step, parameters, state, trial, here + direction * high * i / _POINTS) - wanted)
                 if not error > before:
                     return k
                 before = error
-            near = min(1.0 / _POINTS, 64.0 * _RESOLVED * largest / abs(wanted - reached))
+            near = min(1.0 / _POINTS, 64.0 * _RESOLVED * largest / gap)
             back = _tried(step, parameters, state, trial, here - direction * high * near)
             if not side * (back - reached) < 0.0:
                 return k
-            slope = rising * abs((wanted - reached) / high)
+            slope = rising * (gap / high)
         here += direction * high
         step(parameters, state, here)
         reached = wanted
