@@ -21,6 +21,8 @@ _HALVINGS = 200
 _GUESSES, _SHORTER = 4, 0.03
 _RESOLVED = 1e-13
 """Of the largest output so far: shorter ways rise in steps of rounding, and are not looked at for a turn."""
+_NEAR = 1e-10  # of the largest output so far: how far back from its beginning a way is looked at
+_ROUNDINGS = 64.0 * 2.0**-53
 _SMALLEST = 2.0**-1022
 
 
@@ -41,7 +43,8 @@ def one_behind_the_other(first: Step, second: Step) -> Step:
     @signed_closure(_SIGNATURE)
     def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
         n, m = 2 + int(parameters[0]), int(parameters[1])
-        return second(parameters[n:], state[m:], first(parameters[2:n], state[:m], u))
+        between = first(parameters[2:n], state[:m], u)
+        return second(parameters[n:], state[m:], between) if math.isfinite(between) else between
 
     return step
 
@@ -154,11 +157,10 @@ def inverse(
             before = -gap
             for i in range(1, _POINTS + 1):
                 error = side * (_tried(step, parameters, state, trial, here + direction * high * i / _POINTS) - wanted)
-                if not error > before:
+                if not error > before - _ROUNDINGS * largest:
                     return k
                 before = error
-            near = min(1.0 / _POINTS, 64.0 * _RESOLVED * largest / gap)
-            back = _tried(step, parameters, state, trial, here - direction * high * near)
+            back = _tried(step, parameters, state, trial, here - direction * high * (_NEAR * largest / gap))
             if not side * (back - reached) < 0.0:
                 return k
             slope = rising * (gap / high)
