@@ -123,7 +123,7 @@ def inverse(
         side = math.copysign(1.0, wanted - reached)
         direction = side * rising
         gap, guess = abs(wanted - reached), abs((wanted - reached) / slope)
-        if guess < _SMALLEST:
+        if gap < _SMALLEST:
             u[k] = here
             continue
         low = low_error = high = 0.0

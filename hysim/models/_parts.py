@@ -106,10 +106,10 @@ def inverse_response(law: Any, y: npt.ArrayLike, u0: float | None) -> FloatArray
         reached, reach = output(here), _REACH * (1.0 + abs(here))
         while True:  # the law has a length of its own, which may be much shorter
             rise, fall = output(here + reach) - reached, reached - output(here - reach)
-            if rise * fall > 0.0 or not reach > _SHORTEST * abs(here) + 1e-150:
+            if 0.0 < rise * fall < np.inf or not reach > _SHORTEST * abs(here) + 1e-150:
                 break
             reach *= _CLOSER
-        if not rise * fall > 0.0:
+        if not 0.0 < rise * fall < np.inf:
             raise ValueError(f"the law has no inverse: its output does not rise or fall through u = {here:g}")
         if u0 is None:
             reached = float(outputs[0])

@@ -1,0 +1,167 @@
+"""Do more samples on a monotone branch of the input change anything?
+
+They must not, whatever the law: its output at a sample depends on the order of the turning points alone. Random hostile
+laws of each family (`hostile_laws`) go along one stride from a random state in one piece, in some, and in up to 64, by
+the path kernels, in batches, by the compiled step, and backwards by the inverse. `more_samples` says what may differ:
+nothing for plays and relays, roundings for closed forms, and 1e-11 of the range besides for series. Beside them: a path
+that is cut and continued, an input that stands still, and the mirrored law, each to the bit.
+
+A `BoucWenOscillator` and all else that depends on time is left out: the samples are when its input is held.
+"""
+
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+from hostile_laws import DRAWS
+from more_samples import BITS, Case, Verdict, compiled_run, draw_case, judged, response_run, runs, spread
+from more_samples_batch import (
+    ODD,
+    batch_runs,
+    cut_keeps_bits,
+    even_verdicts,
+    is_odd,
+    standing_changes_nothing,
+)
+from more_samples_inverse import INVERTED, STEPPED, inputs_for, inverse_verdict, stepped_inputs_for, wanted_case
+from results_folder import write_results
+
+from hysim.plot import Figure, figure
+
+RESULTS = Path(__file__).parent / "results" / "more_samples"
+N_CASES, N_SMOKE, BATCH = 10_000, 3, 100
+TIMED = "RateDependentPrandtlIshlinskii"
+NOT_IN_BATCHES = ("CustomLaw", "Line", "SingleValued", "Sum", "Cascade")
+NOT_STEPPED = ("SingleValued", TIMED)
+
+Row = dict[str, float | str]
+Found = Iterator[tuple[str, Verdict, Any]]
+
+
+def forward_verdicts(family: str, seeds: range) -> Found:
+    """Of each case and path: the path, the verdict, and the seed."""
+    cases, errors = [], []
+    for seed in seeds:
+        rng = generator(family, seed)
+        case = draw_case(family, rng)
+        cases.append(case)
+        errors.append(None if family in BITS else remembered(case))
+        yield "response", judged(case, runs(case, response_run), errors[-1]), seed
+        if family not in NOT_STEPPED:
+            yield "compiled step", judged(case, runs(case, compiled_run), errors[-1]), seed
+        if family != TIMED:
+            yield "cut and continued", to_the_bit(cut_keeps_bits(case, rng)), seed
+            yield "input at rest", to_the_bit(standing_changes_nothing(case, rng)), seed
+        if family in ODD:
+            yield "mirrored", to_the_bit(is_odd(case)), seed
+    if family == TIMED:
+        for seed, verdict in zip(seeds, even_verdicts(cases, generator(family, seeds[0])), strict=True):
+            yield "batch", verdict, seed
+    elif family not in NOT_IN_BATCHES:
+        for seed, case, found, error in zip(seeds, cases, batch_runs(cases), errors, strict=True):
+            yield "batch", judged(case, found, error), seed
+
+
+def inverse_verdicts(family: str, seeds: range) -> Found:
+    """As `forward_verdicts`, of the inverses."""
+    for seed in seeds:
+        wanted = wanted_case(family, generator(family, seed))
+        yield "inverse", inverse_verdict(wanted, inputs_for), seed
+        if family in STEPPED:
+            yield "inverse step", inverse_verdict(wanted, stepped_inputs_for), seed
+
+
+def generator(family: str, seed: int) -> np.random.Generator:
+    """The generator of a case."""
+    return np.random.default_rng([seed, *family.encode()])
+
+
+def remembered(case: Case) -> Callable[[], Any]:
+    """The spread of a case, worked out once."""
+    known: list[Any] = []
+
+    def ask() -> Any:
+        if not known:
+            known.append(spread(case))
+        return known[0]
+
+    return ask
+
+
+def to_the_bit(same: bool) -> Verdict:
+    """A verdict without a tolerance."""
+    return Verdict(0.0 if same else np.inf, "compared")
+
+
+def all_verdicts(family: str, seeds: range) -> Found:
+    """Forwards and backwards."""
+    with np.errstate(all="ignore"):  # laws that escape overflow
+        yield from forward_verdicts(family, seeds)
+        if family in INVERTED:
+            yield from inverse_verdicts(family, seeds)
+
+
+def family_rows(family: str, n_cases: int) -> list[Row]:
+    """A row for each path."""
+    began, ratios, ends = time.perf_counter(), {}, {}
+    for first in range(0, n_cases, BATCH):
+        for path, verdict, seed in all_verdicts(family, range(first, min(first + BATCH, n_cases))):
+            ratios.setdefault(path, []).append(verdict.ratio)
+            ends.setdefault(path, Counter())[verdict.end] += 1
+            if verdict.ratio > 1.0:
+                print(f"{family}, {path}: seed {seed} is off by {verdict.ratio:.3g} of what is allowed", flush=True)
+    print(f"{family}: {time.perf_counter() - began:.0f} s", flush=True)
+    return [
+        {
+            "family": family,
+            "path": path,
+            "cases": len(values),
+            "violations": int(np.sum(np.array(values) > 1.0)),
+            "worst": min(float(np.max(values)), 1e300),
+            "median": min(float(np.median(values)), 1e300),
+            "escaped": ends[path]["escaped"],
+            "undecided": ends[path]["edge"],
+            "refused": ends[path]["refused"],
+        }
+        for path, values in ratios.items()
+    ]
+
+
+def main(smoke: bool = False) -> list[Row]:
+    """Count, print and write table, figure and result."""
+    rows = [row for family in DRAWS for row in family_rows(family, N_SMOKE if smoke else N_CASES)]
+    for row in rows:
+        print("  ".join(f"{name} {value:.2g}" if isinstance(value, float) else f"{value}" for name, value in row.items()))
+    violations = sum(int(row["violations"]) for row in rows)
+    print(f"{violations} violations in {sum(int(row['cases']) for row in rows)} comparisons")
+    if not smoke:
+        write_results(RESULTS, rows, draw, {"violations": violations, "comparisons": sum(int(row["cases"]) for row in rows)})
+    return rows
+
+
+def draw(rows: list[Row]) -> Figure:
+    """The worst distance of each family and path, over what is allowed."""
+    paths = {"response": "o", "batch": "s", "compiled step": "x", "inverse": "^", "inverse step": "v"}
+    families = list(DRAWS)[::-1]
+    canvas = figure(height=5.4)
+    ax = canvas.add_subplot()
+    for path, marker in paths.items():
+        own = [row for row in rows if row["path"] == path]
+        worst = [max(float(row["worst"]), 1e-4) for row in own]
+        ax.plot(worst, [families.index(str(row["family"])) for row in own], marker, label=path, fillstyle="none")
+    ax.axvline(1.0, color="#888888", linewidth=0.8)
+    ax.set_xscale("log")
+    ax.set_yticks(range(len(families)), families)
+    ax.set_xlabel("Largest difference / what is allowed (0 drawn at 1e-4)")
+    ax.legend(ncols=len(paths), loc="lower center", bbox_to_anchor=(0.3, 1.0))
+    return canvas
+
+
+if __name__ == "__main__":
+    main()
