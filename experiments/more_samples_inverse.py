@@ -114,7 +114,7 @@ def lowest_slope(law: Any) -> float:
     return float(slope)
 
 
-def steepened(case: Case, rng: Rng) -> Case | None:
+def steepened(case: Case, rng: Rng, closest: float = 0.05) -> Case | None:
     """The case with a slope of the input that outdoes the memory's on the whole stride; none if the memory escapes."""
     law = case.law
     coefficients = {"feedthrough": 0.0} if isinstance(law, hs.BoucWen | hs.Duhem) else {"input_coefficients": (0.0,)}
@@ -136,7 +136,7 @@ def steepened(case: Case, rng: Rng) -> Case | None:
     steepest = max(float(np.abs(plain.tangent(s, *at)).max()) for s in (1.0, -1.0) for at in (states, at_zero))
     if not 1e-12 < steepest < 1e12:
         return None
-    least = 0.05 if isinstance(law, hs.BoucWen | hs.PolynomialBoucWen | hs.GeneralizedBoucWen) else 1.0
+    least = closest if isinstance(law, hs.BoucWen | hs.PolynomialBoucWen | hs.GeneralizedBoucWen) else 1.0
     slope = signed(rng, (1.0 + decades(rng, np.log10(least), 1.5)) * (steepest or 1.0))
     if isinstance(law, hs.BoucWen | hs.Duhem):
         coefficients = {"feedthrough": slope}
@@ -152,9 +152,12 @@ def steepened(case: Case, rng: Rng) -> Case | None:
 
 def of_two(family: str, rng: Rng) -> tuple[Case | None, float]:
     """A sum of a Bouc-Wen law and plays, or one behind the other, both rising."""
-    case, _ = monotone_case("BoucWen", rng)
-    if case is None:
+    case = draw_case("BoucWen", rng)
+    u = pieces(rng, case.before[0], case.before[0] + stride_of(case))
+    steep = steepened(case._replace(before=case.before[:1], u=u), rng, 1.0)  # its search knows no slopes: it may miss
+    if steep is None:  # an output that is reached just before it turns
         return None, 0.0
+    case = steep
     law, plays = case.law, DRAWS["PrandtlIshlinskii"](rng, invertible=True).law
     sign = float(np.sign(law.feedthrough))
     weights = tuple(sign * abs(law.feedthrough) * w / sum(plays.weights) for w in plays.weights)

@@ -18,7 +18,7 @@ _SIGNATURE = float64(CONSTANTS, VECTOR, float64)
 _POINTS = 16  # of a way at which the output is looked at
 _DOUBLINGS = 1100  # more than there are between the smallest number and the largest
 _HALVINGS = 200
-_GUESSES, _SHORTER = 4, 0.03
+_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)  # of a way on which the output turns: where its largest value is sought
 _RESOLVED = 1e-13
 """Of the largest output so far: shorter ways rise in steps of rounding, and are not looked at for a turn."""
 _NEAR = 1e-10  # of the largest output so far: how far back from its beginning a way is looked at
@@ -77,20 +77,32 @@ def _bracket(
     guess: float,
     resolved: bool,
 ) -> tuple[float, float, float, float]:
-    """Two ways with their errors, of which the second is too long or, where none is found, its error not positive."""
-    low, low_error, high, too_far = 0.0, -gap, guess, math.inf
+    """Two ways with their errors, of which the second reaches the output; where none does, its error is negative."""
+    behind = low = 0.0
+    behind_error = low_error = -gap
+    high, too_far = guess, math.inf
     high_error = math.nan
     for _ in range(_DOUBLINGS):
         high_error = side * (_tried(step, parameters, state, trial, here + direction * high) - wanted)
         if 0.0 <= high_error < math.inf:
-            break
+            return low, low_error, high, high_error
         if low_error < high_error < 0.0 or (not resolved and -math.inf < high_error < 0.0):
-            low, low_error = high, high_error
+            behind, behind_error, low, low_error = low, low_error, high, high_error
         else:
             too_far = high
         high = 2.0 * low if too_far == math.inf else 0.5 * (low + too_far)
         if not low < high < too_far:
             break
+    start, end = behind, too_far  # the output turns between them, and `low` may be behind the turn
+    for _ in range(_HALVINGS if too_far < math.inf else 0):
+        first, second = end - _GOLDEN * (end - start), start + _GOLDEN * (end - start)
+        first_error = side * (_tried(step, parameters, state, trial, here + direction * first) - wanted)
+        if 0.0 <= first_error < math.inf:
+            return behind, behind_error, first, first_error
+        second_error = side * (_tried(step, parameters, state, trial, here + direction * second) - wanted)
+        if 0.0 <= second_error < math.inf:
+            return behind, behind_error, second, second_error
+        start, end = (first, end) if first_error < second_error else (start, second)
     return low, low_error, high, high_error
 
 
@@ -126,15 +138,9 @@ def inverse(
         if gap < _SMALLEST:
             u[k] = here
             continue
-        low = low_error = high = 0.0
-        high_error = math.nan
-        for _ in range(_GUESSES):  # a guess that is too long may end behind a turn, and look like one that is too short
-            low, low_error, high, high_error = _bracket(
-                step, parameters, state, trial, here, direction, side, wanted, gap, guess, resolved
-            )
-            if 0.0 <= high_error < math.inf:
-                break
-            guess *= _SHORTER
+        low, low_error, high, high_error = _bracket(
+            step, parameters, state, trial, here, direction, side, wanted, gap, guess, resolved
+        )
         if not 0.0 <= high_error < math.inf:
             return k
         last_side = 0
