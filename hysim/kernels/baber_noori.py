@@ -11,10 +11,14 @@ of z = 0, where c = beta + gamma for w > 0 and gamma - beta for w < 0, everythin
     dw/dL = h(w, e) (A(e) - c nu(e) |w|^n) / eta(e),    de/dL = w
 
 Its power series about the present point, L = t x, follows term by term from those of e, nu^(-1/n), exp(-p e), the
-bell exp(-X^2) and |w|^n. A step is as long as its last terms are rounding (`hysim.kernels.duhem`), and ends where w
-crosses zero. |w|^n has no series at w = 0 unless n is 1 or 2: within a distance in which the integral of its term is
-rounding it is left out. There is no closed form; this is good to 1e-12 of the range. A law that escapes is returned as
-`inf`; one that needs more than MAX_STEPS, or whose eta vanishes on the way, as `nan`.
+bell exp(-X^2) and |w|^n. A step is no longer, and a series no shorter, than the bound of what is left out allows
+(`hysim.kernels.remainder`): on a disc about the point each factor is bounded by its size there and the most by which
+it changes, the bell by the least real part of X^2. Far from the bell all its terms underflow; there it is left out,
+and a step ends before the bell could be more than rounding. A step also ends where w crosses zero. |w|^n has no series
+at w = 0 unless n is 1 or 2: within a distance in which the integral of its term is rounding it is left out, and close
+to there it is bounded on a disc of its own, shorter than that of the rest. There is no closed form; this is good to
+1e-12 of the range. A law that escapes is returned as `inf`; one that needs more than MAX_STEPS, or whose eta vanishes
+on the way, as `nan`.
 
 A law that neither wears off nor pinches takes the exact step of `hysim.kernels.boucwen`, so that z has its bits.
 """
@@ -25,7 +29,8 @@ from hysim._frozen import FloatArray
 from hysim.kernels import boucwen
 from hysim.kernels._compile import inner, kernel
 from hysim.kernels.charts import N_WORK
-from hysim.kernels.duhem import N_TERMS, place, reach, zero
+from hysim.kernels.duhem import place, zero
+from hysim.kernels.remainder import N_TERMS, ROUNDING, fraction
 
 N_OWN = 9  # delta_a, delta_nu, delta_eta, zeta_s, q, p, psi, delta_psi, lambda, before what `boucwen.step` takes
 _A, _BETA, _GAMMA, _N = range(N_OWN, N_OWN + 4)
@@ -40,12 +45,15 @@ _EXPONENT = _SERIES + _N_ROWS * (N_TERMS + 1)  # the n that its charts are made 
 _READY = _EXPONENT + 1  # 0 before the first step
 N_STATE = _READY + 1
 
-MAX_STEPS = 2_000
+MAX_STEPS = 5_000
 _LARGEST = 1.7976931348623157e308
 _LARGEST_EXPONENT = 700.0
-_SMALL = 2.0**-54
-_N_LAST = 3  # terms that are rounding where a series ends: of a symmetric one every other term is zero
-_GROWTH = 16.0  # of the length tried, over the last one that served
+_GROWTH = 4.0  # of the length tried, over the last one that served
+_WIDEST = 6.0  # disc looked at, in steps: a little wider than what serves a step of N_TERMS
+_MAX_DISCS = 40
+_ALL, _SMOOTH, _BEND = 0, 1, 2  # parts of dw/dL: together, without the term of |w|^n, this term
+_FAR = 8.0  # in X: from here on the bell, below 1e-27, is left out
+_CLEAR = 6.0  # and up to here, if it is rounding
 _VANISHED = 1e-3  # of eta: what is lost beside it did not escape
 _RETREAT = 2.0**-10  # of a length at which a term overflows
 
@@ -83,27 +91,29 @@ def advance(w: float, e: float, length: float, parameters: FloatArray, series: F
     left = t = length
     largest = abs(w)
     for _ in range(MAX_STEPS):
-        if left == 0.0:
+        if left <= ROUNDING * length:
             return w, e
-        free = False
-        if w == 0.0 or not (n == 1.0 or n == 2.0):
+        free, whole = False, n == 1.0 or n == 2.0
+        if w == 0.0 or not whole:
             begin(w, e, True, parameters, series)
-            forcing, near = series[_SLOPE, 0], nearness(e, length, parameters, series)
+            forcing = series[_SLOPE, 0]
             if w == 0.0 and forcing == 0.0:
                 return w, e
-            free = abs(w) <= near and not (n == 1.0 or n == 2.0)
-            if free:
-                t = min(t, 2.0 * abs(w / forcing) if w * forcing < 0.0 else near / abs(forcing))
-        last = expand(w, e, t, free, largest, parameters, series)
-        fraction = 1.0
-        if last < 0:
-            last, fraction = N_TERMS, max(reach(series, _N_LAST), died_out(series, largest))
+            if not whole:
+                near, size, bent = nearness(e, length, parameters, series)
+                largest = max(largest, min(size, bent))
+                free = abs(w) <= near
+                if not free and abs(w) < 0.5 * bent:
+                    t = short_way(w, forcing, near, n, t)
+                elif free:
+                    t = min(t, 2.0 * abs(w / forcing) if w * forcing < 0.0 else near / abs(forcing))
+        last, fraction = expand(w, e, t, free, largest, parameters, series)
         if fraction == 0.0:
             if not math.isfinite(series[_W, 1]):
                 return series[_W, 1], e
             t *= _RETREAT
             continue
-        if fraction < 1.0 and t * fraction <= _SMALL * length:  # nothing moves u any more, but w
+        if fraction < 1.0 and t * fraction <= ROUNDING * length:  # nothing moves u any more, but w
             return math.inf if abs(1.0 + parameters[2] * e) > _VANISHED else math.nan, e
         before, w = w, place(series, last, fraction)[0]
         if not abs(w) < _LARGEST:
@@ -119,28 +129,33 @@ def advance(w: float, e: float, length: float, parameters: FloatArray, series: F
 
 
 @inner
-def died_out(series: FloatArray, size: float) -> float:
-    """Fraction of the step at which the last terms of w have become rounding beside `size`."""
-    fraction = 1.0
-    for k in range(N_TERMS + 1 - _N_LAST, N_TERMS + 1):
-        term = abs(series[_W, k])
-        if not math.isfinite(term):
-            return 0.0
-        if term > _SMALL * size:
-            fraction = min(fraction, (_SMALL * size / term) ** (1.0 / k))
-    return fraction
+def nearness(e: float, length: float, parameters: FloatArray, series: FloatArray) -> tuple[float, float, float]:
+    """How near to zero w must be to leave the term with ``|w|^n`` out, and the order of what it comes to; after `begin`.
 
-
-@inner
-def nearness(e: float, length: float, parameters: FloatArray, series: FloatArray) -> float:
-    """How near to zero w must be that the integral of the term with ``|w|^n`` is rounding; after `begin`."""
+    The integral of the term is rounding up to the first distance. w comes to the smaller of the other two: as far as
+    the length goes without the term, and where the term cancels the slope.
+    """
     n, forcing = parameters[_N], abs(series[_SLOPE, 0])
     c = abs(parameters[_BETA]) + abs(parameters[_GAMMA])
     factor = c * abs((1.0 + parameters[1] * e) * series[_PINCH, 0] / (1.0 + parameters[2] * e))
     if forcing == 0.0 or factor == 0.0:
-        return 0.0 if forcing == 0.0 else math.inf
-    size = min(forcing * length, (forcing / factor) ** (1.0 / n))
-    return float(0.5 * (_SMALL * size * (n + 1.0) * forcing / factor) ** (1.0 / (n + 1.0)))
+        return (0.0 if forcing == 0.0 else math.inf), forcing * length, math.inf
+    bent = (forcing / factor) ** (1.0 / n)
+    room = ROUNDING * min(forcing * length, bent) * (n + 1.0) * forcing / factor
+    return float(0.5 * room ** (1.0 / (n + 1.0))), forcing * length, bent
+
+
+@inner
+def short_way(w: float, forcing: float, near: float, n: float, left: float) -> float:
+    """Length over which a series near w = 0 ends after about a dozen terms, or `left` if that is shorter.
+
+    The terms fall off as the powers of the fraction by which w changes, from (w / near)^(n + 1) roundings on.
+    """
+    way = 0.6 * abs(w)
+    if left * abs(forcing) < 0.3 * way:
+        return left
+    theta = min(1.0, max(0.3, (abs(w) / near) ** (-(n + 1.0) / 12.0)))
+    return float(min(left, theta * way / abs(forcing)))
 
 
 @kernel
@@ -153,7 +168,8 @@ def begin(w: float, e: float, free: bool, parameters: FloatArray, series: FloatA
         if parting != 0.0:
             loading = parameters[_BETA] + parameters[_GAMMA]
             parting *= loading ** (-1.0 / n) if loading > 0.0 else math.nan
-        series[_ROOT, 0] = parting * nu ** (-1.0 / n) if nu > 0.0 else math.nan
+            parting *= nu ** (-1.0 / n) if nu > 0.0 else math.nan
+        series[_ROOT, 0] = parting
         fading = min(-parameters[5] * e, _LARGEST_EXPONENT)
         series[_FADED, 0], series[_DEPTH, 0] = math.exp(fading), -parameters[3] * math.expm1(fading)
         series[_WIDTH, 0] = (parameters[6] + parameters[7] * e) * (parameters[8] + series[_DEPTH, 0])
@@ -171,24 +187,191 @@ def begin(w: float, e: float, free: bool, parameters: FloatArray, series: FloatA
 
 
 @inner
-def expand(w: float, e: float, t: float, free: bool, size: float, parameters: FloatArray, series: FloatArray) -> int:
-    """Fill the series over a length t until the terms of w are rounding beside `size`: the index of the last, or -1."""
+def expand(
+    w: float, e: float, t: float, free: bool, size: float, parameters: FloatArray, series: FloatArray
+) -> tuple[int, float]:
+    """Fill the series over a length t until what is left out is rounding beside `size`.
+
+    Returns the index of the last term and the fraction of t that the terms serve, 0 where none is known to.
+    """
     side = begin(w, e, free, parameters, series)
-    small = 0
+    pinches = parameters[3] != 0.0
+    if pinches and abs(series[_X, 0]) >= _FAR:
+        pinches = False
+        series[_PINCH, 0], series[_SLOPE, 0] = 1.0, series[_BRACKET, 0] / (1.0 + parameters[2] * e)
+    tried = 0
     for k in range(1, N_TERMS + 1):
         term = t * series[_SLOPE, k - 1] / k
         series[_W, k], series[_ENERGY, k] = term, t * series[_W, k - 1] / k
         size = max(size, abs(term)) if k < 3 else size
-        small = small + 1 if abs(term) <= _SMALL * size else 0
-        if small == _N_LAST:
-            return k
+        if abs(term) <= ROUNDING * size and k >= tried:
+            tried = k + 2
+            if ends(k, t, size, free, pinches, parameters, series):
+                served = clear(k, 1.0, pinches, parameters, series)
+                if served > 0.0:
+                    return k, served
         if k < N_TERMS:
-            extend(k, side, free, parameters, series)
-    return -1
+            extend(k, side, free, pinches, parameters, series)
+    served = serves(t, size, free, pinches, parameters, series)
+    return N_TERMS, clear(N_TERMS, served, pinches, parameters, series)
 
 
 @inner
-def extend(k: int, side: float, free: bool, parameters: FloatArray, series: FloatArray) -> None:
+def ends(k: int, t: float, size: float, free: bool, pinches: bool, parameters: FloatArray, series: FloatArray) -> bool:
+    """Whether the series may end at the term k: whether the terms left out are rounding beside `size`."""
+    room = ROUNDING * size * (k + 1.0)
+    flow = max(abs(series[_W, 1]), ROUNDING * size)
+    x, gain, doubling = 2.0, 2.0**k, 2.0**k
+    while gain * room < 16.0 * flow and x < _LARGEST:
+        x, gain = 2.0 * x, doubling * gain
+    spread = spread_within(k, x, _SMOOTH if free else _ALL, pinches, parameters, series)
+    if spread * t * x <= room * gain * (x - 1.0):
+        return True
+    if free or spread < math.inf:
+        return False
+    rest = x - spread_within(k, x, _SMOOTH, pinches, parameters, series) * t * x / (room * gain) - 1.0
+    shorter = x * inside(k, x, series)
+    if not (rest > 0.0 and shorter > 1.0):
+        return False
+    spread = spread_within(k, shorter, _BEND, pinches, parameters, series)
+    return bool(spread * t * shorter <= room * shorter**k * (shorter - 1.0) * rest / (x - 1.0))
+
+
+@inner
+def serves(t: float, size: float, free: bool, pinches: bool, parameters: FloatArray, series: FloatArray) -> float:
+    """Fraction of t that N_TERMS terms serve, the best of a few discs."""
+    x, best = _WIDEST, 0.0
+    for _ in range(_MAX_DISCS):
+        spread = spread_within(N_TERMS, x, _SMOOTH if free else _ALL, pinches, parameters, series)
+        share = 0.0
+        if spread < math.inf:
+            share = x * fraction(spread * t * x, size)
+        elif not free:
+            shorter = x * inside(N_TERMS, x, series)
+            smooth = spread_within(N_TERMS, x, _SMOOTH, pinches, parameters, series)
+            bend = spread_within(N_TERMS, shorter, _BEND, pinches, parameters, series)
+            if smooth < math.inf and bend < math.inf:
+                share = x * fraction(smooth * t * x, 0.5 * size)
+                share = min(share, shorter * fraction(bend * t * shorter, 0.5 * size))
+        if share >= 1.0:
+            return 1.0
+        if share < best:
+            break
+        best = share
+        x *= 0.75 if share > 0.01 * x else 0.25
+    return best
+
+
+@inner
+def sum_of_sizes(series: FloatArray, row: int, last: int, x: float) -> float:
+    """What the terms after the first come to at most at the distance x."""
+    total = 0.0
+    for k in range(last, 0, -1):
+        total = (total + abs(series[row, k])) * x
+    return total
+
+
+@inner
+def inside(last: int, x: float, series: FloatArray) -> float:
+    """Part of the distance x up to which the series of w keeps away from zero."""
+    return float(min(1.0, 0.9 * abs(series[_W, 0]) / sum_of_sizes(series, _W, last, x)))
+
+
+@inner
+def spread_within(last: int, x: float, part: int, pinches: bool, parameters: FloatArray, series: FloatArray) -> float:
+    """Bound of ``|f - f(0)|`` where the series go at complex distances up to x; inf where none is known.
+
+    f is dw/dL, or the part of it without the term of ``|w|^n``, or this term. Each factor of f is replaced by its size
+    at 0 and the most by which it changes.
+    """
+    rw, re = sum_of_sizes(series, _W, last, x), sum_of_sizes(series, _ENERGY, last, x)
+    n, w, e = parameters[_N], series[_W, 0], series[_ENERGY, 0]
+    growth, eta = abs(parameters[1]) * re, abs(1.0 + parameters[2] * e)
+    wear = abs(parameters[2]) * re
+    if not (wear < 0.9 * eta and rw < _LARGEST):
+        return math.inf
+    worn = abs(parameters[0]) * re
+    if part == _SMOOTH:
+        bracket = abs(parameters[_A] - parameters[0] * e)
+        changed = bracket + worn
+    else:
+        power, nu, size = series[_POWER, 0], abs(1.0 + parameters[1] * e), abs(w)
+        if n == 1.0:
+            rise = rw
+        elif n == 2.0:
+            rise = rw * (2.0 * size + rw)
+        elif rw >= 0.95 * size:
+            return math.inf
+        else:
+            rise = (size + rw) ** n - power if n > 1.0 else power - (size - rw) ** n
+        c = abs(parameters[_GAMMA] + (parameters[_BETA] if w > 0.0 else -parameters[_BETA]))
+        if w == 0.0:
+            c = abs(parameters[_GAMMA]) + abs(parameters[_BETA])
+        change = c * (nu * rise + growth * (power + rise))
+        bracket = abs(series[_BRACKET, 0])
+        changed = bracket + worn + change
+        if part == _BEND:
+            bracket = c * nu * power
+            changed = bracket + change
+    pinch = abs(series[_PINCH, 0])
+    deeper = pinch_within(rw, re, parameters, series) if pinches else 0.0
+    return float((pinch + deeper) * changed / (eta - wear) - pinch * bracket / eta)
+
+
+@inner
+def pinch_within(rw: float, re: float, parameters: FloatArray, series: FloatArray) -> float:
+    """Bound of ``|h - its value at 0|`` where w and e go no further than rw and re, by the real part of X^2."""
+    deeper, farther, wider = shifts(re, parameters, series)
+    x, width = abs(series[_X, 0]), abs(series[_WIDTH, 0])
+    if not wider < 0.9 * width:
+        return math.inf
+    apart = (rw + farther + x * wider) / (width - wider)
+    exponent = -((x - apart) ** 2) if apart <= 0.5 * x else apart * apart - 0.5 * x * x
+    if not exponent < 0.5 * _LARGEST_EXPONENT:
+        return math.inf
+    highest = math.exp(exponent)
+    change = min(highest * apart * (2.0 * x + apart), highest + series[_BELL, 0])
+    return float(abs(series[_DEPTH, 0]) * change + deeper * highest)
+
+
+@inner
+def shifts(re: float, parameters: FloatArray, series: FloatArray) -> tuple[float, float, float]:
+    """The most by which depth, place and width of the bell change where e goes no further than re."""
+    e = series[_ENERGY, 0]
+    fading = abs(parameters[5]) * re
+    deeper = math.inf
+    if fading < 0.5 * _LARGEST_EXPONENT:
+        deeper = abs(parameters[3]) * series[_FADED, 0] * math.expm1(fading)
+    farther = 0.0
+    if parameters[4] != 0.0 and parameters[1] != 0.0:
+        ratio = abs(parameters[1] * re / (1.0 + parameters[1] * e))
+        farther = math.inf
+        if ratio < 0.9:
+            farther = abs(series[_ROOT, 0]) * ((1.0 - ratio) ** (-1.0 / parameters[_N]) - 1.0)
+    broad = abs(parameters[6] + parameters[7] * e)
+    wider = broad * deeper + abs(parameters[7]) * re * (abs(parameters[8] + series[_DEPTH, 0]) + deeper)
+    return deeper, farther, wider
+
+
+@inner
+def clear(last: int, served: float, pinches: bool, parameters: FloatArray, series: FloatArray) -> float:
+    """Fraction of a step, no more than `served`, on which a bell that is left out stays rounding; 0 for none."""
+    if pinches or parameters[3] == 0.0 or served == 0.0:
+        return served
+    for _ in range(_MAX_DISCS):
+        rw, re = sum_of_sizes(series, _W, last, served), sum_of_sizes(series, _ENERGY, last, served)
+        deeper, farther, wider = shifts(re, parameters, series)
+        apart = abs(series[_W, 0] - series[_ROOT, 0]) - rw - farther
+        width = abs(series[_WIDTH, 0]) + wider
+        depth = abs(series[_DEPTH, 0]) + deeper
+        if apart > _CLEAR * width and depth * math.exp(-((apart / width) ** 2)) <= ROUNDING:
+            return served
+        served *= 0.5
+    return 0.0
+
+
+@inner
+def extend(k: int, side: float, free: bool, pinches: bool, parameters: FloatArray, series: FloatArray) -> None:
     """The terms k of all rows, from those of w and e and all terms before.
 
     They follow from  w g' = n w' g  for g = |w|^n,  nu r' = -nu' r / n  for r = nu^(-1/n),  f' = -p e' f  for
@@ -209,7 +392,7 @@ def extend(k: int, side: float, free: bool, parameters: FloatArray, series: Floa
     strength *= parameters[_GAMMA] + side * parameters[_BETA]
     series[_BRACKET, k] = -parameters[0] * series[_ENERGY, k] - strength
     driven = series[_BRACKET, k]
-    if parameters[3] != 0.0:
+    if pinches:
         moment = (1.0 / n - 1.0) * weighted(series, _ENERGY, _ROOT, k) + k * product(series, _ENERGY, _ROOT, k, 1)
         series[_ROOT, k] = -growth * moment / (k * nu)
         series[_FADED, k] = -parameters[5] * weighted(series, _ENERGY, _FADED, k) / k

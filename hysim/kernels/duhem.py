@@ -11,10 +11,11 @@ each solved by the power series of its flow about the present point. With u = u0
 
     z = sum t_k x^k,    (k + 1) t_(k+1) = h sum_j [a_j z^j]_k,    a_j(x) = sum_i f_ij (u0 + h x)^i
 
-The order follows the terms: the series ends where they have become rounding. Where N_TERMS do not reach
-that, the step is cut to the length at which the last of them do, at no further cost because t_k goes
-with h^k. There is no closed form and the law is not called exact: it is good to 1e-12 of the range.
-A law that escapes is returned as `inf`; one so stiff that it needs more than MAX_STEPS as `nan`.
+The order follows what is left out: the series ends where the bound of that, from the sizes of the coefficients on a
+complex disc (`hysim.kernels.remainder`), has become rounding. Where N_TERMS do not reach that, the step is cut to the
+length at which they do, at no further cost because t_k goes with h^k. There is no closed form and the law is not
+called exact: it is good to 1e-12 of the range. A law that escapes is returned as `inf`; one so stiff that it needs
+more than MAX_STEPS as `nan`.
 
 In a law with |z| a step ends where its series crosses zero, and the memory is then zero to the bit. A step is
 cut before to a length on which the series keeps away from zero or is monotone, so that its sign at the end
@@ -33,16 +34,17 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.kernels._compile import inner, kernel
+from hysim.kernels.remainder import N_TERMS, ROUNDING, fraction
 
-N_TERMS = 24
 MAX_STEPS = 20_000
 LARGEST = 1.7976931348623157e308
 
-_NEGLIGIBLE = 2.0**-54
-_GROWTH = 16.0  # of the length tried, over the last one that served
+_GROWTH = 4.0  # of the length tried, over the last one that served
 _RETREAT = 2.0**-10  # of a length at which a term overflows
 _GRAZE = 2.0**-18  # of a step: on less, a dip below zero and back has no weight
 _MAX_NEWTON = 100
+_WIDEST = 6.0  # disc looked at, in steps: a little wider than what serves a step of N_TERMS
+_MAX_DISCS = 40
 
 
 # ---------------------------------------------------------------------------------- scalar functions
@@ -80,39 +82,70 @@ def coefficient(local: FloatArray, powers: FloatArray, k: int) -> float:
 
 
 @inner
-def series(local: FloatArray, z: float, h: float, powers: FloatArray) -> int:
-    """Fill row 1 of `powers` with the terms of z(x) until they have died out, N_TERMS after the first at most.
+def series(local: FloatArray, z: float, h: float, powers: FloatArray) -> tuple[int, float]:
+    """Fill row 1 of `powers` with the terms of z(x) until those left out are rounding, N_TERMS after the first at most.
 
-    Returns the index of the last one, or -1 if they have not died out.
+    Returns the index of the last one, and the fraction of the step that they serve.
     """
-    rows, columns = local.shape
     powers[1, 0] = z
-    scale, small = abs(z), 0
+    scale, tried = abs(z), 0
     for k in range(N_TERMS):
         term = h * coefficient(local, powers, k) / (k + 1.0)
         powers[1, k + 1] = term
-        if k < 2:
+        if k < 2 or scale == 0.0:
             scale += abs(term)
-        small = small + 1 if abs(term) <= _NEGLIGIBLE * scale else 0
-        if small == rows + columns - 1:  # longer than any gap between two terms
-            return k + 1
-    return -1
+        if abs(term) <= ROUNDING * scale and k >= tried:
+            tried = k + 2
+            if ends(local, k + 1, abs(h), scale, powers):
+                return k + 1, 1.0
+    return N_TERMS, serves(local, abs(h), scale, powers)
 
 
 @inner
-def reach(powers: FloatArray, n_last: int) -> float:
-    """Fraction of the step at which the last `n_last` terms have died out beside one of the first three."""
-    fraction = 1.0
-    for k in range(N_TERMS + 1 - n_last, N_TERMS + 1):
-        term = abs(powers[1, k])
-        if not math.isfinite(term):
-            return 0.0
-        if term > 0.0:
-            allowed = 0.0
-            for m in range(3):
-                allowed = max(allowed, (_NEGLIGIBLE * (abs(powers[1, m]) / term)) ** (1.0 / (k - m)))
-            fraction = min(fraction, allowed)
-    return fraction
+def ends(local: FloatArray, last: int, h: float, size: float, powers: FloatArray) -> bool:
+    """Whether the series may end at this term: whether all terms left out are rounding beside `size`."""
+    x, gain, doubling = 2.0, 2.0**last, 2.0**last
+    room = ROUNDING * size * (last + 1.0)
+    first = 16.0 * max(abs(powers[1, 1]), ROUNDING * size)
+    while gain * room < first:
+        x, gain = 2.0 * x, doubling * gain
+    return bool(spread_within(local, last, x, powers) * h * x <= room * gain * (x - 1.0))
+
+
+@inner
+def serves(local: FloatArray, h: float, size: float, powers: FloatArray) -> float:
+    """Fraction of a step that N_TERMS terms serve, the best of a few discs."""
+    x, best = _WIDEST, 0.0
+    if size == 0.0:
+        size = h * spread_within(local, N_TERMS, 1.0, powers)
+    for _ in range(_MAX_DISCS):
+        spread = spread_within(local, N_TERMS, x, powers)
+        share = x * fraction(spread * h * x, size) if spread <= LARGEST else 0.0
+        if share >= 1.0:
+            return 1.0
+        if share < best:
+            break
+        best = share
+        x *= 0.75 if share > 0.01 * x else 0.25
+    return best
+
+
+@inner
+def spread_within(local: FloatArray, last: int, x: float, powers: FloatArray) -> float:
+    """Bound of ``|f - f(0)|`` where the series of z goes at complex distances up to x, from that of each monomial."""
+    rows, columns = local.shape
+    farthest, size = 0.0, abs(powers[1, 0])
+    for k in range(last, 0, -1):
+        farthest = (farthest + abs(powers[1, k])) * x
+    farthest += size
+    total, here, there = 0.0, 1.0, 1.0
+    for j in range(columns):
+        column = 0.0
+        for i in range(rows - 1, 0, -1):
+            column = (column + abs(local[i, j])) * x
+        total += column * there + abs(local[0, j]) * (there - here)
+        here, there = here * size, there * farthest
+    return total
 
 
 @inner
@@ -170,7 +203,7 @@ def zero(powers: FloatArray, last: int, end: float) -> float:
         value, slope = place(powers, last, x)
         low, high = (x, high) if sign * value >= 0.0 else (low, x)
         trial = newton(low, high, x, sign * value, sign * slope)
-        if value == 0.0 or abs(trial - x) <= _NEGLIGIBLE * x:
+        if value == 0.0 or abs(trial - x) <= ROUNDING * x:
             break
         x = trial
     return x
@@ -194,29 +227,25 @@ def advance(
         expand(law, above + 1 if two_sided and z < 0.0 else above, here, h, local)
         if two_sided and z == 0.0 and falls_from_zero(local, h):
             expand(law, above + 1, here, h, local)
-        last = series(local, z, h, powers)
-        fraction = 1.0
-        if last < 0:
-            last = N_TERMS
-            fraction = reach(powers, local.shape[0] + local.shape[1] - 1)
-        if fraction == 0.0:
+        last, served = series(local, z, h, powers)
+        if served == 0.0:
             if not math.isfinite(powers[1, 1]):
                 return math.inf
             h *= _RETREAT
             continue
-        served = h * fraction
+        end = served
         if two_sided:
-            fraction = untangled(powers, last, fraction)
+            end = untangled(powers, last, end)
         before, z = z, 0.0
         for k in range(last, -1, -1):
-            z = z * fraction + powers[1, k]
+            z = z * end + powers[1, k]
         if not abs(z) <= bound:
             return math.inf
         if two_sided and ((before > 0.0 and z < 0.0) or (before < 0.0 and z > 0.0)):
-            fraction, z = zero(powers, last, fraction), 0.0
-        taken = h * fraction
+            end, z = zero(powers, last, end), 0.0
+        taken = h * end
         rest = 0.0 if taken == rest else rest - taken
-        h = math.copysign(min(abs(rest), _GROWTH * abs(served)), du)
+        h = math.copysign(min(abs(rest), _GROWTH * abs(h * served)), du)
     return math.nan
 
 

@@ -14,9 +14,10 @@ n = 1     closed: w + (a - c w) E_1 + d E_2,  E_1 = (1 - exp(-c L))/c,  E_2 = (L
           series near c L = 0. The place of the extremum is closed too, that of w = 0 is found by Newton's
           method in its bracket.
 other n   the power series of the flow about the present point, w = sum t_k x^k with L = h x and
-          w^n = sum g_k x^k, where w (w^n)' = n w' w^n gives g_k. A step is as long as its last terms are
-          rounding (`hysim.kernels.duhem`). At w = 0 the series do not begin, so the way from there goes
-          by a L + d L^2/2 for as long as the term left out is rounding beside the scale of the stretch.
+          w^n = sum g_k x^k, where w (w^n)' = n w' w^n gives g_k. A step is no longer than the bounds of
+          `hysim.kernels.remainder` allow. w^n is analytic up to w = 0 only, so that no step of the series gets
+          there: near zero w is a L + d L^2/2 less the integral of c (a L + d L^2/2)^n, for as long as the
+          next correction is rounding beside the scale of the stretch, on the way up and on the way down.
           This is good to 1e-12 of the range, and not called exact.
 
 A law that escapes is returned as `inf`; one so stiff that it needs more than MAX_STEPS as `nan`.
@@ -27,10 +28,11 @@ import math
 from hysim._frozen import FloatArray, read_only
 from hysim.kernels import boucwen
 from hysim.kernels._compile import kernel
-from hysim.kernels.duhem import MAX_STEPS, N_TERMS, newton, place, reach
+from hysim.kernels.duhem import MAX_STEPS, newton
 from hysim.kernels.elementary import linear_flow
 from hysim.kernels.polynomials import N_TERMS as N_RAMP
 from hysim.kernels.polynomials import sum16
+from hysim.kernels.remainder import N_TERMS, ROUNDING, fraction, radius
 
 N_HEAD = 2
 N_STATE = N_HEAD + 2 * (N_TERMS + 1)
@@ -39,12 +41,12 @@ _RAMP = read_only([(-1.0) ** k / math.factorial(k + 2) for k in range(N_RAMP)]) 
 _RAMP_REACH = 0.75  # the terms left out are below 1e-18 here
 _LARGEST_EXPONENT = 709.0
 _LARGEST = 1.7976931348623157e308
-_SMALL = 2.0**-54
-_N_LAST = 3  # terms that are rounding where a series ends: of a symmetric one every other term is zero
-_GROWTH = 16.0  # of the length tried, over the last one that served
-_RETREAT = 2.0**-10  # of a length at which a term overflows
-_MAX_NEWTON = 100
-_MAX_HALVES = 60  # to the last bit of the place of an extremum
+_MAX_NEWTON = 1000  # more than the largest exponent: down a growing exponential, Newton's rule goes 1/|c| at a time
+_AHEAD = 16.0  # times the length that is sure before, of a step whose terms tell how much of it they serve
+_WIDEST = 6.0  # disc looked at, in steps: a little wider than what serves a step of N_TERMS
+_MAX_DISCS = 40
+_BRISK = 0.6  # of a sure length near w = 0: the series then needs half as many terms
+_MAX_SIDES = 8
 
 
 @kernel
@@ -66,9 +68,13 @@ def advance(u: float, z: float, du: float, parameters: FloatArray, scratch: Floa
     direction = 1.0 if du > 0.0 else -1.0
     A, beta, gamma, n, delta = parameters[0], parameters[1], parameters[2], parameters[3], parameters[4]
     a, w, length = A + direction * delta * u, direction * z, abs(du)
-    begin = 0.0
-    while True:  # the forcing a + delta L changes its sign once, so there are no more than two zeros of z
+    begin, stands = 0.0, False
+    for _ in range(
+        _MAX_SIDES
+    ):  # the forcing a + delta L changes its sign once, so there are no more than two zeros of z
         left, forcing = length - begin, a + delta * begin
+        if stands:  # z left zero and came back within the rounding of the length: the forcing changes its sign here
+            forcing = 0.0
         if w != 0.0:
             side = 1.0 if w > 0.0 else -1.0
         else:
@@ -80,7 +86,9 @@ def advance(u: float, z: float, du: float, parameters: FloatArray, scratch: Floa
             w, travelled = power_side(abs(w), side * forcing, side * delta, c, n, left, scratch)
         if w != 0.0 or travelled >= left:
             return direction * side * w
+        stands = begin + travelled == begin
         begin += travelled
+    return math.nan
 
 
 # ---------------------------------------------------------------------------------- n = 1
@@ -104,7 +112,7 @@ def linear_side(w: float, a: float, d: float, c: float, length: float) -> tuple[
         value = linear_ramp(w, a, d, c, x)
         low, high = (x, high) if value >= 0.0 else (low, x)
         trial = newton(low, high, x, value, a + d * x - c * value)
-        if value == 0.0 or abs(trial - x) <= _SMALL * x:
+        if value == 0.0 or abs(trial - x) <= ROUNDING * x:
             break
         x = trial
     return 0.0, x
@@ -127,7 +135,7 @@ def linear_ramp(w: float, a: float, d: float, c: float, length: float) -> float:
 def linear_turn(slope: float, d: float, c: float) -> float:
     """Length at which w' = a + d L - c w is zero, from w' = `slope` at L = 0 on."""
     x = -c * slope / d
-    return -slope / d if abs(x) < _SMALL else math.log1p(x) / c
+    return -slope / d if abs(x) < ROUNDING else math.log1p(x) / c
 
 
 # ---------------------------------------------------------------------------------- other n
@@ -135,55 +143,127 @@ def linear_turn(slope: float, d: float, c: float) -> float:
 
 @kernel
 def power_side(
-    w: float, a: float, d: float, c: float, n: float, length: float, scratch: FloatArray
+    w: float, a: float, d: float, c: float, n: float, length: float, terms: FloatArray
 ) -> tuple[float, float]:
-    """As `linear_side`, by power series; `scratch` has 2 (N_TERMS + 1) places."""
-    terms = scratch.reshape((2, N_TERMS + 1))
-    negligible = _SMALL * scale(w, a, d, c, n, length)
-    done, h = 0.0, length
+    """As `linear_side`, by power series; `terms` has 2 (N_TERMS + 1) places."""
+    done, negligible = 0.0, -1.0
+    from_w = w
     for _ in range(MAX_STEPS):
         left, forcing = length - done, a + d * done
-        if escapes(w, abs(a) + abs(d) * length, c, n, left):
-            return math.inf, length
-        if w == 0.0:
-            way = min(left, free_way(forcing, d, abs(c), n, negligible))
-            w = way * (forcing + 0.5 * d * way)
-            if done + way >= length or not w > 0.0:
-                return max(w, 0.0), length if done + way >= length else done + way
-            done += way
-            h = way
-            continue
-        landing = free_landing(w, forcing, d)
-        if landing <= left and abs(c) * w**n * landing <= negligible:
-            return 0.0, done + landing
-        last, fraction = series(w, forcing, d, c, n, h, terms)
-        if fraction == 0.0:
-            if not math.isfinite(terms[1, 1]):
-                return math.inf, length
-            h *= _RETREAT
-            continue
-        w, slope = place(terms, last, fraction)
-        if w <= 0.0 or (terms[1, 1] < 0.0 and slope > 0.0):
-            zero = first_zero(terms, last, fraction)
-            if zero > 0.0:
-                return 0.0, min(length, done + h * zero)
-        if not w < _LARGEST:
-            return math.inf, length
-        taken = h * fraction
-        if taken >= left:
+        if left <= ROUNDING * length:
             return w, length
-        done += taken
-        h = min(length - done, _GROWTH * taken)
+        if w == 0.0 or forcing < 0.0:
+            landing = free_landing(w, forcing, d)
+            if negligible < 0.0 and (w == 0.0 or landing <= left):
+                negligible = ROUNDING * scale(from_w, a, d, c, n, length)
+            if w == 0.0:
+                h, w = take_off(forcing, d, c, n, negligible, left)
+                if h >= left or w == 0.0:
+                    return w, length if h >= left else done + h
+                done += h
+                continue
+            if landing <= left and landing <= near(-forcing - d * landing, d, abs(c), n, negligible):
+                return 0.0, done + landing + c * moment(-forcing - d * landing, d, n, landing) / (forcing + d * landing)
+        power = w**n
+        if escapes(w, abs(a) + abs(d) * length, c * power, n, left):
+            return math.inf, length
+        slope = forcing - c * power
+        if slope == 0.0 and d == 0.0:
+            return w, length
+        bend = abs(c) * power
+        reach, spread = disc(w, abs(slope), d, bend, n, 5.0 * left)
+        theta = left / reach
+        if theta > 0.2:
+            theta = min(theta, fraction(spread * reach, w))
+        safe = min(left, theta * reach)
+        if safe < left and spread < abs(slope):
+            safe *= _BRISK
+        if safe == left or spread < abs(slope):
+            w = series(w, power, forcing, d, c, n, safe, safe / reach, spread * safe, terms)
+            done = length if safe == left else done + safe
+            continue
+        h = min(left, _AHEAD * safe)
+        series(w, power, forcing, d, c, n, h, 1.0, math.inf, terms)
+        share = max(safe / h, serves(terms, bend * h, n))
+        w = summed(terms, share)
+        if not w < _LARGEST:
+            return math.inf if c < 0.0 else math.nan, length
+        if share == 1.0 and h == left:
+            return w, length
+        done += share * h
     return math.nan, length
 
 
 @kernel
-def escapes(w: float, forcing: float, c: float, n: float, length: float) -> bool:
+def disc(w: float, slope: float, d: float, bend: float, n: float, wanted: float) -> tuple[float, float]:
+    """Radius and spread (`hysim.kernels.remainder`) of the flow about w, where dw/dL is `slope` and |c| w^n is `bend`.
+
+    On the disc |v| <= q w, |(w + v)^n - w^n| is at most G w^n, with G = (1 + q)^n - 1 for n >= 1, and 1 - (1 - q)^n
+    for n < 1. A q of order 1/n keeps G of order one. The forcing is known to the end: it adds |d| L to the slope, and
+    nothing to the tail; L is no more than either radius without the other.
+    """
+    if n >= 1.389:
+        q, rise = 1.25 / n, 2.4904
+    elif n >= 1.0:
+        q, rise = 0.9, 1.4393
+    else:
+        q, rise = 0.5, 0.6932 * n
+    reach = disc_radius(q * w, slope, d, bend * rise)
+    if reach < wanted and bend < slope:
+        rise_widest = 1.9**n - 1.0 if n >= 1.0 else 1.0 - 0.1**n
+        if rise_widest * bend < slope:
+            return disc_radius(0.9 * w, slope, d, bend * rise_widest), bend * rise_widest
+    return reach, bend * rise
+
+
+@kernel
+def disc_radius(r: float, slope: float, d: float, spread: float) -> float:
+    """Radius of the flow while the memory stays within r; L is no more than either radius without the other."""
+    total = slope
+    if d != 0.0:
+        lowest = math.sqrt(r / abs(d))
+        total += abs(d) * (min(lowest, r / slope) if slope > 0.0 else lowest)
+    return radius(total / r, spread / r)
+
+
+@kernel
+def serves(terms: FloatArray, bend: float, n: float) -> float:
+    """Fraction of a step that all of its terms serve, by the terms themselves (`hysim.kernels.remainder`)."""
+    rows = terms.size // 2
+    w = terms[rows]
+    x, allowed = _WIDEST, 0.9 * w
+    for _ in range(_MAX_DISCS):
+        total, slope = 0.0, 0.0
+        for k in range(N_TERMS, 0, -1):
+            slope = slope * x + total
+            total = total * x + abs(terms[rows + k])
+        slope = slope * x + total
+        total *= x
+        if total <= allowed:
+            break
+        if total < 1.2 * allowed:
+            x *= allowed / total  # enough: without a constant term, a sum of powers falls at least as x does
+            break
+        x *= (allowed / total) ** (total / (slope * x))  # Newton's rule on logarithms, where the sum is convex
+    else:
+        return 0.0
+    rise = 1.9**n - 1.0 if n >= 1.0 else 1.0 - 0.1**n
+    return min(1.0, x * fraction(x * bend * rise, w))
+
+
+@kernel
+def summed(terms: FloatArray, x: float) -> float:
+    """Value at the place x of the series in the second half of `terms`."""
+    rows, total = terms.size // 2, 0.0
+    for k in range(N_TERMS, -1, -1):
+        total = total * x + terms[rows + k]
+    return total
+
+
+@kernel
+def escapes(w: float, forcing: float, bend: float, n: float, length: float) -> bool:
     """Whether w is sure to reach infinity: -c w^n, which only grows, is twice any forcing, and half of it is enough."""
-    if c >= 0.0 or n <= 1.0:
-        return False
-    growth = -c * w**n
-    return bool(growth > 2.0 * forcing and 2.0 * w < (n - 1.0) * growth * length)
+    return bool(n > 1.0 and -bend > 2.0 * forcing and 2.0 * w < (1.0 - n) * bend * length)
 
 
 @kernel
@@ -195,7 +275,47 @@ def scale(w: float, a: float, d: float, c: float, n: float, length: float) -> fl
 
 
 @kernel
-def free_way(a: float, d: float, c: float, n: float, negligible: float) -> float:
+def take_off(a: float, d: float, c: float, n: float, negligible: float, left: float) -> tuple[float, float]:
+    """A length that can be gone from w = 0, and the value there."""
+    h = near(a, d, abs(c), n, negligible)
+    free = free_length(a, d, abs(c), n, negligible)
+    if free >= h:
+        h = min(left, free)
+        return h, max(0.0, h * (a + 0.5 * d * h))
+    h = min(left, h)
+    return h, max(0.0, h * (a + 0.5 * d * h) - c * moment(a, d, n, h))
+
+
+@kernel
+def near(a: float, d: float, c: float, n: float, negligible: float) -> float:
+    """Length from w = 0 on which w grows nearly as a L and one correction by c w^n is enough: the next is negligible.
+
+    The next is at most n c^2 w^(2 n + 1) / (a^2 (n + 1) (2 n + 1)); 1.2 a L is more than w.
+    """
+    if not a > 0.0:
+        return 0.0
+    length = 0.125 * a / abs(d) if d != 0.0 else math.inf
+    if c > 0.0:
+        room = negligible * (n + 1.0) * (2.0 * n + 1.0) / n / a
+        unit = c * (1.2 * a) ** n / a
+        length = min(length, 0.8 * (room / unit / unit) ** (1.0 / (2.0 * n + 1.0)))
+    return length
+
+
+@kernel
+def moment(a: float, d: float, n: float, length: float) -> float:
+    """Integral of (a L + d L^2 / 2)^n from 0 to `length`, a binomial series in d L / (2 a), which is small."""
+    ratio, factor, total = 0.5 * d * length / a, 1.0, 1.0 / (n + 1.0)
+    for k in range(1, 16):
+        factor *= ratio * (n + 1.0 - k) / k
+        total += factor / (n + 1.0 + k)
+        if abs(factor) < 1e-11:
+            break
+    return float((a * length) ** n * length * total)
+
+
+@kernel
+def free_length(a: float, d: float, c: float, n: float, negligible: float) -> float:
     """Length from w = 0 on which w grows and the integral of c w^n stays negligible."""
     way = -0.5 * a / d if d < 0.0 else math.inf
     if c > 0.0 and a > 0.0:
@@ -213,47 +333,41 @@ def free_landing(w: float, a: float, d: float) -> float:
 
 
 @kernel
-def series(w: float, a: float, d: float, c: float, n: float, h: float, terms: FloatArray) -> tuple[int, float]:
-    """Fill row 1 of `terms` with w(h x) and row 0 with w^n: the index of the last term, the fraction of h they serve.
+def series(
+    w: float,
+    power: float,
+    a: float,
+    d: float,
+    c: float,
+    n: float,
+    h: float,
+    theta: float,
+    spread: float,
+    terms: FloatArray,
+) -> float:
+    """Value after h, from w with w^n = `power`, by as many terms as the bound of the tail asks for.
 
-    They end where _N_LAST of them in a row are rounding, or with N_TERMS.
+    h is the fraction `theta` of the radius, and `spread` is for a length h. The terms of w(h x) go to the second half
+    of `terms`, those of w^n to the first.
     """
-    terms[1, 0], terms[0, 0] = w, w**n
-    size, small = w, 0
+    rows = terms.size // 2
+    terms[rows], terms[0] = w, power
+    room, tail = ROUNDING * w * (1.0 - theta), spread
     for k in range(N_TERMS):
         forcing = a if k == 0 else d * h if k == 1 else 0.0
-        term = h * (forcing - c * terms[0, k]) / (k + 1.0)
-        terms[1, k + 1] = term
-        size += abs(term) if k < 2 else 0.0
-        small = small + 1 if abs(term) <= _SMALL * size else 0
-        if small == _N_LAST:
-            return k + 1, 1.0
-        convolution, weight = 0.0, -(k + 1.0)
-        for j in range(1, k + 2):
-            weight += n + 1.0
-            convolution += weight * terms[1, j] * terms[0, k + 1 - j]
-        terms[0, k + 1] = convolution / ((k + 1.0) * w)
-    return N_TERMS, reach(terms, _N_LAST)
-
-
-@kernel
-def first_zero(terms: FloatArray, last: int, end: float) -> float:
-    """The first place up to `end` at which the series of w is zero, or 0 if there is none."""
-    low, high = 0.0, end
-    if terms[1, 1] < 0.0 and place(terms, last, end)[1] > 0.0:
-        below = 0.0
-        for _ in range(_MAX_HALVES):
-            middle = 0.5 * (below + high)
-            below, high = (middle, high) if place(terms, last, middle)[1] < 0.0 else (below, middle)
-    x = high
-    value, slope = place(terms, last, x)
-    if not value <= 0.0:
-        return 0.0
-    for _ in range(_MAX_NEWTON):
-        low, high = (x, high) if value >= 0.0 else (low, x)
-        trial = newton(low, high, x, value, slope)
-        if value == 0.0 or abs(trial - x) <= _SMALL * x:
-            break
-        x = trial
-        value, slope = place(terms, last, x)
-    return x
+        terms[rows + k + 1] = h * (forcing - c * terms[k]) / (k + 1.0)
+        tail *= theta
+        if (tail <= room * (k + 2.0) and k > 0) or k == N_TERMS - 1:
+            total = 0.0
+            for j in range(k + 1, -1, -1):
+                total += terms[rows + j]
+            return total
+        even, odd, weight, top = 0.0, 0.0, n - k, k + 1  # two sums, so that one need not wait for the other
+        for j in range(1, top, 2):
+            even += weight * terms[rows + j] * terms[top - j]
+            odd += (weight + n + 1.0) * terms[rows + j + 1] * terms[top - j - 1]
+            weight += 2.0 * n + 2.0
+        if top % 2 == 1:
+            even += n * top * terms[rows + top] * power
+        terms[top] = (even + odd) / (top * w)
+    return math.nan

@@ -1,0 +1,139 @@
+"""The laws that are solved by power series: more samples on a monotone branch change nothing, on hostile laws too."""
+
+import numba
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import hysim as hs
+
+N_LAWS = 20 if numba.config.DISABLE_JIT else 300
+FINE = 4 if numba.config.DISABLE_JIT else 16
+PERTURBATION = 2.0**-48
+EXPONENTS = np.array([0.3, 0.5, 0.8, 1.0, 1.3, 2.0, 2.7, 4.0, 6.0, 8.0, 12.0])
+
+
+def spread(rng, low, high, size=N_LAWS):
+    """Numbers between the two, uniform in the logarithm."""
+    return np.exp(rng.uniform(np.log(low), np.log(high), size))
+
+
+def states(rng, scale):
+    """At zero, close to it, in between and beyond saturation."""
+    sizes = [np.zeros(N_LAWS), spread(rng, 1e-15, 1.0), rng.random(N_LAWS), spread(rng, 0.9, 3.0)]
+    return np.choose(rng.integers(0, 4, N_LAWS), sizes) * scale * rng.choice([-1.0, 1.0], N_LAWS)
+
+
+def zhu_wang(rng):
+    A, beta, n = spread(rng, 0.1, 10.0), spread(rng, 0.05, 5.0), rng.choice(EXPONENTS, N_LAWS)
+    gamma = beta * rng.uniform(-1.2, 1.3, N_LAWS)
+    scale = (A / np.maximum(np.abs(beta + gamma), 0.01)) ** (1.0 / n)
+    delta = A / scale * spread(rng, 1e-3, 1.0) * rng.choice([-1.0, 0.0, 1.0], N_LAWS)
+    sets = {"A": A, "beta": beta, "gamma": gamma, "n": n, "delta": delta, "z0": states(rng, scale)}
+    return hs.ZhuWangBoucWen, sets, rng.uniform(-2.0, 2.0, N_LAWS) * scale, scale / A
+
+
+def baber_noori(rng):
+    A, beta = spread(rng, 0.3, 3.0), spread(rng, 0.1, 3.0)
+    n = np.where(rng.random(N_LAWS) < 0.5, rng.choice([1.0, 2.0], N_LAWS), rng.choice(EXPONENTS, N_LAWS))
+    gamma = beta * rng.uniform(-0.9, 1.3, N_LAWS)
+    scale = (A / (beta + gamma)) ** (1.0 / n)
+    e = scale * scale / A
+    some = lambda values: values * (rng.random(N_LAWS) < 0.6)  # noqa: E731
+    sets = {
+        **{"A": A, "beta": beta, "gamma": gamma, "n": n, "z0": states(rng, scale)},
+        **{"delta_a": some(spread(rng, 1e-4, 0.05) * A / e), "delta_nu": some(spread(rng, 1e-4, 0.3) / e)},
+        **{"delta_eta": some(spread(rng, 1e-4, 0.3) / e), "zeta_s": some(rng.uniform(0.1, 0.99, N_LAWS))},
+        **{"q": some(rng.uniform(0.0, 0.6, N_LAWS)), "p": spread(rng, 0.01, 10.0) / e},
+        **{"psi": spread(rng, 0.02, 1.0) * scale, "delta_psi": some(spread(rng, 1e-3, 0.1) * A / scale)},
+        "lambda_": spread(rng, 0.05, 1.0),
+    }
+    return hs.BoucWenBaberNoori, sets, np.zeros(N_LAWS), scale / A
+
+
+def duhem(rng, parts=("p", "q")):
+    shape = (N_LAWS, 3, 3)
+    sets = {}
+    for part in parts:
+        sizes = spread(rng, 1e-3, 10.0, shape) * rng.choice([-1.0, 1.0], shape)
+        sets[part] = np.where(rng.random(shape) < 0.6, 0.0, sizes)
+    sets["q"][:, 0, 1] = -spread(rng, 0.1, 10.0)
+    sets["y0"] = states(rng, 1.0)
+    return hs.Duhem, sets, rng.uniform(-1.0, 1.0, N_LAWS), np.full(N_LAWS, 0.1)
+
+
+def duhem_with_sizes(rng):
+    return duhem(rng, ("p", "q", "p_abs", "q_abs"))
+
+
+@pytest.mark.parametrize("draw", [zhu_wang, baber_noori, duhem, duhem_with_sizes])
+def test_more_samples_on_a_branch_change_nothing(draw):
+    rng = np.random.default_rng(7)
+    family, sets, u0, unit = draw(rng)
+    stroke = unit * spread(rng, 1e-3, 60.0) * rng.choice([-1.0, 1.0], N_LAWS)
+    initial, strength = ("y0", "q") if family is hs.Duhem else ("z0", "A")
+
+    def responses(pieces, **changed):
+        u = u0[:, None] + stroke[:, None] * np.linspace(0.0, 1.0, pieces + 1)
+        return family.responses({**sets, **changed}, u, workers=1)
+
+    coarse, fine = responses(1)[:, -1], responses(FINE)
+    # What a rounding of the state or the law does to the end: a divergence, or a growth from rounding, tells the
+    # samplings apart too.
+    neighbours = [responses(FINE, **{name: sets[name] * (1.0 + PERTURBATION)})[:, -1] for name in (initial, strength)]
+    same = np.all(np.isfinite([coarse, fine.sum(axis=1), *neighbours]), axis=0)
+    assert same.sum() > 0.7 * N_LAWS
+    assert np.array_equal(same, np.all(np.isfinite([fine.sum(axis=1), *neighbours]), axis=0))
+    coarse, fine, neighbours = coarse[same], fine[same], np.array(neighbours)[:, same]
+    sensitivity = np.abs(neighbours - fine[:, -1]).max(axis=0)
+    room = 1e-11 * np.ptp(fine, axis=1) + 4.0 * sensitivity + 1e-15 * np.abs(sets[initial][same])
+    error = np.abs(coarse - fine[:, -1])
+    worst = int(np.argmax(error - room))
+    law = np.flatnonzero(same)[worst]
+    assert error[worst] <= room[worst], {name: values[law] for name, values in sets.items()} | {"u": u0[law]}
+
+
+def test_the_stretch_after_a_zero_does_not_overshoot():
+    """A long first step about a memory of almost zero, where the terms look converged for large n."""
+    model = hs.ZhuWangBoucWen(A=1.0, beta=0.5, gamma=0.5, n=8.0, delta=0.1)
+    z, du = 0.149712985175117, -0.30896712902949797
+    ends = [model.advance(np.linspace(0.0, du, pieces + 1)[1:], (0.0, z))[0][-1] for pieces in (1, 2, 64)]
+    assert ends == pytest.approx([ends[2]] * 3, abs=1e-11 * abs(du))  # the promise of the law
+    assert ends[2] == pytest.approx(along(model, z, du), abs=1e-11)  # and of the solver
+
+
+def along(model, z, du):
+    """End of a falling branch by an adaptive Runge-Kutta method, cut at z = 0; beta = gamma, so that one side bends."""
+    bend = lambda v, w: [model.A - (2.0 * model.beta * abs(w[0]) ** model.n if w[0] < 0.0 else 0.0) - model.delta * v]  # noqa: E731
+    crossing = lambda v, w: w[0]  # noqa: E731
+    crossing.terminal = True
+    down = solve_ivp(bend, (0.0, du), [z], "DOP853", rtol=1e-13, atol=1e-15, events=crossing)
+    return solve_ivp(bend, (down.t[-1], du), [-1e-300], "DOP853", rtol=1e-13, atol=1e-15).y[0, -1]
+
+
+@pytest.mark.parametrize("n", [6.0, 12.0])
+def test_on_an_ordinary_sine_twice_the_samples_agree(n):
+    u = 2.0 * np.sin(np.linspace(0.0, 4.0 * np.pi, 81))
+    halves = np.interp(np.arange(0.0, 80.5, 0.5), np.arange(81), u)
+    model = hs.ZhuWangBoucWen(n=n, delta=0.1)
+    y = model.response(u)
+    assert np.abs(model.response(halves)[::2] - y).max() < 1e-11 * np.ptp(y)
+
+
+@pytest.mark.parametrize("n", [1.0, 2.0, 1.5])
+def test_a_long_branch_does_not_step_over_the_pinching(n):
+    model = hs.BoucWenBaberNoori(A=2.0, beta=0.3, gamma=0.2, n=n, zeta_s=0.9)
+    u = np.array([0.0, 3.0, -3.0, 3.0, -3.0, 0.0])
+    fine = np.interp(np.arange(0.0, 5.0 + 1e-9, 1.0 / 64.0), np.arange(6), u)
+    y = model.response(u)
+    assert np.abs(model.response(fine)[::64] - y).max() < 1e-11 * np.ptp(y)
+    if n == 1.0:
+        assert y[-1] == pytest.approx(0.833, abs=5e-4)  # as an adaptive solver has it, to its last printed digit
+
+
+def test_a_bell_that_narrows_to_nothing_is_left_out():
+    """The width crosses zero while the memory is far from the place of the pinching."""
+    model = hs.BoucWenBaberNoori(n=1.0, zeta_s=0.5, p=1.0, psi=0.1, lambda_=0.3, q=0.0)
+    coarse, _ = model.advance([3.0], (0.0, 0.9, -0.5))
+    fine, _ = model.advance(np.linspace(0.0, 3.0, 65)[1:], (0.0, 0.9, -0.5))
+    assert coarse[-1] == pytest.approx(fine[-1], abs=1e-12)
