@@ -16,6 +16,7 @@ import hysim as hs
 Rng = np.random.Generator
 TINY = (0.0, 1e-300, 1e-12, 1e-6)
 NEAR = (1e-15, 1e-9, 1e-3)
+RATES = ("delta_nu", "delta_eta")
 
 
 class Drawn(NamedTuple):
@@ -117,7 +118,8 @@ def baber_noori(rng: Rng) -> Drawn:
     """The law that wears off, and pinches in half of all laws that may."""
     parameters, balance, length = shape(rng)
     energy = balance * length
-    rates = {name: decades(rng, -6.0, 0.5) / energy * rng.choice([1.0, 1.0, 1.0, 0.0, -0.1]) for name in ("delta_nu", "delta_eta")}
+    signs = rng.choice([1.0, 1.0, 1.0, 0.0, -0.1], 2)
+    rates = {name: decades(rng, -6.0, 0.5) / energy * sign for name, sign in zip(RATES, signs, strict=True)}
     rates["delta_a"] = float(rng.choice([0.0, parameters["A"] * decades(rng, -6.0, 0.0) / energy]))
     pinching: dict[str, float] = {}
     if parameters["beta"] + parameters["gamma"] > 0.0 and rng.random() < 0.5:

@@ -18,9 +18,9 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
+from hostile_laws import DRAWS, decades, signed
 
 import hysim as hs
-from hostile_laws import DRAWS, decades, signed
 
 Array = np.ndarray[Any, np.dtype[Any]]
 Rng = np.random.Generator
@@ -175,7 +175,9 @@ def size(law: Any, before: Array, u: Array, y: Array) -> Array:
         return np.abs(law.offset) + np.abs(law.slope * u)
     if isinstance(law, hs.Duhem):
         return np.abs(y) + 2.0 * (abs(law.offset) + np.abs(law.feedthrough * u))
-    if isinstance(law, hs.BoucWen | hs.PolynomialBoucWen | hs.ZhuWangBoucWen | hs.GeneralizedBoucWen | hs.BoucWenBaberNoori):
+    if isinstance(
+        law, hs.BoucWen | hs.PolynomialBoucWen | hs.ZhuWangBoucWen | hs.GeneralizedBoucWen | hs.BoucWenBaberNoori
+    ):
         c = (law.feedthrough,) if isinstance(law, hs.BoucWen) else law.input_coefficients
         static = abs(law.offset) + sum(abs(value) * np.abs(u) ** k for k, value in enumerate(c, 1))
         return np.abs(y) + 2.0 * static
@@ -183,7 +185,9 @@ def size(law: Any, before: Array, u: Array, y: Array) -> Array:
     if isinstance(law, hs.RateDependentPrandtlIshlinskii):
         arms = arms + law.beta * float(np.ptp(u))
     if isinstance(law, hs.GeneralizedPrandtlIshlinskii):
-        arms = arms + sum(np.abs(side[0]) + np.abs(side[3]) + side[4] * np.abs(u).max() for side in (law.left, law.right or law.left))
+        arms = arms + sum(
+            np.abs(side[0]) + np.abs(side[3]) + side[4] * np.abs(u).max() for side in (law.left, law.right or law.left)
+        )
     return np.full(u.size, abs(law.offset) + float(np.abs(law.weights) @ arms))
 
 
@@ -204,7 +208,7 @@ def is_series(law: Any) -> bool:
 class Run(NamedTuple):
     """Outputs at some samples (None for a run that escapes, "refused" for one that is too stiff), and the state."""
 
-    y: Array | None | str
+    y: Array | str | None
     state: tuple[Any, ...]
 
 

@@ -1,13 +1,13 @@
-"""The same cases in batches, and three near invariants: cutting a path, an input that stands still, and odd symmetry."""
+"""The same cases in batches, and three near invariants: a path that is cut, an input at rest, and odd symmetry."""
 
 from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
-
-import hysim as hs
 from hostile_laws import Rng, decades
 from more_samples import N_PIECES, ROUNDINGS, UNIT, Array, Case, Run, Verdict, size, worst
+
+import hysim as hs
 
 
 def batch_runs(cases: list[Case]) -> list[list[Run]]:
@@ -63,7 +63,7 @@ def places_of(case: Case, chosen: int) -> Array:
 
 
 def held(case: Case, chosen: int) -> Array:
-    """The inputs before, filled up at the front, and those of a stride, filled up at the end; what is left out stands."""
+    """The inputs before, filled up in front, and those of a stride, filled up behind; where one is left out it rests."""
     stand = np.full(case.u.size, -1)
     own = places_of(case, chosen)
     stand[own] = own
@@ -87,7 +87,7 @@ def cut_keeps_bits(case: Case, rng: Rng) -> bool:
 
 
 def standing_changes_nothing(case: Case, rng: Rng) -> bool:
-    """Whether samples at which the input stands still repeat the output to the bit, and leave the others as they are."""
+    """Whether samples at which the input is at rest repeat the output to the bit, and change no other."""
     whole = np.concatenate([case.before, case.u])
     times = rng.integers(1, 4, whole.size)
     try:
@@ -97,7 +97,7 @@ def standing_changes_nothing(case: Case, rng: Rng) -> bool:
 
 
 def is_odd(case: Case) -> bool:
-    """Whether the mirrored law, from the mirrored state and on the mirrored input, has the mirrored output to the bit."""
+    """Whether the mirrored law, from its state and on the mirrored input, has the mirrored output to the bit."""
     try:
         y = case.law.response(np.concatenate([case.before, case.u]))
         mirrored = mirror(case.law).response(-np.concatenate([case.before, case.u]))

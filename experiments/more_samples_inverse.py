@@ -1,8 +1,8 @@
 """More samples of the wanted output on a branch: the inverse ends at the same input, and the law then has this output.
 
-The laws are those of `hostile_laws` with an output that is monotone on the stride: beside a memory the input's own slope
-is 1.05 to 30 times as steep as the memory is anywhere there. What an output may be off by, over the slope there, is what
-an input may be off by.
+The laws are those of `hostile_laws` with an output that is monotone on the stride: beside a memory the input's own
+slope is 1.05 to 30 times as steep as the memory is anywhere there. What an output may be off by, over the slope there,
+is what an input may be off by.
 """
 
 from collections.abc import Callable
@@ -10,16 +10,17 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-
-import hysim as hs
 from hostile_laws import DRAWS, Rng, decades, memory, signed
 from more_samples import (
     LAST_SUM,
+    NOTHING,
     ROUNDINGS,
     SERIES,
     UNIT,
+    WELL_INSIDE,
     Array,
     Case,
+    Spread,
     Verdict,
     draw_case,
     is_series,
@@ -30,6 +31,8 @@ from more_samples import (
     spread,
     worst,
 )
+
+import hysim as hs
 
 SOLVED = 64.0
 """Roundings of the terms of an output that the searches leave: 32 in `BoucWenInverse`, fewer in the others."""
@@ -208,16 +211,25 @@ def inverse_verdict(wanted: Wanted, inverse: Callable[[Wanted, Array], Array]) -
         return Verdict(np.inf, "refused")
     if not all(np.isfinite(u).all() for u in (coarse, some, fine)):
         return Verdict(np.inf, "refused")
-    at_y, at_u = allowed(wanted, fine)
-    last = wanted.y.size - 1
-    ratio = worst(np.abs(some - fine[wanted.kept]), 2.0 * at_u[wanted.kept])
-    ratio = max(ratio, worst(np.abs(coarse - fine[-1:]), 2.0 * at_u[-1:]))
-    for u, places_of in ((coarse, [last]), (some, wanted.kept), (fine, np.arange(last + 1))):
-        ratio = max(ratio, worst(np.abs(forward(wanted.law, wanted.u0, u) - wanted.y[places_of]), at_y[places_of]))
+    ratio = distance(wanted, (coarse, some, fine), allowed(wanted, fine, NOTHING))
+    if ratio > WELL_INSIDE:
+        case = Case(wanted.law, np.array([wanted.u0]), fine, wanted.kept)
+        ratio = distance(wanted, (coarse, some, fine), allowed(wanted, fine, spread(case)))
     return Verdict(ratio, "compared")
 
 
-def allowed(wanted: Wanted, u: Array) -> tuple[Array, Array]:
+def distance(wanted: Wanted, found: tuple[Array, Array, Array], limits: tuple[Array, Array]) -> float:
+    """The largest distance over what is allowed: of the inputs from each other, of the outputs there from the wanted."""
+    (coarse, some, fine), (at_y, at_u) = found, limits
+    last = wanted.y.size - 1
+    ratio = worst(np.abs(some - fine[wanted.kept]), 2.0 * at_u[wanted.kept])
+    ratio = max(ratio, worst(np.abs(coarse - fine[-1:]), 2.0 * at_u[-1:]))
+    for u, samples in ((coarse, [last]), (some, wanted.kept), (fine, np.arange(last + 1))):
+        ratio = max(ratio, worst(np.abs(forward(wanted.law, wanted.u0, u) - wanted.y[samples]), at_y[samples]))
+    return ratio
+
+
+def allowed(wanted: Wanted, u: Array, errors: Spread) -> tuple[Array, Array]:
     """What the outputs and the inputs may be off by."""
     law, case = wanted.law, Case(wanted.law, np.array([wanted.u0]), u, wanted.kept)
     before = np.array([wanted.y0])
@@ -231,7 +243,7 @@ def allowed(wanted: Wanted, u: Array) -> tuple[Array, Array]:
         rounded_u = rounded_u + LAST_SUM * UNIT * size(inverse, before, x, u)
         zones = np.abs(law.dead_zone_weights).sum() if isinstance(law, hs.ModifiedPrandtlIshlinskii) else 1.0
         return at_y + float(np.abs(law.weights).sum() * zones) * rounded_u, at_y / wanted.slope + rounded_u
-    at_y = at_y + ROUNDINGS * spread(case).y
+    at_y = at_y + ROUNDINGS * errors.y
     if is_series(law):
         at_y += SERIES * float(np.ptp(np.append(wanted.y, wanted.y0)))
     slope: Any = wanted.slope
