@@ -63,7 +63,7 @@ def places_of(case: Case, chosen: int) -> Array:
 
 
 def held(case: Case, chosen: int) -> Array:
-    """The inputs before, filled up in front, and those of a stride, filled up behind; where one is left out it rests."""
+    """Inputs before and on the stride, filled up at both ends; at a sample that is left out the input rests."""
     stand = np.full(case.u.size, -1)
     own = places_of(case, chosen)
     stand[own] = own

@@ -219,7 +219,7 @@ def inverse_verdict(wanted: Wanted, inverse: Callable[[Wanted, Array], Array]) -
 
 
 def distance(wanted: Wanted, found: tuple[Array, Array, Array], limits: tuple[Array, Array]) -> float:
-    """The largest distance over what is allowed: of the inputs from each other, of the outputs there from the wanted."""
+    """The largest distance over what is allowed: of inputs from each other, of the outputs there from those wanted."""
     (coarse, some, fine), (at_y, at_u) = found, limits
     last = wanted.y.size - 1
     ratio = worst(np.abs(some - fine[wanted.kept]), 2.0 * at_u[wanted.kept])
