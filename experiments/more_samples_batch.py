@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 from hostile_laws import Rng, decades
-from more_samples import N_PIECES, ROUNDINGS, UNIT, Array, Case, Run, Verdict, size, worst
+from more_samples import N_PIECES, ROUNDINGS, UNIT, Array, Case, Run, Verdict, is_series, size, worst
 
 import hysim as hs
 
@@ -24,7 +24,8 @@ def batch_runs(cases: list[Case]) -> list[list[Run]]:
             y = type(laws[0]).responses(parameters, inputs)
             for k, row in zip(members, y, strict=True):
                 own = row[LONGEST : LONGEST + cases[k].u.size][places_of(cases[k], chosen)]
-                found[k].append(Run(own if np.isfinite(row).all() else None, ()))
+                lost = "refused" if is_series(cases[k].law) else None  # a batch has inf for both
+                found[k].append(Run(own if np.isfinite(row).all() else lost, ()))
     return found
 
 

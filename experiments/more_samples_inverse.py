@@ -241,7 +241,11 @@ def allowed(wanted: Wanted, u: Array, errors: Spread) -> tuple[Array, Array]:
         inverse = (law.plays if isinstance(law, hs.ModifiedPrandtlIshlinskii) else law).inverse()
         x = law.plays.advance(u)[0] if isinstance(law, hs.ModifiedPrandtlIshlinskii) else wanted.y
         rounded_u = rounded_u + LAST_SUM * UNIT * size(inverse, before, x, u)
-        zones = np.abs(law.dead_zone_weights).sum() if isinstance(law, hs.ModifiedPrandtlIshlinskii) else 1.0
+        zones = 1.0
+        if isinstance(law, hs.ModifiedPrandtlIshlinskii):  # and so is the inverse of the dead zones, whose weights
+            zones = np.abs(law.dead_zone_weights).sum()  # telescope to less than 2 / c_0, those of the plays to 2 / w_0
+            least = law.dead_zone_weights[law.dead_zones.index(0.0)] * law.weights[0]
+            rounded_u = rounded_u + LAST_SUM * UNIT * (np.abs(wanted.y) + abs(law.offset)) * 4.0 / least
         return at_y + float(np.abs(law.weights).sum() * zones) * rounded_u, at_y / wanted.slope + rounded_u
     at_y = at_y + ROUNDINGS * errors.y
     if is_series(law):
