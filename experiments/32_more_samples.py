@@ -195,8 +195,8 @@ def draw(rows: list[Row]) -> Figure:
     ax.set_xlim(5e-5, 2e2)
     ax.set_xscale("log")
     ax.set_yticks(range(len(families)), families)
-    ax.set_xlabel("Largest difference / what is allowed (below 1e-4 drawn there, above 100 there)")
-    ax.legend(ncols=len(paths), loc="lower center", bbox_to_anchor=(0.3, 1.0))
+    ax.set_xlabel("Difference / allowed (drawn from 1e-4 to 100)")
+    ax.legend(ncols=3, loc="lower center", bbox_to_anchor=(0.3, 1.0))
     return canvas
 
 
