@@ -28,6 +28,7 @@ N_OWN = 3
 MAX_STEPS = 400
 
 _EPSILON = 2.0**-52
+_SMALLEST = 2.0**-1022  # below it numbers lose their bits: an output that near to another is no other
 _ROUNDINGS = 16.0  # of the forward step, which may keep the residual from zero where the bracket has closed
 _FLAT = 1e-12  # of the slope ahead: what rounding makes of no slope at all on the way back
 _POINTS = 16  # looked at along a stretch that the bound on P'' leaves open
@@ -74,7 +75,7 @@ def rounding(y: float, u: float, z: float, parameters: FloatArray) -> float:
     """What one rounding of the terms of the output at (u, z) amounts to."""
     coefficients = parameters[N_HEAD : N_HEAD + int(parameters[7])]
     terms = abs(parameters[5] * z) + abs(parameters[6]) + abs(u * derivative(u, coefficients))
-    return float(_EPSILON * (abs(y) + terms))
+    return float(_EPSILON * (abs(y) + terms) + _SMALLEST)
 
 
 @inner

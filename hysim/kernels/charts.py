@@ -49,6 +49,7 @@ _CENTRE, _INVERSE, _BELOW, _ABOVE, _LENGTH, _THERE, _BACK = 0, 1, 2, 3, 4, 5, 5 
 _CELL = 5 + 2 * N_TERMS
 _SPARE = _CELLS + 2 * _N_CELLS * _CELL
 _N_TAYLOR = 32
+_TAYLOR_REACH = 0.25  # of a bound of the distance at which the series ends: 31 terms leave out 4^-32
 N_WORK = _SPARE + 2 * _N_TAYLOR
 
 
@@ -332,7 +333,7 @@ def far_step(w: float, forwards: bool, side: int, n: float, length: float, work:
         to_far = far ** (1.0 - n) * -math.expm1((1.0 - n) * math.log(w / far)) / (n - 1.0)
         return (far - w, length - to_far) if length > to_far else (power_flow(w, c, n, length) - w, 0.0)
     power = w**n
-    h = min(length, 0.5 * w / (max(n, 1.0) * (1.0 + power)))
+    h = min(length, _TAYLOR_REACH * w / (max(n, 1.0) * (1.0 + power)))
     return taylor_change(w, power, a, c, n, h, work[_SPARE:]), length - h
 
 
@@ -370,4 +371,6 @@ def power_flow(w: float, c: float, n: float, length: float) -> float:
     x = m * c * math.exp(exponent) * length
     if x <= -1.0:
         return math.inf if m > 0.0 else 0.0
+    if x > 1.0:  # the logarithm of w would be lost beside that of the length, and its rounding with it
+        return float((m * c * length * (1.0 + 1.0 / x)) ** (-1.0 / m))
     return w * math.exp(-math.log1p(x) / m)

@@ -18,8 +18,12 @@ _SIGNATURE = float64(CONSTANTS, VECTOR, float64)
 _POINTS = 16  # of a way at which the output is looked at
 _DOUBLINGS = 1100  # more than there are between the smallest number and the largest
 _HALVINGS = 200
+_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)  # of a way on which the output turns: where its largest value is sought
 _RESOLVED = 1e-13
-"""Of the largest output so far: shorter ways rise in steps of rounding, and are taken to be straight."""
+"""Of the largest output so far: shorter ways rise in steps of rounding, and are not looked at for a turn."""
+_NEAR = 1e-10  # of the largest output so far: how far back from its beginning a way is looked at
+_ROUNDINGS = 64.0 * 2.0**-53
+_SMALLEST = 2.0**-1022
 
 
 def side_by_side(first: Step, second: Step) -> Step:
@@ -39,7 +43,8 @@ def one_behind_the_other(first: Step, second: Step) -> Step:
     @signed_closure(_SIGNATURE)
     def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
         n, m = 2 + int(parameters[0]), int(parameters[1])
-        return second(parameters[n:], state[m:], first(parameters[2:n], state[:m], u))
+        between = first(parameters[2:n], state[:m], u)
+        return second(parameters[n:], state[m:], between) if math.isfinite(between) else between
 
     return step
 
@@ -58,6 +63,49 @@ def _apart(here: float, direction: float, low: float, way: float, high: float) -
     return direction * (here + direction * low) < end < direction * (here + direction * high)
 
 
+@inlined
+def _bracket(
+    step: Step,
+    parameters: FloatArray,
+    state: FloatArray,
+    trial: FloatArray,
+    here: float,
+    direction: float,
+    side: float,
+    wanted: float,
+    gap: float,
+    guess: float,
+    resolved: bool,
+) -> tuple[float, float, float, float]:
+    """Two ways with their errors, of which the second reaches the output; where none does, its error is negative."""
+    behind = low = 0.0
+    behind_error = low_error = -gap
+    high, too_far = guess, math.inf
+    high_error = math.nan
+    for _ in range(_DOUBLINGS):
+        high_error = side * (_tried(step, parameters, state, trial, here + direction * high) - wanted)
+        if 0.0 <= high_error < math.inf:
+            return low, low_error, high, high_error
+        if low_error < high_error < 0.0 or (not resolved and -math.inf < high_error < 0.0):
+            behind, behind_error, low, low_error = low, low_error, high, high_error
+        else:
+            too_far = high
+        high = 2.0 * low if too_far == math.inf else 0.5 * (low + too_far)
+        if not low < high < too_far:
+            break
+    start, end = behind, too_far  # the output turns between them, and `low` may be behind the turn
+    for _ in range(_HALVINGS if too_far < math.inf else 0):
+        first, second = end - _GOLDEN * (end - start), start + _GOLDEN * (end - start)
+        first_error = side * (_tried(step, parameters, state, trial, here + direction * first) - wanted)
+        if 0.0 <= first_error < math.inf:
+            return behind, behind_error, first, first_error
+        second_error = side * (_tried(step, parameters, state, trial, here + direction * second) - wanted)
+        if 0.0 <= second_error < math.inf:
+            return behind, behind_error, second, second_error
+        start, end = (first, end) if first_error < second_error else (start, second)
+    return low, low_error, high, high_error
+
+
 @signed_kernel(int64(STEP, CONSTANTS, VECTOR, VECTOR, float64, float64, float64, CONSTANTS, VECTOR))
 def inverse(
     step: Step,
@@ -73,8 +121,8 @@ def inverse(
     """Inputs for the outputs `y` into `u`: the first sample that has none, or -1.
 
     The law is at the input `here`, where its output is `reached`; `slope` is a guess of dy/du with the right sign.
-    `trial` is as long as `state`. A way is doubled until its end is beyond, and then halved, by regula falsi (Illinois)
-    where that is faster.
+    `trial` is as long as `state`. A way is doubled until its end is beyond, or halved while its end is so far that the
+    output has turned or is not finite, and then closed in on, by regula falsi (Illinois) where that is faster.
     """
     rising, largest = math.copysign(1.0, slope), 0.0
     for k in range(y.size):
@@ -83,21 +131,16 @@ def inverse(
             u[k] = here
             continue
         largest = max(largest, abs(wanted), abs(reached), abs(slope * here))
-        if abs(wanted - reached) <= _RESOLVED * largest:
-            here += (wanted - reached) / slope
-            reached = step(parameters, state, here)
-            u[k] = here
-            continue
+        resolved = abs(wanted - reached) > _RESOLVED * largest
         side = math.copysign(1.0, wanted - reached)
         direction = side * rising
-        low, low_error = 0.0, -abs(wanted - reached)
-        high = abs((wanted - reached) / slope)
-        high_error = side * (_tried(step, parameters, state, trial, here + direction * high) - wanted)
-        for _ in range(_DOUBLINGS):
-            if not low_error < high_error < 0.0:
-                break
-            low, low_error, high = high, high_error, 2.0 * high
-            high_error = side * (_tried(step, parameters, state, trial, here + direction * high) - wanted)
+        gap, guess = abs(wanted - reached), abs((wanted - reached) / slope)
+        if gap < _SMALLEST:
+            u[k] = here
+            continue
+        low, low_error, high, high_error = _bracket(
+            step, parameters, state, trial, here, direction, side, wanted, gap, guess, resolved
+        )
         if not 0.0 <= high_error < math.inf:
             return k
         last_side = 0
@@ -116,16 +159,17 @@ def inverse(
                 high, high_error = way, error
                 low_error *= 0.5 if last_side > 0 else 1.0
                 last_side = 1
-        before = -abs(wanted - reached)
-        for i in range(1, _POINTS + 1):
-            error = side * (_tried(step, parameters, state, trial, here + direction * high * i / _POINTS) - wanted)
-            if not error > before:
+        if resolved:
+            before = -gap
+            for i in range(1, _POINTS + 1):
+                error = side * (_tried(step, parameters, state, trial, here + direction * high * i / _POINTS) - wanted)
+                if not error > before - _ROUNDINGS * largest:
+                    return k
+                before = error
+            back = _tried(step, parameters, state, trial, here - direction * high * (_NEAR * largest / gap))
+            if not side * (back - reached) < 0.0:
                 return k
-            before = error
-        back = _tried(step, parameters, state, trial, here - direction * high / _POINTS)
-        if not side * (back - reached) < 0.0:
-            return k
-        slope = rising * abs((wanted - reached) / high)
+            slope = rising * (gap / high)
         here += direction * high
         step(parameters, state, here)
         reached = wanted

@@ -13,6 +13,8 @@ passes u = 0. Each part is one `hysim.kernels.boucwen.step`, which cuts it at z 
 both laws are the same is not cut: a Bouc-Wen law in this form gives the bits of the law itself.
 """
 
+import math
+
 from hysim._frozen import FloatArray
 from hysim.kernels import boucwen
 from hysim.kernels._compile import kernel
@@ -41,7 +43,9 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     if (last < 0.0 and u > 0.0) or (last > 0.0 and u < 0.0):
         below, above = direction * size, (direction + 1) * size
         if parameters[below + 1] != parameters[above + 1] or parameters[below + 2] != parameters[above + 2]:
-            along(parameters, state, 0.0, direction + (1 if last > 0.0 else 0))
+            y = along(parameters, state, 0.0, direction + (1 if last > 0.0 else 0))
+            if not math.isfinite(state[1]):  # an escape remains one
+                return y
             last = 0.0
     return along(parameters, state, u, direction + (1 if last + u > 0.0 else 0))
 

@@ -18,6 +18,8 @@ from hysim.models.model import CompiledLaw
 _POINTS = 16  # of a stretch at which its slope is looked at
 _MAX_STEPS = 200
 _ROUNDINGS = 8.0 * 2.0**-52
+_CLOSED = 64.0 * 2.0**-52  # of the outputs and of u dy/du: what rounding may leave where the bracket has closed
+_SMALLEST = 2.0**-1022
 
 
 class SteppedLaw(Protocol):
@@ -102,23 +104,32 @@ class _Forward:
             raise ArithmeticError(f"at u = {u[k]:g} its slope is {slopes[k]:g}")
 
     def _zero(self, wanted: float, direction: float, rising: float) -> float:
+        """The input at which the output is `wanted`, sought in `direction`.
+
+        What is not finite, or where the slope has turned, is beyond it. An output that is nearer than the next input
+        takes the input that is there.
+        """
         behind, beyond = self.here[0], direction * math.inf
-        target, state, error = behind, self.here, self.y - wanted
+        target, error, slope = behind, self.y - wanted, self.slope(self.here, direction)
         for _ in range(_MAX_STEPS):
-            slope = self.slope(state, direction)
-            trial = target - error / slope if rising * slope > 0.0 else math.nan
+            trial = target - error / slope if rising * slope > 0.0 and math.isfinite(error) else math.nan
+            if trial == target and rising * slope > 0.0:
+                return target
             if not direction * behind < direction * trial < direction * beyond:
                 if math.isinf(beyond):
                     break
                 trial = 0.5 * (behind + beyond)
             if trial in (behind, beyond):
-                return target
+                left = abs(error) - _CLOSED * (abs(wanted) + abs(self.y) + abs(target * slope)) - _SMALLEST
+                if left <= 0.0:
+                    return target
+                break
             target = trial
             error = self.output(target) - wanted
-            state = tuple(self.compiled.state[: len(self.here)].tolist())
+            slope = self.slope(tuple(self.compiled.state[: len(self.here)].tolist()), direction)
             if abs(error) <= _ROUNDINGS * (abs(wanted) + abs(self.y)):
                 return target
-            if direction * rising * error < 0.0:
+            if direction * rising * error < 0.0 and rising * slope > 0.0 and math.isfinite(error):
                 behind = target
             else:
                 beyond = target

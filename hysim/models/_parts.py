@@ -14,6 +14,9 @@ from hysim.kernels import composed as kernels
 from hysim.kernels.stepping import Step
 from hysim.models.model import CompiledLaw, needs_time
 
+_REACH, _CLOSER = 1e-6, 2.0**-10  # how far to either side of the first input the output is looked at, and then closer
+_SHORTEST = 2.0**-40
+
 
 def labels(parts: Sequence[Any]) -> tuple[str, ...]:
     """The parts' families in small letters, with numbers where one occurs more than once."""
@@ -100,9 +103,13 @@ def inverse_response(law: Any, y: npt.ArrayLike, u0: float | None) -> FloatArray
 
     u = np.empty(outputs.size)
     with np.errstate(all="ignore"):  # a bracket may reach where a memory overflows
-        reached, reach = output(here), 1e-6 * (1.0 + abs(here))
-        rise, fall = output(here + reach) - reached, reached - output(here - reach)
-        if not rise * fall > 0.0:
+        reached, reach = output(here), _REACH * (1.0 + abs(here))
+        while True:  # the law has a length of its own, which may be much shorter
+            rise, fall = output(here + reach) - reached, reached - output(here - reach)
+            if 0.0 < rise * fall < np.inf or not reach > _SHORTEST * abs(here) + 1e-150:
+                break
+            reach *= _CLOSER
+        if not 0.0 < rise * fall < np.inf:
             raise ValueError(f"the law has no inverse: its output does not rise or fall through u = {here:g}")
         if u0 is None:
             reached = float(outputs[0])

@@ -1,0 +1,127 @@
+"""More samples on a monotone branch of the input change nothing: every law, forwards and backwards.
+
+The laws, states and strides are those of `experiments/32_more_samples.py`, and so is what may differ; see
+`experiments/more_samples.py` for the reason of each tolerance.
+"""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+
+import hysim as hs
+
+EXPERIMENTS = Path(__file__).parent.parent / "experiments"
+sys.path.insert(0, str(EXPERIMENTS))
+spec = importlib.util.spec_from_file_location("more_samples_experiment", EXPERIMENTS / "32_more_samples.py")
+experiment = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(experiment)
+
+N_CASES = 2 if numba.config.DISABLE_JIT else 20
+
+NOT_RATE_INDEPENDENT = {"TransferFunction", "Dashpot", "Actuator", "BoucWenOscillator"}
+"""Between two samples the input of these is held, or goes on a line: with more samples it is another input."""
+INVERSES = {"BoucWenInverse"}  # under the laws that it inverts
+
+
+def test_every_law_that_hysim_exports_is_among_the_families():
+    """A new law is either drawn here, or it says why its samples matter."""
+    classes = {name: each for name in hs.__all__ if isinstance(each := getattr(hs, name), type)}
+    exported = {name for name, each in classes.items() if hasattr(each, "response")}
+    assert exported == {*experiment.DRAWS, *NOT_RATE_INDEPENDENT, *INVERSES}
+    undone = {name for name in experiment.DRAWS if hasattr(getattr(hs, name), "inverse_response")}
+    assert undone == set(experiment.INVERTED)
+
+
+@pytest.mark.parametrize("family", experiment.DRAWS)
+def test_more_samples_change_nothing(family):
+    found = experiment.chunk(family, 0, N_CASES)
+    assert found["wrong"] == []
+    for path, ends in found["ends"].items():
+        assert ends.get("compared", 0) > N_CASES // 2, (path, ends)  # most laws neither escape nor are refused
+
+
+def test_the_check_sees_a_law_whose_step_ends_too_early():
+    """The invariant of a first-order step, which every sample changes, is broken in most cases."""
+
+    def euler(parameters, state, u):
+        state[1] += (u - state[0]) * (1.0 - abs(state[1]))
+        state[0] = u
+        return state[1]
+
+    law = hs.CustomLaw(step=euler, parameters={"unused": 0.0}, state={"z": 0.0})
+    case = experiment.Case(law, np.zeros(1), np.linspace(0.1, 1.0, 10), np.array([4, 9]))
+    assert experiment.judged(case, experiment.runs(case, experiment.response_run), None).ratio == np.inf
+
+
+# ---------------------------------------------------------------------------------- what the experiment has found
+
+
+@pytest.mark.parametrize("n", [2.5, 5.0, 11.575])
+def test_a_memory_far_beyond_saturation_falls_the_same_way_in_one_piece_and_in_many(n):
+    """The Taylor steps there were twice as long as their 31 terms could serve: 1e-12 of the memory was lost."""
+    law = hs.BoucWen(n=n, z0=12.0)
+    length = 12.0**n / n
+    u = np.linspace(0.0, 12.0 / length, 40)
+    # ten roundings of the first state, from which each step falls
+    assert law.memory(u[[0, -1]])[-1] == pytest.approx(law.memory(u)[-1], abs=10 * 2.0**-53 * 12.0)
+
+
+@pytest.mark.parametrize("z0", [1e-300, 5e-200, 1e-60])
+def test_a_memory_that_grows_from_next_to_nothing_keeps_its_digits(z0):
+    n, c = 0.4, -2.0
+    law = hs.BoucWen(A=0.0, beta=0.0, gamma=c, n=n, z0=z0)
+    expected = (z0 ** (1.0 - n) + (1.0 - n) * -c * 0.3) ** (1.0 / (1.0 - n))
+    assert law.memory([0.0, 0.3])[-1] == pytest.approx(expected, rel=1e-15)  # a few roundings of the closed form
+
+
+def test_a_memory_that_escapes_before_the_input_changes_its_sign_has_escaped():
+    law = hs.GeneralizedBoucWen(beta=-1.0, gamma=-1.0, n=2.0, b6=0.3)
+    with pytest.raises(hs.SimulationError, match="escapes to infinity"):
+        law.response([-50.0, 50.0])
+
+
+def test_a_cascade_does_not_hide_that_its_first_law_escapes():
+    law = hs.BoucWen(beta=-1.0, gamma=-1.0, n=2.0) >> hs.Preisach(levels=(0.0, 1.0), weights=(1.0,))
+    compiled = law.compiled(0.0)
+    assert not np.isfinite(compiled.step(compiled.parameters, compiled.state, 50.0))
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        hs.GeneralizedBoucWen(n=1.5, gain=-0.3, input_coefficients=(1.0,)),
+        hs.Duhem.from_terms({"u'": 1.0, "|u'| z": -0.5}, feedthrough=2.0),
+    ],
+)
+def test_the_next_output_but_a_rounding_has_an_input(law):
+    _, state = law.advance([0.0, 0.7])
+    y = law.advance([0.7], state)[0][0]
+    u = law.inverse_response([np.nextafter(y, 9.0), np.nextafter(y, -9.0), y], state=state)
+    assert u == pytest.approx(0.7, abs=1e-14)  # a few roundings of the output over a slope of more than 0.5
+
+
+def test_the_smallest_number_is_an_output_that_has_an_input():
+    law = hs.BoucWen(feedthrough=2.0, gain=-0.5)
+    for each in (law, law >> hs.Line(slope=1.0)):
+        assert abs(each.inverse_response([5e-324, 1.0], u0=0.0)[0]) < 1e-300  # the slope is 1.5
+
+
+def test_the_inverse_of_a_cascade_comes_back_from_a_guess_that_is_far_too_long():
+    """At first only the play of threshold zero moves: its slope takes the guess to where the first law has turned."""
+    first = hs.BoucWen(beta=-0.05, gamma=-0.05, n=2.0, gain=-0.1, feedthrough=1.0)  # it turns at u = 3.95
+    law = first >> hs.PrandtlIshlinskii(thresholds=(0.0, 0.1), weights=(0.02, 1.0))
+    u = np.array([0.0, 3.0, 1.0])
+    assert law.inverse_response(law.response(u), u0=0.0) == pytest.approx(
+        u, abs=1e-12
+    )  # 1e-16 of y over a slope of 0.02
+
+
+def test_a_sum_of_short_laws_is_inverted():
+    """1e-6 to either side of the input was taken to be near, whatever the unit."""
+    law = hs.BoucWen(beta=-3e8, gamma=4e8, n=1.5, gain=1e3, feedthrough=1e4) + hs.Line(slope=1.0)
+    u = 1e-9 * np.array([0.0, 1.0, -0.5])
+    assert law.inverse_response(law.response(u), u0=0.0) == pytest.approx(u, abs=1e-23)  # roundings of u
