@@ -69,9 +69,8 @@ def advance(u: float, z: float, du: float, parameters: FloatArray, scratch: Floa
     A, beta, gamma, n, delta = parameters[0], parameters[1], parameters[2], parameters[3], parameters[4]
     a, w, length = A + direction * delta * u, direction * z, abs(du)
     begin, stands = 0.0, False
-    for _ in range(
-        _MAX_SIDES
-    ):  # the forcing a + delta L changes its sign once, so there are no more than two zeros of z
+    # the forcing a + delta L changes its sign once, so there are no more than two zeros of z
+    for _ in range(_MAX_SIDES):
         left, forcing = length - begin, a + delta * begin
         if stands:  # z left zero and came back within the rounding of the length: the forcing changes its sign here
             forcing = 0.0
@@ -172,10 +171,9 @@ def power_side(
             return w, length
         bend = abs(c) * power
         reach, spread = disc(w, abs(slope), d, bend, n, 5.0 * left)
-        theta = left / reach
-        if theta > 0.2:
-            theta = min(theta, fraction(spread * reach, w))
-        safe = min(left, theta * reach)
+        safe = left  # as it is: times the reach it would round, and a denormal one to nothing
+        if left > 0.2 * reach:
+            safe = min(left, fraction(spread * reach, w) * reach)
         if safe < left and spread < abs(slope):
             safe *= _BRISK
         if safe == left or spread < abs(slope):
