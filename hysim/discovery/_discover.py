@@ -364,7 +364,9 @@ def _judged(records: tuple[Record, ...], candidate: Candidate[Any], letter: str,
     structure = candidate.structure
 
     def refit(some: Sequence[Record], weights: Sequence[FloatArray]) -> Sequence[Any]:
-        refined = FreeRun(tuple(some), tuple(each > 0.0 for each in weights)).refine(structure, candidate.unknowns[np.newaxis])
+        refined = FreeRun(tuple(some), tuple(each > 0.0 for each in weights)).refine(
+            structure, candidate.unknowns[np.newaxis]
+        )
         if refined is None:
             raise ValueError("the law diverges")
         return _laws.found(refined, some, letter).models
