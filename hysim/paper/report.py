@@ -111,8 +111,8 @@ def _models(study: Study, drawn: Drawn) -> str:
     rows = [
         [
             row.name, str(row.n_parameters), f"{row.fit_percent:.2f}", f"{row.rmse:.4f}",
-            number(cross_validated(row), 4), f"{row.max_residual / quantum:.2f}", f"{row.max_width:.3f}", f"{row.max_width_at:g}", f"{row.area:.2f}",
-            f"{row.width_rmse:.4f}",
+            number(cross_validated(row), 4), f"{row.max_residual / quantum:.2f}", f"{row.max_width:.3f}",
+            f"{row.max_width_at:g}", f"{row.area:.2f}", f"{row.width_rmse:.4f}",
         ]
         for row in study.comparison.rows
     ]  # fmt: skip
@@ -271,8 +271,10 @@ def _nested() -> str:
         + table(
             header,
             [
-                [each.model, each.start or "–", str(each.n_parameters), f"{each.fit_percent:.2f}",
-                 f"{each.left_out_rmse:.4f}", f"{each.behind:.1f}"]
+                [
+                    each.model, each.start or "–", str(each.n_parameters), f"{each.fit_percent:.2f}",
+                    f"{each.left_out_rmse:.4f}", f"{each.behind:.1f}",
+                ]
                 for each in rows
             ],
         )
