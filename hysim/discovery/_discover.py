@@ -183,12 +183,12 @@ def discover(
             return moving
     any_exponent = library is None and symmetry is None and not signs
 
-    def chosen(first: list[Outcome], seen: Sequence[Samples] | None) -> tuple[Outcome, Candidate[Any]]:
+    def chosen(first: list[Outcome], seen: tuple[Samples, ...] | None) -> tuple[Outcome, Candidate[Any]]:
         others = _searched(records, shown, options, first[0].searched.bic, seen)
         outcome = min([*first, *others], key=lambda each: each.candidate.bic)
         if not any_exponent:
             return outcome, outcome.candidate
-        return outcome, or_any_exponent(FreeRun(records, seen and tuple(seen)), first[0], outcome)
+        return outcome, or_any_exponent(FreeRun(records, seen), first[0], outcome)
 
     def again(seen: tuple[Samples, ...]) -> Candidate[Any]:
         return chosen(_searched(records, (hidden,), options, seen=seen), seen)[1]

@@ -31,11 +31,14 @@ class NestedError:
     left_out_rmse : float
         Root mean square error at the points left out [um].
     behind : float
-        Distance of the mean squared error from that of the best model, in standard errors of the paired difference.
+        Distance of the mean squared error from that of the best model whose terms are not kept, in standard errors of
+        the paired difference.
     same_structure : int or None
         Folds in which a discovered law has the terms that it has on all points.
     folds : int
         Number of points that were left out.
+    terms_kept : bool
+        Whether the terms are those that were found on all points.
     """
 
     model: str
@@ -46,6 +49,7 @@ class NestedError:
     behind: float
     same_structure: int | None
     folds: int
+    terms_kept: bool
 
 
 @cache
@@ -63,6 +67,7 @@ def nested_errors() -> tuple[NestedError, ...]:
             behind=float(row["behind_in_stderr"]),
             same_structure=int(row["same_structure"]) if row["same_structure"] else None,
             folds=int(row["folds"]),
+            terms_kept=row["terms_kept"] == "True",
         )
         for row in rows
     )
