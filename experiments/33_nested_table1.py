@@ -207,7 +207,7 @@ def draw(rows: list[Row]) -> Figure:
     axes.barh(places, [1e3 * row["left_out_rmse_um"] for row in rows], color=colours)
     axes.set_yticks(places, [", ".join(filter(None, (row["model"], row["start"]))) for row in rows])
     axes.invert_yaxis()
-    axes.set(xlabel="rmse at points that the search has not seen [nm]")
+    axes.set(xlabel="Left-out rmse [nm]")
     return canvas
 
 
