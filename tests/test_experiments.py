@@ -138,7 +138,8 @@ def test_the_readme_quotes_the_discoveries():
     short = [(own[name], plain[name]) for name in own if ", noise" in name]
     noisy = [pair for pair in short if not pair[0]["condition"].endswith("noise 0%")]
     assert (len(short), len(noisy)) == (12, 9)
-    assert all(law["exact"] == 20 for law, _ in short if law["condition"].endswith(("noise 0%", "noise 2%")))
+    assert all(law["exact"] == 20 for law, _ in short if law["condition"].endswith("noise 0%"))
+    assert all(law["exact"] >= peer["exact"] for law, peer in short)
     counts = [sum(pair[k]["exact"] for pair in noisy) for k in (0, 1)]
     assert f"the structure is exact in {counts[0]} of {20 * len(noisy)} (PySINDy: {counts[1]})" in readme
     missed = sum(20 - law["exact"] for law, _ in noisy)
