@@ -4,7 +4,8 @@
 
 Regression of the slope along the loading length (`_derivatives`, `_library`, `_shifts`), PySINDy's optimizers from
 dense to sparse (`_pysindy`), refinement by simulation error (`_refinement`), choice of one structure (`_selection`,
-`_search`, `_exponent`), and the question whether it is hysteresis at all (`_judgement`).
+`_subsets`, `_search`, `_exponent`), the error of repeated searches (`_validation`), and the question whether it is
+hysteresis at all (`_judgement`).
 """
 
 import contextlib

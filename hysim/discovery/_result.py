@@ -40,12 +40,13 @@ class Discovery:
         ``"n_terms"``; of the search: ``"threshold"``, the largest one whose structure still has all terms of the law,
         ``"n_structures"`` refined, ``"condition"`` of the regression.
     n_parameters : int
-        What was fitted: the numbers of the law, and y0 of each record.
+        What was fitted: the numbers of the law, and y0 of each record unless the memory begins at rest, at zero.
     judgement : Judgement
         What the verdict rests on: the linear rival, errors on data that neither was fitted to, loop widths at other
         rates, the dissipation.
     cv_rmse : float
-        Cross-validated rmse [unit of y]; nan if it was not asked for, and for an oscillator.
+        Cross-validated rmse [unit of y], the whole search repeated for each fold; nan if it was not asked for, and for
+        an oscillator.
     left_out : tuple of str
         Terms of the library that the records cannot tell from those of lower degree.
     regressed : mapping
