@@ -154,10 +154,8 @@ def main(smoke: bool = False, resume: bool = False) -> list[Row]:
         return behind([nested(each, POINTS[:2]) for each in quick])
     rows = _stored() if resume else []
     done = {(row["model"], row["start"]) for row in rows}
-    tasks: dict[tuple[str, str], Callable[[], Row]] = {
-        (each.name, each.start): lambda each=each: nested(each, POINTS) for each in rivals()
-    }
-    tasks["linear plant, 4 poles", "rest"] = lambda: linear_plant(POINTS)
+    tasks: dict[tuple[str, str], Callable[[], Row]] = {("linear plant, 4 poles", "rest"): lambda: linear_plant(POINTS)}
+    tasks |= {(each.name, each.start): lambda each=each: nested(each, POINTS) for each in rivals()}
     for name, measure in tasks.items():
         if name not in done:
             rows = _written([*rows, measure()])
