@@ -34,7 +34,16 @@ def add_to(commands: Any) -> None:
             f"--{name}", metavar="VALUE", type=float, help=f"of the oscillator, where it is known [units of {unit}]"
         )
     parser.add_argument(
-        "--cross-validate", metavar="loo|K", type=_folds, help="leave one sample out at a time, or one of K blocks"
+        "--cross-validate",
+        metavar="loo|K",
+        type=_folds,
+        help="repeat the whole search with one sample left out at a time, or one of K blocks",
+    )
+    parser.add_argument(
+        "--initial",
+        choices=("auto", "free", "rest"),
+        default="auto",
+        help="whether the memory begins at a value of its own or at rest, at zero (default: %(default)s, by BIC)",
     )
     parser.add_argument("--seed", type=int, default=0, help="of the random restarts (default: %(default)s)")
     parser.add_argument("--out", metavar="MODEL.json", help="write the law, - for the standard output")
@@ -60,6 +69,7 @@ def run(options: argparse.Namespace) -> int:
         damping=options.damping,
         stiffness=options.stiffness,
         cross_validate=options.cross_validate,
+        initial=options.initial,
         seed=options.seed,
         progress=outputs.progress(),
     )
