@@ -160,6 +160,9 @@ def test_the_readme_quotes_the_discoveries():
     again = f"has the same terms in {found['same_structure']} of {found['folds']} searches"
     assert f"The discovered law {again} and is off by {errors[0]:.0f} nm" in readme
     assert f"the asymmetric Bouc-Wen law by {errors[1]:.0f} nm and Bouc and Wen's by {errors[2]:.0f} nm" in readme
+    near = [row for row in nested.values() if not row["terms_kept"] and row["behind_in_stderr"] < 1.0]
+    assert f"{len(near)} rows" in readme
+    assert {row["model"].split(",")[0] for row in near} == {"discovered", "Bouc-Wen", "Zhu-Wang"}
     rows = results["sindy_benchmark"]["rows"]
     told = [row for row in rows if row["case"] == "benchmark"]
     regressed = [row["worst_percent"] for row in rows if row["case"] == "plain PySINDy, m, c, k given"]
