@@ -8,10 +8,78 @@ import pytest
 from discovered import CYCLES, DAHL, LAW, TRUTH, duhem, multisine, record_of, zigzag
 
 import hysim as hs
-from hysim.discovery import arguments
+from hysim.discovery import _discover, arguments
+from hysim.discovery._library import memory_terms
+from hysim.discovery._refinement import FreeRun
+from hysim.discovery._search import Library, searched
 
 RECORD = record_of(LAW.memory, multisine(200), noise=0.01)
 NAMES = list(TRUTH)
+
+
+@pytest.mark.parametrize(("initial", "n_parameters"), [("auto", 3), ("rest", 3), ("free", 4)])
+def test_a_memory_begins_at_rest_or_at_a_number_of_its_own(initial, n_parameters):
+    found = hs.discover(RECORD, route="memory", degree=1, initial=initial)
+    assert list(found.coefficients) == NAMES
+    assert found.n_parameters == n_parameters
+    assert (found.model.z0 == 0.0) is (initial != "free")
+    assert ("held at zero" in found.message) is (initial != "free")
+
+
+def test_a_memory_that_does_not_begin_at_rest_is_not_held_there():
+    record = record_of(hs.BoucWen(A=1.0, beta=0.6, gamma=0.3, z0=0.3).memory, multisine(200), noise=0.01)
+    found = hs.discover(record, route="memory", degree=1)
+    assert found.n_parameters == len(found.coefficients) + 1
+    assert found.model.z0 == pytest.approx(0.3, abs=0.02)  # the noise of a few samples
+
+
+@pytest.mark.parametrize(("u0", "n_parameters"), [(0.0, 2), (0.5, 3)])
+def test_a_duhem_law_begins_at_rest_only_where_its_input_is_zero(u0, n_parameters):
+    """y = 0 says something about the actuator at u = 0 alone; elsewhere it is where the instrument has its zero."""
+    found = hs.discover(record_of(duhem(DAHL), CYCLES + u0), library=["u'", "|u'| y", "|u'|"])
+    assert list(found.coefficients) == list(DAHL)
+    assert found.n_parameters == n_parameters
+
+
+def test_the_search_does_not_look_at_samples_that_are_left_out():
+    """Nothing about the law changes with the outputs that it has not seen."""
+    seen = np.random.default_rng(3).uniform(size=len(RECORD)) > 0.1
+    seen[0] = False
+    library = Library(memory_terms(1), "z", rests=(False, True))
+    options = {"signs": {}, "optimizer": "STLSQ", "derivative": "auto", "seed": 0, "seen": (seen,)}
+    found, spoilt = (
+        searched((hs.Record(u=RECORD.u, y=np.where(seen, RECORD.y, unseen)),), library, **options).candidate
+        for unseen in (RECORD.y, 1e3)
+    )
+    assert found.structure == spoilt.structure
+    assert found.unknowns.tolist() == spoilt.unknowns.tolist()
+
+
+def test_cross_validation_repeats_the_whole_search(monkeypatch):
+    laws, masks = [], []
+
+    def kept(records, library, *, seen=None, **options):
+        outcome = searched(records, library, seen=seen, **options)
+        laws.append(outcome.candidate)
+        masks.append(seen)
+        return outcome
+
+    monkeypatch.setattr(_discover, "searched", kept)
+    record, done = record_of(LAW.memory, multisine(120), noise=0.01), []
+    found = hs.discover(
+        record, library=NAMES, route="memory", cross_validate=3, progress=lambda *step: done.append(step)
+    )
+    folds = np.array_split(np.arange(len(record)), 3)
+    assert masks[0] is None
+    assert [np.flatnonzero(~seen).tolist() for (seen,) in masks[1:]] == [f.tolist() for f in folds]
+    free_run = FreeRun((record,))
+    errors = [
+        free_run.residuals(law.structure, law.unknowns[np.newaxis])[0, fold]
+        for law, fold in zip(laws[1:], folds, strict=True)
+    ]
+    assert found.cv_rmse == pytest.approx(np.sqrt(np.mean(np.concatenate(errors) ** 2)) * np.ptp(record.y), rel=1e-12)
+    assert found.cv_rmse > found.scores["rmse"]
+    assert done == [(k, 6) for k in range(1, 7)]
 
 
 @pytest.mark.parametrize("optimizer", ["SR3", "SSR", "FROLS"])
@@ -135,6 +203,7 @@ def test_a_monotone_loading_is_refused_in_every_form():
         ({"signs": {"u'": 2}}, "must be 1 or -1, got 2"),
         ({"optimizer": "lasso"}, "optimizer must be one of STLSQ, SR3, SSR, FROLS, got 'lasso'"),
         ({"derivative": "spline"}, 'derivative must be "auto", "smoothed" or "weak"'),
+        ({"initial": "periodic"}, 'initial must be "auto", "free" or "rest", got \'periodic\''),
         ({"cross_validate": 1}, 'cross_validate must be "loo"'),
         ({"cross_validate": "all"}, 'cross_validate must be "loo"'),
         (

@@ -36,6 +36,18 @@ def test_a_measured_memory_has_its_law_under_noise(noise):
     assert found.coefficients["|u'| z"] == pytest.approx(-0.6, rel=noise)  # less than the noise of one sample
 
 
+def test_where_noise_hides_the_shape_the_law_of_bouc_and_wen_is_taken():
+    """At z = 0.4 and 5 % of noise u' z^2 in place of u' |z| is as likely, and by a chance of the noise likelier."""
+    phase, turns = np.arange(240) / 240.0, np.random.default_rng(1).uniform(0.0, 1.0, 6)
+    tones = sum(np.sin(2.0 * np.pi * (k * phase + turn)) for k, turn in zip((1, 2, 3, 5, 7, 9), turns, strict=True))
+    u = np.tile(0.5 * tones / np.abs(tones).max(), 2)
+    record = record_of(LAW.memory, u - u[0], noise=0.05, seed=101)
+    found = hs.discover(record, route="memory")
+    assert list(found.coefficients) == list(TRUTH)
+    other = hs.discover(record, route="memory", library=["u'", "u' z^2", "|u'| z"])
+    assert other.scores["bic"] < found.scores["bic"] < other.scores["bic"] + 2.0
+
+
 def test_at_a_small_amplitude_clean_terms_are_still_told_apart():
     """At z = 0.1 the three terms differ by a tenth."""
     found = hs.discover(record_of(LAW.memory, multisine(amplitude=0.1)), route="memory")

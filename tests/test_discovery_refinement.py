@@ -12,7 +12,8 @@ from scipy.optimize import least_squares
 import hysim as hs
 from hysim.discovery import _laws
 from hysim.discovery._descent import descend
-from hysim.discovery._refinement import FreeRun, losses
+from hysim.discovery._refinement import FreeRun, information
+from hysim.discovery._selection import Search, pruned
 from hysim.discovery._structures import AnyExponent, Terms
 from hysim.discovery._validation import left_out_rmse
 from hysim.models.duhem_terms import Term
@@ -118,43 +119,108 @@ def test_standard_errors_are_carried_to_the_gain():
     assert spread == pytest.approx({"u'": 0.0, "u' |z|": 0.2, "|u'| z": 0.3, "feedthrough": 0.5, "gain": 0.1}, rel=1e-6)
 
 
-def test_refinement_leaves_out_what_has_no_weight():
+def test_refinement_does_not_look_at_samples_that_are_not_seen():
     record = record_of(duhem(COLEMAN_HODGDON), CYCLES)
-    spoilt = record.y.copy()
-    spoilt[100] += 5.0
-    weights = np.ones(len(record))
-    weights[100] = 0.0
+    seen = np.ones(len(record), dtype=bool)
+    seen[[0, 100]] = False
     start = 0.9 * np.array([[*COLEMAN_HODGDON.values(), 0.0]])
-    free_run = FreeRun((hs.Record(u=record.u, y=spoilt),), (weights,))
+    free_run = FreeRun((hs.Record(u=record.u, y=np.where(seen, record.y, 1e3)),), (seen,))
     found = free_run.refine(Terms(terms(COLEMAN_HODGDON)), start, tolerance=1e-12)
     assert found.unknowns == pytest.approx([*COLEMAN_HODGDON.values(), 0.0], abs=1e-7)  # the root of rounding
+    assert found.residual.size == free_run.n_samples == len(record) - 2
+    assert free_run.stroke == pytest.approx(np.ptp(record.y))
 
 
-def test_samples_that_are_left_out_cost_little_where_there_are_many():
+def test_a_memory_at_rest_is_one_number_less_and_begins_at_zero():
+    law = hs.BoucWen(A=1.0, beta=0.6, gamma=0.3)
+    record = record_of(lambda u: 7.0 + 40.0 * u + 60.0 * law.memory(u), multisine() + 3.0, noise=0.01)
+    free = Terms(terms(["u'", "u' |z|", "|u'| z"]), feedthrough=True, offset=True)
+    rest, start = free._replace(rest=True), np.array([[60.0, -0.3, -0.6, 40.0, 7.0, record.y[0]]])
+    free_run = FreeRun((record,))
+    of_free, of_rest = (free_run.refine(structure, start, tolerance=1e-12) for structure in (free, rest))
+    assert (of_free.n_parameters, of_rest.n_parameters) == (6, 5)
+    assert of_rest.unknowns[-1] == pytest.approx(of_rest.unknowns[4] + record.u[0] * of_rest.unknowns[3], rel=1e-15)
+    assert of_free.cost <= of_rest.cost < 1.1 * of_free.cost
+    assert of_rest.bic == information(of_rest.cost, len(record), 5) < of_free.bic
+    spread = np.sqrt(np.diag(of_rest.covariance))
+    assert spread[-1] == 0.0
+    assert (spread[:-1] > 0.0).all()
+    assert abs(of_rest.unknowns[4] - 7.0) < 5.0 * spread[4]
+    assert _laws.found(of_rest, [record], "z").models[0].z0 == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_left_out_error_is_that_of_laws_that_have_not_seen_the_sample():
     record = record_of(duhem(DAHL), CYCLES, noise=0.05)
-    candidate = FreeRun((record,)).refine(Terms(terms(DAHL)), np.array([[1.0, -1.0, 0.0]]), tolerance=1e-12)
+    start, unseen = np.array([[1.0, -1.0, 0.0]]), []
+
+    def search(seen):
+        unseen.append(np.flatnonzero(~seen[0]).tolist())
+        return FreeRun((record,), seen).refine(Terms(terms(DAHL)), start, tolerance=1e-12)
+
+    candidate = search((np.ones(len(record), dtype=bool),))
     noise = np.sqrt(candidate.cost / len(record)) * np.ptp(record.y)
+    counted = []
+    error = left_out_rmse([record], search, 10, lambda done, total: counted.append((done, total)))
     # Theory for 3 numbers from 204 samples: 1 + 3/204 of the noise; this draw may differ by as much again.
-    assert left_out_rmse([record], candidate, "loo") == pytest.approx(noise, rel=0.03)
-    assert left_out_rmse([record], candidate, 10) == pytest.approx(noise, rel=0.05)
+    assert error == pytest.approx(noise, rel=0.05)
+    assert sorted(np.concatenate(unseen[1:]).tolist()) == list(range(len(record)))
+    assert counted == [(k, 10) for k in range(1, 11)]
+    assert (
+        left_out_rmse(
+            [record],
+            lambda seen: SimpleNamespace(structure=Terms(terms(["|u'| y"])), unknowns=np.array([50.0, 1.0])),
+            2,
+            lambda done, total: None,
+        )
+        == np.inf
+    )
 
 
-def test_the_loss_of_a_term_is_the_cost_without_it():
+NAMES = ["u'", "u' z", "u' |z|", "|u'| z"]
+
+
+def searched_about_the_truth(record, names, **options):
+    search = Search(FreeRun((record,), **options), (), rests=(False, True))
+    whole = Terms(terms(names))
+    truth = {"u'": 1.0, "u' |z|": -0.3, "|u'| z": -0.6}
+    search.tried[whole] = search.free_run.refine(
+        whole, np.array([[*(truth.get(name, 0.0) for name in names), 0.0]]), tolerance=1e-12
+    )
+    return search, whole
+
+
+def test_the_linearised_free_run_predicts_what_smaller_structures_reach():
+    record = record_of(LAW.memory, multisine(150), noise=0.05)
+    search, whole = searched_about_the_truth(record, NAMES)
+    predicted = search.predicted(search.tried[whole], whole)
+    assert [each.structure for each in predicted[:2]] == [
+        Terms(terms(["u'", "u' |z|", "|u'| z"]), rest=True),
+        Terms(terms(NAMES), rest=True),
+    ]
+    for each in predicted[:4]:
+        refined = search.free_run.refine(each.structure, each.unknowns[np.newaxis], tolerance=1e-12)
+        assert each.bic == pytest.approx(refined.bic, abs=0.2)  # terms that say nothing: linear to their squares
+
+
+def test_no_structure_is_predicted_whose_number_has_a_sign_that_it_must_not_have():
+    record = record_of(LAW.memory, multisine(150), noise=0.05)
+    wanted = Term.parse("u' |z|")
+    search, whole = searched_about_the_truth(record, NAMES, signs={wanted: 1})
+    assert search.tried[whole].unknowns[2] == 0.0
+    predicted = search.predicted(search.tried[whole], whole)
+    assert predicted
+    for each in predicted:
+        if wanted in each.structure.terms:
+            assert each.unknowns[each.structure.terms.index(wanted)] >= 0.0
+
+
+def test_a_number_within_two_standard_errors_of_zero_is_taken_out():
     record = record_of(LAW.memory, multisine(150), noise=0.05)
     free_run = FreeRun((record,))
-    names = ["u'", "u' z", "u' |z|", "|u'| z"]
-    whole = free_run.refine(Terms(terms(names)), np.array([[1.0, 0.0, -0.3, -0.6, 0.0]]), tolerance=1e-12)
-    loss = next(loss for loss in losses(whole) if Term.parse("u' z") not in loss.structure.terms)
-    without = free_run.refine(loss.structure, loss.unknowns[np.newaxis], tolerance=1e-12)
-    assert loss.cost == pytest.approx(without.cost, rel=1e-3)  # a term that says nothing: linear to its square
-
-
-def test_a_term_that_its_sign_holds_at_zero_stays_there_when_another_is_lost():
-    record, held = record_of(LAW.memory, multisine(150)), Term.parse("u' |z|")
-    free_run = FreeRun((record,), signs={held: 1})
-    names = ["u'", "u' |z|", "u' z^2", "|u'| z"]
-    whole = free_run.refine(Terms(terms(names)), np.array([[1.0, 0.1, -0.1, -0.6, 0.0]]))
-    assert whole.unknowns[1] == 0.0
-    for loss in losses(whole):
-        if held in loss.structure.terms:
-            assert loss.unknowns[loss.structure.terms.index(held)] == pytest.approx(0.0, abs=1e-15)
+    names = ["u'", "u' z", "u' |z|", "|u'|", "|u'| z"]
+    whole = free_run.refine(Terms(terms(names), rest=True), np.array([[1.0, 0.0, -0.3, 0.0, -0.6, 0.0]]))
+    assert (np.sort(whole.significance)[:2] < 2.0).all()
+    small = pruned(free_run, whole, frozenset(), 1e-12)
+    assert small.structure.terms == terms(["u'", "u' |z|", "|u'| z"])
+    assert (small.significance >= 2.0).all()
+    assert pruned(free_run, small, frozenset(), 1e-12) is small

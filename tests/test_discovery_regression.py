@@ -23,8 +23,9 @@ from hysim.discovery._library import (
     slopes,
     symmetric,
 )
-from hysim.discovery._selection import complete_structures, is_complete, preferred, thinned
+from hysim.discovery._selection import is_complete, preferred, thinned
 from hysim.discovery._structures import Terms
+from hysim.discovery._subsets import best_subsets
 from hysim.models.duhem_terms import Term
 
 
@@ -133,28 +134,65 @@ def test_an_ensemble_is_drawn_from_its_seed_alone():
     assert first[0] == 1.0
 
 
-def test_complete_structures_are_those_that_a_shift_of_the_origin_keeps():
-    terms = duhem_terms(2)
-    listed = complete_structures(terms, 10_000)
-    brute = [chosen for size in range(1, 13) for chosen in itertools.combinations(terms, size) if is_complete(chosen)]
-    assert listed == brute
-    assert complete_structures(terms, 5) == brute[:5]
+@pytest.mark.parametrize(
+    ("names", "complete"),
+    [
+        (["u'", "|u'|", "|u'| u"], True),
+        (["u'", "|u'| u"], False),
+        (["u'", "u' y", "u' y^2"], True),
+        (["u'", "u' y^2"], False),
+        (["u'", "u' u", "u' u y"], False),
+    ],
+)
+def test_a_complete_structure_keeps_its_form_where_the_origin_is_shifted(names, complete):
+    assert is_complete(Term.parse(name) for name in names) is complete
 
 
-def test_a_complete_law_is_preferred_only_where_it_is_as_likely():
-    def candidate(terms, bic, cost=0.0):
+def test_among_laws_that_are_as_likely_the_fewest_numbers_then_the_plain_form_then_bic_decide():
+    def candidate(terms, bic, cost=1e-3):
         parsed = Terms(tuple(Term.parse(name) for name in terms))
-        return SimpleNamespace(structure=parsed, bic=bic, cost=cost, residual=np.zeros(100))
+        return SimpleNamespace(structure=parsed, bic=bic, cost=cost, residual=np.zeros(100), n_parameters=len(terms))
 
-    sparse, whole = candidate(["u'", "|u'| u"], 0.0), candidate(["u'", "|u'|", "|u'| u"], 1.9)
-    assert preferred([sparse, whole], complete=True) is whole
-    assert preferred([sparse, whole], complete=False) is sparse
-    whole.bic = 4.6
-    assert preferred([sparse, whole], complete=True) is sparse
+    sparse, complete = candidate(["u'", "|u'| u"], 1.9), candidate(["u'", "|u'|", "|u'| u"], 0.0, 0.0)
+    assert preferred([sparse, complete], "y") is sparse
+    sparse.bic = 2.1
+    assert preferred([sparse, complete], "y") is complete
+    plain = candidate(["u'", "|u'|"], 1.9)
+    sparse.bic = 1.5
+    assert preferred([sparse, plain, complete], "y") is plain
+    bouc_wen, other = candidate(["u'", "u' |z|", "|u'| z"], 1.9), candidate(["u'", "u' z^2", "|u'| z"], 0.0, 0.0)
+    assert preferred([bouc_wen, other], "z") is bouc_wen
+    bouc_wen.bic = 2.1
+    assert preferred([bouc_wen, other], "z") is other
     smaller = candidate(["u'"], 9.0, cost=1e-7)  # less than 1e-4 strokes apart in rms
-    assert preferred([sparse, smaller], complete=False) is smaller
+    assert preferred([other, smaller], "z") is smaller
     smaller.cost = 1e-5
-    assert preferred([sparse, smaller], complete=False) is sparse
+    assert preferred([other, smaller], "z") is other
+
+
+@pytest.mark.parametrize("width", [924, 4])
+def test_the_best_subsets_are_those_of_all_least_squares(width):
+    random = np.random.default_rng(0)
+    jacobian, residual, x = random.standard_normal((30, 6)), random.standard_normal(30), random.standard_normal(6)
+    jacobian[:, 4] = jacobian[:, 3] + 1e-2 * jacobian[:, 4]
+    removable = np.array([True, True, False, True, True, True])
+    target = residual - jacobian @ x
+    levels = list(best_subsets(jacobian, residual, x, removable, width=width))
+    assert [level.kept.sum(axis=1).tolist() for level in levels] == [[6 - k] * len(levels[k].cost) for k in range(6)]
+    for level in levels:
+        size = int(level.kept[0].sum())
+        brute = {}
+        for chosen in itertools.combinations([0, 1, 3, 4, 5], size - 1):
+            kept = sorted([*chosen, 2])
+            solved = np.linalg.lstsq(jacobian[:, kept], -target, rcond=None)[0]
+            brute[tuple(kept)] = float(np.sum((target + jacobian[:, kept] @ solved) ** 2)), solved
+        assert level.cost[0] == pytest.approx(min(cost for cost, _ in brute.values()), rel=1e-9)
+        for kept, cost, numbers in zip(level.kept, level.cost, level.x, strict=True):
+            expected, solved = brute[tuple(np.flatnonzero(kept).tolist())]
+            assert cost == pytest.approx(expected, rel=1e-9)  # rounding, and a ridge of 1e-12
+            assert numbers[kept] == pytest.approx(solved, rel=1e-6)  # the ridge, times the condition squared
+            assert not numbers[~kept].any()
+        assert len(level.cost) == min(len(brute), width)
 
 
 def test_thinning_keeps_reversals_and_the_law():

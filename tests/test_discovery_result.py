@@ -25,7 +25,7 @@ def record():
 @pytest.fixture(scope="module")
 def hidden(record):
     """A memory behind an output, without time."""
-    return hs.discover(record, route="output", library=list(TRUTH), cross_validate=10)
+    return hs.discover(record, route="output", library=list(TRUTH), cross_validate=3)
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +84,7 @@ def test_the_summary_has_the_law_its_verdict_and_every_number(hidden):
     assert hidden.verdict in lines[1]
     names = [line.split(" = ")[0].strip() for line in lines if "+-" in line]
     assert names == [*TRUTH, "feedthrough", "offset", "gain"]
-    assert lines[-1].strip() == f"cross-validated rmse {hidden.cv_rmse:.4g}"
+    assert f"cross-validated rmse {hidden.cv_rmse:.4g}" in map(str.strip, lines)
 
 
 def test_warnings_are_printed_under_their_heading_and_stored(hidden):
@@ -107,7 +107,8 @@ def test_the_verbs_take_what_was_found(hidden, record, tmp_path):
     assert row.model == model
     assert row.n_parameters == hidden.n_parameters
     assert row.fit_percent == pytest.approx(hidden.scores["fit_percent"], abs=1e-9)
-    again = hs.identify(model, record, fixed={"n": 1.0, "A": 1.0})
+    start = "rest" if hidden.n_parameters == len(hidden.stderr) - 1 else "free"  # all numbers but "u'", which is 1
+    again = hs.identify(model, record, fixed={"n": 1.0, "A": 1.0}, initial=start)
     for name in ("beta", "gamma", "feedthrough", "gain"):
         assert again.estimates[name] == pytest.approx(getattr(model, name), rel=1e-4)  # the same optimum
     assert model.inverse_response(y[:20], u0=record.u[0]) == pytest.approx(record.u[:20], abs=1e-9)

@@ -119,7 +119,7 @@ def test_the_readme_quotes_the_discoveries():
     folder = EXPERIMENTS[0].parent
     results = {
         name: json.loads((folder / "results" / name / "result.json").read_text())
-        for name in ("sindy_recovery", "sindy_table1", "sindy_benchmark", "sindy_lag_trap")
+        for name in ("sindy_recovery", "sindy_table1", "nested_table1", "sindy_benchmark", "sindy_lag_trap")
     }
     readme = " ".join((folder.parent / "README.md").read_text().split())
     own, plain = (
@@ -135,13 +135,34 @@ def test_the_readme_quotes_the_discoveries():
     assert f"it is exact in {own['amplitude / 20']['exact']}, with the memory hidden" in readme
     assert f"in {own[hidden]['exact']} (PySINDy: {plain[hidden]['exact']})" in readme
     assert f"to a period in {own['100 Hz']['exact']}:" in readme
-    law, bouc_wen = results["sindy_table1"]["rows"][:2]
-    assert f"A law of {law['n_parameters'] - 1} terms fits {law['fit_percent']:.2f} %" in readme
-    left_out = [1e3 * row["left_out_rmse_um"] for row in (law, bouc_wen)]
-    assert f"left-out points to {left_out[0]:.0f} nm, where Bouc-Wen's leaves {left_out[1]:.0f} nm" in readme
-    shares = results["sindy_table1"]["found_again"]
-    kept = [shares[term] for term in ("u'", "u' y", "|u'|", "|u'| u", "|u'| y", "|u'| y^2")]
-    assert (kept.count(1.0), sum(share < 0.5 for share in kept)) == (2, 1)
+    short = [(own[name], plain[name]) for name in own if ", noise" in name]
+    noisy = [pair for pair in short if not pair[0]["condition"].endswith("noise 0%")]
+    assert (len(short), len(noisy)) == (12, 9)
+    assert all(law["exact"] == 20 for law, _ in short if law["condition"].endswith("noise 0%"))
+    assert all(law["exact"] >= peer["exact"] for law, peer in short)
+    counts = [sum(pair[k]["exact"] for pair in noisy) for k in (0, 1)]
+    assert f"the structure is exact in {counts[0]} of {20 * len(noisy)} (PySINDy: {counts[1]})" in readme
+    missed = sum(20 - law["exact"] for law, _ in noisy)
+    unlikely = sum(20 - law["as_likely"] for law, _ in noisy)
+    assert f"in {unlikely} of the {missed} others the truth's BIC is more than 2 above" in readme
+    law = results["sindy_table1"]["rows"][0]
+    equal = "parameters, with y held at 0 at the first point"
+    assert f"A law of {law['n_parameters']} terms and as many {equal}, fits {law['fit_percent']:.2f} %" in readme
+    shares = [results["sindy_table1"]["found_again"][term] for term in results["sindy_table1"]["terms"]]
+    *often, seldom = sorted(shares, reverse=True)
+    words = (
+        f"give back {len(often)} of its terms in at least {100 * min(often):.0f} % of the draws, and the last one in"
+    )
+    assert f"{words} {100 * seldom:.0f} %" in readme
+    nested = {(row["model"], row["start"]): row for row in results["nested_table1"]["rows"]}
+    found, asymmetric = nested["discovered", "auto"], nested["Bouc-Wen, quadratic input, n = 1", "free"]
+    errors = [1e3 * row["left_out_rmse_um"] for row in (found, asymmetric, nested["Bouc-Wen", "free"])]
+    again = f"has the same terms in {found['same_structure']} of {found['folds']} searches"
+    assert f"The discovered law {again} and is off by {errors[0]:.0f} nm" in readme
+    assert f"the asymmetric Bouc-Wen law by {errors[1]:.0f} nm and Bouc and Wen's by {errors[2]:.0f} nm" in readme
+    near = [row for row in nested.values() if not row["terms_kept"] and row["behind_in_stderr"] < 1.0]
+    assert f"{len(near)} rows" in readme
+    assert {row["model"].split(",")[0] for row in near} == {"discovered", "Bouc-Wen", "Zhu-Wang"}
     rows = results["sindy_benchmark"]["rows"]
     told = [row for row in rows if row["case"] == "benchmark"]
     regressed = [row["worst_percent"] for row in rows if row["case"] == "plain PySINDy, m, c, k given"]

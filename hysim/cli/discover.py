@@ -43,7 +43,13 @@ def add_to(commands: Any) -> None:
         "--cross-validate",
         metavar="loo|K",
         type=_folds,
-        help="leave one sample out at a time, or one of K blocks; not for an oscillator",
+        help="repeat the whole search with one sample left out at a time, or one of K blocks; not for an oscillator",
+    )
+    parser.add_argument(
+        "--initial",
+        choices=("auto", "free", "rest"),
+        default="auto",
+        help="whether the memory begins at a value of its own or at rest, at zero (default: %(default)s, by BIC)",
     )
     parser.add_argument("--seed", type=int, default=0, help="of the random restarts (default: %(default)s)")
     parser.add_argument("--out", metavar="MODEL.json", help="write the law, - for the standard output")
@@ -69,6 +75,7 @@ def run(options: argparse.Namespace) -> int:
         damping=options.damping,
         stiffness=options.stiffness,
         cross_validate=options.cross_validate,
+        initial=options.initial,
         seed=options.seed,
         progress=outputs.progress(),
     )

@@ -44,7 +44,7 @@ def descend(
 ) -> Reached:
     """Descend from `x` until a step lowers the sum of squares by less than `tolerance` of it."""
     damping = _FIRST
-    here = _linearised(residuals, x, central)
+    here = linearised(residuals, x, central)
     for _ in range(steps):
         cost = float(here.residual @ here.residual)
         trials = _trials(here, damping * _DAMPINGS, lower, upper)
@@ -56,13 +56,14 @@ def descend(
                 break
             continue
         damping = float(np.clip(damping * _DAMPINGS[best], _LEAST, _MOST))
-        here = _linearised(residuals, trials[best], central)
+        here = linearised(residuals, trials[best], central)
         if cost - squares[best] <= tolerance * cost:
             break
     return here
 
 
-def _linearised(residuals: Residuals, x: FloatArray, central: bool) -> Reached:
+def linearised(residuals: Residuals, x: FloatArray, central: bool) -> Reached:
+    """Residual and Jacobian at `x` (n_x,), by central or one-sided differences."""
     width = _CENTRAL if central else _ONE_SIDED
     steps = width * np.eye(x.size)
     around = residuals(np.concatenate([x[np.newaxis], x + steps, *([x - steps] if central else [])]))

@@ -32,7 +32,7 @@ def or_any_exponent(free_run: FreeRun, hidden: Outcome, chosen: Outcome) -> Cand
         return chosen.candidate
     found = [_refined(thin, hidden, structure) for structure in _structures(hidden.library)[:1]]
     least = min((c.cost for c in found if c is not None), default=math.inf)
-    fewest = _structures(hidden.library)[-1].size + len(thin.records)
+    fewest = _structures(hidden.library)[-1].size + (0 if True in hidden.library.rests else len(thin.records))
     if not information(least, thin.n_samples, fewest) < best.bic - INDISTINCT:
         return chosen.candidate
     found += [_refined(thin, hidden, structure) for structure in _structures(hidden.library)[1:]]
@@ -47,7 +47,12 @@ def _structures(library: Library) -> list[AnyExponent]:
     """With all shifts first, with as few as the route allows last."""
     feedthroughs = {"no": (False,), "may": (True, False), "must": (True,)}[library.feedthrough]
     offsets = (True, False) if library.offset else (False,)
-    return [AnyExponent(feedthrough, offset) for feedthrough in feedthroughs for offset in offsets]
+    return [
+        AnyExponent(feedthrough, offset, rest)
+        for feedthrough in feedthroughs
+        for offset in offsets
+        for rest in library.rests
+    ]
 
 
 def _refined(free_run: FreeRun, hidden: Outcome, structure: AnyExponent) -> Candidate[AnyExponent] | None:

@@ -1,24 +1,25 @@
 """Refinement by simulation error: the numbers of a structure whose free run is nearest to the records.
 
-    minimise sum w_k (y_k - y(u; c, feedthrough, offset, y0)_k)^2
+    minimise sum over the samples seen of (y_k - y(u; c, feedthrough, offset, y0)_k)^2
 
 A derivative that fits says little about a law that must run on its own output, so every structure is judged by its
-free run alone. Records share all numbers but y0. Unknowns are measured in what they contribute, outputs in strokes.
-A free run that leaves BOUND strokes has diverged.
+free run alone. Records share all numbers but y0. A structure at rest has no y0: its memory begins at zero. Unknowns
+are measured in what they contribute, outputs in strokes. A free run that leaves BOUND strokes has diverged.
 
     BIC = N ln(V + FLOOR^2) + d ln N,    V = mean squared residual in strokes,  d = n_parameters
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Generic, NamedTuple, TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from hysim._frozen import FloatArray
-from hysim.discovery._descent import descend
+from hysim.discovery._descent import Reached, descend, linearised
 from hysim.discovery._library import Regression
 from hysim.discovery._structures import Structure, Terms
 from hysim.models.duhem_terms import Term
@@ -26,7 +27,7 @@ from hysim.records import Record
 
 BOUND = 30.0
 FLOOR = 1e-4  # smaller residuals, in strokes, are no evidence for one law over another: no input is exactly known
-_DIVERGED = 1e3  # the residual, in strokes, of a free run that has
+DIVERGED = 1e3  # the residual, in strokes, of a free run that has
 RANKING = 1e-5  # relative change of the cost at which a descent ends: far less than a difference of BIC that counts
 POLISH = 1e-12
 _STEPS_TO_RANK = 20  # a structure that is still on its way then is not taken for its last digits
@@ -38,6 +39,7 @@ _AMPLITUDES = (1.0, 0.5)  # of the steady loops, in ranges of the input
 _CYCLES = 20
 _STEADY = 1e-2  # strokes by which the last two may differ
 
+Samples = npt.NDArray[np.bool_]
 
 S = TypeVar("S", bound=Structure)
 
@@ -64,8 +66,8 @@ class Candidate(Generic[S]):
 
     @property
     def n_parameters(self) -> int:
-        """The numbers of the structure, and y0 of each record."""
-        return len(self.unknowns)
+        """The numbers of the structure, and y0 of each record unless it is at rest there."""
+        return self.structure.size if self.structure.rest else len(self.unknowns)
 
     @cached_property
     def bic(self) -> float:
@@ -74,16 +76,29 @@ class Candidate(Generic[S]):
 
     @property
     def covariance(self) -> FloatArray:
-        """Covariance of the unknowns; nan throughout where the records do not tell one of them."""
-        n, d = self.jacobian.shape
-        sizes = np.linalg.norm(self.jacobian, axis=0)
-        if n <= d or not (sizes > 0.0).all():
-            return np.full((d, d), np.nan)
-        singular, right = np.linalg.svd(self.jacobian / sizes, full_matrices=False)[1:]
-        if singular[-1] < _SINGULAR * singular[0]:
-            return np.full((d, d), np.nan)
-        root = (right / singular[:, np.newaxis]).T / sizes[:, np.newaxis]
-        return np.asarray(root @ root.T * (self.cost / (n - d)))
+        """Covariance of the unknowns, zero for y0 at rest; nan throughout where the records do not tell one of them."""
+        covariance, free = np.zeros((self.unknowns.size,) * 2), slice(self.n_parameters)
+        covariance[free, free] = _covariance(self.jacobian[:, free], self.cost)
+        return covariance
+
+    @property
+    def significance(self) -> FloatArray:
+        """Size of each number of the structure, (size,), in standard errors; inf where that is not known."""
+        size = self.structure.size
+        spread = np.sqrt(np.diag(self.covariance)[:size])
+        return np.where(spread > 0.0, np.abs(self.unknowns[:size]) / np.where(spread > 0.0, spread, 1.0), np.inf)
+
+
+def _covariance(jacobian: FloatArray, cost: float) -> FloatArray:
+    n, d = jacobian.shape
+    sizes = np.linalg.norm(jacobian, axis=0)
+    if n <= d or not (sizes > 0.0).all():
+        return np.full((d, d), np.nan)
+    singular, right = np.linalg.svd(jacobian / sizes, full_matrices=False)[1:]
+    if singular[-1] < _SINGULAR * singular[0]:
+        return np.full((d, d), np.nan)
+    root = (right / singular[:, np.newaxis]).T / sizes[:, np.newaxis]
+    return np.asarray(root @ root.T * (cost / (n - d)))
 
 
 def information(cost: float, n_samples: int, n_parameters: int) -> float:
@@ -95,32 +110,42 @@ def information(cost: float, n_samples: int, n_parameters: int) -> float:
 class FreeRun:
     """The least-squares problem of some records.
 
-    `weights`, shape (n_samples,) for each record, may leave samples out; `signs` are those that coefficients must have.
+    `seen`, shape (n_samples,) for each record, tells the samples whose outputs may be looked at; by default all. The
+    input is known at every sample. `signs` are those that coefficients must have.
     """
 
     records: tuple[Record, ...]
-    weights: tuple[FloatArray, ...] | None = None
+    seen: tuple[Samples, ...] | None = None
     signs: Mapping[Term, int] = field(default_factory=dict)
 
     @cached_property
+    def visible(self) -> tuple[Record, ...]:
+        """The records without the samples that are not seen."""
+        if self.seen is None:
+            return self.records
+        return tuple(
+            Record(u=record.u[kept], y=record.y[kept]) for record, kept in zip(self.records, self.seen, strict=True)
+        )
+
+    @cached_property
     def stroke(self) -> float:
-        """Range of the measured outputs, the unit of outputs and residuals."""
-        return float(max(record.y.max() for record in self.records) - min(record.y.min() for record in self.records))
+        """Range of the outputs seen, the unit of outputs and residuals."""
+        return float(max(record.y.max() for record in self.visible) - min(record.y.min() for record in self.visible))
 
     @cached_property
     def n_samples(self) -> int:
-        """Of all records."""
-        return sum(map(len, self.records))
+        """Number of samples seen."""
+        return sum(map(len, self.visible))
 
     @cached_property
     def largest(self) -> Record:
         """The record with the widest input, which sets the units."""
-        return max(self.records, key=lambda record: float(np.ptp(record.u)))
+        return max(self.visible, key=lambda record: float(np.ptp(record.u)))
 
     @property
     def measured_starts(self) -> FloatArray:
-        """The first output of each record."""
-        return np.array([record.y[0] for record in self.records])
+        """The first output seen of each record."""
+        return np.array([record.y[0] for record in self.visible])
 
     @property
     def line(self) -> FloatArray:
@@ -134,8 +159,8 @@ class FreeRun:
         return np.concatenate([structure.units(self.largest, self.stroke), starts])
 
     def residuals(self, structure: Structure, unknowns: FloatArray) -> FloatArray:
-        """Weighted residuals (n_sets, n_samples) in strokes."""
-        return np.concatenate([self._left(structure, unknowns, k) for k in range(len(self.records))], axis=1)
+        """Residuals (n_sets, n_samples) in strokes at the samples seen."""
+        return np.concatenate([self._residual(structure, unknowns, k) for k in range(len(self.records))], axis=1)
 
     def refine(self, structure: S, starts: FloatArray, *, tolerance: float = RANKING) -> Candidate[S] | None:
         """The optimum that is reached from the best of `starts` (n_starts, size + n_records); None if all diverge."""
@@ -143,9 +168,9 @@ class FreeRun:
         lower, upper = self._bounds(structure, units)
         starts = np.clip(starts, lower, upper)
         costs = np.sum(self.residuals(structure, starts) ** 2, axis=1)
-        if costs.min() >= _DIVERGED**2:
+        if costs.min() >= DIVERGED**2:
             return None
-        found = descend(
+        reached = descend(
             lambda x: self.residuals(structure, x * units),
             starts[np.argmin(costs)] / units,
             lower / units,
@@ -154,10 +179,15 @@ class FreeRun:
             steps=_STEPS_TO_RANK if tolerance >= RANKING else _STEPS,
             central=tolerance < RANKING,
         )
-        unknowns = found.x * units
+        unknowns = self._with_starts(structure, reached.x * units)
         return Candidate(
-            structure, unknowns, found.jacobian / units, found.residual, self._settles(structure, unknowns)
+            structure, unknowns, reached.jacobian / units, reached.residual, self._settles(structure, unknowns)
         )
+
+    def linearised(self, structure: Structure, unknowns: FloatArray) -> Reached:
+        """Residual and Jacobian at some unknowns (size + n_records,), all three in the units of the unknowns."""
+        units = self.units(structure)
+        return linearised(lambda x: self.residuals(structure, x * units), unknowns / units, central=True)
 
     def regressed(
         self, regression: Regression, structure: Terms, feedthrough: float = 0.0, offset: float = 0.0
@@ -176,10 +206,21 @@ class FreeRun:
             np.minimum(np.concatenate([upper, free]), limit),
         )
 
+    def _with_starts(self, structure: Structure, unknowns: FloatArray) -> FloatArray:
+        """The unknowns, their y0 those at rest where the structure is."""
+        if not structure.rest:
+            return unknowns
+        numbers = unknowns[np.newaxis, : structure.size]
+        starts = [structure.output_at_rest(numbers, float(record.u[0])) for record in self.records]
+        return np.concatenate([unknowns[: structure.size], *starts])
+
     def _run(self, structure: Structure, unknowns: FloatArray, k: int) -> FloatArray:
-        record = self.records[k]
-        bound = BOUND * self.stroke + float(np.abs(record.y).max())
-        return structure.run(record.u, unknowns[:, : structure.size], unknowns[:, structure.size + k], bound)
+        record, visible = self.records[k], self.visible[k]
+        bound = BOUND * self.stroke + float(np.abs(visible.y).max())
+        numbers, y0 = unknowns[:, : structure.size], unknowns[:, structure.size + k]
+        if structure.rest:
+            y0 = structure.output_at_rest(numbers, float(record.u[0]))
+        return structure.run(record.u, numbers, y0, bound)
 
     def _settles(self, structure: Structure, unknowns: FloatArray) -> bool:
         k = max(range(len(self.records)), key=lambda k: float(np.ptp(self.records[k].u)))
@@ -194,31 +235,10 @@ class FreeRun:
                 return False
         return True
 
-    def _left(self, structure: Structure, unknowns: FloatArray, k: int) -> FloatArray:
-        left = (self.records[k].y - self._run(structure, unknowns, k)) / self.stroke
-        left[~np.isfinite(left)] = _DIVERGED
-        return left if self.weights is None else left * np.sqrt(self.weights[k])
-
-
-class Loss(NamedTuple):
-    """A structure that has lost a number: its cost and unknowns as the linearised free run predicts them."""
-
-    structure: Terms
-    cost: float
-    unknowns: FloatArray
-
-
-def losses(candidate: Candidate[Terms]) -> Iterator[Loss]:
-    """What taking each number of a candidate's structure out would cost; a term at zero is held there by its sign."""
-    held = np.zeros(candidate.n_parameters, dtype=bool)
-    held[: len(candidate.structure.terms)] = candidate.unknowns[: len(candidate.structure.terms)] == 0.0
-    free = np.where(held, 0.0, candidate.jacobian)
-    for k in range(candidate.structure.size):
-        jacobian = np.delete(free, k, axis=1)
-        sizes = np.linalg.norm(jacobian, axis=0)
-        sizes[sizes == 0.0] = 1.0
-        removed = candidate.jacobian[:, k] * candidate.unknowns[k]
-        shift = np.linalg.lstsq(jacobian / sizes, removed, rcond=1e-10)[0] / sizes
-        left = candidate.residual - removed + jacobian @ shift
-        unknowns = np.delete(candidate.unknowns, k) + shift
-        yield Loss(candidate.structure.without(k), float(left @ left), unknowns)
+    def _residual(self, structure: Structure, unknowns: FloatArray, k: int) -> FloatArray:
+        y = self._run(structure, unknowns, k)
+        if self.seen is not None:
+            y = y[:, self.seen[k]]
+        residual = (self.visible[k].y - y) / self.stroke
+        residual[~np.isfinite(residual)] = DIVERGED
+        return residual

@@ -42,12 +42,14 @@ class Discovery:
         ``"n_terms"``; of the search: ``"threshold"``, the largest one whose structure still has all terms of the law,
         ``"n_structures"`` refined, ``"condition"`` of the regression.
     n_parameters : int
-        Fitted numbers: those of the law, and the initial state of each record where it is free.
+        Fitted numbers: those of the law, and the initial state of each record where it is free. A state of rest, which
+        is zero, is none.
     judgement : Judgement
         What the verdict rests on: the linear rival, errors on data that neither was fitted to, loop widths at other
         rates, the dissipation.
     cv_rmse : float
-        Cross-validated rmse [unit of y]; nan if it was not asked for, and for an oscillator.
+        Cross-validated rmse [unit of y], the whole search repeated for each fold; nan if it was not asked for, and for
+        an oscillator.
     left_out : tuple of str
         Terms of the library that the records cannot tell from those of lower degree.
     regressed : mapping

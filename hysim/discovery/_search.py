@@ -8,8 +8,8 @@ import numpy as np
 
 from hysim.discovery import _pysindy
 from hysim.discovery._library import FORMS, Slopes, slopes
-from hysim.discovery._refinement import POLISH, Candidate, FreeRun
-from hysim.discovery._selection import SEARCHED, Search, Start, preferred, thinned, turning
+from hysim.discovery._refinement import POLISH, Candidate, FreeRun, Samples
+from hysim.discovery._selection import SEARCHED, Search, Start, preferred, pruned, thinning, turning
 from hysim.discovery._shifts import shifted
 from hysim.discovery._structures import Terms, shifts
 from hysim.models.duhem_terms import Term
@@ -38,19 +38,19 @@ class Library:
         Whether the output has one beside the memory.
     offset : bool
         Whether the memory may be zero at another output than zero.
-    complete : bool
-        Whether structures whose form does not depend on the origin come first.
+    rests : tuple of bool
+        Whether a memory that begins at a value of its own is tried, False, or one that begins at zero, True, or both.
     """
 
     terms: tuple[Term, ...]
     letter: str
     feedthrough: str = "no"
     offset: bool = False
-    complete: bool = False
+    rests: tuple[bool, ...] = (False,)
 
     def structure(self, terms: Sequence[Term]) -> Terms:
         """The largest structure of these terms."""
-        return Terms(tuple(terms), self.feedthrough != "no", self.offset)
+        return Terms(tuple(terms), self.feedthrough != "no", self.offset, all(self.rests))
 
 
 @dataclass(frozen=True)
@@ -68,12 +68,13 @@ class Outcome:
     @property
     def searched(self) -> Candidate[Terms]:
         """The law as it was refined on the samples of the search."""
-        return self.search.tried[self.candidate.structure] or self.candidate
+        return self.search.refine(self.candidate.structure, self.candidate.unknowns) or self.candidate
 
     @property
     def unstable(self) -> bool:
         """Whether no structure but the line stays finite in free run."""
-        return all(candidate is None for structure, candidate in self.search.tried.items() if structure != LINE)
+        lines = (LINE, LINE._replace(rest=True))
+        return all(candidate is None for structure, candidate in self.search.tried.items() if structure not in lines)
 
     @property
     def threshold(self) -> float:
@@ -103,28 +104,39 @@ def searched(
     derivative: str,
     seed: int,
     best: float = math.inf,
+    seen: Sequence[Samples] | None = None,
 ) -> Outcome | None:
-    """The best law of a library; None if none can come near the BIC `best`."""
-    some = tuple(thinned(record, SEARCHED // len(records)) for record in records)
-    form = derivative if derivative != "auto" else _better_form(some, library, optimizer)
-    found = slopes(records, form)
+    """The best law of a library; None if none can come near the BIC `best`.
+
+    Only the outputs `seen`, (n_samples,) for each record, are looked at.
+    """
+    whole = FreeRun(tuple(records), None if seen is None else tuple(seen), signs)
+    some = _thinned(whole)
+    form = derivative if derivative != "auto" else _better_form(some.visible, library, optimizer)
+    found = slopes(whole.visible, form)
     starts = shifted(found, library.terms, feedthrough=library.feedthrough != "no", offset=library.offset)
     held = frozenset({"feedthrough"} if library.feedthrough == "must" else ())
-    search = Search(FreeRun(some, signs=signs), starts, held)
+    search = Search(some, starts, held, library.rests)
     for start in starts:
         search.refine(library.structure(start.regression.terms))
     if not search.could_win(1, best):
         return None
-    search.refine(LINE, search.free_run.line)
+    search.refine(LINE._replace(rest=all(library.rests)), some.line)
     for start in starts:
         for _, structure in _path(start, library, optimizer):
             search.refine(structure)
-    search.eliminate()
-    if library.complete:
-        search.enumerate_complete(starts[0].regression.terms)
-    chosen = _on_all_samples(FreeRun(tuple(records), signs=signs), search, library, seed)
+    search.explore(library.structure(starts[0].regression.terms))
+    chosen = _on_all_samples(whole, search, library, seed)
     start = _start_at(found, library, chosen)
     return Outcome(library, chosen, search, start, found, form, _path(start, library, optimizer))
+
+
+def _thinned(whole: FreeRun) -> FreeRun:
+    """The problem on about SEARCHED samples of the records."""
+    samples = [thinning(record, SEARCHED // len(whole.records)) for record in whole.records]
+    records = tuple(Record(u=r.u[kept], y=r.y[kept]) for r, kept in zip(whole.records, samples, strict=True))
+    seen = whole.seen and tuple(mask[kept] for mask, kept in zip(whole.seen, samples, strict=True))
+    return FreeRun(records, seen, whole.signs)
 
 
 def _path(start: Start, library: Library, optimizer: str) -> list[tuple[float, Terms]]:
@@ -168,17 +180,18 @@ def _seen(record: Record) -> Record:
 
 
 def _on_all_samples(free_run: FreeRun, search: Search, library: Library, seed: int) -> Candidate[Terms]:
-    """Step 4 of the selection on all samples, and the best of descending again from random starts."""
+    """Steps 4 and 5 of the selection on all samples, and the best of descending again from random starts."""
     finalists = search.followed(search.sound)
     if free_run.n_samples > search.free_run.n_samples:
-        shortest = preferred(finalists, complete=library.complete)
+        shortest = preferred(finalists, library.letter)
         few = {c.structure: c.unknowns for c in (shortest, *finalists[:_FINALISTS])}
         refined = [free_run.refine(structure, unknowns[np.newaxis]) for structure, unknowns in few.items()]
         finalists = [c for c in refined if c is not None] or finalists
-    chosen = preferred(finalists, complete=library.complete)
+    chosen = preferred(finalists, library.letter)
     restarted = _restarted(search.free_run, search.tried[chosen.structure] or chosen, seed)
-    polished = free_run.refine(chosen.structure, np.stack([chosen.unknowns, restarted.unknowns]), tolerance=POLISH)
-    return polished or chosen
+    starts = np.stack([chosen.unknowns, restarted.unknowns])
+    polished = free_run.refine(chosen.structure, starts, tolerance=POLISH) or chosen
+    return pruned(free_run, polished, search.held, POLISH)
 
 
 def _restarted(free_run: FreeRun, chosen: Candidate[Terms], seed: int) -> Candidate[Terms]:

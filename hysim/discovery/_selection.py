@@ -3,19 +3,22 @@
 Sparse regression of slopes orders the terms, but on short, noisy or quantised records features such as u^2, u y and
 y^2 are nearly one, and the order is rough. So the path is where the search begins:
 
-1. Every structure on the threshold path is refined by simulation error.
-2. From the densest to the sparsest, the best WIDTH structures of each size lose one number at a time. A linearised
-   free run predicts each loss; the TRIED least costly ones are refined.
-3. Of a Duhem library all complete structures are refined, from the smallest up, at most MOST_COMPLETE, until the
-   penalty of their size alone rules them out.
+1. The law of all terms and every structure on the threshold path are refined by simulation error.
+2. About the best of these the free run is linearised in all numbers of the library, and of that linear problem all
+   smaller structures are solved (`_subsets`): which terms, which shifts, and whether the memory begins at zero or at a
+   value of its own. The MET ones of lowest BIC are refined. This is repeated about the new best ones until there are
+   none, at most ROUNDS times.
+3. The best structures are refined both with their memory at zero at the first sample and with a free one.
 4. Laws that come to no steady loop when the input goes on to and fro are out. Structures within INDISTINCT of the
    lowest BIC cannot be told apart by the records ("not worth more than a bare mention", Kass and Raftery 1995), nor
-   can smaller ones whose free runs differ by less than ALIKE strokes in rms. Among them a complete one is preferred,
-   then the one of fewest numbers, then the lowest BIC.
+   can smaller ones whose free runs differ by less than ALIKE strokes in rms. Among them the one of fewest numbers is
+   taken, then a plain one, then the lowest BIC.
+5. Numbers within SIGNIFICANT standard errors of zero are taken out, the least certain first, as long as BIC does not
+   rise by more than INDISTINCT.
 
-A structure is *complete* if with each monomial it has all that divide it. The form of such a law does not depend on
-where the zeros of u and y are, which are conventions of the instrument; any other is a statement about these zeros
-that needs evidence. A law in z = y - feedthrough u - offset makes that statement by its offset.
+A structure in u and y is *plain* if it is complete: with each monomial it has all that divide it, so that its form
+does not depend on where the zeros of u and y are, which are conventions of the instrument. A structure in z is plain
+if it is a Bouc-Wen law.
 
 Long records are searched on about SEARCHED of their samples, the reversals among them: the output of a
 rate-independent law at a sample does not depend on the samples between it and the last reversal. The best structures
@@ -23,7 +26,7 @@ are then refined on all samples, where step 4 is taken again.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -31,19 +34,24 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
+from hysim.discovery._laws import whole_exponent
 from hysim.discovery._library import Regression
-from hysim.discovery._refinement import Candidate, FreeRun, information, losses
+from hysim.discovery._refinement import Candidate, FreeRun, information
 from hysim.discovery._structures import Terms
+from hysim.discovery._subsets import Subsets, best_subsets
 from hysim.models.duhem_terms import Term
 from hysim.records import Record
 
-WIDTH = 2
-TRIED = 2
-MOST_COMPLETE = 118  # at degree 2 all of up to 7 terms
+MET = 24
+ROUNDS = 6
 SEARCHED = 2000
 INDISTINCT = 2.0
 ALIKE = 1e-4
+SIGNIFICANT = 2.0
 HOPELESS = 20.0  # BIC above the best, beyond which a structure is not followed further
+_POINTS = 2  # candidates about which one round linearises
+_LIKELY = 8.0  # predicted BIC above the lowest one, beyond which a structure is not refined
+_TWINS = 6
 
 
 class Start(NamedTuple):
@@ -54,16 +62,26 @@ class Start(NamedTuple):
     offset: float = 0.0
 
 
-def thinned(record: Record, most: int) -> Record:
-    """Every m-th sample of a record, its last one and its reversals, about `most` together.
+class Prediction(NamedTuple):
+    """A structure, its BIC and its unknowns as a linearised free run predicts them."""
 
-    A record that has more reversals than that is cut short.
-    """
+    bic: float
+    structure: Terms
+    unknowns: FloatArray
+
+
+def thinned(record: Record, most: int) -> Record:
+    """Every m-th sample of a record, its last one and its reversals, about `most` together."""
+    samples = thinning(record, most)
+    return Record(u=record.u[samples], y=record.y[samples])
+
+
+def thinning(record: Record, most: int) -> npt.NDArray[np.intp]:
+    """The samples that `thinned` keeps; a record that has more reversals than `most` is cut short."""
     stride = -(-len(record) // most)
     kept = np.arange(len(record)) % stride == 0
     kept[-1] = True
-    samples = np.flatnonzero(kept | turning(record.u))[: 2 * most]
-    return Record(u=record.u[samples], y=record.y[samples])
+    return np.flatnonzero(kept | turning(record.u))[: 2 * most]
 
 
 def turning(u: FloatArray) -> npt.NDArray[np.bool_]:
@@ -78,16 +96,23 @@ def is_complete(terms: Iterable[Term]) -> bool:
     return all(term.divisors() <= present for term in present)
 
 
+def is_plain(structure: Terms, letter: str) -> bool:
+    """Whether a structure in u and y is complete, or one in z a Bouc-Wen law."""
+    return is_complete(structure.terms) if letter == "y" else whole_exponent(structure.terms) is not None
+
+
 @dataclass(frozen=True)
 class Search:
     """The structures tried on some records, with their refinements: None where every free run diverged.
 
-    `held` are numbers that no structure may lose: "feedthrough", if the route says that there is one.
+    `held` are numbers that no structure may lose: "feedthrough", if the route says that there is one. `rests` tells
+    whether memories that begin at a value of their own are tried, False, or those that begin at zero, True, or both.
     """
 
     free_run: FreeRun
     starts: tuple[Start, ...]
     held: frozenset[str] = frozenset()
+    rests: tuple[bool, ...] = (False,)
     tried: dict[Terms, Candidate[Terms] | None] = field(default_factory=dict)
 
     def refine(self, structure: Terms, *unknowns: FloatArray) -> Candidate[Terms] | None:
@@ -118,20 +143,26 @@ class Search:
         best = self.sound[0]
         return [c for c in candidates if c.bic < best.bic + HOPELESS or gap(c, best) < ALIKE]
 
-    def eliminate(self) -> None:
-        """Step 2: from the densest structure down, the best of each size lose one number at a time."""
-        largest = max((structure.size for structure in self.tried), default=0)
-        for size in range(largest, 1, -1):
-            for parent in self._best(size):
-                ranked = sorted(losses(parent), key=lambda loss: loss.cost)
-                for loss in [loss for loss in ranked if self._may_be(loss.structure)][:TRIED]:
-                    self.refine(loss.structure, loss.unknowns)
+    def explore(self, largest: Terms) -> None:
+        """Steps 2 and 3: the structures inside `largest` that the linearised free run says are best."""
+        done: set[Terms] = set()
+        for _ in range(ROUNDS):
+            points = [c for c in self.sound[:_POINTS] if c.structure not in done]
+            points += [c for c in [self.tried.get(largest)] if c is not None and not done]
+            if not points:
+                break
+            done |= {candidate.structure for candidate in points}
+            for each in [each for candidate in points for each in self.predicted(candidate, largest)]:
+                self.refine(each.structure, each.unknowns)
+        for candidate in self.sound[:_TWINS]:
+            for rest in self.rests:
+                self.refine(candidate.structure._replace(rest=rest), candidate.unknowns)
 
-    def enumerate_complete(self, terms: Sequence[Term]) -> None:
-        """Step 3: the complete structures, from the smallest up."""
-        for each in complete_structures(terms, MOST_COMPLETE):
-            if self.could_win(len(each)):
-                self.refine(Terms(each))
+    def predicted(self, candidate: Candidate[Terms], largest: Terms) -> list[Prediction]:
+        """The MET structures inside `largest` of lowest BIC, in the free run linearised about a candidate."""
+        likely = [each for rest in self.rests for each in self._linearly(candidate, largest, rest)]
+        lowest = min((each.bic for each in likely), default=0.0)
+        return sorted((e for e in likely if e.bic < lowest + _LIKELY), key=lambda e: (e.bic, e.structure))[:MET]
 
     def could_win(self, size: int, best: float = math.inf) -> bool:
         """Whether a structure of `size` numbers would be preferred if it ran as well as the best of any size.
@@ -140,41 +171,93 @@ class Search:
         """
         sound = self.sound
         least = min((candidate.cost for candidate in self.found), default=0.0)
-        bound = information(least, self.free_run.n_samples, size + len(self.free_run.records))
+        starts = 0 if True in self.rests else len(self.free_run.records)
+        bound = information(least, self.free_run.n_samples, size + starts)
         return not sound or bound <= min(sound[0].bic, best) + INDISTINCT
 
-    def _best(self, size: int) -> list[Candidate[Terms]]:
-        return [c for c in self.followed(self.found) if c.structure.size == size][:WIDTH]
+    def _linearly(self, candidate: Candidate[Terms], largest: Terms, rest: bool) -> Iterator[Prediction]:
+        """The best predictions of one sort: the unknowns are the numbers of `largest` and each record's first z."""
+        free_run, size = self.free_run, largest.size
+        u0 = np.array([record.u[0] for record in free_run.records])
+        x = _placed(candidate, largest)
+        at = free_run.linearised(largest._replace(rest=False), x)
+        jacobian, residual = at.jacobian / free_run.units(largest), at.residual
+        shift = _shift_columns(largest, u0)
+        jacobian[:, :size] += jacobian[:, size:] @ shift
+        x[size:] -= shift @ x[:size]
+        if rest:
+            residual = residual - jacobian[:, size:] @ x[size:]
+            jacobian, x = jacobian[:, :size], x[:size]
+        removable = np.arange(x.size) < size
+        if "feedthrough" in self.held:
+            removable[len(largest.terms)] = False
+        for subsets in best_subsets(jacobian, residual, x, removable):
+            for k in self._worth_refining(subsets, largest):
+                kept, unknowns = subsets.kept[k], subsets.x[k]
+                bic = information(float(subsets.cost[k]), free_run.n_samples, int(kept.sum()))
+                starts = (np.zeros(u0.size) if rest else unknowns[size:]) + shift @ unknowns[:size]
+                numbers = unknowns[:size][kept[:size]]
+                yield Prediction(bic, _of(largest, kept, rest), np.concatenate([numbers, starts]))
 
-    def _may_be(self, structure: Terms) -> bool:
-        return bool(structure.terms) and (structure.feedthrough or "feedthrough" not in self.held)
+    def _worth_refining(self, subsets: Subsets, largest: Terms) -> list[int]:
+        """The cheapest MET subsets that have a term, and the signs that are wanted."""
+        n_terms = len(largest.terms)
+        wanted = np.array([self.free_run.signs.get(term, 0) for term in largest.terms])
+        allowed = (subsets.x[:, :n_terms] * wanted >= 0.0).all(axis=1) & subsets.kept[:, :n_terms].any(axis=1)
+        return [int(k) for k in np.flatnonzero(allowed)[:MET]]
 
 
-def complete_structures(terms: Sequence[Term], most: int) -> list[tuple[Term, ...]]:
-    """Complete structures of `terms`, all of one size before any of the next, `most` of them."""
-    level: set[frozenset[Term]] = {frozenset()}
-    found: list[tuple[Term, ...]] = []
-    while level and len(found) < most:
-        level = {
-            structure | {term}
-            for structure in level
-            for term in terms
-            if term not in structure and term.divisors() <= structure
-        }
-        found += sorted(tuple(sorted(structure)) for structure in level)
-    return found[:most]
+def _placed(candidate: Candidate[Terms], largest: Terms) -> FloatArray:
+    """The unknowns of a candidate among those of `largest`, zero where it has none."""
+    own, size = candidate.structure, candidate.structure.size
+    values = dict(zip(_names(own), candidate.unknowns[:size].tolist(), strict=True))
+    return np.concatenate([[values.get(name, 0.0) for name in _names(largest)], candidate.unknowns[size:]])
 
 
-def preferred(found: Sequence[Candidate[Terms]], *, complete: bool) -> Candidate[Terms]:
-    """Step 4; only of a Duhem library is a complete structure preferred."""
+def _names(structure: Terms) -> list[Any]:
+    return [*structure.terms, *["feedthrough"] * structure.feedthrough, *["offset"] * structure.offset]
+
+
+def _shift_columns(largest: Terms, u0: FloatArray) -> FloatArray:
+    """The change of each record's first output, (n_records, size), with the numbers while its memory stays."""
+    columns = {"feedthrough": u0, "offset": np.ones(u0.size)}
+    return np.stack([columns.get(name, np.zeros(u0.size)) for name in _names(largest)], axis=1)
+
+
+def _of(largest: Terms, kept: npt.NDArray[np.bool_], rest: bool) -> Terms:
+    """The structure inside `largest` of the numbers kept."""
+    names = [name for name, is_kept in zip(_names(largest), kept.tolist(), strict=False) if is_kept]
+    terms = tuple(name for name in names if isinstance(name, Term))
+    return Terms(terms, "feedthrough" in names, "offset" in names, rest)
+
+
+def preferred(found: Sequence[Candidate[Terms]], letter: str) -> Candidate[Terms]:
+    """Step 4, for structures whose memory is called `letter`."""
     lowest = min(candidate.bic for candidate in found)
     best = min(found, key=lambda candidate: candidate.bic)
     rivals = [c for c in found if c.bic <= lowest + INDISTINCT or _is_as_good(c, best)]
-    return min(rivals, key=lambda c: (complete and not is_complete(c.structure.terms), c.structure.size, c.bic))
+    return min(rivals, key=lambda c: (c.n_parameters, not is_plain(c.structure, letter), c.bic))
+
+
+def pruned(free_run: FreeRun, candidate: Candidate[Terms], held: frozenset[str], tolerance: float) -> Candidate[Terms]:
+    """Step 5."""
+    structure = candidate.structure
+    for k in np.argsort(candidate.significance).tolist():
+        smaller = structure.without(k)
+        needed = not smaller.terms or ("feedthrough" in held and not smaller.feedthrough)
+        if candidate.significance[k] >= SIGNIFICANT:
+            break
+        if needed:
+            continue
+        start = np.delete(candidate.unknowns, k)
+        refined = free_run.refine(smaller, start[np.newaxis], tolerance=tolerance)
+        if refined is not None and refined.bic <= candidate.bic + INDISTINCT and refined.settles >= candidate.settles:
+            return pruned(free_run, refined, held, tolerance)
+    return candidate
 
 
 def _is_as_good(candidate: Candidate[Terms], best: Candidate[Terms]) -> bool:
-    return candidate.structure.size < best.structure.size and gap(candidate, best) < ALIKE
+    return candidate.n_parameters < best.n_parameters and gap(candidate, best) < ALIKE
 
 
 def gap(candidate: Candidate[Any], best: Candidate[Any]) -> float:

@@ -4,7 +4,8 @@ A structure has `size` numbers, those of the memory first, then a feedthrough an
 
     y = offset + feedthrough u + z
 
-The memory at the first sample is not among them: each record has its own.
+The memory at the first sample is not among them: each record has its own, unless the structure is at `rest` there.
+Then z is zero at the first sample of every record, so that y0 = offset + feedthrough u0 is no free number.
 """
 
 from collections.abc import Mapping
@@ -30,6 +31,15 @@ class Structure(Protocol):
         """How many numbers it has."""
         ...
 
+    @property
+    def rest(self) -> bool:
+        """Whether the memory is zero at the first sample of every record."""
+        ...
+
+    def output_at_rest(self, numbers: FloatArray, u0: float) -> FloatArray:
+        """Outputs (n_sets,) at the input `u0` where the memory is zero, of numbers (n_sets, size)."""
+        ...
+
     def units(self, record: Record, stroke: float) -> FloatArray:
         """What of each number moves the output by about a stroke, (size,)."""
         ...
@@ -39,7 +49,7 @@ class Structure(Protocol):
         ...
 
     def run(self, u: FloatArray, numbers: FloatArray, y0: FloatArray, bound: float) -> FloatArray:
-        """Outputs (n_sets, n_samples) of numbers (n_sets, size) from y0 (n_sets,), rows of inf where one escapes."""
+        """Outputs (n_sets, n_samples) of numbers (n_sets, size) from y0 (n_sets,), rows of inf where one diverges."""
         ...
 
 
@@ -49,6 +59,7 @@ class Terms(NamedTuple):
     terms: tuple[Term, ...]
     feedthrough: bool = False
     offset: bool = False
+    rest: bool = False
 
     @property
     def size(self) -> int:
@@ -73,6 +84,11 @@ class Terms(NamedTuple):
         wanted = np.array([signs.get(term, 0) for term in self.terms] + [0] * (self.feedthrough + self.offset))
         return np.where(wanted > 0, 0.0, -np.inf), np.where(wanted < 0, 0.0, np.inf)
 
+    def output_at_rest(self, numbers: FloatArray, u0: float) -> FloatArray:
+        """See `Structure`."""
+        feedthrough, offset = shifts(self, numbers)
+        return offset + feedthrough * u0
+
     def run(self, u: FloatArray, numbers: FloatArray, y0: FloatArray, bound: float) -> FloatArray:
         """See `Structure`."""
         feedthrough, offset = shifts(self, numbers)
@@ -88,6 +104,7 @@ class AnyExponent:
 
     feedthrough: bool = False
     offset: bool = False
+    rest: bool = False
 
     LOWEST, HIGHEST = 0.3, 10.0
 
@@ -106,6 +123,11 @@ class AnyExponent:
         lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
         lower[3], upper[3] = self.LOWEST, self.HIGHEST
         return lower, upper
+
+    def output_at_rest(self, numbers: FloatArray, u0: float) -> FloatArray:
+        """See `Structure`."""
+        feedthrough, offset = shifts(self, numbers)
+        return offset + feedthrough * u0
 
     def run(self, u: FloatArray, numbers: FloatArray, y0: FloatArray, bound: float) -> FloatArray:
         """See `Structure`."""

@@ -1,32 +1,34 @@
-"""What a law is worth on samples that it has not seen: its structure kept, its numbers fitted again."""
+"""The error of discovered laws on samples that the search for them has not seen."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from hysim.discovery._refinement import Candidate, FreeRun
+from hysim._parallel import Progress
+from hysim.discovery._refinement import DIVERGED, Candidate, FreeRun, Samples
 from hysim.identification.folds import folds
 from hysim.records import Record
 
-_WARM = 1e-7  # relative change of the cost: a left-out sample moves the optimum by little, and the rmse is an average
+Search = Callable[[tuple[Samples, ...]], Candidate[Any]]
+"""The law that is found in the outputs seen, (n_samples,) for each record."""
 
 
-def left_out_rmse(records: Sequence[Record], candidate: Candidate[Any], count: str | int) -> float:
-    """Rmse on samples that were left out of the fit [unit of y]; inf where the law diverges.
+def left_out_rmse(records: Sequence[Record], search: Search, count: str | int, progress: Progress) -> float:
+    """Rmse on samples that were left out of the search [unit of y]; inf where a law diverges.
 
-    The inputs are kept, only the residuals of the left-out samples are not seen. This judges the law, not the search
-    for its structure.
+    Each fold repeats the whole search, for structure and numbers. The inputs are kept, only the outputs of the
+    left-out samples are not seen. `progress` counts the folds.
     """
-    structure, edges = candidate.structure, np.cumsum([len(record) for record in records])
-    whole = FreeRun(tuple(records))
+    whole, edges = FreeRun(tuple(records)), np.cumsum([len(record) for record in records])
+    left_out = folds(count, whole.n_samples)
     errors = np.empty(whole.n_samples)
-    for left_out in folds(count, whole.n_samples):
-        weights = np.ones(whole.n_samples)
-        weights[left_out] = 0.0
-        seen = FreeRun(tuple(records), tuple(np.split(weights, edges[:-1])))
-        refined = seen.refine(structure, candidate.unknowns[np.newaxis], tolerance=_WARM)
-        if refined is None:
-            return float("inf")
-        errors[left_out] = whole.residuals(structure, refined.unknowns[np.newaxis])[0, left_out]
+    for done, samples in enumerate(left_out, 1):
+        seen = np.ones(whole.n_samples, dtype=bool)
+        seen[samples] = False
+        law = search(tuple(np.split(seen, edges[:-1])))
+        errors[samples] = whole.residuals(law.structure, law.unknowns[np.newaxis])[0, samples]
+        progress(done, len(left_out))
+    if np.abs(errors).max() >= DIVERGED:
+        return float("inf")
     return float(np.sqrt(np.mean(errors**2))) * whole.stroke

@@ -5,7 +5,7 @@
 | library | yes | only "bouc-wen" |
 | degree | yes, but not with a library of names | yes |
 | symmetry | yes | only "odd" |
-| signs, optimizer, derivative, cross_validate | yes | no |
+| signs, optimizer, derivative, initial, cross_validate | yes | no |
 | structure, mass, damping, stiffness | no | yes |
 | seed, progress | yes | yes |
 
@@ -25,6 +25,7 @@ DEFAULTS: dict[str, Any] = {
     "signs": None,
     "optimizer": "STLSQ",
     "derivative": "auto",
+    "initial": "auto",
     "cross_validate": None,
     "structure": None,
     "mass": None,
