@@ -3,6 +3,7 @@
 import json
 import os
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -84,6 +85,16 @@ def test_the_summary_has_the_law_its_verdict_and_every_number(hidden):
     names = [line.split(" = ")[0].strip() for line in lines if "+-" in line]
     assert names == [*TRUTH, "feedthrough", "offset", "gain"]
     assert lines[-1].strip() == f"cross-validated rmse {hidden.cv_rmse:.4g}"
+
+
+def test_warnings_are_printed_under_their_heading_and_stored(hidden):
+    assert "Warnings" not in replace(hidden, warnings=()).summary()
+    sentences = ("The first sentence.", "The second one.")
+    warned = replace(hidden, warnings=sentences)
+    assert warned.summary().splitlines()[-3:] == ["Warnings", *(f"  {each}" for each in sentences)]
+    assert " ".join(sentences) in str(warned)
+    assert Discovery.from_json(warned.to_json()) == warned
+    assert json.loads(warned.to_json())["discovery"]["fields"]["warnings"] == list(sentences)
 
 
 def test_the_verbs_take_what_was_found(hidden, record, tmp_path):

@@ -56,7 +56,9 @@ class Discovery:
         The optimizer's path from dense to sparse, each structure refined: for a Pareto figure. A structure whose free
         run diverges has a fit of -inf and a BIC of inf. Long records are thinned for the path.
     message : str
-        What else is to be said.
+        How the search ended; empty where there is nothing to add.
+    warnings : tuple of str
+        Reasons to doubt the law or its scores, one plain sentence each; empty where there are none.
     """
 
     model: Any
@@ -78,6 +80,7 @@ class Discovery:
     path_fit_percent: FloatArray
     path_bic: FloatArray
     message: str = ""
+    warnings: tuple[str, ...] = ()
 
     @property
     def latex(self) -> str:
@@ -98,6 +101,7 @@ class Discovery:
                 "route": self.route,
                 "held-out rmse": ", ".join(f"{name} {value:.4g}" for name, value in self.judgement.held_out.items()),
                 "cross-validated": "" if math.isnan(self.cv_rmse) else f"rmse {self.cv_rmse:.4g}",
+                "warnings": " ".join(self.warnings),
                 "search": self.message,
             },
         )
@@ -120,7 +124,9 @@ class Discovery:
         ]
         if not math.isnan(self.cv_rmse):
             lines.append(f"  cross-validated rmse {self.cv_rmse:.4g}")
-        return "\n".join(lines + [f"  {self.message}"] * bool(self.message))
+        lines += [f"  {self.message}"] * bool(self.message)
+        lines += ["Warnings"] * bool(self.warnings) + [f"  {warning}" for warning in self.warnings]
+        return "\n".join(lines)
 
     @property
     def _numbers(self) -> dict[str, float]:
