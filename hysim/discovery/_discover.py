@@ -19,8 +19,9 @@ from hysim import metrics
 from hysim._frozen import FloatArray
 from hysim._parallel import Progress
 from hysim.discovery import _laws, _pysindy
+from hysim.discovery._doubts import doubts
 from hysim.discovery._exponent import or_any_exponent
-from hysim.discovery._judgement import HYSTERESIS, UNSTABLE, Judgement, judge
+from hysim.discovery._judgement import HYSTERESIS, NO_STRUCTURE, Judgement, judge
 from hysim.discovery._library import FORMS, duhem_terms, memory_terms, named_terms, signs_of, symmetric
 from hysim.discovery._refinement import Candidate, FreeRun
 from hysim.discovery._result import Discovery
@@ -298,7 +299,7 @@ def _discovery(
         coefficients=found.coefficients,
         stderr=found.stderr,
         equation=found.equation,
-        verdict=judgement.verdict if not outcome.unstable else UNSTABLE,
+        verdict=judgement.verdict if not outcome.unstable else NO_STRUCTURE,
         route="output" if structure.feedthrough or structure.offset else "memory",
         scores={
             **_scores(candidate, records),
@@ -317,6 +318,7 @@ def _discovery(
         path_n_terms=np.array([len(structure.terms) for _, structure in outcome.path], dtype=float),
         path_fit_percent=np.array([scores["fit_percent"] for scores in path_scores]),
         path_bic=np.array([scores["bic"] for scores in path_scores]),
+        warnings=doubts(judgement),
     )
 
 
@@ -338,8 +340,7 @@ def _judged(records: tuple[Record, ...], candidate: Candidate[Any], letter: str,
             raise ValueError("the law diverges")
         return _laws.found(refined, some, letter).models
 
-    curved = isinstance(structure, AnyExponent) or any(term.rectified for term in structure.terms)
-    return judge(records, models, refit, single_valued=not curved)
+    return judge(records, models, refit)
 
 
 def _scores(candidate: Candidate[Any] | None, records: Sequence[Record]) -> dict[str, float]:

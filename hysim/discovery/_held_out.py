@@ -1,16 +1,20 @@
-"""A law and its linear rival on samples that they have not seen.
+"""A law and its rivals on samples that they have not seen.
 
 What is left out at a time is a record, if there are several; of one record a rate, if its cycles have several; else a
 cycle, if there are three; else a few blocks. The start of each record is always seen, since it tells the memory, or
-the state, at the first sample.
+the state, at the first sample. A part whose input goes beyond the range of all others is not left out, unless every
+part does: nothing is judged by what it says beyond the range that it has seen.
 
-An error on these samples is small enough if it is not above FACTOR times the error of the law on what it has seen,
-where records or rates are left out, or else times the noise. It is so too if it is not above UNEXPLAINED times what a
-curve without memory, a cubic of the input, leaves. Neither is asked where samples go beyond the range of those seen.
+The rivals are the linear plant, and the yardsticks that need no law. Of every residual a slow trend of each record is
+taken away before it counts: a drift is neither a fault of the law nor hysteresis.
+
+An error explains the samples if it is not above FACTOR times the error of the same model on what it has seen, where
+records or rates are left out, or else times the noise. It does so too if it is not above UNEXPLAINED times what a curve
+leaves.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Protocol
@@ -20,19 +24,20 @@ import numpy.typing as npt
 
 from hysim._cycles import TOLERANCE, complete_cycles
 from hysim._frozen import FloatArray
+from hysim.discovery import _yardsticks as yardsticks
 from hysim.discovery._rates import Samples, at_one_rate
 from hysim.discovery._rival import FLOOR, Rival
 from hysim.errors import SimulationError
 from hysim.identification.folds import folds as blocks
 from hysim.records import Record
 
+LAW, RIVAL, RELAXATIONS, PLAYS, CURVE = "law", "rival", "relaxations", "plays", "curve"
 FACTOR = 2.0
 UNEXPLAINED = 0.2
 
 _FOLDS = 5
 _START = 0.1  # of each record is always seen
 _INSIDE = 0.05  # spans of the input by which left-out samples may reach beyond the others
-_CURVE = 3
 
 
 class Law(Protocol):
@@ -47,47 +52,88 @@ Refit = Callable[[Sequence[Record], Sequence[FloatArray]], Sequence[Law]]
 """Laws, one for each record, fitted again where the weights (n_samples,) are not zero."""
 
 
+Model = Callable[[FloatArray], FloatArray]
+"""Outputs (n_samples,) at all samples, fitted again where the weights (n_samples,) are not zero."""
+
+
 @dataclass(frozen=True)
 class Trial:
-    """Rmse of law and rival on held-out samples, and what was left out at a time.
+    """Rmse of the law and its rivals by name, on held-out samples and on those seen, and what was left out at a time.
 
-    `enough` is the rmse that explains the samples, `floor` one below which nothing counts.
+    `noise` is the rmse of white noise in the outputs, `stroke` their range; all in the unit of y.
     """
 
-    law: float
-    rival: float
+    errors: Mapping[str, float]
+    seen: Mapping[str, float]
     by: str
-    enough: float
-    floor: float
+    noise: float
+    stroke: float
+
+    def explains(self, name: str) -> bool:
+        """Whether a model predicts the held-out samples nearly as well as those it has seen, or most of the memory."""
+        usual = self.seen[name] if self.by in ("record", "rate") else self.noise
+        return self.errors[name] <= max(FACTOR * usual, UNEXPLAINED * self.errors[CURVE]) + FLOOR * self.stroke
 
 
 def held_out(records: Sequence[Record], refit: Refit, linear: Rival | None) -> Trial:
-    """Fit law and rival again without some of the samples, and see what they say of these; nan for no rival."""
-    u, y = (np.concatenate([getattr(record, name) for record in records]) for name in ("u", "y"))
-    cuts = np.cumsum([len(record) for record in records])[:-1]
+    """Fit law and rivals again without some of the samples, and see what they say of these.
+
+    Without a linear rival, for lack of time, there are no relaxations either.
+    """
+    y = np.concatenate([record.y for record in records])
     by, left_out = _folds(records)
-    law, other, fitted, covered = [], [], [], True
-    for samples in left_out:
-        seen = np.ones(y.size)
-        seen[samples] = 0.0
-        weights = np.split(seen, cuts)
-        residual = y - _outputs(records, partial(refit, records, weights))
-        law.append(residual[samples])
-        fitted.append(residual[seen > 0.0])
-        if linear is not None:
-            other.append((y - np.concatenate(linear.refitted(records, weights).outputs(records)))[samples])
-        covered &= _covers(u[seen > 0.0], u[samples])
-    floor = FLOOR * float(np.ptp(y))
-    noise = _rms(fitted) if by in ("record", "rate") else _noise(records)
-    memory = float(np.std(y - np.polynomial.Polynomial.fit(u, y, _CURVE)(u)))
-    enough = max(FACTOR * noise, UNEXPLAINED * memory) + floor if covered else math.inf
-    return Trial(_rms(law), _rms(other), by, enough, floor)
+    held, seen = {}, {}
+    for name, model in _models(records, y, refit, linear).items():
+        residual, fitted = np.full(y.size, math.nan), []
+        for samples in left_out:
+            weights = np.ones(y.size)
+            weights[samples] = 0.0
+            left = y - model(weights)
+            residual[samples] = left[samples]
+            fitted.append(np.where(weights > 0.0, left, math.nan))
+        held[name] = _rms_about_trends(residual, records)
+        seen[name] = math.sqrt(np.mean([_rms_about_trends(each, records) ** 2 for each in fitted]))
+    return Trial(held, seen, by, _noise(records), float(np.ptp(y)))
 
 
-def _covers(seen: FloatArray, other: FloatArray) -> bool:
-    """Whether the inputs seen have about the range of the others: no law is judged by what it says beyond it."""
-    beyond = _INSIDE * float(np.ptp(np.append(seen, other)))
-    return bool(other.min() >= seen.min() - beyond and other.max() <= seen.max() + beyond)
+def _models(records: Sequence[Record], y: FloatArray, refit: Refit, linear: Rival | None) -> dict[str, Model]:
+    cuts = np.cumsum([len(record) for record in records])[:-1]
+
+    def law(weights: FloatArray) -> FloatArray:
+        """The free runs; inf where they cannot be fitted or diverge."""
+        try:
+            laws = refit(records, np.split(weights, cuts))
+            return np.concatenate([law.response(record.u) for law, record in zip(laws, records, strict=True)])
+        except (SimulationError, ValueError):
+            return np.full(y.size, math.inf)
+
+    found: dict[str, Model] = {LAW: law}
+    needed = {CURVE: yardsticks.curve, PLAYS: yardsticks.plays}
+    if linear is not None:
+        found[RIVAL] = lambda weights: np.concatenate(
+            linear.refitted(records, np.split(weights, cuts)).outputs(records)
+        )
+        needed[RELAXATIONS] = yardsticks.relaxations
+    for name, made in needed.items():
+        found[name] = partial(_of_yardstick, made(records), y)
+    return found
+
+
+def _of_yardstick(model: yardsticks.Yardstick, y: FloatArray, weights: FloatArray) -> FloatArray:
+    return model.outputs(y, weights)
+
+
+def _rms_about_trends(residual: FloatArray, records: Sequence[Record]) -> float:
+    """Rms of what is not nan, each record's about its own trend; inf where it is not finite."""
+    parts = []
+    for left, record in zip(np.split(residual, np.cumsum([len(each) for each in records])[:-1]), records, strict=True):
+        counts = ~np.isnan(left)
+        if not np.isfinite(left[counts]).all():
+            return math.inf
+        slow = yardsticks.trend(record)[counts]
+        if np.count_nonzero(counts) > slow.shape[1]:
+            parts.append(left[counts] - slow @ np.linalg.lstsq(slow, left[counts])[0])
+    return _rms(parts)
 
 
 def _folds(records: Sequence[Record]) -> tuple[str, list[Samples]]:
@@ -106,15 +152,15 @@ def _folds(records: Sequence[Record]) -> tuple[str, list[Samples]]:
             if len(parts) < 3:
                 by, parts = "block", blocks(min(2 * _FOLDS, lengths[0]), lengths[0])
     groups = [np.unique(np.concatenate(parts[k::_FOLDS])) for k in range(min(_FOLDS, len(parts)))]
-    return by, [group[kept[group]] for group in groups if kept[group].any()]
+    u = np.concatenate([record.u for record in records])
+    left_out = [group[kept[group]] for group in groups if kept[group].any()]
+    return by, [samples for samples in left_out if _covers(np.delete(u, samples), u[samples])] or left_out
 
 
-def _outputs(records: Sequence[Record], laws: Callable[[], Sequence[Law]]) -> FloatArray:
-    """Free runs of the laws one after the other; inf where they cannot be fitted or diverge."""
-    try:
-        return np.concatenate([law.response(record.u) for law, record in zip(laws(), records, strict=True)])
-    except (SimulationError, ValueError):
-        return np.full(sum(len(record) for record in records), math.inf)
+def _covers(seen: FloatArray, other: FloatArray) -> bool:
+    """Whether the inputs seen have about the range of the others."""
+    beyond = _INSIDE * float(np.ptp(np.append(seen, other)))
+    return bool(other.min() >= seen.min() - beyond and other.max() <= seen.max() + beyond)
 
 
 def _noise(records: Sequence[Record]) -> float:
