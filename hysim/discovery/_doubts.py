@@ -11,7 +11,7 @@ def doubts(judgement: Judgement) -> tuple[str, ...]:
     """Reasons to doubt a law, one sentence each, for `Discovery.warnings`."""
     errors = judgement.held_out
     law, plays, curve = errors[LAW], errors[PLAYS], errors[CURVE]
-    linear = min(errors.get(RIVAL, math.inf), errors.get(RELAXATIONS, math.inf))
+    linear = min((errors[name] for name in (RIVAL, RELAXATIONS) if not math.isnan(errors[name])), default=math.inf)
     found = []
     if not judgement.stable:
         found.append(

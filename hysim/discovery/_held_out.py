@@ -78,11 +78,12 @@ class Trial:
 def held_out(records: Sequence[Record], refit: Refit, linear: Rival | None) -> Trial:
     """Fit law and rivals again without some of the samples, and see what they say of these.
 
-    Without a linear rival, for lack of time, there are no relaxations either.
+    Without a linear rival, for lack of time, there are no relaxations either, and both errors are nan.
     """
     y = np.concatenate([record.y for record in records])
     by, left_out = _folds(records)
-    held, seen = {}, {}
+    held = dict.fromkeys((LAW, RIVAL, RELAXATIONS, PLAYS, CURVE), math.nan)
+    seen = held.copy()
     for name, model in _models(records, y, refit, linear).items():
         residual, fitted = np.full(y.size, math.nan), []
         for samples in left_out:

@@ -68,7 +68,7 @@ class Judgement:
     held_out : mapping
         Rmse on samples that were left out of the fit, about a slow trend of each record [unit of y]: ``"law"``;
         ``"rival"``, the linear plant; ``"relaxations"``, linear creep; ``"curve"``, a function of the input alone;
-        ``"plays"``, a superposition of functions of plays. Without time there are no linear models.
+        ``"plays"``, a superposition of functions of plays. Without time that of the linear ones is nan.
     held_out_by : str
         What was left out at a time: ``"record"``, ``"rate"``, ``"cycle"`` or ``"block"``.
     rates : array, shape (3,)
@@ -164,7 +164,7 @@ def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit) -> Judge
 def _verdict(trial: Trial, linear: Rival | None, single_valued: bool, spread: float) -> str:
     straight = linear is not None and linear.is_line
     still = _least(trial, [CURVE, *[RIVAL] * straight, *[LAW] * single_valued])
-    lagging = [name for name in (RELAXATIONS, *[RIVAL] * (not straight)) if name in trial.errors]
+    lagging = [RELAXATIONS, *[RIVAL] * (not straight)]
     turning = [PLAYS, *[LAW] * (not single_valued)]
     if still <= LEAST * trial.stroke or _least(trial, [*lagging, *turning]) >= BETTER * still:
         return NO_STRUCTURE
@@ -178,7 +178,8 @@ def _verdict(trial: Trial, linear: Rival | None, single_valued: bool, spread: fl
 
 
 def _least(trial: Trial, names: Sequence[str]) -> float:
-    return min((trial.errors[name] + FLOOR * trial.stroke for name in names), default=math.inf)
+    errors = (trial.errors[name] + FLOOR * trial.stroke for name in names)
+    return min((error for error in errors if not math.isnan(error)), default=math.inf)
 
 
 def _response(law: Law, record: Record) -> FloatArray | None:
