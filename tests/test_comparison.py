@@ -253,7 +253,7 @@ def test_what_was_not_cross_validated_has_no_verdict_on_it(table1):
     table = hs.compare({"a": hs.Line, "b": hs.SingleValued}, table1, cross_validate=None)
     assert table.winner is None
     assert table.probabilities == {}
-    assert table.verdict == "The BIC prefers a."
+    assert table.verdict == "The BIC prefers b."
     given = hs.compare({"a": hs.Line, "given": hs.Line(slope=0.02)}, table1, cross_validate=None)
     assert (given.winner, given.verdict) == (None, "")  # the one model that has an error would win by default
     with pytest.raises(ValueError, match="criterion must be"):

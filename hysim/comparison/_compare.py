@@ -8,7 +8,7 @@ its loop is.
 import math
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,8 +21,9 @@ from hysim.comparison._result import Comparison, ComparisonRow
 from hysim.errors import SimulationError
 from hysim.identification import Identification, identify
 from hysim.metrics import LoopMetrics, loop_metrics
-from hysim.models.candidates import candidates, is_identifiable
+from hysim.models.candidates import candidates, is_identifiable, is_searched
 from hysim.models.model import needs_time
+from hysim.models.search_space import Direct
 from hysim.records import Record
 from hysim.simulation import simulate
 
@@ -149,7 +150,7 @@ class _Protocol:
         record, measured = self.record, self.measured
         model = getattr(fitted, "model", fitted)
         y = simulate(model, record.t, record.u).y
-        loop = loop_metrics(record.u, y)
+        loop = _loop(model, record, y)
         residual = record.y - y
         rmse = metrics.rmse(record.y, y)
         is_fitted = fitted is not model
@@ -231,7 +232,7 @@ def _is_family(subject: Any) -> bool:
 def _at_the_start_of(record: Record, fitted: Identification, seed: int) -> Any:
     """The identified model, with the state at the first sample that suits another record best."""
     model = fitted.model
-    if not is_identifiable(model):
+    if not is_searched(model):
         return model
     space = model.search_space(record)
     state = set(space.state) & set(space.names)
@@ -239,6 +240,29 @@ def _at_the_start_of(record: Record, fitted: Identification, seed: int) -> Any:
         return model
     shared = {name: value for name, value in fitted.estimates.items() if name not in state}
     return identify(model, record, fixed=shared, seed=seed).model
+
+
+def _loop(model: Any, record: Record, y: FloatArray) -> LoopMetrics:
+    """The model's loop; that of a curve without memory has no width, whatever inputs its branches were sampled at."""
+    loop = loop_metrics(record.u, y)
+    if not isinstance(model, Direct):
+        return loop
+    curve, nothing = model.response(loop.u), np.zeros(loop.u.size)
+    return replace(
+        loop,
+        max_width=0.0,
+        mean_width=0.0,
+        mid_width=0.0,
+        area=0.0,
+        relative_width=0.0,
+        energy=0.0,
+        max_width_at=float(loop.u[0]),
+        orientation="none",
+        equivalent_damping=0.0 if loop.secant_stiffness > 0.0 else math.nan,
+        loading=curve,
+        unloading=curve,
+        width=nothing,
+    )
 
 
 def _rate_deviation(model: Any, record: Record, y: FloatArray) -> float:

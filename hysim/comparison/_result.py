@@ -161,9 +161,9 @@ class Comparison:
         Examples
         --------
         >>> import hysim as hs
-        >>> tab = hs.compare({"curve": hs.SingleValued, "line": hs.Line}, hs.datasets.table1())
+        >>> tab = hs.compare({"plays": hs.PrandtlIshlinskii, "one play": hs.Play}, hs.datasets.table1())
         >>> [row.name for row in tab.ranked("bic")], [row.name for row in tab.ranked("rmse")]
-        (['line', 'curve'], ['curve', 'line'])
+        (['one play', 'plays'], ['plays', 'one play'])
         """
         known = ("cv_rmse", "bic", "aic", "fpe", "rmse", "test_rmse")
         if criterion not in known:

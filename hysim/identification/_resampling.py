@@ -33,6 +33,12 @@ def left_out_errors(
     return found
 
 
+def rms_of_known(errors: FloatArray) -> float:
+    """Root mean square of the errors that are not nan; nan where all are."""
+    known = errors[~np.isnan(errors)]
+    return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
+
+
 def _left_out_errors(
     problem: Problem, noise: Noise, starts: FloatArray, left_out: Sequence[npt.NDArray[np.intp]]
 ) -> FloatArray:

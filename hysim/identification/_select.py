@@ -114,7 +114,7 @@ def select(
     >>> import hysim as hs
     >>> rec = hs.datasets.table1(dwell=1.0)
     >>> hs.select([hs.Line, hs.SingleValued], rec).name
-    'Line'
+    'SingleValued'
     """
     if criterion not in CRITERIA:
         raise ValueError(f"criterion must be one of {', '.join(CRITERIA)}, got {criterion!r}")

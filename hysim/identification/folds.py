@@ -1,7 +1,12 @@
 """Which samples are left out together in a cross-validation."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
+
+from hysim._cycles import TOLERANCE
+from hysim.records import Record
 
 
 def folds(count: str | int, n: int, *, name: str = "folds") -> list[npt.NDArray[np.intp]]:
@@ -21,3 +26,34 @@ def folds(count: str | int, n: int, *, name: str = "folds") -> list[npt.NDArray[
     if not isinstance(number, int) or isinstance(number, bool) or not 2 <= number <= n:
         raise ValueError(f'{name} must be "loo" or a number of blocks from 2 to {n}, got {count!r}')
     return np.array_split(np.arange(n), number)
+
+
+def left_out(cross_validate: str | int | None, records: Sequence[Record]) -> list[npt.NDArray[np.intp]]:
+    """Samples of each fold of records that follow each other, as `identify` is asked for them; none for None.
+
+    Raises
+    ------
+    ValueError
+        If `cross_validate` is unknown, or the records have too few samples or cycles, or are too few.
+    """
+    if cross_validate is None:
+        return []
+    cuts = [0, *np.cumsum([len(record) for record in records]).tolist()]
+    if cross_validate == "records":
+        if len(records) < 2:
+            raise ValueError('cross_validate="records" needs at least 2 records')
+        return np.split(np.arange(cuts[-1]), cuts[1:-1])
+    if cross_validate == "cycles":
+        return _cycles(records, cuts)
+    return folds(cross_validate, cuts[-1], name="cross_validate")
+
+
+def _cycles(records: Sequence[Record], cuts: Sequence[int]) -> list[npt.NDArray[np.intp]]:
+    """The samples between every second turning point of each record's input, but the first, which tell its state."""
+    found = []
+    for record, begin in zip(records, cuts, strict=False):
+        turns = record.reversals(TOLERANCE)[1::2]
+        found += [begin + samples for samples in np.split(np.arange(len(record)), turns)[1:]]
+    if not found:
+        raise ValueError('cross_validate="cycles" needs at least 2 cycles of the input')
+    return found

@@ -9,6 +9,7 @@ from typing import Any
 
 import hysim
 from hysim.models.model import every_family
+from hysim.models.search_space import Direct
 
 
 def candidates() -> dict[str, Any]:
@@ -29,6 +30,11 @@ def candidates() -> dict[str, Any]:
 
 def is_identifiable(subject: Any) -> bool:
     """Whether `identify` takes a class, a model or a structure."""
+    return isinstance(subject, Direct) or is_searched(subject)
+
+
+def is_searched(subject: Any) -> bool:
+    """Whether `identify` searches for the parameters of a class, a model or a structure."""
     return all(callable(getattr(subject, name, None)) for name in ("search_space", "regressors", "assemble"))
 
 

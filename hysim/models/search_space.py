@@ -7,7 +7,7 @@ affine are not searched: for given others, the best ones are the solution of a l
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 from hysim._frozen import FloatArray, frozen
 from hysim.records import Record
@@ -157,6 +157,31 @@ class Identifiable(Protocol):
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
         """Build the model from the user's parameters."""
+        ...
+
+
+class DirectFit(NamedTuple):
+    """A model that was fitted in one step.
+
+    The `model`; its effective number of parameters, `degrees_of_freedom`; and at each sample that it was fitted to the
+    standard error of its output for noise of standard deviation 1, `spread` (n,).
+    """
+
+    model: Any
+    degrees_of_freedom: float
+    spread: FloatArray
+
+
+@runtime_checkable
+class Direct(Protocol):
+    """A family without memory that is fitted in one step, not searched for: `identify` takes it too."""
+
+    def fitted(self, u: FloatArray, y: FloatArray) -> DirectFit:
+        """The fit to outputs `y` at inputs `u`, both of shape (n,)."""
+        ...
+
+    def response(self, u: FloatArray) -> FloatArray:
+        """Output at the inputs `u`, shape (n,)."""
         ...
 
 

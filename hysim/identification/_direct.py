@@ -1,0 +1,101 @@
+"""A family that is fitted in one step (`hysim.models.search_space.Direct`): the fit, and the result that describes it.
+
+It has no parameters with names, and so no standard errors; its number of parameters is that of its degrees of freedom,
+rounded. A sample that is left out is predicted by a fit that repeats every choice without it.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim import metrics
+from hysim._frozen import FloatArray
+from hysim.identification._diagnostics import whiteness
+from hysim.identification._resampling import rms_of_known
+from hysim.identification._result import Identification, Width
+from hysim.metrics.rows import LoopRows
+from hysim.models.search_space import Direct, Freedom
+from hysim.records import Record
+
+
+def refuse(family: Direct, freedom: Freedom, noise: str, intervals: str) -> None:
+    """Refuse what a fit in one step cannot do.
+
+    Raises
+    ------
+    ValueError
+        If parameters are fixed, freed or bounded, the noise is not normal, or intervals are asked for.
+    """
+    name = family.__name__ if isinstance(family, type) else type(family).__name__
+    if freedom.fixed or freedom.free or freedom.bounds:
+        raise ValueError(f"{name} has no parameters by name: leave out fixed=, free= and bounds=")
+    if noise != "gaussian":
+        raise ValueError(f'{name} is fitted by least squares: noise must be "gaussian", got {noise!r}')
+    if intervals != "linear":
+        raise ValueError(f'{name} has no parameters by name: intervals must be "linear", got {intervals!r}')
+
+
+def identified(
+    family: Direct, records: Sequence[Record], folds: Sequence[npt.NDArray[np.intp]], seed: int
+) -> Identification:
+    """The fit to all records together, described as a search is."""
+    u, y = (np.concatenate([getattr(record, name) for record in records]) for name in ("u", "y"))
+    fit = family.fitted(u, y)
+    residual = y - fit.model.response(u)
+    rmse, n_parameters = metrics.rmse(residual, 0.0 * residual), max(1, round(fit.degrees_of_freedom))
+    freedom = y.size - fit.degrees_of_freedom
+    sigma = float(np.sqrt(np.sum(residual**2) / freedom)) if freedom > 0.5 else float("nan")
+    errors = _left_out_errors(family, u, y, folds)
+    return Identification(
+        model=fit.model,
+        models=(fit.model,) * len(records),
+        estimates={},
+        stderr={},
+        intervals={},
+        interval_method="linear",
+        profiles={},
+        covariance=np.empty(0),  # JSON keeps no second axis of an empty matrix
+        condition=float("nan"),
+        redundant=(),
+        free_names=(),
+        n_parameters=n_parameters,
+        fit_percent=metrics.fit_percent(y, y - residual),
+        rmse=rmse,
+        fpe=metrics.fpe(residual, n_parameters),
+        aic=metrics.aic(residual, n_parameters),
+        bic=metrics.bic(residual, n_parameters),
+        noise="gaussian",
+        sigma=rmse,
+        log_likelihood=-0.5 * metrics.aic(residual, 0) - 0.5 * y.size,
+        least_squares=None,
+        residual=residual,
+        resolution=records[0].resolution,
+        response_stderr=sigma * fit.spread,
+        loop_width=_no_width(records[0]),
+        whiteness=whiteness(residual, n_parameters),
+        success=True,
+        message="fitted in one step",
+        cv_residual=errors,
+        cv_rmse=rms_of_known(errors),
+        seed=seed,
+    )
+
+
+def _left_out_errors(family: Direct, u: FloatArray, y: FloatArray, folds: Sequence[npt.NDArray[np.intp]]) -> FloatArray:
+    """Error of each sample, (n,), in the fit without its fold; nan where no fold has it."""
+    errors = np.full(y.size, np.nan)
+    for fold in folds:
+        kept = np.ones(y.size, dtype=bool)
+        kept[fold] = False
+        errors[fold] = y[fold] - family.fitted(u[kept], y[kept]).model.response(u[fold])
+    return errors
+
+
+def _no_width(record: Record) -> Width | None:
+    """The width of a curve's loop, which is zero; None where the record has no loop."""
+    try:
+        LoopRows(record.u)
+    except ValueError:  # there is no complete cycle
+        return None
+    return Width(value=0.0, lower=0.0, upper=0.0)
