@@ -21,6 +21,7 @@ from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
+from scipy import special
 
 from hysim._cycles import TOLERANCE, complete_cycles
 from hysim._frozen import FloatArray
@@ -37,6 +38,8 @@ UNEXPLAINED = 0.2
 
 _FOLDS = 5
 _START = 0.1  # of each record is always seen
+_PARTS = 8  # of each record, for the t test
+_DOUBT = 0.01  # probability of the t test below which a difference counts
 _INSIDE = 0.05  # spans of the input by which left-out samples may reach beyond the others
 
 
@@ -60,19 +63,34 @@ Model = Callable[[FloatArray], FloatArray]
 class Trial:
     """Rmse of the law and its rivals by name, on held-out samples and on those seen, and what was left out at a time.
 
-    `noise` is the rmse of white noise in the outputs, `stroke` their range; all in the unit of y.
+    `together` is the rmse of the plays fitted to all samples, `noise` that of white noise in the outputs, `stroke`
+    their range, and `parts` are rmse by name in parts of the held-out samples; all in the unit of y.
     """
 
     errors: Mapping[str, float]
     seen: Mapping[str, float]
+    together: float
     by: str
     noise: float
     stroke: float
+    parts: Mapping[str, FloatArray]
 
     def explains(self, name: str) -> bool:
-        """Whether a model predicts the held-out samples nearly as well as those it has seen, or most of the memory."""
+        """Whether a model predicts the held-out samples nearly as well as those it has seen, or most of the memory.
+
+        Plays have many numbers, and may have seen too little to predict another path of the input. They explain the
+        records where the same numbers fit all of them nearly as well as each of them alone.
+        """
         usual = self.seen[name] if self.by in ("record", "rate") else self.noise
-        return self.errors[name] <= max(FACTOR * usual, UNEXPLAINED * self.errors[CURVE]) + FLOOR * self.stroke
+        error = min(self.errors[name], self.together) if name == PLAYS else self.errors[name]
+        return error <= max(FACTOR * usual, UNEXPLAINED * self.errors[CURVE]) + FLOOR * self.stroke
+
+    def consistent(self, name: str, other: str) -> bool:
+        """Whether a model is better than another throughout: in the mean of the logarithms, by a t test of the parts."""
+        floor = FLOOR * self.stroke
+        gains = np.log((self.parts[other] + floor) / (self.parts[name] + floor))
+        spread = float(np.std(gains, ddof=1)) if gains.size > 1 else math.inf
+        return float(np.mean(gains)) * math.sqrt(gains.size) > float(special.stdtrit(gains.size - 1, 1.0 - _DOUBT)) * spread
 
 
 def held_out(records: Sequence[Record], refit: Refit, linear: Rival | None) -> Trial:
@@ -82,28 +100,29 @@ def held_out(records: Sequence[Record], refit: Refit, linear: Rival | None) -> T
     """
     y = np.concatenate([record.y for record in records])
     by, left_out = _folds(records)
-    held = dict.fromkeys((LAW, RIVAL, RELAXATIONS, PLAYS, CURVE), math.nan)
-    seen = held.copy()
-    for name, model in _models(records, y, refit, linear).items():
+    errors = dict.fromkeys((LAW, RIVAL, RELAXATIONS, PLAYS, CURVE), math.nan)
+    seen, parts = errors.copy(), {}
+    models = _models(records, y, refit, linear)
+    for name, model in models.items():
         residual, fitted = np.full(y.size, math.nan), []
         for samples in left_out:
             weights = np.ones(y.size)
             weights[samples] = 0.0
-            left = y - model(weights)
-            residual[samples] = left[samples]
-            fitted.append(np.where(weights > 0.0, left, math.nan))
-        held[name] = _rms_about_trends(residual, records)
-        seen[name] = math.sqrt(np.mean([_rms_about_trends(each, records) ** 2 for each in fitted]))
-    return Trial(held, seen, by, _noise(records), float(np.ptp(y)))
+            remaining = y - model(weights)
+            residual[samples] = remaining[samples]
+            fitted.extend(_about_trends(np.where(weights > 0.0, remaining, math.nan), records))
+        held = _about_trends(residual, records)
+        errors[name], seen[name] = _rms(held), _rms(fitted)
+        parts[name] = np.array([_rms([part]) for part in _in_parts(held, records)])
+    together = _about_trends(y - models[PLAYS](np.ones(y.size)), records)
+    return Trial(errors, seen, _rms(together), by, _noise(records), float(np.ptp(y)), parts)
 
 
 def _models(records: Sequence[Record], y: FloatArray, refit: Refit, linear: Rival | None) -> dict[str, Model]:
-    cuts = np.cumsum([len(record) for record in records])[:-1]
-
     def law(weights: FloatArray) -> FloatArray:
         """The free runs; inf where they cannot be fitted or diverge."""
         try:
-            laws = refit(records, np.split(weights, cuts))
+            laws = refit(records, _of_each(weights, records))
             return np.concatenate([law.response(record.u) for law, record in zip(laws, records, strict=True)])
         except (SimulationError, ValueError):
             return np.full(y.size, math.inf)
@@ -112,7 +131,7 @@ def _models(records: Sequence[Record], y: FloatArray, refit: Refit, linear: Riva
     needed = {CURVE: yardsticks.curve, PLAYS: yardsticks.plays}
     if linear is not None:
         found[RIVAL] = lambda weights: np.concatenate(
-            linear.refitted(records, np.split(weights, cuts)).outputs(records)
+            linear.refitted(records, _of_each(weights, records)).outputs(records)
         )
         needed[RELAXATIONS] = yardsticks.relaxations
     for name, made in needed.items():
@@ -124,17 +143,28 @@ def _of_yardstick(model: yardsticks.Yardstick, y: FloatArray, weights: FloatArra
     return model.outputs(y, weights)
 
 
-def _rms_about_trends(residual: FloatArray, records: Sequence[Record]) -> float:
-    """Rms of what is not nan, each record's about its own trend; inf where it is not finite."""
-    parts = []
-    for left, record in zip(np.split(residual, np.cumsum([len(each) for each in records])[:-1]), records, strict=True):
+def _about_trends(residual: FloatArray, records: Sequence[Record]) -> list[FloatArray]:
+    """The residual of each record about its own trend; nan where it is nan, and all of it where that is all trend."""
+    found = []
+    for left, record in zip(_of_each(residual, records), records, strict=True):
         counts = ~np.isnan(left)
-        if not np.isfinite(left[counts]).all():
-            return math.inf
         slow = yardsticks.trend(record)[counts]
-        if np.count_nonzero(counts) > slow.shape[1]:
-            parts.append(left[counts] - slow @ np.linalg.lstsq(slow, left[counts])[0])
-    return _rms(parts)
+        if np.count_nonzero(counts) <= slow.shape[1]:
+            left, counts = np.full(left.size, math.nan), np.zeros(left.size, dtype=bool)
+        elif np.isfinite(left[counts]).all():
+            left[counts] -= slow @ np.linalg.lstsq(slow, left[counts])[0]
+        found.append(left)
+    return found
+
+
+def _in_parts(held: Sequence[FloatArray], records: Sequence[Record]) -> list[FloatArray]:
+    """The residuals of consecutive samples, as many parts of each record as may be independent of each other."""
+    pieces = [piece for left in held for piece in np.array_split(left, _PARTS)]
+    return [piece[~np.isnan(piece)] for piece in pieces if np.count_nonzero(~np.isnan(piece)) > 1]
+
+
+def _of_each(values: FloatArray, records: Sequence[Record]) -> list[FloatArray]:
+    return np.split(values, np.cumsum([len(record) for record in records])[:-1])
 
 
 def _folds(records: Sequence[Record]) -> tuple[str, list[Samples]]:
@@ -155,7 +185,9 @@ def _folds(records: Sequence[Record]) -> tuple[str, list[Samples]]:
     groups = [np.unique(np.concatenate(parts[k::_FOLDS])) for k in range(min(_FOLDS, len(parts)))]
     u = np.concatenate([record.u for record in records])
     left_out = [group[kept[group]] for group in groups if kept[group].any()]
-    return by, [samples for samples in left_out if _covers(np.delete(u, samples), u[samples])] or left_out
+    left_out = [samples for samples in left_out if _covers(np.delete(u, samples), u[samples])] or left_out
+    inside = [samples[_is_inside(np.delete(u, samples), u[samples])] for samples in left_out]
+    return by, [samples for samples in inside if samples.size] or left_out
 
 
 def _covers(seen: FloatArray, other: FloatArray) -> bool:
@@ -164,10 +196,17 @@ def _covers(seen: FloatArray, other: FloatArray) -> bool:
     return bool(other.min() >= seen.min() - beyond and other.max() <= seen.max() + beyond)
 
 
+def _is_inside(seen: FloatArray, other: FloatArray) -> npt.NDArray[np.bool_]:
+    return (other >= seen.min()) & (other <= seen.max())
+
+
 def _noise(records: Sequence[Record]) -> float:
     """Rms of white noise as the third differences of the outputs show it, those of smooth outputs being small."""
     return _rms([np.diff(record.y, 3) for record in records]) / math.sqrt(20.0)
 
 
 def _rms(parts: Sequence[FloatArray]) -> float:
-    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) if parts else math.nan
+    """Root mean square of what is not nan."""
+    values = np.concatenate(parts) if parts else np.empty(0)
+    counts = values[~np.isnan(values)]
+    return float(np.sqrt(np.mean(counts**2))) if counts.size else math.nan

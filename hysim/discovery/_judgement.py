@@ -166,15 +166,18 @@ def _verdict(trial: Trial, linear: Rival | None, single_valued: bool, spread: fl
     still = _least(trial, [CURVE, *[RIVAL] * straight, *[LAW] * single_valued])
     lagging = [RELAXATIONS, *[RIVAL] * (not straight)]
     turning = [PLAYS, *[LAW] * (not single_valued)]
-    if still <= LEAST * trial.stroke or _least(trial, [*lagging, *turning]) >= BETTER * still:
+    moving = min([*lagging, *turning], key=lambda name: _least(trial, [name]))
+    if still <= LEAST * trial.stroke or _least(trial, [moving]) >= BETTER * still:
+        return NO_STRUCTURE
+    if not trial.consistent(moving, CURVE):
         return NO_STRUCTURE
     if not spread >= SEVERAL:
         return ONE_RATE
-    lag = _least(trial, [name for name in lagging if trial.explains(name)])
-    turn = _least(trial, [name for name in turning if trial.explains(name)])
-    if lag < BETTER * min(turn, still):
+    lag, turn = _least(trial, lagging), _least(trial, turning)
+    if _least(trial, [name for name in lagging if trial.explains(name)]) < BETTER * min(turn, still):
         return LAG
-    return HYSTERESIS if turn < BETTER * min(lag, still) else NO_STRUCTURE
+    explained = _least(trial, [name for name in turning if trial.explains(name)])
+    return HYSTERESIS if explained < BETTER * min(lag, still) else NO_STRUCTURE
 
 
 def _least(trial: Trial, names: Sequence[str]) -> float:

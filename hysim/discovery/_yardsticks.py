@@ -17,7 +17,7 @@ between both ends is a column for that record alone.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -25,6 +25,7 @@ from scipy.interpolate import BSpline
 
 from hysim._cycles import TOLERANCE
 from hysim._frozen import FloatArray
+from hysim.models._smoothing import smoothing_spline
 from hysim.models.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.transfer_function import TransferFunction
 from hysim.records import Record
@@ -35,7 +36,7 @@ _PLAYS = 10
 _POWERS = (1, 2, 3)
 _PER_DECADE = 2  # relaxations
 _PLACES = np.linspace(0.0, 1.0, 3)  # of g, in shares of the range of log tau
-_BENDS = 2  # highest degree of a trend
+_BENDS = 4  # highest degree of a trend
 _BRANCHES = 3  # of a record for each degree of its trend: a trend of fewer cannot be told from the loop
 _RIDGES = 10.0 ** np.arange(-12.0, 1.1, 0.5)  # in the largest squared singular value
 _MOST = 0.8  # degrees of freedom in samples
@@ -52,14 +53,21 @@ class Yardstick:
         What the numbers multiply, a constant excepted.
     held : array of bool, shape (n_columns,)
         Columns for what was before one record, whose numbers are held near zero.
+    u : array, shape (n_samples,), optional
+        Input of the smoothing spline that is fitted first; the columns have what it leaves.
     """
 
     columns: FloatArray
     held: np.ndarray
+    u: FloatArray | None = None
 
     def outputs(self, y: FloatArray, weights: FloatArray) -> FloatArray:
         """Outputs at all samples, the numbers fitted to `y` where the weights are not zero."""
         seen = weights > 0.0
+        if self.u is not None:
+            spline = smoothing_spline(self.u[seen], y[seen])
+            first = np.interp(self.u, spline.u, spline.y)
+            return first + replace(self, u=None).outputs(y - first, weights)
         means = self.columns[seen].mean(axis=0)
         sizes = np.linalg.norm(self.columns - self.columns.mean(axis=0), axis=0)
         sizes[sizes == 0.0] = 1.0
@@ -72,7 +80,7 @@ class Yardstick:
 
 def curve(records: Sequence[Record]) -> Yardstick:
     """A function of the input alone."""
-    return _yardstick([_spline(records), _trends(records)])
+    return _yardstick([_spline(records), _trends(records)], u=_inputs(records))
 
 
 def relaxations(records: Sequence[Record]) -> Yardstick:
@@ -86,13 +94,12 @@ def relaxations(records: Sequence[Record]) -> Yardstick:
         np.stack([_relaxed(record, float(tau)) for tau in times], axis=1) @ hats.T
         for record in records
     ]
-    inputs = np.concatenate([record.u for record in records])[:, np.newaxis]
-    return _yardstick([inputs, np.concatenate(parts), _trends(records)])
+    return _yardstick([_inputs(records)[:, np.newaxis], np.concatenate(parts), _trends(records)])
 
 
 def plays(records: Sequence[Record]) -> Yardstick:
     """A curve and functions of plays."""
-    u = np.concatenate([record.u for record in records])
+    u = _inputs(records)
     middle, reach = 0.5 * (u.max() + u.min()), 0.5 * float(np.ptp(u))
     positions, before = [], []
     for record in records:
@@ -101,7 +108,7 @@ def plays(records: Sequence[Record]) -> Yardstick:
         positions.append(0.5 * (high + low))
         before.append(high - low)
     powers = [np.concatenate(positions) ** power for power in _POWERS]
-    return _yardstick([_spline(records), *powers, _trends(records)], _apart(before))
+    return _yardstick([_spline(records), *powers, _trends(records)], _apart(before), u)
 
 
 def trend(record: Record) -> FloatArray:
@@ -110,12 +117,14 @@ def trend(record: Record) -> FloatArray:
     return np.asarray(legendre.legvander(np.linspace(-1.0, 1.0, len(record)), degree))
 
 
-def _yardstick(parts: Sequence[FloatArray], before: FloatArray | None = None) -> Yardstick:
+def _yardstick(
+    parts: Sequence[FloatArray], before: FloatArray | None = None, u: FloatArray | None = None
+) -> Yardstick:
     columns = np.concatenate([*parts, *([] if before is None else [before])], axis=1)
     held = np.zeros(columns.shape[1], dtype=bool)
     if before is not None:
         held[-before.shape[1] :] = True
-    return Yardstick(columns, held)
+    return Yardstick(columns, held, u)
 
 
 def _ridge(design: FloatArray, target: FloatArray, n: int) -> FloatArray:
@@ -135,7 +144,7 @@ def _ridge(design: FloatArray, target: FloatArray, n: int) -> FloatArray:
 
 def _spline(records: Sequence[Record]) -> FloatArray:
     """A cubic spline of the input with even knots, (n_samples, _SPLINES)."""
-    u = np.concatenate([record.u for record in records])
+    u = _inputs(records)
     inner = np.linspace(u.min(), u.max(), _SPLINES - _CUBIC + 1)
     knots = np.concatenate([np.full(_CUBIC, inner[0]), inner, np.full(_CUBIC, inner[-1])])
     return np.asarray(BSpline.design_matrix(u, knots, _CUBIC).toarray())
@@ -152,6 +161,10 @@ def _relaxed(record: Record, tau: float) -> FloatArray:
     """The input after a lag that is at rest at the first sample."""
     lag = TransferFunction(num=(1.0,), den=(tau, 1.0), hold="foh")
     return lag.response(record.u - record.u[0], record.sample_time)
+
+
+def _inputs(records: Sequence[Record]) -> FloatArray:
+    return np.concatenate([record.u for record in records])
 
 
 def _trends(records: Sequence[Record]) -> FloatArray:
