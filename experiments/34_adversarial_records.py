@@ -14,10 +14,13 @@ in every record, other rates and other samplings, and was not.
 import sys
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
+from matplotlib.patches import Patch
 
 import hysim as hs
 from hysim.plot import Figure, figure
@@ -33,6 +36,8 @@ HYSTERESIS, LAG, ONE_RATE, NONE = (
     "no structure found",
 )
 CYCLES = 4
+WORKERS = 2
+SMOKE = (20, 62)  # a curve and a backlash, both at two rates
 Array = np.ndarray
 Plant = Callable[[Array, float], Array]  # output at the samples of an input, from the input and the sample time [s]
 Row = dict[str, float | str | bool]
@@ -287,3 +292,72 @@ def row(case: Case, chosen: Set) -> Row:
         "warnings": " ".join(found.warnings),
         "seconds": seconds,
     }
+
+
+def main(smoke: bool = False) -> list[Row]:
+    """Discover from every record of both sets, and unless it is a smoke run write table, figure and result."""
+    start = time.perf_counter()
+    chosen = [case for case in cases() if not smoke or case.seed in SMOKE]
+    jobs = [(case, each) for each in (SETS[:1] if smoke else SETS) for case in chosen]
+    if smoke:
+        rows = [row(*job) for job in jobs]
+    else:
+        with ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn")) as pool:
+            rows = list(pool.map(row, *zip(*jobs, strict=True)))
+    for line in rows:
+        if not line["is_right"]:
+            print(f"wrong: {line['set']}, {line['kind']}, {line['waveform']}, {line['rates']} rates: {line['verdict']}")
+    numbers = summary(rows)
+    seconds = time.perf_counter() - start
+    for name, counts in numbers.items():
+        print(f"{name}: {counts}")
+    print(f"{len(rows)} discoveries in {seconds:.0f} s")
+    if not smoke:
+        write_results(RESULTS, rows, draw, {"seconds": seconds, "workers": WORKERS, **numbers})
+    return rows
+
+
+def summary(rows: Sequence[Row]) -> dict[str, dict[str, int]]:
+    """For each set: records, right verdicts, and each kind of wrong one."""
+    found = {}
+    for name in dict.fromkeys(str(line["set"]) for line in rows):
+        own = [line for line in rows if line["set"] == name]
+        hysteretic = [line for line in own if line["group"] == "hysteretic"]
+        found[name] = {
+            "records": len(own),
+            "right": sum(bool(line["is_right"]) for line in own),
+            "called hysteresis": sum(line["verdict"] == HYSTERESIS for line in own if line not in hysteretic),
+            "hysteresis lost": sum(not line["is_right"] for line in hysteretic),
+            "cannot tell at two rates": sum(line["verdict"] == ONE_RATE and line["rates"] == 2 for line in own),
+        }
+    return found
+
+
+def draw(rows: list[Row]) -> Figure:
+    """How often each kind of record has each verdict, both sets together; wrong verdicts are hatched."""
+    canvas = figure(height=5.6)
+    names = {1: "one rate", 2: "two rates"}
+    colours = {HYSTERESIS: "#D55E00", LAG: "#0072B2", ONE_RATE: "#BBBBBB", NONE: "#F0E442"}
+    for axes, (n_rates, title) in zip(canvas.subplots(1, 2, sharey=True), names.items(), strict=True):
+        for place, kind in enumerate(PLANTS):
+            left = 0
+            for verdict, colour in colours.items():
+                for right in (True, False):
+                    same = [
+                        line
+                        for line in rows
+                        if (line["kind"], line["rates"], line["verdict"], line["is_right"])
+                        == (kind, n_rates, verdict, right)
+                    ]
+                    axes.barh(place, len(same), left=left, color=colour, hatch="" if right else "////", edgecolor="w")
+                    left += len(same)
+        axes.set(title=title, xlabel="Records", yticks=range(len(PLANTS)), yticklabels=PLANTS)
+        axes.xaxis.get_major_locator().set_params(integer=True)
+    axes.invert_yaxis()
+    handles = [Patch(color=colour, label=verdict) for verdict, colour in colours.items()]
+    canvas.legend(handles=handles, loc="outside lower center", ncols=2)
+    return canvas
+
+
+if __name__ == "__main__":
+    main()

@@ -39,7 +39,7 @@ UNEXPLAINED = 0.2
 _FOLDS = 5
 _START = 0.1  # of each record is always seen
 _PARTS = 8  # of each record, for the t test
-_DOUBT = 0.01  # probability of the t test below which a difference counts
+_DOUBT = 0.05  # probability of the t test below which a difference counts
 _INSIDE = 0.05  # spans of the input by which left-out samples may reach beyond the others
 
 

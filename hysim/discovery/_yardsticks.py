@@ -30,7 +30,7 @@ from hysim.models.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.transfer_function import TransferFunction
 from hysim.records import Record
 
-_SPLINES = 24
+_SPLINES = 12
 _CUBIC = 3
 _PLAYS = 10
 _POWERS = (1, 2, 3)
@@ -40,7 +40,8 @@ _BENDS = 4  # highest degree of a trend
 _BRANCHES = 3  # of a record for each degree of its trend: a trend of fewer cannot be told from the loop
 _RIDGES = 10.0 ** np.arange(-12.0, 1.1, 0.5)  # in the largest squared singular value
 _MOST = 0.8  # degrees of freedom in samples
-_BEFORE = 0.1  # weight of the ridge on what was before a record, in the sizes of its columns
+_BEFORE = 0.1  # how strongly what was before a record is held near zero
+_SLOW = 1e-3  # the same of trends: the first samples of a record that is left out cannot tell them
 
 
 @dataclass(frozen=True)
@@ -51,14 +52,14 @@ class Yardstick:
     ----------
     columns : array, shape (n_samples, n_columns)
         What the numbers multiply, a constant excepted.
-    held : array of bool, shape (n_columns,)
-        Columns for what was before one record, whose numbers are held near zero.
+    held : array, shape (n_columns,)
+        How strongly each number is held near zero whatever the ridge, in squared sizes of its column.
     u : array, shape (n_samples,), optional
         Input of the smoothing spline that is fitted first; the columns have what it leaves.
     """
 
     columns: FloatArray
-    held: np.ndarray
+    held: FloatArray
     u: FloatArray | None = None
 
     def outputs(self, y: FloatArray, weights: FloatArray) -> FloatArray:
@@ -72,7 +73,7 @@ class Yardstick:
         sizes = np.linalg.norm(self.columns - self.columns.mean(axis=0), axis=0)
         sizes[sizes == 0.0] = 1.0
         columns, level = (self.columns - means) / sizes, float(y[seen].mean())
-        prior = np.sqrt(_BEFORE) * np.eye(sizes.size)[self.held]
+        prior = np.diag(np.sqrt(self.held))[self.held > 0.0]
         design = np.concatenate([columns[seen], prior])
         target = np.concatenate([y[seen] - level, np.zeros(len(prior))])
         return np.asarray(level + columns @ _ridge(design, target, int(seen.sum())))
@@ -80,7 +81,7 @@ class Yardstick:
 
 def curve(records: Sequence[Record]) -> Yardstick:
     """A function of the input alone."""
-    return _yardstick([_spline(records), _trends(records)], u=_inputs(records))
+    return _yardstick([_spline(records)], _trends(records), u=_inputs(records))
 
 
 def relaxations(records: Sequence[Record]) -> Yardstick:
@@ -94,7 +95,7 @@ def relaxations(records: Sequence[Record]) -> Yardstick:
         np.stack([_relaxed(record, float(tau)) for tau in times], axis=1) @ hats.T
         for record in records
     ]
-    return _yardstick([_inputs(records)[:, np.newaxis], np.concatenate(parts), _trends(records)])
+    return _yardstick([_inputs(records)[:, np.newaxis], np.concatenate(parts)], _trends(records))
 
 
 def plays(records: Sequence[Record]) -> Yardstick:
@@ -108,7 +109,7 @@ def plays(records: Sequence[Record]) -> Yardstick:
         positions.append(0.5 * (high + low))
         before.append(high - low)
     powers = [np.concatenate(positions) ** power for power in _POWERS]
-    return _yardstick([_spline(records), *powers, _trends(records)], _apart(before), u)
+    return _yardstick([_spline(records), *powers], _trends(records), _apart(before), u)
 
 
 def trend(record: Record) -> FloatArray:
@@ -118,13 +119,15 @@ def trend(record: Record) -> FloatArray:
 
 
 def _yardstick(
-    parts: Sequence[FloatArray], before: FloatArray | None = None, u: FloatArray | None = None
+    parts: Sequence[FloatArray],
+    trends: FloatArray,
+    before: FloatArray | None = None,
+    u: FloatArray | None = None,
 ) -> Yardstick:
-    columns = np.concatenate([*parts, *([] if before is None else [before])], axis=1)
-    held = np.zeros(columns.shape[1], dtype=bool)
-    if before is not None:
-        held[-before.shape[1] :] = True
-    return Yardstick(columns, held, u)
+    groups = [(np.concatenate(parts, axis=1), 0.0), (trends, _SLOW)]
+    groups += [] if before is None else [(before, _BEFORE)]
+    columns = np.concatenate([each for each, _ in groups], axis=1)
+    return Yardstick(columns, np.concatenate([np.full(each.shape[1], held) for each, held in groups]), u)
 
 
 def _ridge(design: FloatArray, target: FloatArray, n: int) -> FloatArray:
