@@ -213,7 +213,9 @@ def _sine(rng: np.random.Generator, samples: int) -> Array:
 
 def _sum_of_sines(rng: np.random.Generator, samples: int) -> Array:
     phase = 2.0 * np.pi * np.arange(CYCLES * samples + 1) / samples
-    parts = [np.sin(factor * phase + shift) for factor, shift in zip((0.5, 1.0, 1.75), rng.uniform(0, 6, 3), strict=True)]
+    parts = [
+        np.sin(factor * phase + shift) for factor, shift in zip((0.5, 1.0, 1.75), rng.uniform(0, 6, 3), strict=True)
+    ]
     u = np.sum(parts, axis=0)
     return u / np.abs(u).max()
 

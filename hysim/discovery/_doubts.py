@@ -15,11 +15,13 @@ def doubts(judgement: Judgement) -> tuple[str, ...]:
     found = []
     if not judgement.stable:
         found.append(
-            "The law diverges in free run, on the records or on steady cycles over their range: do not simulate with it."
+            "The law diverges in free run, on the records or on steady cycles over their range: do not simulate "
+            "with it."
         )
     if linear < BETTER * law:
         found.append(
-            f"A linear dynamic model predicts held-out samples better than the law (rmse {linear:.3g} against {law:.3g})."
+            f"A linear dynamic model predicts held-out samples better than the law (rmse {linear:.3g} against "
+            f"{law:.3g})."
         )
     if judgement.verdict == HYSTERESIS and plays < BETTER * law:
         found.append(
@@ -39,10 +41,11 @@ def _no_structure(judgement: Judgement, turning: float, linear: float, curve: fl
         )
     if set(judgement.explained_by) <= {CURVE}:
         return (
-            "No model predicts held-out samples well: the memory may be hysteresis followed by a lag, or a lag behind a "
-            "curve. Identify the law and the dynamics together, for instance as hs.Actuator."
+            "No model predicts held-out samples well: the memory may be hysteresis followed by a lag, or a lag "
+            "behind a curve. Identify the law and the dynamics together, for instance as hs.Actuator."
         )
     return (
         f"Models that know time and models that do not predict held-out samples about equally well (rmse {linear:.3g} "
-        f"and {turning:.3g}): noise hides what the rates could tell. Give more cycles, less noise, or rates further apart."
+        f"and {turning:.3g}): noise hides what the rates could tell. Record more cycles, or rates further "
+        "apart, with less noise."
     )

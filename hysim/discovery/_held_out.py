@@ -1,9 +1,9 @@
 """A law and its rivals on samples that they have not seen.
 
-What is left out at a time is a record, if there are several; of one record a rate, if its cycles have several; else a
-cycle, if there are three; else a few blocks. The start of each record is always seen, since it tells the memory, or
-the state, at the first sample. A part whose input goes beyond the range of all others is not left out, unless every
-part does: nothing is judged by what it says beyond the range that it has seen.
+What is left out at a time is a record, if there are several and none goes beyond the range of the others; of one
+record a rate, if its cycles have several; else a cycle, if there are three; else a few blocks. The start of each record
+is always seen, since it tells the memory, or the state, at the first sample. Samples beyond the range of the others do
+not count, unless all are: nothing is judged by what it says beyond the range that it has seen.
 
 The rivals are the linear plant, and the yardsticks that need no law. Of every residual a slow trend of each record is
 taken away before it counts: a drift is neither a fault of the law nor hysteresis.
@@ -86,11 +86,13 @@ class Trial:
         return error <= max(FACTOR * usual, UNEXPLAINED * self.errors[CURVE]) + FLOOR * self.stroke
 
     def consistent(self, name: str, other: str) -> bool:
-        """Whether a model is better than another throughout: in the mean of the logarithms, by a t test of the parts."""
+        """Whether a model is better than another in most parts: a t test of the logarithms of their rmse."""
         floor = FLOOR * self.stroke
         gains = np.log((self.parts[other] + floor) / (self.parts[name] + floor))
-        spread = float(np.std(gains, ddof=1)) if gains.size > 1 else math.inf
-        return float(np.mean(gains)) * math.sqrt(gains.size) > float(special.stdtrit(gains.size - 1, 1.0 - _DOUBT)) * spread
+        if gains.size < 2:
+            return True
+        student = float(special.stdtrit(gains.size - 1, 1.0 - _DOUBT))
+        return float(np.mean(gains)) * math.sqrt(gains.size) > student * float(np.std(gains, ddof=1))
 
 
 def held_out(records: Sequence[Record], refit: Refit, linear: Rival | None) -> Trial:
@@ -175,19 +177,25 @@ def _folds(records: Sequence[Record]) -> tuple[str, list[Samples]]:
     for begin, length in zip(begins, lengths, strict=True):
         kept[begin : begin + math.ceil(_START * length)] = False
     by, parts = "record", [begin + np.arange(length) for begin, length in zip(begins, lengths, strict=True)]
-    if len(records) == 1:
-        by, parts = "rate", at_one_rate(records[0])
-        if len(parts) == 1:
-            cycles = complete_cycles(records[0].u, TOLERANCE)[::-1]
-            by, parts = "cycle", [np.arange(*cycle.path.indices(lengths[0])) for cycle in cycles]
-            if len(parts) < 3:
-                by, parts = "block", blocks(min(2 * _FOLDS, lengths[0]), lengths[0])
-    groups = [np.unique(np.concatenate(parts[k::_FOLDS])) for k in range(min(_FOLDS, len(parts)))]
     u = np.concatenate([record.u for record in records])
+    if len(records) == 1:
+        by, parts = _folds_of(records[0])
+    elif not all(_covers(np.delete(u, samples), u[samples]) for samples in parts):
+        by, parts = "block", blocks(min(2 * _FOLDS * len(records), u.size), u.size)
+    groups = [np.unique(np.concatenate(parts[k::_FOLDS])) for k in range(min(_FOLDS, len(parts)))]
     left_out = [group[kept[group]] for group in groups if kept[group].any()]
     left_out = [samples for samples in left_out if _covers(np.delete(u, samples), u[samples])] or left_out
     inside = [samples[_is_inside(np.delete(u, samples), u[samples])] for samples in left_out]
     return by, [samples for samples in inside if samples.size] or left_out
+
+
+def _folds_of(record: Record) -> tuple[str, list[Samples]]:
+    """The parts of a single record: its rates, its cycles or blocks."""
+    parts = at_one_rate(record)
+    if len(parts) > 1:
+        return "rate", parts
+    cycles = [np.arange(*cycle.path.indices(len(record))) for cycle in complete_cycles(record.u, TOLERANCE)[::-1]]
+    return ("cycle", cycles) if len(cycles) > 2 else ("block", blocks(min(2 * _FOLDS, len(record)), len(record)))
 
 
 def _covers(seen: FloatArray, other: FloatArray) -> bool:

@@ -91,10 +91,7 @@ def relaxations(records: Sequence[Record]) -> Yardstick:
     n = max(2, int(np.ceil(_PER_DECADE * np.log10(longest / shortest))) + 1)
     times = np.geomspace(shortest, longest, n)
     hats = np.array([np.interp(np.linspace(0.0, 1.0, n), _PLACES, row) for row in np.eye(_PLACES.size)])
-    parts = [
-        np.stack([_relaxed(record, float(tau)) for tau in times], axis=1) @ hats.T
-        for record in records
-    ]
+    parts = [np.stack([_relaxed(record, float(tau)) for tau in times], axis=1) @ hats.T for record in records]
     return _yardstick([_inputs(records)[:, np.newaxis], np.concatenate(parts)], _trends(records))
 
 
