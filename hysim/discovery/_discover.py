@@ -62,7 +62,7 @@ def discover(
     The slope of the memory along the loading length, dL = ``|du|``, is regressed on a library of terms by PySINDy,
     from a dense law to a sparse one. Every structure on that path is refined by its error in free run, and the search
     goes on from there by taking terms away. Of the structures that the records cannot tell apart the one of fewest
-    numbers is taken. A linear dynamic model is fitted beside it, and both are judged on data they have not seen.
+    numbers is taken. Models without a law are fitted beside it, and all are judged on data they have not seen.
 
     Parameters
     ----------
@@ -107,16 +107,20 @@ def discover(
     Returns
     -------
     Discovery
-        Its verdict is
+        Its verdict is about the records. Beside the law it rests on models that need no library: a single-valued
+        curve, a linear plant, linear creep, and a superposition of functions of plays, all judged on held-out samples.
 
-        - ``"rate-independent hysteresis"``: under several rates the law predicts what it has not seen better than the
-          linear model, and predicts a rate it has not seen too;
-        - ``"linear lag"``: the linear model does;
+        - ``"rate-independent hysteresis"``: under several rates the law or the plays predict what they have not seen
+          better than all models that know time, and than the curve;
+        - ``"linear lag"``: a linear dynamic model does;
         - ``"cannot be told from one rate"``: there is a loop, but the input passes each place at one rate only, or
           there is no time. Under a triangle at one rate the output of a linear lag is a function of u, y and the
           direction, so on that record the lag *is* a rate-independent law;
-        - ``"no structure found"``: a single-valued law does as well, or neither model explains the records;
-        - ``"unstable"``: no law stays finite in free run.
+        - ``"no structure found"``: a single-valued curve does as well, since there is no loop or noise is wider; or
+          no model explains the records; or the law diverges in free run.
+
+        `Discovery.warnings` says which of these it is, that a linear model predicts better than the law, and that a
+        law describes the hysteresis only in part.
 
     Raises
     ------

@@ -34,7 +34,8 @@ def doubts(judgement: Judgement) -> tuple[str, ...]:
 
 
 def _no_structure(judgement: Judgement, turning: float, linear: float, curve: float) -> str:
-    if min(turning, linear) >= BETTER * curve or not judgement.rate_spread >= SEVERAL:
+    alike = min(turning, linear) >= BETTER * curve or (linear >= BETTER * curve and CURVE in judgement.explained_by)
+    if alike or not judgement.rate_spread >= SEVERAL:
         return (
             f"A single-valued curve of the input predicts held-out samples as well as a model with memory (rmse "
             f"{curve:.3g} against {min(turning, linear):.3g}): the records show no loop that is wider than their noise."

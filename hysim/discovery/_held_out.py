@@ -33,6 +33,7 @@ from hysim.identification.folds import folds as blocks
 from hysim.records import Record
 
 LAW, RIVAL, RELAXATIONS, PLAYS, CURVE = "law", "rival", "relaxations", "plays", "curve"
+_MEANS = "means"  # another curve; the better one counts
 FACTOR = 2.0
 UNEXPLAINED = 0.2
 
@@ -103,7 +104,8 @@ def held_out(records: Sequence[Record], refit: Refit, linear: Rival | None) -> T
     y = np.concatenate([record.y for record in records])
     by, left_out = _folds(records)
     errors = dict.fromkeys((LAW, RIVAL, RELAXATIONS, PLAYS, CURVE), math.nan)
-    seen, parts = errors.copy(), {}
+    seen = errors.copy()
+    parts: dict[str, FloatArray] = {}
     models = _models(records, y, refit, linear)
     for name, model in models.items():
         residual, fitted = np.full(y.size, math.nan), []
@@ -116,6 +118,9 @@ def held_out(records: Sequence[Record], refit: Refit, linear: Rival | None) -> T
         held = _about_trends(residual, records)
         errors[name], seen[name] = _rms(held), _rms(fitted)
         parts[name] = np.array([_rms([part]) for part in _in_parts(held, records)])
+    if errors[_MEANS] < errors[CURVE]:
+        errors[CURVE], seen[CURVE], parts[CURVE] = errors[_MEANS], seen[_MEANS], parts[_MEANS]
+    del errors[_MEANS]
     together = _about_trends(y - models[PLAYS](np.ones(y.size)), records)
     return Trial(errors, seen, _rms(together), by, _noise(records), float(np.ptp(y)), parts)
 
@@ -129,7 +134,8 @@ def _models(records: Sequence[Record], y: FloatArray, refit: Refit, linear: Riva
         except (SimulationError, ValueError):
             return np.full(y.size, math.inf)
 
-    found: dict[str, Model] = {LAW: law}
+    u = np.concatenate([record.u for record in records])
+    found: dict[str, Model] = {LAW: law, _MEANS: partial(yardsticks.means, u, y)}
     needed = {CURVE: yardsticks.curve, PLAYS: yardsticks.plays}
     if linear is not None:
         found[RIVAL] = lambda weights: np.concatenate(
@@ -205,7 +211,7 @@ def _covers(seen: FloatArray, other: FloatArray) -> bool:
 
 
 def _is_inside(seen: FloatArray, other: FloatArray) -> npt.NDArray[np.bool_]:
-    return (other >= seen.min()) & (other <= seen.max())
+    return np.asarray((other >= seen.min()) & (other <= seen.max()))
 
 
 def _noise(records: Sequence[Record]) -> float:

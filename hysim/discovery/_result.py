@@ -31,7 +31,7 @@ class Discovery:
     equation : str
         The law as text.
     verdict : str
-        ``"rate-independent hysteresis"``, ``"linear lag"``, ``"cannot be told from one rate"``, ``"unstable"`` or
+        ``"rate-independent hysteresis"``, ``"linear lag"``, ``"cannot be told from one rate"`` or
         ``"no structure found"``; see `discover`.
     route : {"memory", "output", "oscillator"}
         What the law takes the measured output for.
@@ -42,8 +42,8 @@ class Discovery:
     n_parameters : int
         What was fitted: the numbers of the law, and y0 of each record.
     judgement : Judgement
-        What the verdict rests on: the linear rival, errors on data that neither was fitted to, loop widths at other
-        rates, the dissipation.
+        What the verdict rests on: the linear rival, errors of all models on data that they were not fitted to, loop
+        widths at other rates, the dissipation.
     cv_rmse : float
         Cross-validated rmse [unit of y]; nan if it was not asked for, and for an oscillator.
     left_out : tuple of str

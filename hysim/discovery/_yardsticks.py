@@ -25,12 +25,12 @@ from scipy.interpolate import BSpline
 
 from hysim._cycles import TOLERANCE
 from hysim._frozen import FloatArray
-from hysim.models._smoothing import smoothing_spline
+from hysim.models._smoothing import equal_inputs, smoothing_spline
 from hysim.models.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.transfer_function import TransferFunction
 from hysim.records import Record
 
-_SPLINES = 12
+_SPLINES = 24  # or half as many as there are different inputs
 _CUBIC = 3
 _PLAYS = 10
 _POWERS = (1, 2, 3)
@@ -109,6 +109,17 @@ def plays(records: Sequence[Record]) -> Yardstick:
     return _yardstick([_spline(records), *powers], _trends(records), _apart(before), u)
 
 
+def means(u: FloatArray, y: FloatArray, weights: FloatArray) -> FloatArray:
+    """Outputs at all inputs of straight lines through the mean output at each different input that has a weight.
+
+    Where inputs repeat themselves, this curve has steps and kinks that no smooth one has.
+    """
+    seen = weights > 0.0
+    place = equal_inputs(u[seen])
+    counts = np.bincount(place)
+    return np.interp(u, np.bincount(place, u[seen]) / counts, np.bincount(place, y[seen]) / counts)
+
+
 def trend(record: Record) -> FloatArray:
     """Columns (n_samples, 1 + degree) of a slow drift of the record: the polynomials of time up to a degree."""
     degree = min(_BENDS, len(record.branches(TOLERANCE)) // _BRANCHES)
@@ -143,9 +154,10 @@ def _ridge(design: FloatArray, target: FloatArray, n: int) -> FloatArray:
 
 
 def _spline(records: Sequence[Record]) -> FloatArray:
-    """A cubic spline of the input with even knots, (n_samples, _SPLINES)."""
+    """A cubic spline of the input with even knots, (n_samples, n_splines)."""
     u = _inputs(records)
-    inner = np.linspace(u.min(), u.max(), _SPLINES - _CUBIC + 1)
+    n = min(_SPLINES, max(int(equal_inputs(u).max()) // 2, _CUBIC + 1))
+    inner = np.linspace(u.min(), u.max(), n - _CUBIC + 1)
     knots = np.concatenate([np.full(_CUBIC, inner[0]), inner, np.full(_CUBIC, inner[-1])])
     return np.asarray(BSpline.design_matrix(u, knots, _CUBIC).toarray())
 
