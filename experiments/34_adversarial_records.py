@@ -53,7 +53,7 @@ class Set:
     samples_per_cycle: int
 
 
-SETS = (Set("seen", 0, (1.0, 5.0), 60), Set("held back", 1000, (0.5, 2.0), 48))
+SETS = (Set("seen", 0, (1.0, 5.0), 60), Set("held back", 5000, (0.5, 2.0), 48))
 
 
 @dataclass(frozen=True)

@@ -117,7 +117,7 @@ def discover(
           there is no time. Under a triangle at one rate the output of a linear lag is a function of u, y and the
           direction, so on that record the lag *is* a rate-independent law;
         - ``"no structure found"``: a single-valued curve does as well, since there is no loop or noise is wider; or
-          no model explains the records; or the law diverges in free run.
+          no model explains the records; or the law diverges in free run, and the plays show no hysteresis.
 
         `Discovery.warnings` says which of these it is, that a linear model predicts better than the law, and that a
         law describes the hysteresis only in part.
@@ -303,7 +303,7 @@ def _discovery(
         coefficients=found.coefficients,
         stderr=found.stderr,
         equation=found.equation,
-        verdict=judgement.verdict if not outcome.unstable else NO_STRUCTURE,
+        verdict=NO_STRUCTURE if outcome.unstable and judgement.verdict != HYSTERESIS else judgement.verdict,
         route="output" if structure.feedthrough or structure.offset else "memory",
         scores={
             **_scores(candidate, records),

@@ -16,8 +16,8 @@ the noise leaves no such difference.
 3. Several rates. Of the models that explain what they have not seen: "linear lag" if a lagging one is better than all
    others, "rate-independent hysteresis" if a turning one is. Else "no structure found": the memory is neither, such as
    hysteresis followed by a lag, or noise hides what it is.
-4. A law whose free run leaves the finite numbers, on the records or on steady cycles over their range, is no law:
-   "no structure found".
+4. A law that diverges in free run, on the records or on steady cycles over their range, is no law: "no structure
+   found", unless the plays show at several rates that the records are hysteretic.
 """
 
 import math
@@ -142,8 +142,9 @@ def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit) -> Judge
     stable = all(_response(law, record) is not None for law, record in zip(laws, records, strict=True))
     stable = stable and loops[-1] is not None
     single_valued = all(loop is not None and loop.relative_width < LEAST for loop in loops)
+    verdict = _verdict(trial, linear, single_valued, spread)
     return Judgement(
-        verdict=_verdict(trial, linear, single_valued, spread) if stable else NO_STRUCTURE,
+        verdict=verdict if stable or verdict == HYSTERESIS else NO_STRUCTURE,
         rival=None if linear is None else linear.plants[longest],
         rival_offset=math.nan if linear is None else linear.offset,
         held_out=trial.errors,

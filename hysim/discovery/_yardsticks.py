@@ -32,6 +32,7 @@ from hysim.records import Record
 
 _SPLINES = 24  # or half as many as there are different inputs
 _CUBIC = 3
+_IN_MEAN = 6  # samples
 _PLAYS = 10
 _POWERS = (1, 2, 3)
 _PER_DECADE = 2  # relaxations
@@ -110,14 +111,22 @@ def plays(records: Sequence[Record]) -> Yardstick:
 
 
 def means(u: FloatArray, y: FloatArray, weights: FloatArray) -> FloatArray:
-    """Outputs at all inputs of straight lines through the mean output at each different input that has a weight.
+    """Outputs at all inputs of straight lines through mean outputs of neighbouring inputs that have a weight.
 
-    Where inputs repeat themselves, this curve has steps and kinks that no smooth one has.
+    Where inputs repeat themselves, this curve has steps and kinks that no smooth one has. A mean is that of several
+    samples: those of single ones would know the path of an input that another record repeats.
     """
     seen = weights > 0.0
-    place = equal_inputs(u[seen])
-    counts = np.bincount(place)
-    return np.interp(u, np.bincount(place, u[seen]) / counts, np.bincount(place, y[seen]) / counts)
+    order = np.argsort(u[seen], kind="stable")
+    place = equal_inputs(u[seen])[order]
+    new = np.append(True, np.diff(place) > 0)
+    begins = [0]
+    for k in range(1, order.size):
+        if new[k] and k - begins[-1] >= _IN_MEAN:
+            begins.append(k)
+    counts = np.diff([*begins, order.size])
+    at, levels = (np.add.reduceat(values[seen][order], begins) / counts for values in (u, y))
+    return np.interp(u, at, levels)
 
 
 def trend(record: Record) -> FloatArray:
