@@ -20,19 +20,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 from numpy.polynomial import legendre
 from scipy.interpolate import BSpline
 
 from hysim._cycles import TOLERANCE
 from hysim._frozen import FloatArray
-from hysim.models._smoothing import equal_inputs, smoothing_spline
 from hysim.models.prandtl_ishlinskii import PrandtlIshlinskii
+from hysim.models.static import SingleValued
 from hysim.models.transfer_function import TransferFunction
 from hysim.records import Record
 
 _SPLINES = 24  # or half as many as there are different inputs
 _CUBIC = 3
 _IN_MEAN = 6  # samples
+_EQUAL = 1e-9  # of the span: a sine computed twice differs by 1e-15
 _PLAYS = 10
 _POWERS = (1, 2, 3)
 _PER_DECADE = 2  # relaxations
@@ -67,8 +69,7 @@ class Yardstick:
         """Outputs at all samples, the numbers fitted to `y` where the weights are not zero."""
         seen = weights > 0.0
         if self.u is not None:
-            spline = smoothing_spline(self.u[seen], y[seen])
-            first = np.interp(self.u, spline.u, spline.y)
+            first = SingleValued.fitted(self.u[seen], y[seen]).model.response(self.u)
             return first + replace(self, u=None).outputs(y - first, weights)
         means = self.columns[seen].mean(axis=0)
         sizes = np.linalg.norm(self.columns - self.columns.mean(axis=0), axis=0)
@@ -118,15 +119,14 @@ def means(u: FloatArray, y: FloatArray, weights: FloatArray) -> FloatArray:
     """
     seen = weights > 0.0
     order = np.argsort(u[seen], kind="stable")
-    place = equal_inputs(u[seen])[order]
-    new = np.append(True, np.diff(place) > 0)
+    new = np.append(True, _steps(u[seen]))
     begins = [0]
     for k in range(1, order.size):
         if new[k] and k - begins[-1] >= _IN_MEAN:
             begins.append(k)
     counts = np.diff([*begins, order.size])
     at, levels = (np.add.reduceat(values[seen][order], begins) / counts for values in (u, y))
-    return np.interp(u, at, levels)
+    return np.asarray(np.interp(u, at, levels))
 
 
 def trend(record: Record) -> FloatArray:
@@ -165,10 +165,15 @@ def _ridge(design: FloatArray, target: FloatArray, n: int) -> FloatArray:
 def _spline(records: Sequence[Record]) -> FloatArray:
     """A cubic spline of the input with even knots, (n_samples, n_splines)."""
     u = _inputs(records)
-    n = min(_SPLINES, max(int(equal_inputs(u).max()) // 2, _CUBIC + 1))
+    n = min(_SPLINES, max(int(np.count_nonzero(_steps(u))) // 2, _CUBIC + 1))
     inner = np.linspace(u.min(), u.max(), n - _CUBIC + 1)
     knots = np.concatenate([np.full(_CUBIC, inner[0]), inner, np.full(_CUBIC, inner[-1])])
     return np.asarray(BSpline.design_matrix(u, knots, _CUBIC).toarray())
+
+
+def _steps(u: FloatArray) -> npt.NDArray[np.bool_]:
+    """Whether each sorted input differs from the one before it, (n_samples - 1,)."""
+    return np.asarray(np.diff(np.sort(u)) > _EQUAL * float(np.ptp(u)))
 
 
 def _positions(u: FloatArray, side: float) -> FloatArray:
