@@ -69,8 +69,8 @@ class Yardstick:
         """Outputs at all samples, the numbers fitted to `y` where the weights are not zero."""
         seen = weights > 0.0
         if self.u is not None:
-            first = SingleValued.fitted(self.u[seen], y[seen]).model.response(self.u)
-            return first + replace(self, u=None).outputs(y - first, weights)
+            first: FloatArray = SingleValued.fitted(self.u[seen], y[seen]).model.response(self.u)
+            return np.asarray(first + replace(self, u=None).outputs(y - first, weights))
         means = self.columns[seen].mean(axis=0)
         sizes = np.linalg.norm(self.columns - self.columns.mean(axis=0), axis=0)
         sizes[sizes == 0.0] = 1.0
