@@ -20,8 +20,9 @@ from hysim import metrics
 from hysim._frozen import FloatArray
 from hysim._parallel import Progress
 from hysim.discovery import _laws, _pysindy, arguments
+from hysim.discovery._doubts import doubts
 from hysim.discovery._exponent import or_any_exponent
-from hysim.discovery._judgement import HYSTERESIS, UNSTABLE, Judgement, judge
+from hysim.discovery._judgement import HYSTERESIS, NO_STRUCTURE, Judgement, judge
 from hysim.discovery._library import FORMS, duhem_terms, memory_terms, named_terms, signs_of, symmetric
 from hysim.discovery._refinement import Candidate, FreeRun, Samples
 from hysim.discovery._result import Discovery
@@ -62,7 +63,7 @@ def discover(
     The slope of the memory along the loading length, dL = ``|du|``, is regressed on a library of terms by PySINDy,
     from a dense law to a sparse one. Every structure on that path is refined by its error in free run, and the search
     goes on among all smaller structures of the library. Of the structures that the records cannot tell apart the one of
-    fewest numbers is taken. A linear dynamic model is fitted beside it, and both are judged on data they have not seen.
+    fewest numbers is taken. Models without a law are fitted beside it, and all are judged on data they have not seen.
 
     Parameters
     ----------
@@ -113,16 +114,20 @@ def discover(
     Returns
     -------
     Discovery
-        Its verdict is
+        Its verdict is about the records. Beside the law it rests on models that need no library: a single-valued
+        curve, a linear plant, linear creep, and a superposition of functions of plays, all judged on held-out samples.
 
-        - ``"rate-independent hysteresis"``: under several rates the law predicts what it has not seen better than the
-          linear model, and predicts a rate it has not seen too;
-        - ``"linear lag"``: the linear model does;
+        - ``"rate-independent hysteresis"``: under several rates the law or the plays predict what they have not seen
+          better than all models that know time, and than the curve;
+        - ``"linear lag"``: a linear dynamic model does;
         - ``"cannot be told from one rate"``: there is a loop, but the input passes each place at one rate only, or
           there is no time. Under a triangle at one rate the output of a linear lag is a function of u, y and the
           direction, so on that record the lag *is* a rate-independent law;
-        - ``"no structure found"``: a single-valued law does as well, or neither model explains the records;
-        - ``"unstable"``: no law stays finite in free run.
+        - ``"no structure found"``: a single-valued curve does as well, since there is no loop or noise is wider; or
+          no model explains the records; or the law diverges in free run, and the plays show no hysteresis.
+
+        `Discovery.warnings` says which of these it is, that a linear model predicts better than the law, and that a
+        law describes the hysteresis only in part.
 
     Raises
     ------
@@ -337,7 +342,7 @@ def _discovery(
         coefficients=found.coefficients,
         stderr=found.stderr,
         equation=found.equation,
-        verdict=judgement.verdict if not outcome.unstable else UNSTABLE,
+        verdict=NO_STRUCTURE if outcome.unstable and judgement.verdict != HYSTERESIS else judgement.verdict,
         route="output" if structure.feedthrough or structure.offset else "memory",
         scores={
             **_scores(candidate, records),
@@ -360,6 +365,7 @@ def _discovery(
         path_fit_percent=np.array([scores["fit_percent"] for scores in path_scores]),
         path_bic=np.array([scores["bic"] for scores in path_scores]),
         message=f"{letter} at the first sample is held at zero, its rest" if structure.rest else "",
+        warnings=doubts(judgement),
     )
 
 
@@ -383,8 +389,7 @@ def _judged(records: tuple[Record, ...], candidate: Candidate[Any], letter: str,
             raise ValueError("the law diverges")
         return _laws.found(refined, some, letter).models
 
-    curved = isinstance(structure, AnyExponent) or any(term.rectified for term in structure.terms)
-    return judge(records, models, refit, single_valued=not curved)
+    return judge(records, models, refit)
 
 
 def _scores(candidate: Candidate[Any] | None, records: Sequence[Record]) -> dict[str, float]:

@@ -1,38 +1,47 @@
-"""A law and its linear rival on samples that they have not seen.
+"""A law and its rivals on samples that they have not seen.
 
-What is left out at a time is a record, if there are several; of one record a rate, if its cycles have several; else a
-cycle, if there are three; else a few blocks. The start of each record is always seen, since it tells the memory, or
-the state, at the first sample.
+What is left out at a time is a record, if there are several and none goes beyond the range of the others; of one
+record a rate, if its cycles have several; else a cycle, if there are three; else a few blocks. The start of each record
+is always seen, since it tells the memory, or the state, at the first sample. Samples beyond the range of the others do
+not count, unless all are: nothing is judged by what it says beyond the range that it has seen.
 
-An error on these samples is small enough if it is not above FACTOR times the error of the law on what it has seen,
-where records or rates are left out, or else times the noise. It is so too if it is not above UNEXPLAINED times what a
-curve without memory, a cubic of the input, leaves. Neither is asked where samples go beyond the range of those seen.
+The rivals are the linear plant, and the yardsticks that need no law. Of every residual a slow trend of each record is
+taken away before it counts: a drift is neither a fault of the law nor hysteresis.
+
+An error explains the samples if it is not above FACTOR times the error of the same model on what it has seen, where
+records or rates are left out, or else times the noise. It does so too if it is not above UNEXPLAINED times what a curve
+leaves.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
+from scipy import special
 
 from hysim._cycles import TOLERANCE, complete_cycles
 from hysim._frozen import FloatArray
+from hysim.discovery import _yardsticks as yardsticks
 from hysim.discovery._rates import Samples, at_one_rate
 from hysim.discovery._rival import FLOOR, Rival
 from hysim.errors import SimulationError
 from hysim.identification.folds import folds as blocks
 from hysim.records import Record
 
+LAW, RIVAL, RELAXATIONS, PLAYS, CURVE = "law", "rival", "relaxations", "plays", "curve"
+_MEANS = "means"  # another curve; the better one counts
 FACTOR = 2.0
 UNEXPLAINED = 0.2
 
 _FOLDS = 5
 _START = 0.1  # of each record is always seen
+_PARTS = 8  # of each record, for the t test
+_DOUBT = 0.05  # probability of the t test below which a difference counts
 _INSIDE = 0.05  # spans of the input by which left-out samples may reach beyond the others
-_CURVE = 3
 
 
 class Law(Protocol):
@@ -47,47 +56,123 @@ Refit = Callable[[Sequence[Record], Sequence[FloatArray]], Sequence[Law]]
 """Laws, one for each record, fitted again where the weights (n_samples,) are not zero."""
 
 
+Model = Callable[[FloatArray], FloatArray]
+"""Outputs (n_samples,) at all samples, fitted again where the weights (n_samples,) are not zero."""
+
+
 @dataclass(frozen=True)
 class Trial:
-    """Rmse of law and rival on held-out samples, and what was left out at a time.
+    """Rmse of the law and its rivals by name, on held-out samples and on those seen, and what was left out at a time.
 
-    `enough` is the rmse that explains the samples, `floor` one below which nothing counts.
+    `together` is the rmse of the plays fitted to all samples, `noise` that of white noise in the outputs, `stroke`
+    their range, and `parts` are rmse by name in parts of the held-out samples; all in the unit of y.
     """
 
-    law: float
-    rival: float
+    errors: Mapping[str, float]
+    seen: Mapping[str, float]
+    together: float
     by: str
-    enough: float
-    floor: float
+    noise: float
+    stroke: float
+    parts: Mapping[str, FloatArray]
+
+    def explains(self, name: str) -> bool:
+        """Whether a model predicts the held-out samples nearly as well as those it has seen, or most of the memory.
+
+        Plays have many numbers, and may have seen too little to predict another path of the input. They explain the
+        records where the same numbers fit all of them nearly as well as each of them alone.
+        """
+        usual = self.seen[name] if self.by in ("record", "rate") else self.noise
+        error = min(self.errors[name], self.together) if name == PLAYS else self.errors[name]
+        return error <= max(FACTOR * usual, UNEXPLAINED * self.errors[CURVE]) + FLOOR * self.stroke
+
+    def consistent(self, name: str, other: str) -> bool:
+        """Whether a model is better than another in most parts: a t test of the logarithms of their rmse."""
+        floor = FLOOR * self.stroke
+        gains = np.log((self.parts[other] + floor) / (self.parts[name] + floor))
+        if gains.size < 2:
+            return True
+        student = float(special.stdtrit(gains.size - 1, 1.0 - _DOUBT))
+        return float(np.mean(gains)) * math.sqrt(gains.size) > student * float(np.std(gains, ddof=1))
 
 
 def held_out(records: Sequence[Record], refit: Refit, linear: Rival | None) -> Trial:
-    """Fit law and rival again without some of the samples, and see what they say of these; nan for no rival."""
-    u, y = (np.concatenate([getattr(record, name) for record in records]) for name in ("u", "y"))
-    cuts = np.cumsum([len(record) for record in records])[:-1]
+    """Fit law and rivals again without some of the samples, and see what they say of these.
+
+    Without a linear rival, for lack of time, there are no relaxations either, and both errors are nan.
+    """
+    y = np.concatenate([record.y for record in records])
     by, left_out = _folds(records)
-    law, other, fitted, covered = [], [], [], True
-    for samples in left_out:
-        seen = np.ones(y.size)
-        seen[samples] = 0.0
-        weights = np.split(seen, cuts)
-        residual = y - _outputs(records, partial(refit, records, weights))
-        law.append(residual[samples])
-        fitted.append(residual[seen > 0.0])
-        if linear is not None:
-            other.append((y - np.concatenate(linear.refitted(records, weights).outputs(records)))[samples])
-        covered &= _covers(u[seen > 0.0], u[samples])
-    floor = FLOOR * float(np.ptp(y))
-    noise = _rms(fitted) if by in ("record", "rate") else _noise(records)
-    memory = float(np.std(y - np.polynomial.Polynomial.fit(u, y, _CURVE)(u)))
-    enough = max(FACTOR * noise, UNEXPLAINED * memory) + floor if covered else math.inf
-    return Trial(_rms(law), _rms(other), by, enough, floor)
+    errors = dict.fromkeys((LAW, RIVAL, RELAXATIONS, PLAYS, CURVE), math.nan)
+    seen = errors.copy()
+    parts: dict[str, FloatArray] = {}
+    models = _models(records, y, refit, linear)
+    for name, model in models.items():
+        residual, fitted = np.full(y.size, math.nan), []
+        for samples in left_out:
+            weights = np.ones(y.size)
+            weights[samples] = 0.0
+            remaining = y - model(weights)
+            residual[samples] = remaining[samples]
+            fitted.extend(_about_trends(np.where(weights > 0.0, remaining, math.nan), records))
+        held = _about_trends(residual, records)
+        errors[name], seen[name] = _rms(held), _rms(fitted)
+        parts[name] = np.array([_rms([part]) for part in _in_parts(held, records)])
+    if errors[_MEANS] < errors[CURVE]:
+        errors[CURVE], seen[CURVE], parts[CURVE] = errors[_MEANS], seen[_MEANS], parts[_MEANS]
+    del errors[_MEANS]
+    together = _about_trends(y - models[PLAYS](np.ones(y.size)), records)
+    return Trial(errors, seen, _rms(together), by, _noise(records), float(np.ptp(y)), parts)
 
 
-def _covers(seen: FloatArray, other: FloatArray) -> bool:
-    """Whether the inputs seen have about the range of the others: no law is judged by what it says beyond it."""
-    beyond = _INSIDE * float(np.ptp(np.append(seen, other)))
-    return bool(other.min() >= seen.min() - beyond and other.max() <= seen.max() + beyond)
+def _models(records: Sequence[Record], y: FloatArray, refit: Refit, linear: Rival | None) -> dict[str, Model]:
+    def law(weights: FloatArray) -> FloatArray:
+        """The free runs; inf where they cannot be fitted or diverge."""
+        try:
+            laws = refit(records, _of_each(weights, records))
+            return np.concatenate([law.response(record.u) for law, record in zip(laws, records, strict=True)])
+        except (SimulationError, ValueError):
+            return np.full(y.size, math.inf)
+
+    u = np.concatenate([record.u for record in records])
+    found: dict[str, Model] = {LAW: law, _MEANS: partial(yardsticks.means, u, y)}
+    needed = {CURVE: yardsticks.curve, PLAYS: yardsticks.plays}
+    if linear is not None:
+        found[RIVAL] = lambda weights: np.concatenate(
+            linear.refitted(records, _of_each(weights, records)).outputs(records)
+        )
+        needed[RELAXATIONS] = yardsticks.relaxations
+    for name, made in needed.items():
+        found[name] = partial(_of_yardstick, made(records), y)
+    return found
+
+
+def _of_yardstick(model: yardsticks.Yardstick, y: FloatArray, weights: FloatArray) -> FloatArray:
+    return model.outputs(y, weights)
+
+
+def _about_trends(residual: FloatArray, records: Sequence[Record]) -> list[FloatArray]:
+    """The residual of each record about its own trend; nan where it is nan, and all of it where that is all trend."""
+    found = []
+    for left, record in zip(_of_each(residual, records), records, strict=True):
+        counts = ~np.isnan(left)
+        slow = yardsticks.trend(record)[counts]
+        if np.count_nonzero(counts) <= slow.shape[1]:
+            left, counts = np.full(left.size, math.nan), np.zeros(left.size, dtype=bool)
+        elif np.isfinite(left[counts]).all():
+            left[counts] -= slow @ np.linalg.lstsq(slow, left[counts])[0]
+        found.append(left)
+    return found
+
+
+def _in_parts(held: Sequence[FloatArray], records: Sequence[Record]) -> list[FloatArray]:
+    """The residuals of consecutive samples, as many parts of each record as may be independent of each other."""
+    pieces = [piece for left in held for piece in np.array_split(left, _PARTS)]
+    return [piece[~np.isnan(piece)] for piece in pieces if np.count_nonzero(~np.isnan(piece)) > 1]
+
+
+def _of_each(values: FloatArray, records: Sequence[Record]) -> list[FloatArray]:
+    return np.split(values, np.cumsum([len(record) for record in records])[:-1])
 
 
 def _folds(records: Sequence[Record]) -> tuple[str, list[Samples]]:
@@ -98,23 +183,35 @@ def _folds(records: Sequence[Record]) -> tuple[str, list[Samples]]:
     for begin, length in zip(begins, lengths, strict=True):
         kept[begin : begin + math.ceil(_START * length)] = False
     by, parts = "record", [begin + np.arange(length) for begin, length in zip(begins, lengths, strict=True)]
+    u = np.concatenate([record.u for record in records])
     if len(records) == 1:
-        by, parts = "rate", at_one_rate(records[0])
-        if len(parts) == 1:
-            cycles = complete_cycles(records[0].u, TOLERANCE)[::-1]
-            by, parts = "cycle", [np.arange(*cycle.path.indices(lengths[0])) for cycle in cycles]
-            if len(parts) < 3:
-                by, parts = "block", blocks(min(2 * _FOLDS, lengths[0]), lengths[0])
+        by, parts = _folds_of(records[0])
+    elif not all(_covers(np.delete(u, samples), u[samples]) for samples in parts):
+        by, parts = "block", blocks(min(2 * _FOLDS * len(records), u.size), u.size)
     groups = [np.unique(np.concatenate(parts[k::_FOLDS])) for k in range(min(_FOLDS, len(parts)))]
-    return by, [group[kept[group]] for group in groups if kept[group].any()]
+    left_out = [group[kept[group]] for group in groups if kept[group].any()]
+    left_out = [samples for samples in left_out if _covers(np.delete(u, samples), u[samples])] or left_out
+    inside = [samples[_is_inside(np.delete(u, samples), u[samples])] for samples in left_out]
+    return by, [samples for samples in inside if samples.size] or left_out
 
 
-def _outputs(records: Sequence[Record], laws: Callable[[], Sequence[Law]]) -> FloatArray:
-    """Free runs of the laws one after the other; inf where they cannot be fitted or diverge."""
-    try:
-        return np.concatenate([law.response(record.u) for law, record in zip(laws(), records, strict=True)])
-    except (SimulationError, ValueError):
-        return np.full(sum(len(record) for record in records), math.inf)
+def _folds_of(record: Record) -> tuple[str, list[Samples]]:
+    """The parts of a single record: its rates, its cycles or blocks."""
+    parts = at_one_rate(record)
+    if len(parts) > 1:
+        return "rate", parts
+    cycles = [np.arange(*cycle.path.indices(len(record))) for cycle in complete_cycles(record.u, TOLERANCE)[::-1]]
+    return ("cycle", cycles) if len(cycles) > 2 else ("block", blocks(min(2 * _FOLDS, len(record)), len(record)))
+
+
+def _covers(seen: FloatArray, other: FloatArray) -> bool:
+    """Whether the inputs seen have about the range of the others."""
+    beyond = _INSIDE * float(np.ptp(np.append(seen, other)))
+    return bool(other.min() >= seen.min() - beyond and other.max() <= seen.max() + beyond)
+
+
+def _is_inside(seen: FloatArray, other: FloatArray) -> npt.NDArray[np.bool_]:
+    return np.asarray((other >= seen.min()) & (other <= seen.max()))
 
 
 def _noise(records: Sequence[Record]) -> float:
@@ -123,4 +220,7 @@ def _noise(records: Sequence[Record]) -> float:
 
 
 def _rms(parts: Sequence[FloatArray]) -> float:
-    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) if parts else math.nan
+    """Root mean square of what is not nan."""
+    values = np.concatenate(parts) if parts else np.empty(0)
+    counts = values[~np.isnan(values)]
+    return float(np.sqrt(np.mean(counts**2))) if counts.size else math.nan

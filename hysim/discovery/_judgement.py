@@ -1,19 +1,23 @@
-"""Is a discovered law hysteresis, or a lag that looks like it?
+"""Is it hysteresis, a lag that looks like it, or nothing that these records could tell?
 
-Hysteresis is the part of memory that does not know time. A law without time and a linear plant with dynamics are fitted
-to the same records and judged on samples that both have not seen; under several rates one of them fails. Under one
-rate both may run well, and nothing can be said: a lag under a triangle is there a function of u, y and direction.
+Hysteresis is the part of memory that does not know time. Models of three kinds are fitted to the same records and
+judged on samples that none has seen (`_held_out`):
 
-The verdict, where better means an rmse on held-out samples below BETTER times the other's:
+    still     a curve, or a line: no memory
+    lagging   a linear plant of one or two poles, or relaxations: memory that knows time
+    turning   the law, or a superposition of plays: memory that knows the order of the extremes only
 
-1. "unstable": the law's free run leaves the finite numbers, on the records or on steady cycles over their range.
-2. One rate, or no time: "cannot be told from one rate" if the law has memory or a plant with dynamics is better than
-   it, else "no structure found".
-3. Several rates. "no structure found" if neither predicts well enough what it has not seen (`_held_out`). This is
-   memory that is neither, such as hysteresis followed by a lag. Else "linear lag" if the rival is better and has
-   dynamics; "no structure found" if a single-valued law or a line does as well as the law; "rate-independent
-   hysteresis" if the law is better than the rival. Where they do equally well, noise hides what the rates could
-   tell: "cannot be told from one rate".
+The plays need no library, so that the verdict is about the records and does not depend on whether the library has a
+good law for them. Better means an rmse on held-out samples below BETTER times the other's. A loop that is narrower than
+the noise leaves no such difference.
+
+1. Neither a lagging nor a turning model is better than the still ones: "no structure found".
+2. One rate, or no time: "cannot be told from one rate".
+3. Several rates. Of the models that explain what they have not seen: "linear lag" if a lagging one is better than all
+   others, "rate-independent hysteresis" if a turning one is. Else "no structure found": the memory is neither, such as
+   hysteresis followed by a lag, or noise hides what it is.
+4. A law that diverges in free run, on the records or on steady cycles over their range, is no law: "no structure
+   found", unless the plays show at several rates that the records are hysteretic.
 """
 
 import math
@@ -24,9 +28,9 @@ import numpy as np
 from hysim import metrics, signals
 from hysim._cycles import TOLERANCE, complete_cycles
 from hysim._frozen import FloatArray, frozen
-from hysim.discovery._held_out import Law, Refit, Trial, held_out
+from hysim.discovery._held_out import CURVE, LAW, PLAYS, RELAXATIONS, RIVAL, Law, Refit, Trial, held_out
 from hysim.discovery._rates import SEVERAL, rate_spread
-from hysim.discovery._rival import Rival, rival, steady_width
+from hysim.discovery._rival import FLOOR, Rival, rival, steady_width
 from hysim.errors import SimulationError
 from hysim.models.transfer_function import TransferFunction
 from hysim.records import Record
@@ -34,11 +38,12 @@ from hysim.records import Record
 HYSTERESIS = "rate-independent hysteresis"
 LAG = "linear lag"
 ONE_RATE = "cannot be told from one rate"
-UNSTABLE = "unstable"
 NO_STRUCTURE = "no structure found"
 
 RATES = (0.1, 1.0, 10.0)
 BETTER = 0.9
+LEAST = 1e-4
+"""Strokes by which a memory must show: no measured input is known more exactly."""
 
 _THINNED = 1000  # samples of all records together, beyond which fewer are judged
 _PER_BRANCH = 32  # samples of a typical branch that thinning leaves: a sine's extreme is then right to 1.2e-3
@@ -53,7 +58,7 @@ class Judgement:
     Parameters
     ----------
     verdict : str
-        ``"rate-independent hysteresis"``, ``"linear lag"``, ``"cannot be told from one rate"``, ``"unstable"`` or
+        ``"rate-independent hysteresis"``, ``"linear lag"``, ``"cannot be told from one rate"`` or
         ``"no structure found"``.
     rival : TransferFunction or None
         The linear plant fitted to the same records, with the initial state of the longest one; of degree 0 where a
@@ -61,7 +66,9 @@ class Judgement:
     rival_offset : float
         What is added to its output [unit of y].
     held_out : mapping
-        ``"law"`` and ``"rival"`` to the rmse on samples that were left out of the fit [unit of y].
+        Rmse on samples that were left out of the fit, about a slow trend of each record [unit of y]: ``"law"``;
+        ``"rival"``, the linear plant; ``"relaxations"``, linear creep; ``"curve"``, a function of the input alone;
+        ``"plays"``, a superposition of functions of plays. Without time that of the linear ones is nan.
     held_out_by : str
         What was left out at a time: ``"record"``, ``"rate"``, ``"cycle"`` or ``"block"``.
     rates : array, shape (3,)
@@ -76,6 +83,11 @@ class Judgement:
         Whether loops of a quarter, a half and three quarters of that range have areas of that sign too, or none.
     rate_spread : float
         How much the rate of the input differs between passes at the same input, from 1; nan without time.
+    stable : bool
+        Whether the law's free run stays finite, on the records and on steady cycles over their range.
+    explained_by : tuple of str
+        Names of the models in `held_out` that predict the held-out samples nearly as well as those they have seen, or
+        most of the memory.
     """
 
     verdict: str
@@ -88,10 +100,12 @@ class Judgement:
     dissipation: float
     one_sign: bool
     rate_spread: float
+    stable: bool = True
+    explained_by: tuple[str, ...] = ()
 
 
-def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, *, single_valued: bool) -> Judgement:
-    """Judge a law that was fitted to records beside a linear plant.
+def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit) -> Judgement:
+    """Judge a law that was fitted to records beside its rivals.
 
     Parameters
     ----------
@@ -102,8 +116,6 @@ def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, *, singl
         The law, once for each record: all is shared but the memory at the first sample.
     refit : callable
         ``refit(records, weights)`` gives such laws, fitted to the samples whose weights are not zero.
-    single_valued : bool
-        Whether the law is a curve without memory.
 
     Returns
     -------
@@ -116,7 +128,7 @@ def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, *, singl
     >>> u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=40)
     >>> law = hs.Duhem.from_terms({"u'": 1.0, "|u'| y": -1.0})
     >>> rec = hs.Record(u=u, y=law.response(u))
-    >>> judge([rec], [law], lambda recs, weights: [law], single_valued=False).verdict
+    >>> judge([rec], [law], lambda recs, weights: [law]).verdict
     'cannot be told from one rate'
     """
     timed = all(record.t is not None for record in records)
@@ -125,13 +137,17 @@ def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, *, singl
     linear = rival(records) if timed else None
     trial = held_out(records, refit, linear)
     longest = max(range(len(records)), key=lambda k: len(records[k]))
-    areas = _areas(laws[longest], records[longest].u)
+    loops = _loops(laws[longest], records[longest].u)
+    areas = np.array([math.nan if loop is None else _signed_area(loop) for loop in loops])
     stable = all(_response(law, record) is not None for law, record in zip(laws, records, strict=True))
+    stable = stable and loops[-1] is not None
+    single_valued = all(loop is not None and loop.relative_width < LEAST for loop in loops)
+    verdict = _verdict(trial, linear, single_valued, spread)
     return Judgement(
-        verdict=_verdict(trial, linear, single_valued, spread) if stable and math.isfinite(areas[-1]) else UNSTABLE,
+        verdict=verdict if stable or verdict == HYSTERESIS else NO_STRUCTURE,
         rival=None if linear is None else linear.plants[longest],
         rival_offset=math.nan if linear is None else linear.offset,
-        held_out={"law": trial.law, "rival": trial.rival},
+        held_out=trial.errors,
         held_out_by=trial.by,
         rates=np.array(RATES),
         widths={
@@ -141,21 +157,33 @@ def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, *, singl
         dissipation=float(areas[-1]),
         one_sign=bool((areas * areas[-1] >= 0.0).all()),
         rate_spread=spread,
+        stable=stable,
+        explained_by=tuple(name for name in trial.errors if trial.explains(name)),
     )
 
 
 def _verdict(trial: Trial, linear: Rival | None, single_valued: bool, spread: float) -> str:
-    law, other = trial.law + trial.floor, trial.rival + trial.floor
-    lagging = linear is not None and not linear.is_line and other < BETTER * law
+    straight = linear is not None and linear.is_line
+    still = _least(trial, [CURVE, *[RIVAL] * straight, *[LAW] * single_valued])
+    lagging = [RELAXATIONS, *[RIVAL] * (not straight)]
+    turning = [PLAYS, *[LAW] * (not single_valued)]
+    moving = min([*lagging, *turning], key=lambda name: _least(trial, [name]))
+    if still <= LEAST * trial.stroke or _least(trial, [moving]) >= BETTER * still:
+        return NO_STRUCTURE
+    if not trial.consistent(moving, CURVE):
+        return NO_STRUCTURE
     if not spread >= SEVERAL:
-        return ONE_RATE if lagging or not single_valued else NO_STRUCTURE
-    if min(law, other) > trial.enough:
-        return NO_STRUCTURE
-    if lagging:
+        return ONE_RATE
+    lag, turn = _least(trial, lagging), _least(trial, turning)
+    if _least(trial, [name for name in lagging if trial.explains(name)]) < BETTER * min(turn, still):
         return LAG
-    if single_valued or other < BETTER * law:
-        return NO_STRUCTURE
-    return HYSTERESIS if law < BETTER * other else ONE_RATE
+    explained = _least(trial, [name for name in turning if trial.explains(name)])
+    return HYSTERESIS if explained < BETTER * min(lag, still) else NO_STRUCTURE
+
+
+def _least(trial: Trial, names: Sequence[str]) -> float:
+    errors = (trial.errors[name] + FLOOR * trial.stroke for name in names)
+    return min((error for error in errors if not math.isnan(error)), default=math.inf)
 
 
 def _response(law: Law, record: Record) -> FloatArray | None:
@@ -180,20 +208,22 @@ def _rival_widths(linear: Rival | None, k: int, record: Record) -> tuple[float, 
     return tuple(steady_width(linear.plants[k], record[cycles[0].path], rate) for rate in RATES)
 
 
-def _areas(law: Law, u: FloatArray) -> FloatArray:
-    """Signed areas of steady loops of a quarter of the input's range to all of it, around its middle."""
+def _loops(law: Law, u: FloatArray) -> list[metrics.LoopMetrics | None]:
+    """Steady loops of a quarter of the input's range to all of it, around its middle; None where the law diverges."""
     middle, reach = 0.5 * (u.max() + u.min()), 0.5 * float(np.ptp(u))
-    areas = np.full(len(_AMPLITUDES), math.nan)
-    for k, share in enumerate(_AMPLITUDES):
+    loops: list[metrics.LoopMetrics | None] = []
+    for share in _AMPLITUDES:
         cycles = signals.triangle(middle - share * reach, middle + share * reach, cycles=_CYCLES, samples_per_cycle=64)
         path = np.append(u[0], cycles)
         try:
-            y = law.response(path)[1:]
+            loops.append(metrics.loop_metrics(cycles, law.response(path)[1:]))
         except SimulationError:
-            continue
-        loop = metrics.loop_metrics(cycles, y)
-        areas[k] = {"counterclockwise": loop.area, "clockwise": -loop.area, "none": 0.0}[loop.orientation]
-    return areas
+            loops.append(None)
+    return loops
+
+
+def _signed_area(loop: metrics.LoopMetrics) -> float:
+    return {"counterclockwise": loop.area, "clockwise": -loop.area, "none": 0.0}[loop.orientation]
 
 
 def _even(record: Record) -> Record:

@@ -33,7 +33,7 @@ class Discovery:
     equation : str
         The law as text.
     verdict : str
-        ``"rate-independent hysteresis"``, ``"linear lag"``, ``"cannot be told from one rate"``, ``"unstable"`` or
+        ``"rate-independent hysteresis"``, ``"linear lag"``, ``"cannot be told from one rate"`` or
         ``"no structure found"``; see `discover`.
     route : {"memory", "output", "oscillator"}
         What the law takes the measured output for.
@@ -45,8 +45,8 @@ class Discovery:
         Fitted numbers: those of the law, and the initial state of each record where it is free. A state of rest, which
         is zero, is none.
     judgement : Judgement
-        What the verdict rests on: the linear rival, errors on data that neither was fitted to, loop widths at other
-        rates, the dissipation.
+        What the verdict rests on: the linear rival, errors of all models on data that they were not fitted to, loop
+        widths at other rates, the dissipation.
     cv_rmse : float
         Cross-validated rmse [unit of y], the whole search repeated for each fold; nan if it was not asked for, and for
         an oscillator.

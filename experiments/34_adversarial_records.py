@@ -1,0 +1,365 @@
+"""Is the verdict of `discover` right on records that are made to mislead it?
+
+One hundred records whose truth is known: curves without memory, linear dynamics and drift, hysteresis. They are driven
+by triangles, sines, sums of sines and fading sines, at one rate or at two, with 0 to 10 % of noise. A verdict is wrong
+
+- if a curve, linear dynamics or a drift is called hysteresis,
+- if hysteresis is not called that at two rates, or is called anything but "cannot be told from one rate" at one,
+- if two rates are called "cannot be told from one rate".
+
+The first set of records was looked at while the limits of the judgement were chosen. The second one has other numbers
+in every record, other rates and other samplings, and was not.
+"""
+
+import sys
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+from matplotlib.patches import Patch
+
+import hysim as hs
+from hysim.plot import Figure, figure
+
+sys.path.insert(0, str(Path(__file__).parent))
+from results_folder import write_results
+
+RESULTS = Path(__file__).parent / "results" / "adversarial_records"
+HYSTERESIS, LAG, ONE_RATE, NONE = (
+    "rate-independent hysteresis",
+    "linear lag",
+    "cannot be told from one rate",
+    "no structure found",
+)
+CYCLES = 4
+WORKERS = 2
+SMOKE = (20, 62)  # a curve and a backlash, both at two rates
+Array = np.ndarray
+Plant = Callable[[Array, float], Array]  # output at the samples of an input, from the input and the sample time [s]
+Row = dict[str, float | str | bool]
+
+
+@dataclass(frozen=True)
+class Set:
+    """What differs between the records that the limits were chosen with and those that were held back."""
+
+    name: str
+    seed: int
+    rates: tuple[float, float]  # [Hz]
+    samples_per_cycle: int
+
+
+SETS = (Set("seen", 0, (1.0, 5.0), 60), Set("held back", 5000, (0.5, 2.0), 48))
+
+
+@dataclass(frozen=True)
+class Case:
+    """One record, or one at each rate, and what is true of it."""
+
+    kind: str
+    group: str
+    waveform: str
+    n_rates: int
+    noise: float  # share of the output's standard deviation
+    seed: int
+
+    @property
+    def right(self) -> tuple[str, ...]:
+        """The verdicts that are right."""
+        if self.group == "curve":
+            return (NONE,)
+        if self.group == "linear":
+            return (NONE, LAG) if self.n_rates > 1 else (NONE, LAG, ONE_RATE)
+        return (HYSTERESIS,) if self.n_rates > 1 else (ONE_RATE,)
+
+    def records(self, chosen: Set) -> list[hs.Record]:
+        """The records, a plant and an input drawn from the seed."""
+        rng = np.random.default_rng((chosen.seed, self.seed))
+        plant = PLANTS[self.kind](rng)
+        path = WAVEFORMS[self.waveform](rng, chosen.samples_per_cycle)
+        found = []
+        for rate in chosen.rates[: self.n_rates]:
+            t = np.arange(path.size) / (chosen.samples_per_cycle * rate)
+            y = plant(path, float(t[1]))
+            noisy = y + self.noise * y.std() * rng.standard_normal(y.size)
+            found.append(hs.Record(u=path, y=noisy, t=t, name=f"{rate:g} Hz"))
+        return found
+
+
+def _curve(function: Callable[[Array], Array]) -> Callable[[np.random.Generator], Plant]:
+    """A plant that shows a function of the input, shifted and scaled at random."""
+
+    def made(rng: np.random.Generator) -> Plant:
+        shift, gain = rng.uniform(-0.2, 0.2), rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 2.0)
+        return lambda u, step: gain * function(u + shift)
+
+    return made
+
+
+def _delay(rng: np.random.Generator) -> Plant:
+    return _linear(hs.TransferFunction(num=(1.0,), den=(1.0,), delay=rng.uniform(0.01, 0.04), hold="foh"))
+
+
+def _lag(rng: np.random.Generator) -> Plant:
+    tau = rng.uniform(0.02, 0.1)
+    return _linear(hs.TransferFunction(num=(rng.uniform(0.0, 0.5) * tau, 1.0), den=(tau, 1.0), hold="foh"))
+
+
+def _resonance(rng: np.random.Generator) -> Plant:
+    omega, zeta = 2.0 * np.pi * rng.uniform(4.0, 12.0), rng.uniform(0.05, 0.5)
+    return _linear(hs.TransferFunction(num=(omega**2,), den=(1.0, 2.0 * zeta * omega, omega**2), hold="foh"))
+
+
+def _creep(rng: np.random.Generator) -> Plant:
+    times = np.geomspace(0.01, 100.0, 9)
+    weights = rng.uniform(0.02, 0.08) * np.ones(9)
+    parts = [
+        hs.TransferFunction(num=(float(weight),), den=(float(tau), 1.0), hold="foh")
+        for tau, weight in zip(times, weights, strict=True)
+    ]
+    return lambda u, step: u + sum(part.response(u - u[0], step) for part in parts)
+
+
+def _drift(rng: np.random.Generator) -> Plant:
+    """A line or a curve, and a trend that is straight, bends, or wanders."""
+    size, bend, kind = rng.uniform(0.1, 0.4), rng.uniform(0.0, 1.5), rng.integers(3)
+    wander = np.random.default_rng(rng.integers(1 << 30))
+
+    def plant(u: Array, step: float) -> Array:
+        part = np.linspace(0.0, 1.0, u.size)
+        steps = np.cumsum(wander.standard_normal(u.size)) / np.sqrt(u.size)
+        return np.tanh(bend * u) / bend + size * (part, 1.0 - np.exp(-3.0 * part), 0.5 * steps)[kind]
+
+    return plant
+
+
+def _linear(transfer: hs.TransferFunction) -> Plant:
+    return lambda u, step: transfer.response(u - u[0], step)
+
+
+def _of(law: hs.Play | hs.PrandtlIshlinskii | hs.Preisach | hs.BoucWen) -> Plant:
+    return lambda u, step: law.response(u)
+
+
+def _backlash(rng: np.random.Generator) -> Plant:
+    return _of(hs.Play(threshold=rng.uniform(0.05, 0.4), gain=rng.uniform(0.5, 2.0)))
+
+
+def _prandtl_ishlinskii(rng: np.random.Generator) -> Plant:
+    thresholds = tuple(np.linspace(0.0, 0.8, 6).tolist())
+    return _of(hs.PrandtlIshlinskii(thresholds=thresholds, weights=(0.6, *rng.uniform(0.02, 0.25, 5).tolist())))
+
+
+def _preisach(rng: np.random.Generator) -> Plant:
+    levels = np.linspace(-1.0, 1.0, 9)
+    near = np.array([1.0 / (1 + i - j) for i in range(8) for j in range(i + 1)])
+    weights = near * rng.uniform(0.0, 1.0, near.size)
+    return _of(hs.Preisach(levels=tuple(levels.tolist()), weights=tuple(weights.tolist()), z0=(-1.0, 0.0)))
+
+
+def _bouc_wen(rng: np.random.Generator) -> Plant:
+    return _of(_a_bouc_wen(rng))
+
+
+def _a_bouc_wen(rng: np.random.Generator) -> hs.BoucWen:
+    return hs.BoucWen(
+        beta=rng.uniform(0.8, 2.5),
+        gamma=rng.uniform(-0.5, 0.5),
+        n=float(rng.choice([1.0, 1.5, 2.0])),
+        feedthrough=rng.uniform(0.5, 1.0),
+        gain=rng.uniform(-0.5, -0.2),
+    )
+
+
+def _two_laws(rng: np.random.Generator) -> Plant:
+    first, second = _a_bouc_wen(rng), hs.Play(threshold=rng.uniform(0.1, 0.5), gain=rng.uniform(0.2, 0.6))
+    return lambda u, step: first.response(u) + second.response(u)
+
+
+CURVES: dict[str, Callable[[Array], Array]] = {
+    "relu": lambda u: np.maximum(u, 0.0),
+    "dead zone": lambda u: np.sign(u) * np.maximum(np.abs(u) - 0.3, 0.0),
+    "saturation": lambda u: np.clip(u, -0.5, 0.5),
+    "tanh": lambda u: np.tanh(3.0 * u),
+    "cubic": lambda u: u**3 + 0.2 * u,
+    "absolute value": np.abs,
+    "parabola": lambda u: u**2 + 0.5 * u,
+    "staircase": lambda u: np.round(4.0 * u) / 4.0,
+    "exponential": lambda u: np.exp(1.5 * u),
+    "wave": lambda u: u + 0.3 * np.sin(6.0 * u),
+}
+LINEAR = {"delay": _delay, "lag": _lag, "resonance": _resonance, "creep": _creep, "drift": _drift}
+HYSTERETIC = {
+    "backlash": _backlash,
+    "Prandtl-Ishlinskii": _prandtl_ishlinskii,
+    "Preisach": _preisach,
+    "Bouc-Wen": _bouc_wen,
+    "two laws in parallel": _two_laws,
+}
+PLANTS = {kind: _curve(function) for kind, function in CURVES.items()} | LINEAR | HYSTERETIC
+
+
+def _triangle(rng: np.random.Generator, samples: int) -> Array:
+    return hs.signals.triangle(-1.0, 1.0, cycles=CYCLES, samples_per_cycle=samples)
+
+
+def _sine(rng: np.random.Generator, samples: int) -> Array:
+    return hs.signals.sine(1.0, cycles=CYCLES, samples_per_cycle=samples)
+
+
+def _sum_of_sines(rng: np.random.Generator, samples: int) -> Array:
+    phase = 2.0 * np.pi * np.arange(CYCLES * samples + 1) / samples
+    parts = [
+        np.sin(factor * phase + shift) for factor, shift in zip((0.5, 1.0, 1.75), rng.uniform(0, 6, 3), strict=True)
+    ]
+    u = np.sum(parts, axis=0)
+    return u / np.abs(u).max()
+
+
+def _fading(rng: np.random.Generator, samples: int) -> Array:
+    return hs.signals.decaying_sine(1.0, cycles=CYCLES + 2, samples_per_cycle=samples)
+
+
+def _fading_triangle(rng: np.random.Generator, samples: int) -> Array:
+    """A triangle of falling amplitude at one rate."""
+    levels = [1.0, -0.9, 0.8, -0.7, 0.6, -0.5, 0.4]
+    return hs.signals.extremes([0.0, *levels], max_step=4.0 / samples)
+
+
+WAVEFORMS = {
+    "triangle": _triangle,
+    "sine": _sine,
+    "sum of sines": _sum_of_sines,
+    "fading sine": _fading,
+    "fading triangle": _fading_triangle,
+}
+PLANS = {  # waveform, number of rates and noise of the records of each kind
+    "curve": (("triangle", 1, 0.02), ("sine", 2, 0.0), ("sum of sines", 2, 0.1)),
+    "linear": (
+        ("sine", 1, 0.01),
+        ("fading triangle", 1, 0.0),
+        ("triangle", 2, 0.0),
+        ("sine", 2, 0.02),
+        ("sum of sines", 2, 0.05),
+        ("fading sine", 2, 0.1),
+    ),
+    "hysteretic": (
+        ("triangle", 1, 0.0),
+        ("sine", 1, 0.05),
+        ("triangle", 2, 0.0),
+        ("sine", 2, 0.01),
+        ("sum of sines", 2, 0.03),
+        ("fading sine", 2, 0.05),
+        ("triangle", 2, 0.1),
+        ("sum of sines", 2, 0.1),
+    ),
+}
+
+
+def cases() -> list[Case]:
+    """The hundred records; the waveforms of the curves differ from kind to kind."""
+    groups = {"curve": CURVES, "linear": LINEAR, "hysteretic": HYSTERETIC}
+    found: list[Case] = []
+    turned = {"triangle": "sine", "sine": "fading sine", "sum of sines": "triangle"}
+    for group, kinds in groups.items():
+        for k, kind in enumerate(kinds):
+            for waveform, n_rates, noise in PLANS[group]:
+                odd = group == "curve" and k % 2 == 1
+                found.append(Case(kind, group, turned[waveform] if odd else waveform, n_rates, noise, len(found)))
+    return found
+
+
+def row(case: Case, chosen: Set) -> Row:
+    """One line of the table."""
+    records = case.records(chosen)
+    start = time.perf_counter()
+    found = hs.discover(records)
+    seconds = time.perf_counter() - start
+    return {
+        "set": chosen.name,
+        "kind": case.kind,
+        "group": case.group,
+        "waveform": case.waveform,
+        "rates": case.n_rates,
+        "noise_percent": 100.0 * case.noise,
+        "verdict": found.verdict,
+        "right": " or ".join(case.right),
+        "is_right": found.verdict in case.right,
+        "route": found.route,
+        "fit_percent": found.scores["fit_percent"],
+        "warnings": " ".join(found.warnings),
+        "seconds": seconds,
+    }
+
+
+def main(smoke: bool = False) -> list[Row]:
+    """Discover from every record of both sets, and unless it is a smoke run write table, figure and result."""
+    start = time.perf_counter()
+    chosen = [case for case in cases() if not smoke or case.seed in SMOKE]
+    jobs = [(case, each) for each in (SETS[:1] if smoke else SETS) for case in chosen]
+    if smoke:
+        rows = [row(*job) for job in jobs]
+    else:
+        with ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn")) as pool:
+            rows = list(pool.map(row, *zip(*jobs, strict=True)))
+    for line in rows:
+        if not line["is_right"]:
+            print(f"wrong: {line['set']}, {line['kind']}, {line['waveform']}, {line['rates']} rates: {line['verdict']}")
+    numbers = summary(rows)
+    seconds = time.perf_counter() - start
+    for name, counts in numbers.items():
+        print(f"{name}: {counts}")
+    print(f"{len(rows)} discoveries in {seconds:.0f} s")
+    if not smoke:
+        write_results(RESULTS, rows, draw, {"seconds": seconds, "workers": WORKERS, **numbers})
+    return rows
+
+
+def summary(rows: Sequence[Row]) -> dict[str, dict[str, int]]:
+    """For each set: records, right verdicts, and each kind of wrong one."""
+    found = {}
+    for name in dict.fromkeys(str(line["set"]) for line in rows):
+        own = [line for line in rows if line["set"] == name]
+        hysteretic = [line for line in own if line["group"] == "hysteretic"]
+        found[name] = {
+            "records": len(own),
+            "right": sum(bool(line["is_right"]) for line in own),
+            "called hysteresis": sum(line["verdict"] == HYSTERESIS for line in own if line not in hysteretic),
+            "hysteresis lost": sum(not line["is_right"] for line in hysteretic),
+            "cannot tell at two rates": sum(line["verdict"] == ONE_RATE and line["rates"] == 2 for line in own),
+        }
+    return found
+
+
+def draw(rows: list[Row]) -> Figure:
+    """How often each kind of record has each verdict, both sets together; wrong verdicts are hatched."""
+    canvas = figure(height=5.6)
+    names = {1: "one rate", 2: "two rates"}
+    colours = {HYSTERESIS: "#D55E00", LAG: "#0072B2", ONE_RATE: "#BBBBBB", NONE: "#F0E442"}
+    for axes, (n_rates, title) in zip(canvas.subplots(1, 2, sharey=True), names.items(), strict=True):
+        for place, kind in enumerate(PLANTS):
+            left = 0
+            for verdict, colour in colours.items():
+                for right in (True, False):
+                    same = [
+                        line
+                        for line in rows
+                        if (line["kind"], line["rates"], line["verdict"], line["is_right"])
+                        == (kind, n_rates, verdict, right)
+                    ]
+                    axes.barh(place, len(same), left=left, color=colour, hatch="" if right else "////", edgecolor="w")
+                    left += len(same)
+        axes.set(title=title, xlabel="Records", yticks=range(len(PLANTS)), yticklabels=PLANTS)
+        axes.xaxis.get_major_locator().set_params(integer=True)
+    axes.invert_yaxis()
+    handles = [Patch(color=colour, label=verdict) for verdict, colour in colours.items()]
+    canvas.legend(handles=handles, loc="outside lower center", ncols=2)
+    return canvas
+
+
+if __name__ == "__main__":
+    main()
