@@ -32,6 +32,7 @@ LAST_SUM = 4.0
 OFF, NEAREST = 2.0**-36, 2.0**-51
 UNIT = 2.0**-53
 SMALLEST = 2.0**-1022
+PEAK_ROUNDS, PEAK_PIECES = 40, 8
 BITS = ("Play", "Stop", "PrandtlIshlinskii", "ModifiedPrandtlIshlinskii", "MaxwellSlip", "Preisach", "PreisachRelays",
         "CustomLaw", "Line", "SingleValued")  # fmt: skip
 
@@ -79,15 +80,16 @@ def pieces(rng: Rng, start: float, end: float) -> Array:
 
 
 class Spread(NamedTuple):
-    """What one rounding in each step comes to: in the outputs, and in the memory at the end; and who escapes."""
+    """What one rounding in each step comes to: in outputs and in the memory at the end; ranges; who escapes."""
 
     y: Array
     memory: Array
     memory_range: Array
+    y_range: float
     escapes: set[bool]
 
 
-NOTHING = Spread(np.zeros(1), np.zeros(1), np.zeros(1), set())
+NOTHING = Spread(np.zeros(1), np.zeros(1), np.zeros(1), 0.0, set())
 WELL_INSIDE = 0.05  # of what is allowed without the spread
 
 
@@ -112,7 +114,7 @@ def spread(case: Case, off: float = OFF) -> Spread:
     """Distances of the runs perturbed by `off` from the run with all samples, scaled to one rounding in each step."""
     if isinstance(case.law, hs.RateDependentPrandtlIshlinskii):  # its plays add up no errors
         whole = size(case.law, case.before, np.append(case.before[-1], case.u), np.zeros(1))[1:]
-        return Spread(UNIT * whole, np.empty(0), np.empty(0), {False})
+        return Spread(UNIT * whole, np.empty(0), np.empty(0), 0.0, {False})
     inputs, memories = places(case.law)
     y, path = perturbed(case, inputs, memories, 0.0, 0.0)
     escapes = {not np.isfinite(y[-1])}
@@ -122,7 +124,28 @@ def spread(case: Case, off: float = OFF) -> Spread:
         escapes.add(not np.isfinite(other[-1]))
         far_y = np.fmax(far_y, np.abs(other - y))
         far_memory = np.fmax(far_memory, np.abs(other_path[-1] - path[-1]))
-    return Spread(far_y * (UNIT / off), far_memory * (UNIT / off), np.ptp(path, axis=0), escapes)
+    return Spread(far_y * (UNIT / off), far_memory * (UNIT / off), np.ptp(path, axis=0), float(np.ptp(y)), escapes)
+
+
+def spread_through_peaks(case: Case) -> Spread:
+    """The same with samples where the memory moves most: it may rise far and fall back between two samples.
+
+    A rounding at the peak is one beside the peak, and the range of the branch is that of all of it.
+    """
+    inputs, memories = places(case.law)
+    if not memories:
+        return NOTHING
+    u = np.concatenate([case.before[-1:], case.u])
+    for _ in range(PEAK_ROUNDS):
+        _, path = perturbed(case._replace(u=u[1:]), inputs, memories, 0.0, 0.0)
+        ranges = np.ptp(path, axis=0)
+        moved = np.sum(np.abs(np.diff(path, axis=0)) / np.where(ranges > 0.0, ranges, 1.0), axis=1)
+        k = int(np.argmax(np.where(np.isfinite(moved), moved, -1.0)))
+        inside = np.linspace(u[k], u[k + 1], PEAK_PIECES + 1)[1:-1]
+        u = np.concatenate([u[: k + 1], inside[(inside != u[k]) & (inside != u[k + 1])], u[k + 1 :]])
+    at = np.array([np.flatnonzero(u == value)[-1] - 1 for value in case.u])
+    found = spread(case._replace(u=u[1:]))
+    return found._replace(y=found.y[at])
 
 
 def perturbed(
@@ -273,6 +296,8 @@ def judged(case: Case, found: list[Run], errors: Callable[[], Spread] | None) ->
         ratio = compared(case, found, errors())
     if ratio > 1.0:  # close to an unstable balance, at less than 2^-36 of it, only roundings themselves go the same way
         ratio = min(ratio, compared(case, found, spread(case, NEAREST)))
+    if ratio > 1.0:
+        ratio = min(ratio, compared(case, found, spread_through_peaks(case)))
     return Verdict(ratio, "compared")
 
 
@@ -290,7 +315,7 @@ def compared(case: Case, found: list[Run], errors: Spread) -> float:
     apart = np.abs(np.concatenate([some - fine[case.kept], coarse - fine[-1:]]))
     promised = SERIES if is_series(case.law) else 0.0
     allowed = ROUNDINGS * errors.y + LAST_SUM * UNIT * size(case.law, case.before, case.u, fine)
-    ratio = worst(apart, allowed[where] + promised * float(np.ptp(fine)))
+    ratio = worst(apart, allowed[where] + promised * max(float(np.ptp(fine)), errors.y_range))
     if found[0].state and not isinstance(case.law, hs.Sum | hs.Cascade | hs.RateDependentPrandtlIshlinskii):
         states = np.array([run.state[1:] for run in found])
         apart = np.abs(states[:2] - states[2]).max(axis=0)

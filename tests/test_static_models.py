@@ -30,6 +30,19 @@ def test_inputs_that_rounding_alone_tells_apart_are_one_level():
     assert curve.u.size == 21
 
 
+@pytest.mark.parametrize(("period", "cycles"), [(47, 5), (50, 2), (65, 5), (71, 3), (83, 10)])
+def test_sines_whose_extremes_differ_by_a_rounding_are_fitted(period, cycles):
+    u = np.sin(2.0 * np.pi * np.arange(period * cycles) / period)
+    curve = hs.identify(hs.SingleValued, hs.Record(u=u, y=u**3)).model
+    assert (np.diff(curve.u) > 0.0).all()
+    assert curve.response(u) == pytest.approx(u**3, abs=0.02)  # a spline of the noise-free cubic, hardly smoothed
+
+
+def test_the_lowest_inputs_may_be_one_rounding_apart():
+    u = np.array([-1.0, np.nextafter(-1.0, 0.0), 0.0, 0.3, 0.5, 1.0])
+    assert hs.SingleValued.fitted(u, u).model.u[[0, -1]].tolist() == [-1.0, 1.0]
+
+
 def a_play(n=400, noise=0.01):
     u = np.sin(2 * np.pi * (np.arange(n) + 0.137) / 200)
     y = hs.Play(threshold=0.3).response(u) + noise * np.random.default_rng(0).standard_normal(n)

@@ -290,7 +290,7 @@ TASK = """
 def task(k, seed):
     if k == 7:
         raise ValueError("seven")
-    return sum(i * i % 7 for i in range(20_000)) + k
+    return sum(i * i % 7 for i in range(100_000)) + k
 """
 
 

@@ -61,10 +61,11 @@ def smoothing_spline(u: FloatArray, y: FloatArray) -> Smooth:
     inverse = solveh_banded(penalised, np.eye(splines.size), lower=True)
     coefficients = inverse @ moments[0]
     low, high = float(u.min()), float(u.max())
-    knots = np.unique(np.concatenate([[0.0], x, [1.0]]))
+    knots = np.concatenate([[0.0], x, [1.0]])
+    inputs, kept = np.unique(np.clip(low + (high - low) * knots, low, high), return_index=True)  # in u, where they round
     return Smooth(
-        u=np.clip(low + (high - low) * knots, low, high),
-        y=splines.at(knots).combined(coefficients),
+        u=inputs,
+        y=splines.at(knots[kept]).combined(coefficients),
         degrees_of_freedom=float(np.sum(gram * inverse)),
         spread=np.sqrt(_quadratic_form(bands[0], rows.combined(inverse)) / u.size)[place],
     )
