@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 
 import hysim as hs
 
-N_LAWS = 20 if numba.config.DISABLE_JIT else 300
+N_LAWS = 20 if numba.config.DISABLE_JIT else 100
 FINE = 4 if numba.config.DISABLE_JIT else 16
 PERTURBATION = 2.0**-48
 EXPONENTS = np.array([0.3, 0.5, 0.8, 1.0, 1.3, 2.0, 2.7, 4.0, 6.0, 8.0, 12.0])

@@ -20,7 +20,7 @@ spec = importlib.util.spec_from_file_location("more_samples_experiment", EXPERIM
 experiment = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(experiment)
 
-N_CASES = 2 if numba.config.DISABLE_JIT else 20
+N_CASES = 2 if numba.config.DISABLE_JIT else 8
 
 NOT_RATE_INDEPENDENT = {"TransferFunction", "Dashpot", "Actuator", "BoucWenOscillator"}
 """Between two samples the input of these is held, or goes on a line: with more samples it is another input."""

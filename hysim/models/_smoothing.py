@@ -62,7 +62,9 @@ def smoothing_spline(u: FloatArray, y: FloatArray) -> Smooth:
     coefficients = inverse @ moments[0]
     low, high = float(u.min()), float(u.max())
     knots = np.concatenate([[0.0], x, [1.0]])
-    inputs, kept = np.unique(np.clip(low + (high - low) * knots, low, high), return_index=True)  # in u, where they round
+    inputs, kept = np.unique(
+        np.clip(low + (high - low) * knots, low, high), return_index=True
+    )  # in u, where they round
     return Smooth(
         u=inputs,
         y=splines.at(knots[kept]).combined(coefficients),
