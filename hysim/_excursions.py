@@ -3,7 +3,7 @@
 An excursion begins and ends at the level and lies on one side of it: 0 -> max -> 0. Two successive excursions, one to
 each side, are a cycle; an excursion without a partner on the other side, as in 0 -> 5 -> 0 -> 8 -> 0, is a cycle of
 its own. What lies ahead of the first excursion belongs to no cycle, nor does the last excursion of a record whose
-excursions alternate, which is half a cycle.
+excursions alternate, which is half a cycle. Ends of the record within 5 % of the span of the level are no excursions.
 
 The level is the input at the first sample, where tests begin at rest, or else the middle of the levels that the
 branches of the greatest total length reach: whichever gives cycles of the larger total span. The record's first and
@@ -151,7 +151,8 @@ def _pairs_about(
 ) -> list[list[_Excursion]]:
     sides = np.sign(np.where(np.abs(levels - level) > reach, levels - level, 0.0)).astype(np.int64)
     excursions = _excursions(u - level, plateaus, sides)
-    return _paired(excursions, *_around(excursions, sides)) if excursions else []
+    far = np.where(np.abs(levels - level) > NEAR * float(np.ptp(u)), sides, 0)  # a record may pass its own end a little
+    return _paired(excursions, *_around(excursions, far)) if excursions else []
 
 
 def _total_span(level: float, pairs: list[list[_Excursion]], levels: FloatArray) -> float:

@@ -371,3 +371,12 @@ def test_scaling_and_shifting_scale_the_energies(u, seed, scale, offset_u, offse
     other = hs.cycle_metrics(scale * u + offset_u, 2.0 * y + offset_y, tolerance=0.07)
     assert other.energy == pytest.approx(2.0 * scale * table.energy, abs=1e-9)
     assert other.start.size == table.start.size
+
+
+@pytest.mark.parametrize("beyond", [0.008, 0.04])
+@pytest.mark.parametrize("first", [-0.006, 0.0, 0.006])
+def test_a_record_that_ends_a_little_beyond_its_level_keeps_its_last_cycle(first, beyond):
+    u = np.interp(np.arange(300) / 299, [0.0, 1 / 3, 2 / 3, 1.0], [first, 1.0, -1.0, first + beyond])
+    one_sided = np.interp(np.arange(200) / 199, [0.0, 0.5, 1.0], [first, 1.0, first - beyond])
+    assert len(hs.cycle_metrics(u, u**3)) == 1
+    assert len(hs.cycle_metrics(one_sided, one_sided**2)) == 1
