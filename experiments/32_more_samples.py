@@ -52,7 +52,7 @@ Found = Iterator[tuple[str, Verdict, Any]]
 
 
 def forward_verdicts(family: str, seeds: range) -> Found:
-    """Of each case and path: the path, the verdict, and the seed."""
+    """Path, verdict and seed of each case."""
     cases, errors = [], []
     for seed in seeds:
         rng = generator(family, seed)

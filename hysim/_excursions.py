@@ -156,7 +156,7 @@ def _pairs_about(
 
 
 def _total_span(level: float, pairs: list[list[_Excursion]], levels: FloatArray) -> float:
-    """Of all cycles, the sum of the largest distances from the level to either side."""
+    """Sum over all cycles of the largest distances from the level to either side."""
     return sum(max(abs(float(levels[turn]) - level) for turn in part.turns) for pair in pairs for part in pair)
 
 
@@ -176,7 +176,7 @@ def _excursions(v: FloatArray, plateaus: list[tuple[int, int]], sides: npt.NDArr
 
 
 def _visit(v: FloatArray, begin: int, end: int, near: list[tuple[int, int]]) -> float | None:
-    """Where the input is at zero from one sample to another; else at the turning point there that is near to it."""
+    """Place between two samples where the input passes zero; otherwise the turning point there that is near zero."""
     part = v[begin : end + 1]
     at = np.flatnonzero(part == 0.0)
     pauses = np.split(at, np.flatnonzero(np.diff(at) > 1) + 1) if at.size else []

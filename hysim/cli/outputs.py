@@ -82,7 +82,7 @@ def keep(inputs: Iterable[str | None], results: Iterable[str | None]) -> None:
 
 
 def _files(source: str) -> Iterator[os.stat_result]:
-    """What an input consists of: a file, the files of a folder, or what the standard input is read from."""
+    """Files behind an input: itself, the files of a folder, or the file that the standard input is read from."""
     paths = [os.path.join(source, name) for name in os.listdir(source)] if os.path.isdir(source) else [source]
     for path in paths:
         with contextlib.suppress(OSError, ValueError):  # what cannot be read is said where it is read

@@ -32,7 +32,7 @@ class Ended(BaseException):
 
 
 def words(number: int) -> str:
-    """What is said of the end by a signal."""
+    """Message for an end by a signal."""
     return "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
 
 

@@ -39,7 +39,7 @@ _SPACES = ("grid", "list", "sample")
 
 
 class Study(NamedTuple):
-    """What `sweep` takes, and the files that were read for it."""
+    """Arguments of `sweep`, and the files that were read for them."""
 
     task: Callable[..., Any]
     space: Any

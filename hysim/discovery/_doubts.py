@@ -1,4 +1,4 @@
-"""What a user should know before trusting a discovered law: sentences that follow from its judgement."""
+"""Warnings about a discovered law that follow from its judgement."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What the oscillator route finds, and the same as a `Discovery`."""
+"""Result of the oscillator route, and its conversion to a `Discovery`."""
 
 import math
 from collections.abc import Mapping, Sequence
