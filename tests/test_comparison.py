@@ -441,3 +441,11 @@ def test_the_picture_has_a_row_for_each_of_the_best_models(quick):
     np.testing.assert_array_equal(chosen[0, 2].lines[1].get_ydata(), quick["Line"].loop.width)
     with pytest.raises(ValueError, match="no model to draw"):
         hs.plot.comparison(quick, [])
+
+
+def test_a_model_that_could_not_be_compared_is_named_in_print():
+    u = hs.signals.triangle(-3.0, 3.0, cycles=2, samples_per_cycle=40)
+    diverging = hs.BoucWen(A=1.0, beta=-1.0, gamma=-1.0, n=2.0)
+    tab = hs.compare({"bad": diverging, "line": hs.Line}, hs.Record(u=u, y=u), cross_validate=None)
+    assert set(tab.failed) == {"bad"}
+    assert "Not compared: bad." in str(tab)

@@ -95,7 +95,11 @@ def to_words(comparison: "Comparison") -> str:
     more, many = len(best) - _PRINTED, len(comparison.rows)
     head = f"Comparison of {many} model{'' if many == 1 else 's'} on {comparison.record.name or 'a record'}, "
     notes = [f"  ... and {more} more"] if more > 0 else []
-    told = [comparison.verdict, f"Warnings: {'; '.join(comparison.warnings)}" if comparison.warnings else ""]
+    told = [
+        f"Not compared: {', '.join(comparison.failed)}." if comparison.failed else "",
+        comparison.verdict,
+        f"Warnings: {'; '.join(comparison.warnings)}" if comparison.warnings else "",
+    ]
     notes += textwrap.wrap(
         " ".join(filter(None, told)), LETTERS, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False
     )
