@@ -126,7 +126,7 @@ class Search(NamedTuple):
         return _chosen(candidates, elastic, nearest)
 
     def _made(self, structure: OscillatorStructure) -> "Search":
-        """The same search with another belief about how the records were made."""
+        """The same search under another assumption of how the records were made."""
         return self._replace(structure=structure, response=replace(self.response, structure=structure))
 
     def _again(self, candidates: "Sequence[tuple[Search, _Tried]]") -> "list[tuple[Search, _Tried]]":

@@ -233,7 +233,7 @@ class Search:
         }
 
     def _quantile(self) -> float:
-        """Of Student's distribution with the degrees of freedom that are left."""
+        """Quantile of Student's distribution for the remaining degrees of freedom."""
         from scipy.stats import t
 
         freedom = self.problem.y.size - len(self.problem.space.names)
@@ -261,7 +261,7 @@ def _phrases(
     curves: Mapping[str, Profile],
     notes: Sequence[str],
 ) -> list[str]:
-    """How the search ended, and what the data cannot tell."""
+    """Message of how the search ended, and which parameters the data do not determine."""
     phrases = ["converged" if converged else "the search did not converge", *known.reasons]
     inputs = [part.record.u for part in whole.parts]
     if not any(np.ptp(part.record.y) for part in whole.parts):
