@@ -62,8 +62,8 @@ def discover(
 
     The slope of the memory along the loading length, dL = ``|du|``, is regressed on a library of terms by PySINDy,
     from a dense law to a sparse one. Every structure on that path is refined by its error in free run, and the search
-    goes on among all smaller structures of the library. Among structures that fit equally well, the one of fewest numbers
-    is taken. Models without a law are fitted beside it, and all are judged on data they have not seen.
+    goes on among all smaller structures of the library. Among structures that fit equally well, the one of fewest
+    numbers is taken. Models without a law are fitted beside it, and all are judged on data they have not seen.
 
     Parameters
     ----------
