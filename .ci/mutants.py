@@ -89,6 +89,7 @@ MAPPED = {
     "identification/_searched.py": "identification identification_result several_records bad_data",
     "identification/_select.py": "selection",
     "identification/_uncertainty.py": "intervals identification_result noise_models",
+    "identification/columns.py": "warnings",
     "identification/folds.py": "identification comparison",
     "identification/sentences.py": "warnings",
     "identification/json_forms.py": "identification_result",

@@ -31,14 +31,43 @@ def table1():
     return hs.datasets.table1()
 
 
-def test_columns_that_were_swapped_are_suspected(table1):
-    """The table's voltage runs to and fro by steps of 4 V; in reverse a play has to make it from the displacement."""
-    fit = hs.identify(hs.Play, reverse(table1))
-    assert any(each.startswith(SWAPPED) and "check the columns" in each for each in fit.warnings)
-    assert not any(each.startswith(SWAPPED) for each in hs.identify(hs.Play, table1).warnings)
+@pytest.mark.parametrize("family", [hs.PrandtlIshlinskii, hs.Dahl, hs.ColemanHodgdon, hs.Preisach, hs.SingleValued])
+def test_an_output_that_only_a_generator_makes_is_suspected(table1, family):
+    """The table's voltage runs to and fro by steps of 5 V; its displacement does not."""
+    (doubt,) = (each for each in hs.identify(family, reverse(table1)).warnings if each.startswith(SWAPPED))
+    assert "regular waveform" in doubt
+    assert "check the columns" in doubt
+    assert not any(each.startswith(SWAPPED) for each in hs.identify(family, table1).warnings)
+
+
+def test_comparison_and_discovery_suspect_them_too(table1):
     table = hs.compare({"line": hs.Line, "play": hs.Play, "curve": hs.SingleValued}, reverse(table1))
-    assert any(f"play: {SWAPPED}" in each for each in table.warnings)
-    assert "Warnings\n  play: " in table.to_text()
+    assert sum(SWAPPED in each for each in table.warnings) == 1
+    assert SWAPPED in table.to_text()
+    assert any(each.startswith(SWAPPED) for each in hs.discover(reverse(table1)).warnings)
+    assert not any(each.startswith(SWAPPED) for each in hs.discover(table1).warnings)
+
+
+def test_a_sine_as_the_output_is_suspected_and_as_the_input_not():
+    u = 3.0 + np.sin(np.linspace(0.0, 12.0, 300) + 0.4)
+    record = noisy(hs.BoucWen(feedthrough=0.5), 0.001, u=u)
+    assert any("regular waveform" in each for each in hs.identify(hs.BoucWen, reverse(record)).warnings)
+    assert not any(each.startswith(SWAPPED) for each in hs.identify(hs.BoucWen, record).warnings)
+
+
+def test_a_regular_output_of_a_step_or_of_a_line_is_not_suspected():
+    step = np.where(np.arange(200) > 3, 1.0, 0.0)
+    swinging = np.where(step > 0.0, 1.0 - np.cos(0.1 * (np.arange(200) - 4)), 0.0)
+    for u, y in ((step, swinging), (step, np.cumsum(step)), (LOOP, 2.0 * LOOP), (np.sin(LOOP), 1.0 + np.sin(LOOP))):
+        assert not any(each.startswith(SWAPPED) for each in hs.identify(hs.Line, hs.Record(u=u, y=y)).warnings)
+
+
+def test_columns_that_one_family_fits_better_in_reverse_are_suspected(table1):
+    """Noise on the voltage hides the generator; a play cannot make the voltage from the displacement."""
+    shaken = table1.u + 0.05 * np.random.default_rng(0).standard_normal(len(table1))
+    fit = hs.identify(hs.Play, hs.Record(u=table1.y, y=shaken))
+    assert any(each.startswith(SWAPPED) and "check the columns" in each for each in fit.warnings)
+    assert not any(each.startswith(SWAPPED) for each in hs.identify(hs.Play, hs.Record(u=shaken, y=table1.y)).warnings)
 
 
 @pytest.mark.parametrize(

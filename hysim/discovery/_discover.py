@@ -29,6 +29,7 @@ from hysim.discovery._result import Discovery
 from hysim.discovery._search import Library, Outcome, searched
 from hysim.discovery._structures import AnyExponent
 from hysim.discovery._validation import left_out_rmse
+from hysim.identification.columns import swapped_columns
 from hysim.identification.folds import folds
 from hysim.records import Record
 
@@ -200,15 +201,16 @@ def discover(
     report = progress or (lambda done, total: None)
     outcomes = _searched(records, (hidden,), options)
     report(1, total)
-    warnings: tuple[str, ...] = ()
+    doubt = swapped_columns(records)
+    warnings = (doubt,) if doubt else ()
     if route == "auto" and _may_move(records, outcomes[0].candidate):
         if "oscillator" in routes:
             moving = _moving(records, outcomes[0].candidate, vibrating)
             if moving is not None:
                 report(total, total)
-                return moving
+                return replace(moving, warnings=(*moving.warnings, *warnings))
         else:
-            warnings = (arguments.not_tried("oscillator", given),)
+            warnings = (*warnings, arguments.not_tried("oscillator", given))
     any_exponent = library is None and symmetry is None and not signs
 
     def chosen(first: list[Outcome], seen: tuple[Samples, ...] | None) -> tuple[Outcome, Candidate[Any]]:

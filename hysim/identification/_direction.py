@@ -1,4 +1,4 @@
-"""Whether the input and the output of a record were swapped.
+"""Whether a family finds that the input and the output of a record were swapped.
 
 The output of an actuator lags its input: its loop runs counterclockwise, and clockwise where the columns were swapped.
 A force that a displacement takes runs clockwise too, so that the sense alone proves nothing. It is doubted where the
@@ -29,7 +29,7 @@ _GOOD = 0.1  # of the standard deviation: a reverse model that is worse describe
 _PERFECT = 1e-3  # forward errors below this leave nothing to suspect
 
 
-def swapped(
+def swapped_for(
     family: Identifiable, records: Sequence[Record], freedom: Freedom, initial: str | Sequence[str] | None, error: float
 ) -> str:
     """A sentence where the family fits the first record better from y to u; else the empty text.

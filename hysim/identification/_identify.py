@@ -10,13 +10,14 @@ import numpy.typing as npt
 
 from hysim._parallel import Progress, at_most
 from hysim.identification import _direct as direct
-from hysim.identification._direction import swapped
+from hysim.identification._direction import swapped_for
 from hysim.identification._noise import Gaussian, Noise, Quantised, Robust
 from hysim.identification._problem import Problem, problem
 from hysim.identification._resampling import left_out_errors, rms_of_known
 from hysim.identification._result import Identification
 from hysim.identification._search import PERFECT, optima
 from hysim.identification._searched import Search
+from hysim.identification.columns import swapped_columns
 from hysim.identification.folds import left_out
 from hysim.models.model import needs_time
 from hysim.models.search_space import Direct, Freedom, Identifiable
@@ -108,13 +109,15 @@ def identify(
     with at_most(workers):
         if isinstance(model_or_class, Direct):
             direct.refuse(model_or_class, options, noise, intervals)
-            return direct.identified(model_or_class, records, left_out(cross_validate, records), seed)
-        family = _family(model_or_class)
-        whole = problem(family, records, options, initial)
-        fit = _searched(whole, noise, intervals, left_out(cross_validate, records), seed, progress)
-        if needs_time(fit.model):
-            return fit
-        doubt = swapped(family, records, options, initial, 1.0 - fit.fit_percent / 100.0)
+            fit = direct.identified(model_or_class, records, left_out(cross_validate, records), seed)
+            doubt = swapped_columns(records)
+        else:
+            family = _family(model_or_class)
+            whole = problem(family, records, options, initial)
+            fit = _searched(whole, noise, intervals, left_out(cross_validate, records), seed, progress)
+            doubt = swapped_columns(records)
+            if not doubt and not needs_time(fit.model):
+                doubt = swapped_for(family, records, options, initial, 1.0 - fit.fit_percent / 100.0)
         return replace(fit, warnings=(*fit.warnings, doubt)) if doubt else fit
 
 
