@@ -287,6 +287,27 @@ def test_loops_that_run_against_the_others_are_named():
     assert "The loops of some cycles (2) run counterclockwise" in table.sign_convention
 
 
+@pytest.mark.parametrize(("n_against", "named"), [(8, "2, 4, 6, 8, 10, 12, 14, 16)"), (9, "14, 16, ...)")])
+def test_at_most_eight_loops_are_named(n_against, named):
+    u = path(0.0, *([1.0, -1.0] * 2 * n_against), 0.0, n=4)
+    y = slip(u)
+    for k in range(n_against):
+        y[16 * k + 8 : 16 * k + 16] *= -1.0
+    assert named in hs.cycle_metrics(u, y).sign_convention
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+def test_energy_outside_of_the_cycles_is_zero_only_to_rounding(scale):
+    u = path(0.0, 0.7, -0.7, 0.0, 0.3, 0.0)  # an elastic way to and fro at the end
+    y = 3.0 * slip(u)
+    assert hs.cycle_metrics(scale * u, scale * y).energy_outside == 0.0
+    longer = path(0.0, 0.7, -0.7, 0.7, 0.0)
+    left = hs.cycle_metrics(scale * longer, scale * slip(longer), level=0.0)
+    half = path_integral(longer, slip(longer)) - left.energy.sum() / scale**2
+    assert left.energy_outside == pytest.approx(scale**2 * half, rel=1e-9)
+    assert half > 0.1
+
+
 def test_rows_are_the_loops_of_their_cycles():
     u = path(*GROWING)
     table = hs.cycle_metrics(u, slip(u))
@@ -308,7 +329,11 @@ def test_the_table_is_text_and_csv_with_units():
         "cycle", "start", "stop", "amplitude", "mean", "width", "area", "energy", "stiffness", "damping", "gap",
     ]  # fmt: skip
     assert lines[1].split() == ["[mm]", "[mm]", "[kN]", "[kN", "mm]", "[kN", "mm]", "[kN/mm]", "[%]", "[kN]"]
+    assert lines[2] == "-" * len(lines[0])
     assert [line.split()[0] for line in lines[3:6]] == ["1", "2", "3"]
+    about = hs.cycle_metrics(path(0.0, 11.0, 9.0, 12.0, 8.0, 10.0), np.zeros(301))
+    assert about.mean_input == pytest.approx((about.lowest_input + about.highest_input) / 2, rel=ROUNDING)
+    assert about.mean_input.min() > 9.0
     assert float(lines[5].split()[7]) == pytest.approx(table.energy[2], rel=1e-3)
     assert float(lines[5].split()[9]) == pytest.approx(100.0 * table.equivalent_damping[2], abs=0.005)
     assert max(map(len, lines)) <= 100

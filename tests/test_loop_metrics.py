@@ -216,6 +216,33 @@ def test_the_average_of_equal_cycles_is_any_of_them():
     assert (three.area, three.stroke) == pytest.approx((one.area, one.stroke), rel=ROUNDING)
 
 
+def test_the_area_of_an_averaged_loop_is_that_of_one_on_any_grid():
+    """The inputs crowd near 0, so that a branch that is read in the wrong order has another area."""
+    up = np.linspace(0.0, 1.0, 21) ** 2
+    u = np.concatenate([[0.0], *([up[1:], up[-2::-1]] * 4)])
+    y = play(u, 0.15, y=0.0) + u**3
+    one, three = (hs.loop_metrics(u, y, cycles=k) for k in (1, 3))
+    assert three.area == pytest.approx(one.area, rel=ROUNDING)
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e9])
+def test_the_relative_width_has_no_unit(scale):
+    u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=40)
+    y = play(u, 0.25)
+    assert hs.loop_metrics(u, scale * y).relative_width == pytest.approx(hs.loop_metrics(u, y).relative_width)
+
+
+@pytest.mark.parametrize("n_branch", [2, 3, 5])
+def test_the_widths_of_many_loops_are_those_of_each(n_branch):
+    """Few samples and outputs at random: the largest width is in each interval, the first and the last among them."""
+    up = np.sort(np.random.default_rng(n_branch).uniform(-1.0, 1.0, n_branch))
+    u = np.concatenate([[-1.0], up, [1.0], up[::-1] + 1e-3 * (1.0 - up[::-1] ** 2), [-1.0], up, [1.0]])
+    y = np.random.default_rng(0).standard_normal((200, u.size))
+    rows, loops = LoopRows(u), [hs.loop_metrics(u, each) for each in y]
+    assert rows.max_width(y) == pytest.approx([loop.max_width for loop in loops], rel=ROUNDING)
+    assert rows.area(y) == pytest.approx([loop.area for loop in loops], rel=1e-10, abs=ROUNDING)
+
+
 def test_a_drift_is_averaged_over_the_cycles():
     u = hs.signals.triangle(0.0, 1.0, cycles=3, samples_per_cycle=10)
     assert hs.loop_metrics(u, u + 0.1 * np.arange(u.size), cycles=3).closure_gap == pytest.approx(1.0, rel=ROUNDING)
@@ -463,6 +490,41 @@ def test_a_memory_that_decays_slowly_is_run_until_it_repeats():
 def test_what_has_no_describing_function_is_refused(arguments, options, error, message):
     with pytest.raises(error, match=message):
         hs.metrics.describing_function(*arguments, **options)
+
+
+class Counting:
+    """A law whose output at the two extremes of the input is a function of the number of the cycle."""
+
+    def __init__(self, highest, lowest):
+        self.ends = highest, lowest
+
+    def advance(self, u, state=0):
+        if len(u) % 2:  # the way to the first cycle
+            return np.zeros(len(u)), state
+        cycles = state + np.arange(len(u) // 2)
+        return np.stack([end(cycles) for end in self.ends], axis=1).ravel(), state + len(u) // 2
+
+
+def late(cycles):
+    """1 up to cycle 10, 2 from cycle 20 on."""
+    return np.interp(cycles, [10.0, 20.0], [1.0, 2.0])
+
+
+def still(cycles):
+    return np.zeros(len(cycles))
+
+
+@pytest.mark.parametrize("ends", [(late, still), (still, late)])
+def test_a_cycle_repeats_only_when_both_of_its_ends_do_at_the_end_of_a_batch(ends):
+    runs = []
+
+    class Watched(Counting):
+        def advance(self, u, state=0):
+            runs.append(len(u))
+            return super().advance(u, state)
+
+    hs.metrics.describing_function(Watched(*ends), [1.0], samples_per_cycle=4)
+    assert runs == [1, 32, 64, 4]  # cycles 1 to 16 still move, 17 to 48 do not in their second half
 
 
 def test_a_law_that_never_repeats_has_no_describing_function():

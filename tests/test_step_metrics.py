@@ -108,6 +108,12 @@ def test_a_hand_drawn_response_is_measured_by_hand():
     assert found.settling_time == pytest.approx(5.8)  # 0.98, four fifths of the way from 0.9 to 1
 
 
+def test_a_level_is_passed_when_it_is_first_reached():
+    """A pause at exactly 10 % and at 90 %: the rise begins and ends where they begin."""
+    y = np.array([0.0, 0.1, 0.1, 0.1, 0.5, 0.9] + [1.0] * 22)
+    assert step_metrics(np.arange(28.0), y).rise_time == pytest.approx(5.0 - 1.0, rel=1e-12)
+
+
 def test_what_does_not_exist_is_nan():
     t = np.arange(40.0)
     still = step_metrics(t, np.full(40, 3.0))
