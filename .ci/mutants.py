@@ -77,7 +77,7 @@ MAPPED = {
     "metrics/rows.py": "loop_metrics",
     "identification/_direct.py": "static_models",
     "identification/_direction.py": "warnings",
-    "identification/_descent.py": "identification several_records",
+    "identification/_descent.py": "descent identification several_records",
     "identification/_diagnostics.py": "identification_result warnings identification bad_data",
     "identification/_identify.py": "identification identification_result several_records bad_data",
     "identification/_noise.py": "warnings noise_models",

@@ -5,7 +5,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from scipy import interpolate
+from scipy import interpolate, stats
 
 import hysim as hs
 
@@ -192,3 +192,13 @@ def test_the_yardsticks_have_no_memory():
 def test_a_constant_input_is_refused(family):
     with pytest.raises(ValueError, match="constant"):
         hs.identify(family, hs.Record(u=np.ones(5), y=np.arange(5.0)))
+
+
+@pytest.mark.parametrize("family", [hs.SingleValued, hs.Line, hs.Play])
+def test_the_log_likelihood_is_that_of_normal_residuals_of_the_best_sigma(family):
+    """A fit in one step and a search say the same of the same residuals; the constant is left out."""
+    u = np.linspace(-1.0, 1.0, 60)
+    record = hs.Record(u=u, y=u**3 + 0.1 * np.random.default_rng(3).standard_normal(60))
+    fit = hs.identify(family, record)
+    logarithms = stats.norm.logpdf(fit.residual, scale=np.sqrt(np.mean(fit.residual**2)))
+    assert fit.log_likelihood == pytest.approx(logarithms.sum() + 30.0 * np.log(2.0 * np.pi), rel=1e-10)

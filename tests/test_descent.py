@@ -1,0 +1,76 @@
+"""A step of the descent is the bounded regression that it says, and a constraint holds to rounding."""
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+
+import hysim as hs
+from hysim.identification._descent import Constraint, Descent
+from hysim.identification._noise import Gaussian
+from hysim.identification._problem import problem
+from hysim.models.search_space import Freedom
+
+LOOP = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=60)
+SETS = 6
+
+
+@pytest.fixture(scope="module")
+def descent():
+    """Of a Dahl law: the logarithms of its stiffness and its Coulomb level are searched."""
+    y = hs.Dahl(stiffness=5.0, coulomb=2.0).response(LOOP)
+    record = hs.Record(u=LOOP, y=y + 0.01 * np.random.default_rng(0).standard_normal(LOOP.size))
+    whole = problem(hs.Dahl(), [record], Freedom({}, (), {}), None)
+    assert whole.space.coordinates == ("stiffness", "coulomb")
+    return Descent(whole, Gaussian(1e-9), whole.y[np.newaxis], np.ones((1, whole.y.size)))
+
+
+def drawn(descent, seed):
+    """Some sets of parameters."""
+    rng, space = np.random.default_rng(seed), descent.problem.space
+    x = np.log([5.0, 2.0]) + rng.uniform(-1.0, 1.0, (SETS, 2))
+    return np.concatenate([x, rng.uniform(0.5, 1.0, (SETS, len(space.linear)))], axis=1)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("place", [0, 1])
+def test_a_step_is_the_regression_inside_the_box(descent, side, place):
+    """A coordinate a little from its side is driven beyond it; the others make the best of the step to the side."""
+    theta, rng = drawn(descent, 1), np.random.default_rng(2)
+    lower, upper = descent.box()
+    near = lower[place] + 1e-3 if side < 0.0 else upper[place] - 2e-3
+    theta[:, place] = near
+    slopes = rng.standard_normal((SETS, LOOP.size, theta.shape[1]))
+    wanted = rng.uniform(-0.1, 0.1, theta.shape)
+    wanted[:, place] = side * 0.1
+    residual = np.einsum("snk,sk->sn", slopes, wanted) + 1e-3 * rng.standard_normal((SETS, LOOP.size))
+    weights, sigma, undamped = np.ones_like(residual), np.ones((SETS, 1)), np.full(SETS, 1e-18)
+    stepped = descent._step(theta, slopes, residual, weights, sigma, undamped, None)
+    for k in range(SETS):
+        best = lsq_linear(slopes[k], residual[k], (lower - theta[k], upper - theta[k]), tol=1e-14).x
+        assert stepped[k] - theta[k] == pytest.approx(best, abs=1e-6)
+        assert stepped[k, place] == (lower if side < 0.0 else upper)[place]
+    assert np.abs(stepped - theta).max() > 0.05
+
+
+@pytest.mark.parametrize("place", [0, 1])
+@pytest.mark.parametrize("factor", [0.5, 0.99, 3.0])
+def test_a_constraint_on_a_curved_parameter_is_met_to_rounding(descent, place, factor):
+    theta = drawn(descent, 3)
+    places = np.full(SETS, place)
+    constraint = Constraint(places, factor * descent._named(theta, places))
+    assert not descent._kept(theta, constraint).any()
+    restored = descent._restored(theta, constraint, places)
+    assert descent._named(restored, places) == pytest.approx(constraint.value, rel=1e-11)
+    assert descent._kept(restored, constraint).all()
+    others = [k for k in range(theta.shape[1]) if k != place]
+    assert np.array_equal(restored[:, others], theta[:, others])
+
+
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+def test_whether_a_constraint_is_kept_does_not_depend_on_the_unit(descent, size):
+    theta = drawn(descent, 4)
+    theta[:, 0] = np.log(size)
+    places = np.zeros(SETS, dtype=int)
+    value = descent._named(theta, places)
+    assert descent._kept(theta, Constraint(places, value * (1.0 + 1e-9))).all()
+    assert not descent._kept(theta, Constraint(places, value * (1.0 + 1e-7))).any()
