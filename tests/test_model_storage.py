@@ -98,8 +98,18 @@ def test_a_typo_in_a_parameter_is_an_error(model):
         ('{"family": "BoucWen", "parameters": {"bta": 1}}', "bta"),
         ('{"family": "BoucWen", "parameters": {"beta": NaN}}', "beta must be finite"),
         ('{"family": "BoucWen", "parameters": {"beta": "much"}}', "beta must be a number"),
-        ('{"family": "Line", "parameters": 3}', "does not hold a model"),
-        ('{"family": "Line", "parameters": []}', "does not hold a model"),
+        ("5", 'expected a mapping with "family" and "parameters", got 5'),
+        ("[" * 5000 + "]" * 5000, "nested more than 100 deep"),
+        (
+            '{"family": "Line", "parameters": {"slope": ' + "9" * 5000 + "}}",
+            "an integer of 5000 digits is no parameter",
+        ),
+        ('{"family": "Line"}', "'parameters' missing"),
+        ('{"family": "Line", "parameters": 3}', "parameters must be a mapping, got 3"),
+        ('{"family": "Line", "parameters": []}', r"parameters must be a mapping, got \[\]"),
+        ('{"family": "BoucWen", "parameters": {"n": [1]}}', r"n must be a number, got \[1\]"),
+        ('{"family": "Line", "parameters": {}, "units": null}', "units must be a mapping of names to labels, got None"),
+        ('{"family": "Line", "parameters": {}, "units": {"u": 1}}', "units must be a mapping of names to labels"),
         ('{"family": "Line", "parameters": {"slope": 1}}', "offset missing"),
         ('{"family": ["Line"], "parameters": {}}', r"the family must be a name, got \['Line'\]"),
     ],
@@ -110,6 +120,7 @@ def test_a_file_without_a_model_is_named(tmp_path, text, message):
     with pytest.raises(ValueError, match=message) as caught:
         hs.load_model(path)
     assert "bad.json" in str(caught.value)
+    assert "Error" not in str(caught.value)
 
 
 def test_what_is_no_model_is_not_saved(tmp_path):

@@ -123,6 +123,7 @@ def test_every_cycle_has_a_row_in_text_csv_and_json(run, tmp_path):
         (("--cycles", "0"), "expected a number of cycles, at least 1, got '0'"),
         (("--cycles", "loop.csv"), "for the table put the file before --cycles"),
         (("--cycles", "3"), "asked for 3 complete cycle(s) of the input, found 1"),
+        (("--json", "--cycles", "--csv", "-"), "--json and --csv - both write to the standard output"),
         (("--cycles", "--csv", "-", "--out", "-"), "two results would go to the standard output"),
     ],
 )

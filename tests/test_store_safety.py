@@ -108,7 +108,11 @@ def test_a_link_in_the_folder_is_neither_read_nor_written_through(path, shards):
     digits = file.name.partition("-")[0]
     for k in range(3):
         (shards / f"{digits}-{k:09d}.npz").symlink_to(outside)
-    change(path, "INSERT INTO results (task, shard, error) VALUES (2, ?, 'failed')", f"{digits}-000000000.npz")
+    change(
+        path,
+        "INSERT INTO results (task, seconds, shard, error) VALUES (2, 0.0, ?, 'failed')",
+        f"{digits}-000000000.npz",
+    )
     with pytest.raises(ValueError, match="is a link"):
         hs.sweep(squares, SPACE, store=path, workers=1)
     assert outside.read_bytes() == before
@@ -165,12 +169,19 @@ def test_a_damaged_row_of_the_study_is_one_line(path, name, capsys):
         ("UPDATE results SET task = -1 WHERE task = 0", "a row of the task -1"),
         ("UPDATE results SET square = 'much'", "could not convert"),
         ("UPDATE results SET seconds = 'much'", "could not convert"),
+        ("UPDATE results SET seconds = NULL WHERE task = 1", "a row has no 'seconds'"),
         ("UPDATE results SET shard = NULL", "the arrays of the task 0 are missing"),
     ],
 )
 def test_a_damaged_row_of_the_results_is_one_line(path, statement, word):
     change(path, statement)
     refused(path, "damaged store", word)
+
+
+def test_a_row_without_its_parameter_is_not_read_as_nan(path):
+    change(path, "UPDATE results SET a = NULL WHERE task = 1")
+    with pytest.raises(ValueError, match="a row has no 'a'"):
+        hs.load_sweep(path)
 
 
 @pytest.mark.parametrize("damage", ["cut", "empty", "text", "shape", "tasks", "names"])

@@ -119,7 +119,8 @@ def other(a, b):
     ("task", "space", "seed", "words"),
     [
         (other, GRID, 0, "the task's source or what is bound to it has changed"),
-        (sweep_tasks.product, {**GRID, "b": [1, 3]}, 0, "the space was 8 tasks of a, b .* and is 8 tasks"),
+        (sweep_tasks.product, {**GRID, "b": [1, 3]}, 0, r"other values of the parameters \(8 tasks of a, b, as before"),
+        (sweep_tasks.product, {**GRID, "b": [1]}, 0, "the space was 8 tasks of a, b .* and is 4 tasks"),
         (sweep_tasks.product, GRID, 1, "the seed was 0 and is 1"),
     ],
 )

@@ -53,6 +53,8 @@ def run(options: argparse.Namespace) -> int:
 
     if options.csv is not None and options.cycles != _TABLE:
         raise ValueError("--csv writes the table of every cycle: give --cycles without a number too")
+    if options.json and options.csv == records.STANDARD:
+        raise ValueError("--json and --csv - both write to the standard output: give --csv a path")
     is_taken = outputs.check(options.out, options.csv, inputs=[options.file], pictures=[options.plot])
     record = records.read(options)
     tolerance = {} if options.tolerance is None else {"tolerance": options.tolerance}

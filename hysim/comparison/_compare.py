@@ -95,7 +95,7 @@ def compare(
     training = trial.training if trial else record
     if cross_validate == "auto":
         cross_validate = "loo" if len(training) <= _SHORT else _BLOCKS
-    protocol = _Protocol(training, loop_metrics(training.u, training.y), cross_validate, seed, trial)
+    protocol = _Protocol(training, _last_loop(training), cross_validate, seed, trial)
     names = list(subjects)
     results = map_on_threads(
         lambda k: protocol.row(names[k], subjects[names[k]]), len(names), workers=workers, progress=progress
@@ -108,6 +108,13 @@ def compare(
         failed={name: reason for name, reason in found.items() if isinstance(reason, str)},
         test=trial.record if trial else None,
     )
+
+
+def _last_loop(record: Record) -> LoopMetrics:
+    try:
+        return loop_metrics(record.u, record.y)
+    except ValueError as error:
+        raise ValueError(f"compare judges models by the loop of the record, and it has none: {error}") from None
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,8 @@ from hysim._atomic import write_text
 from hysim.models.model import FAMILIES, every_family
 
 _DEEPEST = 100  # lists and mappings in each other: a chain of chains takes three for a model
+_MOST_DIGITS = 400  # the largest float has 309
+_TOO_DEEP = f"lists and mappings are nested more than {_DEEPEST} deep"
 _LONGEST, _BRIEF = 1000, 60  # signs of a message, and of a value in it
 
 
@@ -86,15 +88,32 @@ def load_model(path: str | Path) -> Any:
 def from_json(text: str | bytes, source: str | Path) -> tuple[Any, dict[str, str]]:
     """The model that `to_json` wrote, and the units; errors call the text by the name of its `source`."""
     try:
-        document = json.loads(text, object_pairs_hook=_each_name_once)
+        document = json.loads(text, object_pairs_hook=_each_name_once, parse_int=_integer)
         _check_depth(document)
-        head = {"family": document["family"], "parameters": {**document["parameters"]}}
-        units = {str(name): str(unit) for name, unit in document.get("units", {}).items()}
-    except (AttributeError, KeyError, TypeError, ValueError, RecursionError) as error:
-        raise ValueError(
-            f"{source} does not hold a model of hysim: {type(error).__name__}: {_one_line(error)}"
-        ) from None
-    return from_document(head, source), units
+        units = _units(document)
+    except RecursionError:
+        raise ValueError(f"{source} does not hold a model of hysim: {_TOO_DEEP}") from None
+    except ValueError as error:  # that it is no JSON among them
+        raise ValueError(f"{source} does not hold a model of hysim: {_one_line(error)}") from None
+    return from_document(document, source), units
+
+
+def _units(document: Any) -> dict[str, str]:
+    """The units of a document, whose outer form is checked."""
+    if not isinstance(document, dict):
+        raise ValueError(f'expected a mapping with "family" and "parameters", got {_shown(document)}')
+    if missing := [name for name in ("family", "parameters") if name not in document]:
+        raise ValueError(f"{' and '.join(map(repr, missing))} missing")
+    units = document.get("units", {})
+    if not isinstance(units, dict) or not all(isinstance(unit, str) for unit in units.values()):
+        raise ValueError(f"units must be a mapping of names to labels, got {_shown(units)}")
+    return units
+
+
+def _integer(digits: str) -> int:
+    if len(digits) > _MOST_DIGITS:
+        raise ValueError(f"an integer of {len(digits)} digits is no parameter")
+    return int(digits)
 
 
 def _each_name_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -113,7 +132,7 @@ def _check_depth(document: Any) -> None:
         layer = [item for each in layer for item in _members(each)]
         if not layer:
             return
-    raise ValueError(f"lists and mappings are nested more than {_DEEPEST} deep")
+    raise ValueError(_TOO_DEEP)
 
 
 def _members(value: Any) -> Iterable[Any]:

@@ -71,7 +71,7 @@ class Store:
         with damage_named(self.path):
             axes = {name: _as_column(values, study.kinds[name]) for name, values in study.axes or ()} or None
             columns = {
-                name: _as_column(self._column(column), study.kinds[name]) for name, column in study.parameters.items()
+                name: _as_column(self._filled(column), study.kinds[name]) for name, column in study.parameters.items()
             }
         return Space(columns, axes)
 
@@ -100,7 +100,7 @@ class Store:
             raise ValueError(f"it has a row of the task {places[0] if places[0] < 0 else places[-1]}")
         messages = self._column("error")
         failed = {place: str(text) for place, text in zip(places.tolist(), messages, strict=True) if text is not None}
-        seconds = np.array(self._column("seconds"), dtype=float)
+        seconds = np.array(self._filled("seconds"), dtype=float)
         layout = self._study.layout or ()
         good = np.array([text is None for text in messages], dtype=bool)
         arrays = self._arrays(places[good]) if any(output.shape for output in layout) else {}
@@ -234,6 +234,13 @@ class Store:
         self._database.executemany("INSERT OR REPLACE INTO study VALUES (?, ?)", study.rows.items())
         self._facts = study
 
+    def _filled(self, name: str) -> list[Any]:
+        """A column in which each row has a value; `None` in an output is a nan, which SQLite does not know."""
+        values = self._column(name)
+        if None in values:
+            raise ValueError(f"a row has no {name!r}")
+        return values
+
     def _column(self, name: str) -> list[Any]:
         return [value for (value,) in self._database.execute(f"SELECT {_quoted([name])} FROM results ORDER BY task")]
 
@@ -360,6 +367,9 @@ def _changes(before: Mapping[str, str], now: Mapping[str, str]) -> dict[str, str
     }
     if "task" in words:
         words["task"] = "the task's source or what is bound to it has changed"
+    tasks = now["space"].rpartition(" (")[0]  # without the digest of the values
+    if "space" in words and before.get("space", "").rpartition(" (")[0] == tasks:
+        words["space"] = f"other values of the parameters ({tasks}, as before)"
     return words
 
 
