@@ -345,7 +345,7 @@ def test_the_table_is_text_and_csv_with_units():
     assert [float(row[header.index("energy [kN mm]")]) for row in rows] == table.energy.tolist()
     flat = hs.cycle_metrics([0, 1, 0, -1, 0], [1, 1, 1, 1, 1])
     assert next(csv.DictReader(io.StringIO(flat.to_csv())))["equivalent_damping"] == ""  # no stiffness, no ratio
-    assert repr(table).startswith("<CycleMetrics: 3 cycles about u = 0")
+    assert repr(table).startswith("<CycleMetrics: 3 cycles from u = 0")
 
 
 @pytest.mark.parametrize(

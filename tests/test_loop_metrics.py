@@ -148,6 +148,15 @@ def test_a_plateau_at_the_peak_is_divided_in_its_middle(n_peak):
     assert loop.unloading[-1] == creep[-1]
 
 
+def test_what_is_not_defined_is_not_printed_as_a_number():
+    u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=40)
+    for y in (-u, np.ones(u.size), play(-u, 0.2)):
+        for text in (str(hs.loop_metrics(u, y)), str(hs.cycle_metrics(u, y)), hs.cycle_metrics(u, y).to_text()):
+            assert "nan" not in text
+            assert "none loop" not in text
+    assert "no equivalent damping, which needs a positive stiffness" in str(hs.loop_metrics(u, -u))
+
+
 def test_of_several_samples_at_one_input_the_last_is_taken():
     u = hs.signals.staircase(0.0, 2.0, 1.0, samples_per_step=3)
     y = np.arange(18.0)

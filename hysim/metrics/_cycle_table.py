@@ -48,6 +48,8 @@ class _Column:
         """A number as text shows it."""
         if isinstance(value, int):
             return f"{value}"
+        if math.isnan(value):
+            return "-"
         return f"{100.0 * value:.2f}" if self.unit == "%" else f"{value:.4g}"
 
     def unit_in(self, units: Mapping[str, str]) -> str:
@@ -151,14 +153,15 @@ class CycleMetrics:
 
     def __str__(self) -> str:
         many = "1 cycle" if len(self) == 1 else f"{len(self)} cycles"
+        known = self.equivalent_damping[~np.isnan(self.equivalent_damping)]
         return words(
-            [f"CycleMetrics: {many} about u = {self.level:.6g}, energy {self.energy.sum():.4g} in all"],
+            [f"CycleMetrics: {many} from u = {self.level:.6g}, energy {self.energy.sum():.4g} in all"],
             {
                 "amplitude": extent(self.amplitude),
                 "largest width": extent(self.max_width),
                 "energy": f"{extent(self.energy)} in a cycle, {self.energy_outside:.4g} outside of the cycles",
                 "stiffness": extent(self.secant_stiffness),
-                "damping": f"{extent(self.equivalent_damping)} of the critical",
+                "damping": f"{extent(known)} of the critical" if known.size else "needs a positive stiffness",
                 "sign": self.sign_convention,
             },
         )

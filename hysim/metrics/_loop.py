@@ -107,19 +107,25 @@ class LoopMetrics:
     def __str__(self) -> str:
         cycles = "the last cycle" if self.n_cycles == 1 else f"the mean of {self.n_cycles} cycles"
         return words(
-            [f"LoopMetrics: {self.orientation} loop, {cycles}, largest width {self.max_width:.4g}"],
+            [
+                f"LoopMetrics: {'no' if self.orientation == 'none' else self.orientation} loop, {cycles}, largest width {self.max_width:.4g}"
+            ],
             {
-                "largest width": f"{self.max_width:.4g} at u = {self.max_width_at:.6g}, "
-                f"{100.0 * self.relative_width:.2f} % of the stroke",
+                "largest width": f"{self.max_width:.4g} at u = {self.max_width_at:.6g}"
+                + (f", {100.0 * self.relative_width:.2f} % of the stroke" if self.stroke > 0.0 else ""),
                 "mean width": f"{self.mean_width:.4g}, at mid span {self.mid_width:.4g}",
                 "stroke": f"{self.stroke:.4g} over u of {extent(self.u)}",
                 "area": f"{self.area:.4g}, energy {self.energy:.4g}",
                 "closure gap": f"{self.closure_gap:.4g}",
-                "stiffness": f"{self.secant_stiffness:.4g}, equivalent damping "
-                f"{100.0 * abs(self.equivalent_damping):.2f} %",
+                "stiffness": f"{self.secant_stiffness:.4g}, {self._damping_in_words()}",
                 "sign": self.sign_convention if self.orientation == "counterclockwise" else "",
             },
         )
+
+    def _damping_in_words(self) -> str:
+        if math.isnan(self.equivalent_damping):
+            return "no equivalent damping, which needs a positive stiffness"
+        return f"equivalent damping {100.0 * abs(self.equivalent_damping):.2f} %"
 
     @property
     def sign_convention(self) -> str:
