@@ -129,9 +129,10 @@ def test_rest_holds_the_memory_at_zero(table1):
     assert "z0" not in fit.free_names
 
 
-def test_units_do_not_matter(table1):
-    """The same loop in millivolts and metres has the same optimum."""
-    scaled = hs.Record(u=table1.u * 1e3, y=table1.y * 1e-6)
+@pytest.mark.parametrize("factor", [1e-6, 1e-20])
+def test_units_do_not_matter(table1, factor):
+    """The same loop in millivolts and metres, or a still longer unit, has the same optimum."""
+    scaled = hs.Record(u=table1.u * 1e3, y=table1.y * factor)
     fit = hs.identify(hs.PolynomialBoucWen, scaled, fixed={"n": 1.0})
     assert fit.fit_percent == pytest.approx(96.3107, abs=1e-3)
 
