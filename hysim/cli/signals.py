@@ -1,8 +1,8 @@
 """How a command ends on Ctrl-C, SIGTERM or SIGHUP: in order if it can, and in any case soon.
 
 Python raises an exception between two steps of its own, never inside a call of a compiled library: what such a call
-computes for long would keep a signal waiting. A thread therefore looks after `PATIENCE` whether the command has
-ended, and ends the process if it has not.
+computes for long would keep a signal waiting. A thread therefore waits for `PATIENCE` and then ends the process, unless
+the command has ended by itself.
 """
 
 import contextlib

@@ -105,11 +105,10 @@ class LoopMetrics:
     width: FloatArray
 
     def __str__(self) -> str:
+        loop = "no loop" if self.orientation == "none" else f"{self.orientation} loop"
         cycles = "the last cycle" if self.n_cycles == 1 else f"the mean of {self.n_cycles} cycles"
         return words(
-            [
-                f"LoopMetrics: {'no' if self.orientation == 'none' else self.orientation} loop, {cycles}, largest width {self.max_width:.4g}"
-            ],
+            [f"LoopMetrics: {loop}, {cycles}, largest width {self.max_width:.4g}"],
             {
                 "largest width": f"{self.max_width:.4g} at u = {self.max_width_at:.6g}"
                 + (f", {100.0 * self.relative_width:.2f} % of the stroke" if self.stroke > 0.0 else ""),

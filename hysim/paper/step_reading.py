@@ -29,7 +29,7 @@ _SETTLED = 0.02
 _PER_TIME_CONSTANT = 5
 """Samples in the time constant of the fastest mode, so that two extremes do not lie between two samples."""
 _FADED = 1e-6
-"""What is left of the slowest mode where the evaluation ends."""
+"""Share of the slowest mode that remains where the evaluation ends."""
 _ROOT = 1e-12
 """How exactly an extreme or a crossing is found, as a fraction of the time over which the response is evaluated."""
 
