@@ -11,7 +11,10 @@ rounding    closed forms: what the rounding of each step comes to. A step rounds
             rounding of 2^-53, is what one rounding in each step comes to.
 series      that, and 1e-11 of the range of the output on the branch.
 
-A run that escapes is to escape in all forms, unless the perturbed ones disagree.
+A law that escapes is to escape in all runs, and in every form: the path kernels, batches, the compiled step. Only where
+rounding decides is a difference no fault, and that is measured too: all samples are gone through again with the state
+and each length off by as many roundings as are allowed above, once for each pair of signs. If some of these runs escape
+and others do not, the escape lies within rounding of the last input, and the case counts as undecided.
 """
 
 from collections.abc import Callable
@@ -80,7 +83,7 @@ def pieces(rng: Rng, start: float, end: float) -> Array:
 
 
 class Spread(NamedTuple):
-    """What one rounding in each step comes to: in outputs and in the memory at the end; ranges; who escapes."""
+    """What one rounding in each step comes to: in outputs and in the memory at the end; ranges; which ends there are."""
 
     y: Array
     memory: Array
@@ -287,8 +290,7 @@ def judged(case: Case, found: list[Run], errors: Callable[[], Spread] | None) ->
         return Verdict(0.0, "refused")
     escaped = [run.y is None for run in found]
     if any(escaped):
-        decided = all(escaped) or errors is None or len(errors().escapes) == 1
-        return Verdict(0.0 if all(escaped) or not decided else np.inf, "escaped" if decided else "edge")
+        return Verdict(0.0, "escaped") if all(escaped) else apart_in_escape(case, errors is not None)
     if errors is None:
         return Verdict(to_the_bit(case, found), "compared")
     ratio = compared(case, found, NOTHING)
@@ -299,6 +301,19 @@ def judged(case: Case, found: list[Run], errors: Callable[[], Spread] | None) ->
     if ratio > 1.0:
         ratio = min(ratio, compared(case, found, spread_through_peaks(case)))
     return Verdict(ratio, "compared")
+
+
+def apart_in_escape(case: Case, may_round: bool) -> Verdict:
+    """The verdict where one run escapes and another does not: a violation, unless rounding decides."""
+    decided = not may_round or len(spread(case, ROUNDINGS * UNIT).escapes) == 1
+    return Verdict(np.inf, "escaped") if decided else Verdict(0.0, "edge")
+
+
+def judged_beside(case: Case, found: list[Run], path: list[Run], errors: Callable[[], Spread] | None) -> Verdict:
+    """As `judged`, of another form of the law, which is to escape where the path kernels do."""
+    if any((run.y is None) != (other.y is None) for run, other in zip(found, path, strict=True)):
+        return apart_in_escape(case, errors is not None)
+    return judged(case, found, errors)
 
 
 def to_the_bit(case: Case, found: list[Run]) -> float:

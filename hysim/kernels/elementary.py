@@ -32,6 +32,7 @@ DECAY_REACH = 0.75  # the terms left out are below 3e-17 here
 _TANGENT_REACH = 0.2  # and below 5e-18 here
 _LARGEST_EXPONENT = 709.0
 _SMALL = 2.0**-54
+_FAR = 4.0  # times the balance, or more: from there on a decay is not taken as a change
 
 
 @inlined
@@ -68,7 +69,12 @@ def linear_flow(along: float, A: float, k: float, length: float) -> float:
     if x < -_LARGEST_EXPONENT:
         return along if slope == 0.0 else math.copysign(math.inf, slope)
     decay = math.exp(-x)
-    return along * decay if A == 0.0 else along + slope * ((1.0 - decay) / k)
+    if A == 0.0:
+        return along * decay
+    travelled = (1.0 - decay) / k
+    if x > 0.0 and abs(slope) > _FAR * abs(A):  # a sum of sizes: the one below might be rounded past a small balance
+        return along * decay + A * travelled
+    return along + slope * travelled
 
 
 @inlined
@@ -127,6 +133,8 @@ def quadratic_flow(along: float, A: float, k: float, tangent: float) -> float:
     denominator = 1.0 + k * along * tangent
     if denominator <= 0.0:
         return math.copysign(math.inf, slope)
+    if denominator > _FAR:  # as in `linear_flow`
+        return (along + A * tangent) / denominator
     return along + slope * tangent / denominator
 
 
