@@ -154,6 +154,7 @@ def family_rows(family: str, chunks: list[dict[str, Any]]) -> list[Row]:
                 "escaped": ends["escaped"],
                 "undecided": ends["edge"],
                 "refused": ends["refused"],
+                "partly_refused": ends["partly refused"],
             }
         )
     return rows

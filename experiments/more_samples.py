@@ -14,7 +14,9 @@ series      that, and 1e-11 of the range of the output on the branch.
 A law that escapes is to escape in all runs, and in every form: the path kernels, batches, the compiled step. Only where
 rounding decides is a difference no fault, and that is measured too: all samples are gone through again with the state
 and each length off by as many roundings as are allowed above, once for each pair of signs. If some of these runs escape
-and others do not, the escape lies within rounding of the last input, and the case counts as undecided.
+and others do not, the escape lies within rounding of the last input, and the case counts as undecided. A law that is too
+stiff is refused with an error, which is no result that could differ; as the steps between two samples are limited, and
+not those of the stride, it may be refused in one piece and not in many: this is counted as partly refused.
 """
 
 from collections.abc import Callable
@@ -281,13 +283,14 @@ class Verdict(NamedTuple):
     """How a case ended: its worst distance over what is allowed; or why there is none."""
 
     ratio: float
-    end: str  # "compared", "escaped", "refused", "edge" (rounding decides whether it escapes)
+    end: str  # "compared", "escaped", "refused", "partly refused", "edge" (rounding decides whether it escapes)
 
 
 def judged(case: Case, found: list[Run], errors: Callable[[], Spread] | None) -> Verdict:
     """Compare three runs; without errors they must agree to the bit. The spread is asked for where it can matter."""
-    if any(isinstance(run.y, str) for run in found):
-        return Verdict(0.0, "refused")
+    refused = [isinstance(run.y, str) for run in found]
+    if any(refused):
+        return Verdict(0.0, "refused" if all(refused) else "partly refused")
     escaped = [run.y is None for run in found]
     if any(escaped):
         return Verdict(0.0, "escaped") if all(escaped) else apart_in_escape(case, errors is not None)

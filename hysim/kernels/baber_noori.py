@@ -18,8 +18,8 @@ and a step ends before the bell could be more than rounding. A step also ends wh
 at w = 0 unless n is 1 or 2: within a distance in which the integral of its term is rounding it is left out, and close
 to there it is bounded on a disc of its own, shorter than that of the rest. There is no closed form; this is good to
 1e-12 of the range. A law that escapes is returned as `inf`; one that needs more than MAX_STEPS, or whose eta vanishes
-on the way, as `nan`. That it escapes is shown, or it grows until it overflows: the wear may turn a memory back that moves
-at any speed, so that a fast memory is no proof.
+on the way, as `nan`. That it escapes is shown, or it grows beyond 1e100: the wear may turn back a memory that moves at any
+speed, so that a fast memory is no proof.
 
 A law that neither wears off nor pinches takes the exact step of `hysim.kernels.boucwen`, so that z has its bits.
 """
@@ -48,6 +48,7 @@ N_STATE = _READY + 1
 
 MAX_STEPS = 5_000
 _LARGEST = 1.7976931348623157e308
+_BEYOND, _BEYOND_POWER = 1e100, 1e200  # a memory, or its power n, that grows from there on has escaped
 _LARGEST_EXPONENT = 700.0
 _GROWTH = 4.0  # of the length tried, over the last one that served
 _WIDEST = 6.0  # disc looked at, in steps: a little wider than what serves a step of N_TERMS
@@ -109,6 +110,8 @@ def advance(w: float, e: float, length: float, parameters: FloatArray, series: F
                 elif free:
                     t = min(t, 2.0 * abs(w / forcing) if w * forcing < 0.0 else near / abs(forcing))
         last, fraction = expand(w, e, t, free, size, parameters, series)
+        if w * series[_SLOPE, 0] > 0.0 and (abs(w) > _BEYOND or series[_POWER, 0] > _BEYOND_POWER):
+            return math.copysign(math.inf, w), e
         if fraction == 0.0:
             if not math.isfinite(series[_W, 1]):
                 return series[_W, 1], e
