@@ -13,10 +13,11 @@ series      that, and 1e-11 of the range of the output on the branch.
 
 A law that escapes is to escape in all runs, and in every form: the path kernels, batches, the compiled step. Only where
 rounding decides is a difference no fault, and that is measured too: all samples are gone through again with the state
-and each length off by as many roundings as are allowed above, once for each pair of signs. If some of these runs escape
-and others do not, the escape lies within rounding of the last input, and the case counts as undecided. A law that is too
-stiff is refused with an error, which is no result that could differ; as the steps between two samples are limited, and
-not those of the stride, it may be refused in one piece and not in many: this is counted as partly refused.
+and each length off by as many roundings as are allowed above, once for each pair of signs. If some of them escape and
+others do not, the escape lies within rounding of the last input, and the case counts as undecided.
+
+A law that is too stiff is refused with an error, which is no result that could differ. As the steps between two samples
+are limited, and not those of the stride, it may be refused in one piece and not in many: it counts as partly refused.
 """
 
 from collections.abc import Callable
@@ -85,7 +86,7 @@ def pieces(rng: Rng, start: float, end: float) -> Array:
 
 
 class Spread(NamedTuple):
-    """What one rounding in each step comes to: in outputs and in the memory at the end; ranges; which ends there are."""
+    """What one rounding in each step comes to: in outputs and in the memory at the end; ranges; who escapes."""
 
     y: Array
     memory: Array

@@ -18,8 +18,8 @@ and a step ends before the bell could be more than rounding. A step also ends wh
 at w = 0 unless n is 1 or 2: within a distance in which the integral of its term is rounding it is left out, and close
 to there it is bounded on a disc of its own, shorter than that of the rest. There is no closed form; this is good to
 1e-12 of the range. A law that escapes is returned as `inf`; one that needs more than MAX_STEPS, or whose eta vanishes
-on the way, as `nan`. That it escapes is shown, or it grows beyond 1e100: the wear may turn back a memory that moves at any
-speed, so that a fast memory is no proof.
+on the way, as `nan`. That it escapes is shown, or it grows beyond 1e100: the wear may turn back a memory that moves at
+any speed, so that a fast memory is no proof.
 
 A law that neither wears off nor pinches takes the exact step of `hysim.kernels.boucwen`, so that z has its bits.
 """
@@ -166,7 +166,9 @@ def escapes(w: float, e: float, left: float, parameters: FloatArray, series: Flo
     bell = parameters[3] == 0.0 or abs(parameters[5]) * farthest <= 0.5
     width = abs(parameters[6] + parameters[7] * e)
     bell = bell and (parameters[3] == 0.0 or abs(parameters[7]) * farthest <= 0.5 * width)
-    return bool(bell and 2.0 * abs(parameters[1]) * farthest <= abs(nu) and 2.0 * abs(parameters[2]) * farthest <= abs(eta))
+    return bool(
+        bell and 2.0 * abs(parameters[1]) * farthest <= abs(nu) and 2.0 * abs(parameters[2]) * farthest <= abs(eta)
+    )
 
 
 @inner
