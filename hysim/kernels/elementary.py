@@ -45,7 +45,7 @@ def power(w: float, n: float) -> float:
     return float(abs(w) ** n)
 
 
-@inner
+@inlined
 def linear_advance(z: float, du: float, A: float, loading: float, unloading: float) -> float:
     """Memory of n = 1 after the input has moved by `du`; `loading` is beta + gamma, `unloading` beta - gamma."""
     length = abs(du)
@@ -65,6 +65,12 @@ def linear_flow(along: float, A: float, k: float, length: float) -> float:
     x = k * length
     if abs(x) <= DECAY_REACH:
         return along * math.exp(-x) if A == 0.0 else short_flow(along, A, k, length)
+    return long_flow(along, A, k, x)
+
+
+@inner
+def long_flow(along: float, A: float, k: float, x: float) -> float:
+    """As `linear_flow`, for |x| = |k| length from DECAY_REACH on."""
     slope = A - k * along
     if x < -_LARGEST_EXPONENT:
         return along if slope == 0.0 else math.copysign(math.inf, slope)
@@ -92,7 +98,7 @@ def linear_travel(along: float, A: float, k: float) -> float:
     return math.log1p(-x) / k if x < 1.0 else math.inf
 
 
-@inner
+@inlined
 def quadratic_advance(z: float, du: float, A: float, loading: float, unloading: float) -> float:
     """Memory of n = 2 after the input has moved by `du`, as `linear_advance`."""
     length = abs(du)
