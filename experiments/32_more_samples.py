@@ -26,7 +26,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 from hostile_laws import DRAWS
-from more_samples import BITS, Case, Verdict, compiled_run, draw_case, judged, response_run, runs, spread
+from more_samples import BITS, Case, Verdict, compiled_run, draw_case, judged, judged_beside, response_run, runs, spread
 from more_samples_batch import (
     ODD,
     batch_runs,
@@ -53,15 +53,16 @@ Found = Iterator[tuple[str, Verdict, Any]]
 
 def forward_verdicts(family: str, seeds: range) -> Found:
     """Path, verdict and seed of each case."""
-    cases, errors = [], []
+    cases, errors, paths = [], [], []
     for seed in seeds:
         rng = generator(family, seed)
         case = draw_case(family, rng)
         cases.append(case)
         errors.append(None if family in BITS else remembered(case))
-        yield "response", judged(case, runs(case, response_run), errors[-1]), seed
+        paths.append(runs(case, response_run))
+        yield "response", judged(case, paths[-1], errors[-1]), seed
         if family not in NOT_STEPPED:
-            yield "compiled step", judged(case, runs(case, compiled_run), errors[-1]), seed
+            yield "compiled step", judged_beside(case, runs(case, compiled_run), paths[-1], errors[-1]), seed
         if family != TIMED:
             yield "cut and continued", to_the_bit(cut_keeps_bits(case, rng)), seed
             yield "input at rest", to_the_bit(standing_changes_nothing(case, rng)), seed
@@ -71,8 +72,8 @@ def forward_verdicts(family: str, seeds: range) -> Found:
         for seed, verdict in zip(seeds, even_verdicts(cases, generator(family, seeds[0])), strict=True):
             yield "batch", verdict, seed
     elif family not in NOT_IN_BATCHES:
-        for seed, case, found, error in zip(seeds, cases, batch_runs(cases), errors, strict=True):
-            yield "batch", judged(case, found, error), seed
+        for seed, case, found, path, error in zip(seeds, cases, batch_runs(cases, paths), paths, errors, strict=True):
+            yield "batch", judged_beside(case, found, path, error), seed
 
 
 def inverse_verdicts(family: str, seeds: range) -> Found:
@@ -153,6 +154,7 @@ def family_rows(family: str, chunks: list[dict[str, Any]]) -> list[Row]:
                 "escaped": ends["escaped"],
                 "undecided": ends["edge"],
                 "refused": ends["refused"],
+                "partly_refused": ends["partly refused"],
             }
         )
     return rows

@@ -11,7 +11,13 @@ rounding    closed forms: what the rounding of each step comes to. A step rounds
             rounding of 2^-53, is what one rounding in each step comes to.
 series      that, and 1e-11 of the range of the output on the branch.
 
-A run that escapes is to escape in all forms, unless the perturbed ones disagree.
+A law that escapes is to escape in all runs, and in every form: the path kernels, batches, the compiled step. Only where
+rounding decides is a difference no fault, and that is measured too: all samples are gone through again with the state
+and each length off by as many roundings as are allowed above, once for each pair of signs. If some of them escape and
+others do not, the escape lies within rounding of the last input, and the case counts as undecided.
+
+A law that is too stiff is refused with an error, which is no result that could differ. As the steps between two samples
+are limited, and not those of the stride, it may be refused in one piece and not in many: it counts as partly refused.
 """
 
 from collections.abc import Callable
@@ -278,17 +284,17 @@ class Verdict(NamedTuple):
     """How a case ended: its worst distance over what is allowed; or why there is none."""
 
     ratio: float
-    end: str  # "compared", "escaped", "refused", "edge" (rounding decides whether it escapes)
+    end: str  # "compared", "escaped", "refused", "partly refused", "edge" (rounding decides whether it escapes)
 
 
 def judged(case: Case, found: list[Run], errors: Callable[[], Spread] | None) -> Verdict:
     """Compare three runs; without errors they must agree to the bit. The spread is asked for where it can matter."""
-    if any(isinstance(run.y, str) for run in found):
-        return Verdict(0.0, "refused")
+    refused = [isinstance(run.y, str) for run in found]
+    if any(refused):
+        return Verdict(0.0, "refused" if all(refused) else "partly refused")
     escaped = [run.y is None for run in found]
     if any(escaped):
-        decided = all(escaped) or errors is None or len(errors().escapes) == 1
-        return Verdict(0.0 if all(escaped) or not decided else np.inf, "escaped" if decided else "edge")
+        return Verdict(0.0, "escaped") if all(escaped) else apart_in_escape(case, errors is not None)
     if errors is None:
         return Verdict(to_the_bit(case, found), "compared")
     ratio = compared(case, found, NOTHING)
@@ -299,6 +305,19 @@ def judged(case: Case, found: list[Run], errors: Callable[[], Spread] | None) ->
     if ratio > 1.0:
         ratio = min(ratio, compared(case, found, spread_through_peaks(case)))
     return Verdict(ratio, "compared")
+
+
+def apart_in_escape(case: Case, may_round: bool) -> Verdict:
+    """The verdict where one run escapes and another does not: a violation, unless rounding decides."""
+    decided = not may_round or len(spread(case, ROUNDINGS * UNIT).escapes) == 1
+    return Verdict(np.inf, "escaped") if decided else Verdict(0.0, "edge")
+
+
+def judged_beside(case: Case, found: list[Run], path: list[Run], errors: Callable[[], Spread] | None) -> Verdict:
+    """As `judged`, of another form of the law, which is to escape where the path kernels do."""
+    if any((run.y is None) != (other.y is None) for run, other in zip(found, path, strict=True)):
+        return apart_in_escape(case, errors is not None)
+    return judged(case, found, errors)
 
 
 def to_the_bit(case: Case, found: list[Run]) -> float:

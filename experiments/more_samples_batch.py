@@ -5,13 +5,16 @@ from typing import Any
 
 import numpy as np
 from hostile_laws import Rng, decades
-from more_samples import N_PIECES, ROUNDINGS, UNIT, Array, Case, Run, Verdict, is_series, size, worst
+from more_samples import N_PIECES, ROUNDINGS, UNIT, Array, Case, Run, Verdict, size, worst
 
 import hysim as hs
 
 
-def batch_runs(cases: list[Case]) -> list[list[Run]]:
-    """The three runs of each case by `responses`: where a run leaves out a sample, its input stands still."""
+def batch_runs(cases: list[Case], paths: list[list[Run]]) -> list[list[Run]]:
+    """The three runs of each case by `responses`: where a run leaves out a sample, its input stands still.
+
+    A batch has inf for a law that escapes, and for one that is too stiff: which of them is taken from the path kernels.
+    """
     groups: dict[Any, list[int]] = {}
     for k, case in enumerate(cases):
         groups.setdefault(structure_of(case), []).append(k)
@@ -24,7 +27,7 @@ def batch_runs(cases: list[Case]) -> list[list[Run]]:
             y = type(laws[0]).responses(parameters, inputs)
             for k, row in zip(members, y, strict=True):
                 own = row[LONGEST : LONGEST + cases[k].u.size][places_of(cases[k], chosen)]
-                lost = "refused" if is_series(cases[k].law) else None  # a batch has inf for both
+                lost = "refused" if isinstance(paths[k][chosen].y, str) else None
                 found[k].append(Run(own if np.isfinite(row).all() else lost, ()))
     return found
 

@@ -3,7 +3,7 @@
 import numba
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import simpson, solve_ivp
 
 import hysim as hs
 
@@ -137,3 +137,60 @@ def test_a_bell_that_narrows_to_nothing_is_left_out():
     coarse, _ = model.advance([3.0], (0.0, 0.9, -0.5))
     fine, _ = model.advance(np.linspace(0.0, 3.0, 65)[1:], (0.0, 0.9, -0.5))
     assert coarse[-1] == pytest.approx(fine[-1], abs=1e-12)
+
+
+# ---------------------------------------------------------------------------------- memories that wear off
+
+
+def in_pieces(model, length, state):
+    """States after an input that rises by `length`, in one piece, in 2, and in 64."""
+    return [model.advance(np.linspace(0.0, length, pieces + 1)[1:], state)[1] for pieces in (1, 2, 64)]
+
+
+def test_a_memory_that_wear_turns_back_from_a_peak_has_not_escaped():
+    """Without forcing dw/de = e_0 - e has a closed solution: here the memory peaks at 2e17, on 1e-17 of input."""
+    model = hs.BoucWenBaberNoori(A=0.0, beta=-0.5, gamma=-0.5, n=2.0, delta_nu=-1.0 / 80.0, z0=1.0)
+    e = np.linspace(0.0, 150.0, 300_001)
+    w = np.exp(e - e * e / 160.0)
+    length = simpson(1.0 / w, x=e)
+    for _, z, energy in in_pieces(model, length, (0.0, 1.0, 0.0)):
+        # the end is as far off as the place of the peak, which is a rounding of the length, times the slope there
+        assert z == pytest.approx(w[-1], rel=1e-9)
+        assert energy == pytest.approx(150.0, rel=1e-11)
+
+
+def test_no_step_goes_over_two_zeros():
+    """Where the strength has worn off the memory swings about zero, by less and less."""
+    own = {"delta_a": 89.97, "delta_nu": 0.602859, "delta_eta": 0.74735}
+    model = hs.BoucWenBaberNoori(A=195.407, beta=6.35573, gamma=3.53169, n=1.0, **own)
+    ends = np.array(in_pieces(model, 7.65, (0.0, 2e-5, 0.0)))
+    assert np.ptp(ends, axis=0).max() < 1e-12 * 9.3  # of the range of z on the way
+
+
+def test_a_first_step_that_is_far_too_long_is_cut_to_what_its_terms_serve():
+    """The energy of a plain law, whose memory falls 1000 times as fast at first as it rises then."""
+    A, fall, rise, z0, length = 0.004, 7e7, 128.0, 0.0013, 5.7
+    model = hs.BoucWenBaberNoori(A=A, beta=0.5 * (rise + fall), gamma=0.5 * (rise - fall), n=2.0, z0=-z0)
+    to_zero = np.arctan(np.sqrt(fall / A) * z0) / np.sqrt(A * fall)
+    energy = np.log(np.cosh(np.sqrt(A * rise) * (length - to_zero))) / rise
+    energy -= np.log1p(fall / A * z0 * z0) / (2.0 * fall)
+    found = [end[2] for end in in_pieces(model, length, (0.0, -z0, 0.0))]
+    assert found == pytest.approx([energy] * 3, rel=2e-15, abs=0.0)
+
+
+@pytest.mark.parametrize(("n", "z0"), [(10.0, -885.0), (0.4, -0.02), (2.0, -1e5)])
+def test_a_memory_that_falls_fast_has_not_escaped(n, z0):
+    """Steps much shorter than a rounding of the input were taken for an escape."""
+    model = hs.BoucWenBaberNoori(beta=501.0, gamma=-499.0, n=n, z0=z0, delta_nu=1e-3, delta_eta=1e-3)
+    ends = np.array(in_pieces(model, 5e3 if n < 1.0 else 5.0, (0.0, z0, 0.0)))
+    assert np.isfinite(ends).all()
+    assert np.ptp(ends[:, 1:], axis=0) == pytest.approx(0.0, abs=1e-11 * np.abs(ends[0, 1:]).max())
+
+
+def test_a_memory_that_grows_fast_and_does_escape_is_said_to():
+    worn = {"delta_nu": 1e-3, "delta_eta": 1e-3}
+    for n in (1.5, 2.0, 2.001, 6.0):
+        model = hs.BoucWenBaberNoori(beta=-10.0, gamma=-1.0, n=n, **worn)
+        for pieces in (1, 64):
+            with pytest.raises(hs.SimulationError, match="escapes to infinity"):
+                model.response(np.linspace(0.0, 5.0, pieces + 1))

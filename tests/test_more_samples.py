@@ -84,6 +84,42 @@ def test_a_memory_that_escapes_before_the_input_changes_its_sign_has_escaped():
         law.response([-50.0, 50.0])
 
 
+RUNAWAYS = [
+    hs.BoucWen(beta=0.5, gamma=-1.5, n=2.0),
+    hs.BoucWen(beta=0.5, gamma=-1.5, n=3.0),
+    hs.GeneralizedBoucWen(beta=0.5, gamma=-1.5, n=2.0, b6=0.3),
+    hs.ZhuWangBoucWen(beta=0.5, gamma=-1.5, n=2.0, delta=0.1),
+    hs.BoucWenBaberNoori(beta=0.5, gamma=-1.5, n=3.0, delta_nu=0.1),
+    hs.Duhem.from_terms({"u'": 1.0, "|u'| |z| z": -1.0, "u' z^2": 2.0}),
+    hs.BoucWen(beta=0.5, gamma=-1.5, n=2.0) + hs.Line(slope=1.0),
+]
+
+
+@pytest.mark.parametrize("law", RUNAWAYS, ids=lambda law: type(law).__name__)
+def test_a_law_that_has_escaped_does_not_come_back_in_a_loop(law):
+    """From infinity a strong decay is back at once: a compiled loop went on with finite outputs."""
+    step, parameters, state = law.compiled(0.1)
+    with np.errstate(all="ignore"):
+        outputs = [step(parameters, state, u) for u in (0.1, 50.0, 49.0, -30.0, 0.0)]
+    assert np.isfinite(outputs).tolist() == [True, False, False, False, False]
+
+
+RUNAWAY = RUNAWAYS[0]
+TO_ESCAPE = np.pi / 2.0
+
+
+@pytest.mark.parametrize(("stride", "end"), [(0.5, "escaped"), (TO_ESCAPE, "edge"), (TO_ESCAPE - 1e-13, "escaped")])
+def test_an_escape_in_one_sampling_alone_is_a_violation_unless_rounding_decides(stride, end):
+    case = experiment.Case(RUNAWAY, np.zeros(1), np.linspace(0.0, stride, 5)[1:], np.array([3]))
+    y, lost = np.ones(4), experiment.response_run(case._replace(u=np.array([50.0])), np.array([0]))
+    other = type(lost)(y, (0.0, 0.0))
+    errors = experiment.remembered(case)
+    with np.errstate(all="ignore"):
+        alone = experiment.judged(case, [lost, other, other], errors)
+        beside = experiment.judged_beside(case, [other, other, other], [lost, lost, lost], errors)
+    assert alone == beside == (0.0 if end == "edge" else np.inf, end)
+
+
 def test_a_cascade_does_not_hide_that_its_first_law_escapes():
     law = hs.BoucWen(beta=-1.0, gamma=-1.0, n=2.0) >> hs.Preisach(levels=(0.0, 1.0), weights=(1.0,))
     compiled = law.compiled(0.0)

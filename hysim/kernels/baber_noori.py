@@ -18,7 +18,8 @@ and a step ends before the bell could be more than rounding. A step also ends wh
 at w = 0 unless n is 1 or 2: within a distance in which the integral of its term is rounding it is left out, and close
 to there it is bounded on a disc of its own, shorter than that of the rest. There is no closed form; this is good to
 1e-12 of the range. A law that escapes is returned as `inf`; one that needs more than MAX_STEPS, or whose eta vanishes
-on the way, as `nan`.
+on the way, as `nan`. That it escapes is shown, or it grows beyond 1e100: the wear may turn back a memory that moves at
+any speed, so that a fast memory is no proof.
 
 A law that neither wears off nor pinches takes the exact step of `hysim.kernels.boucwen`, so that z has its bits.
 """
@@ -29,8 +30,8 @@ from hysim._frozen import FloatArray
 from hysim.kernels import boucwen
 from hysim.kernels._compile import inner, kernel
 from hysim.kernels.charts import N_WORK
-from hysim.kernels.duhem import place, zero
-from hysim.kernels.remainder import N_TERMS, ROUNDING, fraction
+from hysim.kernels.duhem import place, untangled, zero
+from hysim.kernels.remainder import FARTHEST, N_TERMS, ROUNDING, fraction
 
 N_OWN = 9  # delta_a, delta_nu, delta_eta, zeta_s, q, p, psi, delta_psi, lambda, before what `boucwen.step` takes
 _A, _BETA, _GAMMA, _N = range(N_OWN, N_OWN + 4)
@@ -47,6 +48,7 @@ N_STATE = _READY + 1
 
 MAX_STEPS = 5_000
 _LARGEST = 1.7976931348623157e308
+_BEYOND, _BEYOND_POWER = 1e100, 1e200  # a memory, or its power n, that grows from there on has escaped
 _LARGEST_EXPONENT = 700.0
 _GROWTH = 4.0  # of the length tried, over the last one that served
 _WIDEST = 6.0  # disc looked at, in steps: a little wider than what serves a step of N_TERMS
@@ -70,7 +72,7 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
         A, beta, gamma, n = common[0], common[1], common[2], common[3]
         boucwen.prepare(A, beta, gamma, n, state[_EXPONENT], plain)
         state[_EXPONENT], state[_READY] = n, 1.0
-    if u != last:
+    if u != last and math.isfinite(z):  # an escape remains one
         direction = 1.0 if u > last else -1.0
         series = state[_SERIES:_EXPONENT].reshape((_N_ROWS, N_TERMS + 1))
         w, e = advance(direction * z, e, abs(u - last), parameters, series)
@@ -89,43 +91,84 @@ def advance(w: float, e: float, length: float, parameters: FloatArray, series: F
     """w and e after the input has moved by `length`; `series` is (_N_ROWS, N_TERMS + 1)."""
     n = parameters[_N]
     left = t = length
-    largest = abs(w)
+    lost = 0.0
     for _ in range(MAX_STEPS):
         if left <= ROUNDING * length:
             return w, e
-        free, whole = False, n == 1.0 or n == 2.0
+        size, free, whole = abs(w), False, n == 1.0 or n == 2.0
         if w == 0.0 or not whole:
             begin(w, e, True, parameters, series)
             forcing = series[_SLOPE, 0]
             if w == 0.0 and forcing == 0.0:
                 return w, e
             if not whole:
-                near, size, bent = nearness(e, length, parameters, series)
-                largest = max(largest, min(size, bent))
+                near, reach, bent = nearness(e, length, parameters, series)
+                size = max(size, min(reach, bent))
                 free = abs(w) <= near
                 if not free and abs(w) < 0.5 * bent:
                     t = short_way(w, forcing, near, n, t)
                 elif free:
                     t = min(t, 2.0 * abs(w / forcing) if w * forcing < 0.0 else near / abs(forcing))
-        last, fraction = expand(w, e, t, free, largest, parameters, series)
+        last, fraction = expand(w, e, t, free, size, parameters, series)
+        if w * series[_SLOPE, 0] > 0.0 and (abs(w) > _BEYOND or series[_POWER, 0] > _BEYOND_POWER):
+            return math.copysign(math.inf, w), e
         if fraction == 0.0:
             if not math.isfinite(series[_W, 1]):
                 return series[_W, 1], e
             t *= _RETREAT
             continue
-        if fraction < 1.0 and t * fraction <= ROUNDING * length:  # nothing moves u any more, but w
-            return math.inf if abs(1.0 + parameters[2] * e) > _VANISHED else math.nan, e
+        if fraction < 1.0:
+            if t * fraction <= ROUNDING * length and abs(1.0 + parameters[2] * e) <= _VANISHED:
+                return math.nan, e
+            if escapes(w, e, left, parameters, series):
+                return math.copysign(math.inf, w), e
+        served = t * fraction
+        if whole:  # else the series keeps away from zero, or is nearly a line
+            fraction = untangled(series, last, fraction)
         before, w = w, place(series, last, fraction)[0]
         if not abs(w) < _LARGEST:
             return w, e
-        largest = max(largest, abs(w))
         if before * w < 0.0:
             fraction, w = zero(series, last, fraction), 0.0
         e = place(series[_ENERGY - 1 :], last, fraction)[0]
         taken = t * fraction
-        left = 0.0 if taken >= left else left - taken
-        t = min(left, _GROWTH * taken)
+        if taken >= left:
+            return w, e
+        taken += lost
+        remaining = left - taken
+        lost = taken - (left - remaining)  # many steps may be a rounding of what is left, each of them
+        left = remaining
+        t = min(left, _GROWTH * served)
     return math.nan, e
+
+
+@inner
+def escapes(w: float, e: float, left: float, parameters: FloatArray, series: FloatArray) -> bool:
+    """Whether w is sure to reach infinity within the length `left`; after `begin`.
+
+    It is if dw/dL is at least a quarter of the term of ``|w|^n`` from here on, and n > 1: then w^(1 - n) comes to zero
+    in time. That holds as long as A stays small beside the term, nu keeps half of its size, and eta at least does not
+    grow by more than a half. For n > 2, e goes no further than w^2 / ((n - 2) rate) until then. For others it
+    goes anywhere, and nu is to grow, and eta to stay.
+    """
+    n, nu, eta = parameters[_N], 1.0 + parameters[1] * e, 1.0 + parameters[2] * e
+    side = 1.0 if w > 0.0 else -1.0
+    term = -(parameters[_GAMMA] + side * parameters[_BETA]) * nu * series[_POWER, 0]
+    rate = 0.25 * side * term / eta
+    if n <= 1.0 or not (rate > 0.0 and (n - 1.0) * rate * left >= abs(w)) or series[_PINCH, 0] != 1.0:
+        return False
+    forcing = abs(parameters[_A] - parameters[0] * e) + abs(parameters[0]) * w * w / rate
+    if forcing > 0.125 * abs(term):
+        return False
+    if n <= 2.0:
+        return bool(parameters[1] * side * nu >= 0.0 and parameters[2] == 0.0 and parameters[3] == 0.0)
+    farthest = w * w / ((n - 2.0) * rate)
+    bell = parameters[3] == 0.0 or abs(parameters[5]) * farthest <= 0.5
+    width = abs(parameters[6] + parameters[7] * e)
+    bell = bell and (parameters[3] == 0.0 or abs(parameters[7]) * farthest <= 0.5 * width)
+    return bool(
+        bell and 2.0 * abs(parameters[1]) * farthest <= abs(nu) and 2.0 * abs(parameters[2]) * farthest <= abs(eta)
+    )
 
 
 @inner
@@ -190,7 +233,7 @@ def begin(w: float, e: float, free: bool, parameters: FloatArray, series: FloatA
 def expand(
     w: float, e: float, t: float, free: bool, size: float, parameters: FloatArray, series: FloatArray
 ) -> tuple[int, float]:
-    """Fill the series over a length t until what is left out is rounding beside `size`.
+    """Fill the series over a length t until what is left out is rounding beside `size`, or the way that w goes.
 
     Returns the index of the last term and the fraction of t that the terms serve, 0 where none is known to.
     """
@@ -199,14 +242,14 @@ def expand(
     if pinches and abs(series[_X, 0]) >= _FAR:
         pinches = False
         series[_PINCH, 0], series[_SLOPE, 0] = 1.0, series[_BRACKET, 0] / (1.0 + parameters[2] * e)
-    tried = 0
+    tried, scale = 0, size
     for k in range(1, N_TERMS + 1):
         term = t * series[_SLOPE, k - 1] / k
         series[_W, k], series[_ENERGY, k] = term, t * series[_W, k - 1] / k
-        size = max(size, abs(term)) if k < 3 else size
-        if abs(term) <= ROUNDING * size and k >= tried:
+        scale = max(size, abs(term)) if k < 2 else scale
+        if abs(term) <= ROUNDING * scale and k >= tried:
             tried = k + 2
-            if ends(k, t, size, free, pinches, parameters, series):
+            if ends(k, t, scale, free, pinches, parameters, series):
                 served = clear(k, 1.0, pinches, parameters, series)
                 if served > 0.0:
                     return k, served
@@ -245,14 +288,15 @@ def serves(t: float, size: float, free: bool, pinches: bool, parameters: FloatAr
         spread = spread_within(N_TERMS, x, _SMOOTH if free else _ALL, pinches, parameters, series)
         share = 0.0
         if spread < math.inf:
-            share = x * fraction(spread * t * x, size)
+            share = x * reached(spread * t * x, size, abs(series[_W, 1]) * x)
         elif not free:
             shorter = x * inside(N_TERMS, x, series)
             smooth = spread_within(N_TERMS, x, _SMOOTH, pinches, parameters, series)
             bend = spread_within(N_TERMS, shorter, _BEND, pinches, parameters, series)
             if smooth < math.inf and bend < math.inf:
-                share = x * fraction(smooth * t * x, 0.5 * size)
-                share = min(share, shorter * fraction(bend * t * shorter, 0.5 * size))
+                way = 0.5 * abs(series[_W, 1])
+                share = x * reached(smooth * t * x, 0.5 * size, way * x)
+                share = min(share, shorter * reached(bend * t * shorter, 0.5 * size, way * shorter))
         if share >= 1.0:
             return 1.0
         if share < best:
@@ -260,6 +304,19 @@ def serves(t: float, size: float, free: bool, pinches: bool, parameters: FloatAr
         best = share
         x *= 0.75 if share > 0.01 * x else 0.25
     return best
+
+
+@inner
+def reached(spread: float, size: float, way: float) -> float:
+    """As `fraction`, beside `size` or beside the part of `way` that the memory goes in this fraction.
+
+    The way of a whole step that only serves in part is no measure: no memory comes there.
+    """
+    room = ROUNDING * way * (1.0 - FARTHEST) * (N_TERMS + 1.0)
+    along = FARTHEST
+    if room < spread:
+        along = min(FARTHEST, (room / spread) ** (1.0 / N_TERMS))
+    return float(max(along, fraction(spread, size)))
 
 
 @inner

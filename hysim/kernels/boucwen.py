@@ -45,32 +45,37 @@ def power_advance(z: float, du: float, A: float, beta: float, gamma: float, n: f
         c, side = (beta + gamma, _LOADING) if sign > 0.0 else (beta - gamma, _UNLOADING)
         balance = work[side]
         if balance > 0.0:
-            place, left, change = w * work[side + 1], left * work[side + 2], 0.0
+            end, left, change = w * work[side + 1], left * work[side + 2], 0.0
             while True:
-                part, left, place = in_chart(place, forwards, 0 if forwards == (c > 0.0) else 1, n, left, work)
+                part, left, end = in_chart(end, forwards, 0 if forwards == (c > 0.0) else 1, n, left, work)
                 change += part
-                if left <= 0.0 or (place <= 0.0 and not forwards):
+                if left <= 0.0 or (end <= 0.0 and not forwards):
                     break
             change *= balance
+            end *= balance
             if left > 0.0:
                 left /= work[side + 2]
         else:
-            change, left = degenerate(w, sign * A, c, n, left)
+            change, left, end = degenerate(w, sign * A, c, n, left)
         if left <= 0.0:
             break
         sign, w = -sign, 0.0
-    along = sign * (w + change)
-    return along if du > 0.0 else -along
+    along = w + change
+    if along < 0.5 * w:  # the sum would carry the rounding of w, and might pass a small balance, or zero
+        along = end
+    return along if (du > 0.0) == (sign > 0.0) else -along
 
 
 @inner
-def degenerate(w: float, a: float, c: float, n: float, length: float) -> tuple[float, float]:
-    """Change of w, and length left over at w = 0, on w' = a - c w^n where one of the terms has vanished."""
+def degenerate(w: float, a: float, c: float, n: float, length: float) -> tuple[float, float, float]:
+    """Change of w, length left over at w = 0, and end, on w' = a - c w^n where one of the terms has vanished."""
     if a == 0.0 or (c != 0.0 and abs(a) < abs(c)):
-        return power_flow(w, c, n, length) - w, 0.0
-    if a < 0.0 and w + a * length < 0.0:
-        return -w, length + w / a
-    return a * length, 0.0
+        end = power_flow(w, c, n, length)
+        return end - w, 0.0, end
+    end = w + a * length
+    if a < 0.0 and end < 0.0:
+        return -w, length + w / a, 0.0
+    return a * length, 0.0, end
 
 
 @inlined
@@ -212,7 +217,9 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     y = offset + c1 u + c2 u^2 + ... + gain z.
     """
     A, beta, gamma, n = parameters[0], parameters[1], parameters[2], parameters[3]
-    z = advance(state[1], u - state[0], A, beta, gamma, n, borrowed(state))
+    z = state[1]
+    if math.isfinite(z):  # an escape remains one
+        z = advance(z, u - state[0], A, beta, gamma, n, borrowed(state))
     state[0], state[1] = u, z
     return float(parameters[5] + polynomial(u, parameters, 6) + parameters[4] * z)
 

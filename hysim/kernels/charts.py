@@ -17,9 +17,10 @@ is covered by charts, each with two polynomials, there (from w to T) and back (f
                       S = e sum s_k e^k, which the flow takes to S exp(-n T) (Koenigs),    e = S sum e_k S^k
     elsewhere     (far beyond saturation) Taylor steps of the flow, whose order follows their terms
 
-Sixteen terms, eight near zero, leave out less than 2^-54 of w. What is returned is the change of w, so that a short way
-carries no more rounding than the sum at its end. A chart depends on n and sigma alone: it does not matter
-which ones have been made before.
+Sixteen terms, eight near zero, leave out less than 2^-54 of w. Both the change of w and the end itself are returned: a
+short way by its change carries no more rounding than the sum at its end, and a decay by many decades keeps its digits,
+and its side of the balance, by its end. A chart depends on n and sigma alone: it does not matter which ones have been
+made before.
 """
 
 import math
@@ -160,7 +161,8 @@ def in_chart(
 ) -> tuple[float, float, float]:
     """From w over `length` in T within one chart, or up to its end: the change of w, the length left over, the end.
 
-    `side` is 0 for sigma = 1 and 1 for sigma = -1. An escape is a change of inf. The end counts if a length is left.
+    `side` is 0 for sigma = 1 and 1 for sigma = -1. An escape is a change of inf. The end has the rounding of its own
+    size, and lies on the side of the balance on which the way began.
     """
     if w < work[_W_ZERO] or (w == work[_W_ZERO] and not forwards):
         return near_zero(w, forwards, side, n, length, work)
@@ -172,8 +174,7 @@ def in_chart(
     top = work[_EDGES + side * (_N_CELLS + 1) + last + 1]
     if w < top or (w == top and not forwards):
         return along_cells(w, forwards, side, last, n, length, work)
-    change, left = far_step(w, forwards, side, n, length, work)
-    return change, left, w + change
+    return far_step(w, forwards, side, n, length, work)
 
 
 @inlined
@@ -190,7 +191,8 @@ def near_zero(
     if target > work[_T_ZERO + side] and forwards:
         return work[_W_ZERO] - w, target - work[_T_ZERO + side], work[_W_ZERO]
     y = target**n if side == 0 else -(target**n)
-    return way + (beyond + target * y * sum8(work, _ZERO_BACK, y)), 0.0, w
+    bend = target * y * sum8(work, _ZERO_BACK, y)
+    return way + (beyond + bend), 0.0, target + bend
 
 
 @inlined
@@ -209,7 +211,8 @@ def near_saturation(w: float, forwards: bool, n: float, length: float, work: Flo
             return (e - half) / scale, (exponent - to_end) / n, work[_W_LOW] if e > 0.0 else work[_W_HIGH]
         exponent = -exponent
     s *= math.exp(-exponent)
-    return (e - s * sum16(work, _SATURATION_BACK, s)) / scale, 0.0, w
+    below = s * sum16(work, _SATURATION_BACK, s)
+    return (e - below) / scale, 0.0, 1.0 - below / scale
 
 
 @inlined
@@ -236,9 +239,10 @@ def along_cells(
         centre = work[cell + _CENTRE]
     work[_VISITED + side] = i
     r = s * sum16(work, cell + _BACK, s)
+    end = centre + r * centre
     if centre == start:
-        return (r - begin) * centre, 0.0, w
-    return (centre - start) + (r * centre - begin * start), 0.0, w
+        return (r - begin) * centre, 0.0, end
+    return (centre - start) + (r * centre - begin * start), 0.0, end
 
 
 @inner
@@ -322,19 +326,25 @@ def cell_series(x: float, n: float, q: FloatArray, p: FloatArray, slope: FloatAr
 
 
 @inner
-def far_step(w: float, forwards: bool, side: int, n: float, length: float, work: FloatArray) -> tuple[float, float]:
+def far_step(
+    w: float, forwards: bool, side: int, n: float, length: float, work: FloatArray
+) -> tuple[float, float, float]:
     """As `in_chart`, for a step of the flow about w, as long as its series serves."""
     a = 1.0 if forwards else -1.0
     c = a if side == 0 else -a
     far = work[_W_FAR]
     if w > far:
-        if c < 0.0:
-            return power_flow(w, c, n, length) - w, 0.0
-        to_far = far ** (1.0 - n) * -math.expm1((1.0 - n) * math.log(w / far)) / (n - 1.0)
-        return (far - w, length - to_far) if length > to_far else (power_flow(w, c, n, length) - w, 0.0)
+        to_far = math.inf
+        if c > 0.0:
+            to_far = far ** (1.0 - n) * -math.expm1((1.0 - n) * math.log(w / far)) / (n - 1.0)
+        if length > to_far:
+            return far - w, length - to_far, far
+        end = power_flow(w, c, n, length)
+        return end - w, 0.0, end
     power = w**n
     h = min(length, _TAYLOR_REACH * w / (max(n, 1.0) * (1.0 + power)))
-    return taylor_change(w, power, a, c, n, h, work[_SPARE:]), length - h
+    change = taylor_change(w, power, a, c, n, h, work[_SPARE:])
+    return change, length - h, w + change
 
 
 @inner

@@ -299,7 +299,9 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     size = rows * columns
     local = state[2 : 2 + size].reshape((rows, columns))
     powers = state[2 + size : state_size(rows, columns)].reshape((max(2, columns), N_TERMS + 1))
-    z = advance(state[0], state[1], u - state[0], law, LARGEST, local, powers)
+    z = state[1]
+    if math.isfinite(z):  # an escape remains one
+        z = advance(state[0], z, u - state[0], law, LARGEST, local, powers)
     state[0], state[1] = u, z
     return float(parameters[0] + (parameters[1] * u + z))
 

@@ -32,6 +32,7 @@ DECAY_REACH = 0.75  # the terms left out are below 3e-17 here
 _TANGENT_REACH = 0.2  # and below 5e-18 here
 _LARGEST_EXPONENT = 709.0
 _SMALL = 2.0**-54
+_FAR = 4.0  # times the balance, or more: from there on a decay is not taken as a change
 
 
 @inlined
@@ -44,7 +45,7 @@ def power(w: float, n: float) -> float:
     return float(abs(w) ** n)
 
 
-@inner
+@inlined
 def linear_advance(z: float, du: float, A: float, loading: float, unloading: float) -> float:
     """Memory of n = 1 after the input has moved by `du`; `loading` is beta + gamma, `unloading` beta - gamma."""
     length = abs(du)
@@ -64,11 +65,22 @@ def linear_flow(along: float, A: float, k: float, length: float) -> float:
     x = k * length
     if abs(x) <= DECAY_REACH:
         return along * math.exp(-x) if A == 0.0 else short_flow(along, A, k, length)
+    return long_flow(along, A, k, x)
+
+
+@inner
+def long_flow(along: float, A: float, k: float, x: float) -> float:
+    """As `linear_flow`, for |x| = |k| length from DECAY_REACH on."""
     slope = A - k * along
     if x < -_LARGEST_EXPONENT:
         return along if slope == 0.0 else math.copysign(math.inf, slope)
     decay = math.exp(-x)
-    return along * decay if A == 0.0 else along + slope * ((1.0 - decay) / k)
+    if A == 0.0:
+        return along * decay
+    travelled = (1.0 - decay) / k
+    if x > 0.0 and abs(slope) > _FAR * abs(A):  # a sum of sizes: the one below might be rounded past a small balance
+        return along * decay + A * travelled
+    return along + slope * travelled
 
 
 @inlined
@@ -86,7 +98,7 @@ def linear_travel(along: float, A: float, k: float) -> float:
     return math.log1p(-x) / k if x < 1.0 else math.inf
 
 
-@inner
+@inlined
 def quadratic_advance(z: float, du: float, A: float, loading: float, unloading: float) -> float:
     """Memory of n = 2 after the input has moved by `du`, as `linear_advance`."""
     length = abs(du)
@@ -127,6 +139,8 @@ def quadratic_flow(along: float, A: float, k: float, tangent: float) -> float:
     denominator = 1.0 + k * along * tangent
     if denominator <= 0.0:
         return math.copysign(math.inf, slope)
+    if denominator > _FAR:  # as in `linear_flow`
+        return (along + A * tangent) / denominator
     return along + slope * tangent / denominator
 
 

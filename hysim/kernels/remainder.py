@@ -39,7 +39,7 @@ from hysim.kernels._compile import inner
 
 N_TERMS = 24
 ROUNDING = 2.0**-54
-_FARTHEST = 0.75  # of the radius: the terms of a series fall off by a quarter at least
+FARTHEST = 0.75  # of the radius: the terms of a series fall off by a quarter at least
 
 
 @inner
@@ -55,7 +55,7 @@ def fraction(spread: float, size: float) -> float:
 
     `spread` is the product of spread and radius in the bound of the tail.
     """
-    room = ROUNDING * size * (1.0 - _FARTHEST) * (N_TERMS + 1.0)
+    room = ROUNDING * size * (1.0 - FARTHEST) * (N_TERMS + 1.0)
     if room >= spread:
-        return _FARTHEST
-    return float(min(_FARTHEST, (room / spread) ** (1.0 / (N_TERMS + 1.0))))
+        return FARTHEST
+    return float(min(FARTHEST, (room / spread) ** (1.0 / (N_TERMS + 1.0))))

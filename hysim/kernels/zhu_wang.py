@@ -56,7 +56,7 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     `parameters` is (A, beta, gamma, n, delta, gain, offset, c1, c2, ...).
     """
     last, z = state[0], state[1]
-    if u != last:
+    if u != last and math.isfinite(z):  # an escape remains one
         z = advance(last, z, u - last, parameters, state[N_HEAD:])
     state[0], state[1] = u, z
     return float(parameters[6] + boucwen.polynomial(u, parameters, 7) + parameters[5] * z)
