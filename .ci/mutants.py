@@ -46,6 +46,7 @@ LONGER, LEAST = 4.0, 60.0  # times the run without a mutant; seconds, since a ke
 MAPPED = {
     "kernels/amplifier.py": "actuator_stages actuator_chain",
     "kernels/baber_noori.py": "certified_series baber_noori",
+    "kernels/baber_noori_series.py": "certified_series baber_noori",
     "kernels/batches.py": "composed clamp_operators own_laws",
     "kernels/boucwen.py": "boucwen_closed_forms boucwen_invariants boucwen_reference boucwen_far asymmetric",
     "kernels/boucwen_inverse.py": "inverse_undoes_response",
