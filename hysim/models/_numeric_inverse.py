@@ -157,17 +157,18 @@ class _Forward:
             state = tuple(self.compiled.state[: len(self.here)].tolist())
             slope = self.slope(state, direction)
             plain, memory = self.terms(*state[:2])
-            sizes = max(plain, plain_here) + max(memory, memory_here) + abs(wanted) + abs(target * slope)
+            memory = min(memory, abs(wanted) + plain)  # what it is where the output is reached; it may be infinite here
+            rounding = _UNIT * (max(plain, plain_here) + max(memory, memory_here) + abs(wanted))
             if abs(error) < nearest:
                 closest, nearest = target, abs(error)
-                stroke = self.terms(0.0, state[1] - z_here)[1]
-                allowed = _CLOSED * _UNIT * sizes + _PROMISED * stroke
-            if abs(error) <= _UNIT * sizes and rising * slope > 0.0:
+                stroke = min(self.terms(0.0, state[1] - z_here)[1], memory + memory_here)
+                allowed = _CLOSED * (rounding + _UNIT * abs(target * slope)) + _PROMISED * stroke
+            if abs(error) <= rounding < math.inf and rising * slope > 0.0:
                 return target, ""
             if direction * rising * error < 0.0 and rising * slope > 0.0 and math.isfinite(error):
                 behind = target
             else:
                 beyond = target
-        if nearest <= allowed + _SMALLEST:
+        if nearest <= allowed + _SMALLEST < math.inf:
             return closest, ""
         return behind, f"the output does not reach it; at u = {target:g} its slope is {slope:g}"

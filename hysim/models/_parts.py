@@ -17,6 +17,7 @@ from hysim.models.model import CompiledLaw, needs_time
 _REACH, _WIDER = 1e-6, 16.0  # how far at most the output is looked at to either side of the first input; the ratio
 _SHORTEST = 2.0**-46  # of the first input, or this number
 _NEXT_TO_NOTHING = 1e-150
+_HIDDEN, _FARTHEST = 2.0**-44, 1e150  # part of the output by which rounding may hide a rise: it is then sought further
 _LINEAR = 0.1  # part by which rises over once, twice and four times a length are no multiples of each other
 
 
@@ -126,9 +127,9 @@ def _first_slope(output: Callable[[float], float], here: float) -> float:
     The law has a length of its own, on which its output may turn, and rounding hides shorter rises. So the slope is
     that on the shortest length on which the output is seen to be linear on both sides.
     """
-    reached, fallback = output(here), 0.0
+    reached, fallback, highest = output(here), 0.0, 0.0
     reach = max(_SHORTEST * abs(here), _NEXT_TO_NOTHING)
-    while reach < _REACH * (1.0 + abs(here)):
+    while reach < _REACH * (1.0 + abs(here)) or (highest < _HIDDEN * abs(reached) and reach < _FARTHEST):
         lengths = reach * np.array([1.0, 2.0, 4.0])
         ends = here + np.array([lengths, -lengths])
         rises = np.array([[output(u) for u in side] for side in ends.tolist()]) - reached
@@ -137,6 +138,7 @@ def _first_slope(output: Callable[[float], float], here: float) -> float:
             fallback = slopes[0, 0]
             if (np.abs(slopes / slopes[:, :1] - 1.0) < _LINEAR).all():
                 return float(slopes[0, 0])
+        highest = float(np.abs(rises).max())
         reach *= _WIDER
     return float(fallback)
 
