@@ -123,3 +123,26 @@ def test_laws_that_are_drawn_with_an_inverse_are_looked_at_between_their_samples
     even = np.linspace(0.0, 3.0, 65)
     _, path = through_peaks(law, even)
     assert np.abs(path[:, 0]).max() > 100.0 * np.abs(law.memory(even)).max()
+
+
+def test_an_input_at_which_the_memory_diverges_is_not_taken():
+    """Newton's first step ends there. The slope is infinite, but it must not allow an error of any size."""
+    law = hs.ZhuWangBoucWen(
+        A=14621.1, beta=-1.7164e-07, gamma=-4.39699e-07, n=3.83036, delta=211450.0, gain=-55.1712,
+        input_coefficients=(-1.04263e8,),
+    )  # fmt: skip
+    state = (1.365079359, -430.412453)
+    u = law.inverse_response([6691.42], state=state)
+    assert law.advance(u, state)[0] == pytest.approx([6691.42], abs=1e-11 * 1.5e8)  # the promise of the power series
+
+
+def test_a_slope_that_rounding_hides_is_sought_further_away():
+    """The output is 2e-7 and rises by 1e-16 on the length 1e-6, which is one rounding or two."""
+    first = hs.BoucWen(
+        A=0.0, beta=-3.239791, gamma=-8.375956, n=2.0, feedthrough=1.1876678e-08, gain=5.443193, offset=-12.995702,
+        z0=4.288676e-06,
+    )  # fmt: skip
+    law = first >> hs.PrandtlIshlinskii(thresholds=(0.0, 0.0125), weights=(6e-9, 6e-9))
+    y = law.response([2.6824e-4, 100.0])
+    u = law.inverse_response(y[1:], u0=2.6824e-4)
+    assert law.response([2.6824e-4, u[0]])[1] == pytest.approx(y[1], rel=4.0 * UNIT)
