@@ -64,7 +64,9 @@ class SteppedLaw(PolynomialInput):
         Returns
         -------
         array, shape (n_samples,)
-            Its `response` is y to rounding. A sample costs some twenty steps of the law, outside compiled code.
+            Its `response` is y to the rounding of its terms, and to 1e-12 of the memory's stroke where the law is
+            stepped by power series. Where the law turns later, the input is the first one that gives y. A sample
+            costs some twenty steps of the law, outside compiled code.
 
         Raises
         ------

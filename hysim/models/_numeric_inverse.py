@@ -2,7 +2,11 @@
 
 From one sample of the output to the next the input moves monotonically. Its end is the zero of
 y(u) - y_wanted, which is monotone where the slope keeps its sign. The slope is looked at where the stretch
-begins, in both directions (or the output would not tell which way the input went), and along it.
+begins, in both directions (or the output would not tell which way the input went), and along it. Where it has
+turned, the search is repeated in front of the turn.
+
+An output may be small beside the terms that it is the sum of. Many inputs then give it to rounding, and the first one
+that is found is taken; the error that is left is no more than what the rounding of the terms comes to.
 """
 
 import math
