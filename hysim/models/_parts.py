@@ -138,6 +138,8 @@ def _first_slope(output: Callable[[float], float], here: float) -> float:
             fallback = slopes[0, 0]
             if (np.abs(slopes / slopes[:, :1] - 1.0) < _LINEAR).all():
                 return float(slopes[0, 0])
+        elif fallback == 0.0 and np.isfinite(slopes[:, 0]).sum() == 1:  # the memory escapes at once on the other side
+            fallback = float(slopes[np.isfinite(slopes[:, 0]), 0][0])
         highest = float(np.abs(rises).max())
         reach *= _WIDER
     return float(fallback)
