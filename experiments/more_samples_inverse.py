@@ -13,7 +13,10 @@ import numpy as np
 from hostile_laws import DRAWS, Rng, decades, memory, signed
 from more_samples import (
     LAST_SUM,
+    NEAREST,
     NOTHING,
+    PEAK_PIECES,
+    PEAK_ROUNDS,
     ROUNDINGS,
     SERIES,
     UNIT,
@@ -29,6 +32,7 @@ from more_samples import (
     places,
     size,
     spread,
+    spread_through_peaks,
     worst,
 )
 
@@ -36,6 +40,7 @@ import hysim as hs
 
 SOLVED = 64.0
 """Roundings of the terms of an output that the searches leave: 32 in `BoucWenInverse`, fewer in the others."""
+FAR = 0.125  # of its range: a memory that moves further between two samples is looked at between them
 PLAYS = ("PrandtlIshlinskii", "ModifiedPrandtlIshlinskii", "GeneralizedPrandtlIshlinskii", "Preisach")
 TIMED = "RateDependentPrandtlIshlinskii"
 STEPPED = ("BoucWen", "PolynomialBoucWen", "Dahl", "ColemanHodgdon", "PrandtlIshlinskii")
@@ -127,8 +132,7 @@ def steepened(case: Case, rng: Rng, closest: float = 0.05) -> Case | None:
     even = np.linspace(case.before[0], case.u[-1], 65)
     low, high = sorted(even[[0, -1]])
     u = np.sort(np.concatenate([case.before, case.u, even, np.clip([0.0], low, high)]))
-    u = u if even[-1] >= even[0] else u[::-1]
-    _, path = perturbed(case._replace(law=plain, u=u[1:]), *places(plain), 0.0, 0.0)
+    u, path = through_peaks(plain, u if even[-1] >= even[0] else u[::-1])
     if not np.isfinite(path).all() or np.abs(path).max() > 1e100:
         return None
     states = [path[:, 0], u, *path[:, 1:].T]
@@ -153,12 +157,32 @@ def steepened(case: Case, rng: Rng, closest: float = 0.05) -> Case | None:
     return case._replace(law=replace(law, **coefficients))
 
 
+def through_peaks(law: Any, u: Array) -> tuple[Array, Array]:
+    """Inputs on a stride, more of them where a memory moves far between two, and the memories there.
+
+    A memory may rise far and fall back between two samples; the energy that a law has taken shows it.
+    """
+    for k in range(PEAK_ROUNDS + 1):
+        _, path = perturbed(Case(law, u[:1], u[1:], np.empty(0, int)), *places(law), 0.0, 0.0)
+        if not np.isfinite(path).all() or k == PEAK_ROUNDS:
+            break
+        ranges = np.ptp(path, axis=0)
+        moved = np.abs(np.diff(path, axis=0)) / np.where(ranges > 0.0, ranges, 1.0)
+        far = np.flatnonzero(moved.max(axis=1) > FAR)
+        inside = [np.linspace(u[i], u[i + 1], PEAK_PIECES + 1)[1:-1] for i in far]
+        finer = np.unique(np.concatenate([u, *inside]))
+        if np.isin(finer, u).all():
+            break
+        u = finer if u[-1] >= u[0] else finer[::-1]
+    return u, path
+
+
 def of_two(family: str, rng: Rng) -> tuple[Case | None, float]:
     """A sum of a Bouc-Wen law and plays, or one behind the other, both rising."""
     case = draw_case("BoucWen", rng)
     u = pieces(rng, case.before[0], case.before[0] + stride_of(case))
-    steep = steepened(case._replace(before=case.before[:1], u=u), rng, 1.0)  # its search knows no slopes: it may miss
-    if steep is None:  # an output that is reached just before it turns
+    steep = steepened(case._replace(before=case.before[:1], u=u), rng)
+    if steep is None:
         return None, 0.0
     case = steep
     law, plays = case.law, DRAWS["PrandtlIshlinskii"](rng, invertible=True).law
@@ -212,10 +236,16 @@ def inverse_verdict(wanted: Wanted, inverse: Callable[[Wanted, Array], Array]) -
     if not all(np.isfinite(u).all() for u in (coarse, some, fine)):
         return Verdict(np.inf, "refused")
     ratio = distance(wanted, (coarse, some, fine), allowed(wanted, fine, NOTHING))
-    if ratio > WELL_INSIDE:
-        case = Case(wanted.law, np.array([wanted.u0]), fine, wanted.kept)
-        ratio = distance(wanted, (coarse, some, fine), allowed(wanted, fine, spread(case)))
+    case = Case(wanted.law, np.array([wanted.u0]), fine, wanted.kept)
+    for errors, enough in ((spread, WELL_INSIDE), (nearest_spread, 1.0), (spread_through_peaks, 1.0)):  # as `judged`
+        if ratio > enough:
+            ratio = min(ratio, distance(wanted, (coarse, some, fine), allowed(wanted, fine, errors(case))))
     return Verdict(ratio, "compared")
+
+
+def nearest_spread(case: Case) -> Spread:
+    """The spread of roundings themselves: close to an unstable balance only these go the same way."""
+    return spread(case, NEAREST)
 
 
 def distance(wanted: Wanted, found: tuple[Array, Array, Array], limits: tuple[Array, Array]) -> float:

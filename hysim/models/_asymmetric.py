@@ -64,7 +64,9 @@ class SteppedLaw(PolynomialInput):
         Returns
         -------
         array, shape (n_samples,)
-            Its `response` is y to rounding. A sample costs some twenty steps of the law, outside compiled code.
+            Its `response` is y to the rounding of its terms, and to 1e-12 of the memory's stroke where the law is
+            stepped by power series. Where the law turns later, the input is the first one that gives y. A sample
+            costs some twenty steps of the law, outside compiled code.
 
         Raises
         ------
@@ -90,7 +92,14 @@ class SteppedLaw(PolynomialInput):
             )
             u0 = float(static.inverse_response(outputs[:1])[0])
         start = self._start(np.array([u0 or 0.0])) if state is None else state
-        return _numeric_inverse.inverse_response(self, outputs, start)
+        return _numeric_inverse.inverse_response(self, outputs, start, self._terms)
+
+    def _terms(self, u: float, z: float) -> tuple[float, float]:
+        """Sizes of the terms of the output that the input contributes, with the offset, and that the memory does."""
+        total = 0.0
+        for coefficient in reversed(self.input_coefficients):
+            total = (total + abs(coefficient)) * abs(u)
+        return abs(self.offset) + total, abs(self.gain * z)
 
     def _compiled(self, output: FloatArray, start: State) -> CompiledLaw:
         memory = np.array([[getattr(self, name) for name in self.memory_names]])

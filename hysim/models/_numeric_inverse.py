@@ -2,7 +2,11 @@
 
 From one sample of the output to the next the input moves monotonically. Its end is the zero of
 y(u) - y_wanted, which is monotone where the slope keeps its sign. The slope is looked at where the stretch
-begins, in both directions (or the output would not tell which way the input went), and along it.
+begins, in both directions (or the output would not tell which way the input went), and along it. Where it has
+turned, the search is repeated in front of the turn.
+
+An output may be small beside the terms that it is the sum of. Many inputs then give it to rounding, and the first one
+that is found is taken; the error that is left is no more than what the rounding of the terms comes to.
 """
 
 import math
@@ -16,10 +20,12 @@ from hysim.errors import SimulationError
 from hysim.models.model import CompiledLaw
 
 _POINTS = 16  # of a stretch at which its slope is looked at
-_MAX_STEPS = 200
-_ROUNDINGS = 8.0 * 2.0**-52
-_CLOSED = 64.0 * 2.0**-52  # of the outputs and of u dy/du: what rounding may leave where the bracket has closed
-_SMALLEST = 2.0**-1022
+_MAX_STEPS = 400
+_MAX_TURNS = 64  # stretches that are tried, each shorter than the last, before the first turn is left at its place
+_UNIT = 2.0**-52
+_CLOSED = 16.0  # roundings of the terms of the output that a law's step may leave where the bracket has closed
+_PROMISED = 1e-12  # of the memory's stroke: what a law that is stepped by a power series may be off by
+_SMALLEST = 2.0**-1022  # below it numbers lose their bits: an output that near to another is no other
 
 
 class SteppedLaw(Protocol):
@@ -35,9 +41,15 @@ class SteppedLaw(Protocol):
         ...
 
 
-def inverse_response(law: SteppedLaw, y: FloatArray, start: tuple[float, ...]) -> FloatArray:
-    """Inputs for the outputs `y`, from the state `start`; see `ZhuWangBoucWen.inverse_response`."""
-    forward = _Forward(law, start)
+def inverse_response(
+    law: SteppedLaw, y: FloatArray, start: tuple[float, ...], terms: Callable[[float, float], tuple[float, float]]
+) -> FloatArray:
+    """Inputs for the outputs `y`, from the state `start`; see `ZhuWangBoucWen.inverse_response`.
+
+    `terms` are the parts of the output at the input u and the memory z, each as the sum of the sizes of its terms:
+    what u contributes with the offset, and what z contributes. They tell how far an output is rounded.
+    """
+    forward = _Forward(law, start, terms)
     slope = forward.slope(start, 1.0)
     rising = math.copysign(1.0, slope)
     if slope == 0.0:
@@ -55,8 +67,10 @@ def inverse_response(law: SteppedLaw, y: FloatArray, start: tuple[float, ...]) -
 class _Forward:
     """The law at its last input, and what it does from there."""
 
-    def __init__(self, law: SteppedLaw, start: tuple[float, ...]) -> None:
-        self.law, self.compiled = law, law.compiled()
+    def __init__(
+        self, law: SteppedLaw, start: tuple[float, ...], terms: Callable[[float, float], tuple[float, float]]
+    ) -> None:
+        self.law, self.compiled, self.terms = law, law.compiled(), terms
         self.here = start
         self.y = self.output(start[0])
 
@@ -78,6 +92,8 @@ class _Forward:
     def reach(self, wanted: float, rising: float) -> float:
         """Move to where the output is `wanted`, and return the input there; `rising` is the sign of the slope.
 
+        The first place is meant: where the law has turned on the way, the search is repeated in front of the turn.
+
         Raises
         ------
         ArithmeticError
@@ -85,52 +101,78 @@ class _Forward:
         """
         gap = wanted - self.y
         u = self.here[0]
-        if gap == 0.0:
+        if abs(gap) < _SMALLEST:
             return u
         direction = math.copysign(1.0, gap) * rising
-        self._check(np.array([self.here, self.here]), np.array([direction, -direction]), rising)
-        end = self._zero(wanted, direction, rising)
-        way = u + (end - u) * np.linspace(0.0, 1.0, _POINTS + 1)
-        self._check(np.array([self.state(point) for point in way]), np.full(way.size, direction), rising)
-        self.here = self.state(end)
-        self.y = wanted
-        return end
+        if reason := self._turn([self.here, self.here], np.array([direction, -direction]), rising)[1]:
+            raise ArithmeticError(reason)
+        limit, reason = direction * math.inf, ""
+        for _ in range(_MAX_TURNS):
+            end, missed = self._zero(wanted, direction, rising, limit)
+            way = [self.state(u + (end - u) * (k / _POINTS)) for k in range(_POINTS)]
+            way.append(self.state(end))
+            turn, reason_here = self._turn(way, np.full(len(way), direction), rising)
+            reason = reason or reason_here or missed
+            if not reason_here and not missed:
+                self.here, self.y = way[-1], wanted
+                return end
+            if not reason_here or not direction * u < direction * turn < direction * end:
+                break
+            limit = turn
+        raise ArithmeticError(reason)
 
-    def _check(self, states: FloatArray, direction: FloatArray, rising: float) -> None:
-        u, z, *others = states.T
+    def _turn(self, states: list[tuple[float, ...]], direction: FloatArray, rising: float) -> tuple[float, str]:
+        """The first of the inputs at which the slope has not the sign `rising`, and a reason; or an empty reason."""
+        u, z, *others = np.array(states).T
         slopes = self.law.tangent(direction, z, u, *others)
-        if not (rising * slopes > 0.0).all():
-            k = int(np.argmin(rising * slopes))
-            raise ArithmeticError(f"at u = {u[k]:g} its slope is {slopes[k]:g}")
+        turned = ~(rising * slopes > 0.0)
+        if not turned.any():
+            return math.nan, ""
+        k = int(np.argmax(turned))
+        return float(u[k]), f"at u = {u[k]:g} its slope is {slopes[k]:g}"
 
-    def _zero(self, wanted: float, direction: float, rising: float) -> float:
-        """The input at which the output is `wanted`, sought in `direction`.
+    def _zero(self, wanted: float, direction: float, rising: float, limit: float) -> tuple[float, str]:
+        """The input at which the output is `wanted`, sought in `direction` up to `limit`, and why there is none.
 
-        What is not finite, or where the slope has turned, is beyond it. An output that is nearer than the next input
-        takes the input that is there.
+        Newton's method in a bracket, which is halved where Newton's steps do not shrink. What is not finite, or where
+        the slope has turned, is beyond the input. The error that is left is no larger than what rounds the output: its
+        terms, those of the input, and the promise of the step.
         """
-        behind, beyond = self.here[0], direction * math.inf
+        behind, beyond = self.here[0], limit
         target, error, slope = behind, self.y - wanted, self.slope(self.here, direction)
+        (plain_here, memory_here), z_here = self.terms(*self.here[:2]), self.here[1]
+        closest, nearest, allowed = behind, math.inf, 0.0
+        before_last = last = math.inf
         for _ in range(_MAX_STEPS):
-            trial = target - error / slope if rising * slope > 0.0 and math.isfinite(error) else math.nan
-            if trial == target and rising * slope > 0.0:
-                return target
-            if not direction * behind < direction * trial < direction * beyond:
+            move = -error / slope if rising * slope > 0.0 and math.isfinite(error) else math.nan
+            trial = target + move
+            if trial == target:
+                return target, ""
+            inside = direction * behind < direction * trial < direction * beyond
+            if not inside or (not math.isinf(beyond) and abs(move) > 0.5 * before_last):
                 if math.isinf(beyond):
                     break
                 trial = 0.5 * (behind + beyond)
+                move = abs(trial - target)
             if trial in (behind, beyond):
-                left = abs(error) - _CLOSED * (abs(wanted) + abs(self.y) + abs(target * slope)) - _SMALLEST
-                if left <= 0.0:
-                    return target
                 break
-            target = trial
+            before_last, last, target = last, abs(move), trial
             error = self.output(target) - wanted
-            slope = self.slope(tuple(self.compiled.state[: len(self.here)].tolist()), direction)
-            if abs(error) <= _ROUNDINGS * (abs(wanted) + abs(self.y)):
-                return target
+            state = tuple(self.compiled.state[: len(self.here)].tolist())
+            slope = self.slope(state, direction)
+            plain, memory = self.terms(*state[:2])
+            memory = min(memory, abs(wanted) + plain)  # what it is where the output is reached; it may be infinite here
+            rounding = _UNIT * (max(plain, plain_here) + max(memory, memory_here) + abs(wanted))
+            if abs(error) < nearest:
+                closest, nearest = target, abs(error)
+                stroke = min(self.terms(0.0, state[1] - z_here)[1], memory + memory_here)
+                allowed = _CLOSED * (rounding + _UNIT * abs(target * slope)) + _PROMISED * stroke
+            if abs(error) <= rounding < math.inf and rising * slope > 0.0:
+                return target, ""
             if direction * rising * error < 0.0 and rising * slope > 0.0 and math.isfinite(error):
                 behind = target
             else:
                 beyond = target
-        raise ArithmeticError(f"the output does not reach it; at u = {target:g} its slope is {slope:g}")
+        if nearest <= allowed + _SMALLEST < math.inf:
+            return closest, ""
+        return behind, f"the output does not reach it; at u = {target:g} its slope is {slope:g}"

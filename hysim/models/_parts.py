@@ -14,8 +14,11 @@ from hysim.kernels import composed as kernels
 from hysim.kernels.stepping import Step
 from hysim.models.model import CompiledLaw, needs_time
 
-_REACH, _CLOSER = 1e-6, 2.0**-10  # how far to either side of the first input the output is looked at, and then closer
-_SHORTEST = 2.0**-40
+_REACH, _WIDER = 1e-6, 16.0  # how far at most the output is looked at to either side of the first input; the ratio
+_SHORTEST = 2.0**-46  # of the first input, or this number
+_NEXT_TO_NOTHING = 1e-150
+_HIDDEN, _FARTHEST = 2.0**-44, 1e150  # part of the output by which rounding may hide a rise: it is then sought further
+_LINEAR = 0.1  # part by which rises over once, twice and four times a length are no multiples of each other
 
 
 def labels(parts: Sequence[Any]) -> tuple[str, ...]:
@@ -103,24 +106,43 @@ def inverse_response(law: Any, y: npt.ArrayLike, u0: float | None) -> FloatArray
 
     u = np.empty(outputs.size)
     with np.errstate(all="ignore"):  # a bracket may reach where a memory overflows
-        reached, reach = output(here), _REACH * (1.0 + abs(here))
-        while True:  # the law has a length of its own, which may be much shorter
-            rise, fall = output(here + reach) - reached, reached - output(here - reach)
-            if 0.0 < rise * fall < np.inf or not reach > _SHORTEST * abs(here) + 1e-150:
-                break
-            reach *= _CLOSER
-        if not 0.0 < rise * fall < np.inf:
+        reached, slope = output(here), _first_slope(output, here)
+        if slope == 0.0:
             raise ValueError(f"the law has no inverse: its output does not rise or fall through u = {here:g}")
         if u0 is None:
             reached = float(outputs[0])
         step, parameters, state = compiled
-        lost = kernels.inverse(step, parameters, state, trial, here, reached, rise / reach, outputs, u)
+        lost = kernels.inverse(step, parameters, state, trial, here, reached, slope, outputs, u)
     if lost >= 0:
         raise SimulationError(
             f"the law has no inverse at sample {lost} (y = {outputs[lost]:g}): the output does not reach it, or "
             "turns on the way"
         )
     return u
+
+
+def _first_slope(output: Callable[[float], float], here: float) -> float:
+    """Slope of the output at the input `here`, zero where it does not rise or fall through it.
+
+    The law has a length of its own, on which its output may turn, and rounding hides shorter rises. So the slope is
+    that on the shortest length on which the output is seen to be linear on both sides.
+    """
+    reached, fallback, highest = output(here), 0.0, 0.0
+    reach = max(_SHORTEST * abs(here), _NEXT_TO_NOTHING)
+    while reach < _REACH * (1.0 + abs(here)) or (highest < _HIDDEN * abs(reached) and reach < _FARTHEST):
+        lengths = reach * np.array([1.0, 2.0, 4.0])
+        ends = here + np.array([lengths, -lengths])
+        rises = np.array([[output(u) for u in side] for side in ends.tolist()]) - reached
+        slopes = rises / (ends - here)
+        if 0.0 < slopes[0, 0] * slopes[1, 0] < np.inf:
+            fallback = slopes[0, 0]
+            if (np.abs(slopes / slopes[:, :1] - 1.0) < _LINEAR).all():
+                return float(slopes[0, 0])
+        elif fallback == 0.0 and np.isfinite(slopes[:, 0]).sum() == 1:  # the memory escapes at once on the other side
+            fallback = float(slopes[np.isfinite(slopes[:, 0]), 0][0])
+        highest = float(np.abs(rises).max())
+        reach *= _WIDER
+    return float(fallback)
 
 
 def _first_input(law: Any, y: float) -> float:

@@ -354,7 +354,7 @@ class Duhem(Composable):
         if state is not None and u0 is not None:
             raise ValueError("give u0 or state, not both: the state has its own input")
         outputs = read_only(y, "y", ndim=1)
-        return _numeric_inverse.inverse_response(self, outputs, state or self._start(float(u0 or 0.0)))
+        return _numeric_inverse.inverse_response(self, outputs, state or self._start(float(u0 or 0.0)), self._terms)
 
     def compiled(self, u0: float = 0.0) -> CompiledLaw:
         """The law as compiled loops take it; the state is that of a first sample at the input `u0`."""
@@ -452,6 +452,10 @@ class Duhem(Composable):
     @property
     def _scalars(self) -> dict[str, float]:
         return {**self.terms, **{name: getattr(self, name) for name in _OUTPUT}}
+
+    def _terms(self, u: float, z: float) -> tuple[float, float]:
+        """Sizes of the terms of the output that the input contributes, with the offset, and that the memory does."""
+        return abs(self.offset) + abs(self.feedthrough * u), abs(z)
 
     def _start(self, u0: float) -> State:
         """The state of a first sample at the input `u0`."""
