@@ -52,8 +52,8 @@ class FoundOscillator:
         Terms whose effects these records cannot tell from the plant's or from those of terms of lower degree.
     scores : mapping
         ``"fit_percent"`` [%], ``"rmse"`` [unit of y], ``"bic"`` of the free run; ``"held_out_rmse"`` [unit of y], on
-        each period (or quarter) with the coefficients of the others; ``"linear_rmse"`` and ``"linear_bic"`` of the
-        rival without memory; ``"condition"`` of the regression on all terms.
+        each period (or quarter) with plant and coefficients of the others; ``"linear_rmse"``, ``"linear_held_out_rmse"`` and
+        ``"linear_bic"`` of the rival without memory; ``"condition"`` of the regression on all terms.
     path_terms : tuple of str
         The structures that were compared, from dense to sparse, each as its terms joined by commas.
     path_n_terms, path_bic, path_held_out_rmse : array, shape (n_structures,)
@@ -148,7 +148,7 @@ def _judgement(found: FoundOscillator, records: Sequence[Record]) -> Judgement:
         verdict=_VERDICTS.get(found.verdict, found.verdict),
         rival=found.rival,
         rival_offset=0.0,
-        held_out={"law": found.scores["held_out_rmse"], "rival": found.scores["linear_rmse"]},
+        held_out={"law": found.scores["held_out_rmse"], "rival": found.scores["linear_held_out_rmse"]},
         held_out_by="block",
         rates=np.array(RATES),
         widths={"law": (width,) * len(RATES), "rival": (math.nan,) * len(RATES)},

@@ -276,9 +276,9 @@ def cases() -> list[Case]:
 def row(case: Case, chosen: Set) -> Row:
     """One line of the table."""
     records = case.records(chosen)
-    start = time.perf_counter()
+    start = time.process_time()  # of this process, whatever else the machine does
     found = hs.discover(records)
-    seconds = time.perf_counter() - start
+    seconds = time.process_time() - start
     return {
         "set": chosen.name,
         "kind": case.kind,
@@ -292,7 +292,7 @@ def row(case: Case, chosen: Set) -> Row:
         "route": found.route,
         "fit_percent": found.scores["fit_percent"],
         "warnings": " ".join(found.warnings),
-        "seconds": seconds,
+        "cpu_seconds": seconds,
     }
 
 
