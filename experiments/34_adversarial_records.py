@@ -265,7 +265,7 @@ PLANS = {  # waveform, number of rates and noise of the records of each kind
 
 def cases() -> list[Case]:
     """The hundred records; the waveforms of the curves differ from kind to kind."""
-    groups = {"curve": CURVES, "linear": LINEAR, "hysteretic": HYSTERETIC}
+    groups: dict[str, list[str]] = {"curve": list(CURVES), "linear": list(LINEAR), "hysteretic": list(HYSTERETIC)}
     found: list[Case] = []
     turned = {"triangle": "sine", "sine": "fading sine", "sum of sines": "triangle"}
     for group, kinds in groups.items():

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 import hysim as hs
 from hysim.discovery._doubts import doubts
-from hysim.discovery._judgement import RATES, judge
+from hysim.discovery._judgement import BETTER, RATES, competitors, judge
 from hysim.discovery._rates import at_one_rate, rate_spread
 from hysim.discovery._rival import steady_width
 
@@ -286,6 +286,25 @@ def test_linear_creep_is_a_lag():
     parts = [hs.TransferFunction(num=(0.1,), den=(tau, 1.0), hold="foh") for tau in np.geomspace(0.01, 10.0, 7)]
     found = judged(sines(lambda u, step: u + sum(part.response(u - u[0], step) for part in parts)), as_line)
     assert found.verdict == "linear lag"
+
+
+@pytest.mark.skipif(not COMPILED, reason="identifies on hundreds of samples, which takes minutes uncompiled")
+def test_only_a_law_that_could_change_the_verdict_is_worth_a_search():
+    curve = competitors(sines(lambda u, _: MAPS["tanh"](u)))
+    assert curve.enough == pytest.approx(BETTER * curve.trial.errors["curve"], rel=1e-3)  # and the floor of the errors
+    slow = competitors(sines(lag().response))
+    assert slow.enough == pytest.approx(slow.trial.errors["rival"] / BETTER, rel=1e-3)
+    assert competitors(sines(lambda u, _: LAW.response(u))).enough == np.inf
+    assert competitors([hs.Record(u=TRIANGLE, y=LAW.response(TRIANGLE))]).enough == np.inf
+
+
+@pytest.mark.skipif(not COMPILED, reason="searches laws for hundreds of samples, which takes minutes uncompiled")
+def test_the_search_is_short_where_a_curve_suffices():
+    found = hs.discover(sines(lambda u, _: MAPS["tanh"](u), (1.0,)))
+    assert found.verdict == "no structure found"
+    assert "only the optimizer's path was searched" in found.message
+    # the path, the line, and the terms that pruning tries: the search among all subsets refines dozens
+    assert found.scores["n_structures"] <= len(found.thresholds) + 10
 
 
 def test_a_better_linear_model_is_told():

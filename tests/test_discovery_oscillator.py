@@ -222,6 +222,8 @@ def test_a_record_that_cannot_do_is_refused(given, message):
         ({"symmetry": "even"}, ValueError, "symmetry must be one of none, odd"),
         ({"mass": -1.0}, ValueError, "mass must be positive"),
         ({"damping": float("nan")}, ValueError, "damping must be finite"),
+        ({"mass": "3"}, TypeError, "mass must be a number, got '3'"),
+        ({"stiffness": True}, TypeError, "stiffness must be a number, got True"),
         ({"structure": hs.BoucWenOscillator.structure(excitation="base")}, ValueError, "must be a force"),
         ({"structure": "newmark"}, TypeError, "structure comes from"),
     ],

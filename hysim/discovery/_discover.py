@@ -138,10 +138,10 @@ def discover(
     ------
     ValueError
         If an option is unknown or not used by the route, an input or output is constant, the input never reverses, its
-        branches are too short to have a slope, there are no more samples than terms, or an oscillator's record has no
-        even time.
+        branches are too short to have a slope, there are no more samples than terms, every law diverges, or an
+        oscillator's record has no even time.
     TypeError
-        If the first argument is not a record or a sequence of them.
+        If the first argument is not a record or a sequence of them, or `mass`, `damping` or `stiffness` is no number.
     ImportError
         If `optimizer` is one of PySINDy's that needs an extra.
 

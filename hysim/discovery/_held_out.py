@@ -103,16 +103,15 @@ def competitors_held_out(records: Sequence[Record], linear: Rival | None) -> Tri
     """
     y = np.concatenate([record.y for record in records])
     by, left_out = _folds(records)
-    names = (LAW, RIVAL, RELAXATIONS, PLAYS, CURVE)
-    trial = Trial(dict.fromkeys(names, math.nan), dict.fromkeys(names, math.nan), math.nan, by, _noise(records), 0.0, {})
+    unknown = dict.fromkeys((LAW, RIVAL, RELAXATIONS, PLAYS, CURVE), math.nan)
+    trial = Trial(unknown, unknown, math.nan, by, _noise(records), 0.0, {})
     models = _models(records, y, linear)
     for name, model in models.items():
         trial = _with(trial, name, model, records, left_out)
-    errors, seen, parts = (dict(each) for each in (trial.errors, trial.seen, trial.parts))
-    for each in (errors, seen, parts):
-        means = each.pop(_MEANS)
-        if trial.errors[_MEANS] < trial.errors[CURVE]:
-            each[CURVE] = means
+    errors, seen, parts = dict(trial.errors), dict(trial.seen), dict(trial.parts)
+    if errors[_MEANS] < errors[CURVE]:
+        errors[CURVE], seen[CURVE], parts[CURVE] = errors[_MEANS], seen[_MEANS], parts[_MEANS]
+    del errors[_MEANS]
     together = about_trends(y - models[PLAYS](np.ones(y.size)), records)
     return replace(trial, errors=errors, seen=seen, parts=parts, together=rms(together), stroke=float(np.ptp(y)))
 

@@ -152,9 +152,7 @@ def competitors(records: Sequence[Record]) -> Competitors:
     return Competitors(records, linear, competitors_held_out(records, linear), spread)
 
 
-def judge(
-    records: Sequence[Record], laws: Sequence[Law], refit: Refit, others: Competitors | None = None
-) -> Judgement:
+def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, others: Competitors | None = None) -> Judgement:
     """Judge a law that was fitted to records beside its rivals.
 
     Parameters

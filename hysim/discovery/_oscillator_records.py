@@ -1,7 +1,6 @@
 """How the records of an oscillator were made, and what of an oscillator is known."""
 
 from collections.abc import Mapping, Sequence
-from numbers import Real
 
 import numpy as np
 
@@ -69,7 +68,7 @@ def known_plant(given: Mapping[str, float | None]) -> dict[str, float]:
         If it is no number, such as text.
     """
     for name, value in given.items():
-        if value is not None and (isinstance(value, bool) or not isinstance(value, Real)):
+        if value is not None and (isinstance(value, bool) or not isinstance(value, (int, float, np.number))):
             raise TypeError(f"{name} must be a number, got {value!r}")
     known = {name: float(value) for name, value in given.items() if value is not None}
     for name, value in known.items():

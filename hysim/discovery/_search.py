@@ -135,6 +135,11 @@ def searched(
     for start in starts:
         for _, structure in _path(start, library, optimizer):
             search.refine(structure)
+    if not search.found:
+        raise ValueError(
+            f"every law that was tried diverges on these records, whose output moves by {whole.stroke:.3g} about "
+            f"{float(records[0].y[0]):.3g}: check the units, or subtract the offset"
+        )
     is_short = not _least_rmse(search) <= enough()
     if not is_short:
         search.explore(library.structure(starts[0].regression.terms))
@@ -198,9 +203,7 @@ def _seen(record: Record) -> Record:
     return Record(u=record.u[kept], y=record.y[kept])
 
 
-def _on_all_samples(
-    free_run: FreeRun, search: Search, library: Library, seed: int, restarts: int
-) -> Candidate[Terms]:
+def _on_all_samples(free_run: FreeRun, search: Search, library: Library, seed: int, restarts: int) -> Candidate[Terms]:
     """Steps 4 and 5 of the selection on all samples, and the best of descending again from random starts."""
     finalists = search.followed(search.sound)
     if free_run.n_samples > search.free_run.n_samples:

@@ -43,21 +43,6 @@ _ANGLE = 0.1  # largest phase of the mode in a default step: errors of 1e-7 of t
 _CHUNK = 1 << 16
 _SETTLING_CHUNK = 1 << 13
 _MOST_PERIODS = 1000
-_PLAIN_PERIODS = 15  # before the first extrapolation: most motions are steady by then
-_INDEPENDENT = 1e-6  # of the largest change: smaller ones are rounding
-_PER_JUMP = 5  # states, whose four changes determine the fixed point of a linear map of three of them
-
-
-def _fixed_point(ends: Sequence[FloatArray], scale: FloatArray) -> dict[str, float]:
-    """Where the states at the ends of successive periods lead to, by reduced rank extrapolation.
-
-    Source: D. A. Smith, W. F. Ford and A. Sidi, Extrapolation methods for vector sequences, SIAM Review 29 (1987) 199.
-    """
-    sizes = np.where(scale > 0.0, scale, 1.0)
-    changes = np.diff(np.array(ends) / sizes, axis=0)
-    weights = np.linalg.lstsq(np.diff(changes, axis=0).T, changes[0], rcond=_INDEPENDENT)[0]
-    place = (ends[0] / sizes - changes[:-1].T @ weights) * sizes
-    return dict(zip(("y", "velocity", "z"), place.tolist(), strict=True))
 
 
 class OscillatorState(NamedTuple):
@@ -185,8 +170,7 @@ class BoucWenOscillator:
         """Displacement in the steady state under an input that repeats itself.
 
         The period is gone through from the initial state again and again, until a state comes back to what it was
-        one period before; what follows is then as it was, too. A motion that settles slowly is extrapolated: the state
-        after a period is nearly a linear function of that before it, whose fixed point four changes determine.
+        one period before; what follows is then as it was, too.
 
         Parameters
         ----------
@@ -225,28 +209,19 @@ class BoucWenOscillator:
             raise ValueError(f"tolerance must be positive, got {tolerance}")
         state = self._start(float(inputs[-1]))
         motion, largest = np.full((inputs.size, 3), np.nan), np.zeros(3)
-        ends: list[FloatArray] = []
-        safe, jumps = state, True
         for _ in range(_MOST_PERIODS):
-            if jumps and len(ends) >= _PLAIN_PERIODS + _PER_JUMP:
-                safe, state = state, state._replace(**_fixed_point(ends[-_PER_JUMP:], largest))
-                ends = ends[:_PLAIN_PERIODS]
             for begin in range(0, inputs.size, _SETTLING_CHUNK):
                 piece = slice(begin, begin + _SETTLING_CHUNK)
                 try:
                     found = self._states(inputs[piece], sample_time, state, None)[1]
                 except SimulationError:
-                    if safe is state or not jumps or len(ends) > _PLAIN_PERIODS:
-                        raise SimulationError("the motion leaves the finite numbers before it is steady") from None
-                    state, jumps = safe, False  # only the extrapolated state diverges
-                    break
+                    raise SimulationError("the motion leaves the finite numbers before it is steady") from None
                 state = OscillatorState(float(inputs[piece][-1]), *found[-1].tolist())
                 change = np.abs(found[-1, :3] - motion[piece][-1])
                 motion[piece] = found[:, :3]
                 largest = np.maximum(largest, np.abs(found[-1, :3]))
                 if np.all(change <= tolerance * largest):
                     return motion[:, 0].copy()
-            ends.append(motion[-1].copy())
         raise SimulationError(f"the motion has not settled within {_MOST_PERIODS} periods")
 
     def signals(self, u: npt.ArrayLike, sample_time: float) -> dict[str, FloatArray]:
