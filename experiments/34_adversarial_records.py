@@ -8,7 +8,7 @@ by triangles, sines, sums of sines and fading sines, at one rate or at two, with
 - if two rates are called "cannot be told from one rate".
 
 The first set of records was looked at while the limits of the judgement were chosen. The second one has other numbers
-in every record, other rates and other samplings, and was not.
+in every record, other rates and other samplings; it was run once, after the limits were fixed.
 """
 
 import os
