@@ -393,6 +393,14 @@ def test_two_records_have_the_ratio_of_their_rates_however_many_cycles_each_has(
     assert rate_spread([long, short]) == pytest.approx(ratio, rel=1e-9)
 
 
+@pytest.mark.parametrize("amplitude", [0.3, 0.5, 1.0])
+def test_a_smaller_record_at_another_rate_shows_its_rate(amplitude):
+    u = hs.signals.triangle(-1.0, 1.0, cycles=3, samples_per_cycle=400)
+    t = np.arange(u.size) / 400.0
+    records = [hs.Record(t=t, u=u, y=u), hs.Record(t=t / 5.0, u=amplitude * u, y=u)]
+    assert rate_spread(records) == pytest.approx(5.0 * amplitude, rel=1e-6)
+
+
 @pytest.mark.parametrize("dwell", [1, 2, 5])
 def test_a_staircase_has_one_rate_however_long_it_stops(dwell):
     u = hs.signals.staircase(0.0, 125.0, 5.0, cycles=2, samples_per_step=dwell)
