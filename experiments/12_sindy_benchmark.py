@@ -100,7 +100,7 @@ def described(case: str, seed: int, found: Any, seconds: float) -> Row:
         "library": len(found.inclusion) + len(found.left_out),
         "rmse": found.scores["rmse"],
         "held_out_rmse": found.judgement.held_out["law"],
-        "linear_rmse": found.judgement.held_out["rival"],
+        "linear_held_out_rmse": found.judgement.held_out["rival"],
         "condition": found.scores["condition"],
         "seconds": seconds,
     }

@@ -3,6 +3,7 @@
 A result says it by ``__str__``, and its first line alone is its ``repr``; notebooks show all of it. No array is listed.
 """
 
+import math
 import textwrap
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
@@ -25,6 +26,11 @@ def shown(cls: type[T]) -> type[T]:
     """Let notebooks show what ``str`` says."""
     cls._repr_mimebundle_ = _bundle  # type: ignore[attr-defined]
     return cls
+
+
+def bic_in_words(bic: float) -> str:
+    """The BIC, which is minus infinity and compares nothing where every residual is zero."""
+    return "BIC not defined" if bic == -math.inf else f"BIC {bic:.1f}"
 
 
 def words(lines: Iterable[str], rows: Mapping[str, str] | None = None) -> str:

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 import hysim as hs
 from hysim.discovery._doubts import doubts
-from hysim.discovery._judgement import RATES, judge
+from hysim.discovery._judgement import BETTER, RATES, competitors, judge
 from hysim.discovery._rates import at_one_rate, rate_spread
 from hysim.discovery._rival import steady_width
 
@@ -288,6 +288,25 @@ def test_linear_creep_is_a_lag():
     assert found.verdict == "linear lag"
 
 
+@pytest.mark.skipif(not COMPILED, reason="identifies on hundreds of samples, which takes minutes uncompiled")
+def test_only_a_law_that_could_change_the_verdict_is_worth_a_search():
+    curve = competitors(sines(lambda u, _: MAPS["tanh"](u)))
+    assert curve.enough == pytest.approx(BETTER * curve.trial.errors["curve"], rel=1e-3)  # and the floor of the errors
+    slow = competitors(sines(lag().response))
+    assert slow.enough == pytest.approx(slow.trial.errors["rival"] / BETTER, rel=1e-3)
+    assert competitors(sines(lambda u, _: LAW.response(u))).enough == np.inf
+    assert competitors([hs.Record(u=TRIANGLE, y=LAW.response(TRIANGLE))]).enough == np.inf
+
+
+@pytest.mark.skipif(not COMPILED, reason="searches laws for hundreds of samples, which takes minutes uncompiled")
+def test_the_search_is_short_where_a_curve_suffices():
+    found = hs.discover(sines(lambda u, _: MAPS["tanh"](u), (1.0,)))
+    assert found.verdict == "no structure found"
+    assert "only the optimizer's path was searched" in found.message
+    # the path, the line, and the terms that pruning tries: the search among all subsets refines dozens
+    assert found.scores["n_structures"] <= len(found.thresholds) + 10
+
+
 def test_a_better_linear_model_is_told():
     found = judged(sines(lag().response), as_line)
     assert "A linear dynamic model predicts held-out samples better than the law" in doubts(found)[0]
@@ -372,6 +391,14 @@ def test_two_records_have_the_ratio_of_their_rates_however_many_cycles_each_has(
     short = hs.Record(t=ratio * np.arange(401), u=u[:401], y=u[:401])
     assert rate_spread([long]) == pytest.approx(1.0, rel=1e-9)
     assert rate_spread([long, short]) == pytest.approx(ratio, rel=1e-9)
+
+
+@pytest.mark.parametrize("amplitude", [0.3, 0.5, 1.0])
+def test_a_smaller_record_at_another_rate_shows_its_rate(amplitude):
+    u = hs.signals.triangle(-1.0, 1.0, cycles=3, samples_per_cycle=400)
+    t = np.arange(u.size) / 400.0
+    records = [hs.Record(t=t, u=u, y=u), hs.Record(t=t / 5.0, u=amplitude * u, y=u)]
+    assert rate_spread(records) == pytest.approx(5.0 * amplitude, rel=1e-6)
 
 
 @pytest.mark.parametrize("dwell", [1, 2, 5])

@@ -63,6 +63,7 @@ def test_with_noise_the_same_terms_come_within_their_standard_errors(noisy):
         assert abs(noisy.coefficients[name] - value) < 4.0 * noisy.stderr[name]  # one in 16 000 is farther off
         assert noisy.inclusion[name] >= 0.9
     assert noisy.scores["rmse"] < noisy.scores["held_out_rmse"] < 0.1 * noisy.scores["linear_rmse"]
+    assert noisy.scores["linear_rmse"] < noisy.scores["linear_held_out_rmse"]  # its plant is left out too
     assert noisy.path_bic.min() == noisy.path_bic[noisy.path_n_terms == 3].min()
     assert len(noisy.inclusion) + len(noisy.left_out) == 15
 
@@ -221,6 +222,8 @@ def test_a_record_that_cannot_do_is_refused(given, message):
         ({"symmetry": "even"}, ValueError, "symmetry must be one of none, odd"),
         ({"mass": -1.0}, ValueError, "mass must be positive"),
         ({"damping": float("nan")}, ValueError, "damping must be finite"),
+        ({"mass": "3"}, TypeError, "mass must be a number, got '3'"),
+        ({"stiffness": True}, TypeError, "stiffness must be a number, got True"),
         ({"structure": hs.BoucWenOscillator.structure(excitation="base")}, ValueError, "must be a force"),
         ({"structure": "newmark"}, TypeError, "structure comes from"),
     ],

@@ -13,6 +13,7 @@ import hysim as hs
 from hysim.discovery import _laws
 from hysim.discovery._descent import descend
 from hysim.discovery._refinement import FreeRun, information
+from hysim.discovery._search import Library, searched
 from hysim.discovery._selection import Search, pruned
 from hysim.discovery._structures import AnyExponent, Terms
 from hysim.discovery._validation import left_out_rmse
@@ -47,6 +48,38 @@ def test_the_descent_ends_where_scipys_does(central, lower, upper):
     assert (found.x >= lower).all()
     assert (found.x <= upper).all()
     assert found.residual == pytest.approx(rosenbrock(found.x)[0], abs=1e-15)
+
+
+def test_a_descent_that_cannot_win_is_given_up():
+    """The sum of (10 (b - a^2))^2 and (1 - a)^2 falls slowly along its valley, here on a level of 5."""
+
+    def steps_and_end(hopeless):
+        calls = []
+
+        def residuals(x):
+            calls.append(len(x))
+            return np.column_stack([rosenbrock(x), np.full(len(x), np.sqrt(5.0))])
+
+        start = np.array([-1.2, 1.0])
+        end = descend(residuals, start, -OPEN, OPEN, tolerance=1e-9, steps=40, central=False, hopeless=hopeless)
+        return len(calls), float(end.residual @ end.residual)
+
+    most, best = steps_and_end(np.inf)
+    assert best == pytest.approx(5.0, rel=1e-6)
+    assert steps_and_end(5.1) == (most, best)  # it comes below that
+    few, cost = steps_and_end(1.0)
+    assert few < most
+    assert cost > 1.0
+
+
+def test_a_polished_law_does_not_lose_its_numbers_to_an_earlier_worse_optimum():
+    record, library = record_of(LAW.memory, CYCLES, noise=0.01), Library(terms(["u'", "|u'| z", "u' |z|"]), "z")
+    found = searched([record], library, signs={}, optimizer="STLSQ", derivative="smoothed", seed=0)
+    structure = found.candidate.structure
+    worse = found.search.free_run.refine(structure, 1.5 * found.candidate.unknowns[np.newaxis], tolerance=np.inf)
+    assert worse.cost > 1.01 * found.candidate.cost
+    found.search.tried[structure] = worse
+    assert found.searched.cost == found.candidate.cost
 
 
 @given(seed=st.integers(0, 2**31))

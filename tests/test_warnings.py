@@ -103,6 +103,8 @@ def test_a_constant_output_is_said_once_and_no_fit_in_percent_is_printed(tmp_pat
     assert "the output is constant" in table.warnings[0]
     for text in (str(fit), fit.summary(), table.to_text(), str(table), table._repr_html_(), str(table.rows[0])):
         assert "nan" not in text
+        assert "-inf" not in text
+        assert " ".join(text.split()).count("output is constant") <= 1
         assert "output is constant" in " ".join(text.split()) or "fit not defined" in text
     assert "nan" not in hs.select([hs.Line, hs.SingleValued], record).to_text()
     np.savetxt(tmp_path / "flat.csv", np.column_stack([record.u, record.y]), delimiter=",", header="u,y", comments="")

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hysim._frozen import FloatArray, frozen
-from hysim._words import printed, words
+from hysim._words import bic_in_words, printed, words
 from hysim.comparison import _tables
 from hysim.comparison._verdict import Contrast, contrasts
 from hysim.identification.sentences import CONSTANT, SWAPPED
@@ -103,7 +103,7 @@ class ComparisonRow:
             {
                 "left out": "" if math.isnan(self.cv_rmse) else f"rmse {self.cv_rmse:.4g}",
                 "largest width": f"{self.max_width:.4g} at {self.max_width_at:.6g}{excess}",
-                "parameters": f"{self.n_parameters}, BIC {self.bic:.1f}",
+                "parameters": f"{self.n_parameters}, {bic_in_words(self.bic)}",
                 "model": in_brief(self.model),
                 "search": self.message,
                 "warnings": "; ".join(self.warnings),
@@ -220,7 +220,7 @@ class Comparison:
     def verdict(self) -> str:
         """The winner, what the record cannot decide, and which models diverged, in words."""
         by_bic = self.ranked("bic")
-        sentences = [f"The BIC prefers {by_bic[0].name}."] if len(by_bic) > 1 else []
+        sentences = [f"The BIC prefers {by_bic[0].name}."] if len(by_bic) > 1 and by_bic[0].bic > -math.inf else []
         if self.winner is not None:
             unit = f" {self.record.units['y']}" if "y" in self.record.units else ""
             rmse = f"cross-validated rmse {self[self.winner].cv_rmse:.4g}{unit}"

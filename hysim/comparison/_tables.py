@@ -62,8 +62,8 @@ def columns(comparison: "Comparison", *, timings: bool) -> list[Column]:
         Column(f"width rmse{y}", lambda row: row.width_rmse, 4, short=False),
         Column("width error [%]", lambda row: row.width_error_percent, 1),
         Column("area error [%]", lambda row: row.area_error_percent, 1),
-        Column("BIC", lambda row: row.bic, 1),
-        Column("AIC", lambda row: row.aic, 1, short=False),
+        Column("BIC", lambda row: _defined(row.bic), 1),
+        Column("AIC", lambda row: _defined(row.aic), 1, short=False),
         Column("FPE", lambda row: row.fpe, 6, short=False),
         Column("rate independent", lambda row: row.is_rate_independent),
         Column("rate deviation", lambda row: row.rate_deviation, 9, short=False),
@@ -211,3 +211,8 @@ def _exact(value: Value | None) -> str:
 
 def _escaped(text: str) -> str:
     return re.sub(r"([%&_#$])", r"\\\1", text)
+
+
+def _defined(criterion: float) -> float:
+    """An information criterion; nan where it is minus infinity, since every residual is zero."""
+    return math.nan if criterion == -math.inf else criterion

@@ -41,11 +41,16 @@ def descend(
     tolerance: float,
     steps: int,
     central: bool,
+    hopeless: float = np.inf,
 ) -> Reached:
-    """Descend from `x` until a step lowers the sum of squares by less than `tolerance` of it."""
+    """Descend from `x` until a step lowers the sum of squares by less than `tolerance` of it.
+
+    The descent also ends where the remaining steps, each lowering the sum by as much as the last one, would not bring
+    it below `hopeless`: steps become smaller near an optimum.
+    """
     damping = _FIRST
     here = linearised(residuals, x, central)
-    for _ in range(steps):
+    for remaining in range(steps - 1, -1, -1):
         cost = float(here.residual @ here.residual)
         trials = _trials(here, damping * _DAMPINGS, lower, upper)
         squares = np.sum(residuals(trials) ** 2, axis=1)
@@ -57,7 +62,8 @@ def descend(
             continue
         damping = float(np.clip(damping * _DAMPINGS[best], _LEAST, _MOST))
         here = linearised(residuals, trials[best], central)
-        if cost - squares[best] <= tolerance * cost:
+        fall = cost - float(squares[best])
+        if fall <= tolerance * cost or cost - (1 + remaining) * fall > hopeless:
             break
     return here
 

@@ -12,6 +12,7 @@ import contextlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from hysim._parallel import Progress
 from hysim.discovery import _laws, _pysindy, arguments
 from hysim.discovery._doubts import doubts
 from hysim.discovery._exponent import or_any_exponent
-from hysim.discovery._judgement import HYSTERESIS, NO_STRUCTURE, Judgement, judge
+from hysim.discovery._judgement import HYSTERESIS, NO_STRUCTURE, Competitors, Judgement, competitors, judge
 from hysim.discovery._library import FORMS, duhem_terms, memory_terms, named_terms, signs_of, symmetric
 from hysim.discovery._refinement import Candidate, FreeRun, Samples
 from hysim.discovery._result import Discovery
@@ -37,6 +38,10 @@ if TYPE_CHECKING:
     from hysim.models.oscillator_structure import OscillatorStructure
 
 _POOR = 80.0  # fit of a law without dynamics [%] below which an oscillator is tried
+_SHORT = (
+    "only the optimizer's path was searched, since no law on it comes near the model without a law that explains the "
+    "records best"
+)
 _STAGES = 3  # hidden memory, other libraries, judgement
 
 
@@ -134,10 +139,10 @@ def discover(
     ------
     ValueError
         If an option is unknown or not used by the route, an input or output is constant, the input never reverses, its
-        branches are too short to have a slope, there are no more samples than terms, or an oscillator's record has no
-        even time.
+        branches are too short to have a slope, there are no more samples than terms, every law diverges, or an
+        oscillator's record has no even time.
     TypeError
-        If the first argument is not a record or a sequence of them.
+        If the first argument is not a record or a sequence of them, or `mass`, `damping` or `stiffness` is no number.
     ImportError
         If `optimizer` is one of PySINDy's that needs an extra.
 
@@ -199,6 +204,9 @@ def discover(
     n_folds = 0 if cross_validate is None else len(folds(cross_validate, sum(map(len, records))))
     total = _STAGES + n_folds
     report = progress or (lambda done, total: None)
+    others = cache(lambda: competitors(records))
+    if cross_validate is None:  # whose folds repeat the search without knowing what the competitors know
+        options["enough"] = lambda: others().enough
     outcomes = _searched(records, (hidden,), options)
     report(1, total)
     doubt = swapped_columns(records)
@@ -214,9 +222,9 @@ def discover(
     any_exponent = library is None and symmetry is None and not signs
 
     def chosen(first: list[Outcome], seen: tuple[Samples, ...] | None) -> tuple[Outcome, Candidate[Any]]:
-        others = _searched(records, shown, options, first[0].searched.bic, seen)
-        outcome = min([*first, *others], key=lambda each: each.candidate.bic)
-        if not any_exponent:
+        more = _searched(records, shown, options, first[0].searched.bic, seen)
+        outcome = min([*first, *more], key=lambda each: each.candidate.bic)
+        if not any_exponent or outcome.is_short:
             return outcome, outcome.candidate
         return outcome, or_any_exponent(FreeRun(records, seen), first[0], outcome)
 
@@ -225,7 +233,7 @@ def discover(
 
     outcome, candidate = chosen(outcomes, None)
     report(_STAGES - 1, total)
-    found = _discovery(records, outcome, candidate, seed)
+    found = _discovery(records, outcome, candidate, others(), seed)
     report(_STAGES, total)
     error = math.nan
     if cross_validate is not None:
@@ -331,11 +339,12 @@ def _discovery(
     records: tuple[Record, ...],
     outcome: Outcome,
     candidate: Candidate[Any],
+    others: Competitors,
     seed: int,
 ) -> Discovery:
     letter, structure = outcome.library.letter, candidate.structure
     found = _laws.found(candidate, records, "z" if isinstance(structure, AnyExponent) else letter)
-    judgement = _judged(records, candidate, letter, found.models)
+    judgement = _judged(records, candidate, letter, found.models, others)
     path = [(threshold, outcome.search.refine(each)) for threshold, each in outcome.path]
     path_scores = [_scores(each, outcome.search.free_run.records) for _, each in path]
     return Discovery(
@@ -366,9 +375,15 @@ def _discovery(
         path_n_terms=np.array([len(structure.terms) for _, structure in outcome.path], dtype=float),
         path_fit_percent=np.array([scores["fit_percent"] for scores in path_scores]),
         path_bic=np.array([scores["bic"] for scores in path_scores]),
-        message=f"{letter} at the first sample is held at zero, its rest" if structure.rest else "",
+        message=_message(outcome, structure.rest),
         warnings=doubts(judgement),
     )
+
+
+def _message(outcome: Outcome, rest: bool) -> str:
+    parts = [f"{outcome.library.letter} at the first sample is held at zero, its rest"] * rest
+    parts += [_SHORT] * outcome.is_short
+    return "; ".join(parts)
 
 
 def _regressed(outcome: Outcome) -> dict[str, float]:
@@ -380,7 +395,9 @@ def _regressed(outcome: Outcome) -> dict[str, float]:
     return _laws.coefficients(structure, numbers, outcome.library.letter)
 
 
-def _judged(records: tuple[Record, ...], candidate: Candidate[Any], letter: str, models: Sequence[Any]) -> Judgement:
+def _judged(
+    records: tuple[Record, ...], candidate: Candidate[Any], letter: str, models: Sequence[Any], others: Competitors
+) -> Judgement:
     structure = candidate.structure
 
     def refit(some: Sequence[Record], weights: Sequence[FloatArray]) -> Sequence[Any]:
@@ -391,7 +408,7 @@ def _judged(records: tuple[Record, ...], candidate: Candidate[Any], letter: str,
             raise ValueError("the law diverges")
         return _laws.found(refined, some, letter).models
 
-    return judge(records, models, refit)
+    return judge(records, models, refit, others)
 
 
 def _scores(candidate: Candidate[Any] | None, records: Sequence[Record]) -> dict[str, float]:

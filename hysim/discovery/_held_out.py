@@ -15,7 +15,7 @@ leaves.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Protocol
 
@@ -96,46 +96,64 @@ class Trial:
         return float(np.mean(gains)) * math.sqrt(gains.size) > student * float(np.std(gains, ddof=1))
 
 
-def held_out(records: Sequence[Record], refit: Refit, linear: Rival | None) -> Trial:
-    """Fit law and rivals again without some of the samples, and see what they say of these.
+def competitors_held_out(records: Sequence[Record], linear: Rival | None) -> Trial:
+    """Fit the rivals of a law again without some of the samples, and predict these; the errors of the law are nan.
 
     Without a linear rival, for lack of time, there are no relaxations either, and both errors are nan.
     """
     y = np.concatenate([record.y for record in records])
     by, left_out = _folds(records)
-    errors = dict.fromkeys((LAW, RIVAL, RELAXATIONS, PLAYS, CURVE), math.nan)
-    seen = errors.copy()
-    parts: dict[str, FloatArray] = {}
-    models = _models(records, y, refit, linear)
+    unknown = dict.fromkeys((LAW, RIVAL, RELAXATIONS, PLAYS, CURVE), math.nan)
+    trial = Trial(unknown, unknown, math.nan, by, _noise(records), 0.0, {})
+    models = _models(records, y, linear)
     for name, model in models.items():
-        residual, fitted = np.full(y.size, math.nan), []
-        for samples in left_out:
-            weights = np.ones(y.size)
-            weights[samples] = 0.0
-            remaining = y - model(weights)
-            residual[samples] = remaining[samples]
-            fitted.extend(_about_trends(np.where(weights > 0.0, remaining, math.nan), records))
-        held = _about_trends(residual, records)
-        errors[name], seen[name] = _rms(held), _rms(fitted)
-        parts[name] = np.array([_rms([part]) for part in _in_parts(held, records)])
+        trial = _with(trial, name, model, records, left_out)
+    errors, seen, parts = dict(trial.errors), dict(trial.seen), dict(trial.parts)
     if errors[_MEANS] < errors[CURVE]:
         errors[CURVE], seen[CURVE], parts[CURVE] = errors[_MEANS], seen[_MEANS], parts[_MEANS]
     del errors[_MEANS]
-    together = _about_trends(y - models[PLAYS](np.ones(y.size)), records)
-    return Trial(errors, seen, _rms(together), by, _noise(records), float(np.ptp(y)), parts)
+    together = about_trends(y - models[PLAYS](np.ones(y.size)), records)
+    return replace(trial, errors=errors, seen=seen, parts=parts, together=rms(together), stroke=float(np.ptp(y)))
 
 
-def _models(records: Sequence[Record], y: FloatArray, refit: Refit, linear: Rival | None) -> dict[str, Model]:
+def law_held_out(trial: Trial, records: Sequence[Record], refit: Refit) -> Trial:
+    """The trial of the rivals with a law beside them, fitted again without the same samples."""
+    n_samples = sum(len(record) for record in records)
+
     def law(weights: FloatArray) -> FloatArray:
         """The free runs; inf where they cannot be fitted or diverge."""
         try:
             laws = refit(records, _of_each(weights, records))
             return np.concatenate([law.response(record.u) for law, record in zip(laws, records, strict=True)])
         except (SimulationError, ValueError):
-            return np.full(y.size, math.inf)
+            return np.full(n_samples, math.inf)
 
+    return _with(trial, LAW, law, records, _folds(records)[1])
+
+
+def _with(trial: Trial, name: str, model: Model, records: Sequence[Record], left_out: Sequence[Samples]) -> Trial:
+    """The trial with the errors of one more model."""
+    y = np.concatenate([record.y for record in records])
+    residual, fitted = np.full(y.size, math.nan), []
+    for samples in left_out:
+        weights = np.ones(y.size)
+        weights[samples] = 0.0
+        remaining = y - model(weights)
+        residual[samples] = remaining[samples]
+        fitted.extend(about_trends(np.where(weights > 0.0, remaining, math.nan), records))
+    held = about_trends(residual, records)
+    parts = np.array([rms([part]) for part in _in_parts(held, records)])
+    return replace(
+        trial,
+        errors={**trial.errors, name: rms(held)},
+        seen={**trial.seen, name: rms(fitted)},
+        parts={**trial.parts, name: parts},
+    )
+
+
+def _models(records: Sequence[Record], y: FloatArray, linear: Rival | None) -> dict[str, Model]:
     u = np.concatenate([record.u for record in records])
-    found: dict[str, Model] = {LAW: law, _MEANS: partial(yardsticks.means, u, y)}
+    found: dict[str, Model] = {_MEANS: partial(yardsticks.means, u, y)}
     needed = {CURVE: yardsticks.curve, PLAYS: yardsticks.plays}
     if linear is not None:
         found[RIVAL] = lambda weights: np.concatenate(
@@ -151,7 +169,7 @@ def _of_yardstick(model: yardsticks.Yardstick, y: FloatArray, weights: FloatArra
     return model.outputs(y, weights)
 
 
-def _about_trends(residual: FloatArray, records: Sequence[Record]) -> list[FloatArray]:
+def about_trends(residual: FloatArray, records: Sequence[Record]) -> list[FloatArray]:
     """The residual of each record about its own trend; nan where it is nan, and all of it where that is all trend."""
     found = []
     for left, record in zip(_of_each(residual, records), records, strict=True):
@@ -216,10 +234,10 @@ def _is_inside(seen: FloatArray, other: FloatArray) -> npt.NDArray[np.bool_]:
 
 def _noise(records: Sequence[Record]) -> float:
     """Rms of white noise as the third differences of the outputs show it, those of smooth outputs being small."""
-    return _rms([np.diff(record.y, 3) for record in records]) / math.sqrt(20.0)
+    return rms([np.diff(record.y, 3) for record in records]) / math.sqrt(20.0)
 
 
-def _rms(parts: Sequence[FloatArray]) -> float:
+def rms(parts: Sequence[FloatArray]) -> float:
     """Root mean square of what is not nan."""
     values = np.concatenate(parts) if parts else np.empty(0)
     counts = values[~np.isnan(values)]

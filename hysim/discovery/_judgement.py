@@ -22,13 +22,25 @@ the noise leaves no such difference.
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from hysim import metrics, signals
 from hysim._cycles import TOLERANCE, complete_cycles
 from hysim._frozen import FloatArray, frozen
-from hysim.discovery._held_out import CURVE, LAW, PLAYS, RELAXATIONS, RIVAL, Law, Refit, Trial, held_out
+from hysim.discovery._held_out import (
+    CURVE,
+    LAW,
+    PLAYS,
+    RELAXATIONS,
+    RIVAL,
+    Law,
+    Refit,
+    Trial,
+    competitors_held_out,
+    law_held_out,
+)
 from hysim.discovery._rates import SEVERAL, rate_spread
 from hysim.discovery._rival import FLOOR, Rival, rival, steady_width
 from hysim.errors import SimulationError
@@ -104,7 +116,43 @@ class Judgement:
     explained_by: tuple[str, ...] = ()
 
 
-def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit) -> Judgement:
+@dataclass(frozen=True)
+class Competitors:
+    """The models that need no law, tried on records: they are the same whatever law is judged beside them.
+
+    `records` have even times, and long ones are thinned; `spread` is their `rate_spread`.
+    """
+
+    records: Sequence[Record]
+    linear: Rival | None
+    trial: Trial
+    spread: float
+
+    @property
+    def enough(self) -> float:
+        """The rmse that a law must reach to change the verdict [unit of y]; inf if any law may change it.
+
+        Without a law the verdict may be that a curve or a linear model suffices. Only a law that predicts better than
+        these changes it. A verdict of hysteresis is one for which the best law is wanted.
+        """
+        verdict = _verdict(self.trial, self.linear, single_valued=False, spread=self.spread)
+        if verdict == NO_STRUCTURE:
+            return BETTER * _still(self.trial, self.linear)
+        if verdict == LAG:
+            return _least(self.trial, _lagging(self.linear)) / BETTER
+        return math.inf
+
+
+def competitors(records: Sequence[Record]) -> Competitors:
+    """Fit the models that need no law."""
+    timed = all(record.t is not None for record in records)
+    spread = rate_spread(records)
+    records = _thinned([_even(record) for record in records] if timed else records)
+    linear = rival(records) if timed else None
+    return Competitors(records, linear, competitors_held_out(records, linear), spread)
+
+
+def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, others: Competitors | None = None) -> Judgement:
     """Judge a law that was fitted to records beside its rivals.
 
     Parameters
@@ -116,6 +164,8 @@ def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit) -> Judge
         The law, once for each record: all is shared but the memory at the first sample.
     refit : callable
         ``refit(records, weights)`` gives such laws, fitted to the samples whose weights are not zero.
+    others : Competitors, optional
+        ``competitors(records)``, where they are known already.
 
     Returns
     -------
@@ -131,11 +181,9 @@ def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit) -> Judge
     >>> judge([rec], [law], lambda recs, weights: [law]).verdict
     'cannot be told from one rate'
     """
-    timed = all(record.t is not None for record in records)
-    spread = rate_spread(records)
-    records = _thinned([_even(record) for record in records] if timed else records)
-    linear = rival(records) if timed else None
-    trial = held_out(records, refit, linear)
+    others = others or competitors(records)
+    records, linear, spread = others.records, others.linear, others.spread
+    trial = law_held_out(others.trial, records, refit)
     longest = max(range(len(records)), key=lambda k: len(records[k]))
     loops = _loops(laws[longest], records[longest].u)
     areas = np.array([math.nan if loop is None else _signed_area(loop) for loop in loops])
@@ -163,9 +211,7 @@ def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit) -> Judge
 
 
 def _verdict(trial: Trial, linear: Rival | None, single_valued: bool, spread: float) -> str:
-    straight = linear is not None and linear.is_line
-    still = _least(trial, [CURVE, *[RIVAL] * straight, *[LAW] * single_valued])
-    lagging = [RELAXATIONS, *[RIVAL] * (not straight)]
+    still, lagging = _still(trial, linear, single_valued), _lagging(linear)
     turning = [PLAYS, *[LAW] * (not single_valued)]
     moving = min([*lagging, *turning], key=lambda name: _least(trial, [name]))
     if still <= LEAST * trial.stroke or _least(trial, [moving]) >= BETTER * still:
@@ -179,6 +225,17 @@ def _verdict(trial: Trial, linear: Rival | None, single_valued: bool, spread: fl
         return LAG
     explained = _least(trial, [name for name in turning if trial.explains(name)])
     return HYSTERESIS if explained < BETTER * min(lag, still) else NO_STRUCTURE
+
+
+def _still(trial: Trial, linear: Rival | None, single_valued: bool = False) -> float:
+    """The error of the best model without memory, which the law is if it is `single_valued`."""
+    straight = linear is not None and linear.is_line
+    return _least(trial, [CURVE, *[RIVAL] * straight, *[LAW] * single_valued])
+
+
+def _lagging(linear: Rival | None) -> list[str]:
+    straight = linear is not None and linear.is_line
+    return [RELAXATIONS, *[RIVAL] * (not straight)]
 
 
 def _least(trial: Trial, names: Sequence[str]) -> float:

@@ -64,7 +64,12 @@ def known_plant(given: Mapping[str, float | None]) -> dict[str, float]:
     ------
     ValueError
         If a number is not finite, or the mass is not positive.
+    TypeError
+        If it is no number, such as text.
     """
+    for name, value in given.items():
+        if value is not None and (isinstance(value, bool) or not isinstance(value, (int, float, np.number))):
+            raise TypeError(f"{name} must be a number, got {value!r}")
     known = {name: float(value) for name, value in given.items() if value is not None}
     for name, value in known.items():
         if not np.isfinite(value):

@@ -182,6 +182,21 @@ class Response:
         target = residual + slopes[:, n_plant:] @ values
         return term_regression(terms, slopes[:, :n_plant], slopes[:, n_plant:], target, self.floor, self._blocks)
 
+    def held_out_rmse(self, oscillator: Oscillator, residual: FloatArray) -> float:
+        """Rmse on each block, predicted by an oscillator with this residual that the other blocks fit [unit of y].
+
+        The fits are linear, about the oscillator.
+        """
+        slopes, total = self.slopes(oscillator, tuple(oscillator.coefficients)), 0.0
+        sizes = np.linalg.norm(slopes, axis=0)
+        slopes = slopes / np.where(sizes > 0.0, sizes, 1.0)
+        for block in self._blocks:
+            seen = np.ones(residual.size, dtype=bool)
+            seen[block] = False
+            change = np.linalg.lstsq(slopes[seen], residual[seen], rcond=None)[0]
+            total += float(np.sum((residual[block] - slopes[block] @ change) ** 2))
+        return float(np.sqrt(total / residual.size))
+
     @cached_property
     def _blocks(self) -> list[slice]:
         """The periods of periodic records, or blocks of others."""

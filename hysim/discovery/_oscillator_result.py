@@ -47,13 +47,14 @@ class FoundOscillator:
     regressed : mapping
         Coefficients before the refinement, from the regression along the measured motion.
     inclusion : mapping
-        Term to the share of fits to resampled data that keep it, for every term of the library that can be told.
+        Term to the share of fits to resampled data that keep it, for every term of the library that is not `left_out`.
     left_out : tuple of str
-        Terms whose effects these records cannot tell from the plant's or from those of terms of lower degree.
+        Terms whose effects on these records are linear combinations of those of the plant and of terms of lower degree.
     scores : mapping
         ``"fit_percent"`` [%], ``"rmse"`` [unit of y], ``"bic"`` of the free run; ``"held_out_rmse"`` [unit of y], on
-        each period (or quarter) with the coefficients of the others; ``"linear_rmse"`` and ``"linear_bic"`` of the
-        rival without memory; ``"condition"`` of the regression on all terms.
+        each period (or quarter) with plant and coefficients of the others; ``"linear_rmse"``,
+        ``"linear_held_out_rmse"`` and ``"linear_bic"`` of the rival without memory; ``"condition"`` of the regression
+        on all terms.
     path_terms : tuple of str
         The structures that were compared, from dense to sparse, each as its terms joined by commas.
     path_n_terms, path_bic, path_held_out_rmse : array, shape (n_structures,)
@@ -89,7 +90,7 @@ class FoundOscillator:
 
 
 def discovery(found: FoundOscillator, records: Sequence[Record]) -> Discovery:
-    """The same result in the words of the other routes."""
+    """The result as a `Discovery`, the type that all routes return."""
     spread = float(np.std(np.concatenate([record.y for record in records])))
     n_terms = float(len(found.coefficients))
     return Discovery(
@@ -138,7 +139,7 @@ def _parameters(found: FoundOscillator) -> dict[str, float]:
 
 
 def _judgement(found: FoundOscillator, records: Sequence[Record]) -> Judgement:
-    """The rival is a mass on a linear spring; the loop is that of the memory, driven by the displacement."""
+    """The judgement, whose rival is a mass on a linear spring and whose loop is memory over displacement."""
     law = found.model.law if isinstance(found.model, BoucWenOscillator) else None
     widest = max((record.y for record in records), key=lambda y: float(np.ptp(y)))
     loop = steady_loop(law, widest) if isinstance(law, BoucWen) and found.coefficients else None
@@ -148,7 +149,7 @@ def _judgement(found: FoundOscillator, records: Sequence[Record]) -> Judgement:
         verdict=_VERDICTS.get(found.verdict, found.verdict),
         rival=found.rival,
         rival_offset=0.0,
-        held_out={"law": found.scores["held_out_rmse"], "rival": found.scores["linear_rmse"]},
+        held_out={"law": found.scores["held_out_rmse"], "rival": found.scores["linear_held_out_rmse"]},
         held_out_by="block",
         rates=np.array(RATES),
         widths={"law": (width,) * len(RATES), "rival": (math.nan,) * len(RATES)},

@@ -26,7 +26,8 @@ def rate_spread(records: Sequence[Record]) -> float:
     The input's range, all records together, has nine equal bands between 5 and 95 % of it. A branch that crosses a
     band whole has there the rate band over time of crossing, a stop at an edge being divided in its middle. In each
     band the 95th percentile of the rates is divided by the 5th, where every record has the same weight however many
-    passes it has. The median over the bands that are crossed more than once is taken. So a sine that slows down
+    passes it has. The median over the bands that are crossed more than once is taken; where two records cross the same
+    bands, only over these, since the others do not compare the records. So a sine that slows down
     before it turns, always at the same place, has one rate, and so has a triangle of any amplitude; sines of two
     amplitudes, or of a decaying one, have several.
     """
@@ -34,7 +35,9 @@ def rate_spread(records: Sequence[Record]) -> float:
         return math.nan
     low, high = min(record.u.min() for record in records), max(record.u.max() for record in records)
     crossed = [_crossings(record, low + (high - low) * _EDGES) for record in records]
-    ratios = [ratio for band in zip(*crossed, strict=True) if (ratio := _ratio(band)) is not None]
+    bands = list(zip(*crossed, strict=True))
+    shared = [band for band in bands if sum(map(bool, band)) > 1]
+    ratios = [ratio for band in shared or bands if (ratio := _ratio(band)) is not None]
     return float(np.median(ratios)) if ratios else math.nan
 
 

@@ -101,6 +101,11 @@ def _covariance(jacobian: FloatArray, cost: float) -> FloatArray:
     return np.asarray(root @ root.T * (cost / (n - d)))
 
 
+def cost_of(bic: float, n_samples: int, n_parameters: int) -> float:
+    """The sum of squared residuals, in squared strokes, of which `information` is `bic`; negative if there is none."""
+    return n_samples * (math.exp((bic - n_parameters * math.log(n_samples)) / n_samples) - FLOOR**2)
+
+
 def information(cost: float, n_samples: int, n_parameters: int) -> float:
     """BIC of a sum of squared residuals in squared strokes."""
     return n_samples * math.log(cost / n_samples + FLOOR**2) + n_parameters * math.log(n_samples)
@@ -162,8 +167,13 @@ class FreeRun:
         """Residuals (n_sets, n_samples) in strokes at the samples seen."""
         return np.concatenate([self._residual(structure, unknowns, k) for k in range(len(self.records))], axis=1)
 
-    def refine(self, structure: S, starts: FloatArray, *, tolerance: float = RANKING) -> Candidate[S] | None:
-        """The optimum that is reached from the best of `starts` (n_starts, size + n_records); None if all diverge."""
+    def refine(
+        self, structure: S, starts: FloatArray, *, tolerance: float = RANKING, hopeless: float = math.inf
+    ) -> Candidate[S] | None:
+        """The optimum that is reached from the best of `starts` (n_starts, size + n_records); None if all diverge.
+
+        A descent that will not come below the cost `hopeless` [squared strokes] is given up.
+        """
         units = self.units(structure)
         lower, upper = self._bounds(structure, units)
         starts = np.clip(starts, lower, upper)
@@ -178,6 +188,7 @@ class FreeRun:
             tolerance=tolerance,
             steps=_STEPS_TO_RANK if tolerance >= RANKING else _STEPS,
             central=tolerance < RANKING,
+            hopeless=hopeless,
         )
         unknowns = self._with_starts(structure, reached.x * units)
         return Candidate(

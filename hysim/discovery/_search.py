@@ -1,12 +1,13 @@
 """One library on some records: from slopes to refined structures."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from hysim.discovery import _pysindy
+from hysim.discovery._held_out import about_trends, rms
 from hysim.discovery._library import FORMS, Slopes, slopes
 from hysim.discovery._refinement import POLISH, Candidate, FreeRun, Samples
 from hysim.discovery._selection import SEARCHED, Search, Start, preferred, pruned, thinning, turning
@@ -55,7 +56,10 @@ class Library:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The law that one library has for the records, and how it was found."""
+    """The law that one library has for the records, and how it was found.
+
+    A search `is_short` if only the optimizer's path was looked at.
+    """
 
     library: Library
     candidate: Candidate[Terms]
@@ -64,11 +68,15 @@ class Outcome:
     slopes: Slopes
     form: str
     path: list[tuple[float, Terms]]
+    is_short: bool = False
 
     @property
     def searched(self) -> Candidate[Terms]:
-        """The law as it was refined on the samples of the search."""
-        return self.search.refine(self.candidate.structure, self.candidate.unknowns) or self.candidate
+        """The law as it is refined on the samples of the search, from the numbers that it has on all samples."""
+        free_run = self.search.free_run
+        if free_run.n_samples == self.candidate.residual.size:
+            return self.candidate
+        return free_run.refine(self.candidate.structure, self.candidate.unknowns[np.newaxis]) or self.candidate
 
     @property
     def unstable(self) -> bool:
@@ -105,10 +113,12 @@ def searched(
     seed: int,
     best: float = math.inf,
     seen: Sequence[Samples] | None = None,
+    enough: Callable[[], float] = lambda: math.inf,
 ) -> Outcome | None:
     """The best law of a library; None if none can come near the BIC `best`.
 
-    Only the outputs `seen`, (n_samples,) for each record, are looked at.
+    Only the outputs `seen`, (n_samples,) for each record, are looked at. If no law on the optimizer's path, on which
+    are the largest ones, has an rmse of `enough()` or less, the search ends there: a smaller law does not fit better.
     """
     whole = FreeRun(tuple(records), None if seen is None else tuple(seen), signs)
     some = _thinned(whole)
@@ -125,10 +135,24 @@ def searched(
     for start in starts:
         for _, structure in _path(start, library, optimizer):
             search.refine(structure)
-    search.explore(library.structure(starts[0].regression.terms))
-    chosen = _on_all_samples(whole, search, library, seed)
+    if not search.found:
+        raise ValueError(
+            f"every law that was tried diverges on these records, whose output moves by {whole.stroke:.3g} about "
+            f"{float(records[0].y[0]):.3g}: check the units, or subtract the offset"
+        )
+    is_short = not _least_rmse(search) <= enough()
+    if not is_short:
+        search.explore(library.structure(starts[0].regression.terms))
+    chosen = _on_all_samples(whole, search, library, seed, restarts=0 if is_short else _RESTARTS)
     start = _start_at(found, library, chosen)
-    return Outcome(library, chosen, search, start, found, form, _path(start, library, optimizer))
+    return Outcome(library, chosen, search, start, found, form, _path(start, library, optimizer), is_short)
+
+
+def _least_rmse(search: Search) -> float:
+    """The smallest rmse of the laws about a slow trend of each record [unit of y], as the judgement takes it."""
+    free_run = search.free_run
+    errors = (rms(about_trends(found.residual, free_run.visible)) for found in search.found)
+    return min(errors, default=math.inf) * free_run.stroke
 
 
 def _thinned(whole: FreeRun) -> FreeRun:
@@ -179,7 +203,7 @@ def _seen(record: Record) -> Record:
     return Record(u=record.u[kept], y=record.y[kept])
 
 
-def _on_all_samples(free_run: FreeRun, search: Search, library: Library, seed: int) -> Candidate[Terms]:
+def _on_all_samples(free_run: FreeRun, search: Search, library: Library, seed: int, restarts: int) -> Candidate[Terms]:
     """Steps 4 and 5 of the selection on all samples, and the best of descending again from random starts."""
     finalists = search.followed(search.sound)
     if free_run.n_samples > search.free_run.n_samples:
@@ -188,20 +212,20 @@ def _on_all_samples(free_run: FreeRun, search: Search, library: Library, seed: i
         refined = [free_run.refine(structure, unknowns[np.newaxis]) for structure, unknowns in few.items()]
         finalists = [c for c in refined if c is not None] or finalists
     chosen = preferred(finalists, library.letter)
-    restarted = _restarted(search.free_run, search.tried[chosen.structure] or chosen, seed)
+    restarted = _restarted(search.free_run, search.tried[chosen.structure] or chosen, seed, restarts)
     starts = np.stack([chosen.unknowns, restarted.unknowns])
     polished = free_run.refine(chosen.structure, starts, tolerance=POLISH) or chosen
     return pruned(free_run, polished, search.held, POLISH)
 
 
-def _restarted(free_run: FreeRun, chosen: Candidate[Terms], seed: int) -> Candidate[Terms]:
+def _restarted(free_run: FreeRun, chosen: Candidate[Terms], seed: int, restarts: int) -> Candidate[Terms]:
     """The best of a candidate and of descending again from random starts around it."""
     random = np.random.default_rng(seed)
     spread = _SPREAD * free_run.units(chosen.structure)
     best = chosen
-    for _ in range(_RESTARTS):
+    for _ in range(restarts):
         start = chosen.unknowns + spread * random.standard_normal(len(spread))
-        found = free_run.refine(chosen.structure, start[np.newaxis])
+        found = free_run.refine(chosen.structure, start[np.newaxis], hopeless=best.cost)
         if found is not None and found.cost < best.cost * (1.0 - _SAME):
             best = found
     return best

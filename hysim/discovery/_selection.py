@@ -36,7 +36,7 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray
 from hysim.discovery._laws import whole_exponent
 from hysim.discovery._library import Regression
-from hysim.discovery._refinement import Candidate, FreeRun, information
+from hysim.discovery._refinement import Candidate, FreeRun, cost_of, information
 from hysim.discovery._structures import Terms
 from hysim.discovery._subsets import Subsets, best_subsets
 from hysim.models.duhem_terms import Term
@@ -115,8 +115,11 @@ class Search:
     rests: tuple[bool, ...] = (False,)
     tried: dict[Terms, Candidate[Terms] | None] = field(default_factory=dict)
 
-    def refine(self, structure: Terms, *unknowns: FloatArray) -> Candidate[Terms] | None:
-        """Refine a structure, unless that has been done, from its regressions and the given starts."""
+    def refine(self, structure: Terms, *unknowns: FloatArray, race: bool = False) -> Candidate[Terms] | None:
+        """Refine a structure, unless that has been done, from its regressions and the given starts.
+
+        In a `race` it is given up where it will not come near the best one (`followed`).
+        """
         if structure not in self.tried:
             regressed = [
                 self.free_run.regressed(start.regression, structure, start.feedthrough, start.offset)
@@ -124,7 +127,8 @@ class Search:
                 if set(structure.terms) <= set(start.regression.terms)
             ]
             given = np.array(unknowns).reshape(-1, structure.size + len(self.free_run.records))
-            self.tried[structure] = self.free_run.refine(structure, np.concatenate([given, *regressed]))
+            starts, hopeless = np.concatenate([given, *regressed]), self._hopeless(structure) if race else math.inf
+            self.tried[structure] = self.free_run.refine(structure, starts, hopeless=hopeless)
         return self.tried[structure]
 
     @property
@@ -143,6 +147,14 @@ class Search:
         best = self.sound[0]
         return [c for c in candidates if c.bic < best.bic + HOPELESS or gap(c, best) < ALIKE]
 
+    def _hopeless(self, structure: Terms) -> float:
+        """The cost above which a structure is not followed."""
+        sound, n = self.sound, self.free_run.n_samples
+        if not sound:
+            return math.inf
+        best, d = sound[0], structure.size + (0 if structure.rest else len(self.free_run.records))
+        return max(cost_of(best.bic + HOPELESS, n, d), best.cost + n * ALIKE**2)
+
     def explore(self, largest: Terms) -> None:
         """Steps 2 and 3: the structures inside `largest` that the linearised free run says are best."""
         done: set[Terms] = set()
@@ -153,7 +165,7 @@ class Search:
                 break
             done |= {candidate.structure for candidate in points}
             for each in [each for candidate in points for each in self.predicted(candidate, largest)]:
-                self.refine(each.structure, each.unknowns)
+                self.refine(each.structure, each.unknowns, race=True)
         for candidate in self.sound[:_TWINS]:
             for rest in self.rests:
                 self.refine(candidate.structure._replace(rest=rest), candidate.unknowns)
@@ -250,7 +262,8 @@ def pruned(free_run: FreeRun, candidate: Candidate[Terms], held: frozenset[str],
         if needed:
             continue
         start = np.delete(candidate.unknowns, k)
-        refined = free_run.refine(smaller, start[np.newaxis], tolerance=tolerance)
+        worst = cost_of(candidate.bic + INDISTINCT, free_run.n_samples, candidate.n_parameters - 1)
+        refined = free_run.refine(smaller, start[np.newaxis], tolerance=tolerance, hopeless=worst)
         if refined is not None and refined.bic <= candidate.bic + INDISTINCT and refined.settles >= candidate.settles:
             return pruned(free_run, refined, held, tolerance)
     return candidate

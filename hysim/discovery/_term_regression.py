@@ -120,7 +120,9 @@ def term_regression(
 
     `floor` is the noise below which nothing counts as evidence, `blocks` are what is held out in turn.
     """
-    basis = list(np.linalg.qr(plant / np.linalg.norm(plant, axis=0))[0].T) if plant.size else []
+    sizes = np.linalg.norm(plant, axis=0)
+    plant, sizes = plant[:, sizes > 0.0], sizes[sizes > 0.0]  # where the motion diverges a slope is unknown, and zero
+    basis = list(np.linalg.qr(plant / sizes)[0].T) if plant.size else []
     n_plant, independent = len(basis), []
     for k, slope in enumerate(slopes.T):
         rest = slope.copy()

@@ -44,7 +44,7 @@ _BRANCHES = 3  # of a record for each degree of its trend: a trend of fewer cann
 _RIDGES = 10.0 ** np.arange(-12.0, 1.1, 0.5)  # in the largest squared singular value
 _MOST = 0.8  # degrees of freedom in samples
 _BEFORE = 0.1  # how strongly what was before a record is held near zero
-_SLOW = 1e-3  # the same of trends: the first samples of a record that is left out cannot tell them
+_SLOW = 1e-3  # the same of trends: they cannot be estimated from the few samples that are seen of a left-out record
 
 
 @dataclass(frozen=True)

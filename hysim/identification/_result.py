@@ -7,7 +7,7 @@ from typing import Any, Self
 import numpy as np
 
 from hysim._frozen import FloatArray, frozen
-from hysim._words import printed, words, wrapped
+from hysim._words import bic_in_words, printed, words, wrapped
 from hysim.identification import json_forms
 from hysim.identification._profile import Profile
 
@@ -191,7 +191,7 @@ class Identification:
         family = type(self.model).__name__
         lines = [
             f"{family}: {self._fit_in_words()}, rmse {self.rmse:.4g}, FPE {self.fpe:.4g}, "
-            f"BIC {self.bic:.1f}, {self.n_parameters} parameters from {self.residual.size} samples"
+            f"{bic_in_words(self.bic)}, {self.n_parameters} parameters from {self.residual.size} samples"
         ]
         lines += [self._line(name) for name in self.free_names]
         held = [f"{name} = {value:g}" for name, value in self.estimates.items() if name not in self.free_names]
