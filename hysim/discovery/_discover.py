@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hysim import metrics
+from hysim._blas import one_blas_thread
 from hysim._frozen import FloatArray
 from hysim._parallel import Progress
 from hysim.discovery import _laws, _pysindy, arguments
@@ -45,6 +46,7 @@ _SHORT = (
 _STAGES = 3  # hidden memory, other libraries, judgement
 
 
+@one_blas_thread()
 def discover(
     record_or_records: Record | Sequence[Record],
     *,

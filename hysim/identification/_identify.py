@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hysim._blas import one_blas_thread
 from hysim._parallel import Progress, at_most
 from hysim.identification import _direct as direct
 from hysim.identification._direction import swapped_for
@@ -106,7 +107,7 @@ def identify(
         raise ValueError(f'noise must be "gaussian", "quantised" or "robust", got {noise!r}')
     if not isinstance(seed, (int, np.integer)) or seed < 0:
         raise ValueError(f"seed must be an integer from 0 on, got {seed!r}")
-    with at_most(workers):
+    with at_most(workers), one_blas_thread():
         if isinstance(model_or_class, Direct):
             direct.refuse(model_or_class, options, noise, intervals)
             fit = direct.identified(model_or_class, records, left_out(cross_validate, records), seed)
