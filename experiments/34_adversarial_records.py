@@ -11,7 +11,6 @@ The first set of records was looked at while the limits of the judgement were ch
 in every record, other rates and other samplings; it was run once, after the limits were fixed.
 """
 
-import os
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -309,7 +308,6 @@ def main(smoke: bool = False) -> list[Row]:
     if smoke:
         rows = [row(*job) for job in jobs]
     else:
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small, and threads of two workers collide
         with ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn")) as pool:
             rows = list(pool.map(row, *zip(*jobs, strict=True)))
     wrong = [line for line in rows if not line["is_right"]]
