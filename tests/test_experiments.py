@@ -201,8 +201,12 @@ def test_a_closed_loop_is_300_times_as_fast_as_in_python_control():
         assert row["largest_difference_um"] < 1e-11
 
 
+def result_of(name):
+    return json.loads((EXPERIMENTS[0].parent / "results" / name / "result.json").read_text())
+
+
 def rows_of(name):
-    return json.loads((EXPERIMENTS[0].parent / "results" / name / "result.json").read_text())["rows"]
+    return result_of(name)["rows"]
 
 
 def the(rows, **wanted):
@@ -346,3 +350,24 @@ def test_ten_thousand_damaged_inputs_end_in_an_exit_code_and_at_most_one_line():
     assert {row["damaged"] for row in result["rows"]} == {"record", "model", "study", "options"}
     assert sum(row["exit 0"] for row in result["rows"]) > 1000
     assert f"each handed to a command. {result['broken']} of them end in a traceback" in README
+
+
+def test_the_readme_quotes_the_invariant():
+    found = result_of("more_samples")
+    families = len({row["family"] for row in found["rows"]})
+    said = f"In {found['cases_per_family']:_} random hostile cases of each of {families} families".replace("_", " ")
+    assert said in README
+    assert f"{found['cases']:_} comparisons, {found['violations']} violate the invariant".replace("_", " ") in README
+    left_out = ("escaped", "undecided", "refused", "partly_refused")
+    share = max(sum(row[end] for end in left_out) / row["cases"] for row in found["rows"])
+    assert f"At worst {100 * share:.1f} % of a family's cases" in README
+
+
+def test_the_readme_quotes_the_adversarial_records():
+    seen, held_back = (result_of("adversarial_records")["sets"][name] for name in ("seen", "held back"))
+    assert f"Of {seen['records']} that were looked at while its limits were chosen {seen['right']} are right" in README
+    assert f"of {held_back['records']} that were held back {held_back['right']}: no curve" in README
+    for counts in (seen, held_back):
+        assert counts["called hysteresis"] == counts["hysteresis lost"] == counts["cannot tell at two rates"] == 0
+    seconds = max(counts["median_cpu_seconds"] for counts in (seen, held_back))
+    assert f"The median record takes {seconds:.1f} s" in README
