@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.patches import Patch
 
 import hysim as hs
 from hysim.plot import Figure, figure
@@ -197,7 +198,7 @@ def _line(row: Row) -> str:
 
 
 def draw(rows: list[Row]) -> Figure:
-    """Left-out errors, the least on top; a discovered law is blue, the one whose terms are kept is light."""
+    """Left-out errors, the least on top."""
     canvas = figure(height=0.7 + 0.24 * len(rows))
     axes = canvas.add_subplot()
     places = np.arange(len(rows))
@@ -206,6 +207,8 @@ def draw(rows: list[Row]) -> Figure:
     axes.set_yticks(places, [", ".join(filter(None, (row["model"], row["start"]))) for row in rows])
     axes.invert_yaxis()
     axes.set(xlabel="Left-out rmse [nm]")
+    meanings = {"C0": "terms searched anew", "0.85": "terms kept", "0.6": "family fixed"}
+    axes.legend(handles=[Patch(color=colour, label=words) for colour, words in meanings.items()], loc="upper right")
     return canvas
 
 
