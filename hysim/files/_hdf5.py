@@ -196,10 +196,12 @@ def _has_sound_heaps(file: BinaryIO) -> bool:
 
 
 def _check_heaps(content: bytes | mmap.mmap) -> None:
-    start = -1
+    start, walked = -1, 0
     while (start := content.find(b"GCOL\x01", start + 1)) >= 0:
         length, at = _number(content, start + 8), start + _HEAD_BYTES
         end = start + length if _LEAST_HEAP <= length <= len(content) - start else at
+        walked += end - at
+        require(walked <= len(content), "the HDF5 file is damaged: its heaps overlap")
         while at + _HEAD_BYTES <= end:
             length, is_used = _number(content, at + 8), content[at : at + 2] != b"\0\0"
             step = length + -length % 8 + (_HEAD_BYTES if is_used else 0)

@@ -86,7 +86,7 @@ def _array(label: str, opener: _Opener, size: int) -> tuple[Array, int, int]:
         file.seek(0)
         header = BytesIO(file.read(_LONGEST_HEADER))
     shape, dtype = _shape_and_type(header, shown(label))
-    kind = "several texts" if dtype.kind == "U" and math.prod(shape) != 1 else KINDS[dtype.kind]
+    kind = "several texts" if dtype.kind == "U" and math.prod(shape) != 1 else KINDS.get(dtype.kind, "no numbers")
     array = Array(label, shape, kind, dtype.itemsize, partial(_values, opener, kind))
     return array, math.prod(shape) * dtype.itemsize, size - header.tell()
 
@@ -102,8 +102,10 @@ def _shape_and_type(header: BytesIO, label: str) -> tuple[tuple[int, ...], np.dt
         with warnings.catch_warnings(action="ignore"):  # about headers that Python 2 wrote
             shape, _, dtype = _HEADER_READERS[major](header, max_header_size=_LONGEST_HEADER)
     except Exception as error:  # NumPy raises errors of many kinds
-        raise UnreadableError(f"array {label} has a header that cannot be read: {shown(str(error), 80)}") from None
+        reason = shown(f"{type(error).__name__} {error}", 80)
+        raise UnreadableError(f"array {label} has a header that cannot be read: {reason}") from None
     require(dtype.names is None, f"array {label} has fields: save each as an array of its own")
+    require(min(shape, default=0) >= 0, f"array {label} is damaged: it has a negative length")
     return shape, dtype
 
 
