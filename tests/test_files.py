@@ -5,6 +5,7 @@ import io
 import struct
 import sys
 import tracemalloc
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -371,6 +372,20 @@ def test_compressed_chunks_of_h5_are_read(tmp_path):
             file["deep/deep"] = file["deep"]
         rec = hs.load(tmp_path / "loop.h5", y="deep/er/y")
         assert (rec.y.tolist(), dict(rec.units)) == ((2 * u).tolist(), {"u": "V"})
+
+
+@pytest.mark.extra("h5py")
+@pytest.mark.parametrize("length", [8, 10_000])
+@pytest.mark.parametrize("options", [{"shuffle": True}, {"fletcher32": True}, {"compression": "gzip"}], ids=str)
+def test_chunks_of_h5_of_another_length_are_refused(options, length):
+    def fill(file):
+        file.create_dataset("u", data=U, chunks=(5,), **options)
+        packed = zlib.compress(bytes(length)) if "compression" in options else bytes(length)
+        file["u"].id.write_direct_chunk((0,), packed)
+        file["y"] = Y
+
+    with pytest.raises(ValueError, match="the file is damaged: a chunk does not have the 40 bytes it says"):
+        load(hdf5(fill))
 
 
 @pytest.mark.extra("h5py")

@@ -140,7 +140,7 @@ class _Reader(NamedTuple):
         return _decoded(values.flat[0])
 
 
-def _decoded(text: bytes | str) -> str:
+def _decoded(text: Any) -> str:
     return text.decode("utf-8", "replace") if isinstance(text, bytes) else str(text)
 
 

@@ -1,8 +1,8 @@
 """NumPy's files: an array (NPY), or a zip archive of arrays (NPZ).
 
-NumPy reads the headers and the numbers, and never a pickle, which could run any code. It reserves as much memory as a
-header asks for, so a header is believed only if the archive or the file says the same size. Nothing is written to the
-disk: the name of an entry is a name and no path.
+NumPy reads the headers. They are believed only if the archive or the file says the same size, and then as many bytes
+are read as numbers. An array of objects is never read: it is a pickle, which could run any code. Nothing is written to
+the disk: the name of an entry is a name and no path.
 """
 
 import math
@@ -12,7 +12,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from io import BytesIO
-from typing import IO, BinaryIO
+from typing import IO, BinaryIO, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -60,7 +60,7 @@ def npy(file: BinaryIO) -> Arrays:
         If it is damaged.
     """
     with damaged("NPY"):
-        array, length, rest = _array("array", partial(nullcontext, file), file.seek(0, 2))
+        array, length, rest = _array("array", partial(_rewound, file), file.seek(0, 2))
         require(
             array.kind != NUMBERS or length <= rest,
             f"the file is cut: its array has {length:,} bytes, there are {rest:,}",
@@ -70,7 +70,7 @@ def npy(file: BinaryIO) -> Arrays:
 
 def _entry(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> Array:
     label = entry.filename.removesuffix(_ENDING)
-    is_known = entry.compress_type in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # which are unpacked bit by bit
+    is_known = entry.compress_type in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # unpacked piece by piece
     require(is_known, f"array {shown(label)} is compressed in another way than NumPy does: save it anew")
     array, length, rest = _array(label, partial(archive.open, entry), entry.file_size)
     require(
@@ -83,15 +83,22 @@ def _entry(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> Array:
 def _array(label: str, opener: _Opener, size: int) -> tuple[Array, int, int]:
     """The array in a file of this size, the bytes that its header promises, and those behind the header."""
     with opener() as file:
-        file.seek(0)
         header = BytesIO(file.read(_LONGEST_HEADER))
-    shape, dtype = _shape_and_type(header, shown(label))
+    shape, order, dtype = _layout(header, shown(label))
+    start, length = header.tell(), math.prod(shape) * dtype.itemsize
     kind = "several texts" if dtype.kind == "U" and math.prod(shape) != 1 else KINDS.get(dtype.kind, "no numbers")
-    array = Array(label, shape, kind, dtype.itemsize, partial(_values, opener, kind))
-    return array, math.prod(shape) * dtype.itemsize, size - header.tell()
+
+    def read() -> npt.NDArray[np.generic] | str:
+        with opener() as file:
+            content = file.read(start + length)
+        values: npt.NDArray[np.generic] = np.ndarray(shape, dtype, content, start, order=order)
+        return str(values.flat[0]) if kind == TEXT else values
+
+    return Array(label, shape, kind, dtype.itemsize, read), length, size - start
 
 
-def _shape_and_type(header: BytesIO, label: str) -> tuple[tuple[int, ...], np.dtype]:
+def _layout(header: BytesIO, label: str) -> tuple[tuple[int, ...], Literal["C", "F"], np.dtype]:
+    """Shape, order and type of an array whose file begins so; the header is read to its end."""
     major, _ = np.lib.format.read_magic(header)
     length = int.from_bytes(header.getvalue()[8 : 10 if major == 1 else 12], "little")
     require(
@@ -100,17 +107,15 @@ def _shape_and_type(header: BytesIO, label: str) -> tuple[tuple[int, ...], np.dt
     )
     try:
         with warnings.catch_warnings(action="ignore"):  # about headers that Python 2 wrote
-            shape, _, dtype = _HEADER_READERS[major](header, max_header_size=_LONGEST_HEADER)
+            shape, is_fortran, dtype = _HEADER_READERS[major](header, max_header_size=_LONGEST_HEADER)
     except Exception as error:  # NumPy raises errors of many kinds
         reason = shown(f"{type(error).__name__} {error}", 80)
         raise UnreadableError(f"array {label} has a header that cannot be read: {reason}") from None
     require(dtype.names is None, f"array {label} has fields: save each as an array of its own")
     require(min(shape, default=0) >= 0, f"array {label} is damaged: it has a negative length")
-    return shape, dtype
+    return shape, "F" if is_fortran else "C", dtype
 
 
-def _values(opener: _Opener, kind: str) -> npt.NDArray[np.generic] | str:
-    with opener() as file, warnings.catch_warnings(action="ignore"):
-        file.seek(0)
-        values = np.lib.format.read_array(file, allow_pickle=False, max_header_size=_LONGEST_HEADER)
-    return str(values.flat[0]) if kind == TEXT else values
+def _rewound(file: BinaryIO) -> AbstractContextManager[IO[bytes]]:
+    file.seek(0)
+    return nullcontext(file)
