@@ -143,6 +143,21 @@ def test_numbers_of_any_type_and_order_are_read(dtype, order):
         assert load(content, u=0, y=1) == hs.Record(u=[0, 1, 1], y=[1, 0, 1], name="stream")
 
 
+def test_numbers_of_npz_that_have_changed_are_refused_by_their_checksum():
+    content = npz({"u": U, "y": Y})
+    for values in (U, Y):  # their last byte
+        at = content.index(values.tobytes()) + values.nbytes - 1
+        with pytest.raises(ValueError, match="the NPZ file is damaged: BadZipFile Bad CRC-32"):
+            load(content[:at] + b"\x7f" + content[at + 1 :])
+
+
+def test_encrypted_npz_is_refused():
+    content = npz({"u": U, "y": Y})
+    at = content.index(b"PK\x01\x02") + 8  # the flags of the first entry in the directory
+    with pytest.raises(ValueError, match="array 'u' is encrypted: save it without a password"):
+        load(content[:at] + b"\1" + content[at + 1 :])
+
+
 def test_headers_of_python_2_are_read_without_a_warning():
     content = npz({"u": lying(5, U.tobytes(), "5L"), "y": Y})
     assert load(content) == hs.Record(u=U, y=Y, name="stream")

@@ -70,6 +70,7 @@ def npy(file: BinaryIO) -> Arrays:
 
 def _entry(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> Array:
     label = entry.filename.removesuffix(_ENDING)
+    require(not entry.flag_bits & 1, f"array {shown(label)} is encrypted: save it without a password")
     is_known = entry.compress_type in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # unpacked piece by piece
     require(is_known, f"array {shown(label)} is compressed in another way than NumPy does: save it anew")
     array, length, rest = _array(label, partial(archive.open, entry), entry.file_size)
