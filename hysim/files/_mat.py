@@ -141,9 +141,9 @@ def _arrays(
     """The array of a matrix, or those in a struct as ``label.field``."""
     if matrix.is_struct and depth <= _DEEPEST:
         for name, field in _fields(_matrix(content()[1]).values):
-            if inner := len(field.content):  # an empty array has none
-                same = partial(tuple[int, _Element], (inner, field))
-                yield from _arrays(_matrix(field), f"{label}.{name}", inner, same, depth + 1)
+            if length := len(field.content):  # an empty array has none
+                inner = partial(_unchanged, length, field)
+                yield from _arrays(_matrix(field), f"{label}.{name}", length, inner, depth + 1)
         return
     kind = _KINDS.get(matrix.kind, "complex numbers" if matrix.is_complex else NUMBERS)
     if matrix.kind == _CHAR:
@@ -153,6 +153,10 @@ def _arrays(
         f"the MAT file is damaged: variable {shown(label)} has {length:,} bytes for {matrix.size:,} values",
     )
     yield Array(label, matrix.shape, kind, 8, partial(_values, content))
+
+
+def _unchanged(length: int, field: _Element) -> tuple[int, _Element]:
+    return length, field
 
 
 def _fields(parts: Iterator[_Element]) -> Iterator[tuple[str, _Element]]:
