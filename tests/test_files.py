@@ -5,6 +5,7 @@ import io
 import struct
 import sys
 import tracemalloc
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,21 @@ import hysim as hs
 from hysim.cli import main
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "experiments"))
-from malformed_files import HAS_H5PY, MAT73_TITLE, U, Y, corpus, corrupt, hdf5, mat, npy, npz, whole
+from malformed_files import (
+    HAS_H5PY,
+    MAT73_TITLE,
+    MAT_TITLE,
+    U,
+    Y,
+    corpus,
+    corrupt,
+    hdf5,
+    lying,
+    mat,
+    npy,
+    npz,
+    whole,
+)
 
 CORPUS = corpus()
 ENDINGS = [".csv", ".tsv", ".npz", ".mat", *([".h5"] if HAS_H5PY else [])]
@@ -128,6 +143,41 @@ def test_numbers_of_any_type_and_order_are_read(dtype, order):
         assert load(content, u=0, y=1) == hs.Record(u=[0, 1, 1], y=[1, 0, 1], name="stream")
 
 
+def test_numbers_of_npz_that_have_changed_are_refused_by_their_checksum():
+    content = npz({"u": U, "y": Y})
+    for values in (U, Y):  # their last byte
+        at = content.index(values.tobytes()) + values.nbytes - 1
+        with pytest.raises(ValueError, match="the NPZ file is damaged: BadZipFile Bad CRC-32"):
+            load(content[:at] + b"\x7f" + content[at + 1 :])
+
+
+def test_encrypted_npz_is_refused():
+    content = npz({"u": U, "y": Y})
+    at = content.index(b"PK\x01\x02") + 8  # the flags of the first entry in the directory
+    with pytest.raises(ValueError, match="array 'u' is encrypted: save it without a password"):
+        load(content[:at] + b"\1" + content[at + 1 :])
+
+
+def test_headers_of_python_2_are_read_without_a_warning():
+    content = npz({"u": lying(5, U.tobytes(), "5L"), "y": Y})
+    assert load(content) == hs.Record(u=U, y=Y, name="stream")
+
+
+def test_the_first_of_several_arrays_in_one_npy_file_is_read():
+    assert load(npy(np.column_stack([U, Y])) + npy(Y), u=0, y=1).y.tolist() == Y.tolist()
+
+
+@pytest.mark.parametrize(
+    "shape",
+    ["-5", "-5,-1", "5 if 5 else 4", "True and 5", "5 .real", "9" * 5000, "-" * 9000 + "5", "(" * 5000 + "5"],
+    ids=lambda shape: shape[:12],
+)
+def test_a_shape_that_is_none_is_one_clear_line(shape):
+    with pytest.raises(ValueError, match=r"array 'u' (has a header that cannot be read|is damaged)") as refused:
+        load(npz({"u": lying(0, U.tobytes(), shape), "y": Y}))
+    assert len(str(refused.value)) < 200
+
+
 @settings(max_examples=20)
 @given(st.lists(st.sampled_from(["f8", "f4", "i2", "u1", "?"]), min_size=1, max_size=4), st.booleans())
 def test_matlab_variables_are_read_as_scipy_reads_them(dtypes, is_compressed):
@@ -149,6 +199,31 @@ def test_fields_of_structs_are_reached_by_a_point_or_a_slash():
     )
     with pytest.raises(ValueError, match=listed):
         load(content)
+
+
+def test_cells_in_cells_in_a_struct_are_not_entered():
+    levels = 50_000  # of which `scipy.io.loadmat` overflows the stack
+    cells = b"".join(
+        struct.pack("<IIIIIIIIiiHHI", 14, 48 * (levels - k) - 8, 6, 8, 1, 0, 5, 8, 1, 1, 1, 1, ord("c"))
+        for k in range(levels)
+    )
+    fields = mat({"u": U})[128:] + mat({"y": Y})[128:] + cells
+    inner = struct.pack("<IIIIIIiiHH4s", 6, 8, 2, 0, 5, 8, 1, 1, 1, 3, b"rec")
+    inner += struct.pack("<HHIII8s8s8s", 5, 4, 8, 1, 24, b"u", b"y", b"cells") + fields
+    content = MAT_TITLE + bytes(8) + struct.pack("<HHII", 0x0100, 0x4D49, 14, len(inner)) + inner
+    assert load(content, u="rec.u", y="rec.y") == hs.Record(u=U, y=Y, name="stream")
+    with pytest.raises(ValueError, match=r"array 'rec\.cells' holds cells"):
+        load(content, u="rec.u", y="rec.cells")
+
+
+def test_structs_in_structs_are_entered_to_a_limit():
+    structs = {"y": Y}
+    for _ in range(40):
+        structs = {"s": structs, "u": U}
+    content = mat({"rec": structs, "u": U, "y": Y})
+    assert load(content, u="rec.s.s.s.u", y="y") == hs.Record(u=U, y=Y, name="stream")
+    with pytest.raises(ValueError, match=r"'rec(\.s){17}' holds several structs"):
+        load(content, u="rec" + 17 * ".s")
 
 
 def test_a_file_from_a_machine_of_the_other_byte_order_is_read():
@@ -312,6 +387,30 @@ def test_compressed_chunks_of_h5_are_read(tmp_path):
             file["deep/deep"] = file["deep"]
         rec = hs.load(tmp_path / "loop.h5", y="deep/er/y")
         assert (rec.y.tolist(), dict(rec.units)) == ((2 * u).tolist(), {"u": "V"})
+
+
+@pytest.mark.extra("h5py")
+@pytest.mark.parametrize("length", [8, 10_000])
+@pytest.mark.parametrize("options", [{"shuffle": True}, {"fletcher32": True}, {"compression": "gzip"}], ids=str)
+def test_chunks_of_h5_of_another_length_are_refused(options, length):
+    def fill(file):
+        file.create_dataset("u", data=U, chunks=(5,), **options)
+        packed = zlib.compress(bytes(length)) if "compression" in options else bytes(length)
+        file["u"].id.write_direct_chunk((0,), packed)
+        file["y"] = Y
+
+    with pytest.raises(ValueError, match="the file is damaged: a chunk does not have the 40 bytes it says"):
+        load(hdf5(fill))
+
+
+@pytest.mark.extra("h5py")
+def test_heaps_in_heaps_of_h5_end_soon():
+    n = 10_000  # heaps, each up to the end of the file: walking through each of them takes minutes
+    heaps = b"".join(
+        struct.pack("<HHIQ", 1, 0, 0, 16) + b"GCOL\1\0\0\0" + struct.pack("<Q", 32 * (n - k) - 16) for k in range(n)
+    )
+    with pytest.raises(ValueError, match="the HDF5 file is damaged: its heaps overlap"):
+        load(whole()["h5"] + heaps, y="group/y")
 
 
 def test_h5_without_its_library_says_what_to_install(tmp_path, monkeypatch):

@@ -27,6 +27,12 @@ _LONGEST_TEXT = 10_000  # bytes of a unit or a name
 _UNITS = "_units"  # ends the name of a text that is the unit of an array
 
 NUMBERS, TEXT = "numbers", "text"
+KINDS = {
+    "b": NUMBERS, "i": NUMBERS, "u": NUMBERS, "f": NUMBERS, "U": TEXT, "S": "bytes", "c": "complex numbers",
+    "m": "time spans", "M": "dates", "O": "pickled objects", "V": "records",
+}  # fmt: skip
+"""Contents of an array by the kind of its NumPy type."""
+
 NOTES = ("name", "resolution")
 """Arrays or attributes that say something of the record."""
 

@@ -1,26 +1,35 @@
 """HDF5 files, and MAT files of version 7.3, which are such files.
 
-Datasets are called by their path, ``group/displacement``. MATLAB's arrays lie there with their axes reversed, its
-structs as groups and its text as numbers, as attributes say. Only what lies in the file itself is read: links to other
-files, and datasets that are kept in them, are not followed. The library believes what a file says about its sizes, so
-they are looked at before, and compressed chunks are opened here first: one that is longer than it should be would
-otherwise take as much memory as it likes.
+Datasets are called by their path, ``group/displacement``. MATLAB's arrays are stored there with their axes reversed,
+its structs as groups and its text as numbers, as attributes say. Only what is in the file itself is read: links to
+other files, and datasets that are kept in them, are not followed.
+
+h5py reads the file. Three things that its library does not check are checked before: sizes; compressed chunks, which
+it would unpack into as much memory as they like; and heaps. In a heap are texts of variable length: it is ``GCOL``, a
+version, its length, and objects one behind the other, each a number, which is 0 for free space, a count, and a length.
+On an object without a length the library stays for ever, and no signal stops it.
+
+Source of the heaps: The HDF Group, HDF5 File Format Specification, Version 3.0, III.E.
 """
 
 import math
+import mmap
 import zlib
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from functools import partial
+from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim.files._arrays import MOST_BYTES, NOTES, NUMBERS, TEXT, Array, Arrays, with_notes
-from hysim.files._hdf5_heaps import has_sound_heaps
-from hysim.files._table import UnreadableError, damaged
+from hysim.files._arrays import KINDS, MOST_BYTES, NOTES, TEXT, Array, Arrays, with_notes
+from hysim.files._table import UnreadableError, damaged, require
+
+MOST_SEARCHED = 500_000_000
+"""Most bytes of a file whose heaps are looked for; in longer ones texts of variable length are left unread."""
 
 _DEFLATE, _SHUFFLE, _FLETCHER32, _LZF = 1, 2, 3, 32000
 _FILTERS = frozenset({_DEFLATE, _SHUFFLE, _FLETCHER32, _LZF})
@@ -28,7 +37,8 @@ _CHECKSUM = 4  # bytes
 _SLACK = 1024  # bytes by which a packed chunk may be longer than its content
 _LONGEST_ATTRIBUTE = 10_000  # bytes
 _WORDS = (8, 8)  # bytes of an address and a length
-_KINDS = {"O": "references or texts", "V": "records", "S": "bytes", "c": "complex numbers"}
+_HEAD_BYTES, _LEAST_HEAP = 16, 4096  # bytes of the head of a heap or an object, and of a heap
+_KINDS = KINDS | {"O": "references or texts"}
 
 
 @contextmanager
@@ -47,57 +57,49 @@ def hdf5(file: BinaryIO, path: Path | None, *, matlab: bool) -> Iterator[Arrays]
     form = "MAT" if matlab else "HDF5"
     with ExitStack() as stack:
         with damaged(form):
-            reader = _Reader(matlab, has_sound_heaps(file))
+            texts = _has_sound_heaps(file)
             root = stack.enter_context(h5py.File(file, "r") if path is None else h5py.File(path, "r", locking=False))
-            reader = reader if root.id.get_create_plist().get_sizes() == _WORDS else _Reader(matlab, False)
-            found = _datasets(h5py, root, "", set(), separator="." if matlab else "/")
-            arrays = [reader.array(label, dataset) for label, dataset in found]
+            reader = _Reader(h5py, matlab, texts and root.id.get_create_plist().get_sizes() == _WORDS)
+            arrays = [reader.array(label, dataset) for label, dataset in reader.datasets(root, "", set())]
             said = {name: reader.attribute(root, name) for name in (*NOTES, "t_units")}
             table = with_notes(arrays, form, {name: value for name, value in said.items() if value is not None})
         yield table
 
 
-def _datasets(h5py: Any, group: Any, path: str, seen: set[int], *, separator: str) -> Iterator[tuple[str, Any]]:
-    """Paths and datasets below a group, in the order of their names, each group once."""
-    address = h5py.h5o.get_info(group.id).addr
-    if address in seen:
-        return
-    seen.add(address)
-    for name in group:
-        if name.startswith("#") or not isinstance(group.get(name, getlink=True), h5py.HardLink):
-            continue  # MATLAB's own groups, and links
-        below, item = path + name, group[name]
-        if isinstance(item, h5py.Group):
-            yield from _datasets(h5py, item, below + separator, seen, separator=separator)
-        elif isinstance(item, h5py.Dataset) and item.shape is not None:
-            yield below, item
-
-
 class _Reader(NamedTuple):
     """Reads what is in a file, MATLAB's or another one; texts of variable length only where that is safe."""
 
+    h5py: Any
     matlab: bool
     texts: bool
 
+    def datasets(self, group: Any, path: str, seen: set[int]) -> Iterator[tuple[str, Any]]:
+        """Paths and datasets below a group, in the order of their names, each group once."""
+        address = self.h5py.h5o.get_info(group.id).addr
+        if address in seen:
+            return
+        seen.add(address)
+        for name in group:
+            if name.startswith("#") or not isinstance(group.get(name, getlink=True), self.h5py.HardLink):
+                continue  # MATLAB's own groups, and links
+            item = group[name]
+            if isinstance(item, self.h5py.Group):
+                yield from self.datasets(item, path + name + ("." if self.matlab else "/"), seen)
+            elif isinstance(item, self.h5py.Dataset) and item.shape is not None:
+                yield path + name, item
+
     def array(self, label: str, dataset: Any) -> Array:
-        """What a dataset is."""
-        shape = tuple(int(length) for length in (dataset.shape[::-1] if self.matlab else dataset.shape))
+        """The properties of a dataset."""
+        shape = tuple(map(int, dataset.shape[::-1] if self.matlab else dataset.shape))
         if "MATLAB_empty" in dataset.attrs:
             shape = (0,)
-        kind = self.kind(dataset, math.prod(shape))
-        unit = self.attribute(dataset, "units")
-        return Array(
-            label=label,
-            shape=shape,
-            kind=kind if kind != TEXT or math.prod(shape) in (*shape, 0, 1) else "several texts",
-            item_bytes=dataset.dtype.itemsize,
-            read=partial(self.text if kind == TEXT else self.numbers, dataset, shape),
-            unit=unit if isinstance(unit, str) else None,
-        )
+        kind, unit = self.kind(dataset, shape), self.attribute(dataset, "units")
+        unit = unit if isinstance(unit, str) else None
+        return Array(label, shape, kind, dataset.dtype.itemsize, partial(self.values, dataset, shape, kind), unit)
 
-    def kind(self, dataset: Any, size: int) -> str:
+    def kind(self, dataset: Any, shape: tuple[int, ...]) -> str:
         """What a dataset holds."""
-        said = self.attribute(dataset, "MATLAB_class")
+        said, size = self.attribute(dataset, "MATLAB_class"), math.prod(shape)
         if dataset.is_virtual or dataset.external:
             return "values that lie in another file"
         if "MATLAB_object_decode" in dataset.attrs or "MATLAB_sparse" in dataset.attrs:
@@ -105,46 +107,41 @@ class _Reader(NamedTuple):
         if said == "cell":
             return "cells"
         if said == "char" or (size == 1 and self.is_text(dataset.dtype)):
-            return TEXT
-        return NUMBERS if dataset.dtype.kind in "biuf" else _KINDS.get(dataset.dtype.kind, "no numbers")
+            return TEXT if size in (*shape, 0, 1) else "several texts"
+        return _KINDS.get(dataset.dtype.kind, "no numbers")
 
     def is_text(self, dtype: np.dtype) -> bool:
         """Whether it is that of texts which can be read."""
-        import h5py
-
-        found = h5py.check_string_dtype(dtype)
+        found = self.h5py.check_string_dtype(dtype)
         return found is not None and (self.texts or found.length is not None)
 
     def attribute(self, item: Any, name: str) -> str | float | None:
-        """A short text or a number that an attribute says."""
+        """The short text or the number in an attribute."""
         if name not in item.attrs:
             return None
         found = item.attrs.get_id(name)
         is_number = found.dtype.kind in "iuf"
-        if math.prod(found.shape) != 1 or found.dtype.itemsize > _LONGEST_ATTRIBUTE:
-            return None
-        if not is_number and not self.is_text(found.dtype):
+        is_short = math.prod(found.shape) == 1 and found.dtype.itemsize <= _LONGEST_ATTRIBUTE
+        if not is_short or not (is_number or self.is_text(found.dtype)):
             return None
         plain = np.asarray(item.attrs[name]).item()
-        return float(plain) if is_number else plain.decode("utf-8", "replace") if isinstance(plain, bytes) else plain
+        return float(plain) if is_number else _decoded(plain)
 
-    def numbers(self, dataset: Any, shape: tuple[int, ...]) -> npt.NDArray[np.generic]:
-        """The numbers of a dataset."""
+    def values(self, dataset: Any, shape: tuple[int, ...], kind: str) -> npt.NDArray[np.generic] | str:
+        """The numbers or the text of a dataset."""
         if not math.prod(shape):
-            return np.empty(shape)
+            return "" if kind == TEXT else np.empty(shape)
         _check_chunks(dataset)
         values: npt.NDArray[np.generic] = np.asarray(dataset[()])
-        return values.T if self.matlab else values
-
-    def text(self, dataset: Any, shape: tuple[int, ...]) -> str:
-        """The text of a dataset."""
-        if not math.prod(shape):
-            return ""
-        _check_chunks(dataset)
-        values = np.asarray(dataset[()]).reshape(-1)
+        if kind != TEXT:
+            return values.T if self.matlab else values
         if values.dtype.kind in "iu":  # as MATLAB has it
             return values.astype("u2").tobytes().decode("utf-16", "replace")
-        return values[0].decode("utf-8", "replace") if isinstance(values[0], bytes) else str(values[0])
+        return _decoded(values.flat[0])
+
+
+def _decoded(text: Any) -> str:
+    return text.decode("utf-8", "replace") if isinstance(text, bytes) else str(text)
 
 
 def _check_chunks(dataset: Any) -> None:
@@ -154,27 +151,64 @@ def _check_chunks(dataset: Any) -> None:
     plan = dataset.id.get_create_plist()
     filters = [plan.get_filter(k)[0] for k in range(plan.get_nfilters())]
     after = filters[filters.index(_DEFLATE) + 1 :] if _DEFLATE in filters else []
-    if not _FILTERS.issuperset(filters) or not {_FLETCHER32}.issuperset(after):
-        raise UnreadableError(f"its chunks are packed by the filters {filters}: rewrite the file with gzip compression")
+    is_known = _FILTERS.issuperset(filters) and {_FLETCHER32}.issuperset(after)
+    require(is_known, f"its chunks are packed by the filters {filters}: rewrite the file with gzip compression")
     plain = math.prod(dataset.chunks) * dataset.dtype.itemsize
-    if plain > MOST_BYTES:
-        raise UnreadableError(f"a chunk of {plain:,} bytes is too large: at most {MOST_BYTES:,} are read")
+    require(plain <= MOST_BYTES, f"a chunk of {plain:,} bytes is too large: at most {MOST_BYTES:,} are read")
     stored: list[Any] = []
     dataset.id.chunk_iter(stored.append)
     for chunk in stored:
         used = [number for k, number in enumerate(filters) if not chunk.filter_mask >> k & 1]
-        if not _is_sound(dataset, chunk, plain, plain + _CHECKSUM * used.count(_FLETCHER32), used):
-            raise UnreadableError(f"the file is damaged: a chunk does not have the {plain:,} bytes it says")
+        is_sound = _is_sound(dataset, chunk, used, plain)
+        require(is_sound, f"the file is damaged: a chunk does not have the {plain:,} bytes it says")
 
 
-def _is_sound(dataset: Any, chunk: Any, least: int, most: int, filters: list[int]) -> bool:
-    """Whether a chunk has a length in these bounds, unpacked."""
-    if _LZF in filters or _DEFLATE in filters:
-        if not 0 < chunk.size <= 2 * most + _SLACK:
-            return False
-        if _LZF in filters:
-            return True
+def _is_sound(dataset: Any, chunk: Any, filters: list[int], plain: int) -> bool:
+    """Whether a chunk has this length, unpacked, or that of a checksum more."""
+    most, length = plain + _CHECKSUM * filters.count(_FLETCHER32), chunk.size
+    if {_DEFLATE, _LZF} & {*filters} and not 0 < length <= 2 * most + _SLACK:
+        return False
+    if _LZF in filters:  # it unpacks to less than 100 times its length
+        return True
+    if _DEFLATE in filters:
         stream = zlib.decompressobj()
-        content = stream.decompress(dataset.id.read_direct_chunk(chunk.chunk_offset)[1], most + 1)
-        return stream.eof and least <= len(content) <= most
-    return bool(least <= chunk.size <= most)
+        length = len(stream.decompress(dataset.id.read_direct_chunk(chunk.chunk_offset)[1], most + 1))
+        return stream.eof and plain <= length <= most
+    return bool(plain <= length <= most)
+
+
+def _has_sound_heaps(file: BinaryIO) -> bool:
+    """Whether the heaps of an open file can be walked through; False if it is too long to look for them.
+
+    Raises
+    ------
+    ValueError
+        If one of them leads nowhere.
+    """
+    if file.seek(0, 2) > MOST_SEARCHED:
+        return False
+    if isinstance(file, BytesIO):
+        _check_heaps(file.getvalue())
+    else:
+        with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+            _check_heaps(content)
+    return True
+
+
+def _check_heaps(content: bytes | mmap.mmap) -> None:
+    start, walked = -1, 0
+    while (start := content.find(b"GCOL\x01", start + 1)) >= 0:
+        length, at = _number(content, start + 8), start + _HEAD_BYTES
+        end = start + length if _LEAST_HEAP <= length <= len(content) - start else at
+        walked += end - at
+        require(walked <= len(content), "the HDF5 file is damaged: its heaps overlap")
+        while at + _HEAD_BYTES <= end:
+            length, is_used = _number(content, at + 8), content[at : at + 2] != b"\0\0"
+            step = length + -length % 8 + (_HEAD_BYTES if is_used else 0)
+            is_inside = 0 < step <= end - at
+            require(is_inside, "the HDF5 file is damaged: a text in it has no length, or too great a one")
+            at += step
+
+
+def _number(content: bytes | mmap.mmap, at: int) -> int:
+    return int.from_bytes(content[at : at + 8], "little")

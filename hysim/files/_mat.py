@@ -1,24 +1,89 @@
 """MAT files of version 5, which MATLAB writes by ``save -v6`` and, compressed, by ``save -v7``.
 
-A file is a header of 128 bytes and a matrix for each variable. They are read here and not by `scipy.io.loadmat`,
-because that trusts the file: cells in cells, 100 000 deep, end its process.
+A file is a header of 128 bytes and an element for each variable. An element is a type, a number of bytes, and these,
+padded to eight; four bytes or fewer may stand in the tag itself. A matrix is an element that holds elements: flags with
+its class, its dimensions, its name, and its values. They are read here and not by `scipy.io.loadmat`, which descends as
+deep as a file says: cells in cells, 100 000 deep, end its process. Here every length is compared with what is left
+around it, a variable is unpacked no further than it says, and only structs are descended into.
+
+Source: MathWorks, MAT-File Format.
 """
 
+import math
+import zlib
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim.files._arrays import MOST_BYTES, NUMBERS, TEXT, Array, Arrays, with_notes
-from hysim.files._mat_elements import CHAR, COMPRESSED, MATRIX, STRUCT, Matrix, Reader
-from hysim.files._table import UnreadableError, damaged, shown
+from hysim.files._table import damaged, require, shown
 
 _HEADER_BYTES = 128
 _BEGINNING = 8192  # bytes that hold what a matrix says of itself
 _DEEPEST = 16  # structs in structs
+_MOST_AXES = 32
+
+_MATRIX, _COMPRESSED = 14, 15  # types of elements
+_STRUCT, _CHAR, _OPAQUE = 2, 4, 17  # classes of matrices
+_COMPLEX = 0x800
+_NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+_LETTERS = {1: "latin-1", 2: "latin-1", 4: "utf-16-{}", 16: "utf-8", 17: "utf-16-{}", 18: "utf-32-{}"}
 _KINDS = {1: "cells", 2: "several structs", 3: "an object", 5: "a sparse matrix", 16: "a function", 17: "an object"}
+
+
+class _Element(NamedTuple):
+    """The type of an element, its bytes, and the byte order ``"<"`` or ``">"`` of the numbers in it."""
+
+    type: int
+    content: memoryview
+    order: str
+
+    def parts(self) -> Iterator["_Element"]:
+        """The elements in this one; an error where one does not fit, or there is none."""
+        at = 0
+        while True:
+            kind, length = _tag(self.content[at : at + 8], self.order)
+            start, stop = at + 8, at + 8 + length + (-length % 8 if kind != _MATRIX else 0)
+            if kind >> 16:  # both in the first four bytes, and the content in the other four
+                kind, length, start, stop = kind & 0xFFFF, kind >> 16, at + 4, at + 8
+            is_inside = start + length <= min(stop, len(self.content))
+            require(is_inside, f"the MAT file is damaged: an element of {length:,} bytes does not fit where it is")
+            yield _Element(kind, self.content[start : start + length], self.order)
+            at = stop
+
+    def numbers(self) -> npt.NDArray[np.generic]:
+        """The content as numbers."""
+        require(self.type in _NUMBERS, f"the MAT file is damaged: numbers in an element of type {self.type}")
+        return np.frombuffer(self.content, self.order + _NUMBERS[self.type])
+
+    def text(self) -> str:
+        """The content as letters."""
+        require(self.type in _LETTERS, f"the MAT file is damaged: letters in an element of type {self.type}")
+        encoding = _LETTERS[self.type].format("le" if self.order == "<" else "be")
+        return str(self.content, encoding, "replace").rstrip("\0")
+
+
+class _Matrix(NamedTuple):
+    """The properties of a matrix, and the elements behind them: its values, or the fields of a struct."""
+
+    kind: int
+    is_complex: bool
+    shape: tuple[int, ...]
+    name: str
+    values: Iterator[_Element]
+
+    @property
+    def size(self) -> int:
+        """Number of elements."""
+        return math.prod(self.shape)
+
+    @property
+    def is_struct(self) -> bool:
+        """Whether it is one struct."""
+        return self.kind == _STRUCT and self.size == 1
 
 
 def mat(file: BinaryIO) -> Arrays:
@@ -31,87 +96,101 @@ def mat(file: BinaryIO) -> Arrays:
     """
     with damaged("MAT"):
         header = file.read(_HEADER_BYTES)
-        if len(header) < _HEADER_BYTES:
-            raise UnreadableError("the MAT file is cut: it has no whole header")
-        reader = Reader("<" if header[126:] == b"IM" else ">")
-        return with_notes(list(_variables(file, reader)), "MAT")
+        require(len(header) == _HEADER_BYTES, "the MAT file is cut: it has no whole header")
+        return with_notes(list(_variables(file, "<" if header[126:] == b"IM" else ">")), "MAT")
 
 
-def _variables(file: BinaryIO, reader: Reader) -> Iterator[Array]:
-    end, at, spent = file.seek(0, 2), _HEADER_BYTES, 0
+def _variables(file: BinaryIO, order: str) -> Iterator[Array]:
+    end, at, in_structs = file.seek(0, 2), _HEADER_BYTES, 0
     while at < end:
         file.seek(at)
-        kind, length = reader.words(file.read(8))
-        if at + 8 + length > end:
-            raise UnreadableError(f"the MAT file is cut: a variable has {length:,} bytes, there are {end - at - 8:,}")
-        beginning = file.read(min(length, _BEGINNING))
-        if kind == COMPRESSED:
-            whole, view = reader.beginning(beginning, _BEGINNING)
-        elif kind == MATRIX:
-            whole, view = length, memoryview(beginning)
-        else:
-            raise UnreadableError(f"the MAT file is damaged: an element of type {kind} where a variable begins")
-        matrix = reader.matrix(view)
-        content = partial(_content, file, reader, at + 8, length, kind)
-        at += 8 + length
-        if matrix.kind == STRUCT and matrix.size == 1:
-            spent += whole
-            if spent > MOST_BYTES:
-                raise UnreadableError(
-                    f"the structs have more than {MOST_BYTES:,} bytes: save their fields as variables"
-                )
-            yield from _struct(reader, content(), matrix, matrix.name, 0)
-        elif matrix.name:  # what has none belongs to an object
-            yield _array(reader, matrix, matrix.name, whole, content)
+        kind, length = _tag(file.read(8), order)
+        at += 8
+        rest = end - at
+        require(length <= rest, f"the MAT file is cut: a variable has {length:,} bytes, there are {rest:,}")
+        require(kind in (_MATRIX, _COMPRESSED), f"the MAT file is damaged: a variable is an element of type {kind}")
+        content = partial(_content, file, at, length, kind == _COMPRESSED, order)
+        unpacked, beginning = content(_BEGINNING)
+        matrix = _matrix(beginning)
+        in_structs += unpacked * matrix.is_struct
+        require(in_structs <= MOST_BYTES, f"the structs have more than {MOST_BYTES:,} bytes: save their fields alone")
+        if matrix.name:  # what has none belongs to an object
+            yield from _arrays(matrix, matrix.name, unpacked, content)
+        at += length
 
 
-def _content(file: BinaryIO, reader: Reader, at: int, length: int, kind: int) -> memoryview:
-    """The content of the variable in this place of the file."""
-    file.seek(at)
-    data = file.read(length)
-    return reader.inflated(data) if kind == COMPRESSED else memoryview(data)
+def _content(
+    file: BinaryIO, start: int, length: int, is_compressed: bool, order: str, most: int | None = None
+) -> tuple[int, _Element]:
+    """The length, unpacked, of the variable in this place of a file, and its content or so many bytes of it."""
+    file.seek(start)
+    content = file.read(length if most is None else min(length, most))
+    if is_compressed:
+        stream = zlib.decompressobj()
+        kind, length = _tag(stream.decompress(content, 8), order)
+        require(kind == _MATRIX, f"the MAT file is damaged: an element of type {kind} is compressed")
+        content = stream.decompress(stream.unconsumed_tail, length + 1 if most is None else most)
+        is_whole = most is not None or len(content) == length
+        require(is_whole, f"the MAT file is damaged: a compressed variable does not have the {length:,} bytes it says")
+    return length, _Element(_MATRIX, memoryview(content), order)
 
 
-def _struct(reader: Reader, data: memoryview, matrix: Matrix, label: str, depth: int) -> Iterator[Array]:
-    """The arrays of a struct's fields, as ``label.field``."""
-    for field, content in reader.fields(data, matrix.start):
-        if not content.nbytes:  # an empty array
-            continue
-        inner, name = reader.matrix(content), f"{label}.{field}"
-        if inner.kind == STRUCT and inner.size == 1 and depth < _DEEPEST:
-            yield from _struct(reader, content, inner, name, depth + 1)
-        else:
-            yield _array(reader, inner, name, content.nbytes, partial(_same, content))
-
-
-def _same(content: memoryview) -> memoryview:
-    return content
-
-
-def _array(reader: Reader, matrix: Matrix, label: str, length: int, content: Callable[[], memoryview]) -> Array:
+def _arrays(
+    matrix: _Matrix, label: str, length: int, content: Callable[[], tuple[int, _Element]], depth: int = 0
+) -> Iterator[Array]:
+    """The array of a matrix, or those in a struct as ``label.field``."""
+    if matrix.is_struct and depth <= _DEEPEST:
+        for name, field in _fields(_matrix(content()[1]).values):
+            if length := len(field.content):  # an empty array has none
+                inner = partial(_unchanged, length, field)
+                yield from _arrays(_matrix(field), f"{label}.{name}", length, inner, depth + 1)
+        return
     kind = _KINDS.get(matrix.kind, "complex numbers" if matrix.is_complex else NUMBERS)
-    if matrix.kind == CHAR:
+    if matrix.kind == _CHAR:
         kind = TEXT if matrix.size in matrix.shape or not matrix.size else "several texts"
-    if kind in (NUMBERS, TEXT) and length > _BEGINNING + 8 * matrix.size:
-        raise UnreadableError(
-            f"the MAT file is damaged: variable {shown(label)} has {length:,} bytes for {matrix.size:,} values"
-        )
-    read = partial(_text if matrix.kind == CHAR else _numbers, reader, label, content)
-    return Array(label, matrix.shape, kind, 8, read)
+    require(
+        kind not in (NUMBERS, TEXT) or length <= _BEGINNING + 8 * matrix.size,
+        f"the MAT file is damaged: variable {shown(label)} has {length:,} bytes for {matrix.size:,} values",
+    )
+    yield Array(label, matrix.shape, kind, 8, partial(_values, content))
 
 
-def _text(reader: Reader, label: str, content: Callable[[], memoryview]) -> str:
-    data = content()
-    matrix = reader.matrix(data)
-    return reader.text(reader.element(data, matrix.start)[0]) if matrix.size else ""
+def _unchanged(length: int, field: _Element) -> tuple[int, _Element]:
+    return length, field
 
 
-def _numbers(reader: Reader, label: str, content: Callable[[], memoryview]) -> npt.NDArray[np.generic]:
-    data = content()
-    matrix = reader.matrix(data)
-    values = reader.numbers(reader.element(data, matrix.start)[0]) if matrix.size else np.empty(0)
-    if values.size != matrix.size:
-        raise UnreadableError(
-            f"the MAT file is damaged: variable {shown(label)} has {values.size:,} numbers for the shape {matrix.shape}"
-        )
-    return values.reshape(matrix.shape, order="F")
+def _fields(parts: Iterator[_Element]) -> Iterator[tuple[str, _Element]]:
+    """Names and matrices of a struct's fields."""
+    width, names = int(next(parts).numbers()[0]), next(parts)
+    require(width > 0, "the MAT file is damaged: the fields of a struct have no names")
+    for start in range(0, len(names.content) // width * width, width):
+        field = next(parts)
+        require(field.type == _MATRIX, f"the MAT file is damaged: a field is an element of type {field.type}")
+        yield names._replace(type=1, content=names.content[start : start + width]).text(), field
+
+
+def _values(content: Callable[[], tuple[int, _Element]]) -> npt.NDArray[np.generic] | str:
+    """The numbers of a matrix, or its text."""
+    matrix = _matrix(content()[1])
+    if not matrix.size:
+        return "" if matrix.kind == _CHAR else np.empty(matrix.shape)
+    values = next(matrix.values)
+    return values.text() if matrix.kind == _CHAR else values.numbers().reshape(matrix.shape, order="F")
+
+
+def _matrix(element: _Element) -> _Matrix:
+    parts = element.parts()
+    flags, _ = _tag(next(parts).content, element.order)
+    if flags & 0xFF == _OPAQUE:  # it has no dimensions
+        return _Matrix(_OPAQUE, False, (), next(parts).text(), parts)
+    shape = tuple(next(parts).numbers().tolist())
+    is_shape = 0 < len(shape) <= _MOST_AXES and min(shape) >= 0
+    require(is_shape, "the MAT file is damaged: a variable has no dimensions, or negative ones")
+    return _Matrix(flags & 0xFF, bool(flags & _COMPLEX), shape, next(parts).text(), parts)
+
+
+def _tag(data: bytes | memoryview, order: str) -> tuple[int, int]:
+    """The two numbers with which an element begins."""
+    require(len(data) >= 8, "the MAT file is cut: an element has no whole tag")
+    first, second = np.frombuffer(data, f"{order}u4", 2).tolist()
+    return first, second

@@ -1,43 +1,34 @@
 """NumPy's files: an array (NPY), or a zip archive of arrays (NPZ).
 
-An array begins with ``\\x93NUMPY``, a version, the length of its header and the header, a Python dictionary of its
-number type, order and shape. Only plain types are read: an array of objects is a pickle, which could run any code.
-A header is believed only if the archive says the same size; nothing is written to the disk, so that an entry's name
-is a name and no path.
+NumPy reads the headers. They are believed only if the archive or the file says the same size, and then as many bytes
+are read as numbers. An array of objects is never read: it is a pickle, which could run any code. Nothing is written to
+the disk: the name of an entry is a name and no path.
 """
 
 import math
-import re
+import warnings
 import zipfile
-from typing import IO, BinaryIO, Literal, NamedTuple
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from functools import partial
+from io import BytesIO
+from typing import IO, BinaryIO, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim.files._arrays import MOST_BYTES, NUMBERS, TEXT, Array, Arrays, with_notes
-from hysim.files._table import Notes, UnreadableError, damaged, shown
+from hysim.files._arrays import KINDS, NUMBERS, TEXT, Array, Arrays, with_notes
+from hysim.files._table import UnreadableError, damaged, require, shown
 
 _ENDING = ".npy"
 _LONGEST_HEADER = 10_000  # bytes, as in NumPy
-_TYPE = re.compile(r"'descr'\s*:\s*'([<>|=]?([biufcmMOSUV])(\d{0,9})(?:\[[^\]]*\])?)'")
-_ORDER = re.compile(r"'fortran_order'\s*:\s*(True|False)")
-_SHAPE = re.compile(r"'shape'\s*:\s*\(((?:\s*\d{1,19}L?\s*,?){0,32})\s*\)")
-_KINDS = {
-    "b": NUMBERS, "i": NUMBERS, "u": NUMBERS, "f": NUMBERS, "U": TEXT, "S": "bytes", "c": "complex numbers",
-    "m": "time spans", "M": "dates", "O": "pickled objects", "V": "records",
-}  # fmt: skip
+_HEADER_READERS = {
+    1: np.lib.format.read_array_header_1_0,
+    2: np.lib.format.read_array_header_2_0,
+    3: np.lib.format.read_array_header_2_0,  # differs from 2 in the letters of field names only
+}
 
-
-class _Header(NamedTuple):
-    kind: str
-    dtype: np.dtype
-    shape: tuple[int, ...]
-    order: Literal["C", "F"]
-    stop: int
-
-    @property
-    def data_bytes(self) -> int:
-        return math.prod(self.shape) * self.dtype.itemsize
+_Opener = Callable[[], AbstractContextManager[IO[bytes]]]
 
 
 def npz(file: BinaryIO) -> Arrays:
@@ -51,12 +42,12 @@ def npz(file: BinaryIO) -> Arrays:
     with damaged("NPZ"):
         archive = zipfile.ZipFile(file)
         entries = [entry for entry in archive.infolist() if entry.filename.endswith(_ENDING)]
-        if not entries:
-            names = [entry.filename for entry in archive.infolist()]
-            raise UnreadableError(
-                f"the zip archive holds no array of NumPy but {shown(', '.join(names[:3]))}; save a workbook as CSV, "
-                "and take the files out of an archive"
-            )
+        names = shown(", ".join(archive.namelist()[:3]))
+        require(
+            entries,
+            f"the zip archive holds no array of NumPy but {names}; save a workbook as CSV, and take the files out of "
+            "an archive",
+        )
         return with_notes([_entry(archive, entry) for entry in entries], "NPZ")
 
 
@@ -69,76 +60,63 @@ def npy(file: BinaryIO) -> Arrays:
         If it is damaged.
     """
     with damaged("NPY"):
-        header = _header(file, "array")
-        size = file.seek(0, 2) - header.stop
-
-        def read() -> npt.NDArray[np.generic]:
-            file.seek(header.stop)
-            return _values(file, header)
-
-        if header.kind == NUMBERS and size < header.data_bytes:
-            raise UnreadableError(f"the file is cut: its array has {header.data_bytes:,} bytes, there are {size:,}")
-        return Arrays([Array("array", header.shape, header.kind, header.dtype.itemsize, read)], Notes(), "NPY")
+        array, length, rest = _array("array", partial(_rewound, file), file.seek(0, 2))
+        require(
+            array.kind != NUMBERS or length <= rest,
+            f"the file is cut: its array has {length:,} bytes, there are {rest:,}",
+        )
+        return with_notes([array], "NPY")
 
 
 def _entry(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> Array:
     label = entry.filename.removesuffix(_ENDING)
-    if entry.flag_bits & 1:
-        raise UnreadableError(f"array {shown(label)} is encrypted: save it without a password")
-    if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-        raise UnreadableError(f"array {shown(label)} is compressed in another way than NumPy does: save it anew")
-    with archive.open(entry) as file:
-        header = _header(file, label)
-    if header.kind == NUMBERS and header.stop + header.data_bytes != entry.file_size:
-        raise UnreadableError(
-            f"array {shown(label)} is damaged: its header says {header.data_bytes:,} bytes of numbers, the archive "
-            f"{entry.file_size - header.stop:,}"
-        )
+    require(not entry.flag_bits & 1, f"array {shown(label)} is encrypted: save it without a password")
+    is_known = entry.compress_type in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # unpacked piece by piece
+    require(is_known, f"array {shown(label)} is compressed in another way than NumPy does: save it anew")
+    array, length, rest = _array(label, partial(archive.open, entry), entry.file_size)
+    require(
+        array.kind != NUMBERS or length == rest,
+        f"array {shown(label)} is damaged: its header says {length:,} bytes of numbers, the archive {rest:,}",
+    )
+    return array
+
+
+def _array(label: str, opener: _Opener, size: int) -> tuple[Array, int, int]:
+    """The array in a file of this size, the bytes that its header promises, and those behind the header."""
+    with opener() as file:
+        header = BytesIO(file.read(_LONGEST_HEADER))
+    shape, order, dtype = _layout(header, shown(label))
+    start, length = header.tell(), math.prod(shape) * dtype.itemsize
+    kind = "several texts" if dtype.kind == "U" and math.prod(shape) != 1 else KINDS.get(dtype.kind, "no numbers")
 
     def read() -> npt.NDArray[np.generic] | str:
-        with archive.open(entry) as file:
-            file.read(header.stop)
-            values = _values(file, header)
-            if file.read(1):
-                raise UnreadableError(f"array {shown(label)} is damaged: it is longer than it says")
-        return str(values.flat[0]) if header.kind == TEXT else values
+        with opener() as file:
+            content = file.read(start + length)
+        values: npt.NDArray[np.generic] = np.ndarray(shape, dtype, content, start, order=order)
+        return str(values.flat[0]) if kind == TEXT else values
 
-    kind = "several texts" if header.kind == TEXT and math.prod(header.shape) != 1 else header.kind
-    return Array(label, header.shape, kind, header.dtype.itemsize, read)
+    return Array(label, shape, kind, dtype.itemsize, read), length, size - start
 
 
-def _header(file: IO[bytes], label: str) -> _Header:
-    start = file.read(10)
-    major = start[6] if len(start) == 10 and start.startswith(b"\x93NUMPY") else 0
-    if major not in (1, 2, 3):
-        raise UnreadableError(f"array {shown(label)} does not begin as an array of NumPy does")
-    more = file.read(2) if major > 1 else b""
-    length = int.from_bytes(start[8:] + more, "little")
-    if length > _LONGEST_HEADER:
-        raise UnreadableError(
-            f"array {shown(label)} has a header of {length:,} bytes, at most {_LONGEST_HEADER:,} are read"
-        )
-    text = file.read(length).decode("utf-8" if major == 3 else "latin-1")
-    of_type, order, shape = _TYPE.search(text), _ORDER.search(text), _SHAPE.search(text)
-    if "'descr': [" in text:
-        raise UnreadableError(f"array {shown(label)} has fields: save each as an array of its own")
-    if of_type is None or order is None or shape is None:
-        raise UnreadableError(f"array {shown(label)} has a header that cannot be read: {shown(text)}")
-    return _Header(
-        kind=_KINDS[of_type[2]],
-        dtype=np.dtype(of_type[1]),
-        shape=tuple(int(length) for length in re.findall(r"\d+", shape[1])),
-        order="F" if order[1] == "True" else "C",
-        stop=10 + len(more) + length,
+def _layout(header: BytesIO, label: str) -> tuple[tuple[int, ...], Literal["C", "F"], np.dtype]:
+    """Shape, order and type of an array whose file begins so; the header is read to its end."""
+    major, _ = np.lib.format.read_magic(header)
+    length = int.from_bytes(header.getvalue()[8 : 10 if major == 1 else 12], "little")
+    require(
+        length <= _LONGEST_HEADER,
+        f"array {label} has a header of {length:,} bytes, at most {_LONGEST_HEADER:,} are read",
     )
+    try:
+        with warnings.catch_warnings(action="ignore"):  # about headers that Python 2 wrote
+            shape, is_fortran, dtype = _HEADER_READERS[major](header, max_header_size=_LONGEST_HEADER)
+    except Exception as error:  # NumPy raises errors of many kinds
+        reason = shown(f"{type(error).__name__} {error}", 80)
+        raise UnreadableError(f"array {label} has a header that cannot be read: {reason}") from None
+    require(dtype.names is None, f"array {label} has fields: save each as an array of its own")
+    require(min(shape, default=0) >= 0, f"array {label} is damaged: it has a negative length")
+    return shape, "F" if is_fortran else "C", dtype
 
 
-def _values(file: IO[bytes], header: _Header) -> npt.NDArray[np.generic]:
-    if header.data_bytes > MOST_BYTES:
-        raise UnreadableError(f"an array of {header.data_bytes:,} bytes is too large: at most {MOST_BYTES:,} are read")
-    content = file.read(header.data_bytes)
-    if len(content) != header.data_bytes:
-        raise UnreadableError(f"the file is cut: an array has {header.data_bytes:,} bytes, there are {len(content):,}")
-    if not content:
-        return np.zeros(header.shape, header.dtype)
-    return np.frombuffer(content, header.dtype).reshape(header.shape, order=header.order)
+def _rewound(file: BinaryIO) -> AbstractContextManager[IO[bytes]]:
+    file.seek(0)
+    return nullcontext(file)

@@ -55,6 +55,18 @@ class UnreadableError(ValueError):
     """What a reader says of a file itself."""
 
 
+def require(condition: object, message: str) -> None:
+    """Refuse a file that does not meet a condition.
+
+    Raises
+    ------
+    UnreadableError
+        With this message, if the condition is false.
+    """
+    if not condition:
+        raise UnreadableError(message)
+
+
 @contextmanager
 def damaged(form: str) -> Iterator[None]:
     """Whatever else goes wrong where a file is read: damaged files raise all kinds of errors."""
