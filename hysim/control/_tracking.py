@@ -197,11 +197,10 @@ class TrackingController(SampledController):
             float(self.model is not None), stage.decline.size, stage.rest.size, stage.lag, chain.samples_late,
             float(seen_in >= 0),
         ]  # fmt: skip
-        matrices = (stage.decline, stage.A, stage.B, chain.outputs)
         readings = np.full(chain.samples_late + 2, chain.displacement(rest))
         return (
             counts,
-            np.concatenate([np.ravel(matrix) for matrix in matrices]),
+            chain.linear_block,
             np.concatenate([rest.x, rest.past, readings]),
         )
 

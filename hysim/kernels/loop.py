@@ -16,6 +16,19 @@ The sensor sees y some samples ago and a part of one. The part makes a second ou
 within the sub-step in which that time lies:
 
     reading        = quantum floor((y seen + noise) / quantum + 1/2)
+
+The controller and the law are steps, passed as function pointers with their parameters and their state. All other
+stages are one block of numbers, `plant`, with one state. Its parts follow each other without gaps:
+
+    amplifier    slew per sub-step, sub-step / time constant, gain, offset, lowest and highest voltage
+    head         number of creep elements, order (states of the linear stage), d, whole samples of the sensor's delay,
+                 sub-steps of a sample, sub-step in which the part of a sample ends or -1 without one, quantum
+    linear       decline, A without the creep's rows, B_0, B_1, B_2, and two rows for `output`, the first one for y
+                 at a sample, the second one for y at the end of the part of a sample, within its sub-step
+
+    state        two of the amplifier; x twice, the second time as room for the next one; the ring of the law's last
+                 d + 3 outputs; the ring of displacements that the sensor has still to show, and the last one that
+                 was taken within a sub-step
 """
 
 import math
@@ -23,12 +36,16 @@ import math
 from numba import float64, int64, types
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import inlined, signed_kernel
+from hysim.kernels._compile import borrowed, inlined, signed_kernel
 from hysim.kernels.amplifier import charge
 from hysim.kernels.controllers import CONTROLLER
 from hysim.kernels.stepping import CONSTANTS, STEP, VECTOR, Step
 
-MATRIX = types.Array(float64, 2, "C", readonly=True)
+SIGNALS = types.Array(float64, 2, "C")
+INPUTS = types.Array(float64, 2, "C", readonly=True)
+
+N_AMPLIFIER = 6
+N_HEAD = N_AMPLIFIER + 7
 
 
 @inlined
@@ -44,15 +61,20 @@ def output(row: FloatArray, x: FloatArray, oldest: float, older: float, newer: f
 def advance(
     decline: FloatArray, A: FloatArray, B: FloatArray, x: FloatArray, oldest: float, older: float, newer: float
 ) -> None:
-    """The linear stage over one sub-step; `x` is twice as long as the state, `A` has the rows after the creep's."""
-    creeping, order = decline.size, B.shape[1]
+    """The linear stage over one sub-step.
+
+    `x` is twice as long as the state. `A` has the rows after those of the creep, `B` is (B_0, B_1, B_2), both row
+    after row.
+    """
+    creeping, order = decline.size, x.size // 2
     for i in range(order):
-        following = B[1, i] * older + B[0, i] * newer + B[2, i] * oldest
+        following = B[order + i] * older + B[i] * newer + B[2 * order + i] * oldest
         if i < creeping:
             following = x[i] + (decline[i] * x[i] + following)
         else:
+            row = A[(i - creeping) * order :]
             for j in range(order):
-                following += A[i - creeping, j] * x[j]
+                following += row[j] * x[j]
         x[order + i] = following
     for i in range(order):
         x[i] = x[order + i]
@@ -60,73 +82,74 @@ def advance(
 
 @signed_kernel(
     int64(
-        CONTROLLER, CONSTANTS, VECTOR, CONSTANTS, VECTOR, STEP, CONSTANTS, VECTOR,
-        CONSTANTS, MATRIX, MATRIX, MATRIX, VECTOR, VECTOR, CONSTANTS, VECTOR,
-        CONSTANTS, CONSTANTS, int64, int64, int64, int64,
-        VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR,
+        CONTROLLER, CONSTANTS, VECTOR, STEP, CONSTANTS, VECTOR, CONSTANTS, VECTOR,
+        INPUTS, int64, int64, SIGNALS, SIGNALS,
     )
 )  # fmt: skip
 def close(
     controller: object,
     controller_parameters: FloatArray,
     controller_state: FloatArray,
-    amplifier: FloatArray,
-    voltages: FloatArray,
     law: Step,
     law_parameters: FloatArray,
     law_state: FloatArray,
-    decline: FloatArray,
-    A: FloatArray,
-    B: FloatArray,
-    outputs: FloatArray,
-    x: FloatArray,
-    past: FloatArray,
-    noise: FloatArray,
-    readings: FloatArray,
-    sensor: FloatArray,
-    reference: FloatArray,
+    plant: FloatArray,
+    plant_state: FloatArray,
+    inputs: FloatArray,
     start: int,
     stop: int,
-    substeps: int,
-    seen_in: int,
-    command: FloatArray,
-    drive: FloatArray,
-    v: FloatArray,
-    w: FloatArray,
-    y: FloatArray,
-    measurement: FloatArray,
+    samples: FloatArray,
+    path: FloatArray,
 ) -> int:
     """Run the samples `start` to `stop - 1`: the first one that is not finite, or -1.
 
-    `amplifier` is (slew per sub-step, sub-step / time constant, gain, offset, lowest, highest), `voltages` its
-    state, `sensor` is (quantum,). `past` is a ring of the law's last d + 3 outputs, `readings` one of the
-    displacements that the sensor has still to give, and then the one taken in the sub-step `seen_in` of the
-    sample before, which is negative where the displacement at the sample itself is taken. They, the states
-    and `x` (twice the order: the state, then room for the next) are carried from chunk to chunk. `v` and `w`
-    hold all sub-steps.
+    Parameters
+    ----------
+    controller, law
+        Steps, each followed by its parameters and its state; the states move along, from call to call too.
+    plant, plant_state : array
+        The other stages; the module's docstring says what stands where.
+    inputs : array, shape (2, n)
+        Reference and noise of the sensor, of the whole run.
+    samples : array, shape (4, n)
+        For the results at the samples: command, drive, displacement and measurement.
+    path : array, shape (2, n substeps)
+        For the results at the sub-steps: voltage at the law, and its output.
     """
-    ring, waiting = past.size, readings.size - 1
+    plant, plant_state = borrowed(plant), borrowed(plant_state)
+    p = N_AMPLIFIER
+    creeping, order, lag, late = int(plant[p]), int(plant[p + 1]), int(plant[p + 2]), int(plant[p + 3])
+    substeps, seen_in, quantum = int(plant[p + 4]), int(plant[p + 5]), plant[p + 6]
+    p, others = N_HEAD, (order - creeping) * order
+    decline, p = plant[p : p + creeping], p + creeping
+    A, p = plant[p : p + others], p + others
+    B, p = plant[p : p + 3 * order], p + 3 * order
+    at_samples, within = plant[p : p + order + 3], plant[p + order + 3 :]
+    ring, waiting = lag + 3, late + 1
+    s = 2 + 2 * order
+    x, past, readings = plant_state[2:s], plant_state[s:], plant_state[s + ring :]
     for k in range(start, stop):
         j = k * substeps
-        y[k] = output(outputs[0], x, past[(j + 1) % ring], past[(j + 2) % ring], 0.0)
-        readings[k % waiting] = y[k] if seen_in < 0 else readings[waiting]
-        measurement[k] = readings[(k + 1) % waiting] + noise[k]
-        if sensor[0] > 0.0:
-            measurement[k] = sensor[0] * ((measurement[k] / sensor[0] + 0.5) // 1.0)
-        drive[k] = controller(controller_parameters, controller_state, reference[k], measurement[k])  # type: ignore[operator]
-        command[k] = controller_state[0]
-        if not (math.isfinite(y[k]) and math.isfinite(drive[k])):
+        y = output(at_samples, x, past[(j + 1) % ring], past[(j + 2) % ring], 0.0)
+        readings[k % waiting] = y if seen_in < 0 else readings[waiting]
+        measurement = readings[(k + 1) % waiting] + inputs[1, k]
+        if quantum > 0.0:
+            measurement = quantum * ((measurement / quantum + 0.5) // 1.0)
+        drive = controller(controller_parameters, controller_state, inputs[0, k], measurement)  # type: ignore[operator]
+        samples[0, k], samples[1, k], samples[2, k], samples[3, k] = controller_state[0], drive, y, measurement
+        if not (math.isfinite(y) and math.isfinite(drive)):
             return k
-        target = min(max(amplifier[2] * drive[k] + amplifier[3], amplifier[4]), amplifier[5])
+        target = min(max(plant[2] * drive + plant[3], plant[4]), plant[5])
         for sub in range(substeps):
             j = k * substeps + sub
-            v[j] = charge(amplifier, voltages, target)
-            w[j] = law(law_parameters, law_state, v[j])
-            if not (math.isfinite(v[j]) and math.isfinite(w[j])):
+            v = charge(plant, plant_state, target)
+            w = law(law_parameters, law_state, v)
+            path[0, j], path[1, j] = v, w
+            if not (math.isfinite(v) and math.isfinite(w)):
                 return k
-            past[j % ring] = w[j]
+            past[j % ring] = w
             oldest, older, newer = past[(j + 1) % ring], past[(j + 2) % ring], past[(j + 3) % ring]
             if sub == seen_in:
-                readings[waiting] = output(outputs[1], x, oldest, older, newer)
+                readings[waiting] = output(within, x, oldest, older, newer)
             advance(decline, A, B, x, oldest, older, newer)
     return -1

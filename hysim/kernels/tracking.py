@@ -141,8 +141,8 @@ def track(parameters: FloatArray, state: FloatArray, reference: float, measureme
     dead, late = int(parameters[15]), int(parameters[16])
     others = order - creeping
     decline, p = parameters[p : p + creeping], p + creeping
-    A, p = parameters[p : p + others * order].reshape((others, order)), p + others * order
-    B, p = parameters[p : p + 3 * order].reshape((3, order)), p + 3 * order
+    A, p = parameters[p : p + others * order], p + others * order
+    B, p = parameters[p : p + 3 * order], p + 3 * order
     at_samples, p = parameters[p : p + order + 3], p + order + 3
     within, p = parameters[p : p + order + 3], p + order + 3
     x, s = state[s : s + 2 * order], s + 2 * order

@@ -105,6 +105,13 @@ class Chain:
             self.seen_in, at = whole_and_part((1.0 - part) * self.substeps)
             seen = seen_within(self.linear, self.step, self.delay, at, **between)
         self.outputs = read_only([self.stage.output, seen])
+        self._parameters = self._packed()
+
+    @property
+    def linear_block(self) -> FloatArray:
+        """The linear stage as one block of numbers; see `hysim.kernels.loop`."""
+        stage = self.stage
+        return np.concatenate([np.ravel(part) for part in (stage.decline, stage.A, stage.B, self.outputs)])
 
     def rest(self, u0: float) -> ChainState:
         """At rest at the command `u0`.
@@ -156,34 +163,42 @@ class Chain:
     ) -> tuple[Signals, ChainState]:
         """Run a controller, whose state moves along, from a state of the chain; the state at the end with it."""
         n = reference.size
-        amplifier = self.amplifier.compiled(self.step).parameters
         law = state.law._replace(state=state.law.state.copy())
-        voltages, x, past, readings = (part.copy() for part in (state.voltages, state.x, state.past, state.readings))
-        noise = read_only(self.sensor.noise_samples(state.samples + n)[state.samples :])
-        quantum = read_only([self.sensor.quantum])
-        v, w = np.empty((2, n * self.substeps))
-        command, drive, y, measurement = np.empty((4, n))
+        parts = (state.voltages, state.x, state.past, state.readings)
+        plant_state = np.concatenate(parts)
+        noise = self.sensor.noise_samples(state.samples + n)[state.samples :]
+        inputs = read_only(np.stack([reference, noise]), finite=False)
+        samples, path = np.empty((4, n)), np.empty((2, n * self.substeps))
         lost = -1
         for start in range(0, n, _CHUNK):
             stop = min(start + _CHUNK, n)
             with np.errstate(all="ignore"):  # an unstable loop may overflow before it is lost
                 lost = kernels.close(
-                    *controller, amplifier, voltages, *law,
-                    self.stage.decline, self.stage.A, self.stage.B, self.outputs, x, past,
-                    noise, readings, quantum, reference, start, stop, self.substeps, self.seen_in,
-                    command, drive, v, w, y, measurement,
-                )  # fmt: skip
+                    *controller, *law, self._parameters, plant_state, inputs, start, stop, samples, path
+                )
             if lost >= 0:
                 break
             if progress is not None:
                 progress(stop, n)
-        turned = np.append(np.roll(readings[:-1], -n), readings[-1])
-        end = ChainState(state.samples + n, voltages, law, x, np.roll(past, -n * self.substeps), turned)
+        voltages, x, past, readings = np.split(plant_state, np.cumsum([part.size for part in parts])[:-1])
+        remaining = np.append(np.roll(readings[:-1], -n), readings[-1])
+        end = ChainState(state.samples + n, voltages, law, x, np.roll(past, -n * self.substeps), remaining)
+        (command, drive, y, measurement), (v, w) = samples, path
         return Signals(command, drive, v, w, y, measurement, lost), end
 
     def driven(self, u: FloatArray, state: ChainState) -> tuple[Signals, ChainState]:
         """Run the commands `u` themselves."""
         return self.run(CompiledController(controllers.through, read_only([]), np.zeros(1)), state, u)
+
+    def _packed(self) -> FloatArray:
+        """The stages apart from the law, as `hysim.kernels.loop` takes them."""
+        stage = self.stage
+        head = [
+            stage.decline.size, stage.rest.size, stage.lag, self.samples_late,
+            self.substeps, self.seen_in, self.sensor.quantum,
+        ]  # fmt: skip
+        amplifier = self.amplifier.compiled(self.step).parameters
+        return read_only(np.concatenate([amplifier, head, self.linear_block]), finite=False)
 
     def just_after(self, before: float, fine: FloatArray) -> FloatArray:
         """The voltages `fine` just after each new command; `before` is the voltage before the run."""
