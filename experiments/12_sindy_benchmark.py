@@ -237,7 +237,7 @@ def draw(rows: list[Row]) -> Figure:
     ax.axhline(ASKED_PERCENT, ls=":", lw=0.8, color="#777777", label="asked")
     ax.set_yscale("log")
     ax.set_xticks(list(SEEDS))
-    ax.set(xlabel="Seed", ylabel="Largest error of a coefficient [%]", title="Law of the benchmark, 39 dB")
+    ax.set(xlabel="Seed", ylabel="Largest error [%]", title="Law of the benchmark, 39 dB")
     canvas.legend(loc="outside lower center", ncols=2)
     return canvas
 
