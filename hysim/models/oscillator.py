@@ -170,7 +170,8 @@ class BoucWenOscillator:
         """Displacement in the steady state under an input that repeats itself.
 
         The period is gone through from the initial state again and again, until a state comes back to what it was
-        one period before; what follows is then as it was, too.
+        one period before; what follows is then as it was, too. A motion that settles slowly is found by Newton's
+        method, and used only if it attracts: a deviation must lose more than 1e-5 of its size in a period.
 
         Parameters
         ----------
@@ -188,7 +189,8 @@ class BoucWenOscillator:
         Raises
         ------
         SimulationError
-            If the motion leaves the finite numbers, or has not settled within 1000 periods.
+            If the motion leaves the finite numbers, or has not settled within 256 periods and the searches
+            by Newton's method between them.
         ValueError
             As `response`, or if u is empty or the tolerance is not positive.
 
