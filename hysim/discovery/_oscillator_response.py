@@ -25,8 +25,8 @@ from hysim.discovery._oscillator_models import State
 from hysim.discovery._term_regression import BLOCKS, FLOOR, TermRegression, term_regression
 from hysim.errors import SimulationError
 from hysim.kernels import hidden as kernels
-from hysim.models._steady_state import ATTEMPTS, attracting_state
 from hysim.models.oscillator_structure import OscillatorStructure
+from hysim.models.steady_state import ATTEMPTS, attracting_state
 from hysim.records import Record
 
 _DIFFERENCES = (3e-4, 3e-5, 3e-6)  # of a parameter, for its slope: the first with which nothing escapes

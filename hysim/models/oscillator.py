@@ -31,10 +31,10 @@ from hysim.errors import SimulationError
 from hysim.kernels import oscillator as kernels
 from hysim.kernels.boucwen import prepare
 from hysim.kernels.charts import N_WORK
-from hysim.models._steady_state import ATTEMPTS, attracting_state
 from hysim.models.boucwen import BoucWen
 from hysim.models.model import model
 from hysim.models.polynomial_boucwen import PolynomialBoucWen
+from hysim.models.steady_state import ATTEMPTS, attracting_state
 
 if TYPE_CHECKING:
     from hysim.models.oscillator_structure import OscillatorStructure
