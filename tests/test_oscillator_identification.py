@@ -142,7 +142,7 @@ def test_the_steady_state_is_where_a_long_simulation_ends(method):
 
 def test_without_damping_the_steady_state_is_refused():
     elastic = replace(plant(), damping=0.0, law=hs.BoucWen(A=5e4, beta=0.0, gamma=0.0))
-    with pytest.raises(hs.SimulationError, match="has not settled within 1000 periods"):
+    with pytest.raises(hs.SimulationError, match="has not settled"):
         elastic.periodic_response([1.0, -1.0], STEP)
 
 

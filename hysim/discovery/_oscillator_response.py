@@ -23,13 +23,14 @@ from hysim.discovery._marquardt import descended
 from hysim.discovery._memory_terms import MemoryTerm, law
 from hysim.discovery._oscillator_models import State
 from hysim.discovery._term_regression import BLOCKS, FLOOR, TermRegression, term_regression
+from hysim.errors import SimulationError
 from hysim.kernels import hidden as kernels
 from hysim.models.oscillator_structure import OscillatorStructure
+from hysim.models.steady_state import ATTEMPTS, attracting_state
 from hysim.records import Record
 
 _DIFFERENCES = (3e-4, 3e-5, 3e-6)  # of a parameter, for its slope: the first with which nothing escapes
 _STEADY = 1e-9  # relative change of the state from period to period
-_MOST_PERIODS = 100
 
 
 class Oscillator(NamedTuple):
@@ -105,13 +106,25 @@ class Response:
         if self.structure.period is None:
             y = np.zeros(force.size)
             return (y, state) if kernels.motion(plant, polynomial, extra, force, h, state, y[1:]) else None
-        y, force = np.empty(force.size), np.append(force, force[0])
-        for _ in range(_MOST_PERIODS):
-            before = state.copy()
-            if not kernels.motion(plant, polynomial, extra, force, h, state, y):
-                return None
-            if np.all(np.abs(state - before) <= _STEADY * np.maximum(np.abs(state), np.abs(before))):
-                return np.roll(y, 1), state
+        y, force, largest = np.empty(force.size), np.append(force, force[0]), np.zeros(3)
+
+        def after(x: FloatArray) -> FloatArray:
+            end = x.copy()
+            if not kernels.motion(plant, polynomial, extra, force, h, end, y):
+                raise SimulationError("the motion diverges")
+            return end
+
+        try:
+            for n_periods in range(ATTEMPTS[-1] + 2):
+                if n_periods in ATTEMPTS:
+                    steady = attracting_state(after, state, largest, _STEADY)
+                    state = state if steady is None else steady
+                before, state = state, after(state)
+                largest = np.maximum(largest, np.abs(state))
+                if np.all(np.abs(state - before) <= _STEADY * np.maximum(np.abs(state), np.abs(before))):
+                    return np.roll(y, 1), state
+        except SimulationError:
+            return None
         return None
 
     def slopes(self, oscillator: Oscillator, terms: Sequence[MemoryTerm]) -> FloatArray:

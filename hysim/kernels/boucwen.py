@@ -49,7 +49,7 @@ def power_advance(z: float, du: float, A: float, beta: float, gamma: float, n: f
             while True:
                 part, left, end = in_chart(end, forwards, 0 if forwards == (c > 0.0) else 1, n, left, work)
                 change += part
-                if left <= 0.0 or (end <= 0.0 and not forwards):
+                if not left > 0.0 or (end <= 0.0 and not forwards):  # not a number ends it, too
                     break
             change *= balance
             end *= balance
@@ -57,7 +57,7 @@ def power_advance(z: float, du: float, A: float, beta: float, gamma: float, n: f
                 left /= work[side + 2]
         else:
             change, left, end = degenerate(w, sign * A, c, n, left)
-        if left <= 0.0:
+        if not left > 0.0:
             break
         sign, w = -sign, 0.0
     along = w + change

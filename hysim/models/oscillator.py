@@ -34,6 +34,7 @@ from hysim.kernels.charts import N_WORK
 from hysim.models.boucwen import BoucWen
 from hysim.models.model import model
 from hysim.models.polynomial_boucwen import PolynomialBoucWen
+from hysim.models.steady_state import ATTEMPTS, attracting_state
 
 if TYPE_CHECKING:
     from hysim.models.oscillator_structure import OscillatorStructure
@@ -42,7 +43,6 @@ METHODS = ("split", "runge-kutta", "newmark", "strang")
 _ANGLE = 0.1  # largest phase of the mode in a default step: errors of 1e-7 of the output on the Noel-Schoukens system
 _CHUNK = 1 << 16
 _SETTLING_CHUNK = 1 << 13
-_MOST_PERIODS = 1000
 
 
 class OscillatorState(NamedTuple):
@@ -170,7 +170,8 @@ class BoucWenOscillator:
         """Displacement in the steady state under an input that repeats itself.
 
         The period is gone through from the initial state again and again, until a state comes back to what it was
-        one period before; what follows is then as it was, too.
+        one period before; what follows is then as it was, too. A motion that settles slowly is found by Newton's
+        method, and used only if it attracts: a deviation must lose more than 1e-5 of its size in a period.
 
         Parameters
         ----------
@@ -188,7 +189,8 @@ class BoucWenOscillator:
         Raises
         ------
         SimulationError
-            If the motion leaves the finite numbers, or has not settled within 1000 periods.
+            If the motion leaves the finite numbers, or has not settled within 256 periods and the searches
+            by Newton's method between them.
         ValueError
             As `response`, or if u is empty or the tolerance is not positive.
 
@@ -209,7 +211,17 @@ class BoucWenOscillator:
             raise ValueError(f"tolerance must be positive, got {tolerance}")
         state = self._start(float(inputs[-1]))
         motion, largest = np.full((inputs.size, 3), np.nan), np.zeros(3)
-        for _ in range(_MOST_PERIODS):
+
+        def after(x: FloatArray) -> FloatArray:
+            start = OscillatorState(float(inputs[-1]), *x.tolist())
+            return np.asarray(self._states(inputs, sample_time, start, None)[1][-1, :3])
+
+        for n_periods in range(ATTEMPTS[-1] + 2):
+            if n_periods in ATTEMPTS:
+                steady = attracting_state(after, motion[-1], largest, tolerance)
+                if steady is not None:
+                    state = OscillatorState(float(inputs[-1]), *steady.tolist())
+                    motion[-1] = steady
             for begin in range(0, inputs.size, _SETTLING_CHUNK):
                 piece = slice(begin, begin + _SETTLING_CHUNK)
                 try:
@@ -222,7 +234,7 @@ class BoucWenOscillator:
                 largest = np.maximum(largest, np.abs(found[-1, :3]))
                 if np.all(change <= tolerance * largest):
                     return motion[:, 0].copy()
-        raise SimulationError(f"the motion has not settled within {_MOST_PERIODS} periods")
+        raise SimulationError(f"the motion has not settled within {ATTEMPTS[-1]} periods")
 
     def signals(self, u: npt.ArrayLike, sample_time: float) -> dict[str, FloatArray]:
         """Every signal at the samples of `u`, by name.
