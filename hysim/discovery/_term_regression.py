@@ -17,6 +17,7 @@ from hysim.discovery._pysindy import sparse_path
 
 FLOOR = 1e-5  # of the rms output: smaller residuals are no evidence of a term
 BLOCKS = 4  # that are held out in turn, where there are no periods
+_RIDGE = 1e-13  # of unit columns: those that a draw of samples makes dependent cost rounding, and no failure
 DEPENDENT = 1e-5  # share of a slope that those before it do not explain, below which it is left out
 
 
@@ -54,7 +55,9 @@ class TermRegression:
     def eliminated(self) -> list[tuple[MemoryTerm, ...]]:
         """Structures from dense to sparse, each without the term that the last one loses least by."""
         R, kept, path = self.triangle, list(range(len(self.terms))), []
-        normal, right = R[:, :-1].T @ R[:, :-1], R[:, :-1].T @ R[:, -1]
+        sizes = np.linalg.norm(R[:, :-1], axis=0)
+        columns = R[:, :-1] / np.where(sizes > 0.0, sizes, 1.0)
+        normal, right = columns.T @ columns + _RIDGE * np.eye(len(kept)), columns.T @ R[:, -1]
         while kept:
             path.append(tuple(self.terms[k] for k in kept))
             inverse = np.linalg.inv(normal[np.ix_(kept, kept)])

@@ -30,9 +30,8 @@ _MOST_STEPS = 8
 _SHARES = (1.0, 0.5, 0.25, 0.125)  # of a Newton step, the first that lowers the mismatch
 _PREDICTED = 0.3  # largest part of the last change that the linear map may miss
 
-Period = Callable[
-    [FloatArray], FloatArray
-]  # state (3,) after a period, from that before; SimulationError if it diverges
+Period = Callable[[FloatArray], FloatArray]
+"""State (3,) after a period, from that before; SimulationError if it diverges."""
 
 
 def attracting_state(period: Period, state: FloatArray, scale: FloatArray, tolerance: float) -> FloatArray | None:
