@@ -6,7 +6,7 @@ from importlib import metadata
 
 from hysim import __version__
 
-DEPENDENCIES = ("numpy", "scipy", "numba", "matplotlib", "pysindy", "control")
+DEPENDENCIES = ("numpy", "scipy", "numba", "matplotlib", "pysindy", "control", "threadpoolctl")
 EXTRAS = ("h5py", "scikit-image", "imageio", "marimo", "pandas", "xarray", "dask", "distributed")
 
 

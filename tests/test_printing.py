@@ -97,7 +97,7 @@ def test_what_is_too_much_is_counted():
 def test_show_versions_prints_every_dependency(capsys):
     assert hs.show_versions() is None
     printed = capsys.readouterr().out
-    assert printed.startswith(f"hysim  {hs.__version__}".replace("  ", " " * 9))
+    assert printed.startswith(f"hysim  {hs.__version__}".replace("  ", " " * 10))
     project = tomllib.loads((Path(__file__).parent.parent / "pyproject.toml").read_text())["project"]
     extras = (
         name

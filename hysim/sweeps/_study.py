@@ -1,4 +1,4 @@
-"""What a store says of its study, read from rows that may be damaged or another's.
+"""The facts of a study, read from rows of a store that may be damaged or of another study.
 
 identity     name to text, by which two studies are known to be the same
 n_tasks      number of tasks
