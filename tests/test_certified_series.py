@@ -6,6 +6,9 @@ import pytest
 from scipy.integrate import simpson, solve_ivp
 
 import hysim as hs
+from hysim.kernels.baber_noori import escapes
+from hysim.kernels.baber_noori_series import N_ROWS, begin
+from hysim.kernels.remainder import N_TERMS
 
 N_LAWS = 20 if numba.config.DISABLE_JIT else 100
 FINE = 4 if numba.config.DISABLE_JIT else 16
@@ -194,3 +197,31 @@ def test_a_memory_that_grows_fast_and_does_escape_is_said_to():
         for pieces in (1, 64):
             with pytest.raises(hs.SimulationError, match="escapes to infinity"):
                 model.response(np.linspace(0.0, 5.0, pieces + 1))
+
+
+@numba.njit
+def escapes_within(w, left, parameters, series):
+    """Inner kernels have no entry from Python."""
+    begin(w, 0.0, False, parameters, series)
+    return escapes(w, 0.0, left, parameters, series)
+
+
+@pytest.mark.parametrize(
+    ("wear", "is_proved"),
+    [
+        ({"delta_nu": 1e-9}, True),
+        ({"delta_nu": 0.01}, True),
+        ({"delta_nu": 20.0}, False),
+        ({"delta_nu": -20.0}, False),
+        ({"delta_eta": 20.0}, False),
+        ({"delta_eta": -20.0}, False),
+        ({"delta_a": 1e7}, False),
+        ({"beta": -0.001}, False),  # too slow for the length
+    ],
+)
+def test_a_divergence_is_proved_only_where_wear_cannot_turn_it_back(wear, is_proved):
+    """From w = 100 with n = 3 the memory diverges within 2e-4, on which e grows by no more than 0.04."""
+    law = hs.BoucWenBaberNoori(**{"A": 1.0, "beta": -1.0, "gamma": 0.0, "n": 3.0, **wear})
+    parameters = law.compiled(0.0).parameters
+    series = np.zeros((N_ROWS, N_TERMS + 1))
+    assert escapes_within(100.0, 0.01, parameters, series) == is_proved
