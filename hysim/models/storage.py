@@ -17,7 +17,7 @@ from hysim._atomic import write_text
 from hysim.models.model import FAMILIES, every_family
 
 _DEEPEST = 100  # lists and mappings in each other: a chain of chains takes three for a model
-_MOST_DIGITS = 400  # the largest float has 309
+_MOST_DIGITS = 4_300  # which Python converts by default
 _TOO_DEEP = f"lists and mappings are nested more than {_DEEPEST} deep"
 _LONGEST, _BRIEF = 1000, 60  # signs of a message, and of a value in it
 
