@@ -146,3 +146,14 @@ def test_standard_errors_cover_the_truth(monkeypatch):
         )
         scores += [(found.coefficients[term] - TRUTH[term]) / found.stderr[term] for term in TRUTH]
     assert np.mean(np.square(scores)) == pytest.approx(1.0, abs=4.0 * math.sqrt(2.0 / len(scores)))
+
+
+def test_the_true_law_is_searched_for_where_the_descent_of_the_largest_one_ends_far_above_it():
+    """The largest laws end near the error of a linear model; the true one has no error."""
+    phase = np.arange(240) / 240
+    one = np.exp(-3.0 * phase) * np.sin(2.0 * np.pi * (8.0 * phase + 0.6369616873214543))
+    u = np.tile(one, 2)
+    u = 2.0 * (u - u[0]) / np.abs(u - u[0]).max()
+    record = hs.Record(u=u, y=LAW.memory(u), t=np.concatenate([phase, 1.0 + phase / 5.0]))
+    found = hs.discover(record, route="memory")
+    assert dict(found.coefficients) == pytest.approx(TRUTH, abs=EXACT)

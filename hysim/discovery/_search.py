@@ -19,6 +19,7 @@ from hysim.records import Record
 LINE = Terms((Term(False, 0, 0),))
 _FINALISTS = 6
 _RESTARTS = 4
+_HOPELESS = 2.0  # times the rmse that is enough: the descent of a large law may end so far above its least rmse
 _SAME = 1e-6  # relative difference of the cost within which two optima are the same
 _SPREAD = 0.3  # of a random restart, in units of what each term contributes over the span of the input
 _HELD_OUT = 3  # every third sample decides between the forms of the slope
@@ -118,7 +119,7 @@ def searched(
     """The best law of a library; None if none can come near the BIC `best`.
 
     Only the outputs `seen`, (n_samples,) for each record, are looked at. If no law on the optimizer's path, on which
-    are the largest ones, has an rmse of `enough()` or less, the search ends there: a smaller law does not fit better.
+    are the largest ones, comes near an rmse of `enough()`, the search ends there: a smaller law does not fit better.
     """
     whole = FreeRun(tuple(records), None if seen is None else tuple(seen), signs)
     some = _thinned(whole)
@@ -140,7 +141,7 @@ def searched(
             f"every law that was tried diverges on these records, whose output moves by {whole.stroke:.3g} about "
             f"{float(records[0].y[0]):.3g}: check the units, or subtract the offset"
         )
-    is_short = not _least_rmse(search) <= enough()
+    is_short = not _least_rmse(search) <= _HOPELESS * enough()
     if not is_short:
         search.explore(library.structure(starts[0].regression.terms))
     chosen = _on_all_samples(whole, search, library, seed, restarts=0 if is_short else _RESTARTS)
