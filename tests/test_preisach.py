@@ -117,6 +117,14 @@ def test_relays_are_the_literal_bank(law, u):
     assert law.response(u) == pytest.approx(relay_bank(law, u), abs=ROUNDING)
 
 
+@pytest.mark.parametrize("levels", [(-1.0, np.nextafter(1.0, 2.0)), (-1e300, -1e-300, 1e300)])
+def test_a_relay_does_not_switch_one_rounding_before_its_level(levels):
+    law = hs.PreisachRelays(levels=levels, weights=(0.05, 0.1, 0.2)[: 2 * len(levels) - 3])
+    up = np.sort(np.concatenate([np.nextafter(levels, -np.inf), levels, np.nextafter(levels, np.inf)]))
+    for path in (np.append(up, up[::-1]), np.append(up[::-1], up)):
+        assert law.response(path) == pytest.approx(relay_bank(law, path), abs=ROUNDING)
+
+
 @given(laws(hs.PreisachRelays), st.lists(st.integers(0, 6), min_size=1, max_size=20))
 def test_relays_switch_at_the_level_itself(law, places):
     u = np.array(law.levels)[np.minimum(places, len(law.levels) - 1)]

@@ -45,10 +45,12 @@ def everett(parameters: FloatArray, a: float, b: float) -> float:
     """E(a, b): half of what the output gains on the way from `b` to `a`, inputs between the levels."""
     n = int(parameters[2])
     i, j = interval(parameters, a), interval(parameters, b)
-    p = (a - parameters[HEAD + i]) / (parameters[HEAD + i + 1] - parameters[HEAD + i])
-    q = (b - parameters[HEAD + j]) / (parameters[HEAD + j + 1] - parameters[HEAD + j])
-    if parameters[0] == 0.0:  # the levels that the way has met
-        p, q = (math.floor(p), math.ceil(q)) if a > b else (math.ceil(p), math.floor(q))
+    low_a, high_a = parameters[HEAD + i], parameters[HEAD + i + 1]
+    low_b, high_b = parameters[HEAD + j], parameters[HEAD + j + 1]
+    p, q = (a - low_a) / (high_a - low_a), (b - low_b) / (high_b - low_b)
+    if parameters[0] == 0.0:  # the levels that the way has met, compared since a quotient may be rounded to 1
+        p = 1.0 if (a >= high_a if a > b else a > low_a) else 0.0
+        q = 1.0 if (b > low_b if a > b else b >= high_b) else 0.0
         if (a > b) != (i + p > j + q):
             return 0.0
     at = HEAD + n + i * n + j
