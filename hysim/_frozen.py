@@ -144,7 +144,8 @@ def _as_mapping(values: Mapping[Any, Any], name: str) -> Mapping[Any, Any]:
     return MappingProxyType(dict(values))
 
 
-def _items(value: Any) -> dict[str, Any]:
+def items(value: Any) -> dict[str, Any]:
+    """Fields of a frozen value by name."""
     return {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
 
 
@@ -173,7 +174,7 @@ def _hash(self: Any) -> int:
 
 
 def _reduce(self: Any) -> tuple[Any, ...]:
-    plain = {name: dict(item) if isinstance(item, MappingProxyType) else item for name, item in _items(self).items()}
+    plain = {name: dict(item) if isinstance(item, MappingProxyType) else item for name, item in items(self).items()}
     return _rebuild, (type(self), plain)
 
 

@@ -1,6 +1,9 @@
 """Many laws of one family at once, by the step with which loops take one of them.
 
-A family then needs no batch kernel of its own: what is compiled for it is its step.
+`parameters` is (n_sets, n_parameters) and `memory`, the front of the state before the first sample, (n_sets, n_memory):
+one law a row. The laws use one state in turn, of `scratch` places more than the memory. Each finds its first input and
+its memory there, a zero in the last place, and the rest of the scratch as the law before left it. `u` is (1, n_samples)
+or (n_sets, n_samples).
 """
 
 import math
@@ -9,34 +12,59 @@ import numpy as np
 from numba import float64, int64, types, void
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import signed_kernel
-from hysim.kernels.stepping import CONSTANTS, STEP, Step, drive
+from hysim.kernels._compile import inlined, signed_kernel
+from hysim.kernels.stepping import CONSTANTS, STEP, VECTOR, Step, drive
 
 _TABLE = types.Array(float64, 2, "C", readonly=True)
 _ROWS = types.Array(float64, 2, "C")
 
 
-@signed_kernel(void(STEP, _TABLE, CONSTANTS, int64, _TABLE, _ROWS, int64, int64))
+@inlined
+def begin(state: FloatArray, memory: FloatArray, first: float) -> None:
+    """The state of a law with this memory before its first input."""
+    for k in range(1, memory.size):
+        state[k] = memory[k]
+    if state.size > memory.size:
+        state[-1] = 0.0
+    state[0] = first
+
+
+@signed_kernel(void(STEP, _TABLE, _TABLE, int64, _TABLE, _ROWS, int64, int64))
 def drive_each(
     step: Step,
     parameters: FloatArray,
-    z0: FloatArray,
-    n_state: int,
+    memory: FloatArray,
+    scratch: int,
     u: FloatArray,
     out: FloatArray,
     start: int,
     stop: int,
 ) -> None:
-    """Outputs of the laws `start` to `stop - 1`, one a row of `parameters`; one that escapes is a row of inf.
-
-    `u` is (1, n_samples) or (n_sets, n_samples). The laws use one state, of `n_state` places, in turn: each finds
-    its first input, its z0 and a zero in front, a zero in the last place, and the rest as its forerunner left it.
-    """
-    state = np.zeros(n_state)
+    """Outputs of the laws `start` to `stop - 1`; one that diverges is a row of inf."""
+    state = np.zeros(memory.shape[1] + scratch)
     for i in range(start, stop):
         row = u[min(i, u.shape[0] - 1)]
         if row.size == 0:
             continue
-        state[0], state[1], state[2], state[-1] = row[0], z0[i], 0.0, 0.0
+        begin(state, memory[i], row[0])
         if drive(step, parameters[i], state, row, out[i]) >= 0:
             out[i] = math.inf
+
+
+@signed_kernel(void(STEP, _TABLE, _TABLE, int64, CONSTANTS, VECTOR, _ROWS))
+def drive_to_end(
+    step: Step,
+    parameters: FloatArray,
+    memory: FloatArray,
+    scratch: int,
+    u: FloatArray,
+    y: FloatArray,
+    out: FloatArray,
+) -> None:
+    """The memory of each law after the last sample of `u` into `out`, nan where it diverges; `y` has room for outputs."""
+    state = np.zeros(memory.shape[1] + scratch)
+    for i in range(out.shape[0]):
+        begin(state, memory[i], u[0])
+        lost = drive(step, parameters[i], state, u, y) >= 0
+        for k in range(memory.shape[1]):
+            out[i, k] = math.nan if lost else state[k]

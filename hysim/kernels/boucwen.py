@@ -198,12 +198,42 @@ def batch(parameters: FloatArray, output: FloatArray, u: FloatArray, out: FloatA
         if escaped >= 0:
             out[i] = math.inf
             continue
-        gain, offset = output[i, 0], output[i, 1]
-        for k in range(row.size):
-            total = 0.0  # as `polynomial`, without a view for each sample
-            for j in range(output.shape[1] - 1, 1, -1):
-                total = (total + output[i, j]) * row[k]
-            out[i, k] = offset + total + gain * out[i, k]
+        to_output(output[i], 0, row, out[i])
+
+
+@kernel
+def path(parameters: FloatArray, state: FloatArray, u: FloatArray, out: FloatArray) -> int:
+    """Outputs at the samples of `u` into `out`, as `step` has them: the first sample of no finite memory, or -1."""
+    A, beta, gamma, n = parameters[0], parameters[1], parameters[2], parameters[3]
+    if u.size == 0:
+        return -1
+    if n == 1.0:
+        lost = linear_path(A, beta, gamma, state[0], state[1], u, out)
+    elif n == 2.0:
+        lost = quadratic_path(A, beta, gamma, state[0], state[1], u, out)
+    else:
+        lost = power_path(A, beta, gamma, n, state[0], state[1], u, state, out)
+    if lost >= 0:
+        return lost
+    state[0], state[1] = u[-1], out[-1]
+    to_output(parameters, 4, u, out)
+    return -1
+
+
+@inlined
+def to_output(parameters: FloatArray, first: int, u: FloatArray, out: FloatArray) -> None:
+    """Replace the memories in `out` by offset + c1 u + c2 u^2 + ... + gain z, of which gain, offset, c1 begin at `first`."""
+    gain, offset = parameters[first], parameters[first + 1]
+    if parameters.size == first + 3:
+        slope = 0.0 + parameters[first + 2]  # as `polynomial` begins
+        for k in range(u.size):
+            out[k] = offset + slope * u[k] + gain * out[k]
+        return
+    for k in range(u.size):
+        total = 0.0  # as `polynomial`, without a view for each sample
+        for j in range(parameters.size - 1, first + 1, -1):
+            total = (total + parameters[j]) * u[k]
+        out[k] = offset + total + gain * out[k]
 
 
 # ---------------------------------------------------------------------------------- one sample at a time

@@ -40,6 +40,10 @@ class Batch(NamedTuple):
     u: FloatArray
     order: npt.NDArray[np.intp] | None = None
 
+    def result(self, reduce: Reduction | None, target: npt.ArrayLike | None, workers: int | None) -> FloatArray:
+        """Rows, or one number of each where `reduce` names it."""
+        return self.rows(workers) if reduce is None else self.reduced(reduce, target, workers)
+
     def rows(self, workers: int | None) -> FloatArray:
         """Outputs, shape (n_sets, n_samples); inf where a law escapes."""
         y = np.empty((self.n_sets, self.u.shape[1]))

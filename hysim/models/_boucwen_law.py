@@ -17,24 +17,22 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim._parallel import in_pieces
-from hysim.errors import SimulationError
 from hysim.kernels import boucwen as kernels
 from hysim.kernels.charts import N_WORK
-from hysim.models import _boucwen_facts, _boucwen_search, boucwen_inverse, limit_cycle
-from hysim.models._memory_batch import Kernel
-from hysim.models._memory_law import MemoryLaw, State
+from hysim.models import _boucwen_facts, boucwen_inverse, limit_cycle
+from hysim.models._memory_law import MemoryLaw
 from hysim.models.boucwen_inverse import BoucWenInverse, InverseState
+from hysim.models.law import Packed, State, Tables
 from hysim.models.limit_cycle import LimitCycle
 from hysim.models.model import CompiledLaw
-from hysim.models.search_space import ALL_FREE, Freedom, SearchSpace
 from hysim.records import Record
 
 
 class BoucWenLaw(MemoryLaw):
     """The memory of Bouc and Wen; what it shares with other laws is in `hysim.models._memory_law`."""
 
-    memory_names: ClassVar[tuple[str, ...]] = ("A", "beta", "gamma", "n", "z0")
+    step = staticmethod(kernels.step)
+    scratch: ClassVar[int] = N_WORK - 2
 
     @property
     def admissible(self) -> bool:
@@ -146,16 +144,6 @@ class BoucWenLaw(MemoryLaw):
         rounding = 1e-14 * (abs(self.gain * self.A) + float(np.abs(boucwen_inverse.coefficients(self)).max()))
         return bounds[0] > rounding or bounds[1] < -rounding
 
-    def compiled(self, u0: float = 0.0) -> CompiledLaw:
-        """The law as compiled loops take it; the state is that of a first sample at the input `u0`."""
-        scalars = self.scalars
-        law = self.A, self.beta, self.gamma, self.n
-        parameters = np.array([*law, self.gain, self.offset, *(scalars[name] for name in self.coefficient_names)])
-        state = np.zeros(N_WORK)
-        kernels.prepare(*law, 0.0, state)
-        state[:2] = u0, self.z0
-        return CompiledLaw(kernels.step, read_only(parameters, finite=False), state)
-
     def inverse(self) -> BoucWenInverse:
         """The law's inverse as an object, for loops that run sample by sample.
 
@@ -209,10 +197,6 @@ class BoucWenLaw(MemoryLaw):
         """
         return boucwen_inverse.inverse_response(self, y, u0, state)
 
-    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box that `identify` searches; see `hysim.models._boucwen_search`."""
-        return _boucwen_search.search_space(self.scalars, self.columns, record, freedom)
-
     def notes(self, record: Record, model: "BoucWenLaw") -> tuple[str, ...]:
         """What the identified law promises for other inputs."""
         if model.admissible and model.stability_class == "I":
@@ -221,33 +205,34 @@ class BoucWenLaw(MemoryLaw):
         bounded = f"of stability class {kind}" if kind != "none" else "of no stability class: other inputs may escape"
         return (f"the law is {bounded}" + ("" if model.admissible else ", and may create energy"),)
 
-    @property
-    def _batch(self) -> Kernel:
-        return kernels.batch
+    @classmethod
+    def pack(cls, tables: Tables) -> Packed:
+        """Parameters (A, beta, gamma, n, gain, offset, c1, c2, ...) and memory (u, z)."""
+        return Packed(cls.joined(tables, "A", "beta", "gamma", "n"), cls.initial_memory(tables))
 
-    def _memory(self, u: FloatArray, state: State) -> tuple[FloatArray, State]:
-        z = np.empty(u.size)
-        law, tables = (self.A, self.beta, self.gamma), np.empty(N_WORK)
-        if self.n not in (1.0, 2.0):
-            kernels.prepare(*law, self.n, 0.0, tables)
+    @classmethod
+    def prepare(cls, parameters: FloatArray, state: FloatArray) -> None:
+        """The charts of the exponent."""
+        kernels.prepare(*parameters[:4], 0.0, state)
 
-        def path(piece: slice) -> int:
-            k = piece.start
-            start = (float(u[k - 1]), float(z[k - 1])) if k else (float(state[0]), float(state[1]))
-            if self.n == 1.0:
-                return int(kernels.linear_path(*law, *start, u[piece], z[piece]))
-            if self.n == 2.0:
-                return int(kernels.quadratic_path(*law, *start, u[piece], z[piece]))
-            return int(kernels.power_path(*law, self.n, *start, u[piece], tables, z[piece]))
+    @classmethod
+    def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:
+        """As `Law.path`, the exponent looked at once for all samples."""
+        return int(kernels.path(law.parameters, law.state, u, y))
 
-        escaped = in_pieces(path, u.size)
-        if escaped >= 0:
-            raise SimulationError(
-                f"the memory escapes to infinity at sample {escaped} (u = {u[escaped]:g}): with beta + gamma = "
-                f"{self.beta + self.gamma:g} and beta - gamma = {self.beta - self.gamma:g} only a shorter input "
-                "bounds it"
-            )
-        return z, (float(u[-1]), float(z[-1])) if z.size else state
+    @classmethod
+    def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
+        """As `Law.rows`, laws of n = 1 side by side, and the charts shared by neighbours of equal n."""
+        memory = np.concatenate([tables[name] for name in ("A", "beta", "gamma", "n", "z0")], axis=1)
+        kernels.batch(read_only(memory), read_only(cls.joined(tables)), u, y, 0, len(y))
+
+    def divergence(self, sample: int, u: float, y: float) -> str:
+        """The sums of parameters that let the memory diverge."""
+        loading, unloading = self.beta + self.gamma, self.beta - self.gamma
+        return (
+            f"the memory diverges at sample {sample} (u = {u:g}): with beta + gamma = {loading:g} and beta - gamma = "
+            f"{unloading:g} it is bounded for shorter inputs only"
+        )
 
     def _memory_slope(self, direction: FloatArray, z: FloatArray, u: FloatArray, *_: FloatArray) -> FloatArray:
         return np.asarray(self.A - np.abs(z) ** self.n * (self.gamma + self.beta * np.sign(z * direction)))

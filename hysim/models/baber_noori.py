@@ -21,13 +21,13 @@ from typing import ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
+from hysim._frozen import FloatArray
 from hysim.kernels import baber_noori as kernels
-from hysim.kernels.stepping import Step
-from hysim.models import _boucwen_conversions, _boucwen_search
+from hysim.models import _boucwen_conversions
 from hysim.models._asymmetric import SteppedLaw
+from hysim.models.law import Packed, Tables
 from hysim.models.model import model
-from hysim.models.search_space import ALL_FREE, Freedom, Holding, Parameters, SearchSpace
+from hysim.models.search_space import Freedom, Holding, Parameters
 from hysim.records import Record
 
 _PINCHING = ("zeta_s", "q", "p", "psi", "delta_psi", "lambda_")
@@ -105,17 +105,23 @@ class BoucWenBaberNoori(SteppedLaw):
     z0: float = 0.0
     input_coefficients: tuple[float, ...] = (0.0,)
 
-    memory_names: ClassVar[tuple[str, ...]] = ("A", "beta", "gamma", "n", *_OWN, "z0")
-    others_at_start: ClassVar[tuple[float, ...]] = (0.0,)
-    state_size: ClassVar[int] = kernels.N_STATE
+    step = staticmethod(kernels.step)
+    scratch: ClassVar[int] = kernels.N_STATE - 3
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.zeta_s != 0.0:
-            sums = {"beta + gamma": self.beta + self.gamma, "psi": self.psi, "lambda_": self.lambda_}
-            for name, value in sums.items():
-                if value <= 0.0:
-                    raise ValueError(f"{name} must be positive in a law that pinches, got {value}")
+    @classmethod
+    def check(cls, tables: Tables) -> None:
+        """Refuse what `MemoryLaw` refuses, and a pinching law in which a width or the yield memory is not positive."""
+        super().check(tables)
+        pinches = tables["zeta_s"] != 0.0
+        sums = {"beta + gamma": tables["beta"] + tables["gamma"], "psi": tables["psi"], "lambda_": tables["lambda_"]}
+        for name, value in sums.items():
+            if (wrong := pinches & (value <= 0.0)).any():
+                raise ValueError(f"{name} must be positive in a law that pinches, got {value[wrong][0]}")
+
+    @classmethod
+    def pack(cls, tables: Tables) -> Packed:
+        """Parameters of wear and pinching, then (A, beta, gamma, n, gain, offset, c1, ...); memory (u, z, e)."""
+        return Packed(cls.joined(tables, *_OWN, "A", "beta", "gamma", "n"), cls.initial_memory(tables, further=1))
 
     @classmethod
     def candidates(cls) -> dict[str, Holding]:
@@ -227,19 +233,12 @@ class BoucWenBaberNoori(SteppedLaw):
         ValueError
             If u is not finite or has not one axis.
         """
-        inputs = read_only(u, "u", ndim=1)
-        state, e = self._start(inputs), np.empty(inputs.size)
-        for k in range(inputs.size):
-            state = self._memory(inputs[k : k + 1], state)[1]
-            e[k] = state[2]
-        return e
+        return self.remembered(u)[:, 1]
 
-    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box that `identify` searches; see `hysim.models._boucwen_search`."""
+    def alike(self, record: Record, freedom: Freedom) -> tuple[tuple[str, ...], ...]:
+        """Parameters held by default: the wear of A, and pinching in a law that does not pinch."""
         pinches = self.zeta_s != 0.0 or "zeta_s" in freedom.free
-        held = ("delta_a",) if pinches else ("delta_a", *_PINCHING)
-        alike = tuple((name,) for name in held)
-        return _boucwen_search.search_space(self.scalars, self.columns, record, freedom, alike=alike)
+        return tuple((name,) for name in ("delta_a", *(() if pinches else _PINCHING)))
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
         """Memory z0 with which a record that repeats itself ends as it began, of a law that does not wear off.
@@ -253,14 +252,6 @@ class BoucWenBaberNoori(SteppedLaw):
         if any(np.any(values[name]) for name in ("delta_a", "delta_nu", "delta_eta", "zeta_s")):
             raise ValueError('a law that wears off has no steady cycle: use initial="free"')
         return super().steady(parameters, record)
-
-    @property
-    def _step(self) -> Step:
-        return kernels.step
-
-    @staticmethod
-    def _step_parameters(memory: FloatArray, output: FloatArray) -> FloatArray:
-        return np.concatenate([memory[:, 4:-1], memory[:, :4], output], axis=1)
 
     def _memory_slope(self, direction: FloatArray, z: FloatArray, u: FloatArray, *others: FloatArray) -> FloatArray:
         e = others[0] if others else np.zeros(())

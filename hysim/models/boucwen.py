@@ -7,7 +7,7 @@ What follows from the equations is in `hysim.models._boucwen_law`, the conversio
 `hysim.models._boucwen_conversions`.
 """
 
-from typing import Self
+from typing import ClassVar, Self
 
 from hysim.models import _boucwen_conversions as conversions
 from hysim.models._boucwen_law import BoucWenLaw
@@ -54,6 +54,8 @@ class BoucWen(BoucWenLaw):
     [0.0, 0.632121, -0.745354, 0.714823]
     """
 
+    polynomial: ClassVar[str] = "feedthrough"
+
     A: float = 1.0
     beta: float = 0.5
     gamma: float = 0.5
@@ -62,11 +64,6 @@ class BoucWen(BoucWenLaw):
     gain: float = 1.0
     offset: float = 0.0
     z0: float = 0.0
-
-    @property
-    def coefficient_names(self) -> tuple[str, ...]:
-        """One name, of the feedthrough."""
-        return ("feedthrough",)
 
     @classmethod
     def from_low_guo(cls, *, alpha: float, beta: float, gamma: float, d: float = 1.0, h0: float = 0.0) -> Self:

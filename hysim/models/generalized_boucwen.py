@@ -17,13 +17,13 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.kernels import generalized as kernels
-from hysim.kernels.stepping import Step
-from hysim.models import _boucwen_search
 from hysim.models._asymmetric import SteppedLaw
+from hysim.models.law import Packed, Tables
 from hysim.models.model import model
-from hysim.models.search_space import ALL_FREE, Freedom, SearchSpace
+from hysim.models.search_space import Freedom
 from hysim.records import Record
 
+_SECTORS = ("b2", "b3", "b4", "b5", "b6")
 _ONE_SIDED = (("b6", "gamma"), ("b3", "b5"), ("b2", "b4"))
 """Where u keeps its sign, the terms of a pair are the same to a sign."""
 
@@ -81,29 +81,24 @@ class GeneralizedBoucWen(SteppedLaw):
     z0: float = 0.0
     input_coefficients: tuple[float, ...] = (0.0,)
 
-    memory_names: ClassVar[tuple[str, ...]] = ("A", "beta", "gamma", "n", "b2", "b3", "b4", "b5", "b6", "z0")
-    state_size: ClassVar[int] = kernels.N_STATE
+    step = staticmethod(kernels.step)
+    scratch: ClassVar[int] = kernels.N_STATE - 2
 
-    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box that `identify` searches; see `hysim.models._boucwen_search`."""
-        one_sided = bool((record.u >= 0.0).all() or (record.u <= 0.0).all())
-        alike = _ONE_SIDED if one_sided else ()
-        return _boucwen_search.search_space(self.scalars, self.columns, record, freedom, alike=alike)
-
-    @property
-    def _step(self) -> Step:
-        return kernels.step
-
-    @staticmethod
-    def _step_parameters(memory: FloatArray, output: FloatArray) -> FloatArray:
-        A, beta, gamma, n, b2, b3, b4, b5, b6, _ = memory.T
+    @classmethod
+    def pack(cls, tables: Tables) -> Packed:
+        """Parameters of four Bouc-Wen laws, for a falling and a rising u, each below and above zero; memory (u, z)."""
+        A, beta, gamma, n, b2, b3, b4, b5, b6 = (tables[name] for name in ("A", "beta", "gamma", "n", *_SECTORS))
         laws = []
         for direction in (-1.0, 1.0):
             for side in (-1.0, 1.0):
                 both = direction * side
-                own = gamma + both * b2 + direction * b4 + side * b6
-                laws += [np.stack([A, beta + both * b3 + direction * b5, own, n], axis=1), output]
-        return np.concatenate(laws, axis=1)
+                bend = gamma + both * b2 + direction * b4 + side * b6
+                laws += [A, beta + both * b3 + direction * b5, bend, n, cls.joined(tables)]
+        return Packed(np.concatenate(laws, axis=1), cls.initial_memory(tables))
+
+    def alike(self, record: Record, freedom: Freedom) -> tuple[tuple[str, ...], ...]:
+        """The pairs of which one is held where the input keeps its sign."""
+        return _ONE_SIDED if (record.u >= 0.0).all() or (record.u <= 0.0).all() else ()
 
     def _memory_slope(self, direction: FloatArray, z: FloatArray, u: FloatArray, *_: FloatArray) -> FloatArray:
         s, e, side = direction, np.sign(z), np.sign(u)

@@ -30,7 +30,6 @@ from scipy.optimize import brentq
 from hysim._frozen import FloatArray, frozen, read_only
 from hysim.errors import SimulationError
 from hysim.kernels import boucwen as kernels
-from hysim.models._memory_batch import batch
 
 _PANELS = 32  # on either half; the innermost, where w^n is not analytic, weighs 2^-32 to a power above 1
 _NODES = 40  # on each: the nearest pole of w^n is pi/n away in the angle, which n = 20 needs them for
@@ -121,8 +120,10 @@ def _from_rest(A: float, c: float, n: float, lengths: FloatArray) -> FloatArray:
     laws = read_only(np.tile([A, c, 0.0, n, 0.0], (lengths.size, 1)))
     memory_itself = read_only(np.tile([1.0, 0.0], (lengths.size, 1)))
     u = read_only(np.stack([np.zeros(lengths.size), lengths], axis=1))
-    with np.errstate(all="ignore"):  # an escape overflows, and uncompiled kernels would warn of it
-        return batch(laws, memory_itself, u, kernels.batch).rows(workers=1)[:, 1]
+    z = np.empty(u.shape)
+    with np.errstate(all="ignore"):  # a memory that diverges overflows, and uncompiled kernels would warn of it
+        kernels.batch(laws, memory_itself, u, z, 0, len(z))
+    return z[:, 1]
 
 
 @functools.cache

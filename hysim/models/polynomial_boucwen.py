@@ -9,12 +9,11 @@ Source: the polynomial input for asymmetric piezoelectric loops after Wang, Chen
 """
 
 from hysim.models._boucwen_law import BoucWenLaw
-from hysim.models._polynomial_input import PolynomialInput
 from hysim.models.model import model
 
 
 @model
-class PolynomialBoucWen(PolynomialInput, BoucWenLaw):
+class PolynomialBoucWen(BoucWenLaw):
     """Bouc-Wen law beside a polynomial of the input, ``y = offset + sum c_k u^k + gain z``.
 
     Parameters

@@ -21,12 +21,9 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.kernels import zhu_wang as kernels
-from hysim.kernels.stepping import Step
-from hysim.models import _boucwen_search
 from hysim.models._asymmetric import SteppedLaw
+from hysim.models.law import Packed, Tables
 from hysim.models.model import model
-from hysim.models.search_space import ALL_FREE, Freedom, SearchSpace
-from hysim.records import Record
 
 
 @model
@@ -76,20 +73,13 @@ class ZhuWangBoucWen(SteppedLaw):
     z0: float = 0.0
     input_coefficients: tuple[float, ...] = (0.0,)
 
-    memory_names: ClassVar[tuple[str, ...]] = ("A", "beta", "gamma", "n", "delta", "z0")
-    state_size: ClassVar[int] = kernels.N_STATE
+    step = staticmethod(kernels.step)
+    scratch: ClassVar[int] = kernels.N_STATE - 2
 
-    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box that `identify` searches; see `hysim.models._boucwen_search`."""
-        return _boucwen_search.search_space(self.scalars, self.columns, record, freedom)
-
-    @property
-    def _step(self) -> Step:
-        return kernels.step
-
-    @staticmethod
-    def _step_parameters(memory: FloatArray, output: FloatArray) -> FloatArray:
-        return np.concatenate([memory[:, :-1], output], axis=1)
+    @classmethod
+    def pack(cls, tables: Tables) -> Packed:
+        """Parameters (A, beta, gamma, n, delta, gain, offset, c1, c2, ...) and memory (u, z)."""
+        return Packed(cls.joined(tables, "A", "beta", "gamma", "n", "delta"), cls.initial_memory(tables))
 
     def _memory_slope(self, direction: FloatArray, z: FloatArray, u: FloatArray, *_: FloatArray) -> FloatArray:
         bend = np.abs(z) ** self.n * (self.gamma + self.beta * np.sign(z * direction))

@@ -1,0 +1,438 @@
+"""The abstract law: all that follows from one step.
+
+    y_k = step(parameters, state, u_k)
+
+`state` is the last input and what the law remembers, and moves along; at the first sample the last input is that
+sample itself. A family declares its fields, its step, and where its search box lies; path, batch, loops, inverse,
+identification, printing and files follow from these. `hysim.models.dahl` is a short example.
+"""
+
+from abc import ABC
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, Field, fields
+from typing import Any, ClassVar, NamedTuple, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, items, read_only
+from hysim._parallel import in_pieces
+from hysim.errors import SimulationError
+from hysim.kernels.batches import drive_each, drive_to_end
+from hysim.kernels.stepping import Step, drive, drive_memory
+from hysim.models._batch import Batch, Reduction, Sets
+from hysim.models.compiled_step import compiled_step
+from hysim.models.composable import Composable
+from hysim.models.model import CompiledLaw
+from hysim.models.parameters import Parameter, declared_space
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.records import Record
+
+State = tuple[float, ...]
+"""Last input, and what the law remembers."""
+
+Tables = Mapping[str, FloatArray]
+"""Every field over sets: (n_sets, 1) for a number, (n_sets, length) for a tuple, (n_sets, rows, columns)."""
+
+_PASSES = 40  # secant steps to the steady cycle
+
+
+class Packed(NamedTuple):
+    """Laws as their step takes them, one a row.
+
+    `parameters` are the constants, (n_sets, n_parameters); `memory` is the front of the state before the first
+    sample, (n_sets, n_memory), whose first column holds the place of the last input.
+    """
+
+    parameters: FloatArray
+    memory: FloatArray
+
+
+class Law(Composable, ABC):
+    """A rate-independent law that is known by its step.
+
+    A family is a subclass under the decorator `hysim.family`: its fields, and the class attributes below. A field is
+    a float or a tuple of floats.
+
+    Attributes
+    ----------
+    step : staticmethod
+        ``step(parameters, state, u) -> y``, a plain function that numba can compile, or a kernel.
+    initial : tuple of str
+        Fields that are the initial memory; they stand in the state behind the last input. By default ``("z0",)``.
+    searched : tuple of Parameter
+        The box in which `hysim.identify` searches, and the fields in which the output is affine.
+    scratch : int
+        Further places at the end of the state, which a step may use as it likes; zero at first.
+    """
+
+    step: ClassVar[Any]
+    initial: ClassVar[tuple[str, ...]] = ("z0",)
+    searched: ClassVar[tuple[Parameter, ...]] = ()
+    scratch: ClassVar[int] = 0
+
+    # ------------------------------------------------------------------------------ what a family may say more
+
+    @classmethod
+    def check(cls, tables: Tables) -> None:
+        """Raise a ValueError where a set of parameters is no law; the tables hold every field over sets."""
+
+    @classmethod
+    def pack(cls, tables: Tables) -> Packed:
+        """Laws as the step takes them: by default the fields one behind the other, and the initial memory."""
+        memory = cls.initial_memory(tables)
+        constants = [table for name, table in tables.items() if name not in cls.initial]
+        return Packed(np.concatenate([memory[:, :0], *constants], axis=1), memory)
+
+    @classmethod
+    def initial_memory(cls, tables: Tables, *, further: int = 0) -> FloatArray:
+        """Places for the last input, the initial memory and `further` numbers that begin at zero, (n_sets, n_memory)."""
+        n_sets = len(next(iter(tables.values())))
+        memory = [np.zeros((n_sets, 1)), *(tables[name] for name in cls.initial), np.zeros((n_sets, further))]
+        return np.concatenate(memory, axis=1)
+
+    @classmethod
+    def prepare(cls, parameters: FloatArray, state: FloatArray) -> None:
+        """Fill the scratch of a state that begins, where a step needs it filled."""
+
+    @classmethod
+    def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:
+        """Outputs at `u` into `y`; the first sample that is not finite, or -1. A family may register a faster one."""
+        return int(drive(law.step, law.parameters, law.state, u, y))
+
+    @classmethod
+    def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
+        """Outputs of many laws into `y`, (n_sets, n_samples), inf where one diverges; a family may have a faster one.
+
+        `u` is (1, n_samples) or (n_sets, n_samples).
+        """
+        parameters, memory = (read_only(table, finite=False) for table in cls.pack(tables))
+        with np.errstate(all="ignore"):
+            drive_each(compiled_step(cls.step), parameters, memory, cls.scratch, u, y, 0, len(y))
+
+    @classmethod
+    def order(cls, tables: Tables) -> npt.NDArray[np.intp] | None:
+        """Order in which laws that share what their step keeps are neighbours; None for the order of the sets."""
+        return None
+
+    def divergence(self, sample: int, u: float, y: float) -> str:
+        """Message for an output that is not finite at a sample."""
+        what = "cannot be computed (the law is too stiff)" if np.isnan(y) else "diverges"
+        return f"the output {what} at sample {sample} (u = {u:g})"
+
+    # ------------------------------------------------------------------------------ simulation
+
+    def __post_init__(self) -> None:
+        self.check(self.tables)
+
+    @property
+    def tables(self) -> dict[str, FloatArray]:
+        """Every field as a table of one set."""
+        return {name: np.asarray(value, dtype=float).reshape(1, *(np.shape(value) or (1,))) for name, value in items(self).items()}
+
+    @property
+    def scalars(self) -> dict[str, float]:
+        """Every number by the name that `hysim.identify` has for it, ``name`` or ``name[k]``."""
+        return scalars_of(items(self))
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names in which the output is affine."""
+        affine = {parameter.name for parameter in self.searched if parameter.affine}
+        return tuple(name for name in self.scalars if name.partition("[")[0] in affine)
+
+    def response(self, u: npt.ArrayLike) -> FloatArray:
+        """Output y at the samples of an input that is monotone between them.
+
+        Parameters
+        ----------
+        u : array, shape (n_samples,)
+            Input [unit of u]; a law of an ODE takes it as linear between the samples.
+
+        Returns
+        -------
+        array, shape (n_samples,)
+            [unit of y].
+
+        Raises
+        ------
+        SimulationError
+            If the output diverges; the message names the sample.
+        ValueError
+            If u is not finite or has not one axis.
+        """
+        return self.advance(u)[0]
+
+    def advance(self, u: npt.ArrayLike, state: State | None = None) -> tuple[FloatArray, State]:
+        """Output at the samples of `u`, continued from `state`, and the state after the last sample.
+
+        Parameters
+        ----------
+        u : array, shape (n_samples,)
+            Input.
+        state : tuple of float, optional
+            Last input and memory, as an earlier call returned them; by default those of a first sample.
+
+        Returns
+        -------
+        y : array, shape (n_samples,)
+            The same bits as from one uncut input.
+        state : tuple of float
+            To continue from.
+
+        Raises
+        ------
+        SimulationError, ValueError
+            As `response`; also if the state has another length.
+        """
+        inputs = read_only(u, "u", ndim=1)
+        law, start = self._begun(inputs, state)
+        y = np.empty(inputs.size)
+        self._follow(law, inputs, y)
+        return y, tuple(law.state[: len(start)].tolist()) if y.size else start
+
+    def memory(self, u: npt.ArrayLike) -> FloatArray:
+        """Memory at the samples of `u`; parameters and errors as in `response`.
+
+        Returns
+        -------
+        array, shape (n_samples,), or (n_samples, n_memory) where a law remembers a tuple of numbers
+        """
+        z = self.remembered(u)
+        single = len(self.initial) == 1 and self.scalars.keys() >= set(self.initial)
+        return z[:, 0] if single else z
+
+    def remembered(self, u: npt.ArrayLike) -> FloatArray:
+        """The state behind the last input at the samples of `u`, shape (n_samples, n_memory)."""
+        inputs = read_only(u, "u", ndim=1)
+        law, start = self._begun(inputs, None)
+        z = np.empty((inputs.size, len(start) - 1))
+        with np.errstate(all="ignore"):
+            lost = in_pieces(lambda k: drive_memory(*law, inputs[k], z[k]), inputs.size)
+        if lost >= 0:
+            raise SimulationError(self.divergence(lost, inputs[lost], z[lost, 0]))
+        return z
+
+    def compiled(self, u0: float = 0.0) -> CompiledLaw:
+        """The law as compiled loops take it; the state is that after a first sample at the input `u0`."""
+        law, _ = self._begun(np.array([u0]), None)
+        with np.errstate(all="ignore"):
+            law.step(law.parameters, law.state, u0)
+        return law
+
+    @classmethod
+    def responses(
+        cls,
+        parameters: Parameters,
+        u: npt.ArrayLike,
+        *,
+        reduce: Reduction | None = None,
+        target: npt.ArrayLike | None = None,
+        workers: int | None = None,
+    ) -> FloatArray:
+        """Outputs of many laws at once, on all cores, or one number of each.
+
+        Parameters
+        ----------
+        parameters : mapping
+            Names of the constructor to one value for all sets or to one for each, in front of the axes that the value
+            has; those not given have their defaults.
+        u : array, shape (n_samples,) or (n_sets, n_samples)
+            One input for all sets, or one for each.
+        reduce : {"sse", "max_width", "area", "final"}, optional
+            Keep of each output only the sum of its squared differences from `target`, the measure of this name of
+            `loop_metrics` (last complete cycle), or the last sample. A million sets then need no million rows.
+        target : array, shape (n_samples,)
+            With ``reduce="sse"`` what the outputs are compared with [unit of y].
+        workers : int, optional
+            Number of threads; by default one for each core. The result does not depend on it.
+
+        Returns
+        -------
+        array, shape (n_sets, n_samples), or (n_sets,) with `reduce`
+            Each row the same bits as `response`; inf for a law that diverges.
+
+        Raises
+        ------
+        TypeError
+            If a name is not one of the constructor's.
+        ValueError
+            If lengths do not fit, the constructor would refuse a value, or the input has no complete cycle to
+            measure.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> u = hs.signals.triangle(-1.0, 1.0, cycles=3, samples_per_cycle=40)
+        >>> hs.BoucWen.responses({"beta": [0.3, 0.5, 0.7]}, u, reduce="area").round(3).tolist()
+        [0.41, 0.595, 0.746]
+        """
+        return cls.batch(cls.defaults(), parameters, u).result(reduce, target, workers)
+
+    # ------------------------------------------------------------------------------ identification
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """The box that `hysim.identify` searches, by the declarations in `searched`."""
+        return declared_space(self.searched, self.scalars, self.initial, record, freedom)
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """Columns in which the output is affine, and the rest of it, shape (n_sets, n_samples, n_columns + 1)."""
+        zero = {**parameters, **dict.fromkeys(self.columns, 0.0)}
+        rest = self.outputs(zero, record.u)
+        with np.errstate(invalid="ignore"):
+            added = [self.outputs({**zero, name: 1.0}, record.u) - rest for name in self.columns]
+        return np.stack([*added, rest], axis=-1)
+
+    def steady(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
+        """Initial memory with which a periodic record ends as it began, (n_sets,) by name; nan where it diverges.
+
+        One pass through the record contracts the memory; the fixed point is found by the secant method.
+        """
+        names = [name for name in self.scalars if name.partition("[")[0] in self.initial]
+        tables, inputs = tables_of(type(self).__name__, items(self), parameters, np.append(record.u, record.u[0]))
+        constants, memory = (read_only(table, finite=False) for table in self.pack(self.completed(tables)))
+        place, step, y = slice(1, 1 + len(names)), compiled_step(self.step), np.empty(inputs.shape[1])
+
+        def passed(z: FloatArray) -> FloatArray:
+            begin, ends = memory.copy(), np.empty(memory.shape)
+            begin[:, place] = np.nan_to_num(z, posinf=0.0, neginf=0.0)
+            with np.errstate(all="ignore"):
+                drive_to_end(step, constants, read_only(begin), self.scratch, inputs[0], y, ends)
+            return np.where(np.isfinite(z), ends[:, place], np.nan)
+
+        before = np.zeros((len(memory), len(names)))
+        z = passed(before)
+        drift_before = z - before
+        for _ in range(_PASSES):
+            with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+                drift = passed(z) - z
+                if not (np.abs(drift) > 1e-15 * np.abs(z)).any():
+                    break
+                secant = z - drift * (z - before) / (drift - drift_before)
+            before, drift_before, z = z, drift, np.where(np.isfinite(secant), secant, z + drift)
+        return dict(zip(names, np.where(np.isfinite(z), z, np.nan).T, strict=True))
+
+    def assemble(self, parameters: Mapping[str, float]) -> Self:
+        """The law with these parameters, one number for each name; the others are its own."""
+        return type(self)(**{**items(self), **arguments_of({**self.scalars, **parameters})})
+
+    # ------------------------------------------------------------------------------ how it is derived
+
+    @classmethod
+    def defaults(cls) -> dict[str, Any]:
+        """Values of the fields that have one by default."""
+        named: tuple[Field[Any], ...] = fields(cls)  # type: ignore[arg-type]
+        values = {each.name: each.default for each in named if each.default is not MISSING}
+        made = {each.name: each.default_factory() for each in named if each.default_factory is not MISSING}
+        return {each.name: {**values, **made}[each.name] for each in named if each.name in {**values, **made}}
+
+    def outputs(self, parameters: Parameters, u: npt.ArrayLike) -> FloatArray:
+        """Outputs (n_sets, n_samples) of laws that are this one where `parameters` does not say otherwise."""
+        return self.batch(items(self), parameters, u, check=False).rows(None)
+
+    @classmethod
+    def batch(
+        cls, defaults: Mapping[str, Any], parameters: Parameters, u: npt.ArrayLike, *, check: bool = True
+    ) -> Batch:
+        """Laws by their parameters, those not given by `defaults`, and their inputs."""
+        tables, inputs = tables_of(cls.__name__, defaults, parameters, u)
+        tables = cls.completed(tables)
+        if check:
+            cls.check(tables)
+
+        def compute(sets: Sets, inputs: FloatArray, y: FloatArray) -> None:
+            cls.rows({name: table[sets] for name, table in tables.items()}, inputs, y)
+
+        n_sets = len(next(iter(tables.values())))
+        return Batch(compute, n_sets, inputs, cls.order(tables))
+
+    @classmethod
+    def completed(cls, tables: dict[str, FloatArray]) -> dict[str, FloatArray]:
+        """The tables with what the constructor would add."""
+        return tables
+
+    def _begun(self, u: FloatArray, state: State | None) -> tuple[CompiledLaw, State]:
+        """The law before the first sample of `u`, and the front of its state."""
+        parameters, memory = self.pack(self.tables)
+        start = (float(u[0]) if u.size else 0.0, *memory[0, 1:].tolist()) if state is None else state
+        if len(start) != memory.shape[1]:
+            raise ValueError(f"the state must hold {memory.shape[1]} numbers, got {len(start)}")
+        moving = np.zeros(len(start) + self.scratch)
+        moving[: len(start)] = start
+        self.prepare(parameters[0], moving)
+        return CompiledLaw(compiled_step(self.step), read_only(parameters[0], finite=False), moving), start
+
+    def _follow(self, law: CompiledLaw, u: FloatArray, y: FloatArray) -> None:
+        """Outputs at `u` into `y`, the state moving along."""
+        with np.errstate(all="ignore"):
+            lost = in_pieces(lambda k: self.path(law, u[k], y[k]), u.size)
+        if lost >= 0:
+            raise SimulationError(self.divergence(lost, u[lost], y[lost]))
+
+
+# ---------------------------------------------------------------------------------- names, numbers and tables
+
+
+def scalars_of(values: Mapping[str, Any]) -> dict[str, float]:
+    """One number for each name, those of a tuple as ``name[k]``."""
+    numbers: dict[str, float] = {}
+    for name, value in values.items():
+        if isinstance(value, tuple):
+            numbers |= {f"{name}[{k}]": each for k, each in enumerate(value)}
+        else:
+            numbers[name] = value
+    return numbers
+
+
+def arguments_of(scalars: Mapping[str, float]) -> dict[str, Any]:
+    """The constructor's arguments, those named ``name[k]`` as one tuple."""
+    arguments: dict[str, Any] = {}
+    for name, value in scalars.items():
+        whole, bracket, _ = name.partition("[")
+        arguments[whole] = (*arguments.get(whole, ()), float(value)) if bracket else float(value)
+    return arguments
+
+
+def tables_of(
+    family: str, defaults: Mapping[str, Any], parameters: Parameters, u: npt.ArrayLike
+) -> tuple[dict[str, FloatArray], FloatArray]:
+    """Every field over sets, (n_sets, ...), and the inputs (1 or n_sets, n_samples).
+
+    A parameter is a field, or an element ``name[k]`` of a tuple.
+
+    Raises
+    ------
+    TypeError
+        If a name is unknown.
+    ValueError
+        If a value has too many axes, or lengths do not fit.
+    """
+    inputs = np.atleast_2d(read_only(u, "u"))
+    if inputs.ndim != 2:
+        raise ValueError(f"u must have 1 axis or 2, got shape {inputs.shape}")
+    whole = {**defaults, **{name: value for name, value in parameters.items() if "[" not in name}}
+    elements = {name: value for name, value in parameters.items() if "[" in name}
+    for name in (*whole, *(name.partition("[")[0] for name in elements)):
+        if name not in defaults:
+            raise TypeError(f"unknown parameter {name!r}: {family} has {', '.join(defaults)}")
+    tables = {name: _table(name, value, np.ndim(defaults[name])) for name, value in whole.items()}
+    columns = {name: _table(name, value, 0) for name, value in elements.items()}
+    lengths = {name: len(table) for name, table in {**tables, **columns, "u": inputs}.items() if len(table) != 1}
+    if len(set(lengths.values())) > 1:
+        raise ValueError(f"parameters and inputs must have one length or length 1, got {lengths}")
+    n_sets = next(iter(lengths.values()), 1)
+    tables = {name: np.broadcast_to(table, (n_sets, *table.shape[1:])) for name, table in tables.items()}
+    for name, column in columns.items():
+        field, _, place = name.partition("[")
+        tables[field] = np.where(np.arange(tables[field].shape[1]) == int(place[:-1]), column, tables[field])
+    return tables, inputs
+
+
+def _table(name: str, values: npt.ArrayLike, ndim: int) -> FloatArray:
+    """Values over sets, of a number (n_sets, 1), of a field with `ndim` axes (n_sets, ...)."""
+    array = read_only(values, name)
+    if array.ndim > ndim + 1:
+        raise ValueError(f"{name} has too many axes: got shape {array.shape}")
+    if array.ndim == ndim:
+        array = array[np.newaxis]
+    return array[:, np.newaxis] if ndim == 0 else array

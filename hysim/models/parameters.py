@@ -1,0 +1,165 @@
+"""Parameters as data: where a family's parameters are searched, and one machine that makes the search box of it.
+
+A parameter is searched in units of the record's spans, so that one box fits a record in any units; or the output is
+affine in it, and it is solved for; or it is neither, and held.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.models.search_space import Freedom, SearchSpace
+from hysim.records import Record
+
+
+class Parameter(NamedTuple):
+    """How `hysim.identify` treats a field of a family.
+
+    `lower` and `upper` are the box, `starts` values from which the search begins beside the law's own, all in units
+    of `unit`: a quotient of the spans of input and output such as ``"y/u"``. A parameter with `log` is searched on a
+    log scale. The output is affine in an `affine` one, which needs no box.
+    """
+
+    name: str
+    lower: float = -np.inf
+    upper: float = np.inf
+    unit: str = "1"
+    log: bool = False
+    starts: tuple[float, ...] = ()
+    affine: bool = False
+
+
+class Coordinate(NamedTuple):
+    """A parameter in its box: searched as a multiple of `scale`, or as its logarithm."""
+
+    name: str
+    lower: float
+    upper: float
+    scale: float = 1.0
+    log: bool = False
+
+    def encode(self, values: Any) -> Any:
+        """Coordinates of values, those outside the box at its side."""
+        inside = np.clip(values, self.lower, self.upper)
+        return np.log(inside) if self.log else inside / self.scale
+
+    def decode(self, x: FloatArray) -> FloatArray:
+        """Values of coordinates."""
+        return np.exp(x) if self.log else x * self.scale
+
+    def limited(self, limits: Mapping[str, tuple[float, float]]) -> "Coordinate":
+        """The coordinate in the user's bounds.
+
+        Raises
+        ------
+        ValueError
+            If a side is not finite, or not positive on a log scale.
+        """
+        lower, upper = limits.get(self.name, (self.lower, self.upper))
+        positive = " positive and" if self.log else ""
+        if not (lower < upper and np.isfinite([lower, upper]).all()) or (self.log and not lower > 0.0):
+            raise ValueError(f"bounds of {self.name!r} must be{positive} finite, got {(lower, upper)}")
+        return self._replace(lower=lower, upper=upper)
+
+
+def declared_space(
+    parameters: Sequence[Parameter],
+    scalars: Mapping[str, float],
+    initial: Sequence[str],
+    record: Record,
+    freedom: Freedom,
+    *,
+    screened: int | None = None,
+) -> SearchSpace:
+    """The search box on one record; `scalars` are the law's own values, `initial` the fields of its initial memory.
+
+    Raises
+    ------
+    ValueError
+        If the input is constant, `freedom.initial` is unknown, or a name or a bound does not fit.
+    """
+    units = spans(record)
+    declared = {parameter.name: parameter for parameter in parameters}
+    of = {name: declared.get(name.partition("[")[0]) for name in scalars}
+    resting = tuple(name for name in scalars if name.partition("[")[0] in initial)
+    kept = {name: scalars[name] for name, each in of.items() if each is None and name not in freedom.free}
+    held = kept | freedom.held(scalars, at_rest=resting if freedom.starts_at_rest() else ())
+    columns = tuple(name for name, each in of.items() if each is not None and each.affine)
+    coordinates, starts = [], []
+    for name, each in of.items():
+        if each is None and name not in held and name not in freedom.bounds:
+            raise ValueError(f"{name!r} is free, but has no bounds: give bounds={{{name!r}: (lower, upper)}}")
+        if each is not None and not each.affine:
+            unit = unit_of(each.unit, units)
+            coordinates.append(Coordinate(name, each.lower * unit, each.upper * unit, unit, each.log))
+            starts.append([scalars[name], *(start * unit for start in each.starts)])
+        elif each is None and name not in held:
+            coordinates.append(Coordinate(name, *freedom.bounds[name]))
+            starts.append([scalars[name]])
+    names = [coordinate.name for coordinate in coordinates]
+    points = [dict(zip(names, values, strict=True)) for values in product(*starts)]
+    limits = freedom.limits(scalars, held)
+    return space_of(coordinates, columns, scalars, held, limits, points, state=resting, screened=screened)
+
+
+def space_of(
+    coordinates: Iterable[Coordinate],
+    columns: tuple[str, ...],
+    defaults: Mapping[str, float],
+    held: Mapping[str, float],
+    limits: Mapping[str, tuple[float, float]],
+    points: Sequence[Mapping[str, float]] = ({},),
+    **others: Any,
+) -> SearchSpace:
+    """The space of the coordinates that are not held, started at `points`: names to values, `defaults` for the rest.
+
+    `columns` are the parameters in which the output is affine, `limits` the user's bounds; `others` goes to
+    `SearchSpace`.
+    """
+    searched = [each.limited(limits) for each in coordinates if each.name not in held]
+    names = tuple(each.name for each in searched)
+    lower, upper = (np.array([each.encode(side) for each, side in zip(searched, sides, strict=True)]) for sides in (
+        [each.lower for each in searched], [each.upper for each in searched]))
+    starts = [[each.encode(point.get(each.name, defaults[each.name])) for each in searched] for point in points]
+    constants = {name: value for name, value in held.items() if name not in columns}
+
+    def parameters(x: FloatArray) -> dict[str, FloatArray]:
+        sets = np.atleast_2d(x)
+        fixed = {name: np.full(len(sets), value) for name, value in constants.items()}
+        return fixed | {each.name: each.decode(column) for each, column in zip(searched, sets.T, strict=True)}
+
+    return SearchSpace(
+        coordinates=names,
+        lower=lower,
+        upper=upper,
+        starts=np.reshape(starts, (len(points), len(names))) if names else np.empty((0, 0)),
+        names=tuple(name for name in defaults if name not in held),
+        columns=columns,
+        linear=tuple(name for name in columns if name not in held),
+        held=held,
+        parameters=parameters,
+        **{"bounds": {name: pair for name, pair in limits.items() if name in columns}, **others},
+    )
+
+
+def spans(record: Record) -> dict[str, float]:
+    """Spans of input and output, the latter 1 where it is constant.
+
+    Raises
+    ------
+    ValueError
+        If the input is constant.
+    """
+    span = float(np.ptp(record.u))
+    if span == 0.0:
+        raise ValueError("the input is constant: nothing can be identified from it")
+    return {"u": span, "y": float(np.ptp(record.y)) or 1.0, "1": 1.0}
+
+
+def unit_of(unit: str, units: Mapping[str, float]) -> float:
+    """Value of a unit such as ``"y/u"`` on a record with these spans."""
+    numerator, _, denominator = unit.partition("/")
+    return units[numerator] / units[denominator or "1"]
