@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen, read_only
 from hysim._words import extent, printed, words
-from hysim.models.model import needs_time
+from hysim.models.protocols import needs_time
 from hysim.records import Record
 
 

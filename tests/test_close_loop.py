@@ -15,7 +15,7 @@ from strategies import bounded_laws
 import hysim as hs
 from hysim.kernels._compile import signed_kernel
 from hysim.kernels.stepping import CONSTANTS, VECTOR
-from hysim.models.model import CompiledLaw
+from hysim.models.protocols import CompiledLaw
 
 EXACT = 1e-12  # expm against expm, and a few hundred steps of a stable loop with signals of order one
 H = 0.05

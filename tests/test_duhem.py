@@ -120,7 +120,7 @@ def test_without_rectified_terms_the_way_back_is_the_way_there():
 
 def test_an_escape_names_its_sample_and_spares_the_rest_of_a_batch():
     law = hs.Duhem.from_terms({"u' y^2": 1.0}, y0=1.0)  # y = 1 / (1 - u)
-    with pytest.raises(SimulationError, match=r"escapes to infinity at sample 2 \(u = 2\)"):
+    with pytest.raises(SimulationError, match=r"diverges at sample 2 \(u = 2\)"):
         law.response([0.0, 0.5, 2.0, 0.5])
     batch = hs.Duhem.responses({"p": law.p, "q": law.q, "y0": [1.0, 0.25]}, [0.0, 0.5, 2.0])
     assert np.isposinf(batch[0]).all()
@@ -129,7 +129,7 @@ def test_an_escape_names_its_sample_and_spares_the_rest_of_a_batch():
 
 def test_a_law_too_stiff_to_follow_says_so():
     law = hs.Duhem.from_terms({"|u'| u^2": 1e9, "|u'| y": -1e9})
-    with pytest.raises(SimulationError, match="too stiff to be followed at sample 1"):
+    with pytest.raises(SimulationError, match=r"law is too stiff\) at sample 1"):
         law.response([0.0, 1.0])
 
 
@@ -222,7 +222,7 @@ def test_arguments_are_checked():
         hs.Duhem(p=[[1.0]], q=[[math.nan]])
     with pytest.raises(ValueError, match="u must be finite, got nan at index 1"):
         GENERAL.response([0.0, math.nan])
-    with pytest.raises(TypeError, match="the parameters of Duhem are p, q, and optionally"):
+    with pytest.raises(TypeError, match="unknown parameter 'z0': Duhem has p, q, p_abs"):
         hs.Duhem.responses({"p": [[1.0]], "q": [[1.0]], "z0": 0.0}, PATH)
     with pytest.raises(ValueError, match="one length or length 1"):
         hs.Duhem.responses({"p": [[1.0]], "q": [[1.0]], "y0": [0.0, 1.0]}, np.zeros((3, 4)))

@@ -149,8 +149,12 @@ def test_a_lost_law_names_the_sample():
         (lambda: hs.CustomLaw(step=dahl, parameters={"a": 1.0}, linear=("b",)), ValueError, "linear names 'b'"),
         (lambda: hs.CustomLaw(step=dahl, parameters={"a": 1.0}, bounds={"b": (0, 1)}), ValueError, "bounds names 'b'"),
         (lambda: DAHL.advance([0.0], (0.0,)), ValueError, "must hold 2 numbers, got 1"),
-        (lambda: hs.identify(DAHL, hs.Record(u=U, y=U), free=("z0",)), ValueError, "'z0' is to be free, but has no"),
-        (lambda: hs.identify(DAHL, hs.Record(u=U, y=U), bounds={"rate": (1.0, np.inf)}), ValueError, "must be finite"),
+        (lambda: hs.identify(DAHL, hs.Record(u=U, y=U), free=("z0",)), ValueError, "'z0' is free, but has no bounds"),
+        (
+            lambda: hs.identify(DAHL, hs.Record(u=U, y=U), bounds={"rate": (1.0, np.inf)}),
+            ValueError,
+            "must be positive and finite",
+        ),
     ],
 )
 def test_wrong_arguments_are_named(call, error, message):

@@ -27,8 +27,8 @@ from hysim.control import (
 from hysim.files import load
 from hysim.models.actuator import Actuator
 from hysim.models.creep import Creep
-from hysim.models.model import needs_time
 from hysim.models.modes import mode
+from hysim.models.protocols import needs_time
 from hysim.models.sensor import Sensor
 from hysim.records import Record
 

@@ -23,8 +23,7 @@ from hysim.errors import SimulationError
 from hysim.identification import Identification, identify
 from hysim.metrics import LoopMetrics, loop_metrics
 from hysim.models.candidates import candidates, is_identifiable, is_searched
-from hysim.models.model import needs_time
-from hysim.models.search_space import Direct
+from hysim.models.protocols import Direct, needs_time
 from hysim.records import Record
 from hysim.simulation import simulate
 

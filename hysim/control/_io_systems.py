@@ -24,8 +24,8 @@ from hysim.kernels.tracking import BOUC_WEN
 from hysim.models.actuator import Actuator
 from hysim.models.boucwen_inverse import BoucWenInverse
 from hysim.models.chain import Chain, ChainState
-from hysim.models.model import CompiledController
 from hysim.models.oscillator import BoucWenOscillator, OscillatorState
+from hysim.models.protocols import CompiledController
 from hysim.models.sensor import Sensor
 
 Rule = Callable[[float, FloatArray, FloatArray, Any], FloatArray]

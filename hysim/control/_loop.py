@@ -14,7 +14,8 @@ from hysim._words import extent, printed, quantity, words
 from hysim.errors import SimulationError
 from hysim.models.actuator import Actuator, is_law
 from hysim.models.chain import Signals
-from hysim.models.model import CompiledController, in_brief
+from hysim.models.model import in_brief
+from hysim.models.protocols import CompiledController
 from hysim.models.sampled import Vibration
 from hysim.models.state_space import linear_plant
 from hysim.records import Record

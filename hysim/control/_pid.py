@@ -17,7 +17,8 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, read_only
 from hysim.control._sampled import Feedback, SampledController
 from hysim.kernels import controllers as kernels
-from hysim.models.model import CompiledController, model
+from hysim.models.model import model
+from hysim.models.protocols import CompiledController
 
 State = tuple[float, float, float, float]
 """Last command before the limits, integral part, derivative part, and last c r - y."""

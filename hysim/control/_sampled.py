@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
-from hysim.models.model import CompiledController
+from hysim.models.protocols import CompiledController
 
 
 class Feedback(NamedTuple):

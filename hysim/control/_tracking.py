@@ -24,7 +24,8 @@ from hysim.control._sampled import Feedback, SampledController
 from hysim.kernels import tracking as kernels
 from hysim.models.actuator import Actuator
 from hysim.models.amplifier import Amplifier
-from hysim.models.model import CompiledController, model
+from hysim.models.model import model
+from hysim.models.protocols import CompiledController
 
 _THROUGH = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
 

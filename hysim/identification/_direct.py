@@ -16,7 +16,8 @@ from hysim.identification._resampling import rms_of_known
 from hysim.identification._result import Identification, Width
 from hysim.identification.sentences import CONSTANT
 from hysim.metrics.rows import LoopRows
-from hysim.models.search_space import Direct, Freedom
+from hysim.models.protocols import Direct
+from hysim.models.search_space import Freedom
 from hysim.records import Record
 
 

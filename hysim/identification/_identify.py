@@ -20,8 +20,8 @@ from hysim.identification._search import PERFECT, optima
 from hysim.identification._searched import Search
 from hysim.identification.columns import swapped_columns
 from hysim.identification.folds import left_out
-from hysim.models.model import needs_time
-from hysim.models.search_space import Direct, Freedom, Identifiable
+from hysim.models.protocols import Direct, Identifiable, needs_time
+from hysim.models.search_space import Freedom
 from hysim.records import Record
 
 
@@ -171,17 +171,17 @@ def _freedom(fixed: Mapping[str, float], free: Sequence[str], bounds: Mapping[st
 def _family(model_or_class: Any) -> Identifiable:
     """The object that declares the search: a class stands for the model with its defaults."""
     family: Any = model_or_class
-    if not all(callable(getattr(family, name, None)) for name in ("search_space", "regressors", "assemble")):
+    if not isinstance(family, Identifiable):
         raise TypeError(f"identify takes a model, a model class or a structure, got {model_or_class!r}")
     belongs_to_the_class = inspect.ismethod(family.search_space)
-    if isinstance(family, type) and not belongs_to_the_class:
-        required = [f.name for f in fields(family) if f.default is MISSING and f.default_factory is MISSING]
+    if isinstance(model_or_class, type) and not belongs_to_the_class:
+        required = [f.name for f in fields(model_or_class) if f.default is MISSING and f.default_factory is MISSING]
         if required:
             raise TypeError(
-                f"{family.__name__} has no defaults for {', '.join(required)}: pass an instance as the start, "
+                f"{model_or_class.__name__} has no defaults for {', '.join(required)}: pass an instance as the start, "
                 "or use discover"
             )
-        family = family()
+        family = model_or_class()
     return family  # type: ignore[no-any-return]
 
 

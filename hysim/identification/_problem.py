@@ -19,7 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
-from hysim.models.search_space import Freedom, Identifiable, Parameters, SearchSpace
+from hysim.models.protocols import Identifiable
+from hysim.models.search_space import Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
 _CHUNK = 200_000  # samples that are evaluated at once, to bound the memory
@@ -138,7 +139,7 @@ class Problem:
         """The family's parameters, (n_sets,) each, for the record `k`; those that are linear are left out."""
         part = self.parts[k]
         parameters = self._decoded(x, part)
-        return _steady(self.family, parameters, part.record) if part.periodic else parameters
+        return _steady(self.family, parameters, part.record) if part.periodic and self.own.state else parameters
 
     def _decoded(self, x: FloatArray, part: Part) -> dict[str, FloatArray]:
         present = part.coordinates >= 0
@@ -220,8 +221,6 @@ def problem(
     whole = None if kinds[0] is None else "free" if "free" in kinds else "rest"
     widest = max(records, key=lambda record: (float(np.ptp(record.u)), len(record)))  # it scales the box
     own = family.search_space(widest, replace(freedom, initial=whole))
-    if "periodic" in kinds and own.state and not hasattr(family, "steady"):
-        raise ValueError(f'{own.state[0]} has no steady cycle that could be computed: use initial="free"')
     if len(records) == 1:
         every = np.arange(len(own.coordinates)), np.arange(len(own.linear))
         return Problem(family, own, own, (Part(records[0], *every, kinds[0] == "periodic", {}),))
@@ -292,4 +291,4 @@ def _place(order: Sequence[tuple[Any, int | None]], k: int, key: Any) -> int:
 
 
 def _steady(family: Any, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
-    return {**parameters, **family.steady(parameters, record)} if hasattr(family, "steady") else dict(parameters)
+    return {**parameters, **family.steady(parameters, record)}

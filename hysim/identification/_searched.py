@@ -155,7 +155,7 @@ class Search:
         first = whole.parts[0].record
         x, linear = np.split(best.theta, [len(whole.space.coordinates)])
         models = tuple(whole.family.assemble(whole.estimates(x, linear, k)) for k in range(len(whole.parts)))
-        notes = whole.family.notes(first, chosen.model) if hasattr(whole.family, "notes") else ()
+        notes = whole.family.notes(first, chosen.model)
         if len(draws) and isinstance(self.noise, Quantised) and best.sigma < _FAINT * self.noise.quantum:
             notes = ("noise this far below the quantum hardly changes a record drawn anew: ask for profiles", *notes)
         return Identification(

@@ -61,7 +61,10 @@ def drive_to_end(
     y: FloatArray,
     out: FloatArray,
 ) -> None:
-    """The memory of each law after the last sample of `u` into `out`, nan where it diverges; `y` has room for outputs."""
+    """The memory of each law after the last sample of `u` into `out`, nan where it diverges.
+
+    `y` has room for the outputs of one law.
+    """
     state = np.zeros(memory.shape[1] + scratch)
     for i in range(out.shape[0]):
         begin(state, memory[i], u[0])

@@ -11,7 +11,7 @@ travelled and w = |z|, both sides of z = 0 obey the same scalar equation
 so one flow, used twice around a zero crossing, is the whole law. It is elementary for n = 1 and n = 2
 (`hysim.kernels.elementary`). For other n everything is measured in w* = |a/c|^(1/n), the value at which
 the two terms balance: then a and c are plus or minus one, and what is left is one function of n
-(`hysim.kernels.charts`). An escape to infinity is returned as `inf`.
+(`hysim.kernels.charts`). A memory that diverges is returned as `inf`.
 
 Layers: scalar functions first (no allocation, no exceptions), then the loops over a path and over a
 batch of laws, then `step`, the form in which closed loops and chains take the law.
@@ -222,7 +222,10 @@ def path(parameters: FloatArray, state: FloatArray, u: FloatArray, out: FloatArr
 
 @inlined
 def to_output(parameters: FloatArray, first: int, u: FloatArray, out: FloatArray) -> None:
-    """Replace the memories in `out` by offset + c1 u + c2 u^2 + ... + gain z, of which gain, offset, c1 begin at `first`."""
+    """Replace the memories z in `out` by offset + c1 u + c2 u^2 + ... + gain z.
+
+    The parameters from `first` on are (gain, offset, c1, c2, ...).
+    """
     gain, offset = parameters[first], parameters[first + 1]
     if parameters.size == first + 3:
         slope = 0.0 + parameters[first + 2]  # as `polynomial` begins

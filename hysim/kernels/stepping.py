@@ -42,5 +42,6 @@ def drive_memory(step: Step, parameters: FloatArray, state: FloatArray, u: Float
 
 @signed_kernel(float64(CONSTANTS, VECTOR, float64))
 def line(parameters: FloatArray, state: FloatArray, u: float) -> float:
-    """The law without memory, `parameters` (offset, slope)."""
+    """The law without memory, `parameters` (offset, slope) and `state` (last u)."""
+    state[0] = u
     return float(parameters[0] + parameters[1] * u)

@@ -1,48 +1,37 @@
-"""Laws that are Bouc-Wen's with n = 1 and gamma = 0 under other names: everything is evaluated as that law.
+"""Laws that are Bouc-Wen's with n = 1 and gamma = 0 under other names: everything is evaluated as that law."""
 
-    z' = A u' - rate |u'| z
-
-On every way of the length L what is left of a memory of one is exp(-rate L), whatever else happens, so that the
-memory is affine in A and in its initial value: a search has the rate alone to find.
-"""
-
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
-from hysim.models._memory_law import State
+from hysim.models._boucwen_step import BoucWenStep
 from hysim.models.boucwen import BoucWen
 from hysim.models.boucwen_inverse import BoucWenInverse, InverseState
-from hysim.models.composable import Composable
+from hysim.models.law import Packed, State, Tables
 from hysim.models.limit_cycle import LimitCycle
-from hysim.models.model import CompiledLaw
 
 
-class AsBoucWen(Composable, ABC):
-    """What a law has from the Bouc-Wen law that it is."""
+class AsBoucWen(BoucWenStep):
+    """A law that says which Bouc-Wen law it is."""
+
+    @classmethod
+    @abstractmethod
+    def equivalent(cls, tables: Tables) -> dict[str, FloatArray]:
+        """Parameters of the Bouc-Wen law over sets, those that differ from its defaults."""
+
+    @classmethod
+    def pack(cls, tables: Tables) -> Packed:
+        """As the Bouc-Wen law is packed."""
+        parameters = cls.equivalent(tables)
+        plain = {name: np.full_like(parameters["A"], value) for name, value in BoucWen.defaults().items()}
+        return BoucWen.pack({**plain, **parameters})
 
     @property
-    @abstractmethod
     def bouc_wen(self) -> BoucWen:
         """The same law as Bouc-Wen's."""
-
-    def memory(self, u: npt.ArrayLike) -> FloatArray:
-        """Memory at the samples of `u`, shape (n_samples,); see `hysim.BoucWen.memory`."""
-        return self.bouc_wen.memory(u)
-
-    def response(self, u: npt.ArrayLike) -> FloatArray:
-        """Output at the samples of an input that is linear between them; see `hysim.BoucWen.response`."""
-        return self.bouc_wen.response(u)
-
-    def advance(self, u: npt.ArrayLike, state: State | None = None) -> tuple[FloatArray, State]:
-        """Output continued from `state`, (last u, memory), and the state after it; see `hysim.BoucWen.advance`."""
-        return self.bouc_wen.advance(u, state)
-
-    def compiled(self, u0: float = 0.0) -> CompiledLaw:
-        """The law as compiled loops take it; the state is that of a first sample at the input `u0`."""
-        return self.bouc_wen.compiled(u0)
+        return BoucWen(**{name: float(table[0, 0]) for name, table in self.equivalent(self.tables).items()})
 
     def tangent(self, direction: npt.ArrayLike, z: npt.ArrayLike) -> FloatArray:
         """Slope dy/du at the memory `z` in a `direction` that is not zero; see `hysim.BoucWen.tangent`."""
@@ -61,10 +50,3 @@ class AsBoucWen(Composable, ABC):
     ) -> FloatArray:
         """Input that gives the output `y` from the input `u0`; see `hysim.BoucWen.inverse_response`."""
         return self.bouc_wen.inverse_response(y, u0, state)
-
-
-def left_and_driven(A: FloatArray, rate: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """What is left of a memory of one, and the memory from zero, shape (n_sets, n_samples) each."""
-    travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(u)))])
-    left = np.exp(-rate[:, np.newaxis] * travelled)
-    return left, BoucWen.responses({"A": A, "beta": rate, "gamma": 0.0}, u)

@@ -48,7 +48,7 @@ class SteppedLaw(MemoryLaw):
         outputs = read_only(y, "y", ndim=1)
         if state is None and u0 is None and outputs.size:
             plain = PolynomialBoucWen(A=0.0, beta=0.0, gamma=0.0, gain=self.gain, offset=self.offset, z0=self.z0)
-            static = replace(plain, input_coefficients=boucwen_inverse.coefficients(self))
+            static = replace(plain, input_coefficients=tuple(boucwen_inverse.coefficients(self)))
             u0 = float(static.inverse_response(outputs[:1])[0])
         start = self._begun(np.array([u0 or 0.0]), None)[1] if state is None else state
         return _numeric_inverse.inverse_response(self, outputs, start, self._terms)

@@ -11,28 +11,21 @@ force) and counterclockwise for a negative one (a piezoelectric displacement).
 Sources: R. Bouc 1967; Y. K. Wen, J. Eng. Mech. Div. 102 (1976); the classes after Ikhouane and Rodellar 2007.
 """
 
-from typing import ClassVar
-
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
-from hysim.kernels import boucwen as kernels
-from hysim.kernels.charts import N_WORK
+from hysim._frozen import FloatArray
 from hysim.models import _boucwen_facts, boucwen_inverse, limit_cycle
+from hysim.models._boucwen_step import BoucWenStep
 from hysim.models._memory_law import MemoryLaw
 from hysim.models.boucwen_inverse import BoucWenInverse, InverseState
 from hysim.models.law import Packed, State, Tables
 from hysim.models.limit_cycle import LimitCycle
-from hysim.models.model import CompiledLaw
 from hysim.records import Record
 
 
-class BoucWenLaw(MemoryLaw):
+class BoucWenLaw(BoucWenStep, MemoryLaw):
     """The memory of Bouc and Wen; what it shares with other laws is in `hysim.models._memory_law`."""
-
-    step = staticmethod(kernels.step)
-    scratch: ClassVar[int] = N_WORK - 2
 
     @property
     def admissible(self) -> bool:
@@ -89,7 +82,7 @@ class BoucWenLaw(MemoryLaw):
         ValueError
             If the amplitude is not positive, or A = 0.
         SimulationError
-            If the memory escapes to infinity within one stroke.
+            If the memory diverges within one stroke.
 
         Examples
         --------
@@ -209,22 +202,6 @@ class BoucWenLaw(MemoryLaw):
     def pack(cls, tables: Tables) -> Packed:
         """Parameters (A, beta, gamma, n, gain, offset, c1, c2, ...) and memory (u, z)."""
         return Packed(cls.joined(tables, "A", "beta", "gamma", "n"), cls.initial_memory(tables))
-
-    @classmethod
-    def prepare(cls, parameters: FloatArray, state: FloatArray) -> None:
-        """The charts of the exponent."""
-        kernels.prepare(*parameters[:4], 0.0, state)
-
-    @classmethod
-    def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:
-        """As `Law.path`, the exponent looked at once for all samples."""
-        return int(kernels.path(law.parameters, law.state, u, y))
-
-    @classmethod
-    def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
-        """As `Law.rows`, laws of n = 1 side by side, and the charts shared by neighbours of equal n."""
-        memory = np.concatenate([tables[name] for name in ("A", "beta", "gamma", "n", "z0")], axis=1)
-        kernels.batch(read_only(memory), read_only(cls.joined(tables)), u, y, 0, len(y))
 
     def divergence(self, sample: int, u: float, y: float) -> str:
         """The sums of parameters that let the memory diverge."""

@@ -17,17 +17,17 @@ import numpy as np
 from hysim._frozen import FloatArray, checked
 from hysim.models._joint_space import declared, together
 from hysim.models._parts import checked_tuple, labels, own, response_of
-from hysim.models._sum_search import is_identifiable, started, time_of
+from hysim.models._sum_search import started, time_of
 from hysim.models._unit_gain import UnitGain
 from hysim.models.composable import Composable
-from hysim.models.model import needs_time
+from hysim.models.protocols import Identifiable, Responding, needs_time
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.transfer_function import TransferFunction, TransferFunctionStructure
 from hysim.records import Record
 
 
 @checked
-class CascadeStructure(Composable):
+class CascadeStructure(Identifiable, Composable):
     """Stages to be identified one behind the other; see `hysim.Cascade.structure`."""
 
     stages: tuple[Any, ...]
@@ -35,12 +35,12 @@ class CascadeStructure(Composable):
     def __post_init__(self) -> None:
         stages = started(checked_tuple(self.stages, "stages"))
         for stage in stages:
-            if not (is_identifiable(stage) or callable(getattr(stage, "response", None))):
+            if not isinstance(stage, Identifiable | Responding):
                 raise TypeError(f"stages must hold models or structures, got {type(stage).__name__}")
             if isinstance(stage, TransferFunction) and stage.initial_state:
                 raise ValueError("a transfer function that is given must not hold an initial state")
         object.__setattr__(self, "stages", stages)
-        if not is_identifiable(stages[self.carrier]):
+        if not isinstance(stages[self.carrier], Identifiable):
             raise TypeError(f"no stage can be identified: a {type(stages[self.carrier]).__name__} carries the gain")
 
     @property
@@ -106,7 +106,7 @@ class CascadeStructure(Composable):
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
         """What the law that carries the gain says of itself."""
         carrier, found = self.stages[self.carrier], model.stages[self.carrier]
-        if not callable(getattr(carrier, "notes", None)) or needs_time(found):
+        if needs_time(found):
             return ()
         return tuple(f"{labels(self.stages)[self.carrier]}: {note}" for note in carrier.notes(record, found))
 

@@ -24,21 +24,21 @@ has its z0, searched where the first input allows it to be.
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from hysim._frozen import FloatArray, checked
-from hysim.models._clamps import Bank, check_elements, positions
+from hysim.models._clamps import check_elements, positions
 from hysim.models.composable import Composable
+from hysim.models.parameters import Coordinate, space_of
+from hysim.models.protocols import Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
 TURN = "turn"
 _LEVELS = 9  # of the former turning point, from which the search begins
-_SHORTEST = 1e-3  # threshold of a single element, in half spans
-_STARTS = (0.1, 0.3, 0.6)
 
 
 class Axis(NamedTuple):
@@ -92,10 +92,10 @@ class ByTheInput:
 
 
 @checked
-class ClampStructure(Composable):
+class ClampStructure(Identifiable, Composable):
     """A bank of plays or stops to be identified; see `PrandtlIshlinskii.structure`."""
 
-    law: type[Bank]
+    law: Any
     thresholds: tuple[float, ...] = ()
     plays: int = 10
     one_signed: bool = True
@@ -129,37 +129,34 @@ class ClampStructure(Composable):
         given = freedom.held(defaults, at_rest=(TURN,) if freedom.starts_at_rest("rest") else ())
         held = {name: defaults[name] for name in names if name not in freedom.free} | given
         limits = freedom.limits(defaults, held)
-        box = dict(zip(names, _gaps(thresholds), strict=True)) | {TURN: (first - 2.0 * half, first + 2.0 * half)}
-        box |= {name: (axis.lower, axis.upper) for name, axis in axes.items()}
-        box = {name: limits.get(name, pair) for name, pair in box.items() if name not in held}
-        scales = np.array([axes[name].scale if name in axes else half for name in box])
-        lower, upper = (np.array([pair[side] for pair in box.values()]) / scales for side in (0, 1))
-        constants = {name: value for name, value in held.items() if name not in columns}
-
-        def parameters(x: FloatArray) -> dict[str, FloatArray]:
-            sets = np.atleast_2d(x)
-            fixed = {name: np.full(len(sets), value) for name, value in constants.items()}
-            searched = fixed | dict(zip(box, (scales * sets).T, strict=True))
-            return searched | self.pushing.derived(searched, record)
-
-        linear = tuple(name for name in columns if name not in held)
-        starts = {name: axes[name].starts if name in axes else (defaults[name],) for name in box}
+        gaps = zip(names, _gaps(thresholds), strict=True)
+        box = [
+            *(Coordinate(name, *gap, half) for name, gap in gaps),
+            Coordinate(TURN, first - 2.0 * half, first + 2.0 * half, half),
+        ]
+        box += [Coordinate(name, axis.lower, axis.upper, axis.scale) for name, axis in axes.items()]
+        starts = {TURN: tuple(first + half * np.linspace(-2.0, 2.0, _LEVELS))} | {
+            name: axis.starts for name, axis in axes.items()
+        }
+        starts = {name: values for name, values in starts.items() if name not in held}
+        points = [dict(zip(starts, values, strict=True)) for values in itertools.product(*starts.values())]
         signs = self._signs(record, dict(zip(self._names("weights", thresholds.size), thresholds, strict=True)))
-        own = {name: pair for name, pair in limits.items() if name in columns}
-        return SearchSpace(
-            coordinates=tuple(box),
-            lower=lower,
-            upper=upper,
-            starts=_starts(starts, half, scales, lower, upper),
-            names=tuple(name for name in defaults if name not in held),
-            columns=columns,
-            linear=linear,
-            held=held,
-            parameters=parameters,
-            bounds={name: pair for name, pair in signs.items() if name in linear} | own,
+        bounds = {name: pair for name, pair in signs.items() if name in columns and name not in held}
+        space = space_of(
+            box,
+            columns,
+            defaults,
+            held,
+            limits,
+            points,
+            bounds=bounds | {name: pair for name, pair in limits.items() if name in columns},
             state=(TURN,),
-            screened=0 if set(box) <= {TURN, *axes} else 256,
+            screened=0 if {each.name for each in box} - set(held) <= {TURN, *axes} else 256,
         )
+        return replace(space, parameters=lambda x: self._with_derived(space.parameters(x), record))
+
+    def _with_derived(self, searched: dict[str, FloatArray], record: Record) -> dict[str, FloatArray]:
+        return searched | self.pushing.derived(searched, record)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """One column for each element, the input where there is a feedthrough, 1 and 0."""
@@ -225,46 +222,6 @@ class ClampStructure(Composable):
         return {name: side for name, threshold in thresholds.items() if threshold > 0.0}
 
 
-def single_space(defaults: Mapping[str, float], record: Record, freedom: Freedom) -> SearchSpace:
-    """Declare threshold and z0 of a single play or stop as coordinates; gain and offset are linear.
-
-    Raises
-    ------
-    ValueError
-        If the input is constant, `initial` is unknown, or a name or a bound does not fit.
-    """
-    half, first = half_span(record), float(record.u[0])
-    held = freedom.held(defaults, at_rest=("z0",) if freedom.starts_at_rest() else ())
-    limits = freedom.limits(defaults, held)
-    box = {"threshold": (_SHORTEST * half, 1.5 * half), "z0": (first - half, first + half)} | limits
-    free = [name for name in ("threshold", "z0") if name not in held]
-    lower, upper = (np.array([box[name][side] for name in free]) / half for side in (0, 1))
-    columns = ("gain", "offset")
-    constants = {name: value for name, value in held.items() if name not in columns}
-
-    def parameters(x: FloatArray) -> dict[str, FloatArray]:
-        sets = np.atleast_2d(x)
-        fixed = {name: np.full(len(sets), value) for name, value in constants.items()}
-        return fixed | dict(zip(free, half * sets.T, strict=True))
-
-    starts = [{"threshold": share, "z0": first / half} for share in _STARTS]
-    starts.append({name: defaults[name] / half for name in ("threshold", "z0")})
-    return SearchSpace(
-        coordinates=tuple(free),
-        lower=lower,
-        upper=upper,
-        starts=np.clip([[start[name] for name in free] for start in starts], lower, upper),
-        names=tuple(name for name in defaults if name not in held),
-        columns=columns,
-        linear=tuple(name for name in columns if name not in held),
-        held=held,
-        parameters=parameters,
-        bounds={name: pair for name, pair in limits.items() if name in columns},
-        state=("z0",),
-        screened=256,
-    )
-
-
 def half_span(record: Record) -> float:
     """Half the span of the input: the largest threshold of which a cycle can tell.
 
@@ -294,16 +251,6 @@ def _gaps(thresholds: FloatArray) -> list[tuple[float, float]]:
     gaps = np.empty((thresholds.size, 2))
     gaps[order] = np.stack([edges[:-1], edges[1:]], axis=1)
     return [(lower, upper) for lower, upper in gaps.tolist()]
-
-
-def _starts(
-    points: Mapping[str, tuple[float, ...]], half: float, scales: FloatArray, lower: FloatArray, upper: FloatArray
-) -> FloatArray:
-    """Every combination of the points given, with every level of the former turning point."""
-    levels = half * np.linspace(-2.0, 2.0, _LEVELS)
-    choices = [values[0] + levels if name == TURN else np.array(values) for name, values in points.items()]
-    rows = list(itertools.product(*choices))
-    return np.clip(np.reshape(rows, (len(rows), len(points))) / scales, lower, upper)
 
 
 def runs_clockwise(record: Record) -> bool:

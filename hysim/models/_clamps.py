@@ -1,4 +1,4 @@
-"""What the laws of plays and stops share.
+"""Laws of plays and stops.
 
     z_i(k) = min(max(z_i(k-1), u_k - r_i), u_k + r_i)
     y      = offset + feedthrough u + sum_i w_i z_i              plays
@@ -11,27 +11,19 @@ play of the negative weight beside c u, so that every law is
     y = offset + c u + sum_i v_i z_i,    v_i = w_i or -w_i
 """
 
-from abc import ABC
-from dataclasses import fields
 from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
-from hysim._parallel import in_pieces
+from hysim._frozen import FloatArray, items, read_only
 from hysim.kernels import clamps as kernels
-from hysim.models._batch import Batch, Reduction, Sets, part_of
-from hysim.models.composable import Composable
+from hysim.models.law import Law, Packed, Tables
 from hysim.models.limit_cycle import LimitCycle
-from hysim.models.model import CompiledLaw
-from hysim.models.search_space import Parameters
-
-State = tuple[float, ...]
-"""Last input, and the positions of the plays."""
+from hysim.models.protocols import CompiledLaw
 
 
-class Bank(Composable, ABC):
+class Bank(Law):
     """Plays or stops; a law says what its thresholds and weights are called, and adds its fields."""
 
     thresholds_name: ClassVar[str]
@@ -44,166 +36,68 @@ class Bank(Composable, ABC):
 
     def __post_init__(self) -> None:
         if self.bank and len(self.z0) == 1:
-            object.__setattr__(self, "z0", self.z0 * len(getattr(self, self.thresholds_name)))
-        check_elements(type(self), *(np.atleast_2d(part) for part in self.elements))
+            object.__setattr__(self, "z0", self.z0 * len(items(self)[self.thresholds_name]))
+        super().__post_init__()
+
+    @classmethod
+    def completed(cls, tables: dict[str, FloatArray]) -> dict[str, FloatArray]:
+        """The tables with one initial position for each play, where one is given for all."""
+        if tables["z0"].shape[1] == 1:
+            tables["z0"] = np.tile(tables["z0"], tables[cls.thresholds_name].shape[1])
+        return tables
+
+    @classmethod
+    def check(cls, tables: Tables) -> None:
+        """Refuse elements that are no plays or stops of this law."""
+        check_elements(cls, *(tables[name] for name in (cls.thresholds_name, cls.weights_name, "z0")))
 
     @property
     def elements(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Thresholds, weights and initial positions, shape (n_plays,) each."""
         names = self.thresholds_name, self.weights_name, "z0"
-        thresholds, weights, z0 = (read_only(np.atleast_1d(getattr(self, name)), name) for name in names)
+        thresholds, weights, z0 = (read_only(self.tables[name][0], name) for name in names)
         return thresholds, weights, z0
 
 
 class ClampLaw(Bank):
-    """A sum of plays or stops, and what else can be told of it."""
+    """A sum of plays or stops beside a line."""
+
+    step = staticmethod(kernels.step)
+    feedthrough = 0.0
 
     @property
     def as_plays(self) -> tuple[float, FloatArray, FloatArray]:
         """Slope c beside the plays, and their thresholds and weights v in the order of the thresholds."""
         thresholds, weights, _ = self.elements
         order = np.argsort(thresholds, kind="stable")
-        feedthrough = float(getattr(self, "feedthrough", 0.0))
+        feedthrough = self.feedthrough
         if self.stops:
             return feedthrough + float(weights.sum()), thresholds[order], -weights[order]
         return feedthrough, thresholds[order], weights[order]
 
-    def memory(self, u: npt.ArrayLike) -> FloatArray:
-        """Positions of the plays at the samples of an input that is monotone between them.
-
-        Parameters
-        ----------
-        u : array, shape (n_samples,)
-            Input; the first sample finds the plays at z0, and pushes them.
-
-        Returns
-        -------
-        array, shape (n_samples, n_plays)
-            [unit of u]; (n_samples,) for a single play or stop.
-
-        Raises
-        ------
-        ValueError
-            If u is not finite or has not one axis.
-        """
-        inputs = read_only(u, "u", ndim=1)
-        thresholds, _, z0 = self.elements
-        z = np.empty((inputs.size, thresholds.size))
-        moving = z0.copy()
-
-        def path(piece: slice) -> int:
-            kernels.positions(thresholds, moving, inputs[piece], z[piece])
-            return -1
-
-        in_pieces(path, inputs.size)
-        return z if self.bank else z[:, 0]
-
-    def response(self, u: npt.ArrayLike) -> FloatArray:
-        """Output y at the samples of an input that is monotone between them.
-
-        Parameters
-        ----------
-        u : array, shape (n_samples,)
-            Input; the first sample finds the plays at z0, and pushes them.
-
-        Returns
-        -------
-        array, shape (n_samples,)
-
-        Raises
-        ------
-        ValueError
-            If u is not finite or has not one axis.
-        """
-        return self.advance(u)[0]
-
-    def advance(self, u: npt.ArrayLike, state: State | None = None) -> tuple[FloatArray, State]:
-        """Output at the samples of `u`, continued from `state`, and the state after the last sample.
-
-        Parameters
-        ----------
-        u : array, shape (n_samples,)
-            Input, monotone between its samples and from the state's input to the first of them.
-        state : tuple of float, optional
-            Input and positions at the last sample so far; by default ``(u[0], *z0)``.
-
-        Returns
-        -------
-        y : array, shape (n_samples,)
-            The same bits as from one uncut input.
-        state : tuple of float
-            To continue from.
-
-        Raises
-        ------
-        ValueError
-            As `response`, or if the state does not hold one position for each play.
-        """
-        inputs = read_only(u, "u", ndim=1)
-        thresholds, weights, z0 = self.elements
-        start = (float(inputs[0]) if inputs.size else 0.0, *z0.tolist()) if state is None else state
-        z = np.array(start[1:], dtype=float)
-        if z.size != thresholds.size:
-            raise ValueError(f"the state must hold {1 + thresholds.size} numbers, got {len(start)}")
-        y = np.empty(inputs.size)
-        output, terms = self._output(), np.empty(z.size)
-
-        def path(piece: slice) -> int:
-            kernels.path(thresholds, weights, output, z, terms, inputs[piece], y[piece])
-            return -1
-
-        in_pieces(path, y.size)
-        return y, (float(inputs[-1]), *z.tolist()) if y.size else start
-
-    def compiled(self, u0: float = 0.0) -> CompiledLaw:
-        """The law as compiled loops take it; the state is that of a first sample at the input `u0`."""
-        thresholds, weights, z0 = self.elements
-        z = np.minimum(np.maximum(z0, u0 - thresholds), u0 + thresholds)
-        parameters = read_only(np.concatenate([self._output(), thresholds, weights]))
-        return CompiledLaw(kernels.step, parameters, np.concatenate([[u0], z]))
+    @classmethod
+    def pack(cls, tables: Tables) -> Packed:
+        """Parameters (stops, offset, feedthrough, thresholds, weights) and memory (u, positions)."""
+        offset = tables["offset"]
+        head = [np.full_like(offset, cls.stops), offset, tables.get("feedthrough", np.zeros_like(offset))]
+        elements = [tables[name] for name in (cls.thresholds_name, cls.weights_name)]
+        return Packed(np.concatenate([*head, *elements], axis=1), cls.initial_memory(tables))
 
     @classmethod
-    def responses(
-        cls,
-        parameters: Parameters,
-        u: npt.ArrayLike,
-        *,
-        reduce: Reduction | None = None,
-        target: npt.ArrayLike | None = None,
-        workers: int | None = None,
-    ) -> FloatArray:
-        """Outputs of many laws at once, on all cores, or one number of each.
+    def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:
+        """As `Law.path`, the plays of a sample side by side."""
+        output, elements = np.split(law.parameters, [kernels.N_OUTPUT])
+        thresholds, weights = np.split(elements, 2)
+        kernels.path(thresholds, weights, output, law.state[1:], np.empty(weights.size), u, y)
+        law.state[0] = u[-1]
+        return -1
 
-        Parameters
-        ----------
-        parameters : mapping
-            The constructor's names to values. A number may be an array over sets, shape (n_sets,), and a
-            tuple an array of shape (n_sets, n_plays), or (n_plays,) for all sets.
-        u : array, shape (n_samples,) or (n_sets, n_samples)
-            One input for all sets, or one for each.
-        reduce : {"sse", "max_width", "area", "final"}, optional
-            Keep of each output only the sum of its squared differences from `target`, the measure of this
-            name of `loop_metrics` (last complete cycle), or the last sample.
-        target : array, shape (n_samples,)
-            With ``reduce="sse"`` what the outputs are compared with [unit of y].
-        workers : int, optional
-            Number of threads; by default one for each core. The result does not depend on it.
-
-        Returns
-        -------
-        array, shape (n_sets, n_samples), or (n_sets,) with `reduce`
-            Each row the same bits as `response`.
-
-        Raises
-        ------
-        TypeError
-            If a name is not one of the constructor's.
-        ValueError
-            If lengths do not fit, a value is not one that the constructor takes, or the input has no
-            complete cycle to measure.
-        """
-        laws = cls._batch(parameters, u)
-        return laws.rows(workers) if reduce is None else laws.reduced(reduce, target, workers)
+    @classmethod
+    def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
+        """As `Law.rows`, the plays of a sample side by side."""
+        output = cls.pack(tables).parameters[:, : kernels.N_OUTPUT]
+        thresholds, weights = (read_only(tables[name]) for name in (cls.thresholds_name, cls.weights_name))
+        kernels.batch(thresholds, weights, read_only(output), read_only(tables["z0"]), u, y)
 
     def tangent(self, direction: npt.ArrayLike, z: npt.ArrayLike, u: npt.ArrayLike) -> FloatArray:
         """Slope dy/du at the positions `z`, for an input at `u` that moves in `direction`.
@@ -234,7 +128,7 @@ class ClampLaw(Bank):
         memory = np.asarray(z, dtype=float) if self.bank else np.asarray(z, dtype=float)[..., np.newaxis]
         pushed = np.where(velocity > 0.0, inputs - thresholds >= memory, inputs + thresholds <= memory)
         moving = ~pushed if self.stops else pushed
-        return np.asarray(getattr(self, "feedthrough", 0.0) + np.sum(weights * moving, axis=-1))
+        return np.asarray(self.feedthrough + np.sum(weights * moving, axis=-1))
 
     def slope_bounds(self) -> tuple[float, float]:
         """Lowest and highest slope dy/du over every input.
@@ -294,54 +188,6 @@ class ClampLaw(Bank):
             energy=float(4.0 * (v @ (r * (r - X)))),
         )
 
-    def _output(self) -> FloatArray:
-        return read_only([float(self.stops), self.offset, getattr(self, "feedthrough", 0.0)])
-
-    @classmethod
-    def _batch(cls, parameters: Parameters, u: npt.ArrayLike) -> Batch:
-        tables, inputs = sets_of(cls, parameters, u)
-        thresholds, weights, z0 = (read_only(tables[name]) for name in (cls.thresholds_name, cls.weights_name, "z0"))
-        n_sets = len(z0)
-        output = np.zeros((n_sets, kernels.N_OUTPUT))
-        output[:, 0] = cls.stops
-        for column, name in ((1, "offset"), (2, "feedthrough")):
-            output[:, column] = tables[name][:, 0] if name in tables else 0.0
-        return _batch(thresholds, weights, read_only(output), z0, inputs)
-
-
-def sets_of(cls: type[Bank], parameters: Parameters, u: npt.ArrayLike) -> tuple[dict[str, FloatArray], FloatArray]:
-    """Every argument of the constructor over sets, shape (n_sets, its length), and the inputs (1 or n_sets, n_samples).
-
-    Raises
-    ------
-    TypeError, ValueError
-        As `ClampLaw.responses`.
-    """
-    defaults = {field.name: field.default for field in fields(cls)}  # type: ignore[arg-type]
-    if unknown := set(parameters) - set(defaults):
-        raise TypeError(f"unknown parameter {sorted(unknown)[0]!r}: {cls.__name__} has {', '.join(defaults)}")
-    inputs = np.atleast_2d(read_only(u, "u"))
-    if inputs.ndim != 2:
-        raise ValueError(f"u must have 1 axis or 2, got shape {inputs.shape}")
-    given = {**defaults, **parameters}
-    tables = {name: _table(name, given[name], isinstance(default, tuple)) for name, default in defaults.items()}
-    lengths = {name: len(table) for name, table in {**tables, "u": inputs}.items() if len(table) != 1}
-    if len(set(lengths.values())) > 1:
-        raise ValueError(f"parameters and inputs must have one length or length 1, got {lengths}")
-    if tables["z0"].shape[1] == 1:
-        tables["z0"] = np.tile(tables["z0"], tables[cls.thresholds_name].shape[1])
-    check_elements(cls, tables[cls.thresholds_name], tables[cls.weights_name], tables["z0"])
-    n_sets = next(iter(lengths.values()), 1)
-    return {name: np.broadcast_to(table, (n_sets, table.shape[1])) for name, table in tables.items()}, inputs
-
-
-def _table(name: str, values: npt.ArrayLike, is_row: bool) -> FloatArray:
-    """Values over sets, shape (1 or n_sets, 1 or the length of a row)."""
-    array = read_only(values, name)
-    if array.ndim > (2 if is_row else 1):
-        raise ValueError(f"{name} has too many axes: got shape {array.shape}")
-    return np.atleast_2d(array) if is_row else array.reshape(-1, 1)
-
 
 def check_elements(cls: type[Bank], thresholds: FloatArray, weights: FloatArray, z0: FloatArray) -> None:
     """Refuse tables (n_sets, n_plays) that are no elements of a law of the class `cls`."""
@@ -384,14 +230,6 @@ def _turning_values(u: FloatArray) -> FloatArray:
     moves = np.flatnonzero(steps)
     turns = moves[1:][np.sign(steps[moves[1:]]) != np.sign(steps[moves[:-1]])]
     return np.concatenate([u[:1], u[turns], u[-1:]])
-
-
-def _batch(thresholds: FloatArray, weights: FloatArray, output: FloatArray, z0: FloatArray, u: FloatArray) -> Batch:
-    def compute(sets: Sets, inputs: FloatArray, y: FloatArray) -> None:
-        r, w, o, z = (part_of(table, sets) for table in (thresholds, weights, output, z0))
-        kernels.batch(r, w, o, z, inputs, y)
-
-    return Batch(compute, len(z0), u)
 
 
 def _first_zero(u: FloatArray, y: FloatArray) -> float:

@@ -1,24 +1,22 @@
 """What sums and cascades of models share."""
 
-from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import Any, Self
+from abc import abstractmethod
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim.models import _parts
+from hysim.models._by_structure import ByStructure
 from hysim.models.composable import Composable
-from hysim.models.model import CompiledLaw, needs_time
-from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
-from hysim.records import Record
+from hysim.models.protocols import CompiledLaw, Continuable, needs_time
 
 State = tuple[Any, ...]
 """The state of each member."""
 
 
-class Composite(Composable, ABC):
+class Composite(ByStructure, Composable):
     """Models that make one model. It is a law, rate-independent, unless one of them moves in time."""
 
     @property
@@ -39,10 +37,6 @@ class Composite(Composable, ABC):
     @abstractmethod
     def compiled(self, u0: float = 0.0) -> CompiledLaw:
         """The law as compiled loops take it."""
-
-    @abstractmethod
-    def _structure(self) -> Any:
-        """What is identified, from this as the start."""
 
     @property
     def dynamic(self) -> bool:
@@ -77,29 +71,10 @@ class Composite(Composable, ABC):
         """
         return _parts.inverse_response(self, y, u0)
 
-    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The members' spaces beside each other, as the `structure` has them."""
-        space: SearchSpace = self._structure().search_space(record, freedom)
-        return space
-
-    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """Columns in which the output is affine, and what is known of it."""
-        return np.asarray(self._structure().regressors(parameters, record))
-
-    def assemble(self, parameters: Mapping[str, float]) -> Self:
-        """The model with these parameters."""
-        found: Self = self._structure().assemble(parameters)
-        return found
-
-    def notes(self, record: Record, model: Self) -> tuple[str, ...]:
-        """What the laws among the members say of themselves."""
-        found: tuple[str, ...] = self._structure().notes(record, model)
-        return found
-
 
 def continued(part: Any, u: FloatArray, sample_time: float | None, state: Any) -> tuple[FloatArray, Any]:
     """Output of a part from `state` on, None for its first sample, and the state after it."""
-    if not callable(getattr(part, "advance", None)):
+    if not isinstance(part, Continuable):
         raise TypeError(f"a {type(part).__name__} cannot be continued")
     if isinstance(part, Composite):
         return part.advance(u, state, sample_time=sample_time)

@@ -19,6 +19,8 @@ from hysim._frozen import FloatArray, checked
 from hysim.models._clamp_search import ClampStructure
 from hysim.models._play_sums import check_dead_zones, dead_zone
 from hysim.models.composable import Composable
+from hysim.models.parameters import Coordinate, space_of
+from hysim.models.protocols import Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
@@ -26,7 +28,7 @@ _LARGEST = 4.0  # of a weight, in slopes of the record
 
 
 @checked
-class DeadZoneStructure(Composable):
+class DeadZoneStructure(Identifiable, Composable):
     """Plays and dead zones to be identified; see `ModifiedPrandtlIshlinskii.structure`."""
 
     law: type
@@ -67,30 +69,9 @@ class DeadZoneStructure(Composable):
             name: np.clip(own.bounds.get(name, (-np.inf, np.inf)), -_LARGEST * slope, _LARGEST * slope)
             for name in weights
         }
-        box = {name: limits.get(name, tuple(pair)) for name, pair in sides.items() if name not in held}
-        lower, upper = (np.array([pair[side] for pair in box.values()]) / slope for side in (0, 1))
+        box = [Coordinate(name, float(pair[0]), float(pair[1]), slope) for name, pair in sides.items()]
         held = dict(own.held) | {f"dead_zones[{j}]": d for j, d in enumerate(zones.tolist())} | held
-        constants = {name: value for name, value in held.items() if name not in columns}
-
-        def parameters(x: FloatArray) -> dict[str, FloatArray]:
-            sets = np.atleast_2d(x)
-            fixed = {name: np.full(len(sets), value) for name, value in constants.items()}
-            return fixed | dict(zip(box, slope * sets.T, strict=True))
-
-        return SearchSpace(
-            coordinates=tuple(box),
-            lower=lower,
-            upper=upper,
-            starts=np.clip([[point[name] / slope for name in box] for point in starts], lower, upper),
-            names=tuple(name for name in defaults if name not in held),
-            columns=columns,
-            linear=tuple(name for name in columns if name not in held),
-            held=held,
-            parameters=parameters,
-            bounds={name: pair for name, pair in limits.items() if name in columns},
-            state=own.state,
-            screened=0,
-        )
+        return space_of(box, columns, defaults, held, limits, starts, state=own.state, screened=0)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns S_0(x), S_1(x), ..., 1, 0 of the output, shape (n_sets, n_samples, n_zones + 2)."""

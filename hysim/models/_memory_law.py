@@ -7,7 +7,6 @@ u is the input, z the memory, y the output; time has no part in it.
 """
 
 from abc import abstractmethod
-from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -112,7 +111,9 @@ class MemoryLaw(Law):
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box that `hysim.identify` searches, in the coordinates of `hysim.models._boucwen_search`."""
-        return _boucwen_search.search_space(self.scalars, self.columns, record, freedom, alike=self.alike(record, freedom))
+        return _boucwen_search.search_space(
+            self.scalars, self.columns, record, freedom, alike=self.alike(record, freedom)
+        )
 
     def alike(self, record: Record, freedom: Freedom) -> tuple[tuple[str, ...], ...]:
         """Groups of parameters of which one is held on this record."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.errors import SimulationError
-from hysim.models.model import CompiledLaw
+from hysim.models.protocols import CompiledLaw
 
 _POINTS = 16  # of a stretch at which its slope is looked at
 _MAX_STEPS = 400

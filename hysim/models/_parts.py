@@ -12,7 +12,7 @@ from hysim._frozen import FloatArray, read_only
 from hysim.errors import SimulationError
 from hysim.kernels import composed as kernels
 from hysim.kernels.stepping import Step
-from hysim.models.model import CompiledLaw, needs_time
+from hysim.models.protocols import CompiledLaw, OfFamily, Responding, Steppable, needs_time
 
 _REACH, _WIDER = 1e-6, 16.0  # how far at most the output is looked at to either side of the first input; the ratio
 _SHORTEST = 2.0**-46  # of the first input, or this number
@@ -28,8 +28,8 @@ def labels(parts: Sequence[Any]) -> tuple[str, ...]:
 
 
 def _label(part: Any) -> str:
-    kind = part if isinstance(part, type) else getattr(part, "law", type(part))
-    family = (kind if isinstance(kind, type) else type(part)).__name__.removesuffix("Structure")
+    kind = part if isinstance(part, type) else part.law if isinstance(part, OfFamily) else type(part)
+    family = kind.__name__.removesuffix("Structure")
     return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", family).lower()
 
 
@@ -37,7 +37,7 @@ def check_parts(parts: Any, what: str) -> tuple[Any, ...]:
     """The parts as a tuple, each with a response."""
     members = checked_tuple(parts, what)
     for member in members:
-        if isinstance(member, type) or not callable(getattr(member, "response", None)):
+        if isinstance(member, type) or not isinstance(member, Responding):
             name = member.__name__ if isinstance(member, type) else type(member).__name__
             raise TypeError(
                 f"{what} must hold models with a response, got {name} (classes and structures go to `structure`)"
@@ -83,7 +83,7 @@ def _joined(join: Callable[[Step, Step], Step], first: Step, second: Step) -> St
 
 def compiled_law(part: Any, u0: float) -> CompiledLaw:
     """A part as compiled loops take it."""
-    if needs_time(part) or not callable(getattr(part, "compiled", None)):
+    if needs_time(part) or not isinstance(part, Steppable):
         why = "it moves in time" if needs_time(part) else "it has no compiled step"
         raise TypeError(f"a {type(part).__name__} cannot be stepped as a law: {why}")
     return CompiledLaw(*part.compiled(u0))

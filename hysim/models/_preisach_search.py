@@ -21,9 +21,12 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, checked, read_only
+from hysim.models._by_structure import ByStructure
 from hysim.models._clamp_search import TURN, half_span, runs_clockwise
 from hysim.models._relays import RelayLaw, check_relays
 from hysim.models.composable import Composable
+from hysim.models.parameters import Coordinate, space_of
+from hysim.models.protocols import Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
@@ -32,7 +35,7 @@ _RANK = 1e-9  # of a column's length: what is left of one that others make up fo
 
 
 @checked
-class PreisachStructure(Composable):
+class PreisachStructure(Identifiable, Composable):
     """A bank of relays to be identified; see `Preisach.structure`."""
 
     law: type[RelayLaw]
@@ -71,29 +74,12 @@ class PreisachStructure(Composable):
         given = freedom.held(defaults)
         held = {**places, **resting, **{name: 0.0 for name in untold if name not in freedom.free}, **given}
         limits = freedom.limits(defaults, held)
-        box = {} if TURN in held else {TURN: limits.get(TURN, (lowest, highest))}
-        lower, upper = np.reshape([*box.values()], (len(box), 2)).T / scale
-        constants = {name: value for name, value in held.items() if name not in columns}
-
-        def parameters(x: FloatArray) -> dict[str, FloatArray]:
-            sets = np.atleast_2d(x)
-            fixed = {name: np.full(len(sets), value) for name, value in constants.items()}
-            return fixed | dict(zip(box, scale * sets.T, strict=True))
-
-        return SearchSpace(
-            coordinates=tuple(box),
-            lower=lower,
-            upper=upper,
-            starts=np.linspace(lower, upper, _STARTS if box else 1),
-            names=tuple(name for name in defaults if name not in held),
-            columns=columns,
-            linear=tuple(name for name in columns if name not in held),
-            held=held,
-            parameters=parameters,
-            bounds={name: pair for name, pair in {**signs, **limits}.items() if name in columns and name not in held},
-            state=(TURN,),
-            screened=0,
-        )
+        turn = Coordinate(TURN, *limits.get(TURN, (lowest, highest)), scale)
+        points = [
+            {TURN: value} for value in np.linspace(turn.lower, turn.upper, 1 if TURN in held else _STARTS).tolist()
+        ]
+        bounds = {name: pair for name, pair in {**signs, **limits}.items() if name in columns and name not in held}
+        return space_of([turn], columns, defaults, held, limits, points, bounds=bounds, state=(TURN,), screened=0)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """The output of each relay of weight 1, then 1 and 0."""
@@ -162,30 +148,11 @@ class PreisachStructure(Composable):
         return {f"weights[{k}]": side for k in np.flatnonzero(rows > columns).tolist()}
 
 
-class SearchedRelays(RelayLaw):
-    """What `identify` asks of both laws."""
+class SearchedRelays(ByStructure, RelayLaw):
+    """A law of relays that `hysim.identify` takes."""
 
-    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The linear weights, and the memory; see the module."""
-        return self._structure().search_space(record, freedom)
-
-    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """Columns of the single relays, 1 and 0, shape (n_sets, n_samples, n_weights + 2)."""
-        return self._structure().regressors(parameters, record)
-
-    def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        """The parameters with the memory of the steady cycle of which `record` is one period or more."""
-        return self._structure().steady(parameters, record)
-
-    def assemble(self, parameters: Mapping[str, float]) -> RelayLaw:
-        """The law with these parameters, one number for each name."""
-        return self._structure().assemble(parameters)
-
-    def notes(self, record: Record, law: RelayLaw) -> tuple[str, ...]:
-        """How many of the weights the record tells apart, where these are not all."""
-        return self._structure().notes(record, law)
-
-    def _structure(self) -> PreisachStructure:
+    def as_structure(self) -> PreisachStructure:
+        """The structure with the levels of this law."""
         return PreisachStructure(law=type(self), levels=self.levels)
 
     @classmethod

@@ -13,8 +13,6 @@ extremes; see `hysim.kernels.preisach`.
 """
 
 import math
-from abc import ABC
-from dataclasses import fields
 from typing import ClassVar
 
 import numpy as np
@@ -23,19 +21,14 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, read_only
 from hysim._parallel import in_pieces
 from hysim.kernels import preisach as kernels
-from hysim.models._batch import Batch, Reduction, Sets, part_of
-from hysim.models.composable import Composable
-from hysim.models.model import CompiledLaw
-from hysim.models.search_space import Parameters
-
-State = tuple[float, ...]
-"""Last input, and the dominant extremes so far, the oldest first."""
+from hysim.models.law import Law, State, Tables
+from hysim.models.protocols import CompiledLaw
 
 _ROOM = 1000  # extremes that a compiled loop remembers
 _NOTHING = np.array([[0.0, 1.0]]), np.array([[0.0]])  # levels and weights of a law without any
 
 
-class RelayLaw(Composable, ABC):
+class RelayLaw(Law):
     """A bank of weighted relays; a law says whether they are spread over their intervals, and adds its fields."""
 
     spread: ClassVar[bool]
@@ -44,58 +37,23 @@ class RelayLaw(Composable, ABC):
     offset: float
     z0: tuple[float, ...]
 
-    def __post_init__(self) -> None:
-        check_relays(np.atleast_2d(self.levels), np.atleast_2d(self.weights))
+    step = staticmethod(kernels.step)
+
+    @classmethod
+    def check(cls, tables: Tables) -> None:
+        """Refuse levels and weights that are no relays."""
+        check_relays(tables["levels"], tables["weights"])
 
     @property
     def everett(self) -> FloatArray:
         """E at the pairs of levels (upper, lower), shape (n_levels, n_levels) [unit of y]; zero above the diagonal."""
         return read_only(everett_of(np.array([self.weights]))[0])
 
-    def response(self, u: npt.ArrayLike) -> FloatArray:
-        """Output y at the samples of an input that is monotone between them.
-
-        Parameters
-        ----------
-        u : array, shape (n_samples,)
-            Input; the first sample finds the relays as z0 left them. Beyond the levels the law is saturated.
-
-        Returns
-        -------
-        array, shape (n_samples,)
-
-        Raises
-        ------
-        ValueError
-            If u is not finite or has not one axis.
-        """
-        return self.advance(u)[0]
-
     def advance(self, u: npt.ArrayLike, state: State | None = None) -> tuple[FloatArray, State]:
-        """Output at the samples of `u`, continued from `state`, and the state after the last sample.
-
-        Parameters
-        ----------
-        u : array, shape (n_samples,)
-            Input, monotone between its samples and from the state's input to the first of them.
-        state : tuple of float, optional
-            Last input so far, and the dominant extremes, the oldest first; by default what z0 leaves.
-
-        Returns
-        -------
-        y : array, shape (n_samples,)
-            The same bits as from one uncut input.
-        state : tuple of float
-            To continue from; as long as the staircase has corners.
-
-        Raises
-        ------
-        ValueError
-            As `response`.
-        """
+        """As `Law.advance`; the state is the last input and the dominant extremes, the oldest first."""
         inputs = read_only(u, "u", ndim=1)
         past = self.z0 if state is None else state[1:]
-        parameters, x, outputs, d = self._begun(past, inputs.size)
+        parameters, x, outputs, d = self._staircase(past, inputs.size)
         y = np.empty(inputs.size)
         before = float(x[d]) if state is None else state[0]
 
@@ -136,62 +94,24 @@ class RelayLaw(Composable, ABC):
         corners = [(max(pair), min(pair)) for pair in zip(extremes[1:], extremes, strict=False)]
         return np.array([*corners, (extremes[-1], extremes[-1])])
 
-    def compiled(self, u0: float = 0.0) -> CompiledLaw:
-        """The law as compiled loops take it; the state is that of a first sample at the input `u0`.
+    memory = None  # type: ignore[assignment]  # a staircase of any length, see `staircase`
 
-        It has room for 1000 extremes. Of more, two neighbours are forgotten that change the staircase least.
-        """
+    def compiled(self, u0: float = 0.0) -> CompiledLaw:
+        """As `Law.compiled`; the state is the last input, the place of the last extreme, extremes and outputs there."""
         state = np.zeros(2 + 2 * _ROOM)
-        parameters, x, y, d = self._begun((*self.z0, u0), 0)
+        parameters, x, y, d = self._staircase((*self.z0, u0), 0)
         kept = min(d + 1, _ROOM)
         state[0], state[1] = u0, kept - 1
         state[2 : 2 + kept], state[2 + _ROOM : 2 + _ROOM + kept] = x[:kept], y[:kept]
         return CompiledLaw(kernels.step, parameters, state)
 
     @classmethod
-    def responses(
-        cls,
-        parameters: Parameters,
-        u: npt.ArrayLike,
-        *,
-        reduce: Reduction | None = None,
-        target: npt.ArrayLike | None = None,
-        workers: int | None = None,
-    ) -> FloatArray:
-        """Outputs of many laws at once, on all cores, or one number of each.
+    def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
+        """As `Law.rows`, with room for as many extremes as there are samples."""
+        parameters = cls._rows(tables["levels"], tables["weights"], tables["offset"][:, 0])
+        kernels.batch(read_only(parameters), read_only(tables["z0"]), u, y)
 
-        Parameters
-        ----------
-        parameters : mapping
-            The constructor's names to values: the offset one number or an array over sets, shape (n_sets,); a tuple
-            an array of shape (n_sets, length), or (length,) for all sets.
-        u : array, shape (n_samples,) or (n_sets, n_samples)
-            One input for all sets, or one for each.
-        reduce : {"sse", "max_width", "area", "final"}, optional
-            Keep of each output only the sum of its squared differences from `target`, the measure of this
-            name of `loop_metrics` (last complete cycle), or the last sample.
-        target : array, shape (n_samples,)
-            With ``reduce="sse"`` what the outputs are compared with [unit of y].
-        workers : int, optional
-            Number of threads; by default one for each core. The result does not depend on it.
-
-        Returns
-        -------
-        array, shape (n_sets, n_samples), or (n_sets,) with `reduce`
-            Each row the same bits as `response`.
-
-        Raises
-        ------
-        TypeError
-            If a name is not one of the constructor's.
-        ValueError
-            If lengths do not fit, a value is not one that the constructor takes, or the input has no
-            complete cycle to measure.
-        """
-        laws = cls._batch(parameters, u)
-        return laws.rows(workers) if reduce is None else laws.reduced(reduce, target, workers)
-
-    def _begun(self, past: State, n_samples: int) -> tuple[FloatArray, FloatArray, FloatArray, int]:
+    def _staircase(self, past: State, n_samples: int) -> tuple[FloatArray, FloatArray, FloatArray, int]:
         """Parameters, extremes and outputs as kernels take them after the inputs `past`, and the last place."""
         parameters = read_only(self._rows(*(np.array([part]) for part in (self.levels, self.weights, self.offset)))[0])
         x, y = np.empty(1 + len(past) + n_samples), np.empty(1 + len(past) + n_samples)
@@ -211,37 +131,6 @@ class RelayLaw(Composable, ABC):
         rows[:, kernels.HEAD : kernels.HEAD + n] = levels
         rows[:, kernels.HEAD + n :] = (everett - everett.transpose(0, 2, 1)).reshape(len(everett), n * n)
         return rows
-
-    @classmethod
-    def _batch(cls, parameters: Parameters, u: npt.ArrayLike) -> Batch:
-        defaults = {field.name: field.default for field in fields(cls)}  # type: ignore[arg-type]
-        if unknown := set(parameters) - set(defaults):
-            raise TypeError(f"unknown parameter {sorted(unknown)[0]!r}: {cls.__name__} has {', '.join(defaults)}")
-        tables = {name: _table(name, value) for name, value in {**defaults, **parameters, "u": u}.items()}
-        lengths = {name: len(table) for name, table in tables.items() if len(table) != 1}
-        if len(set(lengths.values())) > 1:
-            raise ValueError(f"parameters and inputs must have one length or length 1, got {lengths}")
-        n_sets = next(iter(lengths.values()), 1)
-        inputs = tables.pop("u")
-        levels, weights, offset, z0 = (
-            read_only(np.broadcast_to(tables[name], (n_sets, tables[name].shape[1])))
-            for name in ("levels", "weights", "offset", "z0")
-        )
-        check_relays(levels, weights)
-
-        def compute(sets: Sets, inputs: FloatArray, y: FloatArray) -> None:
-            rows = cls._rows(part_of(levels, sets), part_of(weights, sets), part_of(offset, sets)[:, 0])
-            kernels.batch(read_only(rows), part_of(z0, sets), inputs, y)
-
-        return Batch(compute, n_sets, inputs)
-
-
-def _table(name: str, values: npt.ArrayLike) -> FloatArray:
-    """Values over sets, shape (1 or n_sets, length)."""
-    array = read_only(values, name)
-    if array.ndim > (1 if name == "offset" else 2):
-        raise ValueError(f"{name} has too many axes: got shape {array.shape}")
-    return array.reshape(-1, 1) if name == "offset" else np.atleast_2d(array)
 
 
 def check_relays(levels: FloatArray, weights: FloatArray) -> None:

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from hysim._frozen import FloatArray, checked
+from hysim._frozen import FloatArray, checked, items
 from hysim.models._joint_space import declared, together, without_repetition
 from hysim.models._parts import checked_tuple, labels, own, response_of
 from hysim.models.composable import Composable
-from hysim.models.model import needs_time
-from hysim.models.search_space import ALL_FREE, Freedom, Identifiable, Parameters, SearchSpace
+from hysim.models.protocols import Identifiable, Responding, needs_time
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
 
@@ -22,18 +22,13 @@ def started(parts: Sequence[Any]) -> tuple[Any, ...]:
     return tuple(part() if isinstance(part, type) else part for part in parts)
 
 
-def is_identifiable(part: Any) -> bool:
-    """Whether a part declares a search."""
-    return all(callable(getattr(part, name, None)) for name in ("search_space", "regressors", "assemble"))
-
-
 def time_of(part: Any, record: Record) -> float | None:
     """The sample time where the part needs one."""
     return record.sample_time if needs_time(part) else None
 
 
 @checked
-class SumStructure(Composable):
+class SumStructure(Identifiable, Composable):
     """Parts to be identified side by side; see `hysim.Sum.structure`."""
 
     parts: tuple[Any, ...]
@@ -41,7 +36,7 @@ class SumStructure(Composable):
     def __post_init__(self) -> None:
         parts = started(checked_tuple(self.parts, "parts"))
         for part in parts:
-            if not (is_identifiable(part) or callable(getattr(part, "response", None))):
+            if not isinstance(part, Identifiable | Responding):
                 raise TypeError(f"parts must hold models or structures, got {type(part).__name__}")
         object.__setattr__(self, "parts", parts)
 
@@ -69,7 +64,7 @@ class SumStructure(Composable):
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """The parts' columns one after the other, and the sum of what is known."""
         found = self._identified
-        known = [part for part in self.parts if not is_identifiable(part)]
+        known = [part for part in self.parts if not isinstance(part, Identifiable)]
         fixed = sum((response_of(part, record.u, time_of(part, record)) for part in known), np.zeros(len(record)))
         blocks = [part.regressors(own(parameters, label), record) for label, part in found.items()]
         n_sets = max([len(block) for block in blocks], default=1)
@@ -87,11 +82,12 @@ class SumStructure(Composable):
         """
         states: dict[str, Any] = {}
         for label, part in self._identified.items():
-            if callable(steady := getattr(part, "steady", None)):
-                found = steady(own(parameters, label), record)
+            if part.search_space(record).state:
+                try:
+                    found = part.steady(own(parameters, label), record)
+                except ValueError as error:
+                    raise ValueError(f"{label}: {error}") from None
                 states |= {f"{label}.{name}": value for name, value in found.items()}
-            elif part.search_space(record).state:
-                raise ValueError(f'{label} has no steady cycle that could be computed: use initial="free"')
         return {**parameters, **states}
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
@@ -101,7 +97,8 @@ class SumStructure(Composable):
         found = zip(labels(self.parts), self.parts, strict=True)
         return Sum(
             parts=tuple(
-                part.assemble(own(parameters, label)) if is_identifiable(part) else part for label, part in found
+                part.assemble(own(parameters, label)) if isinstance(part, Identifiable) else part
+                for label, part in found
             )
         )
 
@@ -110,14 +107,16 @@ class SumStructure(Composable):
         return tuple(
             f"{label}: {note}"
             for label, part, found in zip(labels(self.parts), self.parts, model.parts, strict=True)
-            if callable(getattr(part, "notes", None)) and not needs_time(found)
+            if isinstance(part, Identifiable) and not needs_time(found)
             for note in part.notes(record, found)
         )
 
     @property
     def _identified(self) -> dict[str, Identifiable]:
         return {
-            label: part for label, part in zip(labels(self.parts), self.parts, strict=True) if is_identifiable(part)
+            label: part
+            for label, part in zip(labels(self.parts), self.parts, strict=True)
+            if isinstance(part, Identifiable)
         }
 
     def _values(self, columns: Sequence[str]) -> dict[str, float]:
@@ -126,5 +125,5 @@ class SumStructure(Composable):
             f"{label}.{name}": value
             for label, part in self._identified.items()
             for name in own(dict.fromkeys(columns), label)
-            if isinstance(value := getattr(part, name, None), float)
+            if isinstance(value := items(part).get(name), float)
         }

@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
+from hysim._frozen import FloatArray, items, read_only
 from hysim.errors import SimulationError
 from hysim.models.amplifier import Amplifier
 from hysim.models.chain import Chain, ChainState, linear_chain
 from hysim.models.creep import Creep
-from hysim.models.model import law_at, model, needs_time
+from hysim.models.model import model
+from hysim.models.protocols import Remembering, Responding, Sampled, Steppable, law_at, needs_time
 from hysim.models.sampled import Stage, Vibration
 from hysim.models.sensor import Sensor
 from hysim.models.state_space import linear_plant
@@ -28,8 +29,8 @@ from hysim.models.transfer_function import TransferFunction
 
 def is_law(value: Any) -> bool:
     """Whether a value answers to an input and can be stepped in a loop, at a sample time if it needs one."""
-    steps = all(callable(getattr(value, name, None)) for name in ("response", "compiled"))
-    return steps and (not needs_time(value) or callable(getattr(value, "at", None)))
+    steps = isinstance(value, Responding) and isinstance(value, Steppable)
+    return steps and (not needs_time(value) or isinstance(value, Sampled))
 
 
 @model
@@ -75,8 +76,8 @@ class Actuator:
 
     def __post_init__(self) -> None:
         for name, kind in (("amplifier", Amplifier), ("creep", Creep), ("sensor", Sensor)):
-            if not isinstance(getattr(self, name), kind | None):
-                raise TypeError(f"{name} must be of {kind.__name__}, got {type(getattr(self, name)).__name__}")
+            if not isinstance(part := items(self)[name], kind | None):
+                raise TypeError(f"{name} must be of {kind.__name__}, got {type(part).__name__}")
         if self.hysteresis is not None and not is_law(self.hysteresis):
             raise TypeError(
                 f"hysteresis must be a law that a loop can step, such as BoucWen, got {type(self.hysteresis).__name__}"
@@ -245,7 +246,7 @@ class Actuator:
 
         The sample time is needed behind an amplifier that takes time.
         """
-        if not callable(getattr(self.hysteresis, "memory", None)):
+        if not isinstance(self.hysteresis, Remembering):
             return None
         inputs = read_only(u, "u", ndim=1)
         if not self._drive_takes_time and not needs_time(self.hysteresis):

@@ -25,9 +25,10 @@ from hysim._frozen import FloatArray
 from hysim.kernels import baber_noori as kernels
 from hysim.models import _boucwen_conversions
 from hysim.models._asymmetric import SteppedLaw
+from hysim.models.holding import Holding
 from hysim.models.law import Packed, Tables
 from hysim.models.model import model
-from hysim.models.search_space import Freedom, Holding, Parameters
+from hysim.models.search_space import Freedom, Parameters
 from hysim.records import Record
 
 _PINCHING = ("zeta_s", "q", "p", "psi", "delta_psi", "lambda_")
@@ -106,7 +107,7 @@ class BoucWenBaberNoori(SteppedLaw):
     input_coefficients: tuple[float, ...] = (0.0,)
 
     step = staticmethod(kernels.step)
-    scratch: ClassVar[int] = kernels.N_STATE - 3
+    workspace: ClassVar[int] = kernels.N_STATE - 3
 
     @classmethod
     def check(cls, tables: Tables) -> None:
@@ -229,7 +230,7 @@ class BoucWenBaberNoori(SteppedLaw):
         Raises
         ------
         SimulationError
-            If the memory escapes to infinity; it names the sample.
+            If the memory diverges; the message names the sample.
         ValueError
             If u is not finite or has not one axis.
         """

@@ -24,7 +24,7 @@ from hysim._parallel import in_pieces
 from hysim.errors import SimulationError
 from hysim.kernels import boucwen_inverse as kernels
 from hysim.kernels.stepping import drive
-from hysim.models.model import CompiledLaw
+from hysim.models.protocols import CompiledLaw
 
 LawState = tuple[float, ...]
 InverseState = tuple[float, float, float]

@@ -9,7 +9,7 @@ from typing import Any
 
 import hysim
 from hysim.models.model import every_family
-from hysim.models.search_space import Direct
+from hysim.models.protocols import Direct, Identifiable, Offering
 
 
 def candidates() -> dict[str, Any]:
@@ -35,11 +35,10 @@ def is_identifiable(subject: Any) -> bool:
 
 def is_searched(subject: Any) -> bool:
     """Whether `identify` searches for the parameters of a class, a model or a structure."""
-    return all(callable(getattr(subject, name, None)) for name in ("search_space", "regressors", "assemble"))
+    return isinstance(subject, Identifiable)
 
 
 def _of_family(name: str, family: Any) -> dict[str, Any]:
-    declared = getattr(family, "candidates", None)
-    if declared is not None:
-        return dict(declared())
+    if isinstance(family, Offering):
+        return dict(family.candidates())
     return {name: family} if is_identifiable(family) else {}

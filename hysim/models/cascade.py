@@ -17,7 +17,8 @@ from hysim.kernels.composed import one_behind_the_other
 from hysim.models._cascade_search import CascadeStructure
 from hysim.models._composite import Composite, State, continued
 from hysim.models._parts import check_parts, compiled_law, compiled_pair, labels, response_of
-from hysim.models.model import CompiledLaw, model
+from hysim.models.model import model
+from hysim.models.protocols import CompiledLaw
 
 __all__ = ["Cascade", "CascadeStructure"]
 
@@ -168,5 +169,6 @@ class Cascade(Composite):
             level = float(stage.response([level])[0])
         return reduce(lambda first, second: compiled_pair(one_behind_the_other, first, second), laws)
 
-    def _structure(self) -> CascadeStructure:
+    def as_structure(self) -> CascadeStructure:
+        """The structure of the same members, those that can be identified as starts."""
         return CascadeStructure(stages=self.stages)

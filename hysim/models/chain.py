@@ -14,7 +14,7 @@ from hysim.kernels import controllers
 from hysim.kernels import loop as kernels
 from hysim.models.amplifier import Amplifier
 from hysim.models.creep import Creep
-from hysim.models.model import CompiledController, CompiledLaw, law_at
+from hysim.models.protocols import CompiledController, CompiledLaw, law_at
 from hysim.models.sampled import (
     Stage,
     Vibration,

@@ -2,6 +2,9 @@
 
 from typing import Any
 
+from hysim._frozen import items
+from hysim.models.protocols import Responding
+
 
 class Composable:
     """What can be a part of a `hysim.Sum` and a stage of a `hysim.Cascade`.
@@ -28,7 +31,7 @@ def _composed(first: Any, second: Any, field: str, whole: type, structure: type)
     members = [
         member
         for operand in (first, second)
-        for member in (getattr(operand, field) if isinstance(operand, whole | structure) else (operand,))
+        for member in (items(operand)[field] if isinstance(operand, whole | structure) else (operand,))
     ]
-    simulated = all(callable(getattr(member, "response", None)) for member in members)
+    simulated = all(isinstance(member, Responding) for member in members)
     return (whole if simulated else structure)(**{field: tuple(members)})

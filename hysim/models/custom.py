@@ -8,9 +8,6 @@ output. It is compiled by numba to the one type that compiled loops take (`hysim
 and `math`, no allocation, no exceptions; nan says that the law is lost.
 """
 
-import functools
-import inspect
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import field, replace
 from types import MappingProxyType
@@ -20,21 +17,16 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, checked, read_only
-from hysim._parallel import in_chunks, in_pieces
-from hysim.errors import SimulationError
-from hysim.kernels.custom import compile_step, drive_sets
-from hysim.kernels.stepping import Step, drive
-from hysim.models.composable import Composable
-from hysim.models.model import CompiledLaw
+from hysim.models._batch import Reduction
+from hysim.models.compiled_step import compiled_step
+from hysim.models.law import Law, Packed, Tables, rows_by_step
+from hysim.models.parameters import Parameter, declared_space
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
-State = tuple[float, ...]
-"""Last input, and the law's own memory."""
-
 
 @checked
-class CustomLaw(Composable):
+class CustomLaw(Law):
     """A law by a scalar function of one's own.
 
     Parameters
@@ -88,7 +80,7 @@ class CustomLaw(Composable):
     (6.0, 0.25)
     """
 
-    step: Callable[[Any, Any, float], float]
+    step: Callable[[Any, Any, float], float]  # type: ignore[misc]
     parameters: Mapping[str, float] = field(default_factory=dict)
     state: Mapping[str, float] = field(default_factory=dict)
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
@@ -96,79 +88,56 @@ class CustomLaw(Composable):
     scratch: int = 0
 
     def __post_init__(self) -> None:
-        for what in ("parameters", "state"):
-            values = {name: _number(value, f"{what}[{name!r}]") for name, value in getattr(self, what).items()}
+        for what, named in (("parameters", self.parameters), ("state", self.state)):
+            values = {name: _number(value, f"{what}[{name!r}]") for name, value in named.items()}
             object.__setattr__(self, what, MappingProxyType(values))
         if not self.parameters:
             raise ValueError("parameters must name at least one parameter")
         if both := set(self.parameters) & set(self.state):
             raise ValueError(f"{sorted(both)[0]!r} names a parameter and an initial value")
         object.__setattr__(self, "linear", tuple(self.linear))
-        for what, names, known in (("linear", self.linear, self.parameters), ("bounds", self.bounds, self.scalars)):
+        for what, names, known in (("linear", self.linear, self.parameters), ("bounds", self.bounds, self.arguments)):
             if unknown := [name for name in names if name not in known]:
-                raise ValueError(f"{what} names {unknown[0]!r}; there are {', '.join(known)}")
+                raise ValueError(f"{what} names {unknown[0]!r}; expected one of {', '.join(known)}")
         compiled_step(self.step)
 
     @property
-    def scalars(self) -> dict[str, float]:
+    def arguments(self) -> dict[str, Any]:
         """Parameters and initial values by name."""
         return {**self.parameters, **self.state}
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """The names in which the output is affine."""
+        """Names in which the output is affine."""
         return self.linear
 
-    def response(self, u: npt.ArrayLike) -> FloatArray:
-        """Output at the samples of `u`, shape (n,).
+    @property
+    def initial(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Names of the initial memory."""
+        return tuple(self.state)
 
-        Raises
-        ------
-        SimulationError
-            If the output leaves the finite numbers; it names the sample.
-        ValueError
-            If u is not finite or has not one axis.
-        """
-        return self.advance(u)[0]
+    def pack(self, tables: Tables) -> Packed:  # type: ignore[override]
+        """The parameters in their order, and the memory with the scratch behind it."""
+        constants = np.concatenate([tables[name] for name in self.parameters], axis=1)
+        scratch = np.zeros((len(constants), self.scratch))
+        memory = [np.zeros((len(constants), 1)), *(tables[name] for name in self.state), scratch]
+        return Packed(constants, np.concatenate(memory, axis=1))
 
-    def advance(self, u: npt.ArrayLike, state: State | None = None) -> tuple[FloatArray, State]:
-        """Output at the samples of `u`, continued from `state`, and the state after the last sample.
+    def rows(self, tables: Tables, u: FloatArray, y: FloatArray) -> None:  # type: ignore[override]
+        """As `Law.rows`."""
+        rows_by_step(compiled_step(self.step), self.pack(tables), 0, u, y)
 
-        Parameters
-        ----------
-        u : array, shape (n_samples,)
-            Input.
-        state : tuple of float, optional
-            What an earlier call returned; by default the initial values, at the first sample.
-
-        Returns
-        -------
-        y : array, shape (n_samples,)
-            The same bits as from one uncut input.
-        state : tuple of float
-            To continue from.
-
-        Raises
-        ------
-        SimulationError, ValueError
-            As `response`.
-        """
-        inputs = read_only(u, "u", ndim=1)
-        compiled = self.compiled(float(inputs[0]) if inputs.size else 0.0)
-        memory = compiled.state if state is None else np.array(state, dtype=float)
-        if memory.shape != compiled.state.shape:
-            raise ValueError(f"the state must hold {compiled.state.size} numbers, got {memory.size}")
-        y = np.empty(inputs.size)
-        with np.errstate(all="ignore"):
-            lost = in_pieces(lambda k: drive(compiled.step, compiled.parameters, memory, inputs[k], y[k]), y.size)
-        if lost >= 0:
-            raise SimulationError(f"the output leaves the finite numbers at sample {lost} (u = {inputs[lost]:g})")
-        return y, tuple(memory.tolist())
-
-    def compiled(self, u0: float = 0.0) -> CompiledLaw:
-        """The law as compiled loops take it; the state is that of a first sample at the input `u0`."""
-        state = np.array([u0, *self.state.values(), *[0.0] * self.scratch])
-        return CompiledLaw(compiled_step(self.step), read_only(list(self.parameters.values()), ndim=1), state)
+    def responses(  # type: ignore[override]
+        self,
+        parameters: Parameters,
+        u: npt.ArrayLike,
+        *,
+        reduce: Reduction | None = None,
+        target: npt.ArrayLike | None = None,
+        workers: int | None = None,
+    ) -> FloatArray:
+        """As `Law.responses`, of laws that are this one where `parameters` does not say otherwise."""
+        return self.outputs_of(parameters, u).result(reduce, target, workers)
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box of the bounded parameters.
@@ -179,53 +148,12 @@ class CustomLaw(Composable):
             If the input is constant, `initial` is unknown, a name does not fit, or bounds are missing or not
             finite.
         """
-        if np.ptp(record.u) == 0.0:
-            raise ValueError("the input is constant: nothing can be identified from it")
-        defaults = self.scalars
         boxes = {**self.bounds, **freedom.bounds}
-        resting = tuple(self.state) if freedom.starts_at_rest() else ()
-        kept = [name for name in defaults if name in resting or (name not in boxes and name not in self.linear)]
-        if unbounded := [name for name in kept if name in freedom.free and name not in boxes]:
-            raise ValueError(
-                f"{unbounded[0]!r} is to be free, but has no bounds: give bounds={{{unbounded[0]!r}: ...}}"
-            )
-        held = {name: defaults[name] for name in kept if name not in freedom.free} | freedom.held(defaults)
-        names = tuple(name for name in defaults if name not in held)
-        searched = tuple(name for name in names if name not in self.linear)
-        limits = freedom.limits(defaults, held)
-        chart = [_Coordinate(name, *boxes[name]) for name in searched]
-        lower, upper = (np.array([axis.encode(axis.box[side]) for axis in chart]) for side in (0, 1))
-        start = np.clip([axis.encode(defaults[axis.name]) for axis in chart], lower, upper)
-
-        def decode(x: FloatArray) -> dict[str, FloatArray]:
-            sets = np.atleast_2d(x)
-            constants = {name: np.full(len(sets), held[name]) for name in held if name not in self.linear}
-            return constants | {axis.name: axis.decode(column) for axis, column in zip(chart, sets.T, strict=True)}
-
-        return SearchSpace(
-            coordinates=searched,
-            lower=lower,
-            upper=upper,
-            starts=start[np.newaxis] if chart else np.empty((0, 0)),
-            names=names,
-            columns=self.linear,
-            linear=tuple(name for name in self.linear if name not in held),
-            held=held,
-            parameters=decode,
-            bounds={name: pair for name, pair in limits.items() if name in self.linear},
-            state=tuple(self.state),
-        )
-
-    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """What each linear parameter adds to the output, and the output without, (n_sets, n_samples, n_linear + 1)."""
-        values = {name: np.atleast_1d(parameters.get(name, value)) for name, value in self.scalars.items()}
-        n_sets = max(column.size for column in values.values())
-        sets = {name: np.broadcast_to(column, n_sets) for name, column in values.items()}
-        sets |= {name: np.zeros(n_sets) for name in self.linear}
-        without = self._outputs(sets, record.u)
-        with np.errstate(invalid="ignore"):
-            added = [self._outputs(sets | {name: np.ones(n_sets)}, record.u) - without for name in self.linear]
-        return np.stack([*added, without], axis=-1)
+        searched = [
+            Parameter(name, *boxes[name], log=boxes[name][0] > 0.0) for name in boxes if name not in self.linear
+        ]
+        searched += [Parameter(name, affine=True) for name in self.linear]
+        return declared_space(searched, (), self.scalars, self.initial, record, freedom)
 
     def assemble(self, parameters: Mapping[str, float]) -> "CustomLaw":
         """The law with these parameters and initial values."""
@@ -234,66 +162,6 @@ class CustomLaw(Composable):
             parameters={name: parameters.get(name, value) for name, value in self.parameters.items()},
             state={name: parameters.get(name, value) for name, value in self.state.items()},
         )
-
-    def _outputs(self, sets: Mapping[str, FloatArray], u: FloatArray) -> FloatArray:
-        """Outputs (n_sets, n_samples); a set that leaves the finite numbers is a row of inf."""
-        n_sets = next(iter(sets.values())).size
-        table = read_only(np.stack([sets[name] for name in self.parameters], axis=1), finite=False)
-        state = np.zeros((n_sets, 1 + len(self.state) + self.scratch))
-        state[:, 0] = u[0]
-        for k, name in enumerate(self.state, 1):
-            state[:, k] = sets[name]
-        out = np.empty((n_sets, u.size))
-        step = compiled_step(self.step)
-
-        def work(start: int, stop: int) -> None:
-            with np.errstate(all="ignore"):
-                drive_sets(step, table, state, u, out, start, stop)
-
-        in_chunks(work, n_sets, n_samples=u.size)
-        return out
-
-
-class _Coordinate:
-    """A parameter between its bounds, on a log scale where both are positive."""
-
-    def __init__(self, name: str, lower: float, upper: float) -> None:
-        if not (math.isfinite(lower) and math.isfinite(upper) and lower < upper):
-            raise ValueError(f"bounds of {name!r} must be finite with lower < upper, got {(lower, upper)}")
-        self.name, self.box, self.scale = name, (lower, upper), max(abs(lower), abs(upper))
-
-    def encode(self, value: float) -> float:
-        """Coordinate of a value."""
-        if self.box[0] > 0.0:
-            return math.log(max(value, self.box[0]))
-        return value / self.scale
-
-    def decode(self, x: FloatArray) -> FloatArray:
-        """Values of a coordinate."""
-        return np.exp(x) if self.box[0] > 0.0 else x * self.scale
-
-
-@functools.lru_cache(maxsize=256)
-def compiled_step(function: Callable[[Any, Any, float], float]) -> Step:
-    """Compile a step for the loops' own types, once in a process.
-
-    Raises
-    ------
-    TypeError
-        If it takes other arguments, or does not compile to one number.
-    """
-    plain = getattr(function, "py_func", function)
-    if not callable(plain):
-        raise TypeError(f"step must be a function step(parameters, state, u) -> y, got {type(function).__name__}")
-    name = getattr(plain, "__name__", "step")
-    taken = inspect.signature(plain).parameters
-    if len(taken) != 3:
-        raise TypeError(f"step must take (parameters, state, u), but {name} takes ({', '.join(taken)})")
-    try:
-        return compile_step(plain)
-    except Exception as error:  # numba raises its own, and now and then what its parts raise
-        reason = " ".join(str(error).split())
-        raise TypeError(f"{name} does not compile as step(parameters, state, u) -> y: {reason}") from None
 
 
 def _number(value: Any, name: str) -> float:

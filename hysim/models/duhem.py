@@ -19,32 +19,27 @@ Sources: P. Duhem 1897; B. D. Coleman and M. L. Hodgdon, Int. J. Eng. Sci. 24 (1
 
 from collections.abc import Mapping, Sequence
 from dataclasses import field
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim._parallel import in_pieces
-from hysim.errors import SimulationError
 from hysim.kernels import duhem as kernels
 from hysim.models import _duhem_search, _numeric_inverse
-from hysim.models.composable import Composable
 from hysim.models.duhem_runs import branches, free_runs, outputs
 from hysim.models.duhem_terms import Polynomials, Term, equation, latex, polynomials, terms_of
-from hysim.models.model import CompiledLaw, model
+from hysim.models.law import Law, Packed, State, Tables
+from hysim.models.model import model
+from hysim.models.protocols import CompiledLaw
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
 if TYPE_CHECKING:
     from hysim.models.duhem_structure import DuhemStructure
 
-State = tuple[float, float]
-"""Last input and memory."""
-
 _BOUND = 1e3
 _OUTPUT = ("feedthrough", "offset", "y0")
-_AXES = {**dict.fromkeys(Polynomials._fields, 3), **dict.fromkeys(_OUTPUT, 1)}  # of the parameters of many laws
 
 
 def _none() -> FloatArray:
@@ -52,7 +47,7 @@ def _none() -> FloatArray:
 
 
 @model
-class Duhem(Composable):
+class Duhem(Law):
     """Polynomial Duhem law, ``y = offset + feedthrough u + z`` with ``z' = u' p(u, z) + |u'| q(u, z)``.
 
     Parameters
@@ -94,9 +89,12 @@ class Duhem(Composable):
     offset: float = 0.0
     y0: float = 0.0
 
+    step = staticmethod(kernels.step)
+    initial: ClassVar[tuple[str, ...]] = ("y0",)
+
     def __post_init__(self) -> None:
-        for name in Polynomials._fields:
-            shape = getattr(self, name).shape
+        for name, part in self._parts._asdict().items():
+            shape = part.shape
             if len(shape) != 2 or 0 in shape:
                 raise ValueError(f"{name} must have two axes and at least one element, got shape {shape}")
 
@@ -237,31 +235,6 @@ class Duhem(Composable):
         """The equation for LaTeX, without dollar signs."""
         return latex(self.equation)
 
-    def response(self, u: npt.ArrayLike) -> FloatArray:
-        """Output y at the samples of an input that is linear between them.
-
-        Parameters
-        ----------
-        u : array, shape (n_samples,)
-            Input; the first sample finds the output at y0.
-
-        Returns
-        -------
-        array, shape (n_samples,)
-
-        Raises
-        ------
-        SimulationError
-            If the output escapes to infinity; it names the sample.
-        ValueError
-            If u is not finite or has not one axis.
-        """
-        return self.advance(u)[0]
-
-    def memory(self, u: npt.ArrayLike) -> FloatArray:
-        """Memory z at the samples of an input that is linear between them; errors as in `response`."""
-        return self._memory(read_only(u, "u", ndim=1), None)
-
     def tangent(self, direction: npt.ArrayLike, z: npt.ArrayLike, u: npt.ArrayLike = 0.0) -> FloatArray:
         """Slope dy/du of the output at the memory `z`, for an input at `u` that moves in `direction`.
 
@@ -289,33 +262,6 @@ class Duhem(Composable):
         p, q, p_abs, q_abs = (np.polynomial.polynomial.polyval2d(inputs, memory, part) for part in self._parts)
         size = np.abs(memory)
         return np.asarray(self.feedthrough + (p + size * p_abs) + np.sign(velocity) * (q + size * q_abs))
-
-    def advance(self, u: npt.ArrayLike, state: State | None = None) -> tuple[FloatArray, State]:
-        """Output at the samples of `u`, continued from `state`, and the state after the last sample.
-
-        Parameters
-        ----------
-        u : array, shape (n_samples,)
-            Input, linear between its samples and from the state's input to the first of them.
-        state : (float, float), optional
-            Input and memory at the last sample so far; by default ``u[0]``, with the output at y0.
-
-        Returns
-        -------
-        y : array, shape (n_samples,)
-            The same bits as from one uncut input.
-        state : (float, float)
-            To continue from.
-
-        Raises
-        ------
-        SimulationError, ValueError
-            As `response`.
-        """
-        inputs = read_only(u, "u", ndim=1)
-        z = self._memory(inputs, state)
-        y = self.offset + (self.feedthrough * inputs + z)
-        return y, (float(inputs[-1]), float(z[-1])) if z.size else state or self._start(0.0)
 
     def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
         """Input that gives the output `y`, linear between the samples.
@@ -354,66 +300,57 @@ class Duhem(Composable):
         if state is not None and u0 is not None:
             raise ValueError("give u0 or state, not both: the state has its own input")
         outputs = read_only(y, "y", ndim=1)
-        return _numeric_inverse.inverse_response(self, outputs, state or self._start(float(u0 or 0.0)), self._terms)
+        return _numeric_inverse.inverse_response(
+            self, outputs, state or self.start(float(u0 or 0.0), np.empty(0)), self._terms
+        )
 
-    def compiled(self, u0: float = 0.0) -> CompiledLaw:
-        """The law as compiled loops take it; the state is that of a first sample at the input `u0`."""
-        law = branches(self._parts)
-        state = np.zeros(kernels.state_size(*law.shape[1:]))
-        state[:2] = self._start(u0)
-        parameters = np.concatenate([[self.offset, self.feedthrough], law.shape, law.ravel()])
-        return CompiledLaw(kernels.step, read_only(parameters), state)
+    @property
+    def workspace(self) -> int:  # type: ignore[override]
+        """Places for the series of the law."""
+        return kernels.state_size(*branches(self._parts).shape[1:]) - 2
 
     @classmethod
-    def responses(cls, parameters: Parameters, u: npt.ArrayLike, *, workers: int | None = None) -> FloatArray:
-        """Outputs of many laws at once, on all cores.
+    def defaults(cls) -> dict[str, Any]:
+        """Zero polynomials, and the other defaults."""
+        return {"p": _none(), "q": _none(), **super().defaults()}
 
-        Parameters
-        ----------
-        parameters : mapping
-            ``"p"`` and ``"q"``, shape (n_sets, rows, columns) or (rows, columns) for all sets, and optionally
-            ``"p_abs"``, ``"q_abs"`` likewise, ``"feedthrough"``, ``"offset"`` and ``"y0"``, shape (n_sets,) or one
-            number.
-        u : array, shape (n_samples,) or (n_sets, n_samples)
-            One input for all sets, or one for each.
-        workers : int, optional
-            Number of threads; by default one for each core. The result does not depend on it.
+    @classmethod
+    def pack(cls, tables: Tables) -> Packed:
+        """Parameters (offset, feedthrough, shape and numbers of the slopes by direction) and memory (u, 0)."""
+        laws = branches(Polynomials(*(tables[name] for name in Polynomials._fields)))
+        shape = np.broadcast_to(np.array(laws.shape[1:], dtype=float), (len(laws), 3))
+        parts = (tables["offset"], tables["feedthrough"], shape, laws.reshape(len(laws), -1))
+        return Packed(np.concatenate(parts, axis=1), np.zeros((len(laws), 2)))
 
-        Returns
-        -------
-        array, shape (n_sets, n_samples)
-            Each row the same bits as `response`, but a law without ``|z|`` among others that have it the same to
-            rounding. A law that escapes is a row of inf.
+    def start(self, u0: float, memory: FloatArray) -> State:
+        """The input, and the memory with which the output is y0."""
+        return u0, self.y0 - self.offset - self.feedthrough * u0
 
-        Raises
-        ------
-        TypeError
-            If a name is not one of the constructor's, or p or q is missing.
-        ValueError
-            If lengths do not fit, or a value is not finite.
-        """
-        if not {"p", "q"} <= parameters.keys() <= _AXES.keys():
-            raise TypeError(
-                "the parameters of Duhem are p, q, and optionally p_abs, q_abs, feedthrough, offset and y0, "
-                f"got {', '.join(parameters)}"
-            )
-        defaults = {"p_abs": _none(), "q_abs": _none(), **dict.fromkeys(_OUTPUT, 0.0)}
-        given = {
-            name: read_only(_with_axes(values, _AXES[name]), name, ndim=_AXES[name])
-            for name, values in {**defaults, **parameters}.items()
-        }
-        given["u"] = read_only(_with_axes(u, 2), "u", ndim=2)
-        lengths = {name: len(values) for name, values in given.items() if len(values) != 1}
-        if len(set(lengths.values())) > 1:
-            raise ValueError(f"parameters and inputs must have one length or length 1, got {lengths}")
-        laws = branches(Polynomials(*(given[name] for name in Polynomials._fields)))
-        offset = given["offset"]
-        y = outputs(laws, given["feedthrough"], given["y0"] - offset, given["u"], kernels.LARGEST, workers)
-        return y + offset[:, np.newaxis]
+    @classmethod
+    def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:
+        """As `Law.path`, without the checks of a single step."""
+        offset, feedthrough, *shape = law.parameters[:5]
+        slopes = law.parameters[5:].reshape([int(length) for length in shape])
+        lost = int(kernels.path(slopes, law.state[0], law.state[1], u, kernels.LARGEST, y))
+        if lost < 0:
+            law.state[:2] = u[-1], y[-1]
+            y[:] = offset + (feedthrough * u + y)
+        return lost
+
+    @classmethod
+    def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
+        """As `Law.rows`, the slopes of all laws side by side."""
+        laws = branches(Polynomials(*(tables[name] for name in Polynomials._fields)))
+        offset, feedthrough, y0 = (tables[name][:, 0] for name in ("offset", "feedthrough", "y0"))
+        y[:] = outputs(laws, feedthrough, y0 - offset, u, kernels.LARGEST, 1) + offset[:, np.newaxis]
+
+    def divergence(self, sample: int, u: float, y: float) -> str:
+        """The law's equation."""
+        return f"{super().divergence(sample, u, y)}: {self.equation}"
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box that `identify` searches; see `hysim.models._duhem_search`."""
-        return _duhem_search.search_space(self._scalars, record, freedom)
+        return _duhem_search.search_space(self.scalars, record, freedom)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """The output itself, shape (n_sets, n_samples, 1): it is affine in none of the parameters.
@@ -421,7 +358,7 @@ class Duhem(Composable):
         A law whose memory goes 1000 times as far as the record counts as one that escapes: following it costs
         much and can only lose.
         """
-        values = {**self._scalars, **parameters}
+        values = {**self.scalars, **parameters}
         names = [name for name in values if name not in _OUTPUT]
         columns = np.broadcast_arrays(*(np.atleast_1d(values[name]) for name in (*names, *_OUTPUT)))
         *coefficients, feedthrough, offset, y0 = columns
@@ -431,10 +368,14 @@ class Duhem(Composable):
         y = free_runs(terms, sets, feedthrough, y0 - offset, record.u[np.newaxis], bound)
         return np.asarray(y + offset[:, np.newaxis])[..., np.newaxis]
 
+    def steady(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
+        """Not computed: raises a ValueError."""
+        raise ValueError('a Duhem law has no steady cycle that could be computed: use initial="free"')
+
     def assemble(self, parameters: Mapping[str, float]) -> Self:
         """The law with these parameters, one number for each name."""
         terms = {name: value for name, value in parameters.items() if name not in _OUTPUT}
-        others = {name: parameters.get(name, getattr(self, name)) for name in _OUTPUT}
+        others = {name: parameters.get(name, self.scalars[name]) for name in _OUTPUT}
         return self.from_terms(terms, **others)
 
     @property
@@ -450,38 +391,9 @@ class Duhem(Composable):
         return "z" if self.feedthrough or self.offset or self.p_abs.any() or self.q_abs.any() else "y"
 
     @property
-    def _scalars(self) -> dict[str, float]:
-        return {**self.terms, **{name: getattr(self, name) for name in _OUTPUT}}
+    def scalars(self) -> dict[str, float]:
+        return {**self.terms, "feedthrough": self.feedthrough, "offset": self.offset, "y0": self.y0}
 
     def _terms(self, u: float, z: float) -> tuple[float, float]:
         """Sizes of the terms of the output that the input contributes, with the offset, and that the memory does."""
         return abs(self.offset) + abs(self.feedthrough * u), abs(z)
-
-    def _start(self, u0: float) -> State:
-        """The state of a first sample at the input `u0`."""
-        return u0, self.y0 - self.offset - self.feedthrough * u0
-
-    def _memory(self, u: FloatArray, state: State | None) -> FloatArray:
-        z = np.empty(u.size)
-        if not u.size:
-            return z
-        last_u, start = self._start(float(u[0])) if state is None else map(float, state)
-        laws = branches(self._parts)
-
-        def path(piece: slice) -> int:
-            k = piece.start
-            before = (float(u[k - 1]), float(z[k - 1])) if k else (last_u, start)
-            return int(kernels.path(laws, *before, u[piece], kernels.LARGEST, z[piece]))
-
-        with np.errstate(all="ignore"):  # an escape overflows, and uncompiled kernels would warn of it
-            lost = in_pieces(path, u.size)
-        if lost >= 0:
-            what = "is too stiff to be followed" if np.isnan(z[lost]) else "escapes to infinity"
-            raise SimulationError(f"the output {what} at sample {lost} (u = {u[lost]:g}): {self.equation}")
-        return z
-
-
-def _with_axes(values: npt.ArrayLike, ndim: int) -> npt.NDArray[np.generic]:
-    """`values` with leading axes of length 1 up to `ndim`."""
-    array = np.asarray(values)
-    return array.reshape((1,) * (ndim - array.ndim) + array.shape)

@@ -19,6 +19,7 @@ from hysim.models import _duhem_search
 from hysim.models.composable import Composable
 from hysim.models.duhem import Duhem
 from hysim.models.duhem_terms import RATES, Term
+from hysim.models.protocols import Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
@@ -27,7 +28,7 @@ _ANY = Duhem(p=np.zeros((1, 1)), q=np.zeros((1, 1)))
 
 
 @dataclass(frozen=True, kw_only=True)
-class DuhemStructure(Composable):
+class DuhemStructure(Identifiable, Composable):
     """The terms of a Duhem law without their coefficients; see `Duhem.structure`."""
 
     terms: tuple[Term, ...]

@@ -23,8 +23,8 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, checked, read_only
 from hysim.models._clamp_search import Axis, ClampStructure, half_span
-from hysim.models._clamps import State
-from hysim.models._play_sums import IDENTITY, RateIndependentPlays, kernel_rows, positions_of
+from hysim.models._play_sums import IDENTITY, ExtendedPlays, kernel_rows, positions_of
+from hysim.models.law import Packed, State, Tables
 from hysim.models.model import model
 from hysim.models.search_space import Parameters
 from hysim.records import Record
@@ -35,7 +35,7 @@ _STARTS: tuple[tuple[float, ...], ...] = ((0.3, 1.0), (0.0, -1.0, 1.0), (0.2,))
 
 
 @model
-class GeneralizedPrandtlIshlinskii(RateIndependentPlays):
+class GeneralizedPrandtlIshlinskii(ExtendedPlays):
     """Generalised Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i`` over plays behind envelopes.
 
     Parameters
@@ -79,9 +79,11 @@ class GeneralizedPrandtlIshlinskii(RateIndependentPlays):
     offset: float = 0.0
     z0: tuple[float, ...] = (0.0,)
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _envelopes(np.atleast_2d(self.left), np.atleast_2d(self.right))
+    @classmethod
+    def check(cls, tables: Tables) -> None:
+        """Refuse elements that are no plays, and envelopes that do not increase."""
+        super().check(tables)
+        _envelopes(tables["left"], tables["right"])
 
     @classmethod
     def structure(
@@ -173,14 +175,16 @@ class GeneralizedPrandtlIshlinskii(RateIndependentPlays):
             raise ValueError(refusal)
         if self._has_one_envelope():
             self.plays.inverse()  # refuses positions that no input leads to
-        return self.steps.inverse_response(y, u0, state)
+        return self.input_of(y, u0, state)
 
     @classmethod
-    def _rows(cls, tables: Mapping[str, FloatArray]) -> FloatArray:
+    def pack(cls, tables: Tables) -> Packed:
+        """Rows with envelopes; see `hysim.kernels.play_sums`."""
         left, right = _envelopes(tables["left"], tables["right"])
-        return kernel_rows(tables, left=left, right=right)
+        return Packed(kernel_rows(tables, left=left, right=right), cls.initial_memory(tables))
 
-    def _structure(self) -> ClampStructure:
+    def as_structure(self) -> ClampStructure:
+        """The structure with the thresholds and envelopes of this law, or with free ones where it has none."""
         left, right = (self.left, self.right) if self.thresholds else ((), ())
         one_signed = self.plays.is_one_signed()
         return self.structure(thresholds=self.thresholds, one_signed=one_signed, left=left, right=right)

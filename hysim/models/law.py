@@ -23,8 +23,8 @@ from hysim.kernels.stepping import Step, drive, drive_memory
 from hysim.models._batch import Batch, Reduction, Sets
 from hysim.models.compiled_step import compiled_step
 from hysim.models.composable import Composable
-from hysim.models.model import CompiledLaw
 from hysim.models.parameters import Parameter, declared_space
+from hysim.models.protocols import CompiledLaw
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
@@ -62,14 +62,20 @@ class Law(Composable, ABC):
         Fields that are the initial memory; they stand in the state behind the last input. By default ``("z0",)``.
     searched : tuple of Parameter
         The box in which `hysim.identify` searches, and the fields in which the output is affine.
-    scratch : int
+    starts : tuple of mappings
+        Points from which a search begins beside the law's own, in the units of `searched`.
+    screened : int, optional
+        Random points that a search tries at first; by default `hysim.identify` chooses.
+    workspace : int
         Further places at the end of the state, which a step may use as it likes; zero at first.
     """
 
     step: ClassVar[Any]
     initial: ClassVar[tuple[str, ...]] = ("z0",)
     searched: ClassVar[tuple[Parameter, ...]] = ()
-    scratch: ClassVar[int] = 0
+    starts: ClassVar[tuple[Mapping[str, float], ...]] = ()
+    screened: ClassVar[int | None] = None
+    workspace: ClassVar[int] = 0
 
     # ------------------------------------------------------------------------------ what a family may say more
 
@@ -86,10 +92,14 @@ class Law(Composable, ABC):
 
     @classmethod
     def initial_memory(cls, tables: Tables, *, further: int = 0) -> FloatArray:
-        """Places for the last input, the initial memory and `further` numbers that begin at zero, (n_sets, n_memory)."""
+        """The last input, the initial memory and `further` numbers that begin at zero, (n_sets, n_memory)."""
         n_sets = len(next(iter(tables.values())))
         memory = [np.zeros((n_sets, 1)), *(tables[name] for name in cls.initial), np.zeros((n_sets, further))]
         return np.concatenate(memory, axis=1)
+
+    def start(self, u0: float, memory: FloatArray) -> State:
+        """The front of the state before a first sample at the input `u0`; `memory` is what `pack` has."""
+        return (u0, *memory[1:].tolist())
 
     @classmethod
     def prepare(cls, parameters: FloatArray, state: FloatArray) -> None:
@@ -106,9 +116,7 @@ class Law(Composable, ABC):
 
         `u` is (1, n_samples) or (n_sets, n_samples).
         """
-        parameters, memory = (read_only(table, finite=False) for table in cls.pack(tables))
-        with np.errstate(all="ignore"):
-            drive_each(compiled_step(cls.step), parameters, memory, cls.scratch, u, y, 0, len(y))
+        rows_by_step(compiled_step(cls.step), cls.pack(tables), cls.workspace, u, y)
 
     @classmethod
     def order(cls, tables: Tables) -> npt.NDArray[np.intp] | None:
@@ -126,14 +134,24 @@ class Law(Composable, ABC):
         self.check(self.tables)
 
     @property
+    def arguments(self) -> dict[str, Any]:
+        """Every field by name."""
+        return items(self)
+
+    @property
     def tables(self) -> dict[str, FloatArray]:
         """Every field as a table of one set."""
-        return {name: np.asarray(value, dtype=float).reshape(1, *(np.shape(value) or (1,))) for name, value in items(self).items()}
+        return {name: _table(name, value, np.ndim(value)) for name, value in self.arguments.items()}
 
     @property
     def scalars(self) -> dict[str, float]:
         """Every number by the name that `hysim.identify` has for it, ``name`` or ``name[k]``."""
-        return scalars_of(items(self))
+        return scalars_of(self.arguments)
+
+    @property
+    def initial_names(self) -> tuple[str, ...]:
+        """Names of the numbers of the initial memory."""
+        return tuple(name for name in self.scalars if name.partition("[")[0] in self.initial)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -198,7 +216,7 @@ class Law(Composable, ABC):
         -------
         array, shape (n_samples,), or (n_samples, n_memory) where a law remembers a tuple of numbers
         """
-        z = self.remembered(u)
+        z = self.remembered(u)[:, : len(self.initial_names)]
         single = len(self.initial) == 1 and self.scalars.keys() >= set(self.initial)
         return z[:, 0] if single else z
 
@@ -273,7 +291,7 @@ class Law(Composable, ABC):
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box that `hysim.identify` searches, by the declarations in `searched`."""
-        return declared_space(self.searched, self.scalars, self.initial, record, freedom)
+        return declared_space(self.searched, self.starts, self.scalars, self.initial, record, freedom, self.screened)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns in which the output is affine, and the rest of it, shape (n_sets, n_samples, n_columns + 1)."""
@@ -288,8 +306,9 @@ class Law(Composable, ABC):
 
         One pass through the record contracts the memory; the fixed point is found by the secant method.
         """
-        names = [name for name in self.scalars if name.partition("[")[0] in self.initial]
-        tables, inputs = tables_of(type(self).__name__, items(self), parameters, np.append(record.u, record.u[0]))
+        names = self.initial_names
+        around = np.append(record.u, record.u[0])
+        tables, inputs = tables_of(type(self).__name__, self.arguments, parameters, around)
         constants, memory = (read_only(table, finite=False) for table in self.pack(self.completed(tables)))
         place, step, y = slice(1, 1 + len(names)), compiled_step(self.step), np.empty(inputs.shape[1])
 
@@ -297,7 +316,7 @@ class Law(Composable, ABC):
             begin, ends = memory.copy(), np.empty(memory.shape)
             begin[:, place] = np.nan_to_num(z, posinf=0.0, neginf=0.0)
             with np.errstate(all="ignore"):
-                drive_to_end(step, constants, read_only(begin), self.scratch, inputs[0], y, ends)
+                drive_to_end(step, constants, read_only(begin), self.workspace, inputs[0], y, ends)
             return np.where(np.isfinite(z), ends[:, place], np.nan)
 
         before = np.zeros((len(memory), len(names)))
@@ -310,7 +329,15 @@ class Law(Composable, ABC):
                     break
                 secant = z - drift * (z - before) / (drift - drift_before)
             before, drift_before, z = z, drift, np.where(np.isfinite(secant), secant, z + drift)
-        return dict(zip(names, np.where(np.isfinite(z), z, np.nan).T, strict=True))
+        shape = np.broadcast_shapes(*map(np.shape, parameters.values()))
+        return {
+            name: column.reshape(shape)[()]
+            for name, column in zip(names, np.where(np.isfinite(z), z, np.nan).T, strict=True)
+        }
+
+    def notes(self, record: Record, model: Any) -> tuple[str, ...]:
+        """Remarks on the identified model, as phrases."""
+        return ()
 
     def assemble(self, parameters: Mapping[str, float]) -> Self:
         """The law with these parameters, one number for each name; the others are its own."""
@@ -328,23 +355,21 @@ class Law(Composable, ABC):
 
     def outputs(self, parameters: Parameters, u: npt.ArrayLike) -> FloatArray:
         """Outputs (n_sets, n_samples) of laws that are this one where `parameters` does not say otherwise."""
-        return self.batch(items(self), parameters, u, check=False).rows(None)
+        return self.outputs_of(parameters, u).rows(None)
+
+    def outputs_of(self, parameters: Parameters, u: npt.ArrayLike) -> Batch:
+        """As `outputs`, not computed yet; parameters that the constructor would refuse are not refused."""
+        tables, inputs = tables_of(type(self).__name__, self.arguments, parameters, u)
+        tables = self.completed(tables)
+        return _batch(self.rows, tables, inputs, self.order(tables))
 
     @classmethod
-    def batch(
-        cls, defaults: Mapping[str, Any], parameters: Parameters, u: npt.ArrayLike, *, check: bool = True
-    ) -> Batch:
+    def batch(cls, defaults: Mapping[str, Any], parameters: Parameters, u: npt.ArrayLike) -> Batch:
         """Laws by their parameters, those not given by `defaults`, and their inputs."""
         tables, inputs = tables_of(cls.__name__, defaults, parameters, u)
         tables = cls.completed(tables)
-        if check:
-            cls.check(tables)
-
-        def compute(sets: Sets, inputs: FloatArray, y: FloatArray) -> None:
-            cls.rows({name: table[sets] for name, table in tables.items()}, inputs, y)
-
-        n_sets = len(next(iter(tables.values())))
-        return Batch(compute, n_sets, inputs, cls.order(tables))
+        cls.check(tables)
+        return _batch(cls.rows, tables, inputs, cls.order(tables))
 
     @classmethod
     def completed(cls, tables: dict[str, FloatArray]) -> dict[str, FloatArray]:
@@ -354,10 +379,10 @@ class Law(Composable, ABC):
     def _begun(self, u: FloatArray, state: State | None) -> tuple[CompiledLaw, State]:
         """The law before the first sample of `u`, and the front of its state."""
         parameters, memory = self.pack(self.tables)
-        start = (float(u[0]) if u.size else 0.0, *memory[0, 1:].tolist()) if state is None else state
+        start = self.start(float(u[0]) if u.size else 0.0, memory[0]) if state is None else state
         if len(start) != memory.shape[1]:
             raise ValueError(f"the state must hold {memory.shape[1]} numbers, got {len(start)}")
-        moving = np.zeros(len(start) + self.scratch)
+        moving = np.zeros(len(start) + self.workspace)
         moving[: len(start)] = start
         self.prepare(parameters[0], moving)
         return CompiledLaw(compiled_step(self.step), read_only(parameters[0], finite=False), moving), start
@@ -368,6 +393,25 @@ class Law(Composable, ABC):
             lost = in_pieces(lambda k: self.path(law, u[k], y[k]), u.size)
         if lost >= 0:
             raise SimulationError(self.divergence(lost, u[lost], y[lost]))
+
+
+def _batch(
+    rows: Callable[[Tables, FloatArray, FloatArray], None],
+    tables: Tables,
+    u: FloatArray,
+    order: npt.NDArray[np.intp] | None,
+) -> Batch:
+    def compute(sets: Sets, inputs: FloatArray, y: FloatArray) -> None:
+        rows({name: table[sets] for name, table in tables.items()}, inputs, y)
+
+    return Batch(compute, len(next(iter(tables.values()))), u, order)
+
+
+def rows_by_step(step: Step, laws: Packed, workspace: int, u: FloatArray, y: FloatArray) -> None:
+    """Outputs of many laws into `y`, sample by sample; see `Law.rows`."""
+    parameters, memory = (read_only(table, finite=False) for table in laws)
+    with np.errstate(all="ignore"):
+        drive_each(step, parameters, memory, workspace, u, y, 0, len(y))
 
 
 # ---------------------------------------------------------------------------------- names, numbers and tables

@@ -69,7 +69,7 @@ def limit_cycle(A: float, beta: float, gamma: float, n: float, amplitude: float)
     ValueError
         If the amplitude is not positive, or A = 0: such a memory dies out.
     SimulationError
-        If the memory escapes to infinity within one stroke.
+        If the memory diverges within one stroke.
     """
     if not 0.0 < amplitude < math.inf:
         raise ValueError(f"amplitude must be positive and finite, got {amplitude}")
@@ -79,7 +79,7 @@ def limit_cycle(A: float, beta: float, gamma: float, n: float, amplitude: float)
     slope, c = abs(A), sign * gamma + abs(beta)
     e = sign * gamma - abs(beta)
     if escape_length(slope, c, n) + escape_length(slope, e, n) <= 2.0 * amplitude:
-        raise SimulationError(f"the memory escapes to infinity between -{amplitude:g} and {amplitude:g}")
+        raise SimulationError(f"the memory diverges between -{amplitude:g} and {amplitude:g}")
     length = amplitude + _half_difference(slope, c, e, n, amplitude)
     nodes, weights = _rule()
     w = _from_rest(slope, c, n, length * nodes)

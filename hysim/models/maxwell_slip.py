@@ -9,23 +9,21 @@ and so a Prandtl-Ishlinskii law. The loop of a positive stiffness runs clockwise
 Sources: M. Goldfarb and N. Celanovic, IEEE Control Systems 17 (1997); W. D. Iwan, J. Appl. Mech. 33 (1966).
 """
 
-from collections.abc import Mapping
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
+from hysim._frozen import read_only
+from hysim.models._by_structure import ByStructure
 from hysim.models._clamp_search import ClampStructure
 from hysim.models._clamps import ClampLaw
 from hysim.models.model import model
 from hysim.models.prandtl_ishlinskii import PrandtlIshlinskii
-from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
-from hysim.records import Record
 
 
 @model
-class MaxwellSlip(ClampLaw):
+class MaxwellSlip(ByStructure, ClampLaw):
     """Maxwell-slip law, ``F = offset + feedthrough u + sum k_i (u - z_i)``.
 
     Parameters
@@ -161,22 +159,7 @@ class MaxwellSlip(ClampLaw):
             z0=tuple(positions.tolist()),
         )
 
-    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The linear stiffness, and the memory; see `hysim.models._clamp_search`."""
-        return self._structure().search_space(record, freedom)
-
-    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """Columns u - z_0, u - z_1, ..., u, 1, 0 of the output, shape (n_sets, n_samples, n_elements + 3)."""
-        return self._structure().regressors(parameters, record)
-
-    def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        """The parameters with the positions of the steady cycle of which `record` is one period or more."""
-        return self._structure().steady(parameters, record)
-
-    def assemble(self, parameters: Mapping[str, float]) -> ClampLaw:
-        """The law with these parameters, one number for each name."""
-        return self._structure().assemble(parameters)  # type: ignore[no-any-return]
-
-    def _structure(self) -> ClampStructure:
+    def as_structure(self) -> ClampStructure:
+        """The structure with the thresholds of this law, or with those by default where it has none."""
         one_signed = all(k >= 0.0 for k in self.stiffness) or all(k <= 0.0 for k in self.stiffness)
         return ClampStructure(law=type(self), thresholds=self.slips, one_signed=one_signed)

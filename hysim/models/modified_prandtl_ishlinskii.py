@@ -16,22 +16,21 @@ Source: K. Kuhnen, Modeling, identification and compensation of complex hysteret
 Prandtl-Ishlinskii approach, European J. Control 9 (2003).
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim.models._clamps import State
 from hysim.models._dead_zone_search import DeadZoneStructure
-from hysim.models._play_sums import RateIndependentPlays, check_dead_zones, dead_zone, kernel_rows
+from hysim.models._play_sums import ExtendedPlays, check_dead_zones, dead_zone, kernel_rows
+from hysim.models.law import Packed, State, Tables
 from hysim.models.model import model
 from hysim.models.prandtl_ishlinskii import PrandtlIshlinskii, wrong_sum
 
 
 @model
-class ModifiedPrandtlIshlinskii(RateIndependentPlays):
+class ModifiedPrandtlIshlinskii(ExtendedPlays):
     """Modified Prandtl-Ishlinskii law, ``y = offset + sum c_j S_j(sum w_i z_i)``: plays, then dead zones.
 
     Parameters
@@ -73,9 +72,11 @@ class ModifiedPrandtlIshlinskii(RateIndependentPlays):
     offset: float = 0.0
     z0: tuple[float, ...] = (0.0,)
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_dead_zones(np.atleast_2d(self.dead_zones), np.atleast_2d(self.dead_zone_weights))
+    @classmethod
+    def check(cls, tables: Tables) -> None:
+        """Refuse elements that are no plays or no dead zones."""
+        super().check(tables)
+        check_dead_zones(tables["dead_zones"], tables["dead_zone_weights"])
 
     @classmethod
     def structure(
@@ -160,12 +161,13 @@ class ModifiedPrandtlIshlinskii(RateIndependentPlays):
         return self.plays.inverse_response(x, u0, state)
 
     @classmethod
-    def _rows(cls, tables: Mapping[str, FloatArray]) -> FloatArray:
+    def pack(cls, tables: Tables) -> Packed:
+        """Rows with dead zones; see `hysim.kernels.play_sums`."""
         behind = tables["dead_zones"], tables["dead_zone_weights"]
-        check_dead_zones(*behind)
-        return kernel_rows(tables, behind=behind)
+        return Packed(kernel_rows(tables, behind=behind), cls.initial_memory(tables))
 
-    def _structure(self) -> DeadZoneStructure:
+    def as_structure(self) -> DeadZoneStructure:
+        """The structure with the thresholds of this law, or with those by default where it has none."""
         plays = replace(PrandtlIshlinskii.structure(thresholds=self.thresholds), one_signed=self.plays.is_one_signed())
         own = self.dead_zones if self.thresholds else ()
         count = 0 if own else 5

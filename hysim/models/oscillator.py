@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import expm
 
-from hysim._frozen import FloatArray, read_only
+from hysim._frozen import FloatArray, items, read_only
 from hysim.errors import SimulationError
 from hysim.kernels import oscillator as kernels
 from hysim.kernels.boucwen import prepare
@@ -123,8 +123,8 @@ class BoucWenOscillator:
             raise TypeError(f"law must be a BoucWen or a PolynomialBoucWen, got {type(self.law).__name__}")
         options = {"excitation": ("force", "base"), "hold": ("foh", "zoh"), "method": METHODS}
         for name, allowed in options.items():
-            if getattr(self, name) not in allowed:
-                raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {getattr(self, name)!r}")
+            if items(self)[name] not in allowed:
+                raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {items(self)[name]!r}")
         if self.substeps is not None and (isinstance(self.substeps, bool) or not isinstance(self.substeps, int)):
             raise TypeError(f"substeps must be a whole number or None, got {self.substeps!r}")
         if self.substeps is not None and self.substeps < 1:

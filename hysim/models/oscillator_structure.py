@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray, checked
+from hysim._frozen import FloatArray, checked, items
 from hysim._parallel import in_chunks
 from hysim.errors import SimulationError
 from hysim.models import _boucwen_search
@@ -22,6 +22,7 @@ from hysim.models._oscillator_start import start
 from hysim.models.boucwen import BoucWen
 from hysim.models.equation_of_motion import Linear, Motion
 from hysim.models.oscillator import METHODS, BoucWenOscillator
+from hysim.models.protocols import Identifiable
 from hysim.models.resampling import HALF_FILTER, decimated, interpolated
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
@@ -36,7 +37,7 @@ _REPEATS = 0.1  # share of the input's rms by which a period may differ from the
 
 
 @checked
-class OscillatorStructure:
+class OscillatorStructure(Identifiable):
     """An oscillator to be identified; see `BoucWenOscillator.structure`.
 
     The box reaches from a tenth of the mass that the search begins with to ten times that mass, from no damping to
@@ -60,8 +61,8 @@ class OscillatorStructure:
             "excitation": ("force", "base"),
         }
         for name, allowed in options.items():
-            if getattr(self, name) not in allowed:
-                raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {getattr(self, name)!r}")
+            if items(self)[name] not in allowed:
+                raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {items(self)[name]!r}")
         for number in (self.oversampling, *self.decimation, self.period or 1):
             if isinstance(number, bool) or not isinstance(number, int):
                 raise TypeError(f"oversampling, decimation and period must be whole numbers, got {number!r}")

@@ -5,7 +5,6 @@ affine in it, and it is solved for; or it is neither, and held.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,9 +17,9 @@ from hysim.records import Record
 class Parameter(NamedTuple):
     """How `hysim.identify` treats a field of a family.
 
-    `lower` and `upper` are the box, `starts` values from which the search begins beside the law's own, all in units
-    of `unit`: a quotient of the spans of input and output such as ``"y/u"``. A parameter with `log` is searched on a
-    log scale. The output is affine in an `affine` one, which needs no box.
+    `lower` and `upper` are the box in units of `unit`: a quotient of the spans of input and output such as ``"y/u"``;
+    ``"h"`` is half the span of the input. The box of a parameter with `from_first` stands about the first input, and
+    one with `log` is searched on a log scale. The output is affine in an `affine` parameter, which needs no box.
     """
 
     name: str
@@ -28,7 +27,7 @@ class Parameter(NamedTuple):
     upper: float = np.inf
     unit: str = "1"
     log: bool = False
-    starts: tuple[float, ...] = ()
+    from_first: bool = False
     affine: bool = False
 
 
@@ -67,42 +66,52 @@ class Coordinate(NamedTuple):
 
 def declared_space(
     parameters: Sequence[Parameter],
+    starts: Sequence[Mapping[str, float]],
     scalars: Mapping[str, float],
     initial: Sequence[str],
     record: Record,
     freedom: Freedom,
-    *,
     screened: int | None = None,
 ) -> SearchSpace:
-    """The search box on one record; `scalars` are the law's own values, `initial` the fields of its initial memory.
+    """The search box on one record.
+
+    `starts` are points in the units of the parameters, from which the search begins beside `scalars`, the law's own
+    values; `initial` are the fields of its initial memory, held at zero where the record begins at rest. A parameter
+    that is not declared is held, unless it is free and bounded.
 
     Raises
     ------
     ValueError
         If the input is constant, `freedom.initial` is unknown, or a name or a bound does not fit.
     """
-    units = spans(record)
+    units, first = spans(record), float(record.u[0])
     declared = {parameter.name: parameter for parameter in parameters}
     of = {name: declared.get(name.partition("[")[0]) for name in scalars}
     resting = tuple(name for name in scalars if name.partition("[")[0] in initial)
-    kept = {name: scalars[name] for name, each in of.items() if each is None and name not in freedom.free}
-    held = kept | freedom.held(scalars, at_rest=resting if freedom.starts_at_rest() else ())
-    columns = tuple(name for name, each in of.items() if each is not None and each.affine)
-    coordinates, starts = [], []
+    bounded = {name for name, each in of.items() if each is None and name in {*freedom.free, *freedom.bounds}}
+    if unbounded := [name for name in scalars if name in bounded and name not in freedom.bounds]:
+        raise ValueError(
+            f"{unbounded[0]!r} is free, but has no bounds: give bounds={{{unbounded[0]!r}: (lower, upper)}}"
+        )
+    own = freedom.held(scalars, at_rest=resting if freedom.starts_at_rest() else ())
+    held = {name: scalars[name] for name, each in of.items() if each is None and name not in bounded} | own
+    coordinates, values = [], {}
     for name, each in of.items():
-        if each is None and name not in held and name not in freedom.bounds:
-            raise ValueError(f"{name!r} is free, but has no bounds: give bounds={{{name!r}: (lower, upper)}}")
-        if each is not None and not each.affine:
-            unit = unit_of(each.unit, units)
-            coordinates.append(Coordinate(name, each.lower * unit, each.upper * unit, unit, each.log))
-            starts.append([scalars[name], *(start * unit for start in each.starts)])
-        elif each is None and name not in held:
-            coordinates.append(Coordinate(name, *freedom.bounds[name]))
-            starts.append([scalars[name]])
-    names = [coordinate.name for coordinate in coordinates]
-    points = [dict(zip(names, values, strict=True)) for values in product(*starts)]
+        if each is None:
+            coordinates += [free_coordinate(name, *freedom.bounds[name])] if name in bounded else []
+        elif not each.affine:
+            unit, origin = unit_of(each.unit, units), first if each.from_first else 0.0
+            coordinates.append(Coordinate(name, origin + each.lower * unit, origin + each.upper * unit, unit, each.log))
+            values[name] = origin, unit
+    points = [{name: values[name][0] + start[name] * values[name][1] for name in start} for start in starts]
+    columns = tuple(name for name, each in of.items() if each is not None and each.affine)
     limits = freedom.limits(scalars, held)
-    return space_of(coordinates, columns, scalars, held, limits, points, state=resting, screened=screened)
+    return space_of(coordinates, columns, scalars, held, limits, [{}, *points], state=resting, screened=screened)
+
+
+def free_coordinate(name: str, lower: float, upper: float) -> Coordinate:
+    """A parameter of which nothing but its bounds is known: on a log scale where they are positive."""
+    return Coordinate(name, lower, upper, max(abs(lower), abs(upper)), log=lower > 0.0)
 
 
 def space_of(
@@ -121,8 +130,8 @@ def space_of(
     """
     searched = [each.limited(limits) for each in coordinates if each.name not in held]
     names = tuple(each.name for each in searched)
-    lower, upper = (np.array([each.encode(side) for each, side in zip(searched, sides, strict=True)]) for sides in (
-        [each.lower for each in searched], [each.upper for each in searched]))
+    lower = np.array([each.encode(each.lower) for each in searched])
+    upper = np.array([each.encode(each.upper) for each in searched])
     starts = [[each.encode(point.get(each.name, defaults[each.name])) for each in searched] for point in points]
     constants = {name: value for name, value in held.items() if name not in columns}
 
@@ -135,7 +144,7 @@ def space_of(
         coordinates=names,
         lower=lower,
         upper=upper,
-        starts=np.reshape(starts, (len(points), len(names))) if names else np.empty((0, 0)),
+        starts=np.reshape(starts, (len(points), len(names)))[: None if names else 1],
         names=tuple(name for name in defaults if name not in held),
         columns=columns,
         linear=tuple(name for name in columns if name not in held),
@@ -156,7 +165,7 @@ def spans(record: Record) -> dict[str, float]:
     span = float(np.ptp(record.u))
     if span == 0.0:
         raise ValueError("the input is constant: nothing can be identified from it")
-    return {"u": span, "y": float(np.ptp(record.y)) or 1.0, "1": 1.0}
+    return {"u": span, "h": 0.5 * span, "y": float(np.ptp(record.y)) or 1.0, "1": 1.0}
 
 
 def unit_of(unit: str, units: Mapping[str, float]) -> float:

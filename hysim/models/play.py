@@ -11,16 +11,15 @@ then the place to which its spring is fixed.
 Sources: M. A. Krasnosel'skii and A. V. Pokrovskii, Systems with Hysteresis, 1989.
 """
 
-from collections.abc import Mapping
-from typing import Any, ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.models import _clamp_search
-from hysim.models._clamps import ClampLaw, end_positions, positions
+from hysim.models._clamps import ClampLaw
 from hysim.models.model import model
-from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.parameters import Parameter
+from hysim.models.search_space import Parameters
 from hysim.records import Record
 
 
@@ -33,36 +32,19 @@ class _Element(ClampLaw):
     threshold: float
     gain: float
 
-    @property
-    def scalars(self) -> dict[str, float]:
-        """Parameters by name, in the order of the constructor."""
-        return {"threshold": self.threshold, "gain": self.gain, "offset": self.offset, "z0": self.z0}
-
-    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box that `identify` searches; see `hysim.models._clamp_search`."""
-        return _clamp_search.single_space(self.scalars, record, freedom)
+    searched = (
+        Parameter("threshold", 1e-3, 1.5, unit="h"),
+        Parameter("z0", -1.0, 1.0, unit="h", from_first=True),
+        Parameter("gain", affine=True),
+        Parameter("offset", affine=True),
+    )
+    starts = tuple({"threshold": share, "z0": 0.0} for share in (0.1, 0.3, 0.6))
+    screened = 256
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns z (or u - z), 1 and 0 of the output, shape (n_sets, n_samples, 3)."""
-        z = positions(*self._memory_of(parameters), record.u)
-        element = record.u[:, np.newaxis] - z if self.stops else z
-        return np.concatenate([element, np.ones_like(z), np.zeros_like(z)], axis=-1)
-
-    def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        """The parameters with the position of the steady cycle of which `record` is one period or more."""
-        z = end_positions(*self._memory_of(parameters), record.u)
-        shape = np.broadcast_shapes(*map(np.shape, parameters.values()))
-        return {**parameters, "z0": z.reshape(shape)[()]}
-
-    def assemble(self, parameters: Mapping[str, float]) -> Self:
-        """The law with these parameters."""
-        return type(self)(**{**self.scalars, **parameters})
-
-    def _memory_of(self, parameters: Parameters) -> tuple[FloatArray, FloatArray]:
-        """Threshold and z0 over the sets, shape (n_sets, 1) each."""
-        values = (np.ravel(parameters.get(name, getattr(self, name))) for name in ("threshold", "z0"))
-        threshold, z0 = np.broadcast_arrays(*values)
-        return threshold[:, np.newaxis], z0[:, np.newaxis]
+        element = self.outputs({**parameters, "gain": 1.0, "offset": 0.0}, record.u)
+        return np.stack([element, np.ones_like(element), np.zeros_like(element)], axis=-1)
 
 
 @model

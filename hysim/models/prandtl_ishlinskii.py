@@ -18,25 +18,24 @@ Sources: K. Kuhnen, European J. Control 9 (2003), for the inverse; P. Krejci and
 Theory Appl. 148 (2001).
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
+from hysim.models._by_structure import ByStructure
 from hysim.models._clamp_search import ClampStructure
-from hysim.models._clamps import ClampLaw, State
+from hysim.models._clamps import ClampLaw
+from hysim.models.law import State
 from hysim.models.model import model
-from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
-from hysim.records import Record
 
 _CONSISTENT = 1e-9  # of the largest threshold: what rounding may add to the distance of two plays
 
 
 @model
-class PrandtlIshlinskii(ClampLaw):
+class PrandtlIshlinskii(ByStructure, ClampLaw):
     """Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i`` over plays of the thresholds r_i.
 
     Parameters
@@ -200,23 +199,8 @@ class PrandtlIshlinskii(ClampLaw):
         law = self if start is None else replace(self, z0=start[1:])
         return law.inverse().response(y)
 
-    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The linear weights, and the memory; see `hysim.models._clamp_search`."""
-        return self._structure().search_space(record, freedom)
-
-    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """Columns z_0, z_1, ..., 1, 0 of the output, shape (n_sets, n_samples, n_plays + 2)."""
-        return self._structure().regressors(parameters, record)
-
-    def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        """The parameters with the positions of the steady cycle of which `record` is one period or more."""
-        return self._structure().steady(parameters, record)
-
-    def assemble(self, parameters: Mapping[str, float]) -> ClampLaw:
-        """The law with these parameters, one number for each name."""
-        return self._structure().assemble(parameters)  # type: ignore[no-any-return]
-
-    def _structure(self) -> ClampStructure:
+    def as_structure(self) -> ClampStructure:
+        """The structure with the thresholds of this law, or with those by default where it has none."""
         return ClampStructure(law=type(self), thresholds=self.thresholds, one_signed=self.is_one_signed())
 
 

@@ -34,7 +34,8 @@ from hysim._frozen import FloatArray, read_only
 from hysim.errors import SimulationError
 from hysim.kernels import preisach as kernels
 from hysim.models._preisach_search import SearchedRelays
-from hysim.models._relays import State, everett_of, weights_of
+from hysim.models._relays import everett_of, weights_of
+from hysim.models.law import State
 from hysim.models.model import model
 from hysim.models.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.records import Record
@@ -349,7 +350,7 @@ class Preisach(SearchedRelays):
         sign = math.copysign(1.0, fastest)
         rising = replace(self, weights=tuple(sign * np.array(self.weights)), offset=sign * self.offset)
         past = state[1:] if state is not None else self.z0 if u0 is None else (*self.z0, u0)
-        parameters, x, outputs, d = rising._begun(past, wanted.size)
+        parameters, x, outputs, d = rising._staircase(past, wanted.size)
         u = np.empty(wanted.size)
         lost = kernels.inverse(parameters, x, outputs, d, read_only(sign * wanted), u)
         if lost >= 0:

@@ -23,17 +23,23 @@ M. Al Janaideh, P. Krejci and G. A. Monteiro, Applications of Mathematics (2023)
 """
 
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, checked, read_only
+from hysim.kernels import play_sums as kernels
 from hysim.models._batch import Reduction
+from hysim.models._by_structure import ByStructure
 from hysim.models._clamp_search import Axis, ClampStructure, half_span
-from hysim.models._clamps import State, sets_of
-from hysim.models._play_sums import ExtendedPlays, PlaySteps, batch_of, kernel_rows, positions_of
-from hysim.models.model import CompiledLaw, model
+from hysim.models._play_sums import ExtendedPlays, kernel_rows, positions_of
+from hysim.models.composable import Composable
+from hysim.models.law import Packed, State, Tables
+from hysim.models.model import model
+from hysim.models.prandtl_ishlinskii import PrandtlIshlinskii
+from hysim.models.protocols import CompiledLaw
 from hysim.models.search_space import Parameters
 from hysim.records import Record
 
@@ -41,8 +47,36 @@ _LARGEST = 1.0  # of the widening at the record's highest speed, in half spans
 _STARTS = (0.0, 0.1, 0.3)
 
 
+@checked
+class PlaysAtSampleTime(ExtendedPlays):
+    """The law at one sample time, thresholds ``r_i + width |u_k - u_(k-1)|``: a law by its step."""
+
+    thresholds: tuple[float, ...] = ()
+    weights: tuple[float, ...] = ()
+    width: float = 0.0
+    offset: float = 0.0
+    z0: tuple[float, ...] = (0.0,)
+
+    @classmethod
+    def pack(cls, tables: Tables) -> Packed:
+        """Rows with wider thresholds; see `hysim.kernels.play_sums`."""
+        return Packed(kernel_rows(tables, width=tables["width"]), cls.initial_memory(tables))
+
+    def as_structure(self) -> ClampStructure:
+        """The structure with the thresholds of this law."""
+        return ClampStructure(law=PrandtlIshlinskii, thresholds=self.thresholds)
+
+    def response_at(self, u: npt.ArrayLike, widening: FloatArray) -> FloatArray:
+        """Output at the samples of `u` of plays whose thresholds are wider by `widening`, shape (n_samples,)."""
+        inputs = read_only(u, "u", ndim=1)
+        y = np.empty(inputs.size)
+        parameters = read_only(self.pack(self.tables).parameters[0])
+        kernels.widened(parameters, np.array([0.0, *self.z0]), inputs, read_only(widening), y)
+        return y
+
+
 @model
-class RateDependentPrandtlIshlinskii(ExtendedPlays):
+class RateDependentPrandtlIshlinskii(ByStructure, Composable):
     """Rate-dependent Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i``, thresholds ``r_i + beta |u'|``.
 
     Parameters
@@ -83,10 +117,19 @@ class RateDependentPrandtlIshlinskii(ExtendedPlays):
     z0: tuple[float, ...] = (0.0,)
 
     dynamic: ClassVar[bool] = True
+    thresholds_name: ClassVar[str] = "thresholds"
+    weights_name: ClassVar[str] = "weights"
+    stops: ClassVar[bool] = False
+    ordered: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        super().__post_init__()
+        object.__setattr__(self, "z0", self.plays.z0)
         _check_beta(np.array(self.beta))
+
+    @property
+    def plays(self) -> PrandtlIshlinskii:
+        """The sum of plays for an input that stands still, without the offset."""
+        return PrandtlIshlinskii(thresholds=self.thresholds, weights=self.weights, z0=self.z0)
 
     @classmethod
     def structure(cls, *, plays: int = 10, thresholds: npt.ArrayLike = (), one_signed: bool = True) -> ClampStructure:
@@ -109,7 +152,7 @@ class RateDependentPrandtlIshlinskii(ExtendedPlays):
         given = tuple(read_only(thresholds, "thresholds", ndim=1).tolist())
         return ClampStructure(law=cls, thresholds=given, plays=plays, one_signed=one_signed, pushing=Widening())
 
-    def at(self, sample_time: float) -> PlaySteps:
+    def at(self, sample_time: float) -> PlaysAtSampleTime:
         """The law at one sample time [s], as loops step it.
 
         Raises
@@ -119,10 +162,13 @@ class RateDependentPrandtlIshlinskii(ExtendedPlays):
         """
         if not sample_time > 0.0:
             raise ValueError(f"sample_time must be positive, got {sample_time}")
-        still = self.steps
-        parameters = still.parameters.copy()
-        parameters[1] = self.beta / sample_time
-        return still._replace(parameters=read_only(parameters))
+        return PlaysAtSampleTime(
+            thresholds=self.thresholds,
+            weights=self.weights,
+            width=self.beta / sample_time,
+            offset=self.offset,
+            z0=self.z0,
+        )
 
     def memory(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
         """Positions of the plays at the samples of `u`, shape (n_samples, n_plays); see `response`."""
@@ -151,7 +197,7 @@ class RateDependentPrandtlIshlinskii(ExtendedPlays):
             another length.
         """
         law = self.at(sample_time)
-        return law.response(u) if speed is None else law.widened(u, self.beta * _as_speed(speed, u))
+        return law.response(u) if speed is None else law.response_at(u, self.beta * _as_speed(speed, u))
 
     def signals(self, u: npt.ArrayLike, sample_time: float) -> dict[str, FloatArray]:
         """Output ``"y"`` and positions ``"z"`` at the samples of `u`; see `response`."""
@@ -224,11 +270,13 @@ class RateDependentPrandtlIshlinskii(ExtendedPlays):
         """
         if not sample_time > 0.0:
             raise ValueError(f"sample_time must be positive, got {sample_time}")
-        tables, inputs = sets_of(cls, parameters, u)
-        _check_beta(tables["beta"])
-        rows = kernel_rows(tables, width=tables["beta"] / sample_time)
-        laws = batch_of(rows, tables["z0"], inputs)
-        return laws.rows(workers) if reduce is None else laws.reduced(reduce, target, workers)
+        known = [field.name for field in fields(cls)]
+        if wrong := [name for name in parameters if name not in known]:
+            raise TypeError(f"unknown parameter {wrong[0]!r}: {cls.__name__} has {', '.join(known)}")
+        beta = np.asarray(parameters.get("beta", cls.beta), dtype=float)
+        _check_beta(beta)
+        sets = {name: value for name, value in parameters.items() if name != "beta"} | {"width": beta / sample_time}
+        return PlaysAtSampleTime.responses(sets, u, reduce=reduce, target=target, workers=workers)
 
     def is_invertible(self, sample_time: float | None = None) -> bool:
         """Whether there is an `inverse`, for a known speed; with a sample time, an `inverse_response` without one."""
@@ -254,8 +302,7 @@ class RateDependentPrandtlIshlinskii(ExtendedPlays):
         >>> law.inverse().beta, law.inverse().thresholds, law.inverse().weights
         (0.5, (0.0, 0.5), (0.5, -0.25))
         """
-        plain = self.plays
-        inverse = type(plain)(**{name: getattr(plain, name) for name in ("thresholds", "weights", "z0")}).inverse()
+        inverse = self.plays.inverse()
         rise = self.offset
         return RateDependentPrandtlIshlinskii(
             thresholds=inverse.thresholds,
@@ -308,13 +355,10 @@ class RateDependentPrandtlIshlinskii(ExtendedPlays):
         if (refusal := self._refusal(sample_time)) is not None:
             raise ValueError(refusal)
         self.plays.inverse()  # refuses positions that no input leads to
-        return self.at(sample_time).inverse_response(y, u0, state)
+        return self.at(sample_time).input_of(y, u0, state)
 
-    @classmethod
-    def _rows(cls, tables: Mapping[str, FloatArray]) -> FloatArray:
-        return kernel_rows(tables)
-
-    def _structure(self) -> ClampStructure:
+    def as_structure(self) -> ClampStructure:
+        """The structure with the thresholds and beta of this law."""
         one_signed = self.plays.is_one_signed()
         return ClampStructure(
             law=type(self), thresholds=self.thresholds, one_signed=one_signed, pushing=Widening(beta=self.beta)

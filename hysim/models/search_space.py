@@ -6,11 +6,10 @@ affine are not searched: for given others, the best ones are the solution of a l
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from dataclasses import dataclass, field
+from typing import Any
 
 from hysim._frozen import FloatArray, frozen
-from hysim.records import Record
 
 Parameters = Mapping[str, Any]
 """User's names to floats or to arrays of shape (n_sets,)."""
@@ -133,80 +132,3 @@ class Freedom:
 
 
 ALL_FREE = Freedom()
-
-
-class Identifiable(Protocol):
-    """What `identify` takes: a model class, a model as the start, or a structure.
-
-    A family may offer two methods more: ``steady(parameters, record)``, the parameters of the state at the first
-    sample of a record that repeats itself, by name, and ``notes(record, model)``, what a user should know of the
-    identified model, as a tuple of phrases.
-    """
-
-    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """Declare the box for `record`."""
-        ...
-
-    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """Columns in which the output is affine, shape (n_sets, n_samples, n_columns + 1).
-
-        Output = columns[..., :-1] @ (the parameters named by `SearchSpace.columns`) + columns[..., -1].
-        A set that leaves the finite numbers has columns that are not finite.
-        """
-        ...
-
-    def assemble(self, parameters: Mapping[str, float]) -> Any:
-        """Build the model from the user's parameters."""
-        ...
-
-
-class DirectFit(NamedTuple):
-    """A model that was fitted in one step.
-
-    The `model`; its effective number of parameters, `degrees_of_freedom`; and at each sample that it was fitted to the
-    standard error of its output for noise of standard deviation 1, `spread` (n,).
-    """
-
-    model: Any
-    degrees_of_freedom: float
-    spread: FloatArray
-
-
-@runtime_checkable
-class Direct(Protocol):
-    """A family without memory that is fitted in one step, not searched for: `identify` takes it too."""
-
-    def fitted(self, u: FloatArray, y: FloatArray) -> DirectFit:
-        """The fit to outputs `y` at inputs `u`, both of shape (n,)."""
-        ...
-
-    def response(self, u: FloatArray) -> FloatArray:
-        """Output at the inputs `u`, shape (n,)."""
-        ...
-
-
-@dataclass(frozen=True)
-class Holding:
-    """Something identifiable, some of its parameters held at values unless the user says more of them."""
-
-    whole: Identifiable
-    values: Mapping[str, float]
-
-    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """That of the whole, in less space."""
-        held = {name: value for name, value in self.values.items() if name not in freedom.free}
-        return self.whole.search_space(record, replace(freedom, fixed={**held, **freedom.fixed}))
-
-    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """Those of the whole."""
-        return self.whole.regressors(parameters, record)
-
-    def assemble(self, parameters: Mapping[str, float]) -> Any:
-        """The model from the user's parameters."""
-        return self.whole.assemble(parameters)
-
-    def __getattr__(self, name: str) -> Any:
-        """The two methods that a family may offer more."""
-        if name not in ("steady", "notes"):
-            raise AttributeError(name)
-        return getattr(self.whole, name)

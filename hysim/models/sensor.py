@@ -8,7 +8,7 @@ The noise is gaussian and white from sample to sample, a function of the seed an
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
+from hysim._frozen import FloatArray, items, read_only
 from hysim.models.model import model
 
 
@@ -46,8 +46,8 @@ class Sensor:
 
     def __post_init__(self) -> None:
         for name in ("quantum", "noise", "delay"):
-            if getattr(self, name) < 0.0:
-                raise ValueError(f"{name} must not be negative, got {getattr(self, name)}")
+            if items(self)[name] < 0.0:
+                raise ValueError(f"{name} must not be negative, got {items(self)[name]}")
         if not isinstance(self.seed, int) or isinstance(self.seed, bool):
             raise TypeError(f"seed must be an integer, got {self.seed!r}")
         if self.seed < 0:

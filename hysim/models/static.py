@@ -15,13 +15,16 @@ from hysim._frozen import FloatArray, read_only
 from hysim.kernels import stepping
 from hysim.models._smoothing import equal_inputs, smoothing_spline
 from hysim.models.composable import Composable
-from hysim.models.model import CompiledLaw, model
-from hysim.models.search_space import ALL_FREE, DirectFit, Freedom, Parameters, SearchSpace
+from hysim.models.law import Law
+from hysim.models.model import model
+from hysim.models.parameters import Parameter, space_of
+from hysim.models.protocols import DirectFit
+from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record
 
 
 @model
-class Line(Composable):
+class Line(Law):
     """Straight line ``y = offset + slope u``.
 
     Parameters
@@ -39,33 +42,10 @@ class Line(Composable):
     offset: float = 0.0
     slope: float = 0.0
 
-    columns: ClassVar[tuple[str, ...]] = ("offset", "slope")
-
-    def response(self, u: npt.ArrayLike) -> FloatArray:
-        """Output at the samples of `u`, shape (n,)."""
-        return self.offset + self.slope * read_only(u, "u", ndim=1)
-
-    def advance(self, u: npt.ArrayLike, state: tuple[()] | None = None) -> tuple[FloatArray, tuple[()]]:
-        """Output at the samples of `u`, and a state that holds nothing."""
-        return self.response(u), ()
-
-    def compiled(self, u0: float = 0.0) -> CompiledLaw:
-        """The line as compiled loops take it; it has no state, whatever the input `u0` before."""
-        return CompiledLaw(stepping.line, read_only([self.offset, self.slope]), np.empty(0))
-
-    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """Nothing to search: both parameters are linear."""
-        if np.ptp(record.u) == 0.0:
-            raise ValueError("the input is constant: nothing can be identified from it")
-        return linear_space(dict.fromkeys(self.columns, 0.0), freedom)
-
-    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """Columns 1, u, 0, shape (1, n_samples, 3)."""
-        return np.stack([np.ones(len(record)), record.u, np.zeros(len(record))], axis=-1)[np.newaxis]
-
-    def assemble(self, parameters: Mapping[str, float]) -> Self:
-        """The line with these parameters."""
-        return type(self)(**parameters)
+    step = staticmethod(stepping.line)
+    initial: ClassVar[tuple[str, ...]] = ()
+    searched = (Parameter("offset", affine=True), Parameter("slope", affine=True))
+    memory = None  # type: ignore[assignment]  # a line remembers nothing
 
 
 @model
@@ -158,16 +138,4 @@ class SingleValued(Composable):
 def linear_space(defaults: Mapping[str, float], freedom: Freedom) -> SearchSpace:
     """The space of a family whose parameters are all linear, by their defaults."""
     held = freedom.held(defaults)
-    names = tuple(name for name in defaults if name not in held)
-    return SearchSpace(
-        coordinates=(),
-        lower=np.empty(0),
-        upper=np.empty(0),
-        starts=np.empty((0, 0)),
-        names=names,
-        columns=tuple(defaults),
-        linear=names,
-        held=held,
-        parameters=lambda x: {},
-        bounds=freedom.limits(defaults, held),
-    )
+    return space_of((), tuple(defaults), defaults, held, freedom.limits(defaults, held))

@@ -14,6 +14,7 @@ import numpy as np
 
 import hysim
 from hysim._atomic import write_text
+from hysim._frozen import items
 from hysim.models.model import FAMILIES, every_family
 
 _DEEPEST = 100  # lists and mappings in each other: a chain of chains takes three for a model
@@ -191,7 +192,7 @@ def is_document(value: Any) -> bool:
 def to_document(value: Any) -> Any:
     """The plain form of a model, or of a value inside one."""
     if is_model(value):
-        parameters = {field.name: to_document(getattr(value, field.name)) for field in fields(value)}
+        parameters = {name: to_document(item) for name, item in items(value).items()}
         return {"family": type(value).__name__, "parameters": parameters}
     if isinstance(value, tuple):
         return [to_document(each) for each in value]

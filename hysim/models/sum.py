@@ -17,7 +17,8 @@ from hysim.kernels.composed import side_by_side
 from hysim.models._composite import Composite, State, continued
 from hysim.models._parts import check_parts, compiled_law, compiled_pair, labels, response_of
 from hysim.models._sum_search import SumStructure
-from hysim.models.model import CompiledLaw, model
+from hysim.models.model import model
+from hysim.models.protocols import CompiledLaw
 from hysim.models.search_space import Parameters
 from hysim.records import Record
 
@@ -168,7 +169,8 @@ class Sum(Composite):
         """The parameters with the parts' states in the steady cycle of which `record` is one period or more."""
         return self._structure().steady(parameters, record)
 
-    def _structure(self) -> SumStructure:
+    def as_structure(self) -> SumStructure:
+        """The structure of the same members, those that can be identified as starts."""
         return SumStructure(parts=self.parts)
 
 

@@ -26,6 +26,7 @@ from hysim.models._transfer_function_notes import notes
 from hysim.models._transfer_function_starts import Guess, guesses, likely_delays, sections
 from hysim.models.composable import Composable
 from hysim.models.model import model
+from hysim.models.protocols import Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
@@ -298,7 +299,7 @@ class TransferFunction(Composable):
 
 
 @checked
-class TransferFunctionStructure(Composable):
+class TransferFunctionStructure(Identifiable, Composable):
     """The shape of a transfer function, to be identified; see `TransferFunction.structure`.
 
     The search runs over second-order sections s^2 + 2 zeta omega s + omega^2 (and one of first order for an

@@ -74,7 +74,7 @@ class ZhuWangBoucWen(SteppedLaw):
     input_coefficients: tuple[float, ...] = (0.0,)
 
     step = staticmethod(kernels.step)
-    scratch: ClassVar[int] = kernels.N_STATE - 2
+    workspace: ClassVar[int] = kernels.N_STATE - 2
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:

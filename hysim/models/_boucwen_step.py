@@ -1,0 +1,37 @@
+"""Laws whose memory is Bouc and Wen's, stepped and driven by its exact kernels."""
+
+from typing import ClassVar
+
+import numpy as np
+
+from hysim._frozen import FloatArray, read_only
+from hysim.kernels import boucwen as kernels
+from hysim.kernels.charts import N_WORK
+from hysim.models.law import Law, Tables
+from hysim.models.protocols import CompiledLaw
+
+
+class BoucWenStep(Law):
+    """A law that packs the parameters (A, beta, gamma, n, gain, offset, c1, c2, ...) and the memory (u, z)."""
+
+    step = staticmethod(kernels.step)
+    workspace: ClassVar[int] = N_WORK - 2
+
+    @classmethod
+    def prepare(cls, parameters: FloatArray, state: FloatArray) -> None:
+        """The charts of the exponent."""
+        A, beta, gamma, n = parameters[:4].tolist()
+        kernels.prepare(A, beta, gamma, n, 0.0, state)
+
+    @classmethod
+    def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:
+        """As `Law.path`, the exponent looked at once for all samples."""
+        return int(kernels.path(law.parameters, law.state, u, y))
+
+    @classmethod
+    def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
+        """As `Law.rows`, laws of n = 1 side by side, and the charts shared by neighbours of equal n."""
+        parameters, memory = cls.pack(tables)
+        laws = read_only(np.concatenate([parameters[:, :4], memory[:, 1:]], axis=1), finite=False)
+        with np.errstate(all="ignore"):  # a memory that diverges overflows, and uncompiled kernels would warn of it
+            kernels.batch(laws, read_only(parameters[:, 4:], finite=False), u, y, 0, len(y))

@@ -1,0 +1,38 @@
+"""Models that are identified by a structure of their own, beginning with their own values."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any
+
+from hysim._frozen import FloatArray
+from hysim.models.protocols import Identifiable
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.records import Record
+
+
+class ByStructure(ABC):
+    """A model that passes `hysim.identify` on to a structure."""
+
+    @abstractmethod
+    def as_structure(self) -> Identifiable:
+        """The structure that is searched, beginning with this model."""
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """Search box of the structure."""
+        return self.as_structure().search_space(record, freedom)
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """Columns of the structure in which the output is affine, (n_sets, n_samples, n_columns + 1)."""
+        return self.as_structure().regressors(parameters, record)
+
+    def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
+        """Initial memory with which a periodic record ends as it began."""
+        return self.as_structure().steady(parameters, record)
+
+    def assemble(self, parameters: Mapping[str, float]) -> Any:
+        """The model with these parameters."""
+        return self.as_structure().assemble(parameters)
+
+    def notes(self, record: Record, model: Any) -> tuple[str, ...]:
+        """Remarks on the identified model."""
+        return self.as_structure().notes(record, model)

@@ -1,0 +1,186 @@
+"""The roles that a model can play, one protocol each; `isinstance` tells whether it plays one.
+
+A verb asks for a role, never for a class: a user's own class that has the methods takes part. A class that inherits a
+method and does not offer it sets it to None, which `isinstance` sees.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, NamedTuple, Protocol, TypeGuard, runtime_checkable
+
+from hysim._frozen import FloatArray
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.records import Record
+
+
+class CompiledLaw(NamedTuple):
+    """A law, or its inverse, as loops take it: `y = step(parameters, state, u)`, which moves the state in place."""
+
+    step: Callable[[FloatArray, FloatArray, float], float]
+    parameters: FloatArray
+    state: FloatArray
+
+
+class CompiledController(NamedTuple):
+    """A controller as loops take it: `u = step(parameters, state, reference, measurement)`.
+
+    The state begins with the last command, before the controller's limits.
+    """
+
+    step: Callable[[FloatArray, FloatArray, float, float], float]
+    parameters: FloatArray
+    state: FloatArray
+
+
+@runtime_checkable
+class Responding(Protocol):
+    """A model with an output for each input."""
+
+    @property
+    def response(self) -> Callable[..., FloatArray]:
+        """``response(u)``, or ``response(u, sample_time)`` of a `Dynamic` model."""
+        ...
+
+
+@runtime_checkable
+class Dynamic(Protocol):
+    """A plant whose output depends on time; it says so by `dynamic = True`."""
+
+    dynamic: ClassVar[bool] = True
+
+    def response(self, u: FloatArray, sample_time: float) -> FloatArray:
+        """Output at the samples of `u`, shape (n,), taken every `sample_time` [s]."""
+        ...
+
+
+@runtime_checkable
+class Continuable(Protocol):
+    """A model whose response can be continued from a state."""
+
+    @property
+    def advance(self) -> Callable[..., tuple[Any, Any]]:
+        """``advance(u, state)`` returns output and state; a `Dynamic` model has the sample time in between."""
+        ...
+
+
+@runtime_checkable
+class Steppable(Protocol):
+    """A law that compiled loops take."""
+
+    def compiled(self, u0: float = 0.0) -> CompiledLaw:
+        """The step, its parameters, and the state after a first sample at the input `u0`."""
+        ...
+
+
+@runtime_checkable
+class Sampled(Protocol):
+    """A law that depends on the sample time, and is a `Steppable` law at each."""
+
+    def at(self, sample_time: float) -> Steppable:
+        """The law at one sample time [s]."""
+        ...
+
+
+@runtime_checkable
+class Remembering(Protocol):
+    """A law whose memory is a number, or a tuple of them, at each sample."""
+
+    def memory(self, u: FloatArray) -> FloatArray:
+        """Memory at the samples of `u`, shape (n,) or (n, n_memory)."""
+        ...
+
+
+@runtime_checkable
+class Invertible(Protocol):
+    """A law whose input can be computed from its output."""
+
+    @property
+    def inverse_response(self) -> Callable[..., FloatArray]:
+        """``inverse_response(y, u0=None)``, the input that gives the output `y`."""
+        ...
+
+
+@runtime_checkable
+class OfFamily(Protocol):
+    """A structure whose `law` is the family that it makes models of."""
+
+    law: type
+
+
+@runtime_checkable
+class Offering(Protocol):
+    """A family that says what `hysim.compare` tries of it."""
+
+    @classmethod
+    def candidates(cls) -> Mapping[str, Any]:
+        """Names to classes, models or structures; none where it is left out."""
+        ...
+
+
+@runtime_checkable
+class Identifiable(Protocol):
+    """What `identify` takes: a model class, a model as the start, or a structure."""
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """Declare the box for `record`."""
+        ...
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """Columns in which the output is affine, shape (n_sets, n_samples, n_columns + 1).
+
+        Output = columns[..., :-1] @ (the parameters named by `SearchSpace.columns`) + columns[..., -1].
+        A set that leaves the finite numbers has columns that are not finite.
+        """
+        ...
+
+    def assemble(self, parameters: Mapping[str, float]) -> Any:
+        """Build the model from the user's parameters."""
+        ...
+
+    def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
+        """The state at the first sample of a record that repeats itself, by name.
+
+        Raises
+        ------
+        ValueError
+            If it cannot be computed.
+        """
+        raise ValueError(f'a {type(self).__name__} has no steady cycle that could be computed: use initial="free"')
+
+    def notes(self, record: Record, model: Any) -> tuple[str, ...]:
+        """Remarks on the identified model, as phrases."""
+        return ()
+
+
+class DirectFit(NamedTuple):
+    """A model that was fitted in one step.
+
+    The `model`; its effective number of parameters, `degrees_of_freedom`; and at each sample that it was fitted to the
+    standard error of its output for noise of standard deviation 1, `spread` (n,).
+    """
+
+    model: Any
+    degrees_of_freedom: float
+    spread: FloatArray
+
+
+@runtime_checkable
+class Direct(Protocol):
+    """A family without memory that is fitted in one step, not searched for: `identify` takes it too."""
+
+    def fitted(self, u: FloatArray, y: FloatArray) -> DirectFit:
+        """The fit to outputs `y` at inputs `u`, both of shape (n,)."""
+        ...
+
+    def response(self, u: FloatArray) -> FloatArray:
+        """Output at the inputs `u`, shape (n,)."""
+        ...
+
+
+def needs_time(plant: Any) -> TypeGuard[Dynamic]:
+    """Whether the output of a plant depends on time."""
+    return isinstance(plant, Dynamic) and plant.dynamic
+
+
+def law_at(law: Any, sample_time: float) -> Any:
+    """A law as it is stepped at a sample time [s]: what its ``at`` returns, or itself where it has none."""
+    return law.at(sample_time) if isinstance(law, Sampled) else law
