@@ -19,8 +19,6 @@ from hysim.models._parts import check_parts, compiled_law, compiled_pair, labels
 from hysim.models._sum_search import SumStructure
 from hysim.models.model import model
 from hysim.models.protocols import CompiledLaw
-from hysim.models.search_space import Parameters
-from hysim.records import Record
 
 __all__ = ["Sum", "SumStructure"]
 
@@ -164,10 +162,6 @@ class Sum(Composite):
         """
         laws = [compiled_law(part, u0) for part in self.parts]
         return reduce(lambda first, second: compiled_pair(side_by_side, first, second), laws)
-
-    def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        """The parameters with the parts' states in the steady cycle of which `record` is one period or more."""
-        return self._structure().steady(parameters, record)
 
     def as_structure(self) -> SumStructure:
         """The structure of the same members, those that can be identified as starts."""
