@@ -1,13 +1,19 @@
-"""What every sampled controller shares: a step from state to state, the same that compiled loops take."""
+"""Base class of the sampled controllers, and their linear part."""
 
+import functools
+import math
 from abc import ABC, abstractmethod
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
+from hysim.kernels.tracking import bound
 from hysim.models.model import CompiledController
+
+with_inverse = functools.lru_cache(maxsize=256)(bound)
+"""The controller of a kernel of `hysim.kernels.tracking` and the inverse of a law."""
 
 
 class Feedback(NamedTuple):
@@ -107,3 +113,21 @@ class SampledController(ABC):
         """
         moved = state._replace(state=np.array(state.state))
         return moved.step(moved.parameters, moved.state, reference, measurement), moved
+
+
+def check_kind(name: str, part: Any, kind: type) -> None:
+    """Raise a TypeError if a part is there and not of its kind."""
+    if part is not None and not isinstance(part, kind):
+        raise TypeError(f"{name} must be of {kind.__name__}, got {type(part).__name__}")
+
+
+def check_limits(limits: tuple[float, ...] | None) -> None:
+    """Raise a ValueError if limits are given and are no interval."""
+    if limits is not None and not (len(limits) == 2 and limits[0] <= limits[1]):
+        raise ValueError(f"limits must be (lowest, highest), got {limits}")
+
+
+def check_sample_time(sample_time: float) -> None:
+    """Raise a ValueError if a sample time is not positive and finite."""
+    if not 0.0 < sample_time < math.inf:
+        raise ValueError(f"sample_time must be positive and finite, got {sample_time}")

@@ -7,8 +7,8 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
-from hysim.models import _parts
+from hysim._frozen import FloatArray, read_only
+from hysim.models import _inverse_search, _parts
 from hysim.models.composable import Composable
 from hysim.models.model import CompiledLaw, needs_time
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
@@ -75,7 +75,15 @@ class Composite(Composable, ABC):
             If y is not finite or has not one axis, a member moves in time, or the output does not tell where the
             input begins.
         """
-        return _parts.inverse_response(self, y, u0)
+        outputs = read_only(y, "y", ndim=1)
+        if self.dynamic:
+            raise ValueError("what moves in time has no inverse that depends on the output alone")
+        if not outputs.size:
+            return outputs
+        here = _inverse_search.first_input(self, float(outputs[0])) if u0 is None else float(u0)
+        reached = float(outputs[0]) if u0 is None else None
+        inverse = _inverse_search.inverse_step(self.compiled(here), here, reached)
+        return _inverse_search.inverse_response(inverse, outputs)
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The members' spaces beside each other, as the `structure` has them."""

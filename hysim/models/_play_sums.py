@@ -1,5 +1,6 @@
 """What the extended Prandtl-Ishlinskii laws share: the rows of numbers that `hysim.kernels.play_sums` takes."""
 
+import math
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import fields
@@ -81,20 +82,26 @@ class PlaySteps(NamedTuple):
             raise ValueError("give u0 or state, not both: the state has its own input")
         else:
             start = state
-        u = np.empty(wanted.size)
-        moving = self._moving(start)
-        lost = in_pieces(lambda k: drive(kernels.inverse_step, self.parameters, moving, wanted[k], u[k]), u.size)
+        u, inverse = np.empty(wanted.size), self.inverse_step(start)
+        lost = in_pieces(lambda k: drive(inverse.step, inverse.parameters, inverse.state, wanted[k], u[k]), u.size)
         if lost >= 0:
             raise SimulationError(f"no input gives the output at sample {lost} (y = {wanted[lost]:g})")
         return u
+
+    def inverse_step(self, state: State, limits: tuple[float, float] = (-math.inf, math.inf)) -> CompiledLaw:
+        """The inverse of the law in this state, as `hysim.kernels.inverses` has it."""
+        moving = self._moving(state)
+        y = kernels.step(self.parameters, moving.copy(), moving[0])
+        parameters = read_only(np.concatenate([limits, self.parameters]), finite=False)
+        return CompiledLaw(kernels.inverse_step, parameters, np.concatenate([[moving[0], y], moving]))
 
     def _at_rest(self, y: float) -> float:
         """The first input that finds the plays at z0 and gives `y`, whatever its rate would be."""
         still = self.parameters.copy()
         still[1] = 0.0
-        first = np.empty(1)
-        drive(kernels.inverse_step, read_only(still), self._moving((0.0, *self.z0.tolist())), read_only([y]), first)
-        return float(first[0]) if np.isfinite(first[0]) else 0.0
+        inverse = PlaySteps(read_only(still), self.z0).inverse_step((0.0, *self.z0.tolist()))
+        u = inverse.step(inverse.parameters, inverse.state, y)
+        return u if math.isfinite(u) else 0.0
 
     def _moving(self, state: State) -> FloatArray:
         if len(state) != 1 + self.z0.size:

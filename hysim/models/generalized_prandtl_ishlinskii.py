@@ -169,11 +169,15 @@ class GeneralizedPrandtlIshlinskii(RateIndependentPlays):
             If the law is not invertible, z0 holds positions that no input leads to, or y is not finite or has
             not one axis.
         """
+        self.check_invertible()
+        return self.steps.inverse_response(y, u0, state)
+
+    def check_invertible(self) -> None:
+        """Raise a ValueError if the law is not invertible, or z0 holds positions that no input leads to."""
         if (refusal := self._refusal()) is not None:
             raise ValueError(refusal)
         if self._has_one_envelope():
-            self.plays.inverse()  # refuses positions that no input leads to
-        return self.steps.inverse_response(y, u0, state)
+            self.plays.inverse()  # refuses these positions
 
     @classmethod
     def _rows(cls, tables: Mapping[str, FloatArray]) -> FloatArray:
