@@ -15,7 +15,7 @@ from hysim._parallel import in_pieces
 from hysim.errors import SimulationError
 from hysim.kernels.batches import drive_each
 from hysim.kernels.stepping import Step, drive
-from hysim.models import _numeric_inverse
+from hysim.models import _inverse_search
 from hysim.models._memory_batch import Kernel
 from hysim.models._memory_law import State
 from hysim.models._polynomial_input import PolynomialInput
@@ -65,14 +65,12 @@ class SteppedLaw(PolynomialInput):
         -------
         array, shape (n_samples,)
             Its `response` is y to the rounding of its terms, and to 1e-12 of the memory's stroke where the law is
-            stepped by power series. Where the law turns later, the input is the first one that gives y. A sample
-            costs some twenty steps of the law, outside compiled code.
+            stepped by power series. Where the law turns later, the input is the first one with the output y.
 
         Raises
         ------
         SimulationError
-            If the slope dy/du does not keep its sign on the way, or the output does not reach a sample; the
-            message names the sample and the input.
+            If the output does not reach a sample, or does not rise (or fall) all the way there; it names the sample.
         ValueError
             If y is not finite or has not one axis, both u0 and state are given, its first sample does not tell
             the first input (give u0), or the slope is zero where the record begins.
@@ -92,14 +90,12 @@ class SteppedLaw(PolynomialInput):
             )
             u0 = float(static.inverse_response(outputs[:1])[0])
         start = self._start(np.array([u0 or 0.0])) if state is None else state
-        return _numeric_inverse.inverse_response(self, outputs, start, self._terms)
+        return _inverse_search.inverse_response_from(self.compiled(start[0]), start, self._terms(*start[:2]), outputs)
 
-    def _terms(self, u: float, z: float) -> tuple[float, float]:
-        """Sizes of the terms of the output that the input contributes, with the offset, and that the memory does."""
-        total = 0.0
-        for coefficient in reversed(self.input_coefficients):
-            total = (total + abs(coefficient)) * abs(u)
-        return abs(self.offset) + total, abs(self.gain * z)
+    def _terms(self, u: float, z: float) -> float:
+        """Size of the terms of the output."""
+        powers = [abs(coefficient * u**k) for k, coefficient in enumerate(self.input_coefficients, 1)]
+        return abs(self.offset) + sum(powers) + abs(self.gain * z)
 
     def _compiled(self, output: FloatArray, start: State) -> CompiledLaw:
         memory = np.array([[getattr(self, name) for name in self.memory_names]])

@@ -28,10 +28,13 @@ _LINEAR = 0.1  # part by which rises over once, twice and four times a length ar
 _searched = functools.lru_cache(maxsize=256)(kernels.searched)
 
 
-def inverse_step(forward: CompiledLaw, u: float, y: float | None = None, limits: Limits = UNLIMITED) -> CompiledLaw:
+def inverse_step(
+    forward: CompiledLaw, u: float, y: float | None = None, limits: Limits = UNLIMITED, terms: float = 0.0
+) -> CompiledLaw:
     """The inverse of a law that stands at the input `u`, as `hysim.kernels.inverses` has it.
 
-    `y` is the output there, by default that of the step.
+    `y` is the output there, by default that of the step; `terms` is the size of the terms that it is the sum of, where
+    they are larger: their rounding is the output's.
 
     Raises
     ------
@@ -51,7 +54,7 @@ def inverse_step(forward: CompiledLaw, u: float, y: float | None = None, limits:
     return CompiledLaw(
         _searched(forward.step),
         read_only(np.concatenate([limits, forward.parameters]), finite=False),
-        np.concatenate([[u, reached if y is None else y, slope, 0.0], forward.state, trial]),
+        np.concatenate([[u, reached if y is None else y, slope, terms], forward.state, trial]),
     )
 
 
@@ -68,10 +71,16 @@ def inverse_response(inverse: CompiledLaw, y: FloatArray) -> FloatArray:
         lost = in_pieces(lambda k: drive(inverse.step, inverse.parameters, inverse.state, y[k], u[k]), y.size)
     if lost >= 0:
         raise SimulationError(
-            f"the law has no inverse at sample {lost} (y = {y[lost]:g}): the output does not reach it, or turns on "
-            "the way"
+            f"the law has no inverse at sample {lost} (y = {y[lost]:g}): from u = {inverse.state[0]:g} on the output "
+            "does not reach it, or turns on the way"
         )
     return u
+
+
+def inverse_response_from(forward: CompiledLaw, start: tuple[float, ...], terms: float, y: FloatArray) -> FloatArray:
+    """Inputs for the outputs `y` of a law in the state `start`, with which its own begins; see `inverse_step`."""
+    forward.state[: len(start)] = start
+    return inverse_response(inverse_step(forward, start[0], terms=terms), y)
 
 
 def first_input(law: Any, y: float) -> float:
