@@ -79,11 +79,8 @@ class Record:
         for name, values in (("y", self.y), ("t", self.t)):
             if values is not None and values.size != self.u.size:
                 raise ValueError(f"u and {name} must have equal lengths, got {self.u.size} and {values.size}")
-        if self.t is not None and not (np.diff(self.t) > 0).all():
-            k = int(np.argmax(np.diff(self.t) <= 0)) + 1
-            raise ValueError(
-                f"time must increase from sample to sample, got {self.t[k]} after {self.t[k - 1]} at sample {k}"
-            )
+        if self.t is not None:
+            check_increasing(self.t)
         if unknown := set(self.units) - {"t", "u", "y"}:
             raise ValueError(f'units are labels of "t", "u" and "y", got {sorted(unknown)}')
         if self.resolution is not None and self.resolution <= 0:
@@ -136,13 +133,7 @@ class Record:
         """
         if self.t is None:
             raise ValueError("the record has no time: give t, or use a rate-independent law")
-        steps = np.diff(self.t)
-        mean = float(steps.mean())
-        if np.ptp(steps) > 1e-6 * mean:
-            raise ValueError(
-                f"the time must be evenly spaced, got steps from {steps.min()} to {steps.max()}: resample first"
-            )
-        return mean
+        return even_step(self.t)
 
     def reversals(self, tolerance: float = 0.0) -> npt.NDArray[np.intp]:
         """Samples at which the input turns.
@@ -435,6 +426,33 @@ class Record:
         if isinstance(place, (float, np.floating)) and 0.0 < place < 1.0:
             return round(place * len(self))
         raise TypeError(f"a place is a sample's number or a fraction between 0 and 1, got {place!r}")
+
+
+def check_increasing(t: FloatArray) -> None:
+    """Raise a ValueError if times do not increase from sample to sample."""
+    if not (np.diff(t) > 0).all():
+        k = int(np.argmax(np.diff(t) <= 0)) + 1
+        raise ValueError(f"time must increase from sample to sample, got {t[k]} after {t[k - 1]} at sample {k}")
+
+
+def even_step(t: FloatArray) -> float:
+    """The constant step of increasing times, shape (n_samples,).
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than 2 samples, times do not increase, or steps differ by more than 1e-6 of their mean.
+    """
+    if t.size < 2:
+        raise ValueError(f"t must hold at least 2 samples, got {t.size}")
+    check_increasing(t)
+    steps = np.diff(t)
+    mean = float(steps.mean())
+    if np.ptp(steps) > 1e-6 * mean:
+        raise ValueError(
+            f"the time must be evenly spaced, got steps from {steps.min()} to {steps.max()}: resample first"
+        )
+    return mean
 
 
 def _scaled(values: T, power: int) -> T:

@@ -79,7 +79,7 @@ def test_an_output_that_is_reached_before_the_law_turns_is_found_there():
     wanted = CURVE.response([0.0, 0.3, 0.7, 0.9])[1:]
     for value, u in zip(wanted, (0.3, 0.7, 0.9), strict=True):
         assert CURVE.inverse_response([value], u0=0.0)[0] == pytest.approx(u, abs=1e-14)
-    with pytest.raises(hs.SimulationError, match=r"its slope is -"):
+    with pytest.raises(hs.SimulationError, match="turns on the way"):
         CURVE.inverse_response([0.8], u0=0.0)
 
 

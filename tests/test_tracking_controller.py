@@ -355,7 +355,7 @@ def test_parts_that_do_not_fit_are_refused(parts, error, message):
 @pytest.mark.parametrize(
     ("parts", "error", "message"),
     [
-        ({"law": hs.Play(threshold=1.0)}, TypeError, "inverse that a loop can step"),
+        ({"law": hs.TransferFunction(num=(1.0,), den=(1.0, 1.0))}, TypeError, "law that a loop can step"),
         ({"law": hs.Line()}, ValueError, "slope is zero"),
         ({"creep": hs.Line()}, TypeError, "creep must be of Creep"),
         ({"amplifier": hs.Amplifier(slew_rate=1.0)}, ValueError, "answer at once"),

@@ -12,11 +12,12 @@ from hysim.control._assessment import (
 )
 from hysim.control._bandwidth import bandwidth
 from hysim.control._c_export import CSource, to_c
-from hysim.control._feedforward import InverseFeedforward, ModeInverse, Shaper
+from hysim.control._feedforward import InverseFeedforward
 from hysim.control._filters import DampingLoop, Notch
 from hysim.control._loop import ClosedLoop, as_actuator, close_loop
 from hysim.control._margins import LinearLoop
 from hysim.control._pid import PID
+from hysim.control._shaping import ModeInverse, Shaper
 from hysim.control._to_control import to_control
 from hysim.control._tracking import TrackingController
 from hysim.control._tune import tune

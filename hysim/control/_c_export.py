@@ -24,8 +24,9 @@ from hysim._words import printed, words
 from hysim.control import _c_fragments as pieces
 from hysim.control._pid import PID
 from hysim.control._tracking import TrackingController
-from hysim.kernels import boucwen_inverse
+from hysim.kernels import boucwen_inverse, inverses
 from hysim.kernels import tracking as kernels
+from hysim.kernels.stepping import Step
 
 _DIGITS = {"double": 17, "float": 9}
 _RANGES = {"double": (2.0**-1022, sys.float_info.max), "float": (2.0**-126, (2.0 - 2.0**-23) * 2.0**127)}
@@ -243,21 +244,22 @@ def _draft(controller: TrackingController, sample_time: float, u0: float, y0: fl
     compiled = controller.compiled(sample_time, u0, y0)
     draft = _Draft(_Blocks(compiled.parameters), _Blocks(compiled.state), {}, {}, [], [pieces.CLAMP], [], [])
     head = draft.parameters.take(kernels.N_HEAD)
-    command, *_ = draft.state.take(3).tolist()
+    command = float(draft.state.take(1)[0])
+    forward = controller.feedforward
     draft.constants.update(LOWEST=float(head[0]), HIGHEST=float(head[1]))
     draft.places.append(_Place("command", command))
     feedback = controller.feedback is not None or controller.feedforward is None
     compares = feedback or controller.damping is not None
     follows = compares and controller.model is not None
-    if feedback or follows or head[10] > 0.0:
+    if feedback or follows or (forward is not None and forward.creep is not None):
         draft.functions.append(pieces.ACCUMULATE)
     _reference(draft, head, compares and not follows)
     _model(draft, head, follows)
     _feedback(draft, controller, feedback)
     draft.body += ["given = s->command = command;"]
     draft.values.extend(["command", "given", "limited"])
-    if head[7] > 0.0:
-        _feedforward(draft, head, follows)
+    if forward is not None:
+        _feedforward(draft, forward.block(sample_time, u0).inverse, follows)
     draft.body += ["limited = clamp(given, LOWEST, HIGHEST);"]
     if feedback:
         draft.body += [
@@ -270,7 +272,7 @@ def _draft(controller: TrackingController, sample_time: float, u0: float, y0: fl
 
 def _reference(draft: _Draft, head: FloatArray, targeted: bool) -> None:
     """The reference's filters: what is to be given, and where to be."""
-    taps, inverts = int(head[6]), head[7] > 0.0
+    taps, inverts = int(head[2]), head[3] > 0.0
     drive, target, ring = draft.parameters.take(taps), draft.parameters.take(taps), draft.state.take(taps)
     sums = [("drive", drive, inverts), ("target", target, targeted)]
     draft.values.extend(name for name, _, used in sums if used)
@@ -289,7 +291,7 @@ def _reference(draft: _Draft, head: FloatArray, targeted: bool) -> None:
 
 def _model(draft: _Draft, head: FloatArray, follows: bool) -> None:
     """What the feedback compares with."""
-    creeping, order, dead, late = (int(number) for number in head[13:17])
+    creeping, order, dead, late = (int(number) for number in head[5:9])
     declines, moved = draft.parameters.take(creeping), draft.parameters.take((order - creeping) * order)
     entries, at_samples, within = (draft.parameters.take(size) for size in (3 * order, order + 3, order + 3))
     x, past, readings = draft.state.take(2 * order)[:order], draft.state.take(dead + 3), draft.state.take(late + 2)
@@ -297,7 +299,7 @@ def _model(draft: _Draft, head: FloatArray, follows: bool) -> None:
         return
     if not order:
         raise ValueError("the model has no creep and no vibration: leave it out, or give it what it is to follow")
-    part = head[17] > 0.0
+    part = head[9] > 0.0
     draft.constants.update(ORDER=order, CREEPING=creeping, DEAD=dead, LATE=late)
     draft.tables.update(B=entries, OUTPUT=within if part else at_samples)
     draft.tables.update(DECLINES=declines if creeping else np.zeros(1), MOVED=moved if moved.size else np.zeros(1))
@@ -336,17 +338,18 @@ def _feedback(draft: _Draft, controller: TrackingController, feedback: bool) -> 
         draft.body += ["(void)measurement;"]
 
 
-def _feedforward(draft: _Draft, head: FloatArray, follows: bool) -> None:
+def _feedforward(draft: _Draft, inverse: Step, follows: bool) -> None:
     """The inverse of creep, law and amplifier."""
-    elements = int(head[10])
+    gain, offset, number, scale = draft.parameters.take(kernels.N_FEEDFORWARD).tolist()
+    elements = int(number)
     weights, declines = draft.parameters.take(elements), draft.parameters.take(elements)
     positions = draft.state.take(elements)
-    voltages = dict(
-        zip(("LOWEST_VOLTAGE", "HIGHEST_VOLTAGE", "AMPLIFICATION", "ZERO"), head[2:6].tolist(), strict=True)
+    lowest, highest = draft.parameters.take(inverses.N_LIMITS).tolist()
+    draft.constants.update(
+        LOWEST_VOLTAGE=lowest, HIGHEST_VOLTAGE=highest, AMPLIFICATION=gain, ZERO=offset, THROUGH=scale
     )
-    draft.constants.update(voltages, THROUGH=float(head[11]))
     draft.values.extend(["u", "reached"])
-    _law(draft, int(head[7]), draft.parameters.take(int(head[8])), draft.state.take(int(head[9])))
+    _law(draft, inverse)
     if elements:
         draft.constants["ELEMENTS"] = elements
         draft.tables.update(WEIGHTS=weights, POSITION_DECLINES=declines)
@@ -370,24 +373,24 @@ def _feedforward(draft: _Draft, head: FloatArray, follows: bool) -> None:
         draft.body += ["move_model(s);"]
 
 
-def _law(draft: _Draft, kind: int, parameters: FloatArray, state: FloatArray) -> None:
+def _law(draft: _Draft, inverse: Step) -> None:
     """The inverse of the law."""
-    if kind == kernels.LINE:
-        offset, slope = parameters.tolist()
+    if inverse is inverses.line:
+        offset, slope = draft.parameters.take(2).tolist()
         draft.constants.update(OFFSET=offset, SLOPE=slope)
         draft.places.append(_Place("level", 0.0))
         draft.functions.append(pieces.LINE)
         return
-    if kind != kernels.BOUC_WEN:
+    if inverse is not boucwen_inverse.step:
         raise ValueError("the law has no inverse in C: it must be a Bouc-Wen law with n = 1, or a line")
-    rising, A, beta, gamma, n, gain, offset, degree = parameters[: boucwen_inverse.N_HEAD].tolist()
+    rising, A, beta, gamma, n, gain, offset, degree = draft.parameters.take(boucwen_inverse.N_HEAD).tolist()
     if n != 1.0:
         raise ValueError(f"the law has no inverse in C: n must be 1, got {n:g}")
     loading = {"K_LOADING": beta + gamma, "K_UNLOADING": beta - gamma}
     draft.constants.update(RISING=rising, A=A, **loading, GAIN=gain, OFFSET=offset, DEGREE=int(degree))
-    draft.tables["COEFFICIENTS"] = parameters[boucwen_inverse.N_HEAD :][: int(degree)]
-    u, z = state[boucwen_inverse.N_OWN :][:2].tolist()
-    draft.places.extend([_Place("level", float(state[0])), _Place("law_u", u), _Place("law_z", z)])
+    draft.tables["COEFFICIENTS"] = draft.parameters.take(int(degree))
+    _, level, _, _, u, z = draft.state.take(boucwen_inverse.N_OWN + 2).tolist()
+    draft.places.extend([_Place("level", level), _Place("law_u", u), _Place("law_z", z)])
     draft.functions.append(pieces.BOUC_WEN)
 
 

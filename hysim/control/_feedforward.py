@@ -1,252 +1,43 @@
-"""What a controller can do before anything is measured: shape the reference, and invert the plant.
-
-Shaping. Impulses A_i at the samples t_i leave no vibration of a mode with the poles p = -zeta w +- j w_d if
-
-    sum A_i exp(-p t_i) = 0,    sum A_i = 1
-
-Half a period pi / w_d is seldom a whole number of samples. Three impulses, at 0 and at the two samples around it,
-satisfy both equations exactly (zero vibration, ZV); the same twice over does for the derivative by the frequency too
-(ZVD), three times over for the second one (ZVDD); several modes take one shaper behind the other. So does one mode
-whose frequency is known to be in a band: with the zeros at Chebyshev's points of it, the residual is nowhere in the
-band larger than need be (extra-insensitive, EI). Two moving averages in a row make a step of the reference a motion
-of constant acceleration and deceleration.
-
-The mode's inverse. Under the hold a mode is A(z) y = B(z) w with B(z) = b_1 z + b_2 and a zero -b_2 / b_1 close to
--1, so that its inverse rings. With the reference known two samples ahead
-
-    w = A(z) B(1/z) / B(1)^2 r        gives       y = B(z) B(1/z) / B(1)^2 r
-
-which has no phase and no vibration: y is the reference through the weights b_1 b_2, b_1^2 + b_2^2, b_1 b_2.
-
-Sources: N. C. Singer and W. P. Seering, J. Dyn. Sys. Meas. Control 112 (1990), for shaping; W. E. Singhose,
-W. P. Seering and N. C. Singer, J. Mech. Design 116 (1994), for residuals bounded over a band; M. Tomizuka, J. Dyn. Sys.
-Meas. Control 109 (1987), for the inverse without phase.
-"""
+"""Feed-forward by the inverse of an actuator, in one compiled step; its equations stand in `hysim.kernels.tracking`."""
 
 import math
-from dataclasses import replace
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
+from hysim.control._sampled import Feedback, SampledController, check_kind, with_inverse
 from hysim.kernels import tracking as kernels
-from hysim.models.actuator import Actuator
+from hysim.kernels.stepping import Step
+from hysim.models.actuator import Actuator, is_law
 from hysim.models.amplifier import Amplifier
-from hysim.models.boucwen_inverse import BoucWenInverse
 from hysim.models.creep import Creep
+from hysim.models.inverse_steps import inverse_step
 from hysim.models.model import model
-from hysim.models.modes import mode
-from hysim.models.prandtl_ishlinskii import PrandtlIshlinskii
-from hysim.models.sampled import sampled, vibration_stage
+from hysim.models.protocols import CompiledController, needs_time
 from hysim.models.static import Line
 
-_BOXES = 2  # moving averages in a row: their motion has a bounded acceleration, that of a mode in least time
+
+class FeedforwardBlock(NamedTuple):
+    """A feed-forward as `hysim.kernels.tracking.feed_forward` takes it."""
+
+    inverse: Step
+    parameters: FloatArray
+    state: FloatArray
 
 
 @model
-class Shaper:
-    """A filter of the reference after which modes do not vibrate.
-
-    Parameters
-    ----------
-    natural_frequencies, damping_ratios : sequence of float
-        Of the modes, positive [rad/s] and from 0 to below 1; none for a shaper that is smooth only.
-    repeats : int
-        How often each mode's shaper is applied: the more, the less its frequency need be known.
-    smoothing : float
-        Duration of the moving averages together [s]; 0 for none.
-
-    Raises
-    ------
-    ValueError
-        If lengths differ or a number is outside its range.
-
-    Examples
-    --------
-    >>> import numpy as np, hysim as hs
-    >>> hs.Shaper.zv(np.pi, 0.0).impulses(sample_time=0.5).round(6).tolist()
-    [0.5, 0.0, 0.5]
-    """
-
-    natural_frequencies: tuple[float, ...] = ()
-    damping_ratios: tuple[float, ...] = ()
-    repeats: int = 1
-    smoothing: float = 0.0
-
-    def __post_init__(self) -> None:
-        if len(self.natural_frequencies) != len(self.damping_ratios):
-            raise ValueError(
-                f"natural_frequencies and damping_ratios must be equally long, got {len(self.natural_frequencies)} "
-                f"and {len(self.damping_ratios)}"
-            )
-        if min(self.natural_frequencies, default=1.0) <= 0.0:
-            raise ValueError(f"natural_frequencies must be positive, got {min(self.natural_frequencies)}")
-        if not all(0.0 <= ratio < 1.0 for ratio in self.damping_ratios):
-            raise ValueError(f"damping_ratios must be from 0 to below 1, got {self.damping_ratios}")
-        if not isinstance(self.repeats, int) or self.repeats < 1:
-            raise ValueError(f"repeats must be an integer of at least 1, got {self.repeats}")
-        if self.smoothing < 0.0:
-            raise ValueError(f"smoothing must not be negative, got {self.smoothing}")
-
-    @classmethod
-    def zv(cls, natural_frequencies: npt.ArrayLike, damping_ratios: npt.ArrayLike) -> Self:
-        """Zero vibration of one mode, or of several.
-
-        Parameters
-        ----------
-        natural_frequencies, damping_ratios : float or sequence of float
-            [rad/s], [1]
-
-        Raises
-        ------
-        ValueError
-            As the constructor.
-
-        Examples
-        --------
-        >>> import hysim as hs
-        >>> three_modes = hs.Shaper.zv((100.0, 250.0, 400.0), (0.01, 0.02, 0.02))
-        >>> round(float(three_modes.impulses(1e-3).sum()), 12)
-        1.0
-        """
-        return cls(
-            natural_frequencies=tuple(np.atleast_1d(natural_frequencies)),
-            damping_ratios=tuple(np.atleast_1d(damping_ratios)),
-        )
-
-    @classmethod
-    def zvd(cls, natural_frequencies: npt.ArrayLike, damping_ratios: npt.ArrayLike) -> Self:
-        """As `zv`, and zero derivative of the vibration by the frequency."""
-        return cls(
-            natural_frequencies=tuple(np.atleast_1d(natural_frequencies)),
-            damping_ratios=tuple(np.atleast_1d(damping_ratios)),
-            repeats=2,
-        )
-
-    @classmethod
-    def zvdd(cls, natural_frequencies: npt.ArrayLike, damping_ratios: npt.ArrayLike) -> Self:
-        """As `zvd`, and zero second derivative."""
-        return replace(cls.zvd(natural_frequencies, damping_ratios), repeats=3)
-
-    @classmethod
-    def ei(cls, natural_frequency: float, damping_ratio: float, tolerance: float = 0.1, zeros: int = 2) -> Self:
-        """Least residual of one mode whose frequency lies in a band.
-
-        Parameters
-        ----------
-        natural_frequency, damping_ratio : float
-            [rad/s], [1]
-        tolerance : float
-            By which part of it the frequency may be off either way.
-        zeros : int
-            Frequencies in the band at which nothing vibrates, each taking half a period.
-
-        Raises
-        ------
-        ValueError
-            If the tolerance is not from 0 to below 1, there is no zero, or as the constructor.
-
-        Examples
-        --------
-        >>> import hysim as hs
-        >>> hs.Shaper.ei(100.0, 0.01, tolerance=0.1, zeros=1) == hs.Shaper.zv(100.0, 0.01)
-        True
-        """
-        if not 0.0 <= tolerance < 1.0:
-            raise ValueError(f"tolerance must be from 0 to below 1, got {tolerance}")
-        if not isinstance(zeros, int) or zeros < 1:
-            raise ValueError(f"zeros must be an integer of at least 1, got {zeros}")
-        places = np.sin(np.pi * (np.arange(zeros) - 0.5 * (zeros - 1)) / zeros)
-        return cls.zv(natural_frequency * (1.0 + tolerance * places), np.full(zeros, damping_ratio))
-
-    def impulses(self, sample_time: float) -> FloatArray:
-        """Weights of the reference now, a sample ago, and so on.
-
-        Raises
-        ------
-        ValueError
-            If a mode's half period is shorter than a sample.
-        """
-        total = np.ones(1)
-        for frequency, ratio in zip(self.natural_frequencies, self.damping_ratios, strict=True):
-            one = _zero_vibration(frequency, ratio, sample_time)
-            for _ in range(self.repeats):
-                total = np.convolve(total, one)
-        samples = max(1, round(self.smoothing / (_BOXES * sample_time)))
-        for _ in range(_BOXES):
-            total = np.convolve(total, np.full(samples, 1.0 / samples))
-        return total
-
-
-@model
-class ModeInverse:
-    """The inverse of a resonance, for a reference that is smooth or shaped so.
-
-    Parameters
-    ----------
-    natural_frequency : float
-        Positive [rad/s].
-    damping_ratio : float
-        Not negative.
-
-    Raises
-    ------
-    ValueError
-        If a number is outside its range.
-
-    Notes
-    -----
-    It needs the reference two samples ahead. What it asks for grows with the reference's acceleration: a step of one
-    asks for some 1 / (natural_frequency sample_time)^2.
-
-    Examples
-    --------
-    >>> import numpy as np, hysim as hs
-    >>> weights = hs.ModeInverse(natural_frequency=100.0, damping_ratio=0.0).weights(sample_time=1e-3)
-    >>> ramp = np.array([2.0, 1.0, 0.0, -1.0])  # what is given is held, and right in the middle of the sample
-    >>> round(float(weights @ ramp), 9), round(float(weights.sum()), 9)
-    (0.5, 1.0)
-    """
-
-    natural_frequency: float
-    damping_ratio: float
-
-    def __post_init__(self) -> None:
-        mode(self.natural_frequency, self.damping_ratio)
-
-    def weights(self, sample_time: float) -> FloatArray:
-        """Weights of the reference in two samples, in one, now, and one ago."""
-        stage = sampled(vibration_stage(mode(self.natural_frequency, self.damping_ratio), sample_time), sample_time)
-        C, moved = stage.output[3:], stage.A
-        a1, a2 = -np.trace(moved), np.linalg.det(moved)
-        b1 = C @ stage.B[0]
-        b2 = C @ moved @ stage.B[0] + a1 * b1
-        weights: FloatArray = np.convolve([1.0, a1, a2], [b2, b1]) / (b1 + b2) ** 2
-        return weights
-
-
-class InverseBlocks(NamedTuple):
-    """An inverse as `hysim.kernels.tracking` takes it; `level` is where the law rests."""
-
-    kind: int
-    law: FloatArray
-    law_state: FloatArray
-    weights: FloatArray
-    declines: FloatArray
-    scale: float
-    level: float
-
-
-@model
-class InverseFeedforward:
+class InverseFeedforward(SampledController):
     """The command that takes a model of an actuator to a wanted displacement, sample by sample.
 
+    It closes a loop by itself, or as a part of a `TrackingController`. The displacement is reached one sample later.
+
     Parameters
     ----------
-    law : BoucWen, PolynomialBoucWen, Dahl, PrandtlIshlinskii or Line, optional
-        The hysteresis to invert; by default none, a line of slope one.
+    law : law, optional
+        The hysteresis to invert, any law with an inverse, sums and cascades among them; by default none, a line of
+        slope one.
     creep : Creep, optional
         The creep to invert: at the end of each sample it and the law together are where they are wanted.
     amplifier : Amplifier, optional
@@ -255,15 +46,17 @@ class InverseFeedforward:
     Raises
     ------
     TypeError
-        If the law has no inverse that a loop can step.
+        If the law cannot be stepped.
     ValueError
-        If the amplifier takes time or has no gain, or the law is not invertible.
+        If the amplifier takes time or has no gain, or the law has no inverse at u = 0.
 
     Examples
     --------
-    >>> import hysim as hs
-    >>> plant = hs.Actuator(hysteresis=hs.BoucWen(feedthrough=1.0, gain=0.5), creep=hs.Creep.per_decade(1.5))
-    >>> hs.InverseFeedforward.of(plant) == hs.InverseFeedforward(law=plant.hysteresis, creep=plant.creep)
+    >>> import numpy as np, hysim as hs
+    >>> law = hs.Dahl() + hs.Line(slope=1.0)
+    >>> t = 0.01 * np.arange(200)
+    >>> run = hs.close_loop(law, hs.InverseFeedforward(law=law), t, np.sin(t))
+    >>> bool(np.abs(run.y[1:] - np.sin(t[:-1])).max() < 1e-12)
     True
     """
 
@@ -272,14 +65,18 @@ class InverseFeedforward:
     amplifier: Amplifier | None = None
 
     def __post_init__(self) -> None:
-        for name, kind in (("creep", Creep), ("amplifier", Amplifier)):
-            if not isinstance(getattr(self, name), kind | None):
-                raise TypeError(f"{name} must be of {kind.__name__}, got {type(getattr(self, name)).__name__}")
+        check_kind("creep", self.creep, Creep)
+        check_kind("amplifier", self.amplifier, Amplifier)
         if self.amplifier is not None and (self.amplifier.dynamic or not self.amplifier.gain):
             raise ValueError(
                 "the amplifier must answer at once and have a gain: its slewing and its lag have no inverse"
             )
-        self._law(0.0)
+        if self.law is None:
+            return
+        if not is_law(self.law):
+            raise TypeError(f"law must be a law that a loop can step, such as BoucWen, got {type(self.law).__name__}")
+        if not needs_time(self.law):
+            inverse_step(self.law, 0.0)
 
     @classmethod
     def of(cls, plant: Actuator) -> Self:
@@ -292,49 +89,33 @@ class InverseFeedforward:
         """
         return cls(law=plant.hysteresis, creep=plant.creep, amplifier=plant.amplifier)
 
-    def blocks(self, sample_time: float, u0: float) -> InverseBlocks:
-        """At rest at the command `u0`."""
-        u = float((self.amplifier or Amplifier()).voltage(u0))
-        kind, law, law_state = self._law(u)
-        level = u if self.law is None else float(np.asarray(self.law.response(np.array([u])))[0])
-        if self.creep is None:
-            return InverseBlocks(kind, law, law_state, np.empty(0), np.empty(0), 1.0, level)
-        declines = np.expm1(-sample_time / np.array(self.creep.time_constants))
-        weights = np.array(self.creep.weights)
-        through = self.creep.instant_gain - float(weights @ declines)
-        return InverseBlocks(kind, law, law_state, weights, declines, 1.0 / through, level)
+    def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
+        """Zeros: the measurement is not used."""
+        return np.zeros(np.shape(frequency), dtype=complex)
 
-    def _law(self, u: float) -> tuple[int, FloatArray, FloatArray]:
-        """Kind, parameters and state of the law's inverse, the law at rest at the voltage `u`."""
-        law = Line(slope=1.0) if self.law is None else self.law
-        if isinstance(law, Line):
-            if not law.slope:
-                raise ValueError("the law has no inverse: its slope is zero")
-            return kernels.LINE, read_only([law.offset, law.slope]), np.empty(0)
-        inverse = law.inverse() if callable(getattr(law, "inverse", None)) else None
-        if isinstance(inverse, BoucWenInverse):
-            compiled = inverse.compiled(u0=u)
-            return kernels.BOUC_WEN, compiled.parameters, compiled.state
-        if isinstance(inverse, PrandtlIshlinskii):
-            forward = law.compiled(u)
-            back = inverse.compiled(float(law.response(np.array([u]))[0]))
-            return (
-                kernels.PLAYS,
-                np.concatenate([back.parameters, forward.parameters]),
-                np.concatenate([back.state, forward.state, back.state]),
-            )
-        raise TypeError(f"law must have an inverse that a loop can step, such as BoucWen, got {type(law).__name__}")
+    def linear(self, sample_time: float) -> Feedback:
+        """No feedback: the measurement is not used."""
+        return Feedback(np.zeros((0, 0)), np.zeros(0), np.zeros(0), 0.0)
 
+    def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
+        """The controller as compiled loops take it, at rest at the command `u0`."""
+        inverse, parameters, state = self.block(sample_time, u0)
+        step = with_inverse(kernels.invert, inverse)
+        return CompiledController(step, read_only(parameters, finite=False), np.append(u0, state))
 
-def _zero_vibration(frequency: float, ratio: float, sample_time: float) -> FloatArray:
-    """Impulses at 0 and around half a period."""
-    damped = frequency * math.sqrt(1.0 - ratio**2)
-    samples = math.floor(math.pi / (damped * sample_time) + 1e-9)
-    if samples < 1:
-        raise ValueError(f"half a period of {frequency:g} rad/s must not be shorter than a sample, {sample_time:g} s")
-    places = np.array([0, samples, samples + 1])
-    left = np.exp(complex(ratio * frequency, -damped) * sample_time * places)
-    weights = np.linalg.solve([left.real, left.imag, np.ones(3)], [0.0, 0.0, 1.0])
-    impulses = np.zeros(samples + 2)
-    impulses[places] = weights
-    return np.trim_zeros(np.where(np.abs(impulses) < 1e-15, 0.0, impulses), "b")
+    def block(
+        self, sample_time: float, u0: float, commands: tuple[float, float] = (-math.inf, math.inf)
+    ) -> FeedforwardBlock:
+        """The compiled inverse, at rest at the command `u0`, for commands within these limits."""
+        amplifier, law = self.amplifier or Amplifier(), Line(slope=1.0) if self.law is None else self.law
+        lowest, highest = sorted(amplifier.voltage(commands).tolist())
+        inverse = inverse_step(law, float(amplifier.voltage(u0)), (lowest, highest), sample_time)
+        creep = self.creep or Creep(time_constants=(), weights=())
+        declines, weights = np.expm1(-sample_time / np.array(creep.time_constants)), np.array(creep.weights)
+        scale = 1.0 / (creep.instant_gain - float(weights @ declines))
+        head = [amplifier.gain, amplifier.offset, weights.size, scale]
+        return FeedforwardBlock(
+            inverse.step,
+            np.concatenate([head, weights, declines, inverse.parameters]),
+            np.concatenate([np.full(weights.size, inverse.state[1]), inverse.state]),
+        )

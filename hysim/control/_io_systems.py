@@ -18,9 +18,11 @@ from typing import Any
 import numpy as np
 
 from hysim._frozen import FloatArray
+from hysim.control._feedforward import InverseFeedforward
+from hysim.control._tracking import TrackingController
 from hysim.errors import SimulationError
-from hysim.kernels.boucwen_inverse import N_OWN
-from hysim.kernels.tracking import BOUC_WEN
+from hysim.kernels import boucwen_inverse
+from hysim.kernels.charts import N_WORK
 from hysim.models.actuator import Actuator
 from hysim.models.boucwen_inverse import BoucWenInverse
 from hysim.models.chain import Chain, ChainState
@@ -160,6 +162,7 @@ def _memory_names(law: Any, state: FloatArray) -> list[str]:
 
 def _scratch(controller: Any, sample_time: float) -> int:
     """How many elements at the end of a controller's state are room for the charts of a Bouc-Wen law."""
-    feedforward = getattr(controller, "feedforward", None)
-    inverse = feedforward and feedforward.blocks(sample_time, 0.0)
-    return inverse.law_state.size - N_OWN - 2 if inverse and inverse.kind == BOUC_WEN else 0
+    forward = controller.feedforward if isinstance(controller, TrackingController) else controller
+    if not isinstance(forward, InverseFeedforward):
+        return 0
+    return N_WORK - 2 if forward.block(sample_time, 0.0).inverse is boucwen_inverse.step else 0

@@ -1,17 +1,23 @@
-"""What every sampled controller shares: a step from state to state, the same that compiled loops take."""
+"""Base class of the sampled controllers, and their linear part."""
 
+import functools
+import math
 from abc import ABC, abstractmethod
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
+from hysim.kernels.tracking import bound
 from hysim.models.protocols import CompiledController
+
+with_inverse = functools.lru_cache(maxsize=256)(bound)
+"""The controller of a kernel of `hysim.kernels.tracking` and the inverse of a law."""
 
 
 class Feedback(NamedTuple):
-    """What a controller makes of the measurement, limits apart: x' = A x + B m, command = C x + D m."""
+    """Linear system from the measurement m to the command, limits apart: x' = A x + B m, command = C x + D m."""
 
     A: FloatArray
     B: FloatArray
@@ -19,7 +25,7 @@ class Feedback(NamedTuple):
     D: float
 
     def then(self, other: "Feedback") -> "Feedback":
-        """This one, and another behind it."""
+        """This system, and another behind it."""
         return Feedback(
             np.block([[self.A, np.zeros((self.B.size, other.B.size))], [np.outer(other.B, self.C), other.A]]),
             np.concatenate([self.B, other.B * self.D]),
@@ -39,7 +45,7 @@ class Feedback(NamedTuple):
 
 
 class SampledController(ABC):
-    """Frozen settings that give a compiled step with its state."""
+    """Frozen settings of a controller that is stepped from sample to sample."""
 
     @abstractmethod
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
@@ -47,47 +53,38 @@ class SampledController(ABC):
 
     @abstractmethod
     def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
-        """From the negative measurement to the command, limits apart, at frequencies [rad/s] in their shape."""
+        """Response from the negative measurement to the command at frequencies [rad/s], limits apart.
+
+        The frequencies must not be zero where there is an integral; the result has their shape.
+        """
 
     @abstractmethod
     def linear(self, sample_time: float) -> Feedback:
-        """From the measurement to the command, limits apart."""
+        """Linear system from the measurement to the command, limits apart."""
 
     def ahead(self, sample_time: float) -> int:
         """By how many samples the reference must be known ahead of its time; 0 for a controller without preview."""
         return 0
 
     def initial(self, sample_time: float, u: float = 0.0, y: float = 0.0) -> CompiledController:
-        """The state at rest, to `step` from.
-
-        Parameters
-        ----------
-        sample_time : float
-            [s]
-        u, y : float
-            Command and displacement that have been held for ever [unit of u], [unit of y].
-
-        Returns
-        -------
-        CompiledController
-            The compiled step, its parameters and its state.
+        """The state to `step` from, at rest at a command [unit of u] and a displacement [unit of y].
 
         Raises
         ------
         ValueError
-            If the sample time is not positive and finite.
+            If the sample time [s] is not positive and finite.
         """
         return self.compiled(sample_time, u, y)
 
     def step(self, state: CompiledController, reference: float, measurement: float) -> tuple[float, CompiledController]:
-        """The command for one sample, and the state after it; `state` itself stays as it is.
+        """The command for one sample, and the state after it; `state` itself does not change.
 
         Parameters
         ----------
         state : CompiledController
             From `initial`, or from the step before.
         reference, measurement : float
-            The reference `ahead` of its time, and the measurement now [unit of y].
+            The reference, `ahead` of its time where the controller has preview, and the measurement [unit of y].
 
         Returns
         -------
@@ -100,10 +97,27 @@ class SampledController(ABC):
         --------
         >>> import hysim as hs
         >>> pid = hs.PID(kp=1.0, ki=0.5)
-        >>> state = pid.initial(sample_time=1.0)
-        >>> u, state = pid.step(state, reference=1.0, measurement=0.0)
+        >>> u, state = pid.step(pid.initial(sample_time=1.0), reference=1.0, measurement=0.0)
         >>> u, pid.step(state, 1.0, 0.0)[0]
         (1.0, 1.5)
         """
-        moved = state._replace(state=np.array(state.state))
-        return moved.step(moved.parameters, moved.state, reference, measurement), moved
+        after = state._replace(state=np.array(state.state))
+        return after.step(after.parameters, after.state, reference, measurement), after
+
+
+def check_kind(name: str, part: Any, kind: type) -> None:
+    """Raise a TypeError if a part is neither None nor of its kind."""
+    if part is not None and not isinstance(part, kind):
+        raise TypeError(f"{name} must be of {kind.__name__}, got {type(part).__name__}")
+
+
+def check_limits(limits: tuple[float, ...] | None) -> None:
+    """Raise a ValueError if limits are given and are no interval."""
+    if limits is not None and not (len(limits) == 2 and limits[0] <= limits[1]):
+        raise ValueError(f"limits must be (lowest, highest), got {limits}")
+
+
+def check_sample_time(sample_time: float) -> None:
+    """Raise a ValueError if a sample time is not positive and finite."""
+    if not 0.0 < sample_time < math.inf:
+        raise ValueError(f"sample_time must be positive and finite, got {sample_time}")

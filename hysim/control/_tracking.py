@@ -11,23 +11,31 @@ take, so that the displacement is at the reference in its own time.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim.control._feedforward import InverseFeedforward, ModeInverse, Shaper
+from hysim.control._feedforward import FeedforwardBlock, InverseFeedforward
 from hysim.control._filters import DampingLoop, Notch, biquad
 from hysim.control._pid import PID
-from hysim.control._sampled import Feedback, SampledController
+from hysim.control._sampled import (
+    Feedback,
+    SampledController,
+    check_kind,
+    check_limits,
+    check_sample_time,
+    with_inverse,
+)
+from hysim.control._shaping import ModeInverse, Shaper
 from hysim.kernels import tracking as kernels
+from hysim.kernels.inverses import line
 from hysim.models.actuator import Actuator
-from hysim.models.amplifier import Amplifier
 from hysim.models.model import model
 from hysim.models.protocols import CompiledController
 
 _THROUGH = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
+_NOTHING = FeedforwardBlock(line, np.empty(0), np.empty(0))
 
 
 @model
@@ -88,11 +96,14 @@ class TrackingController(SampledController):
     limits: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
-        for name, kind in _PARTS.items():
-            if not isinstance(getattr(self, name), kind | None):
-                raise TypeError(f"{name} must be of {kind.__name__}, got {type(getattr(self, name)).__name__}")
-        if self.limits is not None and not (len(self.limits) == 2 and self.limits[0] <= self.limits[1]):
-            raise ValueError(f"limits must be (lowest, highest), got {self.limits}")
+        check_kind("shaper", self.shaper, Shaper)
+        check_kind("mode_inverse", self.mode_inverse, ModeInverse)
+        check_kind("feedforward", self.feedforward, InverseFeedforward)
+        check_kind("feedback", self.feedback, PID)
+        check_kind("notch", self.notch, Notch)
+        check_kind("damping", self.damping, DampingLoop)
+        check_kind("model", self.model, Actuator)
+        check_limits(self.limits)
         if self.feedback is not None and self.feedback.limits is not None:
             raise ValueError(
                 "the feedback is limited together with the feed-forward: give the limits to the controller"
@@ -100,8 +111,8 @@ class TrackingController(SampledController):
         if self.feedforward is None and (self.mode_inverse is not None or self.model is not None):
             raise ValueError("a mode's inverse and a model need a feedforward; InverseFeedforward() passes on")
         if self.model is not None and self.feedforward is not None:
-            seen = self.feedforward.law, self.feedforward.amplifier
-            if (self.model.hysteresis, self.model.amplifier) != seen:
+            inverted = self.feedforward.law, self.feedforward.amplifier
+            if (self.model.hysteresis, self.model.amplifier) != inverted:
                 raise ValueError("the model's law and amplifier must be those of the feedforward")
 
     def ahead(self, sample_time: float) -> int:
@@ -143,33 +154,22 @@ class TrackingController(SampledController):
 
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
         """The controller as compiled loops take it, at rest at `u0` and `y0`."""
-        if not 0.0 < sample_time < math.inf:
-            raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
+        check_sample_time(sample_time)
+        lowest, highest = self.limits or (-math.inf, math.inf)
         taps = self._taps(sample_time)
         counts, plant, plant_state = self._model_blocks(sample_time, u0)
         feedback = (self.feedback or PID()).compiled(sample_time, u0 if self.feedforward is None else 0.0, y0)
-        inverse = None if self.feedforward is None else self.feedforward.blocks(sample_time, u0)
-        amplifier = (None if self.feedforward is None else self.feedforward.amplifier) or Amplifier()
-        lowest, highest = self.limits or (-math.inf, math.inf)
-        head = [
-            lowest, highest, *sorted(amplifier.voltage([lowest, highest])), amplifier.gain, amplifier.offset,
-            taps.shape[1],
-        ]  # fmt: skip
+        forward = _NOTHING if self.feedforward is None else self.feedforward.block(sample_time, u0, (lowest, highest))
+        head = [lowest, highest, taps.shape[1], float(self.feedforward is not None), *counts]
         filters = [
             _THROUGH if self.notch is None else self.notch.coefficients(sample_time),
             0.0 * _THROUGH if self.damping is None else self.damping.coefficients(sample_time),
         ]
-        parameters = [taps.ravel(), plant, feedback.parameters, *filters]
-        state = [np.array([u0, 0.0, 0.0]), np.full(taps.shape[1], y0), plant_state, feedback.state, np.zeros(4)]
-        if inverse is None:
-            head += [0.0] * 5
-        else:
-            head += [inverse.kind, inverse.law.size, inverse.law_state.size, inverse.weights.size, inverse.scale]
-            parameters += [inverse.weights, inverse.declines, inverse.law]
-            state += [np.full(inverse.weights.size, inverse.level), inverse.law_state]
+        parameters = [np.array(head), taps.ravel(), plant, feedback.parameters, *filters, forward.parameters]
+        state = [np.array([u0]), np.full(taps.shape[1], y0), plant_state, feedback.state, np.zeros(4), forward.state]
         return CompiledController(
-            kernels.track,
-            read_only(np.concatenate([head, counts, *parameters]), finite=False),
+            with_inverse(kernels.track, forward.inverse),
+            read_only(np.concatenate(parameters), finite=False),
             np.concatenate(state),
         )
 
@@ -204,14 +204,3 @@ class TrackingController(SampledController):
             chain.linear_block,
             np.concatenate([rest.x, rest.past, readings]),
         )
-
-
-_PARTS: dict[str, Any] = {
-    "shaper": Shaper,
-    "mode_inverse": ModeInverse,
-    "feedforward": InverseFeedforward,
-    "feedback": PID,
-    "notch": Notch,
-    "damping": DampingLoop,
-    "model": Actuator,
-}

@@ -12,9 +12,10 @@ from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 import numba
-from numba.core import cgutils
+from numba.core import cgutils, types
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
+from numba.experimental.function_type import _get_wrapper_address
 from numba.extending import intrinsic
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -46,6 +47,25 @@ def signed_closure(*signatures: Any) -> Callable[[F], F]:
     """As `signed_kernel`, for a function that closes over kernels: no later process would find it in the cache."""
     compiler: Any = numba.njit
     return lambda function: compiler(list(signatures), nogil=True, error_model="numpy")(function)
+
+
+class _Address(types.WrapperAddressProtocol):
+    """A kernel that numba knows by its signature and its address alone."""
+
+    def __init__(self, function: Any, signature: Any) -> None:
+        self._function, self._signature = function, signature
+
+    def __wrapper_address__(self) -> int:
+        return int(_get_wrapper_address(self._function, self._signature))
+
+    def signature(self) -> Any:
+        return self._signature
+
+
+def by_address(function: F, signature: Any) -> F:
+    """A kernel that a closure calls by its address: its code is not compiled into the closure once more."""
+    address: Any = _Address(function, signature) if isinstance(function, Dispatcher) else function
+    return address  # type: ignore[no-any-return]
 
 
 def signed_inlined(*signatures: Any) -> Callable[[F], F]:

@@ -22,9 +22,10 @@ from hysim._frozen import FloatArray
 from hysim.kernels import boucwen
 from hysim.kernels._compile import borrowed, inner, kernel
 from hysim.kernels.elementary import power
+from hysim.kernels.inverses import N_LIMITS, N_PLACE, within_limits
 
 N_HEAD = 8
-N_OWN = 3
+N_OWN = N_PLACE + 2
 MAX_STEPS = 400
 
 _EPSILON = 2.0**-52
@@ -103,7 +104,7 @@ def lowest_slope(u: float, z: float, end: float, z_end: float, direction: float,
 
 @inner
 def monotone(u: float, z: float, direction: float, parameters: FloatArray, state: FloatArray) -> bool:
-    """Whether the slope is positive from (u, z) to where the law's state stands; else the place goes into `state`."""
+    """Whether the slope is positive from (u, z) to where the law's state stands; else `state` gets the place."""
     memory = state[N_OWN:]
     end, z_end = memory[0], memory[1]
     if lowest_slope(u, z, end, z_end, direction, parameters) > 0.0:
@@ -113,7 +114,7 @@ def monotone(u: float, z: float, direction: float, parameters: FloatArray, state
         forward(u, z, point, parameters, memory)
         steepness = slope(point, memory[1], direction, parameters)
         if not steepness > 0.0:
-            state[1], state[2] = point, parameters[0] * steepness
+            state[2], state[3] = point, parameters[0] * steepness
             return False
     memory[0], memory[1] = end, z_end
     return bool(parameters[7] > 1.0)
@@ -130,7 +131,7 @@ def solve(
     memory = state[N_OWN:]
     upward = parameters[0] * direction
     steepness, back = slope(u, z, direction, parameters), slope(u, z, -direction, parameters)
-    state[1], state[2] = u, parameters[0] * min(steepness, back)
+    state[2], state[3] = u, parameters[0] * min(steepness, back)
     if not (steepness > 0.0 and back > -_FLAT * steepness):
         return False
     at_start = rounding(y, u, z, parameters)
@@ -150,7 +151,7 @@ def solve(
         else:
             beyond = target
         if not error >= 0.0:
-            state[1], state[2] = target, parameters[0] * steepness
+            state[2], state[3] = target, parameters[0] * steepness
         move = -error / steepness if steepness > 0.0 else math.nan
         trial = target + direction * move
         inside = direction * behind <= direction * trial <= direction * beyond
@@ -171,25 +172,29 @@ def solve(
 
 @kernel
 def step(parameters: FloatArray, state: FloatArray, y: float) -> float:
-    """Input at the next output `y`, or nan where the law has no inverse; the state then stays where it is.
+    """Input at the next output `y`, or nan where the law has no inverse; see `hysim.kernels.inverses`.
 
-    `parameters` is (rising, A, beta, gamma, n, gain, offset, number of coefficients, c1, c2, ...,
-    parameters of `boucwen.step`). `state` is (last y, u and slope at the place that has no
-    inverse, state of `boucwen.step`).
+    `parameters` is (lowest input, highest input, rising, A, beta, gamma, n, gain, offset, number of coefficients, c1,
+    c2, ..., parameters of `boucwen.step`). `state` is (u, y, input and slope at the place that has no inverse, state
+    of `boucwen.step`).
     """
-    if y == state[0]:
-        return float(state[N_OWN])
     parameters, state = borrowed(parameters), borrowed(state)
-    memory = state[N_OWN:]
+    if y == state[1] and parameters[0] <= state[0] <= parameters[1]:
+        return float(state[0])
+    own, memory = parameters[N_LIMITS:], state[N_OWN:]
     u, z = memory[0], memory[1]
-    upward = 1.0 if y > state[0] else -1.0
-    coefficients = parameters[N_HEAD : N_HEAD + int(parameters[7])]
-    gap = upward * (y - (parameters[6] + boucwen.polynomial(u, coefficients, 0) + parameters[5] * z))
-    direction = parameters[0] * upward
-    if not gap <= 0.0 and not (
-        solve(u, z, y, direction, gap, parameters, state) and monotone(u, z, direction, parameters, state)
-    ):
+    upward = 1.0 if y > state[1] else -1.0
+    coefficients = own[N_HEAD : N_HEAD + int(own[7])]
+    gap = upward * (y - (own[6] + boucwen.polynomial(u, coefficients, 0) + own[5] * z))
+    direction, wanted = own[0] * upward, u
+    if not gap <= 0.0:
+        exists = solve(u, z, y, direction, gap, own, state) and monotone(u, z, direction, own, state)
+        wanted = memory[0] if exists else math.nan
+    end = within_limits(parameters, wanted, direction)
+    if end == wanted:
+        state[0], state[1] = wanted, y
+    elif math.isnan(end):
         memory[0], memory[1] = u, z
-        return math.nan
-    state[0] = y
-    return float(memory[0])
+    else:
+        state[0], state[1] = end, forward(u, z, end, own, memory)
+    return float(wanted)

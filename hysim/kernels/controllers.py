@@ -12,12 +12,15 @@ Every controller is a function `command(parameters, state, reference, measuremen
 so that a loop is compiled once for all of them. Its state begins with the last command, before the limits.
 """
 
+from collections.abc import Callable
+
 from numba import float64, int64, types
 
 from hysim._frozen import FloatArray
 from hysim.kernels._compile import signed_kernel
 from hysim.kernels.stepping import CONSTANTS, VECTOR
 
+ControllerStep = Callable[[FloatArray, FloatArray, float, float], float]
 CONTROLLER = types.FunctionType(float64(CONSTANTS, VECTOR, float64, float64))
 
 
@@ -47,7 +50,7 @@ def through(parameters: FloatArray, state: FloatArray, reference: float, measure
 
 @signed_kernel(int64(CONTROLLER, CONSTANTS, VECTOR, CONSTANTS, CONSTANTS, VECTOR, VECTOR))
 def replay(
-    controller: object,
+    controller: ControllerStep,
     parameters: FloatArray,
     state: FloatArray,
     reference: FloatArray,
@@ -57,6 +60,6 @@ def replay(
 ) -> int:
     """Commands and voltages of a controller for recorded references and measurements; 0."""
     for k in range(reference.size):
-        u[k] = controller(parameters, state, reference[k], measurement[k])  # type: ignore[operator]
+        u[k] = controller(parameters, state, reference[k], measurement[k])
         command[k] = state[0]
     return 0

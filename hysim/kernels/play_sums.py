@@ -17,8 +17,9 @@ import math
 from numba import float64, types, void
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import inlined, inner, signed_kernel
-from hysim.kernels.stepping import CONSTANTS, VECTOR
+from hysim.kernels._compile import inlined, inner, kernel, signed_kernel
+from hysim.kernels.inverses import N_LIMITS, N_PLACE, within_limits
+from hysim.kernels.stepping import CONSTANTS, STEP, VECTOR
 
 N_ENVELOPE = 5
 LEFT = 2
@@ -116,22 +117,21 @@ def looked_at(parameters: FloatArray, state: FloatArray, u: float, direction: fl
 # ---------------------------------------------------------------------------------- what loops take
 
 
-@signed_kernel(float64(CONSTANTS, VECTOR, float64))
+@signed_kernel(STEP.signature)
 def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """Output at the next input `u`; `state` moves along."""
     return float(moved(parameters, state, u, parameters[1] * abs(u - state[0])))
 
 
-@signed_kernel(float64(CONSTANTS, VECTOR, float64))
-def inverse_step(parameters: FloatArray, state: FloatArray, y: float) -> float:
-    """Input that takes the output to `y`, the next one to the last input; nan where there is none.
+@inner
+def solved(parameters: FloatArray, state: FloatArray, y: float, direction: float) -> float:
+    """Input in a direction from the last one that takes the output to `y`; nan where there is none.
 
     The output of a law without dead zones is monotone in the input, of the sign of all weights together: Newton's
     method in a bracket that closes on the zero, and a bisection where the output stands still.
     """
     rising = math.copysign(1.0, slope_of_all(parameters, state.size - 1))
     u = behind = state[0]
-    direction = rising * math.copysign(1.0, y - looked_at(parameters, state, u, 1.0)[0])
     beyond, ahead = direction * math.inf, _FIRST_STEP * (1.0 + abs(u))
     for _ in range(_MAX_STEPS):
         total, slope, size = looked_at(parameters, state, u, direction)
@@ -153,9 +153,23 @@ def inverse_step(parameters: FloatArray, state: FloatArray, y: float) -> float:
             if trial in (behind, beyond):
                 break
         u = trial
-    if not abs(error) <= _REACHED * (size + abs(y)):
-        return math.nan
-    step(parameters, state, u)
+    return u if abs(error) <= _REACHED * (size + abs(y)) else math.nan
+
+
+@kernel
+def inverse_step(parameters: FloatArray, state: FloatArray, y: float) -> float:
+    """Input that takes the output to `y`, the next one to the last input; see `hysim.kernels.inverses`.
+
+    `parameters` are the limits and those of `step`; `state` is (u, y) and that of `step`.
+    """
+    own, law = parameters[N_LIMITS:], state[N_PLACE:]
+    rise = y - looked_at(own, law, law[0], 1.0)[0]
+    direction = math.copysign(1.0, slope_of_all(own, law.size - 1)) * math.copysign(1.0, rise)
+    u = solved(own, law, y, direction)
+    end = within_limits(parameters, u, direction)
+    if not math.isnan(end):
+        output = step(own, law, end)
+        state[0], state[1] = end, y if end == u else output
     return float(u)
 
 

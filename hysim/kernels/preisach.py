@@ -20,6 +20,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.kernels._compile import inner, kernel
+from hysim.kernels.inverses import N_LIMITS, N_PLACE, within_limits
 
 HEAD = 3
 
@@ -150,27 +151,6 @@ def batch(parameters: FloatArray, z0: FloatArray, u: FloatArray, out: FloatArray
         path(parameters[i], x, y, d, u[min(i, u.shape[0] - 1)], out[i])
 
 
-@kernel
-def inverse(parameters: FloatArray, x: FloatArray, y: FloatArray, d: int, wanted: FloatArray, out: FloatArray) -> int:
-    """Inputs at which the output is `wanted` into `out`: the first sample that is out of reach, or -1.
-
-    The law must rise with its input. `x`, `y` and `d` are as in `path`.
-    """
-    for k in range(wanted.size):
-        if wanted[k] != y[d]:
-            start = origin(y, d, wanted[k])
-            if start < 0 and wanted[k] < y[0]:
-                return k
-            d = start + 1
-            if start >= 0:
-                x[d] = solved(parameters, x[start], y[start], wanted[k])
-            y[d] = wanted[k]
-        out[k] = x[d]
-        if math.isnan(x[d]):
-            return k
-    return -1
-
-
 # ---------------------------------------------------------------------------------- one sample at a time
 
 
@@ -185,3 +165,36 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     d = moved(parameters, x, y, d, u)
     state[0], state[1] = u, d
     return float(y[d])
+
+
+@kernel
+def inverse_step(parameters: FloatArray, state: FloatArray, wanted: float) -> float:
+    """Input at which the output is `wanted`, or nan beyond saturation; see `hysim.kernels.inverses`.
+
+    `parameters` are the limits, 1.0 for a law that rises or -1.0 for one that falls with its input, and the
+    parameters of `step` of the law with this sign, which rises; `state` is (u, y) and the state of `step`.
+    """
+    sign, own, law = parameters[N_LIMITS], parameters[N_LIMITS + 1 :], state[N_PLACE:]
+    room = (law.size - 2) // 2
+    x, y = law[2 : 2 + room], law[2 + room :]
+    d, rising_wanted = int(law[1]), sign * wanted
+    if d + 1 == room:
+        d = shortened(own, x, y, d)
+    direction, u, place = 1.0 if rising_wanted > y[d] else -1.0, x[d], d
+    if rising_wanted != y[d]:
+        start = origin(y, d, rising_wanted)
+        place = start + 1
+        if start >= 0:
+            u = solved(own, x[start], y[start], rising_wanted)
+        else:
+            u = x[0] if rising_wanted >= y[0] else math.nan
+    end = within_limits(parameters, u, direction)
+    if end == u:
+        x[place], y[place], d = u, rising_wanted, place
+    elif not math.isnan(end):
+        d = moved(own, x, y, d, end)
+    law[1] = d
+    if not math.isnan(end):
+        law[0] = state[0] = end
+        state[1] = sign * y[d]
+    return float(u)

@@ -1,12 +1,12 @@
 """A feed-forward and a feedback in one sampled controller, one sample at a time.
 
-At each sample the controller gets the reference of some samples ahead, r, and the measurement m of the displacement
+At each sample the controller gets the reference r of some samples ahead, and the measurement m of the displacement
 just before the new command:
 
     target   s = sum p_i r_(-i)                        where the displacement is to be now
     drive    d = sum q_i r_(-i)                        what creep and law together are to give next
     creep    v = (d - sum w_i q_i (1 + e_i)) / (g_0 - sum w_i e_i)     so that they do at the end of the sample
-    law      f = the input that takes the law's copy to v, within the limits; where it ends is w
+    law      f = the input at which the law's output is v, within the limits; w is the output there
     creep    q_i <- q_i + e_i (q_i - w),               e_i = exp(-h / tau_i) - 1
     feedback b = notch(PID(s, m)) + damping(m - s)
     u = f + b within the limits,  what is cut off winds the PID's integral back
@@ -14,23 +14,28 @@ just before the new command:
 With a model, s in the feedback is what a copy of the plant, driven by w, would have measured. The copy's equations
 are those of `hysim.kernels.loop`, its rings of past values kept with the newest first.
 
+The inverse of the law is a step (`hysim.kernels.inverses`); `bound` makes a controller of a kernel and this step.
 The parameters are a head and blocks one behind the other, in the order in which the kernel takes them; so is the
 state, which begins with the command before the limits.
 """
 
 import math
+from collections.abc import Callable
+
+from numba import float64
 
 from hysim._frozen import FloatArray
-from hysim.kernels import boucwen_inverse, clamps
-from hysim.kernels._compile import inlined, inner, kernel
-from hysim.kernels.controllers import pid
+from hysim.kernels._compile import by_address, inlined, kernel, signed_closure
+from hysim.kernels.controllers import CONTROLLER, ControllerStep, pid
 from hysim.kernels.loop import advance, output
+from hysim.kernels.stepping import CONSTANTS, STEP, VECTOR, Step
 
-N_HEAD = 18
-LINE, BOUC_WEN, PLAYS = 1, 2, 3
-"""Laws of which the kernel has the inverse; 0 stands for no feed-forward."""
+N_HEAD = 10
+N_FEEDFORWARD = 4
 
-_JUST, _TINY = 1e-15, 1e-300  # beyond a limit: what is asked for where nothing reaches
+BoundStep = Callable[[Step, FloatArray, FloatArray, float, float], float]
+_BOUND = float64(STEP, CONSTANTS, VECTOR, float64, float64)
+_JUST, _TINY = 1e-15, 1e-300  # beyond a limit: the command where no input gives the output
 
 
 @inlined
@@ -59,86 +64,54 @@ def biquad(coefficients: FloatArray, state: FloatArray, x: float) -> float:
     return float(y)
 
 
-@inner
-def invert_bouc_wen(
-    parameters: FloatArray, state: FloatArray, v: float, lowest: float, highest: float, reached: FloatArray
-) -> float:
-    """Input that gives `v`; `reached` is then the one within the limits, and the output there."""
-    memory = state[boucwen_inverse.N_OWN :]
-    u_before, z_before, y_before = memory[0], memory[1], state[0]
-    u = boucwen_inverse.step(parameters, state, v)
-    reached[0], reached[1] = u, v
-    if lowest <= u <= highest:
-        return float(u)
-    beyond = u
-    if math.isnan(u):
-        beyond = math.inf if (v > y_before) == (parameters[0] > 0.0) else -math.inf
-    reached[0] = min(max(beyond, lowest), highest)
-    reached[1] = boucwen_inverse.forward(u_before, z_before, reached[0], parameters, memory)
-    memory[0] = reached[0]
-    state[0] = reached[1]
-    return float(reached[0] + math.copysign(_JUST * abs(reached[0]) + _TINY, beyond)) if math.isnan(u) else float(u)
+@inlined
+def feed_forward(inverse: Step, parameters: FloatArray, state: FloatArray, drive: float) -> tuple[float, float, float]:
+    """Command that takes creep and law together to `drive`, the one within the limits, and the law's output there.
 
-
-@inner
-def invert_plays(
-    parameters: FloatArray, state: FloatArray, v: float, lowest: float, highest: float, reached: FloatArray
-) -> float:
-    """As `invert_bouc_wen`, of plays; the inverse and the law come one behind the other, then room for one state."""
-    n, m = parameters.size // 2, state.size // 3
-    inverse, law, kept = state[:m], state[m : 2 * m], state[2 * m :]
-    for i in range(m):
-        kept[i] = inverse[i]
-    u = clamps.step(parameters[:n], inverse, v)
-    reached[0] = min(max(u, lowest), highest)
-    reached[1] = clamps.step(parameters[n:], law, reached[0])
-    if reached[0] != u:
-        for i in range(m):
-            inverse[i] = kept[i]
-        clamps.step(parameters[:n], inverse, reached[1])
-    return float(u)
-
-
-@inner
-def invert(
-    kind: int,
-    parameters: FloatArray,
-    state: FloatArray,
-    v: float,
-    lowest: float,
-    highest: float,
-    reached: FloatArray,
-) -> float:
-    """Input that takes a law of a kind to `v`."""
-    if kind == BOUC_WEN:
-        return float(invert_bouc_wen(parameters, state, v, lowest, highest, reached))
-    if kind == PLAYS:
-        return float(invert_plays(parameters, state, v, lowest, highest, reached))
-    u = (v - parameters[0]) / parameters[1]
-    reached[0] = min(max(u, lowest), highest)
-    reached[1] = v if reached[0] == u else parameters[0] + parameters[1] * reached[0]
-    return float(u)
+    `parameters` are (gain and offset of the amplifier, elements of the creep, its 1 / (g_0 - sum w_i e_i), w_i, e_i,
+    parameters of the inverse); `state` is (q_i, state of the inverse).
+    """
+    gain, offset, elements = parameters[0], parameters[1], int(parameters[2])
+    p = N_FEEDFORWARD + elements
+    weights, declines, own = parameters[N_FEEDFORWARD:p], parameters[p : p + elements], parameters[p + elements :]
+    positions, law = state[:elements], state[elements:]
+    for i in range(elements):
+        drive -= weights[i] * (positions[i] + declines[i] * positions[i])
+    u = inverse(own, law, drive * parameters[3])
+    reached = law[0]
+    if math.isnan(u) and (reached == own[0] or reached == own[1]):
+        beyond = _JUST * abs(reached) + _TINY
+        u = reached + (beyond if reached == own[1] else -beyond)
+    for i in range(elements):
+        positions[i] += declines[i] * (positions[i] - law[1])
+    limited = math.nan if math.isnan(u) else reached
+    return (u - offset) / gain, (limited - offset) / gain, law[1]
 
 
 @kernel
-def track(parameters: FloatArray, state: FloatArray, reference: float, measurement: float) -> float:
+def invert(inverse: Step, parameters: FloatArray, state: FloatArray, reference: float, measurement: float) -> float:
+    """The command of a feed-forward alone; `state` is the last command before the limits, then its own."""
+    state[0], limited, _ = feed_forward(inverse, parameters, state[1:], reference)
+    return float(limited)
+
+
+@kernel
+def track(inverse: Step, parameters: FloatArray, state: FloatArray, reference: float, measurement: float) -> float:
     """The command within the limits.
 
-    The head is (lowest and highest command, lowest and highest voltage, gain and offset of the amplifier, number
-    of taps, kind of the law, its numbers of parameters and of states, elements of the creep, its 1 / (g_0 - sum
-    w_i e_i), whether there is a model, its number of states that creep and of all states, its whole samples of
-    dead time and of delay, and whether a part of a sample is left of the delay).
+    The head is (lowest and highest command, number of taps, whether there is a feed-forward, whether there is a model,
+    its number of states that creep and of all states, its whole samples of dead time and of delay, and whether a part
+    of a sample is left of the delay).
     """
-    lowest, highest = parameters[0], parameters[1]
-    taps, kind = int(parameters[6]), int(parameters[7])
-    p, s = N_HEAD, 3
+    lowest, highest, taps = parameters[0], parameters[1], int(parameters[2])
+    feeds_forward, has_model, has_part = parameters[3] > 0.0, parameters[4] > 0.0, parameters[9] > 0.0
+    p, s = N_HEAD, 1
     ring = state[s : s + taps]
     push(ring, reference)
     drive, target = dot(parameters[p : p + taps], ring), dot(parameters[p + taps : p + 2 * taps], ring)
     p, s = p + 2 * taps, s + taps
 
-    creeping, order = int(parameters[13]), int(parameters[14])
-    dead, late = int(parameters[15]), int(parameters[16])
+    creeping, order, dead, late = int(parameters[5]), int(parameters[6]), int(parameters[7]), int(parameters[8])
     others = order - creeping
     decline, p = parameters[p : p + creeping], p + creeping
     A, p = parameters[p : p + others * order], p + others * order
@@ -148,9 +121,9 @@ def track(parameters: FloatArray, state: FloatArray, reference: float, measureme
     x, s = state[s : s + 2 * order], s + 2 * order
     past, s = state[s : s + dead + 3], s + dead + 3
     readings, s = state[s : s + late + 2], s + late + 2
-    if parameters[12] > 0.0:
+    if has_model:
         y = output(at_samples, x, past[dead + 1], past[dead], 0.0)
-        push(readings[: late + 1], readings[late + 1] if parameters[17] > 0.0 else y)
+        push(readings[: late + 1], readings[late + 1] if has_part else y)
         target = readings[late]
 
     integral, unwinding = s + 1, parameters[p + 8]
@@ -159,28 +132,30 @@ def track(parameters: FloatArray, state: FloatArray, reference: float, measureme
     command += biquad(parameters[p + 14 : p + 19], state[s + 6 : s + 8], measurement - target)
     p, s = p + 19, s + 8
 
-    wanted = given = command
-    if kind > 0:
-        elements, n_parameters, n_states = int(parameters[10]), int(parameters[8]), int(parameters[9])
-        weights, p = parameters[p : p + elements], p + elements
-        declines, p = parameters[p : p + elements], p + elements
-        positions, s = state[s : s + elements], s + elements
-        for i in range(elements):
-            drive -= weights[i] * (positions[i] + declines[i] * positions[i])
-        law, law_state, reached = parameters[p : p + n_parameters], state[s : s + n_states], state[1:3]
-        v = drive * parameters[11]
-        u = invert(kind, law, law_state, v, parameters[2], parameters[3], reached)
-        for i in range(elements):
-            positions[i] += declines[i] * (positions[i] - reached[1])
-        wanted += (u - parameters[5]) / parameters[4]
-        given += (reached[0] - parameters[5]) / parameters[4]
-        push(past, reached[1])
+    wanted = total = command
+    if feeds_forward:
+        forward, limited, level = feed_forward(inverse, parameters[p:], state[s:], drive)
+        wanted += forward
+        total += limited
+        push(past, level)
         oldest, older, newer = past[dead + 2], past[dead + 1], past[dead]
-        if parameters[17] > 0.0:
+        if has_part:
             readings[late + 1] = output(within, x, oldest, older, newer)
         advance(decline, A, B, x, oldest, older, newer)
-    limited = min(max(given, lowest), highest)
-    if limited != given:
-        state[integral] += unwinding * (limited - given)
+    u = min(max(total, lowest), highest)
+    if u != total:
+        state[integral] += unwinding * (u - total)
     state[0] = wanted
-    return float(limited)
+    return float(u)
+
+
+def bound(controller: BoundStep, inverse: Step) -> ControllerStep:
+    """The controller of a kernel, `invert` or `track`, with the inverse that it steps."""
+    controller_by = by_address(controller, _BOUND)
+    inverse_by = by_address(inverse, STEP.signature)
+
+    @signed_closure(CONTROLLER.signature)
+    def step(parameters: FloatArray, state: FloatArray, reference: float, measurement: float) -> float:
+        return controller_by(inverse_by, parameters, state, reference, measurement)
+
+    return step

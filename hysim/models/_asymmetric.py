@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim.models import _numeric_inverse, boucwen_inverse
+from hysim.models import _inverse_search, boucwen_inverse
 from hysim.models._memory_law import MemoryLaw
 from hysim.models.law import State
 from hysim.models.polynomial_boucwen import PolynomialBoucWen
@@ -37,8 +37,7 @@ class SteppedLaw(MemoryLaw):
         Raises
         ------
         SimulationError
-            If the slope dy/du does not keep its sign up to a sample, or the output does not reach it; the message
-            names the sample, the input and the slope.
+            If the output does not reach a sample, or does not rise (or fall) all the way there; it names the sample.
         ValueError
             If y is not finite or has not one axis, both u0 and state are given, its first sample does not determine
             the first input (give u0), or the slope is zero where the record begins.
@@ -51,11 +50,12 @@ class SteppedLaw(MemoryLaw):
             static = replace(plain, input_coefficients=tuple(boucwen_inverse.coefficients(self)))
             u0 = float(static.inverse_response(outputs[:1])[0])
         start = self._begun(np.array([u0 or 0.0]), None)[1] if state is None else state
-        return _numeric_inverse.inverse_response(self, outputs, start, self._terms)
+        forward = self._begun(np.array([start[0]]), start)[0]
+        return _inverse_search.inverse_response(
+            _inverse_search.inverse_step(forward, start[0], terms=self._terms(*start[:2])), outputs
+        )
 
-    def _terms(self, u: float, z: float) -> tuple[float, float]:
-        """Sizes of the terms of the output that the input contributes, with the offset, and that the memory does."""
-        total = 0.0
-        for coefficient in reversed(boucwen_inverse.coefficients(self)):
-            total = (total + abs(coefficient)) * abs(u)
-        return abs(self.offset) + total, abs(self.gain * z)
+    def _terms(self, u: float, z: float) -> float:
+        """Size of the terms of the output."""
+        powers = [abs(c * u**k) for k, c in enumerate(boucwen_inverse.coefficients(self).tolist(), 1)]
+        return float(abs(self.offset) + sum(powers) + abs(self.gain * z))

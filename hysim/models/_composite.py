@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, read_only
 from hysim.models import _parts
 from hysim.models._by_structure import ByStructure
+from hysim.models._inverse_search import inverse_response_of
 from hysim.models.composable import Composable
 from hysim.models.protocols import CompiledLaw, Continuable, needs_time
 
@@ -69,7 +70,10 @@ class Composite(ByStructure, Composable):
             If y is not finite or has not one axis, a member moves in time, or the output does not tell where the
             input begins.
         """
-        return _parts.inverse_response(self, y, u0)
+        outputs = read_only(y, "y", ndim=1)
+        if self.dynamic:
+            raise ValueError("what moves in time has no inverse that depends on the output alone")
+        return inverse_response_of(self, outputs, u0)
 
 
 def continued(part: Any, u: FloatArray, sample_time: float | None, state: Any) -> tuple[FloatArray, Any]:

@@ -1,4 +1,4 @@
-"""What sums and cascades share: names of their parts, parts that are stepped, and laws that are inverted."""
+"""What sums and cascades share: names of their parts, and parts that are stepped."""
 
 import functools
 import re
@@ -6,19 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim.errors import SimulationError
-from hysim.kernels import composed as kernels
 from hysim.kernels.stepping import Step
 from hysim.models.protocols import CompiledLaw, OfFamily, Responding, Steppable, needs_time
-
-_REACH, _WIDER = 1e-6, 16.0  # how far at most the output is looked at to either side of the first input; the ratio
-_SHORTEST = 2.0**-46  # of the first input, or this number
-_NEXT_TO_NOTHING = 1e-150
-_HIDDEN, _FARTHEST = 2.0**-44, 1e150  # part of the output by which rounding may hide a rise: it is then sought further
-_LINEAR = 0.1  # part by which rises over once, twice and four times a length are no multiples of each other
 
 
 def labels(parts: Sequence[Any]) -> tuple[str, ...]:
@@ -87,80 +78,6 @@ def compiled_law(part: Any, u0: float) -> CompiledLaw:
         why = "it moves in time" if needs_time(part) else "it has no compiled step"
         raise TypeError(f"a {type(part).__name__} cannot be stepped as a law: {why}")
     return CompiledLaw(*part.compiled(u0))
-
-
-def inverse_response(law: Any, y: npt.ArrayLike, u0: float | None) -> FloatArray:
-    """Input for the output `y` of a law with a compiled step; see `Composite.inverse_response`."""
-    outputs = read_only(y, "y", ndim=1)
-    if law.dynamic:
-        raise ValueError("what moves in time has no inverse that depends on the output alone")
-    if not outputs.size:
-        return outputs
-    here = _first_input(law, float(outputs[0])) if u0 is None else float(u0)
-    compiled = law.compiled(here)
-    trial = np.empty_like(compiled.state)
-
-    def output(u: float) -> float:
-        trial[:] = compiled.state
-        return float(compiled.step(compiled.parameters, trial, u))
-
-    u = np.empty(outputs.size)
-    with np.errstate(all="ignore"):  # a bracket may reach where a memory overflows
-        reached, slope = output(here), _first_slope(output, here)
-        if slope == 0.0:
-            raise ValueError(f"the law has no inverse: its output does not rise or fall through u = {here:g}")
-        if u0 is None:
-            reached = float(outputs[0])
-        step, parameters, state = compiled
-        lost = kernels.inverse(step, parameters, state, trial, here, reached, slope, outputs, u)
-    if lost >= 0:
-        raise SimulationError(
-            f"the law has no inverse at sample {lost} (y = {outputs[lost]:g}): the output does not reach it, or "
-            "turns on the way"
-        )
-    return u
-
-
-def _first_slope(output: Callable[[float], float], here: float) -> float:
-    """Slope of the output at the input `here`, zero where it does not rise or fall through it.
-
-    The law has a length of its own, on which its output may turn, and rounding hides shorter rises. So the slope is
-    that on the shortest length on which the output is seen to be linear on both sides.
-    """
-    reached, fallback, highest = output(here), 0.0, 0.0
-    reach = max(_SHORTEST * abs(here), _NEXT_TO_NOTHING)
-    while reach < _REACH * (1.0 + abs(here)) or (highest < _HIDDEN * abs(reached) and reach < _FARTHEST):
-        lengths = reach * np.array([1.0, 2.0, 4.0])
-        ends = here + np.array([lengths, -lengths])
-        rises = np.array([[output(u) for u in side] for side in ends.tolist()]) - reached
-        slopes = rises / (ends - here)
-        if 0.0 < slopes[0, 0] * slopes[1, 0] < np.inf:
-            fallback = slopes[0, 0]
-            if (np.abs(slopes / slopes[:, :1] - 1.0) < _LINEAR).all():
-                return float(slopes[0, 0])
-        elif fallback == 0.0 and np.isfinite(slopes[:, 0]).sum() == 1:  # the memory escapes at once on the other side
-            fallback = float(slopes[np.isfinite(slopes[:, 0]), 0][0])
-        highest = float(np.abs(rises).max())
-        reach *= _WIDER
-    return float(fallback)
-
-
-def _first_input(law: Any, y: float) -> float:
-    """The first input whose output is `y`, found from zero."""
-    from scipy.optimize import brentq
-
-    def error(u: float) -> float:
-        return float(law.response([u])[0]) - y
-
-    if error(0.0) == 0.0:
-        return 0.0
-    reach = 1e-6
-    while reach < 1e150:
-        for end in (reach, -reach):
-            if error(end) * error(0.0) <= 0.0:
-                return float(brentq(error, 0.0, end, xtol=1e-300, rtol=4.0 * np.finfo(float).eps))
-        reach *= 2.0
-    raise ValueError("the first output does not tell the first input: give u0")
 
 
 def own(parameters: Mapping[str, Any], label: str) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """What the extended Prandtl-Ishlinskii laws share: the rows of numbers that `hysim.kernels.play_sums` takes."""
 
+import math
 from typing import ClassVar
 
 import numpy as np
@@ -14,7 +15,9 @@ from hysim.models._by_structure import ByStructure
 from hysim.models._clamps import Bank
 from hysim.models.law import State, Tables
 from hysim.models.prandtl_ishlinskii import PrandtlIshlinskii
+from hysim.models.protocols import CompiledLaw
 
+_WIDTH = 3  # place of the width behind the limits and the offset
 IDENTITY = (0.0, 0.0, 0.0, 0.0, 1.0)
 """The envelope gamma(u) = u."""
 
@@ -45,21 +48,26 @@ class ExtendedPlays(ByStructure, Bank):
         if state is None:
             first = self._first_input(float(wanted[0])) if u0 is None and wanted.size else u0
             state = self.advance([first or 0.0])[1]
-        law, _ = self._begun(wanted, state)
-        u = np.empty(wanted.size)
-        lost = in_pieces(lambda k: drive(kernels.inverse_step, law.parameters, law.state, wanted[k], u[k]), u.size)
+        u, inverse = np.empty(wanted.size), self.inverse_step(state)
+        lost = in_pieces(lambda k: drive(inverse.step, inverse.parameters, inverse.state, wanted[k], u[k]), u.size)
         if lost >= 0:
             raise SimulationError(f"no input gives the output at sample {lost} (y = {wanted[lost]:g})")
         return u
 
     def _first_input(self, y: float) -> float:
         """The first input that finds the plays at z0 and gives `y`, whatever its speed would be."""
-        law = self.compiled()
-        still = law.parameters.copy()
-        still[1] = 0.0
-        first = np.empty(1)
-        drive(kernels.inverse_step, read_only(still), np.array([0.0, *self.z0]), read_only([y]), first)
-        return float(first[0]) if np.isfinite(first[0]) else 0.0
+        inverse = self.inverse_step((0.0, *self.z0))
+        still = inverse.parameters.copy()
+        still[_WIDTH] = 0.0
+        u = inverse.step(read_only(still, finite=False), inverse.state, y)
+        return u if math.isfinite(u) else 0.0
+
+    def inverse_step(self, state: State, limits: tuple[float, float] = (-math.inf, math.inf)) -> CompiledLaw:
+        """The inverse of the law in this state, as `hysim.kernels.inverses` has it."""
+        law, _ = self._begun(np.array([state[0]]), state)
+        y = kernels.step(law.parameters, law.state.copy(), state[0])
+        parameters = read_only(np.concatenate([limits, law.parameters]), finite=False)
+        return CompiledLaw(kernels.inverse_step, parameters, np.concatenate([[state[0], y], law.state]))
 
 
 def kernel_rows(

@@ -12,6 +12,7 @@ output that it can reach. For a piezoelectric stack, y = d (u - h) with the memo
 their alpha max(1, 2 beta / (beta + gamma)) < 1.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Protocol
@@ -129,12 +130,14 @@ class BoucWenInverse:
                 lambda k: drive(compiled.step, compiled.parameters, compiled.state, samples[k], u[k]), u.size
             )
         if failed >= 0:
-            raise SimulationError(self._failure(failed, samples[failed], *compiled.state[1:3]))
-        last_y, last_u, z = compiled.state[[0, kernels.N_OWN, kernels.N_OWN + 1]].tolist()
+            raise SimulationError(self._failure(failed, samples[failed], *compiled.state[2:4]))
+        last_u, last_y, z = compiled.state[[0, 1, kernels.N_OWN + 1]].tolist()
         return u.reshape(outputs.shape), (last_u, z, last_y)
 
-    def compiled(self, y0: float | None = None, *, u0: float | None = None) -> CompiledLaw:
-        """The inverse as compiled loops take it, ``u = step(parameters, state, y)``.
+    def compiled(
+        self, y0: float | None = None, *, u0: float | None = None, limits: tuple[float, float] = (-math.inf, math.inf)
+    ) -> CompiledLaw:
+        """The inverse as compiled loops take it, ``u = step(parameters, state, y)``; see `hysim.kernels.inverses`.
 
         Parameters
         ----------
@@ -142,17 +145,21 @@ class BoucWenInverse:
             Output at which the law rests before the first sample, its memory at z0.
         u0 : float, optional
             Or the input at which it rests; by default zero.
+        limits : (float, float)
+            Lowest and highest input to which its copy of the law moves.
 
         Returns
         -------
         CompiledLaw
-            Its step gives nan where there is no inverse, and keeps its state.
+            Its step returns nan where there is no inverse.
         """
         if y0 is not None and u0 is None:
-            return self._compiled(self._rest(float(y0)))
-        return self._compiled((float(u0 or 0.0), self.law.z0))
+            return self._compiled(self._rest(float(y0)), limits)
+        return self._compiled((float(u0 or 0.0), self.law.z0), limits)
 
-    def _compiled(self, state: LawState | InverseState) -> CompiledLaw:
+    def _compiled(
+        self, state: LawState | InverseState, limits: tuple[float, float] = (-math.inf, math.inf)
+    ) -> CompiledLaw:
         law = self.law
         u, z, *known = (float(value) for value in state)
         forward = law.compiled(u)
@@ -162,8 +169,8 @@ class BoucWenInverse:
         head = [1.0 if self.increasing else -1.0, law.A, law.beta, law.gamma, law.n, law.gain, law.offset, c.size]
         return CompiledLaw(
             kernels.step,
-            read_only(np.concatenate([head, c, forward.parameters]), finite=False),
-            np.concatenate([[last_y, np.nan, np.nan], forward.state]),
+            read_only(np.concatenate([limits, head, c, forward.parameters]), finite=False),
+            np.concatenate([[u, last_y, np.nan, np.nan], forward.state]),
         )
 
     def _rest(self, y: float) -> InverseState:
@@ -179,7 +186,7 @@ class BoucWenInverse:
         if not np.isfinite(u):
             raise SimulationError(
                 f"no input gives the first output {y:g} with the memory at z0: the polynomial turns at "
-                f"u = {compiled.state[1]:g}; give u0 to begin on another branch"
+                f"u = {compiled.state[2]:g}; give u0 to begin on another branch"
             )
         return float(u), self.law.z0, float(y)
 

@@ -26,7 +26,7 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
 from hysim.kernels import duhem as kernels
-from hysim.models import _duhem_search, _numeric_inverse
+from hysim.models import _duhem_search, _inverse_search
 from hysim.models.duhem_runs import branches, free_runs, outputs
 from hysim.models.duhem_terms import Polynomials, Term, equation, latex, polynomials, terms_of
 from hysim.models.law import Law, Packed, State, Tables
@@ -279,13 +279,12 @@ class Duhem(Law):
         -------
         array, shape (n_samples,)
             The law that comes from u0 through these inputs has the output y, to 1e-12 of its range; so has its
-            `response` if y begins at y0. A sample costs some twenty steps of the law, outside compiled code.
+            `response` if y begins at y0.
 
         Raises
         ------
         SimulationError
-            If the slope dy/du does not keep its sign on the way, or the output does not reach a sample; the
-            message names the sample and the input.
+            If the output does not reach a sample, or does not rise (or fall) all the way there; it names the sample.
         ValueError
             If y is not finite or has not one axis, both u0 and state are given, or the slope is zero where the
             record begins.
@@ -300,9 +299,10 @@ class Duhem(Law):
         if state is not None and u0 is not None:
             raise ValueError("give u0 or state, not both: the state has its own input")
         outputs = read_only(y, "y", ndim=1)
-        return _numeric_inverse.inverse_response(
-            self, outputs, state or self.start(float(u0 or 0.0), np.empty(0)), self._terms
-        )
+        start = state or self.start(float(u0 or 0.0), np.empty(0))
+        terms = abs(self.offset) + abs(self.feedthrough * start[0]) + abs(start[1])
+        forward = self._begun(np.array([start[0]]), start)[0]
+        return _inverse_search.inverse_response(_inverse_search.inverse_step(forward, start[0], terms=terms), outputs)
 
     @property
     def workspace(self) -> int:  # type: ignore[override]
@@ -393,7 +393,3 @@ class Duhem(Law):
     @property
     def scalars(self) -> dict[str, float]:
         return {**self.terms, "feedthrough": self.feedthrough, "offset": self.offset, "y0": self.y0}
-
-    def _terms(self, u: float, z: float) -> tuple[float, float]:
-        """Sizes of the terms of the output that the input contributes, with the offset, and that the memory does."""
-        return abs(self.offset) + abs(self.feedthrough * u), abs(z)

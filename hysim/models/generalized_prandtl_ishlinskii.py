@@ -171,11 +171,15 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
             If the law is not invertible, z0 holds positions that no input leads to, or y is not finite or has
             not one axis.
         """
+        self.check_invertible()
+        return self.input_of(y, u0, state)
+
+    def check_invertible(self) -> None:
+        """Raise a ValueError if the law is not invertible, or z0 holds positions that no input leads to."""
         if (refusal := self._refusal()) is not None:
             raise ValueError(refusal)
         if self._has_one_envelope():
-            self.plays.inverse()  # refuses positions that no input leads to
-        return self.input_of(y, u0, state)
+            self.plays.inverse()  # refuses these positions
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:

@@ -21,6 +21,7 @@ from hysim.errors import SimulationError
 from hysim.kernels.batches import drive_each, drive_to_end
 from hysim.kernels.stepping import Step, drive, drive_memory
 from hysim.models._batch import Batch, Reduction, Sets
+from hysim.models._inverse_search import inverse_response, inverse_response_of, inverse_step
 from hysim.models.compiled_step import compiled_step
 from hysim.models.composable import Composable
 from hysim.models.parameters import Parameter, declared_space
@@ -286,6 +287,40 @@ class Law(Composable, ABC):
         [0.41, 0.595, 0.746]
         """
         return cls.batch(cls.defaults(), parameters, u).result(reduce, target, workers)
+
+    def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
+        """Input that gives the output `y`, monotone between the samples.
+
+        Parameters
+        ----------
+        y : array, shape (n_samples,)
+            Wanted output [unit of y].
+        u0 : float, optional
+            Input at which the law rests before it moves to the first sample. By default the law begins at the first
+            sample: at the input with the first output, found from u = 0.
+        state : tuple of float, optional
+            State to continue from, in place of u0.
+
+        Returns
+        -------
+        array, shape (n_samples,)
+            Its `response` is y to the rounding of u; where the law turns later, the first input with the output.
+
+        Raises
+        ------
+        SimulationError
+            If the output does not reach a sample, or does not rise (or fall) all the way there; it names the sample.
+        ValueError
+            If y is not finite or has not one axis, both u0 and state are given, or the output does not determine where
+            the input begins.
+        """
+        if state is not None and u0 is not None:
+            raise ValueError("give u0 or state, not both: the state has its own input")
+        outputs = read_only(y, "y", ndim=1)
+        if state is None:
+            return inverse_response_of(self, outputs, u0)
+        forward, _ = self._begun(np.array([state[0]]), state)
+        return inverse_response(inverse_step(forward, state[0]), outputs)
 
     # ------------------------------------------------------------------------------ identification
 

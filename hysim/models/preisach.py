@@ -31,13 +31,16 @@ import numpy.typing as npt
 
 from hysim._cycles import TOLERANCE
 from hysim._frozen import FloatArray, read_only
+from hysim._parallel import in_pieces
 from hysim.errors import SimulationError
 from hysim.kernels import preisach as kernels
+from hysim.kernels.stepping import drive
 from hysim.models._preisach_search import SearchedRelays
 from hysim.models._relays import everett_of, weights_of
 from hysim.models.law import State
 from hysim.models.model import model
 from hysim.models.prandtl_ishlinskii import PrandtlIshlinskii
+from hysim.models.protocols import CompiledLaw
 from hysim.records import Record
 
 Density = Callable[[FloatArray, FloatArray], npt.ArrayLike]
@@ -342,6 +345,27 @@ class Preisach(SearchedRelays):
         if state is not None and u0 is not None:
             raise ValueError("give u0 or state, not both: the state has its own input")
         wanted = read_only(y, "y", ndim=1)
+        past = state[1:] if state is not None else self.z0 if u0 is None else (*self.z0, u0)
+        u, inverse = np.empty(wanted.size), self.inverse_step(past, room=wanted.size)
+        lost = in_pieces(lambda k: drive(inverse.step, inverse.parameters, inverse.state, wanted[k], u[k]), u.size)
+        if lost >= 0:
+            bound = abs(float(self.everett[-1, 0]))
+            raise SimulationError(
+                f"the law has no inverse at sample {lost} (y = {wanted[lost]:g}): it saturates at "
+                f"{self.offset - bound:g} and {self.offset + bound:g}"
+            )
+        return u
+
+    def inverse_step(
+        self, past: State, limits: tuple[float, float] = (-math.inf, math.inf), *, room: int = 0
+    ) -> CompiledLaw:
+        """The inverse after the inputs `past`, as `hysim.kernels.inverses` has it, with room for so many more extremes.
+
+        Raises
+        ------
+        ValueError
+            If the slope vanishes or changes its sign.
+        """
         slowest, fastest = self.slope_bounds()
         if not slowest * fastest > 0.0:
             raise ValueError(
@@ -349,17 +373,14 @@ class Preisach(SearchedRelays):
             )
         sign = math.copysign(1.0, fastest)
         rising = replace(self, weights=tuple(sign * np.array(self.weights)), offset=sign * self.offset)
-        past = state[1:] if state is not None else self.z0 if u0 is None else (*self.z0, u0)
-        parameters, x, outputs, d = rising._staircase(past, wanted.size)
-        u = np.empty(wanted.size)
-        lost = kernels.inverse(parameters, x, outputs, d, read_only(sign * wanted), u)
-        if lost >= 0:
-            bound = abs(float(rising.everett[-1, 0]))
-            raise SimulationError(
-                f"the law has no inverse at sample {lost} (y = {wanted[lost]:g}): it saturates at "
-                f"{self.offset - bound:g} and {self.offset + bound:g}"
-            )
-        return u
+        parameters, x, y, d = rising._staircase(past, 1 + room)
+        x[d + 1 :] = y[d + 1 :] = 0.0
+        u = past[-1] if past else float(x[d])
+        return CompiledLaw(
+            kernels.inverse_step,
+            read_only(np.concatenate([limits, [sign], parameters]), finite=False),
+            np.concatenate([[u, sign * y[d], u, d], x, y]),
+        )
 
 
 def _at(levels: FloatArray, branch: Record) -> FloatArray:

@@ -352,10 +352,14 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
             if u0 is not None or state is not None:
                 raise ValueError("a speed goes with the z0 of the law: replace that in place of u0 or state")
             return self.inverse().response(y, sample_time, speed=speed)
+        self.check_invertible(sample_time)
+        return self.at(sample_time).input_of(y, u0, state)
+
+    def check_invertible(self, sample_time: float) -> None:
+        """Raise a ValueError if the law is not invertible at this sample time, or no input leads to z0."""
         if (refusal := self._refusal(sample_time)) is not None:
             raise ValueError(refusal)
-        self.plays.inverse()  # refuses positions that no input leads to
-        return self.at(sample_time).input_of(y, u0, state)
+        self.plays.inverse()  # refuses such positions
 
     def as_structure(self) -> ClampStructure:
         """The structure with the thresholds and beta of this law."""

@@ -1,0 +1,306 @@
+"""Inverses of laws as steps: `u = step(parameters, state, y)` returns the input at which the output is `y`.
+
+Every inverse holds a copy of its law, and moves it to the input within limits, so that it continues rightly where the
+input was limited:
+
+    parameters    lowest and highest input, then what the inverse and the law need
+    state         input at which the copy stands, output there, then what the inverse and the law remember
+
+The input that is returned is not limited. Where no input has the output it is nan; the copy then moves to the limit
+ahead, or stays where it is if there is no limit. `hysim.kernels.boucwen_inverse`, `play_sums` and `preisach` have
+closed forms of their own; `searched` makes the inverse of any law from its step.
+
+    searched:    u with y(u) = y, where y rises (or falls) along the whole branch from the input before
+"""
+
+import math
+
+from numba import float64
+
+from hysim._frozen import FloatArray
+from hysim.kernels import clamps
+from hysim.kernels._compile import by_address, inlined, kernel, signed_closure
+from hysim.kernels.stepping import CONSTANTS, STEP, VECTOR, Step
+
+N_LIMITS = 2  # parameters before those of the inverse itself
+N_PLACE = 2  # places of the state before those of the inverse itself
+N_SEARCH = 4  # places of the state of `searched` before the law's: input, output, slope, largest output so far
+
+_POINTS = 16  # of a branch at which the output is looked at
+_DOUBLINGS = 1100  # more than there are between the smallest number and the largest
+_HALVINGS = 200
+_ATTEMPTS = 64  # branches that are tried, each ended where the output has turned on the last
+_RESOLVED = 1e-13
+"""Of the largest output so far: shorter branches rise in steps of rounding, and are not searched for a turn."""
+_NEAR, _NEARER, _NEAREST = 1e-10, 0.125, 1e-13
+"""Of the largest output so far: how far back from its beginning a branch is looked at, and then nearer."""
+_ROUNDINGS = 64.0 * 2.0**-53
+_CLEAR = 256.0  # roundings by which an output has to rise to show it
+_AHEAD = 2.0**-26
+"""Of a branch: how far beyond its end the output is looked at; a turn is missed by the square of it, a rounding."""
+_SMALLEST = 2.0**-1022
+_SEARCH = float64(STEP, CONSTANTS, VECTOR, float64)
+
+
+# ---------------------------------------------------------------------------------- limits
+
+
+@inlined
+def within_limits(parameters: FloatArray, u: float, direction: float) -> float:
+    """Input to which the copy of the law moves for the wanted input `u`; nan if it stays.
+
+    `direction` is that in which an input was sought, for the case that there is none.
+    """
+    if not math.isnan(u):
+        return float(min(max(u, parameters[0]), parameters[1]))
+    limit = parameters[1] if direction > 0.0 else parameters[0]
+    return float(limit) if abs(limit) < math.inf else math.nan
+
+
+# ---------------------------------------------------------------------------------- closed forms
+
+
+@kernel
+def line(parameters: FloatArray, state: FloatArray, y: float) -> float:
+    """Inverse of `hysim.kernels.stepping.line`; `parameters` are (limits, offset, slope), `state` is (u, y)."""
+    offset, slope = parameters[N_LIMITS], parameters[N_LIMITS + 1]
+    u = (y - offset) / slope
+    state[0] = within_limits(parameters, u, 0.0)
+    state[1] = y if state[0] == u else offset + slope * state[0]
+    return float(u)
+
+
+@kernel
+def plays(parameters: FloatArray, state: FloatArray, y: float) -> float:
+    """Inverse of a sum of plays by another one.
+
+    `parameters` are the limits, and then those of `clamps.step` of the inverse and of the law; `state` is (u, y), the
+    states of both, and room for one more.
+    """
+    n, m = (parameters.size - N_LIMITS) // 2, (state.size - N_PLACE) // 3
+    own, forward = parameters[N_LIMITS : N_LIMITS + n], parameters[N_LIMITS + n :]
+    inverse, law, before = state[N_PLACE : N_PLACE + m], state[N_PLACE + m : N_PLACE + 2 * m], state[N_PLACE + 2 * m :]
+    for i in range(m):
+        before[i] = inverse[i]
+    u = clamps.step(own, inverse, y)
+    state[0] = within_limits(parameters, u, 0.0)
+    state[1] = clamps.step(forward, law, state[0])
+    if state[0] != u:
+        for i in range(m):
+            inverse[i] = before[i]
+        clamps.step(own, inverse, state[1])
+    return float(u)
+
+
+# ---------------------------------------------------------------------------------- search on a law's step
+
+
+@inlined
+def _tried(step: Step, parameters: FloatArray, state: FloatArray, trial: FloatArray, u: float) -> float:
+    """Output at `u`, the state left as it is."""
+    trial[:] = state
+    return step(parameters, trial, u)
+
+
+@inlined
+def _apart(here: float, direction: float, low: float, length: float, high: float) -> bool:
+    """Whether the input after `length` is a number between those after `low` and `high`."""
+    end = direction * (here + direction * length)
+    return direction * (here + direction * low) < end < direction * (here + direction * high)
+
+
+@inlined
+def _bracket(
+    step: Step,
+    parameters: FloatArray,
+    state: FloatArray,
+    trial: FloatArray,
+    here: float,
+    direction: float,
+    side: float,
+    wanted: float,
+    gap: float,
+    guess: float,
+    limit: float,
+    ahead: float,
+    noise: float,
+) -> tuple[float, float, float, float]:
+    """Two lengths with their errors, of which the second reaches the output; where none does, its error is negative.
+
+    The output turns before `limit`. Where `ahead` is not zero, it is looked at by this part of a length beyond each
+    end: where it falls there, the end is behind the turn. A `noise` of infinity stands for an output that rises in
+    steps of rounding.
+    """
+    low, low_error = 0.0, -gap
+    high, too_far = min(guess, 0.5 * limit), limit
+    high_error = math.nan
+    for _ in range(_DOUBLINGS):
+        high_error = side * (_tried(step, parameters, state, trial, here + direction * high) - wanted)
+        if 0.0 <= high_error < math.inf:
+            return low, low_error, high, high_error
+        rises = -math.inf < high_error < 0.0 and high_error >= low_error - noise
+        if rises and ahead > 0.0:
+            next_error = side * (step(parameters, trial, here + direction * (high + ahead * high)) - wanted)
+            rises = next_error >= high_error - noise
+        if rises:
+            low, low_error = high, high_error
+        else:
+            too_far = high
+        high = 2.0 * low if too_far == math.inf else 0.5 * (low + too_far)
+        if not low < high < too_far:
+            break
+    return low, low_error, high, high_error
+
+
+@inlined
+def _closed_in(
+    step: Step,
+    parameters: FloatArray,
+    state: FloatArray,
+    trial: FloatArray,
+    here: float,
+    direction: float,
+    side: float,
+    wanted: float,
+    low: float,
+    low_error: float,
+    high: float,
+    high_error: float,
+) -> float:
+    """The shortest length that reaches the output, by regula falsi (Illinois) where that is faster than halving."""
+    last_side = 0
+    for i in range(_HALVINGS):
+        length = high - (high - low) * (high_error / (high_error - low_error))
+        if i % 3 == 2 or not _apart(here, direction, low, length, high):
+            length = 0.5 * (low + high)
+        if high_error == 0.0 or not _apart(here, direction, low, length, high):
+            break
+        error = side * (_tried(step, parameters, state, trial, here + direction * length) - wanted)
+        if error < 0.0:
+            low, low_error = length, error
+            high_error *= 0.5 if last_side < 0 else 1.0
+            last_side = -1
+        else:
+            high, high_error = length, error
+            low_error *= 0.5 if last_side > 0 else 1.0
+            last_side = 1
+    return high
+
+
+@inlined
+def _turn(
+    step: Step,
+    parameters: FloatArray,
+    state: FloatArray,
+    trial: FloatArray,
+    here: float,
+    direction: float,
+    side: float,
+    reached: float,
+    length: float,
+    noise: float,
+) -> float:
+    """Length at which the output has fallen; zero if it rises all along."""
+    before = 0.0
+    for i in range(1, _POINTS + 1):
+        part = length * i / _POINTS
+        rise = side * (_tried(step, parameters, state, trial, here + direction * part) - reached)
+        if not rise > before - noise:
+            return part
+        before = rise
+    return 0.0
+
+
+@inlined
+def _falls_back(
+    step: Step,
+    parameters: FloatArray,
+    state: FloatArray,
+    trial: FloatArray,
+    here: float,
+    direction: float,
+    side: float,
+    reached: float,
+    steepness: float,
+    largest: float,
+) -> bool:
+    """Whether the output falls where the input turns back; `steepness` is the slope of the branch ahead.
+
+    It is looked at as near as rounding allows, and counts as falling where it is infinite even there.
+    """
+    near, noise, known = _NEAR, 0.0, False
+    while near > _NEAREST:
+        back = side * (
+            _tried(step, parameters, state, trial, here - direction * (near * largest / steepness)) - reached
+        )
+        if back < -noise and math.isfinite(back):
+            return True
+        known = known or math.isfinite(back)
+        near, noise = near * _NEARER, _ROUNDINGS * largest
+    return not known
+
+
+@kernel
+def search(step: Step, parameters: FloatArray, state: FloatArray, y: float) -> float:
+    """Input at which a law has the output `y`; the step of `searched`.
+
+    A length is doubled until its end is beyond, or halved while its end is so far that the output has turned or is not
+    finite, and then closed in on. Where this fails, or the output has turned before, it is sought again: with a look
+    ahead, which tells an end before the turn from one behind it, and before the turn.
+    """
+    m = (state.size - N_SEARCH) // 2
+    own, law, trial = parameters[N_LIMITS:], state[N_SEARCH : N_SEARCH + m], state[N_SEARCH + m :]
+    here, reached, slope = state[0], state[1], state[2]
+    rising, side, gap = math.copysign(1.0, slope), math.copysign(1.0, y - reached), abs(y - reached)
+    direction, length = side * rising, math.nan
+    if gap < _SMALLEST:
+        length = 0.0
+    else:
+        state[3] = max(state[3], abs(y), abs(reached), abs(slope * here))
+        largest, resolved = state[3], gap > _RESOLVED * state[3]
+        noise, guess = _ROUNDINGS * largest, gap / abs(slope)
+        limit, ahead = math.inf, 0.0
+        for _ in range(_ATTEMPTS):
+            allowed = noise if resolved else math.inf
+            low, low_error, high, high_error = _bracket(
+                step, own, law, trial, here, direction, side, y, gap, guess, limit, ahead, allowed
+            )
+            reaches = 0.0 <= high_error < math.inf
+            if reaches:
+                high = _closed_in(step, own, law, trial, here, direction, side, y, low, low_error, high, high_error)
+            if reaches or ahead > 0.0:
+                end = high if reaches else low
+                turn = _turn(step, own, law, trial, here, direction, side, reached, end, noise)
+                if turn == 0.0 or not resolved:
+                    length = high if reaches else math.nan
+                    break
+                limit = turn
+            ahead = max(_AHEAD, _CLEAR * noise / gap)
+        if resolved and not math.isnan(length):
+            steepness = gap / length
+            if _falls_back(step, own, law, trial, here, direction, side, reached, steepness, largest):
+                state[2] = rising * steepness
+            else:
+                length = math.nan
+    u = here + direction * length
+    end = within_limits(parameters, u, direction)
+    if not math.isnan(end) and (length != 0.0 or end != here):
+        output = step(own, law, end)
+        state[0], state[1] = end, y if end == u else output
+    return float(u)
+
+
+def searched(step: Step) -> Step:
+    """The inverse of the law with this step.
+
+    Its parameters are the limits and the law's; its state is (u, y, slope dy/du of the right sign, 0), the law's
+    state, and room for one more.
+    """
+    search_by = by_address(search, _SEARCH)
+    step_by = by_address(step, STEP.signature)
+
+    @signed_closure(STEP.signature)
+    def inverse(parameters: FloatArray, state: FloatArray, y: float) -> float:
+        return search_by(step_by, parameters, state, y)
+
+    return inverse

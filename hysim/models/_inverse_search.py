@@ -1,0 +1,127 @@
+"""The inverse of any law that is known by its step, found by a search on this step (`hysim.kernels.inverses`)."""
+
+import functools
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from hysim._frozen import FloatArray, read_only
+from hysim._parallel import in_pieces
+from hysim.errors import SimulationError
+from hysim.kernels import inverses as kernels
+from hysim.kernels.stepping import drive
+from hysim.models.protocols import CompiledLaw
+
+Limits = tuple[float, float]
+"""Lowest and highest input."""
+
+UNLIMITED: Limits = (-math.inf, math.inf)
+
+_REACH, _WIDER = 1e-6, 16.0  # how far at most the output is looked at to either side of the first input; the ratio
+_SHORTEST = 2.0**-46  # of the first input, or this number
+_NEXT_TO_NOTHING = 1e-150
+_HIDDEN, _FARTHEST = 2.0**-44, 1e150  # part of the output by which rounding may hide a rise: it is then sought further
+_LINEAR = 0.1  # part by which rises over once, twice and four times a length are no multiples of each other
+
+_searched = functools.lru_cache(maxsize=256)(kernels.searched)
+
+
+def inverse_step(
+    forward: CompiledLaw, u: float, y: float | None = None, limits: Limits = UNLIMITED, terms: float = 0.0
+) -> CompiledLaw:
+    """The inverse of a law that stands at the input `u`, as `hysim.kernels.inverses` has it.
+
+    `y` is the output there, by default that of the step; `terms` is the size of the terms that it is the sum of, where
+    they are larger: their rounding is the output's.
+
+    Raises
+    ------
+    ValueError
+        If the output does not rise or fall through `u`.
+    """
+    trial = np.empty_like(forward.state)
+
+    def output(u: float) -> float:
+        trial[:] = forward.state
+        return float(forward.step(forward.parameters, trial, u))
+
+    with np.errstate(all="ignore"):
+        reached, slope = output(u), _slope(output, u)
+    if slope == 0.0:
+        raise ValueError(f"the law has no inverse: its output does not rise or fall through u = {u:g}")
+    return CompiledLaw(
+        _searched(forward.step),
+        read_only(np.concatenate([limits, forward.parameters]), finite=False),
+        np.concatenate([[u, reached if y is None else y, slope, terms], forward.state, trial]),
+    )
+
+
+def inverse_response(inverse: CompiledLaw, y: FloatArray) -> FloatArray:
+    """Inputs for the outputs `y`, whose inverse is stepped from where it stands.
+
+    Raises
+    ------
+    SimulationError
+        If an output has no input; it names the sample.
+    """
+    u = np.empty(y.size)
+    with np.errstate(all="ignore"):  # a bracket may reach where a memory overflows
+        lost = in_pieces(lambda k: drive(inverse.step, inverse.parameters, inverse.state, y[k], u[k]), y.size)
+    if lost >= 0:
+        raise SimulationError(
+            f"the law has no inverse at sample {lost} (y = {y[lost]:g}): from u = {inverse.state[0]:g} on the output "
+            "does not reach it, or turns on the way"
+        )
+    return u
+
+
+def inverse_response_of(law: Any, y: FloatArray, u0: float | None) -> FloatArray:
+    """Inputs for the outputs `y` of a law that rests at `u0`; by default at the first input with the first output."""
+    if not y.size:
+        return y
+    here, reached = (first_input(law, float(y[0])), float(y[0])) if u0 is None else (float(u0), None)
+    return inverse_response(inverse_step(law.compiled(here), here, reached), y)
+
+
+def first_input(law: Any, y: float) -> float:
+    """The first input whose output is `y`, found from zero."""
+    from scipy.optimize import brentq
+
+    def error(u: float) -> float:
+        return float(law.response([u])[0]) - y
+
+    if error(0.0) == 0.0:
+        return 0.0
+    reach = 1e-6
+    while reach < 1e150:
+        for end in (reach, -reach):
+            if error(end) * error(0.0) <= 0.0:
+                return float(brentq(error, 0.0, end, xtol=1e-300, rtol=4.0 * np.finfo(float).eps))
+        reach *= 2.0
+    raise ValueError("the first output does not tell the first input: give u0")
+
+
+def _slope(output: Callable[[float], float], here: float) -> float:
+    """Slope of the output at the input `here`, zero where it does not rise or fall through it.
+
+    The law has a length of its own, on which its output may turn, and rounding hides shorter rises. So the slope is
+    that on the shortest length on which the output is linear on both sides.
+    """
+    reached, fallback, highest = output(here), 0.0, 0.0
+    reach = max(_SHORTEST * abs(here), _NEXT_TO_NOTHING)
+    while reach < _REACH * (1.0 + abs(here)) or (highest < _HIDDEN * abs(reached) and reach < _FARTHEST):
+        lengths = reach * np.array([1.0, 2.0, 4.0])
+        ends = here + np.array([lengths, -lengths])
+        rises = np.array([[output(u) for u in side] for side in ends.tolist()]) - reached
+        slopes = rises / (ends - here)
+        if 0.0 < slopes[0, 0] * slopes[1, 0] < np.inf:
+            fallback = slopes[0, 0]
+            if (np.abs(slopes / slopes[:, :1] - 1.0) < _LINEAR).all():
+                return float(slopes[0, 0])
+        elif fallback == 0.0 and np.isfinite(slopes[:, 0]).sum() == 1:  # the memory diverges at once on the other side
+            fallback = float(slopes[np.isfinite(slopes[:, 0]), 0][0])
+        highest = float(np.abs(rises).max())
+        reach *= _WIDER
+    return float(fallback)

@@ -1,0 +1,146 @@
+"""The inverse of every law that has one, as the feed-forward that closes a loop by itself."""
+
+import numpy as np
+import pytest
+from numba import njit
+
+import hysim as hs
+from hysim.models.actuator import is_law
+from hysim.models.inverse_steps import inverse_step
+from hysim.models.model import every_family
+
+CLOSE = 1e-10  # of the range of the reference
+H = 1.0  # s
+LINE = hs.Line(slope=1.0)
+PLAYS = hs.PrandtlIshlinskii(thresholds=(0.0, 0.2, 0.5), weights=(1.0, 0.5, 0.3), offset=0.1)
+
+
+@njit
+def stiffening(parameters, state, u):
+    """A play beside a cubic spring."""
+    state[1] = min(max(state[1], u - parameters[1]), u + parameters[1])
+    state[0] = u
+    return parameters[0] * u + 0.1 * u**3 + 0.4 * state[1]
+
+
+LAWS = {
+    "BoucWen": hs.BoucWen(beta=0.6, gamma=0.3, feedthrough=1.0, gain=0.4, offset=-0.1, z0=0.2),
+    "BoucWen, n = 2": hs.BoucWen(n=2.0, feedthrough=1.0, gain=-0.4),
+    "BoucWen, n = 1.6": hs.BoucWen(n=1.6, feedthrough=-1.0, gain=0.4),
+    "PolynomialBoucWen": hs.PolynomialBoucWen(beta=0.4, gamma=0.4, gain=0.3, input_coefficients=(0.6, 0.1, 0.02)),
+    "ZhuWangBoucWen": hs.ZhuWangBoucWen(delta=0.1, n=1.5, input_coefficients=(2.0, 0.1)),
+    "GeneralizedBoucWen": hs.GeneralizedBoucWen(n=1.5, gain=-0.3, input_coefficients=(1.0,)),
+    "BoucWenBaberNoori": hs.BoucWenBaberNoori(delta_nu=0.2, delta_eta=0.1, input_coefficients=(1.0,)),
+    "Duhem": hs.Duhem.from_terms({"u'": 1.0, "u' |z|": -0.3, "|u'| z": -0.6}, feedthrough=2.0),
+    "Dahl": hs.Dahl(stiffness=2.0, coulomb=4.0),
+    "ColemanHodgdon": hs.ColemanHodgdon(alpha=0.8, c=1.0, B=0.7),
+    "Line": hs.Line(offset=0.2, slope=-0.7),
+    "PrandtlIshlinskii": PLAYS,
+    "ModifiedPrandtlIshlinskii": hs.ModifiedPrandtlIshlinskii(
+        thresholds=(0.0, 0.2), weights=(1.0, 0.5), dead_zones=(-0.4, 0.0, 0.3), dead_zone_weights=(0.2, 1.0, 0.4)
+    ),
+    "GeneralizedPrandtlIshlinskii": hs.GeneralizedPrandtlIshlinskii(
+        thresholds=(0.0, 0.2), weights=(1.0, 0.5), left=(1.0, 1.0, 0.0, 0.0, 0.5)
+    ),
+    "RateDependentPrandtlIshlinskii": hs.RateDependentPrandtlIshlinskii(
+        thresholds=(0.0, 0.2), weights=(1.0, 0.5), beta=0.1
+    ),
+    "MaxwellSlip": hs.MaxwellSlip(stiffness=(1.0, 0.5), slips=(9.0, 0.4)),
+    "Stop": hs.Stop(threshold=9.0),
+    "Play": hs.Play(threshold=0.0, gain=2.0),
+    "Preisach": hs.Preisach.from_density(np.linspace(-3.0, 3.0, 8), lambda a, b: 1.0 + 0.1 * (a - b)),
+    "Preisach, falling": hs.Preisach.from_density(np.linspace(-3.0, 3.0, 8), lambda a, b: -1.0 + 0.0 * a),
+    "Sum": hs.Dahl(coulomb=0.5) + PLAYS + LINE,
+    "Cascade": hs.BoucWen(n=1.6, feedthrough=1.0, gain=0.4) >> PLAYS,
+    "CustomLaw": hs.CustomLaw(step=stiffening, parameters={"slope": 1.0, "r": 0.2}, state={"z": 0.0}),
+}
+REFUSED = {
+    "Play": (hs.Play(threshold=0.2), ValueError, "does not rise or fall"),
+    "PreisachRelays": (hs.PreisachRelays(levels=(-1.0, 0.5, 1.0), weights=(1.0, 0.5, 1.0)), ValueError, "does not"),
+    "SingleValued": (hs.SingleValued(u=[0.0, 1.0], y=[0.0, 2.0]), TypeError, "that a loop can step"),
+    "Dashpot": (hs.Dashpot(), TypeError, "that a loop can step"),
+    "a dashpot in a sum": (hs.Dashpot() + LINE, TypeError, "loop can step"),
+    "PrandtlIshlinskii": (hs.PrandtlIshlinskii(thresholds=(0.2,), weights=(1.0,)), ValueError, "no inverse"),
+    "ModifiedPrandtlIshlinskii": (
+        hs.ModifiedPrandtlIshlinskii(
+            thresholds=(0.0,), weights=(1.0,), dead_zones=(-0.3, 0.3), dead_zone_weights=(1.0, 1.0)
+        ),
+        ValueError,
+        "no inverse",
+    ),
+    "GeneralizedPrandtlIshlinskii": (
+        hs.GeneralizedPrandtlIshlinskii(thresholds=(0.0, 1.0), weights=(1.0, -2.0)), ValueError, "one sign",
+    ),
+    "Preisach": (hs.Preisach(levels=(0.0, 1.0, 2.0), weights=(1.0, -2.0, 1.0)), ValueError, "one sign"),
+    "an even law": (hs.PolynomialBoucWen(gain=0.0, input_coefficients=(0.0, 1.0)), ValueError, "slope is zero"),
+}  # fmt: skip
+families = pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+
+
+def reversing(law, u0, n=240):
+    """A reference inside the reach of the law, with reversals of all sizes, and the input that has it."""
+    s = np.linspace(0.0, 6.0 * np.pi, n)
+    u = u0 + 0.8 * np.sin(s) * np.cos(0.13 * s) + 0.3 * np.sin(3.1 * s) - 0.02 * s
+    start = {"sample_time": H} if isinstance(law, hs.RateDependentPrandtlIshlinskii) else {}
+    return law.response(np.append(u0, u), **start)[1:], u
+
+
+def test_every_family_has_its_case():
+    laws = {name for name, family in every_family().items() if is_law(family)}
+    assert laws <= {name.split(",")[0] for name in (*LAWS, *REFUSED)}
+
+
+@families
+@pytest.mark.parametrize("u0", [0.0, 0.3])
+def test_the_response_is_the_reference_a_sample_later(law, u0):
+    reference, u = reversing(law, u0)
+    run = hs.close_loop(law, hs.InverseFeedforward(law=law), H * np.arange(u.size), reference, u0=u0)
+    assert np.abs(run.y[1:] - reference[:-1]).max() <= CLOSE * np.ptp(reference)
+    assert np.abs(run.u - u).max() <= 1e-9 * np.ptp(u)  # slopes are above 0.1
+    assert run.conditions["limited_samples"] == 0
+
+
+@families
+def test_after_a_limit_it_continues_rightly(law):
+    """The copy of the law in the inverse is limited with the law."""
+    reference, u = reversing(law, 0.0)
+    low, high = -0.7, 0.6
+    controller = hs.TrackingController(feedforward=hs.InverseFeedforward(law=law), limits=(low, high))
+    run = hs.close_loop(law, controller, H * np.arange(u.size), reference)
+    free = (run.u > low) & (run.u < high)
+    assert 0.2 < free.mean() < 0.9
+    assert (run.u[~free] == np.clip(run.command, low, high)[~free]).all()
+    assert np.abs(run.y[1:] - reference[:-1])[free[:-1]].max() <= CLOSE * np.ptp(reference)
+
+
+@families
+def test_with_creep_and_an_amplifier(law):
+    plant = hs.Actuator(amplifier=hs.Amplifier(gain=-2.0, offset=0.1), hysteresis=law, creep=hs.Creep.per_decade(1.0))
+    reference, u = reversing(law, 0.1)
+    run = hs.close_loop(plant, hs.InverseFeedforward.of(plant), H * np.arange(u.size), reference)
+    assert np.abs(run.y[1:] - reference[:-1]).max() <= CLOSE * np.ptp(reference)
+
+
+@pytest.mark.parametrize(("law", "error", "message"), REFUSED.values(), ids=REFUSED)
+def test_what_has_no_inverse_is_refused(law, error, message):
+    with pytest.raises(error, match=message):
+        hs.InverseFeedforward(law=law)
+
+
+def test_a_rate_too_high_for_an_inverse_is_refused():
+    law = LAWS["RateDependentPrandtlIshlinskii"]
+    t = 1e-3 * np.arange(5)
+    with pytest.raises(ValueError, match=r"no stable inverse at the sample time 0\.001"):
+        hs.close_loop(law, hs.InverseFeedforward(law=law), t, t)
+
+
+@pytest.mark.parametrize("name", ["BoucWen", "Dahl", "Preisach", "Sum", "Stop"])
+def test_an_output_without_an_input_is_nan_and_the_copy_stays_or_waits_at_its_limit(name):
+    law = {**LAWS, "Sum": hs.Dahl(coulomb=0.5) + hs.Stop(threshold=9.0), "BoucWen": hs.BoucWen(gain=2.0)}[name]
+    for limits, place in (((-np.inf, np.inf), 0.25), ((-0.5, 0.5), 0.5)):
+        step, parameters, state = inverse_step(law, 0.25, limits)
+        y0 = state[1]
+        assert np.isnan(step(parameters, state, 1e9))
+        assert state[0] == place
+        assert step(parameters, state, state[1]) == place
+        assert step(parameters, state, y0 + 0.01) < 0.5
