@@ -49,6 +49,9 @@ _HOME = {
     "LoopMetrics": "hysim.metrics",
     "cycle_metrics": "hysim.metrics",
     "CycleMetrics": "hysim.metrics",
+    "Law": "hysim.models.law",
+    "family": "hysim.models.model",
+    "Parameter": "hysim.models.parameters",
     "BoucWen": "hysim.models.boucwen",
     "PolynomialBoucWen": "hysim.models.polynomial_boucwen",
     "ZhuWangBoucWen": "hysim.models.zhu_wang_boucwen",
@@ -146,12 +149,15 @@ if TYPE_CHECKING:
     from hysim.models.generalized_prandtl_ishlinskii import (
         GeneralizedPrandtlIshlinskii as GeneralizedPrandtlIshlinskii,
     )
+    from hysim.models.law import Law as Law
     from hysim.models.limit_cycle import LimitCycle as LimitCycle
     from hysim.models.maxwell_slip import MaxwellSlip as MaxwellSlip
+    from hysim.models.model import family as family
     from hysim.models.modes import Modes as Modes
     from hysim.models.modes import mode as mode
     from hysim.models.modified_prandtl_ishlinskii import ModifiedPrandtlIshlinskii as ModifiedPrandtlIshlinskii
     from hysim.models.oscillator import BoucWenOscillator as BoucWenOscillator
+    from hysim.models.parameters import Parameter as Parameter
     from hysim.models.play import Play as Play
     from hysim.models.play import Stop as Stop
     from hysim.models.polynomial_boucwen import PolynomialBoucWen as PolynomialBoucWen

@@ -74,3 +74,6 @@ def every_family() -> dict[str, type]:
         if not module.name.startswith("_"):
             importlib.import_module(f"{models.__name__}.{module.name}")
     return FAMILIES
+
+
+family = model
