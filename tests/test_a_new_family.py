@@ -1,6 +1,7 @@
 """A family that hysim does not have, `tests/my_laws.py`, takes part in every verb."""
 
 import inspect
+import itertools
 import os
 import subprocess
 import sys
@@ -19,7 +20,7 @@ RECORD = hs.Record(u=U, y=LAW.response(U), t=np.arange(U.size) * 0.01)
 def obvious(law, u):
     """The law's own differential equation, with a thousand steps a stroke."""
     force, y = law.z0, [law.offset + law.c * u[0] + law.z0]
-    for before, after in zip(u[:-1], u[1:], strict=True):
+    for before, after in itertools.pairwise(u):
         du = (after - before) / 1000
         for _ in range(1000):
             middle = force + 0.5 * du * law.k * (1.0 - np.sign(du) * force / law.coulomb) ** 2
