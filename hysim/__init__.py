@@ -7,92 +7,10 @@ import costs the standard library only.
 import importlib
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+from hysim._names import HOME, MODULES
+from hysim._release import __version__ as __version__
 
-_MODULES = ("benchmarks", "control", "datasets", "metrics", "plot", "rig", "signals", "vision")
-_HOME = {
-    "Record": "hysim.records",
-    "load": "hysim.files",
-    "save_record": "hysim.files",
-    "simulate": "hysim.simulation",
-    "Simulation": "hysim.simulation",
-    "identify": "hysim.identification",
-    "Identification": "hysim.identification",
-    "select": "hysim.identification",
-    "Selection": "hysim.identification",
-    "discover": "hysim.discovery",
-    "Discovery": "hysim.discovery",
-    "PID": "hysim.control",
-    "TrackingController": "hysim.control",
-    "InverseFeedforward": "hysim.control",
-    "ModeInverse": "hysim.control",
-    "Shaper": "hysim.control",
-    "Notch": "hysim.control",
-    "DampingLoop": "hysim.control",
-    "close_loop": "hysim.control",
-    "ClosedLoop": "hysim.control",
-    "tune": "hysim.control",
-    "Tuning": "hysim.control",
-    "to_c": "hysim.control",
-    "CSource": "hysim.control",
-    "to_control": "hysim.control",
-    "compare": "hysim.comparison",
-    "Comparison": "hysim.comparison",
-    "sweep": "hysim.sweeps",
-    "Sweep": "hysim.sweeps",
-    "Sample": "hysim.sweeps",
-    "response_task": "hysim.sweeps",
-    "load_sweep": "hysim.sweeps",
-    "sobol_indices": "hysim.sweeps",
-    "SobolIndices": "hysim.sweeps",
-    "loop_metrics": "hysim.metrics",
-    "LoopMetrics": "hysim.metrics",
-    "cycle_metrics": "hysim.metrics",
-    "CycleMetrics": "hysim.metrics",
-    "Law": "hysim.models.law",
-    "family": "hysim.models.model",
-    "Parameter": "hysim.models.parameters",
-    "BoucWen": "hysim.models.boucwen",
-    "PolynomialBoucWen": "hysim.models.polynomial_boucwen",
-    "ZhuWangBoucWen": "hysim.models.zhu_wang_boucwen",
-    "GeneralizedBoucWen": "hysim.models.generalized_boucwen",
-    "BoucWenBaberNoori": "hysim.models.baber_noori",
-    "BoucWenInverse": "hysim.models.boucwen_inverse",
-    "LimitCycle": "hysim.models.limit_cycle",
-    "Duhem": "hysim.models.duhem",
-    "PrandtlIshlinskii": "hysim.models.prandtl_ishlinskii",
-    "ModifiedPrandtlIshlinskii": "hysim.models.modified_prandtl_ishlinskii",
-    "GeneralizedPrandtlIshlinskii": "hysim.models.generalized_prandtl_ishlinskii",
-    "RateDependentPrandtlIshlinskii": "hysim.models.rate_dependent_prandtl_ishlinskii",
-    "Play": "hysim.models.play",
-    "Stop": "hysim.models.play",
-    "MaxwellSlip": "hysim.models.maxwell_slip",
-    "Preisach": "hysim.models.preisach",
-    "PreisachRelays": "hysim.models.preisach",
-    "Dahl": "hysim.models.dahl",
-    "ColemanHodgdon": "hysim.models.coleman_hodgdon",
-    "Sum": "hysim.models.sum",
-    "Cascade": "hysim.models.cascade",
-    "Dashpot": "hysim.models.dashpot",
-    "CustomLaw": "hysim.models.custom",
-    "BoucWenOscillator": "hysim.models.oscillator",
-    "TransferFunction": "hysim.models.transfer_function",
-    "StateSpace": "hysim.models.state_space",
-    "Modes": "hysim.models.modes",
-    "mode": "hysim.models.modes",
-    "Creep": "hysim.models.creep",
-    "Amplifier": "hysim.models.amplifier",
-    "Sensor": "hysim.models.sensor",
-    "Actuator": "hysim.models.actuator",
-    "Line": "hysim.models.static",
-    "SingleValued": "hysim.models.static",
-    "save": "hysim.models.storage",
-    "load_model": "hysim.models.storage",
-    "SimulationError": "hysim.errors",
-    "show_versions": "hysim._versions",
-}
-
-__all__ = ["__version__", *_MODULES, *_HOME]
+__all__ = ["__version__", *MODULES, *HOME]
 
 if TYPE_CHECKING:
     from hysim import benchmarks as benchmarks
@@ -189,10 +107,10 @@ if TYPE_CHECKING:
 else:
 
     def __getattr__(name: str) -> Any:
-        if name in _MODULES:
+        if name in MODULES:
             value = importlib.import_module(f"hysim.{name}")
-        elif name in _HOME:
-            value = getattr(importlib.import_module(_HOME[name]), name)
+        elif name in HOME:
+            value = getattr(importlib.import_module(HOME[name]), name)
         else:
             raise AttributeError(f"module 'hysim' has no attribute {name!r}")
         globals()[name] = value

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import hysim
+from hysim._names import HOME, MODULES
 
 SOURCE = ast.parse(Path(hysim.__file__).read_text())
 
@@ -30,13 +31,13 @@ def test_the_bare_import_loads_the_standard_library_only():
 def test_lazy_names_are_the_ones_that_type_checkers_see():
     guard = next(node for node in SOURCE.body if isinstance(node, ast.If))
     seen = {alias.asname for node in guard.body if isinstance(node, ast.ImportFrom) for alias in node.names}
-    assert seen == set(hysim._HOME) | set(hysim._MODULES)
+    assert seen == set(HOME) | set(MODULES)
 
 
 @pytest.mark.parametrize("name", [name for name in hysim.__all__ if not name.startswith("__")])
 def test_every_public_name_can_be_had(name):
     value = getattr(hysim, name)
-    if name in hysim._HOME:
+    if name in HOME:
         assert value.__doc__
         assert value.__name__ == name
     assert name in dir(hysim)
@@ -47,7 +48,7 @@ def test_no_submodule_takes_the_place_of_a_public_name():
     for module in pkgutil.walk_packages(hysim.__path__, "hysim."):
         if not module.name.endswith("__main__"):
             importlib.import_module(module.name)
-    for name in hysim._HOME:
+    for name in HOME:
         assert getattr(hysim, name).__module__.startswith("hysim")
         assert not isinstance(getattr(hysim, name), type(sys)), name
 

@@ -17,9 +17,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-import hysim
 from hysim._atomic import write_text
 from hysim._frozen import FloatArray, frozen
+from hysim._release import __version__
 from hysim._words import printed, words
 from hysim.control import _c_fragments as pieces
 from hysim.control._pid import PID
@@ -142,7 +142,7 @@ def to_c(
     texts = {
         "name": name,
         "NAME": name.upper(),
-        "version": hysim.__version__,
+        "version": __version__,
         "type": precision,
         "sample_time": number.bare(sample_time),
         "ahead": str(controller.ahead(sample_time)),

@@ -70,7 +70,7 @@ def model(
         return None
     n = exponent(law) or 1.0
     A, dissipative, conservative = (law.get(term, 0.0) for term in bouc_wen_terms(n))
-    oscillator = structure.assemble({**plant, "A": A, "beta": -dissipative, "gamma": -conservative, "n": n})
+    oscillator: BoucWenOscillator = structure.assemble({**plant, "A": A, "beta": -dissipative, "gamma": -conservative, "n": n})
     if not any(state):
         return oscillator
     return replace(oscillator, initial_state=state[:2], law=replace(oscillator.law, z0=state.z))

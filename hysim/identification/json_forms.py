@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-import hysim
+from hysim._release import __version__
 from hysim.models import storage
 
 _INFINITE = ("inf", "-inf")
@@ -24,7 +24,7 @@ def to_text(name: str, result: Any) -> str:
     TypeError
         If one of its models is not of hysim's families.
     """
-    document = {"hysim": hysim.__version__, name: to_plain(result)}
+    document = {"hysim": __version__, name: to_plain(result)}
     return json.dumps(document, indent=2, allow_nan=False) + "\n"
 
 

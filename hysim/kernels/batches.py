@@ -13,10 +13,10 @@ from numba import float64, int64, types, void
 
 from hysim._frozen import FloatArray
 from hysim.kernels._compile import inlined, signed_kernel
-from hysim.kernels.stepping import CONSTANTS, STEP, VECTOR, Step, drive
+from hysim.kernels.stepping import STEP, Step, drive
 
-_TABLE = types.Array(float64, 2, "C", readonly=True)
-_ROWS = types.Array(float64, 2, "C")
+TABLE = types.Array(float64, 2, "C", readonly=True)
+ROWS = types.Array(float64, 2, "C")
 
 
 @inlined
@@ -29,7 +29,7 @@ def begin(state: FloatArray, memory: FloatArray, first: float) -> None:
     state[0] = first
 
 
-@signed_kernel(void(STEP, _TABLE, _TABLE, int64, _TABLE, _ROWS, int64, int64))
+@signed_kernel(void(STEP, TABLE, TABLE, int64, TABLE, ROWS, int64, int64))
 def drive_each(
     step: Step,
     parameters: FloatArray,
@@ -49,25 +49,3 @@ def drive_each(
         begin(state, memory[i], row[0])
         if drive(step, parameters[i], state, row, out[i]) >= 0:
             out[i] = math.inf
-
-
-@signed_kernel(void(STEP, _TABLE, _TABLE, int64, CONSTANTS, VECTOR, _ROWS))
-def drive_to_end(
-    step: Step,
-    parameters: FloatArray,
-    memory: FloatArray,
-    scratch: int,
-    u: FloatArray,
-    y: FloatArray,
-    out: FloatArray,
-) -> None:
-    """The memory of each law after the last sample of `u` into `out`, nan where it diverges.
-
-    `y` has room for the outputs of one law.
-    """
-    state = np.zeros(memory.shape[1] + scratch)
-    for i in range(out.shape[0]):
-        begin(state, memory[i], u[0])
-        lost = drive(step, parameters[i], state, u, y) >= 0
-        for k in range(memory.shape[1]):
-            out[i, k] = math.nan if lost else state[k]

@@ -28,18 +28,6 @@ def drive(step: Step, parameters: FloatArray, state: FloatArray, u: FloatArray, 
     return -1
 
 
-@signed_kernel(int64(STEP, CONSTANTS, VECTOR, CONSTANTS, types.Array(float64, 2, "C")))
-def drive_memory(step: Step, parameters: FloatArray, state: FloatArray, u: FloatArray, out: FloatArray) -> int:
-    """The state behind the last input after each input `u` into `out`; the first sample that is not finite, or -1."""
-    for k in range(u.size):
-        y = step(parameters, state, u[k])
-        for i in range(out.shape[1]):
-            out[k, i] = state[1 + i]
-        if not abs(y) < 1.7976931348623157e308:
-            return k
-    return -1
-
-
 @signed_kernel(float64(CONSTANTS, VECTOR, float64))
 def line(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """The law without memory, `parameters` (offset, slope) and `state` (last u)."""

@@ -32,11 +32,7 @@ that rates go over by the factor (1 - alpha) ko.
 """
 
 import math
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from hysim.models.baber_noori import BoucWenBaberNoori
-    from hysim.models.boucwen import BoucWen
+from typing import Any
 
 Scalars = dict[str, float]
 
@@ -46,7 +42,7 @@ def from_low_guo(alpha: float, beta: float, gamma: float, d: float, h0: float) -
     return {"A": alpha * d, "beta": beta, "gamma": gamma, "n": 1.0, "feedthrough": d, "gain": -1.0, "z0": h0}
 
 
-def to_low_guo(law: "BoucWen") -> Scalars:
+def to_low_guo(law: Any) -> Scalars:
     """The only member: h is the memory in the unit of the output."""
     _no_offset(law, "Low and Guo's law")
     if law.n != 1.0:
@@ -69,7 +65,7 @@ def from_wen(alpha: float, k: float, A: float, beta: float, gamma: float, n: flo
     return {**shape, "feedthrough": alpha * k, "gain": (1.0 - alpha) * k * D, "z0": z0}
 
 
-def to_wen(law: "BoucWen") -> Scalars:
+def to_wen(law: Any) -> Scalars:
     """The member with A = D = 1, for which k is the stiffness at z = 0."""
     return {**_with_unit_slope(law, "Wen's law"), "A": 1.0, "D": 1.0}
 
@@ -80,7 +76,7 @@ def from_normalized(k_x: float, k_w: float, rho: float, sigma: float, n: float, 
     return {**shape, "feedthrough": k_x, "gain": k_w, "z0": w0}
 
 
-def to_normalized(law: "BoucWen") -> Scalars:
+def to_normalized(law: Any) -> Scalars:
     """The only member: w is the memory in units of its saturation."""
     _no_offset(law, "the normalised law")
     loading = law.beta + law.gamma
@@ -104,7 +100,7 @@ def from_noel_schoukens(alpha: float, beta: float, gamma: float, delta: float, n
     return {"A": alpha, "beta": beta * gamma, "gamma": beta * delta, "n": nu, "z0": z0}
 
 
-def to_noel_schoukens(law: "BoucWen") -> Scalars:
+def to_noel_schoukens(law: Any) -> Scalars:
     """The member with beta = 1."""
     _no_offset(law, "the benchmark's law")
     if law.feedthrough != 0.0:
@@ -134,7 +130,7 @@ def from_opensees(
     return from_wen(alpha, ko, Ao, beta, gamma, n, 1.0, 0.0)
 
 
-def to_opensees(law: "BoucWen") -> Scalars:
+def to_opensees(law: Any) -> Scalars:
     """The member with Ao = 1, for which ko is the stiffness at z = 0."""
     if law.z0 != 0.0:
         raise ValueError(f"the material begins with z = 0, got z0 = {law.z0:g}")
@@ -154,7 +150,7 @@ def from_opensees_original(
     return {**shape, "feedthrough": alphaL * E, "gain": (1.0 - alphaL) * fy}
 
 
-def to_opensees_original(law: "BoucWen") -> Scalars:
+def to_opensees_original(law: Any) -> Scalars:
     """The member with beta + gamma = 1, for which fy is where the material yields."""
     if law.z0 != 0.0:
         raise ValueError(f"the material begins with z = 0, got z0 = {law.z0:g}")
@@ -166,7 +162,7 @@ def to_opensees_original(law: "BoucWen") -> Scalars:
     return {"E": same["k"], "fy": same["k"] * loading ** (-1.0 / same["n"]), "alphaL": same["alpha"], **shape}
 
 
-def to_suanpan(law: "BoucWen") -> Scalars:
+def to_suanpan(law: Any) -> Scalars:
     """The same member; there gamma is not written."""
     same = to_opensees_original(law)
     names = {"elastic_modulus": "E", "yield_stress": "fy", "hardening": "alphaL", "beta": "beta", "n": "eta"}
@@ -183,7 +179,7 @@ def from_opensees_energy(
     return {**shape, **worn, "gain": stiffness, "input_coefficients": (alpha * ko,)}
 
 
-def to_opensees_degrading(law: "BoucWenBaberNoori") -> Scalars:
+def to_opensees_degrading(law: Any) -> Scalars:
     """The member with Ao = A."""
     if law.zeta_s != 0.0:
         raise ValueError(f"the material does not pinch, got zeta_s = {law.zeta_s:g}: see to_opensees_bwbn")
@@ -195,7 +191,7 @@ def to_opensees_degrading(law: "BoucWenBaberNoori") -> Scalars:
     }
 
 
-def to_opensees_pinching(law: "BoucWenBaberNoori") -> Scalars:
+def to_opensees_pinching(law: Any) -> Scalars:
     """The member with Ao = A."""
     for name in ("delta_a", "delta_nu", "delta_eta"):
         if getattr(law, name) != 0.0:
@@ -211,7 +207,7 @@ def to_opensees_pinching(law: "BoucWenBaberNoori") -> Scalars:
     }
 
 
-def _of_opensees_energy(law: "BoucWenBaberNoori") -> Scalars:
+def _of_opensees_energy(law: Any) -> Scalars:
     """What the two materials with an energy share."""
     _no_offset(law, "the material")
     if law.z0 != 0.0:
@@ -225,7 +221,7 @@ def _of_opensees_energy(law: "BoucWenBaberNoori") -> Scalars:
     return {"alpha": law.input_coefficients[0] / ko, "ko": ko, **shape}
 
 
-def _with_unit_slope(law: "BoucWen", whose: str) -> Scalars:
+def _with_unit_slope(law: Any, whose: str) -> Scalars:
     """The form that Wen and OpenSees share, with A = 1."""
     _no_offset(law, whose)
     if law.A == 0.0:
@@ -239,7 +235,7 @@ def _with_unit_slope(law: "BoucWen", whose: str) -> Scalars:
     return {"alpha": law.feedthrough / k, "k": k} | {name: unit[name] for name in ("beta", "gamma", "n", "z0")}
 
 
-def _in_unit(law: "BoucWen", unit: float) -> Scalars:
+def _in_unit(law: Any, unit: float) -> Scalars:
     """The law with its memory measured in `unit`."""
     scale = abs(unit) ** (law.n - 1.0)
     return {
@@ -252,6 +248,6 @@ def _in_unit(law: "BoucWen", unit: float) -> Scalars:
     }
 
 
-def _no_offset(law: "BoucWen | BoucWenBaberNoori", whose: str) -> None:
+def _no_offset(law: Any, whose: str) -> None:
     if law.offset != 0.0:
         raise ValueError(f"{whose} has no offset, got {law.offset:g}: take it off the output")

@@ -19,7 +19,7 @@ from hysim.models._joint_space import declared, together
 from hysim.models._parts import checked_tuple, labels, own, response_of
 from hysim.models._sum_search import started, time_of
 from hysim.models._unit_gain import UnitGain
-from hysim.models.composable import Composable
+from hysim.models.composable import Composable, composed
 from hysim.models.protocols import Identifiable, Responding, needs_time
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.transfer_function import TransferFunction, TransferFunctionStructure
@@ -93,15 +93,12 @@ class CascadeStructure(Identifiable, Composable):
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
         """The cascade with these parameters."""
-        from hysim.models.cascade import Cascade
-
         searched = self._searched
-        return Cascade(
-            stages=tuple(
-                searched[label].assemble(own(parameters, label)) if label in searched else stage
-                for label, stage in zip(labels(self.stages), self.stages, strict=True)
-            )
+        stages = zip(labels(self.stages), self.stages, strict=True)
+        members = (
+            searched[label].assemble(own(parameters, label)) if label in searched else stage for label, stage in stages
         )
+        return composed(">>", tuple(members))
 
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
         """What the law that carries the gain says of itself."""

@@ -10,7 +10,7 @@ from hysim._frozen import FloatArray, read_only
 from hysim._parallel import in_pieces
 from hysim.errors import SimulationError
 from hysim.kernels import play_sums as kernels
-from hysim.kernels.stepping import drive, drive_memory
+from hysim.kernels.stepping import drive
 from hysim.models._by_structure import ByStructure
 from hysim.models._clamps import Bank
 from hysim.models.law import State, Tables
@@ -98,6 +98,8 @@ def positions_of(
     right: FloatArray | None = None,
 ) -> FloatArray:
     """Positions (n_sets, n_samples, n_plays) of plays (n_sets, n_plays), pushed as `kernel_rows` says."""
+    from hysim.kernels.memories import drive_memory  # compiled where it is needed
+
     tables = {"offset": np.zeros((len(z0), 1)), "thresholds": thresholds, "weights": np.zeros_like(z0)}
     rows = kernel_rows(tables, width=width, left=left, right=right)
     z = np.empty((len(z0), u.size, z0.shape[1]))

@@ -11,7 +11,7 @@ import numpy as np
 from hysim._frozen import FloatArray, checked, items
 from hysim.models._joint_space import declared, together, without_repetition
 from hysim.models._parts import checked_tuple, labels, own, response_of
-from hysim.models.composable import Composable
+from hysim.models.composable import Composable, composed
 from hysim.models.protocols import Identifiable, Responding, needs_time
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
@@ -92,15 +92,11 @@ class SumStructure(Identifiable, Composable):
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
         """The sum with these parameters."""
-        from hysim.models.sum import Sum
-
-        found = zip(labels(self.parts), self.parts, strict=True)
-        return Sum(
-            parts=tuple(
-                part.assemble(own(parameters, label)) if isinstance(part, Identifiable) else part
-                for label, part in found
-            )
+        parts = zip(labels(self.parts), self.parts, strict=True)
+        members = (
+            part.assemble(own(parameters, label)) if isinstance(part, Identifiable) else part for label, part in parts
         )
+        return composed("+", tuple(members))
 
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
         """What the laws among the parts say of themselves."""

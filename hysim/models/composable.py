@@ -1,37 +1,56 @@
 """Sums and cascades by operators: ``law + law``, ``law >> plant``."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from hysim._frozen import items
 from hysim.models.protocols import Responding
 
 
-class Composable:
-    """What can be a part of a `hysim.Sum` and a stage of a `hysim.Cascade`.
+class _Kind(NamedTuple):
+    """A way to compose models: the model made, the structure made, and the field of both that holds the members."""
 
-    An operand that is a structure, or holds one, makes the structure of the whole.
+    model: type
+    structure: type
+    field: str
+
+
+_KINDS: dict[str, _Kind] = {}
+
+
+def register(operator: str, model: type, structure: type, field: str) -> None:
+    """Say what the operator ``"+"`` or ``">>"`` makes; `hysim.models` registers both."""
+    _KINDS[operator] = _Kind(model, structure, field)
+
+
+def composed(operator: str, members: tuple[Any, ...]) -> Any:
+    """The model that an operator makes of these members."""
+    kind = _KINDS[operator]
+    return kind.model(**{kind.field: members})
+
+
+class Composable:
+    """Base class of what can be a part of a `hysim.Sum` and a stage of a `hysim.Cascade`.
+
+    An operand that is a structure, or holds one, makes a structure.
     """
 
     def __add__(self, other: "Composable") -> Any:
         """Sum of the outputs; a sum among the operands adds its own parts."""
-        from hysim.models.sum import Sum, SumStructure
-
-        return _composed(self, other, "parts", Sum, SumStructure)
+        return _joined(self, other, _KINDS["+"])
 
     def __rshift__(self, other: "Composable") -> Any:
         """`other` behind this; a cascade among the operands adds its own stages."""
-        from hysim.models.cascade import Cascade, CascadeStructure
-
-        return _composed(self, other, "stages", Cascade, CascadeStructure)
+        return _joined(self, other, _KINDS[">>"])
 
 
-def _composed(first: Any, second: Any, field: str, whole: type, structure: type) -> Any:
+def _joined(first: Any, second: Any, kind: _Kind) -> Any:
     if not isinstance(second, Composable):
         return NotImplemented
+    whole = kind.model, kind.structure
     members = [
         member
         for operand in (first, second)
-        for member in (items(operand)[field] if isinstance(operand, whole | structure) else (operand,))
+        for member in (items(operand)[kind.field] if isinstance(operand, whole) else (operand,))
     ]
     simulated = all(isinstance(member, Responding) for member in members)
-    return (whole if simulated else structure)(**{field: tuple(members)})
+    return (kind.model if simulated else kind.structure)(**{kind.field: tuple(members)})

@@ -19,24 +19,22 @@ Sources: P. Duhem 1897; B. D. Coleman and M. L. Hodgdon, Int. J. Eng. Sci. 24 (1
 
 from collections.abc import Mapping, Sequence
 from dataclasses import field
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
 from hysim.kernels import duhem as kernels
-from hysim.models import _duhem_search, _inverse_search
+from hysim.models import _duhem_search, _inverse_search, duhem_structure
 from hysim.models.duhem_runs import branches, free_runs, outputs
+from hysim.models.duhem_structure import DuhemStructure
 from hysim.models.duhem_terms import Polynomials, Term, equation, latex, polynomials, terms_of
 from hysim.models.law import Law, Packed, State, Tables
 from hysim.models.model import model
 from hysim.models.protocols import CompiledLaw
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
-
-if TYPE_CHECKING:
-    from hysim.models.duhem_structure import DuhemStructure
 
 _BOUND = 1e3
 _OUTPUT = ("feedthrough", "offset", "y0")
@@ -172,12 +170,12 @@ class Duhem(Law):
         return cls(p=half[0] + half[1], q=half[0] - half[1], feedthrough=feedthrough, offset=offset, y0=y0)
 
     @classmethod
-    def candidates(cls) -> "dict[str, DuhemStructure]":
+    def candidates(cls) -> dict[str, DuhemStructure]:
         """What `hysim.compare` tries of this family: polynomials of the first and of the second degree."""
         return {f"Duhem of degree {degree}": cls.structure(degree=degree) for degree in (1, 2)}
 
-    @staticmethod
-    def structure(*, degree: int | None = None, terms: Sequence[str] | None = None) -> "DuhemStructure":
+    @classmethod
+    def structure(cls, *, degree: int | None = None, terms: Sequence[str] | None = None) -> DuhemStructure:
         """What `hysim.identify` takes: the terms of a law between u and y, without their coefficients.
 
         The search begins at a regression on the record, so that no start is needed.
@@ -209,12 +207,10 @@ class Duhem(Law):
         >>> round(fit.estimates["|u'| u"], 6)
         3.1635
         """
-        from hysim.models import duhem_structure
-
         if degree is not None and terms is None:
-            return duhem_structure.of_degree(degree)
+            return duhem_structure.of_degree(degree, cls(p=_none(), q=_none()))
         if terms is not None and degree is None:
-            return duhem_structure.of_terms(tuple(terms))
+            return duhem_structure.of_terms(tuple(terms), cls(p=_none(), q=_none()))
         raise ValueError("give degree or terms, one of the two")
 
     @property

@@ -11,26 +11,26 @@ run closest to the record are the middle of the box.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.models import _duhem_search
 from hysim.models.composable import Composable
-from hysim.models.duhem import Duhem
 from hysim.models.duhem_terms import RATES, Term
 from hysim.models.protocols import Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
 _RANK = 1e-6  # singular values of the normalised columns below this are taken as zero
-_ANY = Duhem(p=np.zeros((1, 1)), q=np.zeros((1, 1)))
 
 
 @dataclass(frozen=True, kw_only=True)
 class DuhemStructure(Identifiable, Composable):
-    """The terms of a Duhem law without their coefficients; see `Duhem.structure`."""
+    """The terms of a Duhem law without their coefficients; see `Duhem.structure`. `family` is any law of the family."""
 
+    family: Identifiable
     terms: tuple[Term, ...]
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
@@ -45,7 +45,7 @@ class DuhemStructure(Identifiable, Composable):
         degrees = sorted({term.degree for term in self.terms}, reverse=True)
         level = {"feedthrough": 0.0, "offset": 0.0, "y0": float(record.y[0]) if len(record) else 0.0}
         found = [{**dict.fromkeys(names, 0.0), **self._regression(record, degree), **level} for degree in degrees]
-        found.sort(key=lambda values: _distance(values, record))
+        found.sort(key=lambda values: self._distance(values, record))
         space = _duhem_search.search_space(found[0], record, freedom)
         unit = {name: values[0] for name, values in space.parameters(np.ones(space.lower.size)).items()}
         starts = np.array([[values[name] / unit[name] for name in space.coordinates] for values in found])
@@ -53,11 +53,17 @@ class DuhemStructure(Identifiable, Composable):
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """As `Duhem.regressors`."""
-        return _ANY.regressors(parameters, record)
+        return self.family.regressors(parameters, record)
 
-    def assemble(self, parameters: Mapping[str, float]) -> Duhem:
+    def assemble(self, parameters: Mapping[str, float]) -> Any:
         """The law with these parameters, one number for each name."""
-        return _ANY.assemble(parameters)
+        return self.family.assemble(parameters)
+
+    def _distance(self, values: Mapping[str, float], record: Record) -> float:
+        """Sum of squared residuals in free run, inf where the law diverges."""
+        y = self.family.regressors(values, record)[0, :, 0]
+        with np.errstate(over="ignore"):
+            return float(np.sum((record.y - y) ** 2))
 
     def _regression(self, record: Record, degree: int) -> dict[str, float]:
         """The coefficients of the terms up to this degree."""
@@ -75,14 +81,7 @@ class DuhemStructure(Identifiable, Composable):
         return {term.name: float(value) for term, value in zip(terms, solution, strict=False)}
 
 
-def _distance(values: Mapping[str, float], record: Record) -> float:
-    """Sum of squared residuals in free run, inf where the law escapes."""
-    y = _ANY.regressors(values, record)[0, :, 0]
-    with np.errstate(over="ignore"):
-        return float(np.sum((record.y - y) ** 2))
-
-
-def of_degree(degree: int) -> DuhemStructure:
+def of_degree(degree: int, family: Identifiable) -> DuhemStructure:
     """Every monomial of u and y up to `degree`, with u' and with ``|u'|``.
 
     Raises
@@ -95,10 +94,11 @@ def of_degree(degree: int) -> DuhemStructure:
     if degree < 0:
         raise ValueError(f"degree must not be negative, got {degree}")
     powers = [(total, j) for total in range(degree + 1) for j in range(total + 1)]
-    return DuhemStructure(terms=tuple(Term(rate == RATES[1], total, j) for rate in RATES for total, j in powers))
+    terms = tuple(Term(rate == RATES[1], total, j) for rate in RATES for total, j in powers)
+    return DuhemStructure(family=family, terms=terms)
 
 
-def of_terms(names: tuple[str, ...]) -> DuhemStructure:
+def of_terms(names: tuple[str, ...], family: Identifiable) -> DuhemStructure:
     """The terms with these names.
 
     Raises
@@ -111,4 +111,4 @@ def of_terms(names: tuple[str, ...]) -> DuhemStructure:
         raise ValueError("terms must name at least one term")
     if barred := [term.name for term in terms if term.absolute]:
         raise ValueError(f"{barred[0]!r} needs a memory of its own: begin the search from a law, Duhem.from_terms")
-    return DuhemStructure(terms=terms)
+    return DuhemStructure(family=family, terms=terms)

@@ -17,6 +17,9 @@ from scipy.signal import cont2discrete, lfilter
 
 from hysim._frozen import FloatArray
 
+METHODS = ("split", "runge-kutta", "newmark", "strang")
+"""Ways to step an oscillator."""
+
 _ROUNDS = 20  # of the linear fit: it settles in five to ten
 _SETTLED = 1e-9
 _DAMPING = (1e-3, 2.0)  # damping ratio of D

@@ -18,8 +18,8 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, items, read_only
 from hysim._parallel import in_pieces
 from hysim.errors import SimulationError
-from hysim.kernels.batches import drive_each, drive_to_end
-from hysim.kernels.stepping import Step, drive, drive_memory
+from hysim.kernels.batches import drive_each
+from hysim.kernels.stepping import Step, drive
 from hysim.models._batch import Batch, Reduction, Sets
 from hysim.models._inverse_search import inverse_response, inverse_response_of, inverse_step
 from hysim.models.compiled_step import compiled_step
@@ -223,6 +223,8 @@ class Law(Composable, ABC):
 
     def remembered(self, u: npt.ArrayLike) -> FloatArray:
         """The state behind the last input at the samples of `u`, shape (n_samples, n_memory)."""
+        from hysim.kernels.memories import drive_memory  # compiled where it is needed
+
         inputs = read_only(u, "u", ndim=1)
         law, start = self._begun(inputs, None)
         z = np.empty((inputs.size, len(start) - 1))
@@ -341,6 +343,8 @@ class Law(Composable, ABC):
 
         One pass through the record contracts the memory; the fixed point is found by the secant method.
         """
+        from hysim.kernels.memories import drive_to_end  # compiled where it is needed
+
         names = self.initial_names
         around = np.append(record.u, record.u[0])
         tables, inputs = tables_of(type(self).__name__, self.arguments, parameters, around)

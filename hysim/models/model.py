@@ -5,13 +5,13 @@ compared by value. Evolving state is separate: it is passed in and handed back.
 """
 
 import importlib
-import pkgutil
 from dataclasses import fields
 from typing import Any, TypeVar, dataclass_transform
 
 import numpy as np
 
 from hysim._frozen import checked, items
+from hysim._names import HOME
 from hysim._words import shown, value_in_words, words, wrapped
 
 T = TypeVar("T")
@@ -67,12 +67,10 @@ def _models_in(name: str, value: Any) -> dict[str, Any]:
 
 
 def every_family() -> dict[str, type]:
-    """The registry after every public module of models has entered its families."""
-    from hysim import models
-
-    for module in pkgutil.iter_modules(models.__path__):
-        if not module.name.startswith("_"):
-            importlib.import_module(f"{models.__name__}.{module.name}")
+    """The registry after every public model of hysim has entered its family."""
+    for module in dict.fromkeys(HOME.values()):
+        if module.startswith("hysim.models."):
+            importlib.import_module(module)
     return FAMILIES
 
 

@@ -20,7 +20,7 @@ The last never falls if -beta <= gamma <= beta. With A = 0 the memory stores not
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -32,14 +32,12 @@ from hysim.kernels import oscillator as kernels
 from hysim.kernels.boucwen import prepare
 from hysim.kernels.charts import N_WORK
 from hysim.models.boucwen import BoucWen
+from hysim.models.equation_of_motion import METHODS
 from hysim.models.model import model
+from hysim.models.oscillator_structure import OscillatorStructure
 from hysim.models.polynomial_boucwen import PolynomialBoucWen
 from hysim.models.steady_state import ATTEMPTS, attracting_state
 
-if TYPE_CHECKING:
-    from hysim.models.oscillator_structure import OscillatorStructure
-
-METHODS = ("split", "runge-kutta", "newmark", "strang")
 _ANGLE = 0.1  # largest phase of the mode in a default step: errors of 1e-7 of the output on the Noel-Schoukens system
 _CHUNK = 1 << 16
 _SETTLING_CHUNK = 1 << 13
@@ -309,8 +307,9 @@ class BoucWenOscillator:
         }
         return signals, OscillatorState(inputs[-1], *states[-1]) if inputs.size else state or start
 
-    @staticmethod
+    @classmethod
     def structure(
+        cls,
         *,
         method: str = "split",
         oversampling: int = 4,
@@ -319,7 +318,7 @@ class BoucWenOscillator:
         period: int | None = None,
         hold: str = "foh",
         excitation: str = "force",
-    ) -> "OscillatorStructure":
+    ) -> OscillatorStructure:
         """What `hysim.identify` takes: how the record of an oscillator with a Bouc-Wen law was made.
 
         Its parameters are ``mass, damping, stiffness, A, beta, gamma, n``, all free by default. Under a base's
@@ -368,9 +367,8 @@ class BoucWenOscillator:
         >>> round(fit.estimates["mass"], 4), round(fit.estimates["gamma"], 1)
         (2.0, -300.0)
         """
-        from hysim.models.oscillator_structure import OscillatorStructure
-
         return OscillatorStructure(
+            family=cls,
             method=method,
             oversampling=oversampling,
             decimation=tuple(decimation),

@@ -10,7 +10,7 @@ affine in no parameter: all are searched, from where `hysim.models._oscillator_s
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,8 +20,7 @@ from hysim.errors import SimulationError
 from hysim.models import _boucwen_search
 from hysim.models._oscillator_start import start
 from hysim.models.boucwen import BoucWen
-from hysim.models.equation_of_motion import Linear, Motion
-from hysim.models.oscillator import METHODS, BoucWenOscillator
+from hysim.models.equation_of_motion import METHODS, Linear, Motion
 from hysim.models.protocols import Identifiable
 from hysim.models.resampling import HALF_FILTER, decimated, interpolated
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
@@ -38,13 +37,14 @@ _REPEATS = 0.1  # share of the input's rms by which a period may differ from the
 
 @checked
 class OscillatorStructure(Identifiable):
-    """An oscillator to be identified; see `BoucWenOscillator.structure`.
+    """An oscillator to be identified; see `BoucWenOscillator.structure`, whose class is `family`.
 
     The box reaches from a tenth of the mass that the search begins with to ten times that mass, from no damping to
     twice the critical one, and to ten times the stiffness of small motions for both springs; that of the law is the
     one of `hysim.BoucWen`, with the displacement as its input and A not negative.
     """
 
+    family: type
     method: str = "split"
     oversampling: int = 4
     decimation: tuple[int, ...] = ()
@@ -130,9 +130,9 @@ class OscillatorStructure(Identifiable):
         in_chunks(simulate, len(sets), minimum=1)
         return outputs
 
-    def assemble(self, parameters: Mapping[str, float]) -> BoucWenOscillator:
+    def assemble(self, parameters: Mapping[str, float]) -> Any:
         """The oscillator with these parameters, its steps as fine as those of the identification."""
-        return BoucWenOscillator(
+        return self.family(
             mass=parameters["mass"],
             damping=parameters["damping"],
             stiffness=parameters["stiffness"],
@@ -179,8 +179,9 @@ class OscillatorStructure(Identifiable):
         places = np.arange(u.size * factor if self.period else (u.size - 1) * factor + 1) / factor
         return np.asarray(np.interp(places, np.arange(u.size + 1), np.append(u, u[0])))
 
-    def _fine_output(self, plant: BoucWenOscillator, force: FloatArray, step: float) -> FloatArray:
-        return plant.response(force, step) if self.period is None else plant.periodic_response(force, step)
+    def _fine_output(self, plant: Any, force: FloatArray, step: float) -> FloatArray:
+        run = plant.response if self.period is None else plant.periodic_response
+        return np.asarray(run(force, step))
 
     def sampled(self, y: FloatArray) -> FloatArray:
         """What the record keeps of an output at the ends of the steps."""

@@ -3,6 +3,7 @@
 A model inside another, such as the law of an actuator, is a family with its parameters in its place.
 """
 
+import importlib
 import json
 from collections import Counter
 from collections.abc import Iterable, Mapping
@@ -12,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
-import hysim
 from hysim._atomic import write_text
 from hysim._frozen import items
+from hysim._names import HOME
+from hysim._release import __version__
 from hysim.models.model import FAMILIES, every_family
 
 _DEEPEST = 100  # lists and mappings in each other: a chain of chains takes three for a model
@@ -59,7 +61,7 @@ def to_json(model: Any, *, units: Mapping[str, str] | None = None) -> str:
     """What `save` writes, as a string."""
     if not is_model(model):
         raise TypeError(f"save takes a model of hysim, got {type(model).__name__}")
-    document = {"hysim": hysim.__version__, **to_document(model), "units": dict(units or {})}
+    document = {"hysim": __version__, **to_document(model), "units": dict(units or {})}
     _check_depth(document)
     return json.dumps(document, indent=2, allow_nan=False) + "\n"
 
@@ -147,8 +149,8 @@ def from_document(document: Mapping[str, Any], path: str | Path) -> Any:
         raise ValueError(f"{path} does not hold a model of hysim: the family must be a name, got {_shown(family)}")
     if not isinstance(given, Mapping):
         raise ValueError(f"{path} does not hold a {family}: parameters must be a mapping, got {_shown(given)}")
-    if family in hysim.__all__:
-        getattr(hysim, family)  # loads its module, which enters it into the families
+    if family in HOME:
+        importlib.import_module(HOME[family])  # enters it into the families
     if family not in FAMILIES:
         known = ", ".join(sorted(every_family()))
         raise ValueError(f"{path} holds a model of the family {_shown(family)}; there are {known}")

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-import hysim
+from hysim._release import __version__
 from hysim.sweeps._space import Space
 
 _PLAIN = (str, bytes, int, float, complex, type(None), type(...), np.generic)
@@ -24,7 +24,7 @@ def identity(task: Callable[..., Any], space: Space, seed: int) -> dict[str, str
         "task": _digest(inspect.unwrap(task)),
         "space": f"{space.n_tasks} tasks of {names} ({_digest(dict(space.columns))})",
         "seed": str(seed),
-        "hysim": hysim.__version__,
+        "hysim": __version__,
     }
 
 

@@ -1,0 +1,3 @@
+"""Version of hysim."""
+
+__version__ = "0.1.0"
