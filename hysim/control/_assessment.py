@@ -1,8 +1,8 @@
-"""What a loop achieves against the same plant in open loop: one code for every plant and controller.
+"""Figures of a closed loop beside those of the same plant in open loop, alike for every plant and controller.
 
-The open loop drives the plant with reference / secant gain. Loops are measured against the reference, over
-the last of several cycles; steps by the three figures of `hysim.metrics.vibration_reduction`, always
-together; square waves over their last period.
+The open loop drives the plant with reference / secant gain. Hysteresis loops are measured against the reference, over
+the last of several cycles; steps by the three figures of `hysim.metrics.vibration_reduction`, always together; square
+waves over their last period.
 """
 
 import math
@@ -14,9 +14,9 @@ import numpy.typing as npt
 from hysim import signals
 from hysim._frozen import FloatArray, frozen, read_only
 from hysim._words import extent, printed, words
-from hysim.control._drive import secant_gain, without_memory
-from hysim.control._loop import ClosedLoop, Controller, RestingPlant, as_actuator, close_loop, preview
-from hysim.errors import SimulationError
+from hysim.control._loop import ClosedLoop, RestingPlant, as_actuator, close_loop
+from hysim.control._open_loop import secant_gain, without_memory
+from hysim.control._protocols import Controller, preview
 from hysim.metrics import LoopMetrics, VibrationReduction, loop_metrics, reduction_percent, rmse, vibration_reduction
 from hysim.models.actuator import Actuator
 
@@ -26,7 +26,7 @@ _FEWEST = 10  # samples of which a step is measured
 @printed
 @frozen
 class OpenLoop:
-    """What a periodic reference comes to without a controller; every signal has shape (n,).
+    """Response to a periodic reference without a controller; every signal has shape (n,).
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class OpenLoop:
     u, y : array
         Voltage reference / secant gain [unit of u], and the true displacement just before each [unit of y].
     secant_gain : float
-        Stroke over span of its own last cycle, which is the steady one without creep [unit of y / unit of u].
+        Stroke over span of the last cycle, which is the steady one without creep [unit of y / unit of u].
     samples_per_cycle : int
         Of the reference.
     """
@@ -65,7 +65,7 @@ class OpenLoop:
         return signal[-self.samples_per_cycle - 1 :]
 
     def loop_of(self, y: FloatArray) -> LoopMetrics:
-        """The measures of a displacement against the reference, in the last cycle."""
+        """Measures of a displacement against the reference, in the last cycle."""
         return loop_metrics(self.cycle, self.last(y))
 
     def reduction_percent(self, y: FloatArray) -> float:
@@ -76,7 +76,7 @@ class OpenLoop:
 @printed
 @frozen
 class HysteresisAssessment:
-    """A triangle, followed in open and in closed loop.
+    """Figures of a triangle, followed in open and in closed loop.
 
     Parameters
     ----------
@@ -89,16 +89,12 @@ class HysteresisAssessment:
         Largest widths [unit of y].
     open_lag_width, lag_width : float
         Those of the same loops with the law replaced by a line of its secant gain [unit of y].
-    tracking_rms : float
-        Rms error of the closed loop over the last cycle [unit of y].
-    closure_gap : float
-        Displacement at the last cycle's end minus at its start [unit of y].
+    tracking_rms, closure_gap : float
+        Rms error of the closed loop over the last cycle, and displacement at its end minus at its start [unit of y].
     secant_gain : float
         Of the open loop [unit of y / unit of u].
-    open_u, open_y : array, shape (n,)
-        The open loop.
-    closed : ClosedLoop
-        The closed one, with its conditions.
+    open_u, open_y, closed
+        The open loop, shape (n,), and the closed one.
     """
 
     hysteresis_reduction_percent: float
@@ -133,16 +129,14 @@ class HysteresisAssessment:
 @printed
 @frozen
 class StepAssessment:
-    """A step, in open and in closed loop.
+    """Figures of a step, in open and in closed loop.
 
     Parameters
     ----------
     reduction : VibrationReduction
-        The three figures, and both responses' measures.
-    open_y : array, shape (n,)
-        The open loop, its voltage stepping to where the step ends.
-    closed : ClosedLoop
-        The closed one, with its conditions; before the step, it holds the resting displacement as long as asked for.
+        The three figures, and the measures of both responses.
+    open_y, closed
+        The open loop, shape (n,), whose voltage steps to its final value, and the closed one.
     """
 
     reduction: VibrationReduction
@@ -150,14 +144,14 @@ class StepAssessment:
     closed: ClosedLoop
 
     def __str__(self) -> str:
-        way = f"from {self.closed.y[0]:.4g} to {self.closed.reference[-1]:.4g}"
-        return words([f"StepAssessment {way}, voltage {extent(self.closed.u)}", f"  {self.reduction}"])
+        ends = f"from {self.closed.y[0]:.4g} to {self.closed.reference[-1]:.4g}"
+        return words([f"StepAssessment {ends}, voltage {extent(self.closed.u)}", f"  {self.reduction}"])
 
 
 @printed
 @frozen
 class SquareWaveAssessment:
-    """A square wave in its periodic steady state, in open and in closed loop.
+    """Figures of a square wave in its periodic steady state, in open and in closed loop.
 
     Parameters
     ----------
@@ -168,10 +162,8 @@ class SquareWaveAssessment:
     reduction : VibrationReduction, or None
         The step's figures over the last half period, if this is at least the open loop's t98 and five of its
         periods long.
-    open_y : array, shape (n,)
-        The open loop.
-    closed : ClosedLoop
-        The closed one, with its conditions.
+    open_y, closed
+        The open loop, shape (n,), and the closed one.
     """
 
     open_tracking_rms: float
@@ -202,45 +194,41 @@ def assess_hysteresis(
     sample_time: float,
     cycles: int = 10,
 ) -> HysteresisAssessment:
-    """Let a loop follow a triangle, and measure what is left of the hysteresis.
+    """Let a loop follow a triangle, and measure the hysteresis that remains.
 
     Parameters
     ----------
     plant : Actuator, law or linear plant
         At rest at no voltage before the first sample.
     controller : PID, or anything with its ``compiled``
-        What closes the loop.
+        Closes the loop.
     low, high : float
-        The triangle's extremes [unit of y]; reachable ones, if the figure shall say something.
+        The triangle's extremes, which the plant must be able to reach [unit of y].
     period, sample_time : float
         Of the triangle, an even number of samples, and of the controller [s].
     cycles : int
         Number of cycles, of which the last is measured.
 
-    Returns
-    -------
-    HysteresisAssessment
-
     Raises
     ------
     SimulationError
-        If a loop is lost.
+        If a loop diverges.
     ValueError
-        If the triangle is not one, or the plant has no gain.
+        If a period is not a whole number of samples, or the plant has no gain.
 
     Examples
     --------
     >>> import hysim as hs
     >>> law, pid = hs.BoucWen(gain=0.5, feedthrough=1.0), hs.PID(ki=200.0)
-    >>> found = hs.control.assess_hysteresis(law, pid, low=0.0, high=1.0, period=10.0, sample_time=0.001)
-    >>> found.hysteresis_reduction_percent > 90.0, found.lag_width > 0.5 * found.closed_width
+    >>> result = hs.control.assess_hysteresis(law, pid, low=0.0, high=1.0, period=10.0, sample_time=0.001)
+    >>> result.hysteresis_reduction_percent > 90.0, result.lag_width > 0.5 * result.closed_width
     (True, True)
     """
     actuator = as_actuator(plant)
-    samples = _whole("a period", period, sample_time)
+    samples = _samples_in("a period", period, sample_time)
     reference = signals.triangle(low, high, cycles=cycles, samples_per_cycle=samples)
     opened = open_loop(actuator, reference, sample_time, samples)
-    line = without_memory(actuator, opened.cycle / opened.secant_gain)
+    line = RestingPlant(without_memory(actuator, opened.cycle / opened.secant_gain), sample_time)
     closed = close_loop(actuator, controller, opened.t, reference)
     reduction, after = opened.reduction_percent(closed.y), opened.loop_of(closed.y)
     has_law = actuator.hysteresis is not None
@@ -249,8 +237,8 @@ def assess_hysteresis(
         lag_reduction_percent=math.nan if has_law else reduction,
         open_width=opened.loop.max_width,
         closed_width=after.max_width,
-        open_lag_width=opened.loop_of(_held(line, opened.u, sample_time, 0.0)).max_width,
-        lag_width=opened.loop_of(_followed(line, controller, sample_time, reference)).max_width,
+        open_lag_width=opened.loop_of(line.driven(opened.u)).max_width,
+        lag_width=opened.loop_of(line.run(controller, reference).y).max_width,
         tracking_rms=rmse(opened.cycle, opened.last(closed.y)),
         closure_gap=after.closure_gap,
         secant_gain=opened.secant_gain,
@@ -269,28 +257,20 @@ def open_loop(plant: Any, reference: npt.ArrayLike, sample_time: float, samples_
         At rest at no voltage before the first sample.
     reference : array, shape (n,)
         Whole cycles, and the sample at which the last one ends [unit of y].
-    sample_time : float
-        [s]
-    samples_per_cycle : int
-        Of the reference.
-
-    Returns
-    -------
-    OpenLoop
+    sample_time, samples_per_cycle
+        Of the reference [s].
 
     Raises
     ------
-    SimulationError
-        If the plant leaves the finite numbers.
-    ValueError
-        If the reference does not hold whole cycles, or the plant has no gain.
+    SimulationError, ValueError
+        If the plant diverges or has no gain, or the reference does not hold whole cycles.
 
     Examples
     --------
     >>> import hysim as hs
     >>> triangle = hs.signals.triangle(0.0, 1.0, cycles=2, samples_per_cycle=100)
     >>> opened = hs.control.open_loop(hs.Line(slope=2.0), triangle, 0.1, 100)
-    >>> opened.secant_gain, round(opened.loop.max_width, 6)  # two samples' way: read just before the next voltage
+    >>> opened.secant_gain, round(opened.loop.max_width, 6)  # two samples' rise: read just before the next voltage
     (2.0, 0.04)
     """
     actuator, r = as_actuator(plant), read_only(reference, "reference", ndim=1)
@@ -305,7 +285,7 @@ def open_loop(plant: Any, reference: npt.ArrayLike, sample_time: float, samples_
         t=read_only(sample_time * np.arange(r.size)),
         reference=r,
         u=r / gain,
-        y=_held(actuator, r / gain, sample_time, 0.0),
+        y=RestingPlant(actuator, sample_time).driven(r / gain),
         secant_gain=gain,
         samples_per_cycle=samples_per_cycle,
     )
@@ -322,14 +302,12 @@ def assess_step(
     hold: float = 0.0,
     known_ahead: bool = False,
 ) -> StepAssessment:
-    """Let a loop follow a step, and measure what is left of the vibration.
+    """Let a loop follow a step, and measure the vibration that remains.
 
     Parameters
     ----------
-    plant : Actuator, law or linear plant
-        At rest at `u0` before the first sample.
-    controller : PID, or anything with its ``compiled``
-        What closes the loop.
+    plant, controller
+        As of `assess_hysteresis`; the plant rests at `u0`.
     step : float
         From the resting displacement [unit of y].
     duration, sample_time : float
@@ -337,45 +315,38 @@ def assess_step(
     u0 : float
         Voltage before the first sample.
     hold : float
-        Time before the step, in which the closed loop comes to rest where the plant is [s]: for a controller whose
-        model is wrong, which takes another voltage for that displacement.
+        Time before the step for a controller with a wrong model to come to rest [s].
     known_ahead : bool
-        A controller with preview moves before the reference does. By default nobody knows of the step before it
-        comes: the open loop is given its own when the controller is told. Where the reference is known ahead, the open
-        loop steps in the reference's time, and all times are still from when the controller is told.
-
-    Returns
-    -------
-    StepAssessment
+        Whether the reference is known ahead, so that a controller with preview moves before the step; the open loop
+        then steps in the reference's time. By default the controller is told when the open loop steps.
 
     Raises
     ------
-    SimulationError
-        If the loop is lost.
-    ValueError
-        If the plant has no gain.
+    SimulationError, ValueError
+        As `assess_hysteresis`.
 
     Examples
     --------
     >>> import hysim as hs
     >>> mode = hs.TransferFunction(num=(1.0,), den=(1.0, 0.2, 1.0))
     >>> pid = hs.PID.standard(4.0, Ti=2.0, Td=1.0, derivative_filter=0.05, setpoint_weight=0.0)
-    >>> found = hs.control.assess_step(mode, pid, step=1.0, duration=200.0, sample_time=0.01).reduction
-    >>> round(found.overshoot_reduction_percent), round(found.settling_time_reduction_percent)
+    >>> result = hs.control.assess_step(mode, pid, step=1.0, duration=200.0, sample_time=0.01).reduction
+    >>> round(result.overshoot_reduction_percent), round(result.settling_time_reduction_percent)
     (100, 84)
     """
     actuator = as_actuator(plant)
     before, after = round(hold / sample_time), round(duration / sample_time) + 1
     ahead = preview(controller, sample_time)
     t = sample_time * np.arange(before + after)
-    rest = _resting_displacement(actuator, u0)
-    reference = rest + np.where(np.arange(t.size) < before + ahead, 0.0, step)
+    resting = RestingPlant(actuator, sample_time, u0)
+    reference = resting.y0 + np.where(np.arange(t.size) < before + ahead, 0.0, step)
     closed = close_loop(actuator, controller, t, reference, u0=u0)
-    gain = secant_gain(actuator, np.array([rest, rest + step]))
+    gain = secant_gain(actuator, np.array([resting.y0, resting.y0 + step]))
     waits = np.arange(after) < (ahead if known_ahead else 0)
-    open_y = _held(actuator, u0 + np.where(waits, 0.0, step / gain), sample_time, u0)
+    open_y = resting.driven(u0 + np.where(waits, 0.0, step / gain))
+    decay_rate = -_least_damped(actuator).real
     return StepAssessment(
-        reduction=vibration_reduction(t[:after], open_y, closed.y[before:], decay_rate=_decay_rate(actuator)),
+        reduction=vibration_reduction(t[:after], open_y, closed.y[before:], decay_rate=decay_rate),
         open_y=open_y,
         closed=closed,
     )
@@ -388,10 +359,8 @@ def assess_square_wave(
 
     Parameters
     ----------
-    plant : Actuator, law or linear plant
-        At rest at no voltage before the first sample.
-    controller : PID, or anything with its ``compiled``
-        What closes the loop.
+    plant, controller
+        As of `assess_hysteresis`.
     low, high : float
         The wave's levels, the first half of each period at the low one [unit of y].
     period, sample_time : float
@@ -399,16 +368,10 @@ def assess_square_wave(
     periods : int
         Number of periods, enough for the open loop to become periodic.
 
-    Returns
-    -------
-    SquareWaveAssessment
-
     Raises
     ------
-    SimulationError
-        If the loop is lost.
-    ValueError
-        If high is not above low, a half period is not a whole number of samples, or the plant has no gain.
+    SimulationError, ValueError
+        As `assess_hysteresis`, or if high is not above low.
 
     Examples
     --------
@@ -416,26 +379,26 @@ def assess_square_wave(
     >>> lag = hs.TransferFunction(num=(1.0,), den=(1.0, 1.0))
     >>> pid = hs.PID(kp=9.0, ki=9.0)
     >>> wave = dict(low=0.0, high=1.0, period=4.0, sample_time=0.01, periods=5)
-    >>> found = hs.control.assess_square_wave(lag, pid, **wave)
-    >>> found.tracking_rms < 0.5 * found.open_tracking_rms
+    >>> result = hs.control.assess_square_wave(lag, pid, **wave)
+    >>> result.tracking_rms < 0.5 * result.open_tracking_rms
     True
     """
     actuator = as_actuator(plant)
     if not high > low:
         raise ValueError(f"high must be above low, got low {low} and high {high}")
-    half = _whole("a half period", 0.5 * period, sample_time)
+    half = _samples_in("a half period", 0.5 * period, sample_time)
     reference = np.tile(np.repeat([low, high], half), periods)
     t = sample_time * np.arange(reference.size)
     gain = secant_gain(actuator, np.array([low, high]))
     closed = close_loop(actuator, controller, t, reference)
-    open_y = _held(actuator, reference / gain, sample_time, 0.0)
+    open_y = RestingPlant(actuator, sample_time).driven(reference / gain)
     last, last_half = slice(-2 * half, None), slice(-half, None)
-    step = None
+    mode, step = _least_damped(actuator), None
     if half >= _FEWEST:
         halves = t[last_half], open_y[last_half], closed.y[last_half]
-        found = vibration_reduction(*halves, decay_rate=_decay_rate(actuator))
-        if half * sample_time >= found.open.t98 + 5.0 * _vibration_period(actuator):
-            step = found
+        reduction = vibration_reduction(*halves, decay_rate=-mode.real)
+        if half * sample_time >= reduction.open.t98 + 5.0 * 2.0 * math.pi / mode.imag:
+            step = reduction
     return SquareWaveAssessment(
         open_tracking_rms=rmse(reference[last], open_y[last]),
         tracking_rms=rmse(reference[last], closed.y[last]),
@@ -447,38 +410,12 @@ def assess_square_wave(
     )
 
 
-def _whole(what: str, duration: float, sample_time: float) -> int:
+def _samples_in(what: str, duration: float, sample_time: float) -> int:
     """Number of samples in a duration."""
     samples = round(duration / sample_time)
     if samples < 1 or abs(samples - duration / sample_time) > 1e-6 * samples:
         raise ValueError(f"{what} must be a whole number of samples, got {duration / sample_time:g}")
     return samples
-
-
-def _followed(actuator: Actuator, controller: Controller, sample_time: float, reference: FloatArray) -> FloatArray:
-    """Displacements of a closed loop of which nothing else is asked."""
-    found = RestingPlant(actuator, sample_time).run(controller, reference)
-    if found.lost >= 0:
-        raise SimulationError(f"the loop without memory is unstable: it is lost at t = {sample_time * found.lost:g}")
-    return found.y
-
-
-def _held(actuator: Actuator, u: FloatArray, sample_time: float, u0: float) -> FloatArray:
-    """Displacements just before each voltage, as a loop measures them, from rest at `u0`."""
-    return RestingPlant(actuator, sample_time, u0).driven(u)
-
-
-def _resting_displacement(actuator: Actuator, u0: float) -> float:
-    return RestingPlant(actuator, 1.0, u0).y0
-
-
-def _decay_rate(actuator: Actuator) -> float:
-    """Damping ratio times natural frequency of the least damped mode; nan without a vibration."""
-    return -_least_damped(actuator).real
-
-
-def _vibration_period(actuator: Actuator) -> float:
-    return 2.0 * math.pi / _least_damped(actuator).imag
 
 
 def _least_damped(actuator: Actuator) -> complex:

@@ -1,7 +1,7 @@
 """The bandwidth of a loop, found by running it.
 
 A sine r = y0 + a sin(w t) about a resting displacement y0 is followed by the whole loop: law, limits, sampling and all.
-Behind its transient the true displacement is fitted by least squares as
+After its transient the true displacement is fitted by least squares as
 
     y = c + a Re(G) sin(w t) + a Im(G) cos(w t)
 
@@ -15,9 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from hysim._frozen import read_only
-from hysim.control._loop import Controller, RestingPlant, as_actuator
-from hysim.errors import SimulationError
+from hysim.control._loop import RestingPlant, as_actuator
+from hysim.control._protocols import Controller
 
 _PER_DECADE = 24  # frequencies tried
 _BISECTIONS = 10
@@ -42,16 +41,16 @@ def bandwidth(
     ----------
     plant : Actuator, law or linear plant
         At rest at `u0` before the first sample; the noise of its sensor is left out.
-    controller : PID, TrackingController, or anything with its ``compiled``
-        What closes the loop.
+    controller : PID, TrackingController, or anything with their ``compiled``
+        Closes the loop.
     sample_time : float
         Of the controller [s].
     amplitude : float
         Of the sine about the resting displacement [unit of y].
     lowest : float
-        Frequency from which on it is looked for [rad/s].
+        First frequency tried [rad/s].
     transient : float
-        After which the response is taken to be periodic [s].
+        Time after which the response is taken to be periodic [s].
     u0 : float
         Voltage before the first sample.
 
@@ -64,7 +63,7 @@ def bandwidth(
     Raises
     ------
     SimulationError
-        If the loop is lost.
+        If the loop diverges.
     ValueError
         If the amplitude or the lowest frequency is not positive.
 
@@ -89,12 +88,12 @@ def bandwidth(
 
     highest = 2.0 * math.pi / (_SHORTEST * sample_time)
     tried = np.geomspace(lowest, highest, 1 + math.ceil(_PER_DECADE * math.log10(highest / lowest))).tolist()
-    lost = next((k for k, frequency in enumerate(tried) if not follows(frequency)), None)
-    if lost is None:
+    first_failure = next((k for k, frequency in enumerate(tried) if not follows(frequency)), None)
+    if first_failure is None:
         return math.inf
-    if not lost:
+    if not first_failure:
         return 0.0
-    within, beyond = tried[lost - 1], tried[lost]
+    within, beyond = tried[first_failure - 1], tried[first_failure]
     for _ in range(_BISECTIONS):
         middle = math.sqrt(within * beyond)
         within, beyond = (middle, beyond) if follows(middle) else (within, middle)
@@ -104,15 +103,13 @@ def bandwidth(
 def _describing(
     resting: RestingPlant, controller: Controller, frequency: float, amplitude: float, transient: float
 ) -> complex:
-    """From the reference to the true displacement, at a frequency."""
+    """G at a frequency."""
     h = resting.sample_time
     before = math.ceil(transient / h)
     fitted = max(_FEWEST, math.ceil(2.0 * math.pi * _PERIODS / (frequency * h)))
-    t = read_only(h * np.arange(before + fitted))
+    t = h * np.arange(before + fitted)
     sine = np.sin(frequency * t)
-    found = resting.run(controller, resting.y0 + amplitude * sine)
-    if found.lost >= 0:
-        raise SimulationError(f"the loop is unstable: it is lost at t = {h * found.lost:g}")
+    y = resting.run(controller, resting.y0 + amplitude * sine).y
     columns = np.stack([sine, np.cos(frequency * t), np.ones_like(t)], axis=1)[before:]
-    real, imaginary, _ = np.linalg.lstsq(columns, found.y[before:])[0] / amplitude
+    real, imaginary, _ = np.linalg.lstsq(columns, y[before:])[0] / amplitude
     return complex(real, imaginary)

@@ -1,15 +1,15 @@
 """The verb `to_c`: a controller as C99 for the device that it runs on.
 
-The numbers are those that the compiled loops get, block by block (`hysim.kernels.tracking`); the code around them is
-that of `hysim.control._c_fragments`, and only what this controller needs of it. Sums of many small terms, the
-integral and the creep, carry along what rounding takes from them, so that they move in single precision too.
+The numbers are those of the compiled loops, block by block (`hysim.kernels.tracking`); the code around them comes from
+`hysim.control._c_fragments`, as far as this controller needs it. Sums of many small terms, the integral and the creep,
+carry their rounding errors along, so that they move in single precision too.
 """
 
 import math
 import re
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from string import Template
 from textwrap import wrap
@@ -41,11 +41,11 @@ class CSource:
     Parameters
     ----------
     name : str
-        What its files, types and functions are called.
+        Of its files, types and functions.
     header, source : str
         Texts of the header and of the source.
     sketch : str
-        Text of an Arduino sketch around them, its pins and scales to be put in.
+        Text of an Arduino sketch around them, with placeholders for pins and scales.
 
     Examples
     --------
@@ -65,13 +65,7 @@ class CSource:
         return words([f"CSource {self.name}: C99 with math.h alone"], rows)
 
     def write(self, folder: str | Path) -> None:
-        """Write name.h, name.c, and the sketch under the folder's name, as Arduino has it; the folder is made.
-
-        Raises
-        ------
-        OSError
-            If the folder cannot be written to.
-        """
+        """Write name.h, name.c and the sketch, which Arduino wants under the folder's name; the folder is made."""
         place = Path(folder).resolve()
         place.mkdir(parents=True, exist_ok=True)
         write_text(place / f"{self.name}.h", self.header)
@@ -103,17 +97,11 @@ def to_c(
     precision : "double" or "float"
         Of every number in it.
 
-    Returns
-    -------
-    CSource
-
     Raises
     ------
-    TypeError
-        If the controller is of another kind.
-    ValueError
-        If the law is another one, the name is no name in C, the precision is neither, a number does not fit into
-        it, or the sample time is not positive and finite.
+    TypeError, ValueError
+        If the controller or its law is another one, the name is no name in C, the precision is neither, a number does
+        not fit into it, or the sample time is not positive and finite.
 
     Notes
     -----
@@ -148,7 +136,10 @@ def to_c(
         "ahead": str(controller.ahead(sample_time)),
         "u0": f"{u0:g}",
         "y0": f"{y0:g}",
-        "fields": "\n".join(f"    {name}_real {place.declaration};" for place in draft.places),
+        "fields": "\n".join(
+            f"    {name}_real {place}{f'[{start.size}]' if isinstance(start, np.ndarray) else ''};"
+            for place, start in draft.places.items()
+        ),
         "period": f"{1e6 * sample_time:.0f}",
     }
     header, source, sketch = (
@@ -158,42 +149,10 @@ def to_c(
 
 
 def _composed(controller: PID | TrackingController) -> TrackingController:
-    """A PID alone is a controller of one part, to the bit."""
+    """A PID alone as a controller of one part, which has the same bits."""
     if isinstance(controller, TrackingController):
         return controller
     return TrackingController(feedback=replace(controller, limits=None), limits=controller.limits)
-
-
-class _Place(NamedTuple):
-    """In the state: what is there at the start, a number or several."""
-
-    name: str
-    start: float | FloatArray
-
-    @property
-    def declaration(self) -> str:
-        """Name and size."""
-        return f"{self.name}[{self.start.size}]" if isinstance(self.start, np.ndarray) else self.name
-
-    def initialised(self, number: "_Number") -> str:
-        """What the start gives it."""
-        start = self.start
-        value = number.braced(start, indent=8) if isinstance(start, np.ndarray) else number.literal(start)
-        return f"        .{self.name} = {value},"
-
-
-@dataclass
-class _Draft:
-    """What the source is to hold; the parts add to it in the order in which the kernel takes their blocks."""
-
-    parameters: "_Blocks"
-    state: "_Blocks"
-    constants: dict[str, float | int]
-    tables: dict[str, FloatArray]
-    places: list[_Place]
-    functions: list[str]
-    values: list[str]
-    body: list[str]
 
 
 class _Blocks:
@@ -208,13 +167,30 @@ class _Blocks:
         return self._numbers[self._taken - size : self._taken]
 
 
+@dataclass
+class _Draft:
+    """Parts of the source; they are added in the order in which the kernel takes their blocks.
+
+    `places` are the state's, by name, with the number or the array at the start.
+    """
+
+    parameters: _Blocks
+    state: _Blocks
+    constants: dict[str, float | int]
+    tables: dict[str, FloatArray] = field(default_factory=dict)
+    places: dict[str, float | FloatArray] = field(default_factory=dict)
+    functions: list[str] = field(default_factory=lambda: [pieces.CLAMP])
+    values: list[str] = field(default_factory=list)
+    body: list[str] = field(default_factory=list)
+
+
 class _Number(NamedTuple):
-    """Numbers as C has them, in all their digits."""
+    """Numbers in C, with all their digits."""
 
     precision: str
 
     def bare(self, value: float | int) -> str:
-        """Without what marks the precision."""
+        """Without the mark of the precision."""
         if isinstance(value, int):
             return str(value)
         if math.isinf(value):
@@ -233,7 +209,7 @@ class _Number(NamedTuple):
         return text if isinstance(value, int) or "INF" in text else f"R({text})"
 
     def braced(self, values: FloatArray, indent: int = 0) -> str:
-        """As an initialiser of a line that is so far indented."""
+        """As an initialiser on a line with this indent."""
         joined = ", ".join(self.literal(value) for value in values.tolist())
         inner = " " * (indent + 4)
         lines = wrap(joined, 112, initial_indent=inner, subsequent_indent=inner, break_on_hyphens=False)
@@ -241,14 +217,12 @@ class _Number(NamedTuple):
 
 
 def _draft(controller: TrackingController, sample_time: float, u0: float, y0: float) -> _Draft:
-    compiled = controller.compiled(sample_time, u0, y0)
-    draft = _Draft(_Blocks(compiled.parameters), _Blocks(compiled.state), {}, {}, [], [pieces.CLAMP], [], [])
-    head = draft.parameters.take(kernels.N_HEAD)
-    command = float(draft.state.take(1)[0])
-    forward = controller.feedforward
-    draft.constants.update(LOWEST=float(head[0]), HIGHEST=float(head[1]))
-    draft.places.append(_Place("command", command))
-    feedback = controller.feedback is not None or controller.feedforward is None
+    compiled, forward = controller.compiled(sample_time, u0, y0), controller.feedforward
+    parameters, state = _Blocks(compiled.parameters), _Blocks(compiled.state)
+    head, command = parameters.take(kernels.N_HEAD), state.take(1)
+    draft = _Draft(parameters, state, {"LOWEST": float(head[0]), "HIGHEST": float(head[1])})
+    draft.places["command"] = float(command[0])
+    feedback = controller.feedback is not None or forward is None
     compares = feedback or controller.damping is not None
     follows = compares and controller.model is not None
     if feedback or follows or (forward is not None and forward.creep is not None):
@@ -256,43 +230,39 @@ def _draft(controller: TrackingController, sample_time: float, u0: float, y0: fl
     _reference(draft, head, compares and not follows)
     _model(draft, head, follows)
     _feedback(draft, controller, feedback)
-    draft.body += ["given = s->command = command;"]
-    draft.values.extend(["command", "given", "limited"])
+    draft.body.append("given = s->command = command;")
+    draft.values += ["command", "given", "limited"]
     if forward is not None:
         _feedforward(draft, forward.block(sample_time, u0).inverse, follows)
-    draft.body += ["limited = clamp(given, LOWEST, HIGHEST);"]
+    draft.body.append("limited = clamp(given, LOWEST, HIGHEST);")
     if feedback:
-        draft.body += [
-            "if (limited != given)",
-            "    accumulate(&s->integral, &s->integral_carry, UNWINDING * (limited - given));",
-        ]
-    draft.body += ["return limited;"]
+        draft.body += pieces.UNWIND
+    draft.body.append("return limited;")
     return draft
 
 
 def _reference(draft: _Draft, head: FloatArray, targeted: bool) -> None:
-    """The reference's filters: what is to be given, and where to be."""
-    taps, inverts = int(head[2]), head[3] > 0.0
-    drive, target, ring = draft.parameters.take(taps), draft.parameters.take(taps), draft.state.take(taps)
-    sums = [("drive", drive, inverts), ("target", target, targeted)]
-    draft.values.extend(name for name, _, used in sums if used)
+    """Filters of the reference: for the feed-forward, and for the feedback."""
+    taps = int(head[2])
+    sums = {"drive": draft.parameters.take(taps), "target": draft.parameters.take(taps)}
+    ring, used = draft.state.take(taps), {"drive": head[3] > 0.0, "target": targeted}
+    names = [name for name in sums if used[name]]
+    draft.values += names
     if taps == 1:
-        draft.body.extend(f"{name} = reference;" for name, _, used in sums if used)
+        draft.body += [f"{name} = reference;" for name in names]
         return
-    draft.functions.extend([pieces.PUSH, pieces.DOT])
+    draft.functions += [pieces.PUSH, pieces.DOT]
     draft.constants["TAPS"] = taps
-    draft.places.append(_Place("references", ring))
-    draft.body += ["push(s->references, TAPS, reference);"]
-    for name, weights, used in sums:
-        if used:
-            draft.tables[f"{name}_WEIGHTS".upper()] = weights
-            draft.body += [f"{name} = dot({name.upper()}_WEIGHTS, s->references, TAPS);"]
+    draft.places["references"] = ring
+    draft.tables.update({f"{name.upper()}_WEIGHTS": sums[name] for name in names})
+    draft.body.append("push(s->references, TAPS, reference);")
+    draft.body += [f"{name} = dot({name.upper()}_WEIGHTS, s->references, TAPS);" for name in names]
 
 
 def _model(draft: _Draft, head: FloatArray, follows: bool) -> None:
-    """What the feedback compares with."""
+    """The model with which the feedback compares."""
     creeping, order, dead, late = (int(number) for number in head[5:9])
-    declines, moved = draft.parameters.take(creeping), draft.parameters.take((order - creeping) * order)
+    declines, others = draft.parameters.take(creeping), draft.parameters.take((order - creeping) * order)
     entries, at_samples, within = (draft.parameters.take(size) for size in (3 * order, order + 3, order + 3))
     x, past, readings = draft.state.take(2 * order)[:order], draft.state.take(dead + 3), draft.state.take(late + 2)
     if not follows:
@@ -302,40 +272,33 @@ def _model(draft: _Draft, head: FloatArray, follows: bool) -> None:
     part = head[9] > 0.0
     draft.constants.update(ORDER=order, CREEPING=creeping, DEAD=dead, LATE=late)
     draft.tables.update(B=entries, OUTPUT=within if part else at_samples)
-    draft.tables.update(DECLINES=declines if creeping else np.zeros(1), MOVED=moved if moved.size else np.zeros(1))
-    draft.places.extend([_Place("x", x), _Place("x_carry", np.zeros(order)), _Place("past", past)])
-    draft.places.append(_Place("readings", readings))
-    if pieces.PUSH not in draft.functions:
-        draft.functions.append(pieces.PUSH)
-    draft.functions.append(_filled(pieces.MODEL, pieces.WITHIN if part else pieces.AT_SAMPLES))
+    draft.tables.update(DECLINES=declines if creeping else np.zeros(1), MOVED=others if others.size else np.zeros(1))
+    draft.places.update(x=x, x_carry=np.zeros(order), past=past, readings=readings)
+    draft.functions += [pieces.PUSH, _filled(pieces.MODEL, pieces.WITHIN if part else pieces.AT_SAMPLES)]
     draft.values.append("target")
-    draft.body += ["target = model_reading(s);"]
+    draft.body.append("target = model_reading(s);")
 
 
 def _feedback(draft: _Draft, controller: TrackingController, feedback: bool) -> None:
     """PID, notch and damping."""
     numbers, state = draft.parameters.take(9).tolist(), draft.state.take(4).tolist()
     notch, damping, filters = draft.parameters.take(5), draft.parameters.take(5), draft.state.take(4)
-    draft.body += ["command = pid(s, target, measurement);" if feedback else "command = R(0.0);"]
+    draft.body.append("command = pid(s, target, measurement);" if feedback else "command = R(0.0);")
     if feedback:
         draft.constants.update(zip(_PID, numbers[:6] + numbers[8:], strict=True))
         draft.functions.append(pieces.PID)
-        names = ("integral", "derivative", "seen")
-        draft.places.extend(_Place(name, value) for name, value in zip(names, state[1:], strict=True))
-        draft.places.append(_Place("integral_carry", 0.0))
-    filtered = feedback and controller.notch is not None
-    if filtered or controller.damping is not None:
+        draft.places.update(integral=state[1], derivative=state[2], seen=state[3], integral_carry=0.0)
+    filtered, damped = feedback and controller.notch is not None, controller.damping is not None
+    if filtered or damped:
         draft.functions.append(pieces.BIQUAD)
     if filtered:
-        draft.tables["NOTCH"] = notch
-        draft.places.append(_Place("notch", filters[:2]))
-        draft.body += ["command = biquad(NOTCH, s->notch, command);"]
-    if controller.damping is not None:
-        draft.tables["DAMPING"] = damping
-        draft.places.append(_Place("damping", filters[2:]))
-        draft.body += ["command += biquad(DAMPING, s->damping, measurement - target);"]
-    if not (feedback or controller.damping is not None):
-        draft.body += ["(void)measurement;"]
+        draft.tables["NOTCH"], draft.places["notch"] = notch, filters[:2]
+        draft.body.append("command = biquad(NOTCH, s->notch, command);")
+    if damped:
+        draft.tables["DAMPING"], draft.places["damping"] = damping, filters[2:]
+        draft.body.append("command += biquad(DAMPING, s->damping, measurement - target);")
+    if not (feedback or damped):
+        draft.body.append("(void)measurement;")
 
 
 def _feedforward(draft: _Draft, inverse: Step, follows: bool) -> None:
@@ -348,29 +311,15 @@ def _feedforward(draft: _Draft, inverse: Step, follows: bool) -> None:
     draft.constants.update(
         LOWEST_VOLTAGE=lowest, HIGHEST_VOLTAGE=highest, AMPLIFICATION=gain, ZERO=offset, THROUGH=scale
     )
-    draft.values.extend(["u", "reached"])
+    draft.values += ["u", "reached"]
     _law(draft, inverse)
     if elements:
         draft.constants["ELEMENTS"] = elements
         draft.tables.update(WEIGHTS=weights, POSITION_DECLINES=declines)
-        draft.places.extend([_Place("positions", positions), _Place("positions_carry", np.zeros(elements))])
-        draft.body += [
-            "for (i = 0; i < ELEMENTS; i++)",
-            "    drive -= WEIGHTS[i] * (s->positions[i] + POSITION_DECLINES[i] * s->positions[i]);",
-        ]
-    draft.body += ["u = invert(s, drive * THROUGH, &reached);"]
-    if elements:
-        draft.body += [
-            "for (i = 0; i < ELEMENTS; i++)",
-            "    accumulate(&s->positions[i], &s->positions_carry[i],",
-            "               POSITION_DECLINES[i] * (s->positions[i] - s->level));",
-        ]
-    draft.body += [
-        "s->command += (u - ZERO) / AMPLIFICATION;",
-        "given += (reached - ZERO) / AMPLIFICATION;",
-    ]
+        draft.places.update(positions=positions, positions_carry=np.zeros(elements))
+    draft.body += pieces.CREEP_INVERTED if elements else pieces.INVERTED
     if follows:
-        draft.body += ["move_model(s);"]
+        draft.body.append("move_model(s);")
 
 
 def _law(draft: _Draft, inverse: Step) -> None:
@@ -378,7 +327,7 @@ def _law(draft: _Draft, inverse: Step) -> None:
     if inverse is inverses.line:
         offset, slope = draft.parameters.take(2).tolist()
         draft.constants.update(OFFSET=offset, SLOPE=slope)
-        draft.places.append(_Place("level", 0.0))
+        draft.places["level"] = 0.0
         draft.functions.append(pieces.LINE)
         return
     if inverse is not boucwen_inverse.step:
@@ -386,32 +335,33 @@ def _law(draft: _Draft, inverse: Step) -> None:
     rising, A, beta, gamma, n, gain, offset, degree = draft.parameters.take(boucwen_inverse.N_HEAD).tolist()
     if n != 1.0:
         raise ValueError(f"the law has no inverse in C: n must be 1, got {n:g}")
-    loading = {"K_LOADING": beta + gamma, "K_UNLOADING": beta - gamma}
-    draft.constants.update(RISING=rising, A=A, **loading, GAIN=gain, OFFSET=offset, DEGREE=int(degree))
+    draft.constants.update(RISING=rising, A=A, K_LOADING=beta + gamma, K_UNLOADING=beta - gamma)
+    draft.constants.update(GAIN=gain, OFFSET=offset, DEGREE=int(degree))
     draft.tables["COEFFICIENTS"] = draft.parameters.take(int(degree))
     _, level, _, _, u, z = draft.state.take(boucwen_inverse.N_OWN + 2).tolist()
-    draft.places.extend([_Place("level", level), _Place("law_u", u), _Place("law_z", z)])
+    draft.places.update(level=level, law_u=u, law_z=z)
     draft.functions.append(pieces.BOUC_WEN)
 
 
 def _source(draft: _Draft, number: _Number) -> str:
-    """The text of the source, the controller's name still open."""
+    """The text of the source, with $name for the controller's."""
     defines = [f"#define {name} {number.literal(value)}" for name, value in draft.constants.items()]
-    tables = [f"static const real {name}[] = {number.braced(values)};" for name, values in draft.tables.items()]
-    rest = [place.initialised(number) for place in draft.places if np.any(place.start) or place.name == "command"]
-    body = [
-        f"real {', '.join(dict.fromkeys(draft.values))};",
-        *(["int i;"] if "ELEMENTS" in draft.constants else []),
-        "",
+    tables = [f"static const real {name}[] = {number.braced(values)};\n" for name, values in draft.tables.items()]
+    rest = [
+        f"        .{name} = {number.braced(start, 8) if isinstance(start, np.ndarray) else number.literal(start)},"
+        for name, start in draft.places.items()
+        if np.any(start) or name == "command"
     ]
+    index = ["int i;"] if "ELEMENTS" in draft.constants else []
+    body = [f"real {', '.join(dict.fromkeys(draft.values))};", *index, "", *draft.body]
     return "\n".join(
         [
             pieces.PRELUDE + pieces.MACROS[number.precision],
             "\n".join([*defines, ""]),
-            *([table + "\n" for table in tables]),
-            *draft.functions,
+            *tables,
+            *dict.fromkeys(draft.functions),
             _filled(pieces.START, {"@rest": "\n".join(rest)}),
-            _filled(pieces.STEP, {"@body": "\n".join(f"    {line}".rstrip() for line in [*body, *draft.body])}),
+            _filled(pieces.STEP, {"@body": "\n".join(f"    {line}".rstrip() for line in body)}),
         ]
     )
 

@@ -49,30 +49,20 @@ PRELUDE = """\
 typedef ${name}_real real;
 """
 
+_FUNCTIONS = ("EXP", "LOG", "EXPM1", "LOG1P", "FABS", "FMAX", "FMIN")
+
 MACROS = {
-    "double": """\
-#define R(literal) literal
-#define EXP exp
-#define LOG log
-#define EXPM1 expm1
-#define LOG1P log1p
-#define FABS fabs
-#define FMAX fmax
-#define FMIN fmin
+    "double": "#define R(literal) literal\n"
+    + "".join(f"#define {name} {name.lower()}\n" for name in _FUNCTIONS)
+    + """\
 #define EPSILON 2.2204460492503131e-16 /* of 1 */
 #define FLAT 1e-12                    /* no slope at all, on the way back */
 #define JUST 1e-15                    /* beyond a limit */
 #define TINY 1e-300
 """,
-    "float": """\
-#define R(literal) literal##F
-#define EXP expf
-#define LOG logf
-#define EXPM1 expm1f
-#define LOG1P log1pf
-#define FABS fabsf
-#define FMAX fmaxf
-#define FMIN fminf
+    "float": "#define R(literal) literal##F\n"
+    + "".join(f"#define {name} {name.lower()}f\n" for name in _FUNCTIONS)
+    + """\
 #define EPSILON 1.19209290e-7F /* of 1 */
 #define FLAT 5e-4F             /* no slope at all, on the way back */
 #define JUST 5e-7F             /* beyond a limit */
@@ -369,6 +359,25 @@ static real invert(${name}_state *s, real v, real *reached)
     return *reached + (beyond > R(0.0) ? R(1.0) : R(-1.0)) * (JUST * FABS(*reached) + TINY);
 }
 """
+
+UNWIND = [
+    "if (limited != given)",
+    "    accumulate(&s->integral, &s->integral_carry, UNWINDING * (limited - given));",
+]
+INVERTED = [
+    "u = invert(s, drive * THROUGH, &reached);",
+    "s->command += (u - ZERO) / AMPLIFICATION;",
+    "given += (reached - ZERO) / AMPLIFICATION;",
+]
+CREEP_INVERTED = [
+    "for (i = 0; i < ELEMENTS; i++)",
+    "    drive -= WEIGHTS[i] * (s->positions[i] + POSITION_DECLINES[i] * s->positions[i]);",
+    INVERTED[0],
+    "for (i = 0; i < ELEMENTS; i++)",
+    "    accumulate(&s->positions[i], &s->positions_carry[i],",
+    "               POSITION_DECLINES[i] * (s->positions[i] - s->level));",
+    *INVERTED[1:],
+]
 
 MODEL = """\
 /* The plant that the feedback compares with: a linear stage behind the law, and a sensor that is late. */

@@ -80,13 +80,7 @@ class InverseFeedforward(SampledController):
 
     @classmethod
     def of(cls, plant: Actuator) -> Self:
-        """The inverse of an actuator's amplifier, law and creep.
-
-        Raises
-        ------
-        TypeError, ValueError
-            As the constructor.
-        """
+        """The inverse of an actuator's amplifier, law and creep; it raises as the constructor does."""
         return cls(law=plant.hysteresis, creep=plant.creep, amplifier=plant.amplifier)
 
     def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:

@@ -22,16 +22,14 @@ from hysim.models.model import model
 
 @model
 class Notch:
-    """A filter that takes a resonance out of the feedback's command.
+    """Filter that cancels a resonance in the feedback's command.
 
     Parameters
     ----------
-    natural_frequency : float
-        Of the resonance, positive [rad/s].
-    damping_ratio : float
-        Of the resonance, not negative: the filter's zeros lie on its poles.
+    natural_frequency, damping_ratio : float
+        Of the resonance, on whose poles the filter's zeros lie: positive [rad/s], and not negative.
     new_damping_ratio : float
-        Of the poles that it puts in their place, positive.
+        Damping ratio of the filter's poles, positive.
 
     Raises
     ------
@@ -51,14 +49,15 @@ class Notch:
     new_damping_ratio: float = 1.0
 
     def __post_init__(self) -> None:
-        _check_frequency(self.natural_frequency)
+        if not self.natural_frequency > 0.0:
+            raise ValueError(f"natural_frequency must be positive, got {self.natural_frequency}")
         if self.damping_ratio < 0.0:
             raise ValueError(f"damping_ratio must not be negative, got {self.damping_ratio}")
         if not self.new_damping_ratio > 0.0:
             raise ValueError(f"new_damping_ratio must be positive, got {self.new_damping_ratio}")
 
     def coefficients(self, sample_time: float) -> FloatArray:
-        """(b0, b1, b2, a1, a2) of its discrete form."""
+        """Coefficients (b0, b1, b2, a1, a2) of the discrete form."""
         w = self.natural_frequency
         numerator, denominator = (
             (w**2, 2.0 * ratio * w, 1.0) for ratio in (self.damping_ratio, self.new_damping_ratio)
@@ -66,7 +65,7 @@ class Notch:
         return _discrete(numerator, denominator, w, sample_time)
 
     def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
-        """Of its discrete form at frequencies [rad/s], in their shape."""
+        """Response of the discrete form at frequencies [rad/s], in their shape."""
         return biquad_response(self.coefficients(sample_time), frequency, sample_time)
 
 
@@ -74,17 +73,17 @@ class Notch:
 class DampingLoop:
     """Positive feedback of the displacement through a low-pass filter, which damps a resonance.
 
-    It acts on the measurement less where the displacement is to be, so that it is silent where nothing vibrates.
+    It acts on the measurement minus the wanted displacement, so that it is silent where nothing vibrates.
 
     Parameters
     ----------
     gain : float
-        At rest, of the plant's sign; its product with the plant's gain below one [unit of u / unit of y].
+        Static gain, of the plant's sign; its product with the plant's gain must be below one [unit of u / unit of y].
     frequency : float
         Corner of the filter, positive [rad/s].
     damping_ratio : float, optional
-        Of a filter of second order (positive position feedback), positive; None for one of first order (integral
-        resonant control).
+        Of a filter of second order (positive position feedback), positive; None for first order (integral resonant
+        control).
 
     Raises
     ------
@@ -105,12 +104,13 @@ class DampingLoop:
     damping_ratio: float | None = None
 
     def __post_init__(self) -> None:
-        _check_frequency(self.frequency, "frequency")
+        if not self.frequency > 0.0:
+            raise ValueError(f"frequency must be positive, got {self.frequency}")
         if self.damping_ratio is not None and not self.damping_ratio > 0.0:
             raise ValueError(f"damping_ratio must be positive, got {self.damping_ratio}")
 
     def coefficients(self, sample_time: float) -> FloatArray:
-        """(b0, b1, b2, a1, a2) of its discrete form."""
+        """Coefficients (b0, b1, b2, a1, a2) of the discrete form."""
         w = self.frequency
         if self.damping_ratio is None:
             return _discrete((self.gain * w, 0.0, 0.0), (w, 1.0, 0.0), w, sample_time)
@@ -118,7 +118,7 @@ class DampingLoop:
         return _discrete(numerator, denominator, w, sample_time)
 
     def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
-        """Of its discrete form at frequencies [rad/s], in their shape."""
+        """Response of the discrete form at frequencies [rad/s], in their shape."""
         return biquad_response(self.coefficients(sample_time), frequency, sample_time)
 
 
@@ -155,8 +155,3 @@ def _discrete(
         (p + c * q + c * c * r, 2.0 * (p - c * c * r), p - c * q + c * c * r) for p, q, r in (numerator, denominator)
     )
     return np.array([b0, b1, b2, a1, a2]) / a0
-
-
-def _check_frequency(value: float, name: str = "natural_frequency") -> None:
-    if not value > 0.0:
-        raise ValueError(f"{name} must be positive, got {value}")

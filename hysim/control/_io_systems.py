@@ -2,10 +2,10 @@
 
     x[k+1] = f(x[k], u[k]),    y[k] = g(x[k])
 
-A discrete plant is one sample of hysim's own loop: x is what is carried from sample to sample, its memory among it,
-and y the measurement just before the new command u[k], so that no command reaches the output of its own sample. A
-controller is its own step, whose command answers to the inputs at once. Both are functions of their arguments alone:
-python-control may evaluate them as often and in whatever order it likes.
+A discrete plant is one sample of hysim's own loop: x is the state that is carried from sample to sample, with the
+memory, and y the measurement just before the new command u[k], so that no command reaches the output of its own sample.
+A controller is its own step, whose command answers to the inputs at once. Both are functions of their arguments alone,
+which python-control may evaluate in any order.
 
 Every state is counted from rest: x = 0, from which python-control starts, is the system at rest at u = 0.
 """
@@ -19,6 +19,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.control._feedforward import InverseFeedforward
+from hysim.control._protocols import Remembering
 from hysim.control._tracking import TrackingController
 from hysim.errors import SimulationError
 from hysim.kernels import boucwen_inverse
@@ -31,9 +32,7 @@ from hysim.models.protocols import CompiledController
 from hysim.models.sensor import Sensor
 
 Rule = Callable[[float, FloatArray, FloatArray, Any], FloatArray]
-"""Of python-control: time, state, input and parameters to the state's change or to the output."""
-
-_MOTION = ["y", "velocity", "z"]
+"""A function of python-control: time, state, input and parameters to the state's change or to the output."""
 
 
 def actuator_system(actuator: Actuator, sample_time: float) -> Any:
@@ -54,7 +53,7 @@ def actuator_system(actuator: Actuator, sample_time: float) -> Any:
     def update(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:
         signals, end = chain.driven(u, state(x))
         if signals.lost >= 0:
-            raise SimulationError(f"the plant leaves the finite numbers after t = {t:g}, at the command {u[0]:g}")
+            raise SimulationError(f"the plant diverges after t = {t:g}, at the command {u[0]:g}")
         return np.asarray((np.concatenate(_parts(end)) - at_rest)[carried])
 
     def output(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:
@@ -63,10 +62,11 @@ def actuator_system(actuator: Actuator, sample_time: float) -> Any:
     return _system(update, output, ["u"], "y", [name for name in names if name], sample_time)
 
 
-def oscillator_system(plant: BoucWenOscillator) -> Any:
-    """The oscillator as its differential equations."""
-    start, elastic_force = _start(plant), plant.elastic_force
-    law = plant.law
+def oscillator_system(plant: BoucWenOscillator, sample_time: float | None) -> Any:
+    """The oscillator as its differential equations, or from sample to sample, its input held between them."""
+    start: FloatArray = np.array([*(plant.initial_state or (0.0, 0.0)), plant.law.z0])
+    step = sample_time or 0.0
+    law, elastic_force, held = plant.law, plant.elastic_force, replace(plant, hold="zoh")
     weight = 1.0 if plant.excitation == "force" else -plant.mass
 
     def slope(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:
@@ -75,44 +75,35 @@ def oscillator_system(plant: BoucWenOscillator) -> Any:
         against = law.gamma * velocity + law.beta * abs(velocity) * math.copysign(1.0, z)
         return np.array([velocity, force / plant.mass, law.A * velocity - abs(z) ** law.n * against])
 
-    def output(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:
-        return (x + start)[:1]
-
-    return _system(slope, output, ["u"], "y", _MOTION, 0)
-
-
-def held_oscillator_system(plant: BoucWenOscillator, sample_time: float) -> Any:
-    """The oscillator from sample to sample, its input held between them."""
-    start, held = _start(plant), replace(plant, hold="zoh")
-
     def update(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:
-        _, end = held.advance(u, sample_time, OscillatorState(float(u[0]), *(x + start).tolist()))
+        _, end = held.advance(u, step, OscillatorState(float(u[0]), *(x + start).tolist()))
         return np.array([end.y, end.velocity, end.z]) - start
 
     def output(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:
         return (x + start)[:1]
 
-    return _system(update, output, ["u"], "y", _MOTION, sample_time)
+    rule = slope if sample_time is None else update
+    return _system(rule, output, ["u"], "y", ["y", "velocity", "z"], step)
 
 
 def controller_system(controller: Any, sample_time: float) -> Any:
     """The controller from reference and measurement to the command, within its limits."""
     compiled = CompiledController(*controller.compiled(sample_time, 0.0, 0.0))
     at_rest = compiled.state
-    carried = np.isfinite(at_rest)  # what is not finite is written before it is read
+    carried = np.isfinite(at_rest)  # other places are written before they are read
     carried[at_rest.size - _scratch(controller, sample_time) :] = False
 
-    def moved(x: FloatArray, inputs: FloatArray) -> tuple[float, FloatArray]:
+    def stepped(x: FloatArray, inputs: FloatArray) -> tuple[float, FloatArray]:
         state = at_rest.copy()
         state[carried] += x
         command = compiled.step(compiled.parameters, state, float(inputs[0]), float(inputs[1]))
         return command, (state - at_rest)[carried]
 
     def update(t: float, x: FloatArray, inputs: FloatArray, params: Any) -> FloatArray:
-        return moved(x, inputs)[1]
+        return stepped(x, inputs)[1]
 
     def output(t: float, x: FloatArray, inputs: FloatArray, params: Any) -> FloatArray:
-        return np.array([moved(x, inputs)[0]])
+        return np.array([stepped(x, inputs)[0]])
 
     names = [f"x[{i}]" for i in range(np.count_nonzero(carried))]
     return _system(update, output, ["reference", "measurement"], "u", names, sample_time)
@@ -122,11 +113,6 @@ def _system(update: Rule, output: Rule, inputs: list[str], name: str, states: li
     import control
 
     return control.nlsys(update, output, inputs=inputs, outputs=[name], states=states, dt=sample_time)
-
-
-def _start(plant: BoucWenOscillator) -> FloatArray:
-    """Displacement, velocity and memory with which the plant's own simulations begin."""
-    return np.array([*(plant.initial_state or (0.0, 0.0)), plant.law.z0])
 
 
 def _parts(state: ChainState) -> list[FloatArray]:
@@ -141,7 +127,7 @@ def _with_parts(state: ChainState, values: FloatArray) -> ChainState:
 
 
 def _names(chain: Chain, state: ChainState) -> list[str]:
-    """What each element of a chain's state is called, in the order of its parts; nothing where it is scratch."""
+    """Names of the elements of a chain's state, in the order of its parts; empty for scratch."""
     creeping, order, late = chain.stage.decline.size, chain.stage.rest.size, chain.samples_late
     memory = _memory_names(chain.hysteresis, state.law.state)
     return [
@@ -154,8 +140,8 @@ def _names(chain: Chain, state: ChainState) -> list[str]:
 
 
 def _memory_names(law: Any, state: FloatArray) -> list[str]:
-    """What a law with a memory z hands on is the begin of its compiled state, the rest scratch; others need all."""
-    size = len(law.advance(state[:1])[1]) if callable(getattr(law, "memory", None)) else state.size
+    """Names of a law's state; of a law with a memory z it begins the compiled state, and the rest is scratch."""
+    size = len(law.advance(state[:1])[1]) if isinstance(law, Remembering) else state.size
     others = ["z"] if size == 2 else [f"z[{i}]" for i in range(size - 1)]
     return ["v", *others][:size]
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import field, replace
-from typing import Any, Protocol
+from typing import Any, TypeGuard
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +11,7 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, frozen, read_only
 from hysim._parallel import Progress
 from hysim._words import extent, printed, quantity, words
+from hysim.control._protocols import Controller, Remembering, Responding, limits_of, preview
 from hysim.errors import SimulationError
 from hysim.models.actuator import Actuator, is_law
 from hysim.models.chain import Signals
@@ -18,21 +19,13 @@ from hysim.models.model import in_brief
 from hysim.models.protocols import CompiledController
 from hysim.models.sampled import Vibration
 from hysim.models.state_space import linear_plant
-from hysim.records import Record
-
-
-class Controller(Protocol):
-    """What closes a loop: frozen settings that give a compiled step with its state."""
-
-    def compiled(self, sample_time: float, u0: float, y0: float) -> CompiledController:
-        """The controller at rest at the voltage `u0` and the displacement `y0`."""
-        ...
+from hysim.records import even_step
 
 
 @printed
 @frozen
 class ClosedLoop:
-    """A loop that was closed; every signal has shape (n,).
+    """Signals of a closed loop, each of shape (n,), and its conditions.
 
     Parameters
     ----------
@@ -41,20 +34,18 @@ class ClosedLoop:
     reference, error : array
         Reference, and reference minus measurement [unit of y].
     command, drive : array
-        What the controller asks for, and what it gives within its limits; held from each sample on [unit of u].
+        Command of the controller before and after its limits, held from each sample on [unit of u].
     u : array
-        Voltage at the law just after each new command, within the amplifier's limits [unit of u]. It is held, unless
-        the amplifier takes time.
+        Voltage at the law just after each new command, within the amplifier's limits [unit of u].
     z : array, or None
         Memory of the law at each sample, before the new command; None for a law without one.
     y, measurement : array
-        True displacement at each sample, before the new command, and what the sensor gives [unit of y].
+        True displacement at each sample, before the new command, and its measurement [unit of y].
     conditions : mapping
-        Under which the loop ran: plant, controller, sample_time [s], substeps, delay (of the vibration and the
-        sensor together) [s], preview (by how much the controller knows the reference ahead) [s], limits (the
-        controller's), amplifier_limits, sensor_quantum, noise (rms), seed, u0, the extremes lowest_u and highest_u
-        of the voltage, limited_samples (at which the controller or the amplifier gave less than was asked for),
-        and voltage_noise_rms and voltage_noise_peak: of the voltage less that of the same loop without noise.
+        plant, controller, sample_time [s], substeps, delay (of vibration and sensor) [s], preview [s], limits (of the
+        controller), amplifier_limits, sensor_quantum, noise (rms), seed, u0, lowest_u, highest_u, limited_samples (at
+        which controller or amplifier are at a limit), voltage_noise_rms and voltage_noise_peak (of the difference to
+        the same loop without noise).
     units : mapping
         Labels of the units of ``"t"``, ``"u"`` and ``"y"``.
     """
@@ -74,19 +65,19 @@ class ClosedLoop:
     def __str__(self) -> str:
         t, u, y = (self.units.get(signal, unit) for signal, unit in (("t", "s"), ("u", ""), ("y", "")))
         rms = float(np.sqrt(np.mean((self.reference - self.y) ** 2)))
-        known = self.conditions
+        conditions = self.conditions
         return words(
             [f"ClosedLoop: {self.t.size} samples to {quantity(self.t[-1], t)}, tracking rms {quantity(rms, y)}"],
             {
                 "reference": extent(self.reference, y),
                 "displacement": extent(self.y, y),
-                "voltage": f"{extent(self.u, u)}, limited at {known.get('limited_samples', 'unknown')} samples",
-                "plant": in_brief(known["plant"]) if "plant" in known else "",
-                "controller": in_brief(known["controller"]) if "controller" in known else "",
+                "voltage": f"{extent(self.u, u)}, limited at {conditions.get('limited_samples', 'unknown')} samples",
+                "plant": in_brief(conditions["plant"]) if "plant" in conditions else "",
+                "controller": in_brief(conditions["controller"]) if "controller" in conditions else "",
                 "conditions": ", ".join(
-                    f"{name.replace('_', ' ')} {known[name]:.4g}"
+                    f"{name.replace('_', ' ')} {conditions[name]:.4g}"
                     for name in ("sample_time", "delay", "preview", "noise", "sensor_quantum", "voltage_noise_rms")
-                    if known.get(name)
+                    if conditions.get(name)
                 ),
             },
         )
@@ -105,18 +96,17 @@ def close_loop(
 ) -> ClosedLoop:
     """Run a sampled controller around an actuator.
 
-    At every sample the controller reads the sensor and gives a command, which is held until the next. The plant
-    between the samples is exact, unless its amplifier takes time: then it is second order in the sub-step. The
-    delay of the sensor is that of the loop: one sample of it, ``hs.Sensor(delay=sample_time)``, is a controller
-    that needs a sample to compute.
+    At every sample the controller reads the sensor and sends a command, which is held until the next. The plant
+    between the samples is exact, unless its amplifier takes time: then it is second order in the sub-step. A
+    controller that needs a sample to compute is modelled by ``hs.Sensor(delay=sample_time)``.
 
     Parameters
     ----------
     plant : Actuator, law or linear plant
         At rest at `u0` before the first sample, creep included.
-    controller : PID, TrackingController, or anything with its ``compiled``
-        At rest too, without a bump. A controller with a method ``ahead`` is given the reference so many samples
-        ahead of its time, and after the end of the record its last value.
+    controller : PID, TrackingController, InverseFeedforward, or anything with their ``compiled``
+        At rest too. A controller with a method ``ahead`` gets the reference so many samples ahead of its time, and
+        after the end of the record its last value.
     t : array, shape (n,)
         Evenly spaced times [s]; their spacing is the controller's sample time.
     reference : array, shape (n,)
@@ -124,20 +114,16 @@ def close_loop(
     u0 : float
         Command before the first sample [unit of u].
     substeps : int, optional
-        Of a sample, behind an amplifier that takes time; by default as in `Actuator.response`.
+        Per sample, behind an amplifier that takes time; by default as in `Actuator.response`.
     units : mapping, optional
-        Labels to carry along.
+        Labels of the units.
     progress : callable, optional
         Called as ``progress(done, total)`` with numbers of samples, in long runs.
-
-    Returns
-    -------
-    ClosedLoop
 
     Raises
     ------
     SimulationError
-        If a signal leaves the finite numbers, as in an unstable loop; it names the time.
+        If the loop diverges; it names the time.
     TypeError, ValueError
         If the plant is not one, times are uneven, lengths differ, or the plant cannot rest at `u0`.
 
@@ -153,11 +139,8 @@ def close_loop(
     if not is_controller(controller):
         raise TypeError(f"controller must be a PID or the like, got {type(controller).__name__}")
     r, times = read_only(reference, "reference", ndim=1), read_only(t, "t", ndim=1)
-    sample_time = Record(u=r, y=r, t=times).sample_time
-    plant_at_rest = RestingPlant(actuator, sample_time, u0, substeps)
-    signals = plant_at_rest.run(controller, r, progress)
-    if signals.lost >= 0:
-        raise SimulationError(f"the loop leaves the finite numbers at t = {times[signals.lost]:g}: it is unstable")
+    plant_at_rest = RestingPlant(actuator, sample_time_of(times, r), u0, substeps)
+    signals = plant_at_rest.run(controller, r, progress, float(times[0]))
     u = plant_at_rest.voltages(signals)
     return ClosedLoop(
         t=times,
@@ -178,7 +161,7 @@ def close_loop(
 
 
 class RestingPlant:
-    """An actuator at rest at the command `u0`, sampled: every loop that is run starts from here."""
+    """A sampled actuator at rest at the command `u0`, from which every loop starts."""
 
     def __init__(self, actuator: Actuator, sample_time: float, u0: float = 0.0, substeps: int | None = None) -> None:
         self.sample_time, self.u0 = sample_time, u0
@@ -186,11 +169,28 @@ class RestingPlant:
         self.state = self.chain.rest(u0)
         self.y0 = self.chain.displacement(self.state)
 
-    def run(self, controller: Controller, reference: FloatArray, progress: Progress | None = None) -> Signals:
-        """Close the loop around it."""
+    def run(
+        self, controller: Controller, reference: FloatArray, progress: Progress | None = None, begin: float = 0.0
+    ) -> Signals:
+        """Signals of the loop that a controller closes, from the time `begin` [s].
+
+        Raises
+        ------
+        SimulationError
+            If the loop diverges.
+        """
+        signals = self.attempt(controller, reference, progress)
+        if signals.lost >= 0:
+            time = begin + signals.lost * self.sample_time
+            raise SimulationError(f"the loop diverges at t = {time:g}: it is unstable")
+        return signals
+
+    def attempt(self, controller: Controller, reference: FloatArray, progress: Progress | None = None) -> Signals:
+        """As `run`; where the loop diverges, the signals name the sample."""
         compiled = CompiledController(*controller.compiled(self.sample_time, self.u0, self.y0))
-        given = _known_ahead(reference, preview(controller, self.sample_time))
-        return self.chain.run(compiled, self.state, given, progress)[0]
+        samples = min(preview(controller, self.sample_time), reference.size)
+        ahead = read_only(np.append(reference[samples:], np.full(samples, reference[-1])))
+        return self.chain.run(compiled, self.state, ahead, progress)[0]
 
     def voltages(self, signals: Signals) -> FloatArray:
         """Voltage at the law just after each new command."""
@@ -198,38 +198,30 @@ class RestingPlant:
 
     def memory(self, signals: Signals) -> FloatArray | None:
         """Memory of the law just before each new command; None for a law without one."""
-        memory = getattr(self.chain.hysteresis, "memory", None)
-        if not callable(memory):
+        law = self.chain.hysteresis
+        if not isinstance(law, Remembering):
             return None
-        path = np.append(self.state.voltages[1], signals.v)
-        return np.asarray(memory(path)[: -1 : self.chain.substeps])
+        return np.asarray(law.memory(np.append(self.state.voltages[1], signals.v))[: -1 : self.chain.substeps])
 
     def driven(self, u: FloatArray) -> FloatArray:
         """Displacements just before each of the commands `u`, as a loop would measure them."""
         return self.chain.driven(u, self.state)[0].y
 
 
-def is_controller(value: Any) -> bool:
-    """Whether a value gives a compiled step from reference and measurement to a command."""
-    return callable(getattr(value, "compiled", None)) and not callable(getattr(value, "response", None))
+def sample_time_of(t: FloatArray, reference: FloatArray) -> float:
+    """Spacing of the times [s] of a reference; a ValueError if they do not fit."""
+    if t.size != reference.size:
+        raise ValueError(f"reference and t must have equal lengths, got {reference.size} and {t.size}")
+    return even_step(t)
+
+
+def is_controller(value: Any) -> TypeGuard[Controller]:
+    """Whether a value closes a loop: it is compiled, and is no law."""
+    return isinstance(value, Controller) and not isinstance(value, Responding)
 
 
 def as_actuator(plant: Any) -> Actuator:
-    """Any plant as the chain that loops run.
-
-    Parameters
-    ----------
-    plant : Actuator, law or linear plant
-        A law becomes an actuator's hysteresis, a linear plant its vibration.
-
-    Returns
-    -------
-    Actuator
-
-    Raises
-    ------
-    TypeError
-        If it is none of these.
+    """Any plant as an actuator: a law becomes its hysteresis, a linear plant its vibration; others are a TypeError.
 
     Examples
     --------
@@ -247,19 +239,6 @@ def as_actuator(plant: Any) -> Actuator:
     raise TypeError(f"plant must be an Actuator, a law or a linear plant, got {type(plant).__name__}")
 
 
-def preview(controller: Controller, sample_time: float) -> int:
-    """By how many samples a controller gets the reference ahead of its time."""
-    ahead = getattr(controller, "ahead", None)
-    return int(ahead(sample_time)) if callable(ahead) else 0
-
-
-def _known_ahead(reference: FloatArray, samples: int) -> FloatArray:
-    """The reference of some samples later; after its end the last value."""
-    if not samples:
-        return reference
-    return read_only(np.append(reference[samples:], np.full(min(samples, reference.size), reference[-1])))
-
-
 def _conditions(
     actuator: Actuator, controller: Controller, plant: RestingPlant, signals: Signals, u: FloatArray
 ) -> dict[str, Any]:
@@ -272,7 +251,7 @@ def _conditions(
         "substeps": plant.chain.substeps,
         "delay": plant.chain.delay + sensor.delay,
         "preview": preview(controller, plant.sample_time) * plant.sample_time,
-        "limits": getattr(controller, "limits", None),
+        "limits": limits_of(controller),
         "amplifier_limits": amplifier.limits,
         "sensor_quantum": sensor.quantum,
         "noise": sensor.noise,
@@ -287,13 +266,11 @@ def _conditions(
 def _voltage_noise(
     actuator: Actuator, controller: Controller, plant: RestingPlant, reference: FloatArray, u: FloatArray
 ) -> dict[str, float]:
-    """What the sensor's noise adds to the voltage: against the same loop without it; nan where that one is lost."""
+    """Difference of the voltage to that of the loop without the sensor's noise; nan where that one diverges."""
     if actuator.sensor is None or not actuator.sensor.noise:
         return {"voltage_noise_rms": 0.0, "voltage_noise_peak": 0.0}
     quiet = replace(actuator, sensor=replace(actuator.sensor, noise=0.0))
     at_rest = RestingPlant(quiet, plant.sample_time, plant.u0, plant.chain.substeps)
-    signals = at_rest.run(controller, reference)
-    if signals.lost >= 0:
-        return {"voltage_noise_rms": math.nan, "voltage_noise_peak": math.nan}
-    noise = u - at_rest.voltages(signals)
+    signals = at_rest.attempt(controller, reference)
+    noise = u - at_rest.voltages(signals) if signals.lost < 0 else np.array([math.nan])
     return {"voltage_noise_rms": float(np.sqrt(np.mean(noise**2))), "voltage_noise_peak": float(np.abs(noise).max())}

@@ -1,16 +1,15 @@
-"""How far a sampled linear loop is from instability, and what its sensor's noise costs.
+"""Distance of a sampled linear loop from instability, and voltage noise that its sensor causes.
 
 L is the loop's frequency response: the plant behind the hold, times the controller. Its distance from -1 is one over
-the maximum sensitivity max |1 / (1 + L)|. That says nothing about a loop that is unstable already: the poles
-of
+the maximum sensitivity max |1 / (1 + L)|. This holds for stable loops only: the poles of
 
     x' = A x + B v,        v = C_c q + D_c (y + noise),    y = C x
     q' = A_c q + B_c (y + noise)
 
-have to lie inside the unit circle (x' and q' the states of plant and controller one sample later). Near a lightly
-damped pole exp(-d + i a) of the plant, L changes over the half width d of its resonance, and near one of the loop
-1 / (1 + L) does. So both are looked at around the angles a, in units of d, and the largest peaks once more between
-the neighbours. White noise of unit rms gives the command the variance
+must lie inside the unit circle (x' and q' the states of plant and controller one sample later). Near a lightly damped
+pole exp(-d + i a) of the plant, L changes over the half width d of its resonance, and near one of the loop 1 / (1 + L)
+does. So both are evaluated around the angles a, in units of d, and the largest peaks once more between the neighbours.
+White noise of unit rms gives the command the variance
 
     D_c^2 + K X K^T,       X = G G^T + M G G^T M^T + M^2 G G^T M^2^T + ...
 
@@ -31,7 +30,7 @@ from hysim.control._to_control import to_control
 
 _FREQUENCIES = 300
 _SLOWEST = 1e-4
-"""Lowest frequency looked at, in units of the highest, pi / sample time."""
+"""Lowest frequency, in units of the highest, pi / sample time."""
 
 _PLANTS_POLES = np.sinh(np.linspace(-8.0, 8.0, 80))
 _LOOPS_POLES = np.sinh(np.linspace(-2.0, 2.0, 9))
@@ -41,13 +40,13 @@ _LIGHT = 0.5
 """Half width over angle of a pole below which 300 frequencies do not resolve it."""
 
 _HIGH = 0.9
-"""Of the largest value found: lower peaks are left alone."""
+"""Part of the largest value below which peaks are not refined."""
 
 _ROUNDS = 2
 _BETWEEN = 9
 
 _FORGOTTEN = 1e-9
-"""Power of M after which the noise of so long ago has no part in X."""
+"""Size of a power of M from which on older noise has no part in X."""
 
 
 class _Loop(NamedTuple):
@@ -65,12 +64,12 @@ class LinearLoop:
     Parameters
     ----------
     plant : Actuator, law or linear plant
-        Of which the linear part is taken.
+        Its linear part counts.
     sample_time : float
         Of the controller [s].
     frequencies : array, optional
-        At which L is looked at, increasing [rad/s]; by default 300, log-spaced up to pi / sample time, and more
-        around each resonance of the plant.
+        Where L is evaluated, increasing [rad/s]; by default 300, log-spaced up to pi / sample time, and more around
+        each resonance of the plant.
 
     Examples
     --------
@@ -108,7 +107,7 @@ class LinearLoop:
         return bool(np.abs(np.linalg.eigvals(self._loop(controller, slope).M)).max() < 1.0)
 
     def margins(self, controller: SampledController, slope: float = 1.0) -> tuple[float, float]:
-        """Gain and phase margin [degrees] with a law of this slope, by python-control, which leaves z = -1 out."""
+        """Gain and phase margin [degrees] with a law of this slope, by python-control, and at z = -1."""
         import control
 
         loop = slope * self.response(controller)
@@ -145,16 +144,16 @@ class LinearLoop:
     def _highest(
         self, frequencies: FloatArray, values: FloatArray, controller: SampledController, slope: float
     ) -> float:
-        """The largest value, its peaks and those that are nearly as high looked at again between their neighbours."""
+        """The largest value, refined between the neighbours of all peaks that are nearly as high."""
         before, after = np.append(0.0, values[:-1]), np.append(values[1:], 0.0)
         highest = float(values.max())
         peaks = np.flatnonzero((values > before) & (values >= after) & (values >= _HIGH * highest))
         low, high = frequencies[np.maximum(peaks - 1, 0)], frequencies[np.minimum(peaks + 1, values.size - 1)]
         for _ in range(_ROUNDS):
             between = np.linspace(low, high, _BETWEEN)
-            found = self._at(between.ravel(), controller, slope).reshape(between.shape)
-            highest = max(highest, float(found.max()))
-            best, each = found.argmax(axis=0), np.arange(low.size)
+            finer = self._at(between.ravel(), controller, slope).reshape(between.shape)
+            highest = max(highest, float(finer.max()))
+            best, each = finer.argmax(axis=0), np.arange(low.size)
             low, high = between[np.maximum(best - 1, 0), each], between[np.minimum(best + 1, _BETWEEN - 1), each]
         return highest
 

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim.control._sampled import Feedback, SampledController
+from hysim.control._sampled import Feedback, SampledController, check_limits, check_sample_time
 from hysim.kernels import controllers as kernels
 from hysim.models.model import model
 from hysim.models.protocols import CompiledController
@@ -30,22 +30,21 @@ class PID(SampledController):
 
     Parameters
     ----------
-    kp : float
-        Proportional gain [unit of u / unit of y].
-    ki, kd : float
-        Gains of the integral [unit of u / (unit of y s)] and of the derivative [unit of u s / unit of y].
+    kp, ki, kd : float
+        Gains: proportional [unit of u / unit of y], integral [unit of u / (unit of y s)] and derivative
+        [unit of u s / unit of y].
     derivative_filter : float
         Time constant T_f of the derivative's first-order filter [s]; 0 for none.
     limits : (float, float), optional
         Lowest and highest voltage; None for none [unit of u].
     tracking_time : float, optional
-        Time in which the integral gives way while the voltage is limited [s]; by default sqrt(Ti Td), and Ti
-        without a derivative. Not below a sample time. Without an integral there is nothing to wind up.
+        Time constant with which the integral unwinds while the voltage is limited [s], at least a sample time; by
+        default sqrt(Ti Td), and Ti without a derivative.
     setpoint_weight : float
-        b, the part of the reference that the proportional action sees.
+        b, the weight of the reference in the proportional action.
     derivative_weight : float
-        c, the part that the derivative sees: 0 differentiates the measurement alone, so that a step of the
-        reference gives no kick; 1 differentiates the error.
+        c, the weight of the reference in the derivative: 0 differentiates the measurement alone, so that a step of
+        the reference gives no kick; 1 differentiates the error.
 
     Raises
     ------
@@ -54,8 +53,8 @@ class PID(SampledController):
 
     Notes
     -----
-    The gains have the sign of the plant's gain. `advance` starts, and a loop starts, without a bump: as if
-    the controller had held the resting voltage at the resting displacement for ever.
+    The gains have the sign of the plant's gain. `advance` and loops start without a bump: as if the controller had
+    always held the resting voltage at the resting displacement.
 
     Examples
     --------
@@ -78,8 +77,7 @@ class PID(SampledController):
             raise ValueError(f"derivative_filter is a time and must not be negative, got {self.derivative_filter}")
         if self.tracking_time is not None and self.tracking_time < 0.0:
             raise ValueError(f"tracking_time must not be negative, got {self.tracking_time}")
-        if self.limits is not None and not (len(self.limits) == 2 and self.limits[0] <= self.limits[1]):
-            raise ValueError(f"limits must be (lowest, highest), got {self.limits}")
+        check_limits(self.limits)
 
     @classmethod
     def standard(
@@ -103,12 +101,7 @@ class PID(SampledController):
         Ti, Td : float
             Integral time, infinite for none, and derivative time [s].
         derivative_filter, limits, tracking_time, setpoint_weight, derivative_weight
-            As in the constructor.
-
-        Raises
-        ------
-        ValueError
-            If Ti is not positive, or as the constructor.
+            As in the constructor, which lists what raises a ValueError; here Ti must be positive too.
         """
         if not Ti > 0.0:
             raise ValueError(f"Ti must be positive, got {Ti}: an infinite one leaves the integral out")
@@ -124,7 +117,7 @@ class PID(SampledController):
         )
 
     def start(self, u: float = 0.0, y: float = 0.0) -> State:
-        """The state of a controller that has held the voltage `u` at the displacement `y` for ever."""
+        """The state at rest at the voltage `u` and the displacement `y`."""
         return u, u - self.kp * (self.setpoint_weight - 1.0) * y, 0.0, (self.derivative_weight - 1.0) * y
 
     def advance(
@@ -151,7 +144,7 @@ class PID(SampledController):
         Raises
         ------
         ValueError
-            If lengths differ, a value is not finite, the sample time is not positive, or the state is none.
+            If lengths differ, a value is not finite, the sample time is not positive, or the state has not 4 numbers.
 
         Examples
         --------
@@ -164,28 +157,19 @@ class PID(SampledController):
         if r.size != y.size:
             raise ValueError(f"reference and measurement must have equal lengths, got {r.size} and {y.size}")
         begin = self.start(y=float(y[0]) if y.size else 0.0) if state is None else state
-        moving = np.array(read_only(begin, "state", ndim=1))
-        if moving.size != 4:
-            raise ValueError(f"state must hold 4 numbers, as `start` gives them, got {moving.size}")
+        state_after = np.array(read_only(begin, "state", ndim=1))
+        if state_after.size != 4:
+            raise ValueError(f"state must hold 4 numbers, as `start` gives them, got {state_after.size}")
         command, u = np.empty((2, r.size))
         step, parameters, _ = self.compiled(sample_time)
-        kernels.replay(step, parameters, moving, r, y, command, u)
-        last, integral, derivative, seen = moving.tolist()
-        return u, (last, integral, derivative, seen)
+        kernels.replay(step, parameters, state_after, r, y, command, u)
+        last, integral, derivative, weighted = state_after.tolist()
+        return u, (last, integral, derivative, weighted)
 
     def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
-        """From the negative measurement to the command, as the sampled controller has it; limits apart.
+        """Response from the negative measurement to the command at frequencies [rad/s], limits apart.
 
-        Parameters
-        ----------
-        frequency : array, any shape
-            Not zero where there is an integral [rad/s].
-        sample_time : float
-            [s]
-
-        Returns
-        -------
-        array of complex
+        The frequencies must not be zero where there is an integral; the result has their shape.
         """
         z = np.exp(1j * np.asarray(frequency, dtype=float) * sample_time)
         lag = self.derivative_filter + sample_time
@@ -194,7 +178,7 @@ class PID(SampledController):
         return np.asarray(self.kp + integral + derivative)
 
     def linear(self, sample_time: float) -> Feedback:
-        """From the measurement to the command, limits apart: the states are I, D and the measurement before."""
+        """Linear system from the measurement to the command; the states are I, D and the last measurement."""
         lag, integrates = self.derivative_filter + sample_time, 1.0 if self.ki else 0.0
         rate, kept = self.kd / lag, self.derivative_filter / lag
         return Feedback(
@@ -206,8 +190,7 @@ class PID(SampledController):
 
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
         """The controller as compiled loops take it, at rest at `u0` and `y0`."""
-        if not 0.0 < sample_time < math.inf:
-            raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
+        check_sample_time(sample_time)
         lowest, highest = self.limits or (-math.inf, math.inf)
         lag = self.derivative_filter + sample_time
         parameters = [

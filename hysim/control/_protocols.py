@@ -53,6 +53,10 @@ class Remembering(Protocol):
         """Memory at the samples of `u`."""
         ...
 
+    def advance(self, u: npt.ArrayLike) -> tuple[FloatArray, tuple[float, ...]]:
+        """Output at the samples of `u`, and the state after them."""
+        ...
+
 
 def limits_of(controller: object) -> tuple[float, ...] | None:
     """Lowest and highest command of a controller; None for no limits."""

@@ -5,11 +5,10 @@ Shaping. Impulses A_i at the samples t_i leave no vibration of a mode with the p
     sum A_i exp(-p t_i) = 0,    sum A_i = 1
 
 Half a period pi / w_d is seldom a whole number of samples. Three impulses, at 0 and at the two samples around it,
-satisfy both equations exactly (zero vibration, ZV); the same twice over does for the derivative by the frequency too
-(ZVD), three times over for the second one (ZVDD); several modes take one shaper behind the other. So does one mode
-whose frequency is known to be in a band: with the zeros at Chebyshev's points of it, the residual is nowhere in the
-band larger than need be (extra-insensitive, EI). Two moving averages in a row make a step of the reference a motion
-of constant acceleration and deceleration.
+satisfy both equations exactly (zero vibration, ZV); applied twice, the derivative by the frequency vanishes too (ZVD),
+three times the second one (ZVDD); several modes take one shaper behind the other. For one mode whose frequency lies
+in a band, zeros at Chebyshev's points of the band make the largest residual in it smallest (extra-insensitive, EI).
+Two moving averages in a row make a step of the reference a motion of constant acceleration and deceleration.
 
 The mode's inverse. Under the hold a mode is A(z) y = B(z) w with B(z) = b_1 z + b_2 and a zero -b_2 / b_1 close to
 -1, so that its inverse rings. With the reference known two samples ahead
@@ -40,14 +39,14 @@ _BOXES = 2  # moving averages in a row: their motion has a bounded acceleration,
 
 @model
 class Shaper:
-    """A filter of the reference after which modes do not vibrate.
+    """Filter of the reference that excites no vibration of some modes.
 
     Parameters
     ----------
     natural_frequencies, damping_ratios : sequence of float
-        Of the modes, positive [rad/s] and from 0 to below 1; none for a shaper that is smooth only.
+        Of the modes, positive [rad/s] and from 0 to below 1; none for smoothing alone.
     repeats : int
-        How often each mode's shaper is applied: the more, the less its frequency need be known.
+        How often each mode's shaper is applied: the more, the less exactly its frequency need be known.
     smoothing : float
         Duration of the moving averages together [s]; 0 for none.
 
@@ -85,25 +84,7 @@ class Shaper:
 
     @classmethod
     def zv(cls, natural_frequencies: npt.ArrayLike, damping_ratios: npt.ArrayLike) -> Self:
-        """Zero vibration of one mode, or of several.
-
-        Parameters
-        ----------
-        natural_frequencies, damping_ratios : float or sequence of float
-            [rad/s], [1]
-
-        Raises
-        ------
-        ValueError
-            As the constructor.
-
-        Examples
-        --------
-        >>> import hysim as hs
-        >>> three_modes = hs.Shaper.zv((100.0, 250.0, 400.0), (0.01, 0.02, 0.02))
-        >>> round(float(three_modes.impulses(1e-3).sum()), 12)
-        1.0
-        """
+        """Zero vibration of one mode, or of several: numbers or sequences [rad/s], [1], as in the constructor."""
         return cls(
             natural_frequencies=tuple(np.atleast_1d(natural_frequencies)),
             damping_ratios=tuple(np.atleast_1d(damping_ratios)),
@@ -112,29 +93,25 @@ class Shaper:
     @classmethod
     def zvd(cls, natural_frequencies: npt.ArrayLike, damping_ratios: npt.ArrayLike) -> Self:
         """As `zv`, and zero derivative of the vibration by the frequency."""
-        return cls(
-            natural_frequencies=tuple(np.atleast_1d(natural_frequencies)),
-            damping_ratios=tuple(np.atleast_1d(damping_ratios)),
-            repeats=2,
-        )
+        return replace(cls.zv(natural_frequencies, damping_ratios), repeats=2)
 
     @classmethod
     def zvdd(cls, natural_frequencies: npt.ArrayLike, damping_ratios: npt.ArrayLike) -> Self:
         """As `zvd`, and zero second derivative."""
-        return replace(cls.zvd(natural_frequencies, damping_ratios), repeats=3)
+        return replace(cls.zv(natural_frequencies, damping_ratios), repeats=3)
 
     @classmethod
     def ei(cls, natural_frequency: float, damping_ratio: float, tolerance: float = 0.1, zeros: int = 2) -> Self:
-        """Least residual of one mode whose frequency lies in a band.
+        """Smallest residual of one mode whose frequency lies in a band.
 
         Parameters
         ----------
         natural_frequency, damping_ratio : float
             [rad/s], [1]
         tolerance : float
-            By which part of it the frequency may be off either way.
+            Half width of the band, relative to the frequency.
         zeros : int
-            Frequencies in the band at which nothing vibrates, each taking half a period.
+            Number of frequencies in the band at which nothing vibrates; each takes half a period.
 
         Raises
         ------
@@ -155,13 +132,7 @@ class Shaper:
         return cls.zv(natural_frequency * (1.0 + tolerance * places), np.full(zeros, damping_ratio))
 
     def impulses(self, sample_time: float) -> FloatArray:
-        """Weights of the reference now, a sample ago, and so on.
-
-        Raises
-        ------
-        ValueError
-            If a mode's half period is shorter than a sample.
-        """
+        """Weights of the reference now, a sample ago, and so on; a ValueError if half a period is below a sample."""
         total = np.ones(1)
         for frequency, ratio in zip(self.natural_frequencies, self.damping_ratios, strict=True):
             one = _zero_vibration(frequency, ratio, sample_time)
@@ -175,30 +146,20 @@ class Shaper:
 
 @model
 class ModeInverse:
-    """The inverse of a resonance, for a reference that is smooth or shaped so.
+    """Inverse of a resonance, for a smooth reference that is known two samples ahead.
+
+    Its output grows with the reference's acceleration: a step of one makes some 1 / (natural_frequency sample_time)^2.
 
     Parameters
     ----------
-    natural_frequency : float
-        Positive [rad/s].
-    damping_ratio : float
-        Not negative.
-
-    Raises
-    ------
-    ValueError
-        If a number is outside its range.
-
-    Notes
-    -----
-    It needs the reference two samples ahead. What it asks for grows with the reference's acceleration: a step of one
-    asks for some 1 / (natural_frequency sample_time)^2.
+    natural_frequency, damping_ratio : float
+        Positive [rad/s], and not negative; otherwise a ValueError.
 
     Examples
     --------
     >>> import numpy as np, hysim as hs
     >>> weights = hs.ModeInverse(natural_frequency=100.0, damping_ratio=0.0).weights(sample_time=1e-3)
-    >>> ramp = np.array([2.0, 1.0, 0.0, -1.0])  # what is given is held, and right in the middle of the sample
+    >>> ramp = np.array([2.0, 1.0, 0.0, -1.0])  # the output is held: right in the middle of the sample
     >>> round(float(weights @ ramp), 9), round(float(weights.sum()), 9)
     (0.5, 1.0)
     """
@@ -212,10 +173,10 @@ class ModeInverse:
     def weights(self, sample_time: float) -> FloatArray:
         """Weights of the reference in two samples, in one, now, and one ago."""
         stage = sampled(vibration_stage(mode(self.natural_frequency, self.damping_ratio), sample_time), sample_time)
-        C, moved = stage.output[3:], stage.A
-        a1, a2 = -np.trace(moved), np.linalg.det(moved)
+        C, A = stage.output[3:], stage.A
+        a1, a2 = -np.trace(A), np.linalg.det(A)
         b1 = C @ stage.B[0]
-        b2 = C @ moved @ stage.B[0] + a1 * b1
+        b2 = C @ A @ stage.B[0] + a1 * b1
         weights: FloatArray = np.convolve([1.0, a1, a2], [b2, b1]) / (b1 + b2) ** 2
         return weights
 
@@ -227,8 +188,8 @@ def _zero_vibration(frequency: float, ratio: float, sample_time: float) -> Float
     if samples < 1:
         raise ValueError(f"half a period of {frequency:g} rad/s must not be shorter than a sample, {sample_time:g} s")
     places = np.array([0, samples, samples + 1])
-    left = np.exp(complex(ratio * frequency, -damped) * sample_time * places)
-    weights = np.linalg.solve([left.real, left.imag, np.ones(3)], [0.0, 0.0, 1.0])
+    residual = np.exp(complex(ratio * frequency, -damped) * sample_time * places)
+    weights = np.linalg.solve([residual.real, residual.imag, np.ones(3)], [0.0, 0.0, 1.0])
     impulses = np.zeros(samples + 2)
     impulses[places] = weights
     return np.trim_zeros(np.where(np.abs(impulses) < 1e-15, 0.0, impulses), "b")

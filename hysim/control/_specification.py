@@ -1,4 +1,4 @@
-"""What a tuned loop must keep to on every plant that it may meet: linear figures, at both extreme slopes of the law."""
+"""Bounds that a tuned loop must keep on every plant: linear figures, at both extreme slopes of the law."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -7,25 +7,22 @@ from typing import NamedTuple
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.control._drive import secant_gain, slopes
 from hysim.control._margins import LinearLoop
+from hysim.control._open_loop import secant_gain, slopes
 from hysim.control._sampled import SampledController
 from hysim.control._tuning import Trial
 from hysim.models.actuator import Actuator
 
 
 class Judgement(NamedTuple):
-    """The largest figures of all plants and slopes; infinite where one loop is unstable."""
+    """The largest figures of all plants and slopes; infinite if a loop is unstable."""
 
     max_sensitivity: float
     voltage_noise: float
 
 
 class Specification:
-    """Bounds on the maximum sensitivity and on the voltage noise.
-
-    The first plant is the one whose gain and resonances the linear rule looks at.
-    """
+    """Bounds on the maximum sensitivity and on the voltage noise; the linear rule uses the first plant."""
 
     def __init__(
         self,
@@ -44,7 +41,7 @@ class Specification:
         self.plants = [_PlantLoops(plant, cycle, sample_time) for plant in plants]
 
     def judge(self, controller: SampledController) -> Judgement:
-        """How the worst of the loops fares."""
+        """The figures of a controller."""
         sensitivity = 0.0
         for loop, slope in self._loops():
             sensitivity = max(sensitivity, loop.max_sensitivity(controller, slope))
@@ -52,19 +49,19 @@ class Specification:
                 return Judgement(math.inf, math.inf)
         return Judgement(sensitivity, max(plant.voltage_noise(controller) for plant in self.plants))
 
-    def excess(self, found: Judgement | Trial) -> float:
-        """By which parts of the bounds they are exceeded, in sum; 0 within."""
-        if found.max_sensitivity == math.inf:
+    def excess(self, figures: Judgement | Trial) -> float:
+        """Sum of the parts by which the bounds are exceeded; 0 within."""
+        if figures.max_sensitivity == math.inf:
             return math.inf
-        parts = found.max_sensitivity / self.max_sensitivity, found.voltage_noise / self.max_voltage_noise
+        parts = figures.max_sensitivity / self.max_sensitivity, figures.voltage_noise / self.max_voltage_noise
         return sum(max(0.0, part - 1.0) for part in parts)
 
-    def words(self, found: Trial) -> str:
+    def words(self, trial: Trial) -> str:
         """The figures and their bounds."""
-        sensitivity = f"sensitivity {found.max_sensitivity:.2f} of {self.max_sensitivity:g} allowed"
+        sensitivity = f"sensitivity {trial.max_sensitivity:.2f} of {self.max_sensitivity:g} allowed"
         if self.max_voltage_noise == math.inf:
             return sensitivity
-        return f"{sensitivity}, voltage noise {found.voltage_noise:.2g} of {self.max_voltage_noise:g}"
+        return f"{sensitivity}, voltage noise {trial.voltage_noise:.2g} of {self.max_voltage_noise:g}"
 
     def margins(self, controller: SampledController) -> tuple[float, float]:
         """The smallest gain and phase margin."""

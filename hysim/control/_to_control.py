@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from hysim.control._io_systems import actuator_system, controller_system, held_oscillator_system, oscillator_system
+from hysim.control._io_systems import actuator_system, controller_system, oscillator_system
 from hysim.control._loop import as_actuator, is_controller
 from hysim.control._pid import PID
 from hysim.models.actuator import Actuator
@@ -20,21 +20,21 @@ def to_control(plant: Any, sample_time: float | None = None) -> Any:
     Parameters
     ----------
     plant : TransferFunction, StateSpace, Modes, Actuator, law, BoucWenOscillator, PID or TrackingController
-        What is linear becomes a linear system: a plant without a law, of whose actuator limits and slewing are left
-        out but not the sensor's delay; and a PID, from its error to its command without limits, its derivative
-        acting on the error, which leaves its loop's poles as they are. All others become nonlinear systems with
-        their memory in the state: an actuator with its limits and its sensor but without the noise, a
-        `TrackingController` from reference and measurement to the command.
+        A plant without a law becomes a linear system, without the actuator's limits and slewing but with the sensor's
+        delay; a PID too, from its error to its command without limits, its derivative acting on the error, which
+        keeps the loop's poles. All others become nonlinear systems with their memory in the state: an actuator with
+        its limits and its sensor but without noise, a `TrackingController` from reference and measurement to the
+        command.
     sample_time : float, optional
-        Of the system's discrete form, which is that of `close_loop` [s]. By default the system stays continuous,
-        as linear ones and an oscillator can: laws, actuators with one and a `TrackingController` cannot.
+        Of the discrete form, which is that of `close_loop` [s]. By default the system stays continuous, which laws,
+        actuators with a law and a `TrackingController` cannot.
 
     Returns
     -------
     control.TransferFunction, control.StateSpace or control.NonlinearIOSystem
-        The state zero is rest at u = 0, or where an oscillator's own simulations start; a controller's is rest at
-        u = 0 and the displacement zero, while `close_loop` takes the plant's. The output of a discrete plant is what
-        is measured just before each new command, which is held until the next.
+        The state zero is rest at u = 0 (of a controller also at the displacement zero), or the start of an
+        oscillator's own simulations. The output of a discrete plant is the measurement just before each new command,
+        which is held until the next.
 
     Raises
     ------
@@ -66,16 +66,16 @@ def to_control(plant: Any, sample_time: float | None = None) -> Any:
     if isinstance(plant, PID):
         return _pid(plant, sample_time)
     if isinstance(plant, BoucWenOscillator):
-        return oscillator_system(plant) if sample_time is None else held_oscillator_system(plant, sample_time)
+        return oscillator_system(plant, sample_time)
     if is_controller(plant):
-        return controller_system(plant, _given(sample_time, plant))
+        return controller_system(plant, _required(sample_time, plant))
     actuator = as_actuator(plant)
     if actuator.hysteresis is not None:
-        return actuator_system(actuator, _given(sample_time, actuator.hysteresis))
+        return actuator_system(actuator, _required(sample_time, actuator.hysteresis))
     return _continuous(actuator) if sample_time is None else _discrete(actuator, sample_time)
 
 
-def _given(sample_time: float | None, stepped: Any) -> float:
+def _required(sample_time: float | None, stepped: Any) -> float:
     if sample_time is None:
         raise ValueError(f"{type(stepped).__name__} moves from sample to sample: give a sample_time")
     return sample_time

@@ -2,12 +2,12 @@
 
     reference -> shaper -> mode's inverse -> inverse of creep and law -> limits -> u
                    |                                  |                    |
-                   +--> where to be, or what ------ model                  |
-                        it would measure -> PID -> notch -> + -------------+
+                   +--> target, or measurement  --- model                  |
+                        of the model    -> PID -> notch -> + --------------+
                                        \\-> damping --------/
 
-Every part may be left out. With `preview` the reference is given as many samples ahead as its filters and the hold
-take, so that the displacement is at the reference in its own time.
+Every part may be left out. With `preview` the reference is known as many samples ahead as its filters and the hold
+take, so that the displacement follows it without delay.
 """
 
 import math
@@ -40,7 +40,7 @@ _NOTHING = FeedforwardBlock(line, np.empty(0), np.empty(0))
 
 @model
 class TrackingController(SampledController):
-    """A sampled controller of parts.
+    """Sampled controller of feed-forward and feedback parts.
 
     Parameters
     ----------
@@ -51,15 +51,14 @@ class TrackingController(SampledController):
     feedforward : InverseFeedforward, optional
         Inverse of creep, law and amplifier, behind it; without one the reference reaches the feedback only.
     feedback : PID, optional
-        On the shaped reference, or on the model's measurement; its limits must be left to the controller.
+        On the shaped reference, or on the model's measurement; without limits of its own.
     notch : Notch, optional
         Filter of the feedback's command.
     damping : DampingLoop, optional
         Beside the feedback.
     model : Actuator, optional
-        The plant as the feed-forward sees it, with vibration and the sensor's delay: the feedback then compares with
-        what it would measure, and answers only to what the model does not know. Its law and amplifier must be the
-        feed-forward's.
+        The feed-forward's plant with its vibration and the sensor's delay: the feedback then compares with the
+        measurement that this model would give, and corrects only the difference.
     preview : bool
         Whether the reference is known ahead.
     limits : (float, float), optional
@@ -116,25 +115,16 @@ class TrackingController(SampledController):
                 raise ValueError("the model's law and amplifier must be those of the feedforward")
 
     def ahead(self, sample_time: float) -> int:
-        """By how many samples the reference must be known ahead: what the filters and the hold take."""
+        """By how many samples the reference must be known ahead, for the filters and the hold."""
         if not self.preview:
             return 0
         shaped = self._shaped(sample_time)
         return self._hold + round(float(shaped @ np.arange(shaped.size)))
 
     def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
-        """Of the feedback, from the negative measurement to the command; limits apart.
+        """Response of the feedback from the negative measurement to the command at frequencies [rad/s], limits apart.
 
-        Parameters
-        ----------
-        frequency : array, any shape
-            Not zero where there is an integral [rad/s].
-        sample_time : float
-            [s]
-
-        Returns
-        -------
-        array of complex
+        The frequencies must not be zero where there is an integral; the result has their shape.
         """
         total = (self.feedback or PID()).frequency_response(frequency, sample_time)
         if self.notch is not None:
@@ -144,7 +134,7 @@ class TrackingController(SampledController):
         return np.asarray(total)
 
     def linear(self, sample_time: float) -> Feedback:
-        """From the measurement to the command, limits apart."""
+        """Linear system from the measurement to the command, limits apart."""
         total = (self.feedback or PID()).linear(sample_time)
         if self.notch is not None:
             total = total.then(biquad(self.notch.coefficients(sample_time)))
@@ -175,14 +165,14 @@ class TrackingController(SampledController):
 
     @property
     def _hold(self) -> int:
-        """Samples from the drive to the displacement that it is to give."""
+        """Samples from the drive to the displacement that it causes."""
         return 0 if self.feedforward is None else 1 if self.mode_inverse is None else 2
 
     def _shaped(self, sample_time: float) -> FloatArray:
         return np.ones(1) if self.shaper is None else self.shaper.impulses(sample_time)
 
     def _taps(self, sample_time: float) -> FloatArray:
-        """Weights of the reference, the newest first, for the drive and for where to be."""
+        """Weights of the reference, the newest first, for the drive and for the target."""
         shaped = self._shaped(sample_time)
         inverted = np.ones(1) if self.mode_inverse is None else self.mode_inverse.weights(sample_time)
         drive, target = np.convolve(shaped, inverted), np.concatenate([np.zeros(self._hold), shaped])
@@ -190,7 +180,7 @@ class TrackingController(SampledController):
         return np.stack([np.pad(weights, (0, size - weights.size)) for weights in (drive, target)])
 
     def _model_blocks(self, sample_time: float, u0: float) -> tuple[list[float], FloatArray, FloatArray]:
-        """The model as the kernel takes it: the head's numbers, the matrices, the state at rest."""
+        """The model for the kernel: the head's numbers, the matrices, the state at rest."""
         chain = (self.model or Actuator()).chain(sample_time)
         rest = chain.rest(u0)
         stage, seen_in = chain.stage, chain.seen_in
@@ -199,8 +189,4 @@ class TrackingController(SampledController):
             float(seen_in >= 0),
         ]  # fmt: skip
         readings = np.full(chain.samples_late + 2, chain.displacement(rest))
-        return (
-            counts,
-            chain.linear_block,
-            np.concatenate([rest.x, rest.past, readings]),
-        )
+        return counts, chain.linear_block, np.concatenate([rest.x, rest.past, readings])

@@ -4,18 +4,19 @@ A linear rule gives the starts: for each crossover frequency and each shape (Ti 
 resonance of the plant) the gain makes |L| = 1 there, L the sampled loop with the law at its secant gain. Those that
 are stable on every plant, at the least and at the largest slope of its law, are simulated, and the search of
 J. A. Nelder and R. Mead (1965) descends from the best of them over the logarithms of the gains. A barrier keeps the
-largest of all maximum sensitivities max |1 / (1 + L)|, and the voltage noise, within their bounds. What is made small
-is one number of the simulated error e, in units of the reference's span, the larger one where several limits are given:
+largest of all maximum sensitivities max |1 / (1 + L)|, and the voltage noise, within their bounds. The objective is a
+number of the simulated error e, in units of the reference's span, the largest one where several limits are given:
 
     "itae"   integral of t |e| / duration^2     a step: what lasts counts most
     "rms"    rms of e                           a periodic reference
 
 e is that of the true displacement. The noise of the plant's sensor is in the simulation, the same in each, so that the
-search stays deterministic: noise shakes the memory of a law, which no linear figure knows.
+search is deterministic: noise moves the memory of a law, which no linear figure shows.
 """
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,15 +24,12 @@ import numpy.typing as npt
 from scipy.optimize import minimize
 
 from hysim._frozen import FloatArray, read_only
-from hysim.control._loop import RestingPlant, as_actuator
+from hysim.control._loop import RestingPlant, as_actuator, sample_time_of
 from hysim.control._margins import LinearLoop
-from hysim.control._pid import PID
+from hysim.control._protocols import limits_of
 from hysim.control._specification import Specification
-from hysim.control._template import Limits, as_template, within
-from hysim.control._tracking import TrackingController
+from hysim.control._template import Limits, Tuned, as_template
 from hysim.control._tuning import Trial, Tuning, front
-from hysim.models.chain import Signals
-from hysim.records import Record
 
 OBJECTIVES: dict[str, Callable[[FloatArray], float]] = {
     "itae": lambda e: float(np.mean(np.linspace(0.0, 1.0, e.size) * np.abs(e))),
@@ -51,7 +49,7 @@ def tune(
     t: npt.ArrayLike,
     reference: npt.ArrayLike,
     *,
-    controller: PID | TrackingController | None = None,
+    controller: Tuned | None = None,
     objective: str = "itae",
     limits: Limits | Sequence[Limits] = None,
     max_sensitivity: float = 2.0,
@@ -69,16 +67,16 @@ def tune(
     t : array, shape (n,)
         Evenly spaced times [s]; their spacing is the controller's sample time.
     reference : array, shape (n,)
-        What the loop shall follow [unit of y].
+        [unit of y]
     controller : PID or TrackingController, optional
-        A template. The gains of its PID that are not zero are tuned, and so is the gain of its damping loop; everything
-        else stays. ``hs.PID(ki=1.0)`` asks for an integral alone. By default a PID in standard form, with its
-        setpoint weight and a derivative filter of a tenth of Td.
+        A template: the gains of its PID and of its damping loop that are not zero are tuned, everything else stays.
+        ``hs.PID(ki=1.0)`` asks for an integral alone. By default a PID in standard form, with its setpoint weight and
+        a derivative filter of a tenth of Td.
     objective : {"itae", "rms"}
-        What is made small: for a step, for a periodic reference.
+        Measure of the error to minimise: for a step, for a periodic reference.
     limits : (float, float), optional
-        Lowest and highest voltage; by default the template's. Of a list of such pairs, or None for no limits, the loop
-        is simulated within each, so that one controller serves all; the one returned has the first.
+        Lowest and highest voltage; by default the template's. Several such pairs (None for no limits) ask for one
+        controller that serves all of them; the one returned has the first.
     max_sensitivity : float
         Bound on max ``|1 / (1 + L)|``, above one: the smaller, the more the plant may differ from its model.
     max_voltage_noise : float, optional
@@ -86,13 +84,9 @@ def tune(
     variations : sequence of plants
         Other plants, such as one whose resonance is elsewhere, on which the bounds must hold too.
     transient : float
-        Time at the begin that does not count [s]: what a periodic reference needs to become steady.
+        Time at the beginning that does not count [s], until a periodic reference is steady.
     u0 : float
         Voltage before the first sample.
-
-    Returns
-    -------
-    Tuning
 
     Raises
     ------
@@ -104,8 +98,8 @@ def tune(
     --------
     >>> import numpy as np, hysim as hs
     >>> mode = hs.TransferFunction(num=(1.0,), den=(1.0, 0.2, 1.0))
-    >>> found = hs.tune(mode, np.arange(0.0, 40.0, 0.05), np.ones(800), limits=(0.0, 10.0))
-    >>> found.success, found.max_sensitivity <= 2.0, found.objective < 0.005
+    >>> tuning = hs.tune(mode, np.arange(0.0, 40.0, 0.05), np.ones(800), limits=(0.0, 10.0))
+    >>> tuning.success, tuning.max_sensitivity <= 2.0, tuning.objective < 0.005
     (True, True, True)
     """
     if objective not in OBJECTIVES:
@@ -120,7 +114,7 @@ def tune(
 
 
 class _SimulatedLoop:
-    """The loop that a controller closes around the plant, within each of the limits, and its error as one number."""
+    """The error of the loop that a controller closes around the plant, within each of the limits, as one number."""
 
     def __init__(
         self,
@@ -134,7 +128,7 @@ class _SimulatedLoop:
     ) -> None:
         self.actuator = as_actuator(plant)
         self.reference = read_only(reference, "reference", ndim=1)
-        self.h = Record(u=self.reference, y=self.reference, t=read_only(t, "t")).sample_time
+        self.h = sample_time_of(read_only(t, "t", ndim=1), self.reference)
         self.plant = RestingPlant(self.actuator, self.h, u0)
         if not 0.0 <= transient < self.h * (self.reference.size - 1):
             raise ValueError(f"transient must lie within the record, from 0 on, got {transient}")
@@ -145,38 +139,38 @@ class _SimulatedLoop:
         if self.span == 0.0:
             raise ValueError(f"the reference stays at the resting displacement {self.plant.y0:g}: nothing to follow")
 
-    def value(self, controller: Any) -> float:
-        """The objective within the limits where it is larger; infinite if the loop is lost."""
-        runs = [self.plant.run(within(controller, limits), self.reference) for limits in self.limits]
-        return max(map(self._value, runs))
+    def value(self, controller: Tuned) -> float:
+        """The largest objective within any of the limits; infinite if a loop diverges."""
+        largest = -math.inf
+        for limits in self.limits:
+            signals = self.plant.attempt(replace(controller, limits=limits), self.reference)
+            if signals.lost >= 0:
+                return math.inf
+            largest = max(largest, self.objective((self.reference - signals.y)[self.counted] / self.span))
+        return largest
 
-    def limited(self, controller: Any) -> int:
+    def limited(self, controller: Tuned) -> int:
         """At how many samples the controller's limits hold the voltage."""
-        signals = self.plant.run(controller, self.reference)
+        signals = self.plant.attempt(controller, self.reference)
         return int(np.count_nonzero(signals.drive != signals.command))
-
-    def _value(self, signals: Signals) -> float:
-        if signals.lost >= 0:
-            return math.inf
-        return self.objective((self.reference - signals.y)[self.counted] / self.span)
 
 
 class _Search:
     """The cost of a controller as a function of its point."""
 
-    def __init__(self, loop: _SimulatedLoop, specification: Specification, controller: Any) -> None:
+    def __init__(self, loop: _SimulatedLoop, specification: Specification, controller: Tuned | None) -> None:
         self.loop, self.specification = loop, specification
         self.template = as_template(controller, math.copysign(1.0, specification.plants[0].gain))
         self.trials: list[Trial] = []
 
     def starts(self) -> list[FloatArray]:
-        """The linear rule's points that are stable, those far beyond the bounds left out where there are others."""
+        """The stable points of the linear rule, without those far beyond the bounds where there are others."""
         rule = [*self.template.own(), *self.rule()]
-        stable = [(found, x) for x in rule if (found := self.excess(x)) < math.inf]
+        stable = [(excess, x) for x in rule if (excess := self.excess(x)) < math.inf]
         if not stable:
             raise ValueError("no controller of the linear rule makes the loop stable; is the sample time short enough?")
-        enough = max(1.0, min(found for found, _ in stable))
-        return [x for found, x in stable if found <= enough]
+        enough = max(1.0, min(excess for excess, _ in stable))
+        return [x for excess, x in stable if excess <= enough]
 
     def rule(self) -> list[FloatArray]:
         """Points whose feedback has |L| = 1 at a crossover frequency."""
@@ -192,18 +186,19 @@ class _Search:
         return points
 
     def excess(self, x: FloatArray) -> float:
+        """By how much the controller at a point exceeds the bounds."""
         return self.specification.excess(self.specification.judge(self.template.controller(x)))
 
     def cost(self, x: FloatArray) -> float:
         """The objective, and a barrier beyond the bounds."""
-        controller = within(self.template.controller(x), self.loop.limits[0])
-        found = self.specification.judge(controller)
-        value = self.loop.value(controller) if found.max_sensitivity < math.inf else math.inf
-        self.trials.append(Trial(controller=controller, objective=value, **found._asdict()))
-        return value * (1.0 + _BARRIER * self.specification.excess(found))
+        controller = replace(self.template.controller(x), limits=self.loop.limits[0])
+        judgement = self.specification.judge(controller)
+        value = self.loop.value(controller) if judgement.max_sensitivity < math.inf else math.inf
+        self.trials.append(Trial(controller=controller, objective=value, **judgement._asdict()))
+        return value * (1.0 + _BARRIER * self.specification.excess(judgement))
 
     def descend(self, start: FloatArray) -> None:
-        """Search from a start; what it meets is among the trials."""
+        """Search from a start; every controller tried is among the trials."""
         options = {**_SEARCHED, "initial_simplex": self.template.simplex(start)}
         minimize(self.cost, start, method="Nelder-Mead", options=options)
 
@@ -238,7 +233,7 @@ class _Search:
 def _each(limits: Any, controller: Any) -> tuple[Limits, ...]:
     """The limits of each simulation, from one pair or from several."""
     if limits is None:
-        return (getattr(controller, "limits", None),)
+        return (limits_of(controller),)
     if all(np.ndim(limit) == 0 and limit is not None for limit in limits):
         return (limits,)
     return tuple(limits)

@@ -1,4 +1,4 @@
-"""What `tune` found: the controller, how far it can be trusted, and the trade-off that it was chosen from."""
+"""Result of `tune`: the controller, its margins, and the trade-off from which it was chosen."""
 
 import math
 from collections.abc import Iterable
@@ -11,12 +11,12 @@ from hysim.models.model import in_brief
 
 @frozen
 class Trial:
-    """A controller that was tried.
+    """A controller that `tune` tried, and its figures.
 
     Parameters
     ----------
     controller : PID or TrackingController
-        Its gains, with the limits.
+        With the limits.
     max_sensitivity : float
         Largest ``|1 / (1 + L)|`` of all plants, at either slope of the law; infinite if a loop is unstable.
     voltage_noise : float
@@ -34,31 +34,24 @@ class Trial:
 @printed
 @frozen
 class Tuning:
-    """What `tune` found.
+    """Result of `tune`.
 
     Parameters
     ----------
-    controller : PID or TrackingController
-        The gains, with the limits.
-    objective : float
-        Its value, in units of the reference's span.
-    max_sensitivity : float
-        Largest ``|1 / (1 + L)|`` of all plants, at either slope of the law.
+    controller, objective, max_sensitivity, voltage_noise
+        Of the best `Trial`. The noise also moves the memory of a law; `close_loop` has this in its conditions.
     gain_margin, phase_margin : float
         Factor and angle [degrees] by which the loop may change before it is unstable: the smallest of all plants and
         slopes.
-    voltage_noise : float
-        Largest rms of the voltage that the sensor's noise causes in the linear loops of all plants and slopes, limits
-        apart [unit of u]. What the noise does to the memory comes on top; `close_loop` has it in its conditions.
     trade_off : tuple of Trial
-        What a smaller maximum sensitivity costs: the trials within the bound on the noise that no other beats in both
-        objective and sensitivity, the most robust first.
+        The trials within the bound on the noise that no other beats in both objective and sensitivity, the most
+        robust first.
     trials : tuple of Trial
         Every controller that was simulated.
     success : bool
         Whether a controller within the bounds was found.
     message : str
-        What was searched, how near the bounds are, and at how many samples the voltage was limited.
+        Extent of the search, distance to the bounds, and at how many samples the voltage was limited.
     """
 
     controller: Any

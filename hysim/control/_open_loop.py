@@ -1,4 +1,4 @@
-"""The open loop that a closed one is judged against: the voltage reference / secant gain.
+"""The open loop that a closed one is compared with: the voltage reference / secant gain.
 
 The secant gain of a steady cycle is its stroke over its voltage's span. It depends on the span itself, so that it
 is a fixed point: the gain g at which the cycle driven by ``cycle / g`` has the gain f(g) = g. It is found by the
@@ -29,7 +29,7 @@ def secant_gain(
 
     `cycle` is one period of a reference that starts where it ends. Without a sample time the cycle is
     quasi-static: the law's, times the vibration's DC gain. With a number of periods the last of them stands for the
-    steady cycle, which creep takes for ever to come to.
+    steady cycle, which creep approaches too slowly.
 
     Raises
     ------
@@ -39,25 +39,27 @@ def secant_gain(
     span = float(np.ptp(cycle))
     if actuator.hysteresis is None and sample_time is None:
         return _usable(actuator.dc_gain)
-    gain = _usable(actuator.dc_gain * _slope(actuator, 1.0))
+    gain = _usable(actuator.dc_gain * _first_slope(actuator))
     before: tuple[float, float] | None = None
     for _ in range(_ITERATIONS):
         y = steady_cycle(actuator, cycle / gain, sample_time, periods)
-        found = _usable(float(np.ptp(y)) / span * gain)
-        change = abs(found / gain - 1.0)
+        next_gain = _usable(float(np.ptp(y)) / span * gain)
+        change = abs(next_gain / gain - 1.0)
         if change <= _CONVERGED:
-            return found
-        now = gain, found
-        gain, before = found if before is None else _secant(before, now), now
+            return next_gain
+        now = gain, next_gain
+        gain, before = next_gain if before is None else _secant(before, now), now
     if change > _ACCEPTED:
         raise ValueError(f"no voltage drives the plant along the reference: its secant gain wanders about {gain:g}")
-    return found
+    return next_gain
 
 
-def steady_cycle(actuator: Actuator, u: FloatArray, sample_time: float | None, driven: int | None = None) -> FloatArray:
-    """The displacement over a period of the voltage `u`, once it repeats, or over the last of the driven ones."""
-    if driven is not None:
-        return _driven(actuator, np.tile(u, driven), sample_time)[-u.size :]
+def steady_cycle(
+    actuator: Actuator, u: FloatArray, sample_time: float | None, periods: int | None = None
+) -> FloatArray:
+    """Displacement over a period of the voltage `u` once it repeats, or over the last of some periods."""
+    if periods is not None:
+        return _driven(actuator, np.tile(u, periods), sample_time)[-u.size :]
     periods = 3
     while True:
         y = _driven(actuator, np.tile(u, periods), sample_time)
@@ -83,15 +85,15 @@ def slopes(actuator: Actuator, u: FloatArray) -> tuple[float, float]:
     if actuator.hysteresis is None:
         return 1.0, 1.0
     voltage, level = actuator.voltage(u), _steady_level(actuator, u)
-    moves = np.diff(voltage, append=voltage[0])
-    local = np.diff(level, append=level[0])[moves != 0.0] / moves[moves != 0.0]
+    steps = np.diff(voltage, append=voltage[0])
+    local = np.diff(level, append=level[0])[steps != 0.0] / steps[steps != 0.0]
     return float(local.min()), float(local.max())
 
 
 def _driven(actuator: Actuator, u: FloatArray, sample_time: float | None) -> FloatArray:
     if sample_time is not None:
         return actuator.response(u, sample_time)
-    return np.asarray(_behind(actuator) * actuator.level(u))
+    return np.asarray(replace(actuator, amplifier=None).dc_gain * actuator.level(u))
 
 
 def _steady_level(actuator: Actuator, u: FloatArray) -> FloatArray:
@@ -99,23 +101,18 @@ def _steady_level(actuator: Actuator, u: FloatArray) -> FloatArray:
     return steady_cycle(Actuator(hysteresis=actuator.hysteresis), actuator.voltage(u), None)
 
 
-def _behind(actuator: Actuator) -> float:
-    """Gain at rest of what is behind the law."""
-    return replace(actuator, amplifier=None).dc_gain
-
-
-def _slope(actuator: Actuator, rise: float) -> float:
-    if actuator.hysteresis is None:
-        return 1.0
-    low, high = Actuator(hysteresis=actuator.hysteresis).level(np.array([0.0, rise]))
-    return float(high - low) / rise
+def _first_slope(actuator: Actuator) -> float:
+    """Secant slope of the law from 0 to 1; one without a law."""
+    low, high = replace(actuator, amplifier=None).level(np.array([0.0, 1.0]))
+    return float(high - low)
 
 
 def _secant(before: tuple[float, float], now: tuple[float, float]) -> float:
-    """Where, in log g and log f, the line through two points meets the diagonal; f where the map is no contraction."""
-    (gain, found), run = now, math.log(now[0] / before[0])
-    slope = math.log(found / before[1]) / run if run else math.inf
-    return gain * (found / gain) ** (1.0 / (1.0 - slope)) if abs(slope) < _CONTRACTION else found
+    """Gain at which, in log g and log f, the line through two points meets f = g; f if the map is no contraction."""
+    gain, value = now
+    step = math.log(gain / before[0])
+    slope = math.log(value / before[1]) / step if step else math.inf
+    return gain * (value / gain) ** (1.0 / (1.0 - slope)) if abs(slope) < _CONTRACTION else value
 
 
 def _usable(gain: float) -> float:
