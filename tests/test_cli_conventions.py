@@ -16,6 +16,7 @@ import pytest
 import hysim as hs
 from hysim._atomic import write_all
 from hysim.cli import COMMANDS, control, designs, main, outputs, parsers
+from hysim.cli.options import READERS, pair, parameter_bounds, parameter_value
 from hysim.cli.plot import KINDS
 
 LAW = hs.BoucWen(beta=0.03, gamma=0.02, gain=-0.01, feedthrough=0.03)
@@ -69,7 +70,7 @@ def test_the_commands_are_those_of_the_design():
 def test_every_option_has_help_and_every_quantity_a_unit(name):
     action = OPTIONS[name]
     assert action.help, name
-    if getattr(action.type, "__name__", "") in ("float", "_pair", "_value", "_bounds", "_quantum"):
+    if action.type in (float, pair, parameter_value, parameter_bounds, READERS["QUANTUM"]):
         assert re.search(r"\[(1|s|Hz|%%|units? of .+)\]", action.help), (name, action.help)
 
 
@@ -340,8 +341,8 @@ def test_the_kinds_of_controllers_are_the_same_in_help_and_in_designs():
     made = hs.Actuator(hysteresis=LAW, vibration=hs.mode(10.0, 0.1))
     for kind in control.CONTROLLERS:
         tuned = designs.feedback(made, kind, None) or hs.PID(kp=1.0)
-        whole = designs.whole(made, kind, None, tuned, preview=False)
-        assert (getattr(whole, "feedforward", None) is not None) == (kind in designs.INVERTING)
+        controller = designs.controller(made, kind, None, tuned, preview=False)
+        assert (getattr(controller, "feedforward", None) is not None) == (kind in designs.INVERTING)
 
 
 def test_a_plant_without_a_resting_voltage_steps_from_none():

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 import hysim as hs
 from hysim.cli import main, models, outputs
+from hysim.models.candidates import is_identifiable
 
 LAW = hs.BoucWen(beta=0.03, gamma=0.02, gain=0.01, feedthrough=0.015)
 COLUMNS = ["--u", "voltage", "--y", "displacement"]
@@ -120,10 +121,10 @@ def test_every_cycle_has_a_row_in_text_csv_and_json(run, tmp_path):
     ("options", "message"),
     [
         (("--csv", "x.csv"), "--csv writes the table of every cycle: give --cycles without a number too"),
-        (("--cycles", "0"), "expected a number of cycles, at least 1, got '0'"),
-        (("--cycles", "loop.csv"), "for the table put the file before --cycles"),
+        (("--cycles", "0"), "expected a number of cycles, at least 1; the table needs the file before --cycles, got '0'"),
+        (("--cycles", "loop.csv"), "the table needs the file before --cycles"),
         (("--cycles", "3"), "asked for 3 complete cycle(s) of the input, found 1"),
-        (("--json", "--cycles", "--csv", "-"), "--json and --csv - both write to the standard output"),
+        (("--json", "--cycles", "--csv", "-"), "two results would go to the standard output"),
         (("--cycles", "--csv", "-", "--out", "-"), "two results would go to the standard output"),
     ],
 )
@@ -189,11 +190,14 @@ def test_a_structure_takes_its_own_options_and_no_other_family_does(run):
     assert (code, err) == (2, "hysim: error: the model transfer-function needs --zeros\n")
 
 
-@pytest.mark.parametrize("name", models.FAMILIES)
-def test_every_name_of_a_model_stands_for_something_that_can_be_identified(name):
-    family = getattr(hs, models.FAMILIES[name])
-    ways = ("structure",) if name in models.STRUCTURES else ("search_space", "fitted")
-    assert any(callable(getattr(family, way, None)) for way in ways)
+def test_every_name_of_a_model_stands_for_something_that_can_be_identified(run):
+    names = models.names()
+    assert {"bouc-wen", "zhu-wang", "baber-noori", "duhem", "preisach", "play", "line"} <= set(names)
+    for name in names:
+        family = models.family(name)
+        assert is_identifiable(family) or (name, family) == ("transfer-function", hs.TransferFunction)
+    text = run("identify", "--help")[1].partition("Names of models: ")[2]
+    assert "".join(text.split()) == f"{','.join(names)}."  # lines may be broken at hyphens
 
 
 def test_models_are_compared_side_by_side_and_the_tables_written(run, tmp_path):
