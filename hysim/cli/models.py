@@ -145,7 +145,10 @@ def read(path: str) -> tuple[Any, dict[str, str]]:
 
     if is_import_path(path):
         law = imported(path)
-        return (law() if isinstance(law, type) else law), {}
+        try:
+            return (law() if isinstance(law, type) else law), {}
+        except TypeError as error:
+            raise ValueError(f"{path} needs values for its parameters: give an instance ({error})") from None
     if path == STANDARD:
         return from_json(sys.stdin.read(), "the standard input")
     return from_json(Path(path).read_bytes(), path)

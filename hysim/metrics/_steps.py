@@ -1,4 +1,4 @@
-"""The measures of a response to a step, and of what a loop takes away from its vibration.
+"""The measures of a response to a step, and of the vibration that a loop removes.
 
     eta(t) = (y - y0) / (yf - y0),    y0 the first sample, yf the mean of the last tenth of the samples
 
@@ -9,7 +9,7 @@ so that negative gains and creep need no special case. Of a plant in open and in
     t98            when eta first reaches 98 %
     residual       rms of eta - 1 from the open loop's t98, for 2 ln(50) / decay rate of its slowest vibration
 
-and each reduction is 100 (1 - closed / open) %. Crossings are interpolated. What does not exist is nan.
+and each reduction is 100 (1 - closed / open) %. Crossings are interpolated. A measure that does not exist is nan.
 """
 
 import math
@@ -22,7 +22,7 @@ from hysim._frozen import FloatArray, frozen, read_only
 from hysim._words import printed, words
 
 SETTLED = 0.02
-"""How near to its final value a response has settled."""
+"""Distance from the final value within which a response has settled, as a fraction of the step."""
 
 
 @frozen
@@ -54,7 +54,7 @@ class StepMetrics:
 @printed
 @frozen
 class VibrationReduction:
-    """What a loop takes away from the vibration after a step, always three figures together.
+    """The reduction of the vibration after a step by a loop, always three figures together.
 
     Parameters
     ----------
@@ -172,16 +172,7 @@ def vibration_reduction(
 
 
 def reduction_percent(before: float, after: float) -> float:
-    """100 (1 - after / before) %; nan if there was nothing before.
-
-    Parameters
-    ----------
-    before, after : float
-        A measure of the open and of the closed loop, in one unit.
-
-    Returns
-    -------
-    float
+    """100 (1 - after / before) %, of a measure in open and in closed loop; nan if `before` is not positive.
 
     Examples
     --------

@@ -60,13 +60,12 @@ def trade_off(tuning: Tuning, ax: Axes | None = None) -> Axes:
     """
     chosen = tuning.max_sensitivity, tuning.objective
     worst = 2.0 * tuning.max_sensitivity, _WORST_OBJECTIVE * tuning.objective
+    simulated: dict[str, Any] = {"linestyle": "none", "color": POINTS, "markersize": 3.0, "label": "simulated"}
+    best: dict[str, Any] = {"markersize": 4.0, "drawstyle": "steps-post", "label": "best so robust", **line(0)}
     with one(ax) as axes:
-        for trials, name, style in (
-            (tuning.trials, "simulated", {"linestyle": "none", "color": POINTS, "markersize": 3.0}),
-            (tuning.trade_off, "best so robust", {"markersize": 4.0, "drawstyle": "steps-post"} | line(0)),
-        ):
+        for trials, style in ((tuning.trials, simulated), (tuning.trade_off, best)):
             points = np.array([(trial.max_sensitivity, trial.objective) for trial in trials])
-            axes.plot(*points[(points <= worst).all(axis=1)].T, marker="o", label=name, **style)
+            axes.plot(*points[(points <= worst).all(axis=1)].T, marker="o", **style)
         axes.plot(*chosen, "D", color=MEASURED, markersize=7, label="chosen")
         axes.set(xlabel="Maximum sensitivity", ylabel="Objective [of the reference's span]", yscale="log")
         axes.legend()

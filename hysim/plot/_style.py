@@ -10,7 +10,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import matplotlib.style
 import numpy as np
 import numpy.typing as npt
@@ -47,7 +46,7 @@ _LINES = (
     ("#E69F00", (0, (1, 2.5))),
 )
 
-_STYLE = dict(matplotlib.rc_params_from_file(Path(__file__).with_name("house.mplstyle"), use_default_template=False))
+_STYLE = Path(__file__).with_name("house.mplstyle")
 
 _QUANTITIES = {
     **dict.fromkeys(("V", "mV", "kV"), "Voltage"),
