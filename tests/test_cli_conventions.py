@@ -16,12 +16,13 @@ import pytest
 import hysim as hs
 from hysim._atomic import write_all
 from hysim.cli import COMMANDS, control, designs, main, outputs, parsers
-from hysim.cli.options import READERS, pair, parameter_bounds, parameter_value
+from hysim.cli.options import REAL
 from hysim.cli.plot import KINDS
 
 LAW = hs.BoucWen(beta=0.03, gamma=0.02, gain=-0.01, feedthrough=0.03)
 COLUMNS = ("--u", "voltage", "--y", "displacement")
 PARSER, PARSERS = parsers()
+QUANTITIES = (*REAL, "LOW,HIGH", "FREQUENCY,DAMPING", "NAME=VALUE", "NAME=LOW:HIGH", "QUANTUM")
 OPTIONS = {
     f"{name} {action.dest}": action
     for name, parser in (("hysim", PARSER), *PARSERS.items())
@@ -70,7 +71,7 @@ def test_the_commands_are_those_of_the_design():
 def test_every_option_has_help_and_every_quantity_a_unit(name):
     action = OPTIONS[name]
     assert action.help, name
-    if action.type in (float, pair, parameter_value, parameter_bounds, READERS["QUANTUM"]):
+    if action.metavar in QUANTITIES:
         assert re.search(r"\[(1|s|Hz|%%|units? of .+)\]", action.help), (name, action.help)
 
 
@@ -320,7 +321,7 @@ def test_bounds_that_cannot_be_kept_exit_with_1(run):
         (("law.json", *DESIGN, "--step", "0"), "--step must be a number that is not zero"),
         (("law.json", *DESIGN, "--range", "2,1"), "LOW below HIGH, got 2,1"),
         (("law.json", "--sample-time", "1", "--limits", "1,0"), "--limits must be LOW,HIGH"),
-        (("law.json", *DESIGN, "--limits", "1"), "expected two numbers with a comma between them"),
+        (("law.json", *DESIGN, "--limits", "1"), "expected LOW,HIGH with numbers"),
         (("law.json", *DESIGN, "--controller", "notch"), "needs a plant with one mode, this one has 0"),
         (("law.json", *DESIGN, "--vary-mode", "10"), "needs a plant with one mode"),
         (("law.json", *DESIGN, "--mode", "1,0.1", "--vary-mode", "100"), "--vary-mode must be above 0 and below 100"),

@@ -53,7 +53,7 @@ def test_a_class_by_import_path_is_identified_as_its_family_is(run):
     assert own == named
     assert own[0] == 0
     code, out, _ = run("simulate", "my_laws:Slope", "loop.csv", "--u", "voltage")
-    assert (code, out.splitlines()[:3]) == (0, ["u,y", "0.0,0.0", "5.0,5.0"])
+    assert (code, out.splitlines()[:3]) == (0, ["u,y", "0.0,0.0", "5.0,0.0"])
 
 
 def test_laws_by_import_path_are_compared_with_families(run):
@@ -94,9 +94,9 @@ def test_an_import_path_that_leads_to_no_law_is_refused_in_one_line(run, model, 
 
 
 def test_a_class_without_default_values_is_no_model_to_simulate(run):
-    code, _, err = run("simulate", "hysim:Play", "loop.csv", "--u", "voltage")
+    code, _, err = run("simulate", "hysim:Duhem", "loop.csv", "--u", "voltage")
     assert code == 2
-    assert "hysim:Play needs values for its parameters" in err
+    assert "hysim:Duhem needs values for its parameters" in err
 
 
 def test_an_existing_file_is_read_although_its_name_looks_like_an_import_path(run, tmp_path):

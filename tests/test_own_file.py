@@ -4,6 +4,7 @@ import dataclasses
 import io
 import json
 import re
+import sys
 import xml.etree.ElementTree as ET
 from itertools import pairwise
 from pathlib import Path
@@ -121,7 +122,10 @@ def test_every_cycle_has_a_row_in_text_csv_and_json(run, tmp_path):
     ("options", "message"),
     [
         (("--csv", "x.csv"), "--csv writes the table of every cycle: give --cycles without a number too"),
-        (("--cycles", "0"), "expected a number of cycles, at least 1; the table needs the file before --cycles, got '0'"),
+        (
+            ("--cycles", "0"),
+            "expected a number of cycles, at least 1; the table needs the file before --cycles, got '0'",
+        ),
         (("--cycles", "loop.csv"), "the table needs the file before --cycles"),
         (("--cycles", "3"), "asked for 3 complete cycle(s) of the input, found 1"),
         (("--json", "--cycles", "--csv", "-"), "two results would go to the standard output"),
@@ -336,12 +340,15 @@ def test_any_file_ends_in_an_exit_code_and_at_most_one_line_of_error(text, has_m
     assert (err.getvalue().count("\n"), bool(out.getvalue())) == ((1, False) if code == 2 else (0, True))
 
 
-def test_the_commands_of_the_documentation_run_in_order(run, folder):
+def test_the_commands_of_the_documentation_run_in_order(run, folder, monkeypatch):
     page = (Path(__file__).parent.parent / "docs" / "command_line.md").read_text()
+    (folder / "my_laws.py").write_text("import hysim as hs\nMyLaw = hs.Line\nmy_law = hs.Line(slope=0.02)\n")
+    monkeypatch.syspath_prepend(folder)
     for block in re.findall(r"^```shell\n(.*?)^```", page, flags=re.MULTILINE | re.DOTALL):
         for line in block.splitlines():
             piped = None
             for command in line.split(" | "):
                 code, piped, err = run(*command.split()[1:], stdin=piped)
                 assert (code, err) == (0, ""), command
+    del sys.modules["my_laws"]
     assert {"law.json", "fit.svg", "simulated.csv", "both.svg"} <= {path.name for path in folder.iterdir()}

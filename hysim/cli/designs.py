@@ -144,11 +144,11 @@ def fit_percent(model: Any, record: Record | None) -> float:
     return metrics.fit_percent(record.y, model.response(record.u))
 
 
-def file_rms(actuator: Actuator, controller: Any, wanted: "Reference", kind: str) -> float:
+def file_rms(actuator: Actuator, controller: Any, reference: "Reference", kind: str) -> float:
     """Tracking rms along the reference in a file; nan for the triangle and the step, which have other measures."""
     if kind in ("triangle", "step"):
         return math.nan
-    return metrics.rmse(wanted.values, close_loop(actuator, controller, wanted.t, wanted.values).y)
+    return metrics.rmse(reference.values, close_loop(actuator, controller, reference.t, reference.values).y)
 
 
 class Reference(NamedTuple):
@@ -160,15 +160,15 @@ class Reference(NamedTuple):
     objective: str
 
 
-def reference(asked: Task, rest: float, kind: str) -> Reference:
+def reference(task: Task, rest: float, kind: str) -> Reference:
     """The triangle, the step from a displacement at rest, or the reference in a file."""
-    h = asked.sample_time
+    h = task.sample_time
     if kind == "step":
-        samples = round(asked.duration / h) + 1
-        return _evenly(np.full(samples, rest + asked.step), h, 0.0, "itae")
+        samples = round(task.duration / h) + 1
+        return _evenly(np.full(samples, rest + task.step), h, 0.0, "itae")
     if kind == "triangle":
-        values = signals.triangle(asked.low, asked.high, cycles=2, samples_per_cycle=asked.samples_per_cycle)
-        return _evenly(values, h, asked.period, "rms")
+        values = signals.triangle(task.low, task.high, cycles=2, samples_per_cycle=task.samples_per_cycle)
+        return _evenly(values, h, task.period, "rms")
     return _evenly(load(kind, t=0, u=1, y=1).resample(h).u, h, 0.0, "rms")
 
 

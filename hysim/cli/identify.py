@@ -20,12 +20,8 @@ def run(options: argparse.Namespace) -> int:
         fixed=dict(options.fix),
         free=tuple(options.free),
         bounds=dict(options.bounds),
-        initial=options.initial,
-        noise=options.noise,
-        intervals=options.intervals,
-        cross_validate=options.cross_validate,
-        seed=options.seed,
         progress=outputs.progress(),
+        **outputs.fields_of(options, ("initial", "noise", "intervals", "cross_validate", "seed")),
     )
     names = (
         "estimates", "stderr", "intervals", "interval_method", "free_names", "n_parameters", "noise", "sigma",
@@ -38,9 +34,7 @@ def run(options: argparse.Namespace) -> int:
             options.plot: lambda: outputs.loop_of_model(record, fit.model),
         },
         outputs.printed(
-            options,
-            lambda: {"family": type(fit.model).__name__} | outputs.fields_of(fit, names),
-            fit.summary,
+            options, lambda: {"family": type(fit.model).__name__} | outputs.fields_of(fit, names), fit.summary
         ),
     )
     return SUCCESS if fit.success else NOT_CONVERGED

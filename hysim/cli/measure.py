@@ -21,12 +21,8 @@ def run(options: argparse.Namespace) -> int:
     motion = displacement(
         options.frames,
         options.scale,
-        region=options.region,
-        direction=options.direction,
-        reference=options.reference,
-        method=options.method,
-        unit=options.unit,
         progress=outputs.progress(),
+        **outputs.fields_of(options, ("region", "direction", "reference", "method", "unit")),
     )
     columns, units = _table(options, motion, log)
     outputs.write(

@@ -13,7 +13,7 @@ from hysim._frozen import FloatArray
 from hysim.cli.records import STANDARD
 
 FORMS = "name of a family, such as bouc-wen; MODEL.json; or module:name of your own"
-"""What an option for models takes."""
+"""Values of an option for models."""
 
 OPTIONS = f"""
 --model MODEL  {FORMS}; an unknown name lists the names [required]
@@ -58,10 +58,10 @@ def family(name: str) -> Any:
     from hysim.models.model import FAMILIES
 
     public = {_hyphenated(each): each for each in hysim.__all__ if each[0].isupper()} | _SHORT
-    found = resolved(f"hysim:{public[name]}") if name in public else None
-    if found is None or FAMILIES.get(public[name]) is not found:
+    law = resolved(f"hysim:{public[name]}") if name in public else None
+    if law is None or FAMILIES.get(public[name]) is not law:
         raise ValueError(f"there is no model {name!r}: give MODEL.json, module:name, or one of {', '.join(names())}")
-    return found
+    return law
 
 
 def _hyphenated(name: str) -> str:
@@ -70,7 +70,7 @@ def _hyphenated(name: str) -> str:
 
 
 def resolved(path: str) -> Any:
-    """The object at an import path, `module:name`; modules in the current folder are found.
+    """The object at an import path, `module:name`; modules in the current folder are importable.
 
     Raises
     ------

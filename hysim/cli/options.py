@@ -120,37 +120,23 @@ def word_or_number(
     return read
 
 
-def numbers(text: str, separator: str, count: int, expected: str, number: Callable[[str], Any] = float) -> Any:
-    """A tuple of numbers in a text."""
-    try:
-        values = tuple(map(number, text.split(separator)))
-    except ValueError:
-        values = ()
-    if len(values) != count:
-        raise argparse.ArgumentTypeError(f"expected {expected}, got {text!r}")
-    return values
+def numbers(form: str, number: Callable[[str], float] = float) -> Callable[[str], Any]:
+    """A reader of numbers with the signs between them that a form has, such as ``LOW,HIGH`` or ``NAME=LOW:HIGH``."""
+    names, equals, values = form.rpartition("=")
+    separator = ":" if ":" in values else ","
 
+    def read(text: str) -> Any:
+        name, _, rest = text.partition("=") if equals else ("", "", text)
+        try:
+            parts = tuple(map(number, rest.split(separator)))
+        except ValueError:
+            parts = ()
+        if len(parts) != len(values.split(separator)):
+            raise argparse.ArgumentTypeError(f"expected {form} with numbers, got {text!r}")
+        content = parts[0] if len(parts) == 1 else parts
+        return (name, content) if names else content
 
-def pair(text: str) -> Any:
-    """Two numbers, as in ``0,10``."""
-    return numbers(text, ",", 2, "two numbers with a comma between them")
-
-
-def parameter_value(text: str) -> tuple[str, float]:
-    """Name and value, as in ``n=1``."""
-    name, _, value = text.partition("=")
-    return name, numbers(value, ":", 1, "NAME=VALUE with numbers, as in n=1")[0]
-
-
-def parameter_bounds(text: str) -> tuple[str, Any]:
-    """Name and bounds, as in ``beta=0:2``."""
-    name, _, interval = text.partition("=")
-    return name, numbers(interval, ":", 2, "NAME=LOW:HIGH with numbers, as in beta=0:2")
-
-
-def region(text: str) -> Any:
-    """Rows and columns, as in ``10,90,20,180``."""
-    return numbers(text, ",", 4, "top,bottom,left,right in pixels", int)
+    return read
 
 
 def column(text: str) -> str | int:
@@ -172,19 +158,15 @@ def library(text: str) -> str | list[str]:
     return names if len(names) > 1 or "'" in text else text
 
 
-_WHOLE = "N NUMBER DEGREE"
-_REAL = "STEP TIME RMS PERCENT BOUND HERTZ HEIGHT VALUE SHARE LENGTH"
+REAL = ("STEP", "TIME", "RMS", "PERCENT", "BOUND", "HERTZ", "HEIGHT", "VALUE", "SHARE", "LENGTH")
 READERS: dict[str, Callable[[str], Any]] = {
-    **dict.fromkeys(_WHOLE.split(), int),
-    **dict.fromkeys(_REAL.split(), float),
-    "LOW,HIGH": pair,
-    "FREQUENCY,DAMPING": pair,
+    **dict.fromkeys(("N", "NUMBER", "DEGREE"), int),
+    **dict.fromkeys(REAL, float),
+    **{form: numbers(form) for form in ("LOW,HIGH", "FREQUENCY,DAMPING", "NAME=VALUE", "NAME=LOW:HIGH")},
+    "T,B,L,R": numbers("T,B,L,R", int),
     "COLUMN": column,
     "SIGNAL=UNIT": unit,
-    "NAME=VALUE": parameter_value,
-    "NAME=LOW:HIGH": parameter_bounds,
     "NAME|TERMS": library,
-    "T,B,L,R": region,
     "QUANTUM": word_or_number("a number or detect", "detect", number=float),
     "CYCLES": word_or_number("a number of cycles, at least 1; the table needs the file before --cycles", least=1),
     "loo|cycles|K": word_or_number("loo, cycles or a number of blocks", "loo", "cycles", least=0),

@@ -136,7 +136,7 @@ def scalars(result: Any) -> dict[str, Any]:
 
 
 def fields_of(result: Any, names: Iterable[str]) -> dict[str, Any]:
-    """Some fields of a result, by name."""
+    """Some fields of a result, or values of options, by name."""
     return {name: vars(result)[name] for name in names}
 
 

@@ -33,23 +33,15 @@ class Contents(NamedTuple):
 
 
 class Kind(NamedTuple):
-    """A kind of picture: its description, how it is drawn, and the least and largest numbers of records and models."""
+    """A kind of picture: its description, its drawing, and bounds of the numbers of records and models."""
 
     shows: str
-    draw: "Callable[[Figure, Contents], None]"
+    draw: "Callable[[Any, Figure, Contents], object]"
     records: tuple[int, int] = (1, _MANY)
     models: tuple[int, int] = (0, _MANY)
 
 
-def _loop(canvas: "Figure", contents: Contents) -> None:
-    from hysim import plot
-
-    plot.loop(*contents.results, ax=canvas.add_subplot())
-
-
-def _history(canvas: "Figure", contents: Contents) -> None:
-    from hysim import plot
-
+def _history(plot: Any, canvas: "Figure", contents: Contents) -> None:
     panels = plot.panels(canvas, 2)
     for result in contents.results:
         plot.history(result, panels)
@@ -58,35 +50,13 @@ def _history(canvas: "Figure", contents: Contents) -> None:
         panels[0].legend()
 
 
-def _width(canvas: "Figure", contents: Contents) -> None:
-    from hysim import plot
-
-    plot.width(*contents.results, ax=canvas.add_subplot())
-
-
-def _minor_loops(canvas: "Figure", contents: Contents) -> None:
-    from hysim import plot
-
+def _minor_loops(plot: Any, canvas: "Figure", contents: Contents) -> None:
     for result, ax in zip(contents.results, plot.panels(canvas, len(contents.results)), strict=True):
         plot.minor_loops(result, ax)
 
 
-def _residual_map(canvas: "Figure", contents: Contents) -> None:
-    from hysim import plot
-
-    plot.residual_map(contents.measured[0], contents.simulated[0], canvas.subplots(1, 2, sharey=True))
-
-
-def _forc(canvas: "Figure", contents: Contents) -> None:
-    from hysim import plot
-
-    plot.forc(contents.measured[0], canvas.add_subplot())
-
-
-def _describing_function(canvas: "Figure", contents: Contents) -> None:
+def _describing_function(plot: Any, canvas: "Figure", contents: Contents) -> None:
     import numpy as np
-
-    from hysim import plot
 
     record = contents.measured[0]
     lowest, highest = float(record.u.min()), float(record.u.max())
@@ -96,14 +66,25 @@ def _describing_function(canvas: "Figure", contents: Contents) -> None:
 
 
 KINDS = {
-    "loop": Kind("output against input", _loop),
+    "loop": Kind("output against input", lambda plot, canvas, c: plot.loop(*c.results, ax=canvas.add_subplot())),
     "history": Kind("output and input against time", _history),
-    "width": Kind("width of the last cycle against the input", _width),
+    "width": Kind(
+        "width of the last cycle against the input",
+        lambda plot, canvas, c: plot.width(*c.results, ax=canvas.add_subplot()),
+    ),
     "minor-loops": Kind("each cycle as a loop, the smaller the darker", _minor_loops),
     "residual-map": Kind(
-        "measured minus model over input and cycles; one file, one model", _residual_map, records=(1, 1), models=(1, 1)
+        "measured minus model over input and cycles; one file, one model",
+        lambda plot, canvas, c: plot.residual_map(c.measured[0], c.simulated[0], canvas.subplots(1, 2, sharey=True)),
+        records=(1, 1),
+        models=(1, 1),
     ),
-    "forc": Kind("density of relays, from first-order reversal curves; one file", _forc, records=(1, 1), models=(0, 0)),
+    "forc": Kind(
+        "density of relays, from first-order reversal curves; one file",
+        lambda plot, canvas, c: plot.forc(c.measured[0], canvas.add_subplot()),
+        records=(1, 1),
+        models=(0, 0),
+    ),
     "describing-function": Kind(
         "gain and phase of models over the amplitudes in the file", _describing_function, models=(1, _MANY)
     ),
@@ -120,8 +101,10 @@ def run(options: argparse.Namespace) -> int:
             raise ValueError(f"--kind {options.kind} takes {number} {name}, got {len(paths)}")
     if [*files, *options.model].count(records.STANDARD) > 1:
         raise ValueError("the standard input holds one record or one model, not both: give files for the others")
+    from hysim import plot
+
     contents = _contents(options, files)
-    outputs.write({options.out: lambda: outputs.drawn(lambda canvas: kind.draw(canvas, contents))})
+    outputs.write({options.out: lambda: outputs.drawn(lambda canvas: kind.draw(plot, canvas, contents))})
     return 0
 
 

@@ -54,13 +54,13 @@ def read(options: argparse.Namespace, file: str | None = None) -> Record:
         u=u,
         y=options.y if "y" in options else u,
         t=False if options.no_t else options.t,
-        on_missing=options.on_missing,
         delimiter=_DELIMITERS.get(options.delimiter, options.delimiter),
+        units=dict(options.unit),
+        name="record" if path == STANDARD else None,
+        on_missing=options.on_missing,
         decimal=options.decimal,
         encoding=options.encoding,
-        units=dict(options.unit),
         resolution=options.resolution,
-        name="record" if path == STANDARD else None,
     )
     if options.sample_time is None:
         return record

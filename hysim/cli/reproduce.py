@@ -50,8 +50,8 @@ def _verdicts(claims: "Sequence[Claim]") -> Iterator[str]:
             yield f"{claim.id}: {claim.recomputed:.1f} % where the paper says {claim.printed:g} %, {claim.verdict}"
 
 
-def _progress(done: int, total: int, what: str) -> None:
-    print(f"[{done + 1}/{total + 1}] {what}", file=sys.stderr, flush=True)
+def _progress(done: int, total: int, step: str) -> None:
+    print(f"[{done + 1}/{total + 1}] {step}", file=sys.stderr, flush=True)
 
 
 COMMAND = Command(

@@ -44,16 +44,16 @@ def handled() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    wanted = [signal.Signals[name] for name in _NAMES if name in signal.Signals.__members__]
-    ours = [number for number in wanted if signal.getsignal(number) is signal.SIG_DFL]
-    watched = [*ours, *(number for number in wanted if signal.getsignal(number) is signal.default_int_handler)]
-    for number in ours:
+    numbers = [signal.Signals[name] for name in _NAMES if name in signal.Signals.__members__]
+    unhandled = [number for number in numbers if signal.getsignal(number) is signal.SIG_DFL]
+    watched = [*unhandled, *(number for number in numbers if signal.getsignal(number) is signal.default_int_handler)]
+    for number in unhandled:
         signal.signal(number, _raise)
     try:
         with _watched(frozenset(watched)):
             yield
     finally:
-        for number in ours:
+        for number in unhandled:
             signal.signal(number, signal.SIG_DFL)
 
 

@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
 def _document(result: "Sweep") -> dict[str, Any]:
     import numpy as np
 
-    known = {name: values[np.isfinite(values)] for name, values in result.outputs.items()}
+    finite = {name: values[np.isfinite(values)] for name, values in result.outputs.items()}
     return {
         "n_tasks": result.n_tasks,
         "n_done": len(result),
@@ -51,7 +51,7 @@ def _document(result: "Sweep") -> dict[str, Any]:
         "outputs": {
             name: dict(zip(("lowest", "median", "highest"), np.quantile(values, [0.0, 0.5, 1.0]).tolist(), strict=True))
             | {"not_finite": len(result) - values.size}
-            for name, values in known.items()
+            for name, values in finite.items()
             if values.size
         },
     }
@@ -72,20 +72,12 @@ def _computed(options: argparse.Namespace) -> Any:
     if not options.study or not options.out:
         raise ValueError("give a study and --out RESULTS.sqlite, or --show RESULTS.sqlite")
     if Path(options.out).exists() and not options.resume:
-        raise ValueError(f"{options.out} exists: --resume goes on with it; else give another --out")
+        raise ValueError(f"{options.out} exists: continue it with --resume, or give another --out")
     task, space, seed, files = studies.read(options.study)
     outputs.keep(files, [options.out, options.csv, options.plot])
     with _executor(options) as executor:
-        return sweep(
-            task,
-            space,
-            executor=executor,
-            workers=options.workers,
-            store=options.out,
-            seed=seed,
-            on_change=options.on_change,
-            progress=progress(),
-        )
+        how = outputs.fields_of(options, ("workers", "on_change"))
+        return sweep(task, space, executor=executor, store=options.out, seed=seed, progress=progress(), **how)
 
 
 @contextmanager

@@ -99,8 +99,8 @@ def to_words(comparison: "Comparison") -> str:
     best = [row.name for row in comparison.ranked()]
     unknown = [row.name for row in comparison.rows if math.isnan(row.cv_rmse)]
     by_name = {row["name"]: row for row in rows(comparison)}
-    wanted = ("name", "n_parameters", "fit_percent", "rmse", "cv_rmse", "max_width")
-    chosen = [column for column in columns(comparison, timings=False) if column.name in wanted]
+    names = ("name", "n_parameters", "fit_percent", "rmse", "cv_rmse", "rmse_ratio", "max_width")
+    chosen = [column for column in columns(comparison, timings=False) if column.name in names]
     ordered = [by_name[name] for name in best + unknown]
     table = [["", *(column.heading for column in chosen[1:])]]
     table += [[_printed(row[column.name], column.digits) for column in chosen] for row in ordered[:_PRINTED]]

@@ -1,4 +1,4 @@
-"""Pictures of results: functions of a result and, if wanted, of the Axes to draw on.
+"""Pictures of results: functions of a result and, optionally, of the Axes to draw on.
 
 All functions have in common
 

@@ -22,7 +22,7 @@ def selection(discovery: Discovery, axes: Sequence[Axes] | AxesArray | None = No
     """Draw the fit and the BIC of the free run of a discovery against the number of terms, on two Axes.
 
     `discovery` is a result of `hysim.discover`. The structures on the path of thresholds are circles, and the chosen
-    law is a diamond, which need not be on the path: the search goes on from it by removing terms. A structure that fits
+    law is a diamond, which need not be on the path: the search removes further terms from it. A structure that fits
     5 % worse than the best, or whose free run diverges, is a cross on the edge. The result has shape (2,).
     """
     n_terms, fits, scores = discovery.path_n_terms, discovery.path_fit_percent, discovery.scores

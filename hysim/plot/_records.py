@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from hysim._frozen import FloatArray
+from hysim.control import ClosedLoop
 from hysim.plot._style import MARKERS, MEASURED, POINTS, AxesArray, label, line, one, several
 from hysim.records import Record
 
@@ -51,21 +52,6 @@ class _WithTime(Protocol):
 @runtime_checkable
 class _WithMemory(Protocol):
     z: FloatArray | None
-
-
-class Response(Protocol):
-    """A result that can be drawn as a response: a closed loop, or anything with these arrays."""
-
-    @property
-    def t(self) -> FloatArray: ...
-    @property
-    def reference(self) -> FloatArray: ...
-    @property
-    def y(self) -> FloatArray: ...
-    @property
-    def measurement(self) -> FloatArray: ...
-    @property
-    def units(self) -> Mapping[str, str]: ...
 
 
 def times_of(result: InputOutput) -> FloatArray | None:
@@ -195,7 +181,7 @@ def traces(
     return axes
 
 
-def response(run: Response, ax: Axes | None = None) -> Axes:
+def response(run: ClosedLoop, ax: Axes | None = None) -> Axes:
     """Draw reference and displacement of a closed loop against time, and the measurement where it differs.
 
     `run` is a result of `hysim.close_loop`, or anything with t, reference, y, measurement, shape (n,), and units.

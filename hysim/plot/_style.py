@@ -1,4 +1,4 @@
-"""The house style: thin spines, a light grid, and lines told apart by dash and lightness as well as by colour.
+"""The house style: thin spines, a light grid, and lines that differ in dashes and lightness as well as in colour.
 
 The colours are those of M. Okabe and K. Ito (2008), chosen for the colour-blind.
 """
