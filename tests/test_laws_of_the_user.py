@@ -64,15 +64,13 @@ def test_laws_by_import_path_are_compared_with_families(run):
     assert document["rows"][2]["fit_percent"] == pytest.approx(100.0)
 
 
-def test_a_study_takes_a_law_by_import_path(run, tmp_path):
+def test_a_study_of_data_executes_no_code(run, tmp_path):
     response = 'record = "loop.csv"\nu = "voltage"\ny = "displacement"\n[grid]\nbeta = [0.02, 0.03]\n'
-    for name, law in (("own", "my_laws:law"), ("stored", "law.json")):
-        (tmp_path / f"{name}.toml").write_text(f'[response]\nlaw = "{law}"\n{response}')
-        assert run("sweep", f"{name}.toml", "--out", f"{name}.sqlite", "--csv", f"{name}.csv")[0] == 0
-    tables = [(tmp_path / f"{name}.csv").read_text().splitlines() for name in ("own", "stored")]
-    rmse = [[line.split(",")[:3] for line in table] for table in tables]
-    assert rmse[0] == rmse[1]
-    assert rmse[0][0][1:] == ["beta", "rmse"]
+    (tmp_path / "study.toml").write_text(f'[response]\nlaw = "my_laws:law"\n{response}')
+    code, out, err = run("sweep", "study.toml", "--out", "rows.sqlite")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "law takes a family or a file, got 'my_laws:law': a law of your own is code, which a task can use" in err
+    assert "my_laws" not in sys.modules
 
 
 @pytest.mark.parametrize(

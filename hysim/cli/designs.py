@@ -104,13 +104,7 @@ def limits(options: argparse.Namespace, record: Record | None) -> Pair | None:
 
 
 def task(actuator: Actuator, options: argparse.Namespace, within: Pair | None) -> Task:
-    """The task of the loop.
-
-    Raises
-    ------
-    ValueError
-        If no option limits the range, or a number is outside its bounds.
-    """
+    """The task of the loop; a ValueError if no option limits the range, or a number is outside its bounds."""
     h = _positive("--sample-time", options.sample_time)
     low, high = options.range or _reach(actuator, within)
     if not low < high:
@@ -193,10 +187,8 @@ def feedback(actuator: Actuator, kind: str, within: Pair | None) -> PID | Tracki
 def controller(actuator: Actuator, kind: str, within: Pair | None, tuned: Any, *, preview: bool) -> Any:
     """The controller of a kind, with a tuned feedback.
 
-    Raises
-    ------
-    TypeError, ValueError
-        If the plant lacks the inverse or the single mode that the kind needs, or a preview has no inverse to serve.
+    A TypeError or ValueError is raised if the plant lacks the inverse or the single mode that the kind needs, or a
+    preview has no inverse to serve.
     """
     if kind not in INVERTING:
         if preview:

@@ -48,13 +48,7 @@ def names() -> list[str]:
 
 
 def family(name: str) -> Any:
-    """The family that has a name on the command line, such as ``bouc-wen``.
-
-    Raises
-    ------
-    ValueError
-        If there is none; the message lists the names.
-    """
+    """The family with a name such as ``bouc-wen``; a ValueError, which lists the names, if there is none."""
     from hysim.models.model import FAMILIES
 
     public = {_hyphenated(each): each for each in hysim.__all__ if each[0].isupper()} | _SHORT
@@ -72,10 +66,7 @@ def _hyphenated(name: str) -> str:
 def resolved(path: str) -> Any:
     """The object at an import path, `module:name`; modules in the current folder are importable.
 
-    Raises
-    ------
-    ValueError
-        If there is no such module, or it does not have the name.
+    A ValueError is raised if there is no such module, or it does not have the name.
     """
     module, _, name = path.partition(":")
     if os.getcwd() not in sys.path:
@@ -96,13 +87,7 @@ def is_import_path(text: str) -> bool:
 
 
 def imported(path: str) -> Any:
-    """The family or model at an import path.
-
-    Raises
-    ------
-    ValueError
-        If there is no such module or name, or it is no law.
-    """
+    """The family or model at an import path; a ValueError if there is no such name, or it is no law."""
     from hysim.models.candidates import is_identifiable
 
     law = resolved(path)
@@ -121,10 +106,8 @@ def chosen(text: str) -> Any:
 def to_identify(options: argparse.Namespace) -> Any:
     """The argument of `identify` for these options.
 
-    Raises
-    ------
-    ValueError
-        If there is no such model, an option belongs to another one, or one that this model needs is missing.
+    A ValueError is raised if there is no such model, an option belongs to another one, or one that this model needs is
+    missing.
     """
     structure = {name: vars(options)[name] for name in _STRUCTURE if vars(options)[name] is not None}
     if options.model != "transfer-function":
@@ -160,13 +143,7 @@ def name_of(path: str) -> str:
 
 
 def simulated(model: Any, record: "hysim.Record", units: dict[str, str]) -> "hysim.Simulation":
-    """The model's free run over the record's input.
-
-    Raises
-    ------
-    ValueError
-        If the model has no response, such as a controller.
-    """
+    """The model's free run over the record's input; a ValueError if it has no response, such as a controller."""
     if not isinstance(model, Responding):
         raise ValueError(f"a {type(model).__name__} has no response to simulate: give a law or a plant")
     return hysim.simulate(model, record.t, record.u, units=units)

@@ -29,11 +29,8 @@ _ENDINGS = (".svg", ".png", ".pdf")
 def check(options: argparse.Namespace) -> None:
     """Refuse results of a command that cannot be written, before anything is computed.
 
-    Raises
-    ------
-    ValueError
-        If a folder does not exist or may not be written to, the ending of a picture or a table is unknown, two results
-        would go to one place, such as the standard output, or a result would overwrite an input.
+    A ValueError is raised if a folder does not exist or may not be written to, the ending of a picture or a table is
+    unknown, two results would go to one place, such as the standard output, or a result would overwrite an input.
     """
     inputs: list[str] = []
     results: list[tuple[str, str]] = []
@@ -141,12 +138,9 @@ def fields_of(result: Any, names: Iterable[str]) -> dict[str, Any]:
 
 
 def table(path: str, columns: Mapping[str, "FloatArray"], units: Mapping[str, str]) -> str | bytes:
-    """Columns in the format that the ending of their path names; the standard output gets comma-separated text.
+    """Columns in the format of their path's ending; the standard output gets comma-separated text.
 
-    Raises
-    ------
-    ValueError
-        If the ending names none, or its format needs an extra.
+    A ValueError is raised if the ending is unknown, or its format needs an extra.
     """
     if path == STANDARD:
         return to_csv(columns, units)

@@ -1,27 +1,6 @@
-"""Studies in TOML files: the task, its parameters, and the seed.
+"""Studies in TOML files: a task or a law on a record, its parameters, and the seed; docs/studies.md has the format.
 
-seed = 1
-task = "width.py:width"                 a function in a file beside this one, or "package.module:function"
-
-[response]                              or, instead of the task, a law on a record
-law = "law.json"                        or a name that `hysim identify --model` takes
-record = "loop.csv"                     beside this file; or "table1"
-u = "voltage"                           its columns
-y = "displacement"
-measure = "rmse"
-
-[grid]                                  values of each parameter, all combinations
-beta = [0.2, 0.5]
-n = {from = 1.0, to = 2.0, number = 5}
-
-[[list]]                                or one table for each task
-beta = 0.2
-
-[sample]                                or a sample
-n = 64
-method = "sobol"
-distributions.beta = [0.2, 0.5]         low, high
-distributions.n = {name = "norm", loc = 1.5, scale = 0.1}       of scipy.stats
+A study with a task is code: its module or file is executed. A study with a response is data only.
 """
 
 import functools
@@ -49,15 +28,7 @@ class Study(NamedTuple):
 
 
 def read(path: str) -> Study:
-    """The study in a file.
-
-    Raises
-    ------
-    ValueError
-        If the file is not such a study; the message names it.
-    OSError
-        If it cannot be read.
-    """
+    """The study in a file; a ValueError that names the file if it is no study, an OSError if it cannot be read."""
     try:
         document = tomllib.loads(Path(path).read_text(encoding="utf-8"))
         _check(document, {"seed", "task", "response", *_SPACES}, "a study")
@@ -114,7 +85,9 @@ def _response(table: Mapping[str, Any], folder: Path) -> Any:
     _check(table, {"law", "record", "u", "y", "measure"}, "[response]")
     name = table["law"]
     is_file = name.endswith(".json") or (folder / name).is_file()
-    law = hysim.load_model(folder / name) if is_file else models.chosen(name)
+    if not is_file and models.is_import_path(name):
+        raise ValueError(f"law takes a family or a file, got {name!r}: a law of your own is code, which a task can use")
+    law = hysim.load_model(folder / name) if is_file else models.family(name)
     if table["record"] == "table1":
         record = hysim.datasets.table1()
     else:

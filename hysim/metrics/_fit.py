@@ -20,19 +20,8 @@ from hysim._frozen import FloatArray, read_only
 def rmse(y: npt.ArrayLike, y_model: npt.ArrayLike) -> float:
     """Root mean square of y - y_model [unit of y].
 
-    Parameters
-    ----------
-    y, y_model : array, shape (N,)
-        Measured and modelled output [unit of y].
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    ValueError
-        If lengths differ, a value is not finite or there is no sample.
+    `y` and `y_model` are the measured and the modelled output, shape (N,) [unit of y]. A ValueError is raised if
+    lengths differ, a value is not finite or there is no sample.
 
     Examples
     --------
@@ -77,25 +66,9 @@ def fit_percent(y: npt.ArrayLike, y_model: npt.ArrayLike) -> float:
 def fpe(residual: npt.ArrayLike, n_parameters: int) -> float:
     """Final prediction error V (1 + d/N) / (1 - d/N) [unit of y, squared]; nan where d >= N.
 
-    Parameters
-    ----------
-    residual : array, shape (N,)
-        Measured minus model [unit of y].
-    n_parameters : int
-        Number d of fitted parameters.
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    ValueError
-        If there is no sample, a value is not finite or `n_parameters` is negative.
-
-    References
-    ----------
-    H. Akaike, Ann. Inst. Statist. Math. 21 (1969) 243.
+    `residual` is measured minus model, shape (N,) [unit of y], and `n_parameters` the number d of fitted parameters. A
+    ValueError is raised if there is no sample, a value is not finite or the number is negative. Source: H. Akaike, Ann.
+    Inst. Statist. Math. 21 (1969) 243.
 
     Examples
     --------

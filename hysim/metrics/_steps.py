@@ -33,14 +33,12 @@ class StepMetrics:
     ----------
     initial, final : float
         First value, and mean of the last tenth [unit of y].
-    rise_time : float
-        From 10 to 90 % [unit of t].
+    rise_time, t98 : float
+        Time from 10 to 90 %, and time at which 98 % is first reached [unit of t].
     overshoot : float
         Largest excess over the final value [% of the step], at least 0.
     settling_time : float
-        After which the response stays within 2 % [unit of t]; nan if it does not before the last tenth.
-    t98 : float
-        When 98 % is first reached [unit of t].
+        Time after which the response stays within 2 %; nan if it does not before the last tenth [unit of t].
     """
 
     initial: float
@@ -91,20 +89,9 @@ def _in_words(response: StepMetrics) -> str:
 def step_metrics(t: npt.ArrayLike, y: npt.ArrayLike) -> StepMetrics:
     """Measure a response to a step at the first sample.
 
-    Parameters
-    ----------
-    t, y : array, shape (n,)
-        Increasing times and outputs; long enough for the output to come to rest.
-
-    Returns
-    -------
-    StepMetrics
-        All nan, beside the two levels, if the output ends where it began.
-
-    Raises
-    ------
-    ValueError
-        If lengths differ, a value is not finite, or there are fewer than 10 samples.
+    `t` and `y` are increasing times and outputs, shape (n,), long enough for the output to come to rest. All measures
+    but the two levels are nan if the output ends where it began. A ValueError is raised if lengths differ, a value is
+    not finite, or there are fewer than 10 samples.
 
     Examples
     --------

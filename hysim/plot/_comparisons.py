@@ -80,27 +80,10 @@ def comparison(
 ) -> AxesArray:
     """Draw the best models side by side: one row per model, with its loop, its residuals and its loop width.
 
-    Parameters
-    ----------
-    comparison : Comparison
-        The models on one record.
-    names : sequence of str, optional
-        The models, in this order; by default the four with the smallest cross-validated rmse, or the first four.
-    axes : Axes, three for each model, optional
-        Where to draw, row by row.
-    quanta : str
-        Name of the sensor's quanta, as in `residuals`.
-
-    Returns
-    -------
-    array of Axes, shape (n_models, 3)
-
-    Raises
-    ------
-    ValueError
-        If there is nothing to draw, or too few Axes.
-    KeyError
-        If there is no model of a name.
+    `names` are those of the models, in this order; by default the four with the smallest cross-validated rmse, or the
+    first four. `axes` are three for each model, row by row, and `quanta` is the name of the sensor's quanta, as in
+    `residuals`. The result has shape (n_models, 3). A ValueError is raised if there is nothing to draw, a KeyError if
+    there is no model of a name.
 
     Examples
     --------
@@ -135,28 +118,11 @@ def identification(
 ) -> AxesArray:
     """Draw the model over the measured loop, the residuals, and the profiles of the likelihood if there are any.
 
-    The band is two standard errors of the model's output wide to each side. Residuals are counted in quanta of the
-    sensor if its resolution is known, with lines at one quantum. A profile is the signed root of the deviance over the
+    `record` is the Record, or the sequence of them, from which `fit` was identified; another one is a ValueError. The
+    band is two standard errors of the model's output wide to each side. Residuals are counted in quanta of the sensor
+    if its resolution is known, with lines at one quantum. A profile is the signed root of the deviance over the
     distance from the estimate in standard errors: the diagonal, where the likelihood is that of a normal distribution.
-    The interval at 95 % lies between the horizontal lines.
-
-    Parameters
-    ----------
-    fit : Identification
-        The result of `hysim.identify`.
-    record : Record or sequence of Record
-        The data of the identification.
-    axes : two Axes, or three with profiles, optional
-        For the loop, the residuals, and the profiles.
-
-    Returns
-    -------
-    array of Axes, shape (2,) or (3,)
-
-    Raises
-    ------
-    ValueError
-        If the result is of another record, or there are fewer Axes than needed.
+    The interval at 95 % lies between the horizontal lines. The result has shape (2,), or (3,) with profiles.
 
     Examples
     --------

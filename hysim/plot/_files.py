@@ -32,22 +32,8 @@ _NAME = re.compile(r"[A-Za-z][\w-]*", re.ASCII)
 def to_svg(figure: Figure, *, name: str = "figure") -> str:
     """Write a figure as one ``<svg>`` element, good as a file and inside an HTML page.
 
-    Parameters
-    ----------
-    figure : Figure
-        Any matplotlib figure.
-    name : str
-        Prefix of all ids: pictures on one page need different names.
-
-    Returns
-    -------
-    str
-        The same bytes for the same figure and name, in any process.
-
-    Raises
-    ------
-    ValueError
-        If the name is not a letter followed by letters, digits, `_` and `-`.
+    `name` is the prefix of all ids: pictures on one page need different names, each a letter followed by letters,
+    digits, `_` and `-`, else a ValueError is raised. The same figure and name give the same bytes, in any process.
     """
     if not _NAME.fullmatch(name):
         raise ValueError(f"name must be a letter followed by letters, digits, _ and -, got {name!r}")
@@ -79,23 +65,8 @@ def save_svg(figure: Figure, path: str | Path, *, name: str | None = None) -> No
 def to_bytes(figure: Figure, form: str, *, name: str = "figure") -> bytes:
     """Write a figure as the content of a file, the same bytes each time.
 
-    Parameters
-    ----------
-    figure : Figure
-        Any matplotlib figure.
-    form : {"svg", "png", "pdf"}
-        The format; PNG has 200 dots an inch.
-    name : str
-        As in `to_svg`.
-
-    Returns
-    -------
-    bytes
-
-    Raises
-    ------
-    ValueError
-        If there is no such format.
+    `form` is ``"svg"``, ``"png"``, with 200 dots per inch, or ``"pdf"``; another word is a ValueError. `name` is as in
+    `to_svg`.
 
     Examples
     --------

@@ -84,28 +84,10 @@ def animate(
 ) -> FuncAnimation:
     """Animate a point that moves along the loop, with a trail behind it, over the whole path in light grey.
 
-    Parameters
-    ----------
-    result : Record, Simulation or anything with `u` and `y`
-        The path. Frames are evenly spaced in its time, if it has one, else in its samples.
-    ax : Axes, optional
-        Where to draw.
-    frames : int
-        Number of pictures, at least 2; the first shows the first sample, the last one the last.
-    interval : float
-        Time between two pictures [ms].
-    trail : float
-        Length of the trail, as a fraction of the record.
-
-    Returns
-    -------
-    matplotlib.animation.FuncAnimation
-        Keep a reference to it, or it stops. ``save("loop.gif", writer="pillow")`` writes it to a file.
-
-    Raises
-    ------
-    ValueError
-        If there are fewer than 2 frames.
+    `result` is a Record, a Simulation or anything with arrays `u` and `y`. The number of `frames` is at least 2, else a
+    ValueError is raised; they are evenly spaced in the result's time, if it has one, or in its samples, from the first
+    to the last. `interval` is the time between two frames [ms], `trail` the length of the trail as a fraction of the
+    record. Keep a reference to the animation, or it stops; ``save("loop.gif", writer="pillow")`` writes it to a file.
 
     Examples
     --------

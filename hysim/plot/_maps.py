@@ -42,24 +42,10 @@ def residual_map(
     and a change from bottom to top is drift. Grey is zero, lighter is more, darker is less. A cell is the mean over the
     samples of one branch in one interval of the input, and white if there are none.
 
-    Parameters
-    ----------
-    record : Record
-        The measurement.
-    model : model, Simulation or Identification
-        A simulation of the record's input, or a model to simulate.
-    axes : two Axes, optional
-        For loading and for unloading.
-    bins : int, optional
-        Number of intervals of the input; by default half as many as a branch has samples, at most 40.
-    tolerance : float
-        Reversals of the input up to this fraction of its span do not end a branch.
-    quanta : str
-        Name of the sensor's quanta, in which residuals are counted if the record has a resolution.
-
-    Returns
-    -------
-    array of Axes, shape (2,)
+    `model` is a model, a Simulation of the record's input, or an Identification. `bins` is the number of intervals of
+    the input, by default half as many as a branch has samples, at most 40. Reversals of the input up to the fraction
+    `tolerance` of its span do not end a branch. `quanta` is the name of the sensor's quanta, in which residuals are
+    counted if the record has a resolution. The result has shape (2,).
 
     Raises
     ------
@@ -107,23 +93,10 @@ def forc(
     lighter is more, darker is less. The cells along the diagonal, of relays that switch up and down at one input, are
     triangles.
 
-    Parameters
-    ----------
-    source : Preisach, PreisachRelays or Record
-        A law, or a record of reversal curves such as those of `hysim.signals.reversal_curves`.
-    ax : Axes, optional
-        Where to draw.
-    coordinates : {"thresholds", "centre"}
-        The upper threshold a over the lower one b; or the middle (a + b) / 2, known as bias or interaction field, over
-        half the distance (a - b) / 2, known as coercivity.
-    units : mapping, optional
-        Labels of the units of ``"u"`` and ``"y"``; by default the record's.
-    tolerance : float
-        Reversals of a record's input up to this fraction of its span are ignored as noise.
-
-    Returns
-    -------
-    Axes
+    `source` is a Preisach, a PreisachRelays, or a Record of curves such as `hysim.signals.reversal_curves`, whose
+    reversals up to the fraction `tolerance` of its span are ignored. `coordinates` are ``"thresholds"``, the upper one
+    a over the lower one b; or ``"centre"``, the middle (a + b) / 2, known as bias or interaction field, over half the
+    distance (a - b) / 2, known as coercivity. `units` are labels of the units of ``"u"`` and ``"y"``.
 
     Raises
     ------

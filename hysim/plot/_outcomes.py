@@ -114,27 +114,9 @@ def describing_function(
 ) -> AxesArray:
     """Draw gain and phase of a law's first harmonic against the amplitude of a sine, on two Axes.
 
-    Parameters
-    ----------
-    law : model or mapping
-        A rate-independent law, or name to law for several.
-    amplitudes : array, shape (n,)
-        Increasing amplitudes of the input [unit of u].
-    axes : two Axes, optional
-        For the gain and for the phase, which is left out where the gain is zero.
-    mean : float
-        Input in the middle of the cycle [unit of u].
-    units : mapping, optional
-        Labels of the units of ``"u"`` and ``"y"``.
-
-    Returns
-    -------
-    array of Axes, shape (2,)
-
-    Raises
-    ------
-    TypeError, ValueError, SimulationError
-        As `hysim.metrics.describing_function`.
+    `law` is a rate-independent law, or a mapping of names to laws; `amplitudes`, shape (n,), increase [unit of u];
+    `mean` is the input in the middle of the cycle [unit of u]; `units` are labels of the units of ``"u"`` and ``"y"``.
+    A phase is left out where the gain is zero. Errors are those of `hysim.metrics.describing_function`.
 
     Examples
     --------

@@ -109,23 +109,10 @@ def loop(*results: InputOutput, ax: Axes | None = None) -> Axes:
 def history(result: InputOutput, axes: Sequence[Axes] | AxesArray | None = None, *, hold: str = "zoh") -> AxesArray:
     """Draw output, input and, if there is one, memory against time, one over the other.
 
-    Parameters
-    ----------
-    result : Record, Simulation or anything with `u` and `y`
-        A record's output is drawn as points, any other as a line; without times against the sample's number.
-    axes : two or three Axes, optional
-        For the output, the input and the memory z, which is left out with two Axes.
-    hold : {"zoh", "foh"}
-        Whether the input is held between samples, which makes steps, or runs along straight lines.
-
-    Returns
-    -------
-    array of Axes, shape (2,) or (3,)
-
-    Raises
-    ------
-    ValueError
-        If `hold` is another word or fewer than two Axes are given.
+    `result` is a Record, whose output is drawn as points, a Simulation or anything with arrays `u` and `y`; without
+    times they are drawn against the sample's number. With two `axes` the memory z is left out. `hold` is ``"zoh"``,
+    which draws the input as steps, or ``"foh"``, straight lines between samples; another word is a ValueError. The
+    result has shape (2,) or (3,).
 
     Examples
     --------

@@ -85,26 +85,12 @@ def triangle(low: float, high: float, *, cycles: int, samples_per_cycle: int) ->
 
 
 def sine(amplitude: float, *, mean: float = 0.0, cycles: int, samples_per_cycle: int) -> FloatArray:
-    """Samples of mean + amplitude sin(2 pi k / samples_per_cycle).
+    """Samples of mean + amplitude sin(2 pi k / samples_per_cycle), from the mean to the mean.
 
-    Parameters
-    ----------
-    amplitude, mean : float
-        Half the span, and the value in its middle [unit of u].
-    cycles : int
-        Number of periods. A loop needs two: it is measured from extreme to extreme.
-    samples_per_cycle : int
-        Samples of a period; with a multiple of 4 both extremes are hit.
-
-    Returns
-    -------
-    array, shape (cycles * samples_per_cycle + 1,) [unit of u]
-        Starts and ends at the mean.
-
-    Raises
-    ------
-    ValueError
-        If the amplitude is not positive, or a count is below 1.
+    `amplitude` is half the span, and `mean` the value in its middle [unit of u]. With a multiple of 4 as
+    `samples_per_cycle` both extremes are hit. A loop needs two `cycles`: it is measured from extreme to extreme. The
+    result has shape (cycles * samples_per_cycle + 1,) [unit of u]. A ValueError is raised if the amplitude is not
+    positive, or a count is below 1.
 
     Examples
     --------

@@ -16,27 +16,10 @@ _ROUNDING = 1e-12  # of a number of steps
 def reversal_curves(low: float, high: float, *, curves: int, samples_per_step: int = 1) -> FloatArray:
     """First-order reversal curves: from low up to one level after the other, and back each time.
 
-    The levels divide the span evenly, and the highest one is last. With N curves and m samples from one level to the
-    next, curve k = 1 ... N takes 2 k m samples.
-
-    Parameters
-    ----------
-    low, high : float
-        Extremes, both hit exactly [unit of u].
-    curves : int
-        Number N of levels above low from which a curve falls.
-    samples_per_step : int
-        Number m of samples from level to level; every level is hit exactly.
-
-    Returns
-    -------
-    array, shape (curves * (curves + 1) * samples_per_step + 1,) [unit of u]
-        Starts and ends at low.
-
-    Raises
-    ------
-    ValueError
-        If high is not above low, or a count is below 1.
+    `low` and `high` are both hit exactly [unit of u]. The levels above low divide the span evenly into N = `curves`
+    parts, and the highest one is last. With m = `samples_per_step` from one level to the next, curve k = 1 ... N takes
+    2 k m samples. The result has shape (N (N + 1) m + 1,), starts and ends at low [unit of u]. A ValueError is raised
+    if high is not above low, or a count is below 1.
 
     Examples
     --------
