@@ -33,16 +33,14 @@ def run(options: argparse.Namespace) -> int:
         progress=outputs.progress(),
     )
     timings = options.timings
-    outputs.write(
-        {
-            options.out: lambda: _best(table, record),
-            options.csv: lambda: table.to_csv(timings=timings),
-            options.markdown: lambda: table.to_markdown(timings=timings) + "\n",
-            options.latex: lambda: table.to_latex(timings=timings) + "\n",
-            options.plot: lambda: _picture(table),
-        },
-        outputs.printed(options, lambda: _document(table, timings), lambda: table.to_text(timings=timings)),
-    )
+    files: outputs.Files = {
+        options.out: lambda: _best(table, record),
+        options.csv: lambda: table.to_csv(timings=timings),
+        options.markdown: lambda: table.to_markdown(timings=timings) + "\n",
+        options.latex: lambda: table.to_latex(timings=timings) + "\n",
+        options.plot: lambda: _picture(table),
+    }
+    outputs.write(options, files, lambda: table.to_text(timings=timings), lambda: _document(table, timings))
     return 0
 
 

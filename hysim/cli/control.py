@@ -35,9 +35,7 @@ def run(options: argparse.Namespace) -> int:
         code = _c_code(options, design.controller)
         files |= {options.c: lambda: code.source, header: lambda: code.header}
     files[options.plot] = lambda: achievements.picture(design)
-    outputs.write(
-        files, outputs.printed(options, lambda: achievements.document(design), lambda: achievements.text(design))
-    )
+    outputs.write(options, files, lambda: achievements.text(design), lambda: achievements.document(design))
     return SUCCESS if design.tuning is None or design.tuning.success else NOT_WITHIN_BOUNDS
 
 

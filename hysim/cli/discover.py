@@ -19,17 +19,14 @@ def run(options: argparse.Namespace) -> int:
     arguments.routes(options.route, arguments.given(chosen), called=_in_the_shell)
     record = records.read(options)
     discovery = discover(record, route=options.route, seed=options.seed, progress=outputs.progress(), **chosen)
-    printed = discovery.to_json if options.json else lambda: discovery.summary() + "\n"
     model = discovery.model
-    if model is not None:
-        files: dict[str | None, Any] = {
-            options.out: lambda: to_json(model, units=record.units),
-            options.plot: lambda: outputs.loop_of_model(record, model),
-        }
-        outputs.write(files, printed)
-        return SUCCESS
-    outputs.write({}, printed)
-    if unwritten := [name for name, path in (("--out", options.out), ("--plot", options.plot)) if path]:
+    files: outputs.Files = {
+        options.out: lambda: to_json(model, units=record.units),
+        options.plot: lambda: outputs.loop_of_model(record, model),
+    }
+    outputs.write(options, {} if model is None else files, discovery.to_json if options.json else discovery.summary)
+    unwritten = [name for name, path in (("--out", options.out), ("--plot", options.plot)) if path and model is None]
+    if unwritten:
         print(f"hysim: {' and '.join(unwritten)} not written: {discovery.warnings[0]}", file=sys.stderr)
     return NO_MODEL if unwritten else SUCCESS
 

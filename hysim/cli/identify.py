@@ -28,15 +28,12 @@ def run(options: argparse.Namespace) -> int:
         "fit_percent", "rmse", "cv_rmse", "fpe", "aic", "bic", "whiteness", "seed", "success", "message",
         "warnings",
     )  # fmt: skip
-    outputs.write(
-        {
-            options.out: lambda: to_json(fit.model, units=record.units),
-            options.plot: lambda: outputs.loop_of_model(record, fit.model),
-        },
-        outputs.printed(
-            options, lambda: {"family": type(fit.model).__name__} | outputs.fields_of(fit, names), fit.summary
-        ),
-    )
+    files: outputs.Files = {
+        options.out: lambda: to_json(fit.model, units=record.units),
+        options.plot: lambda: outputs.loop_of_model(record, fit.model),
+    }
+    family = {"family": type(fit.model).__name__}
+    outputs.write(options, files, fit.summary, lambda: family | outputs.fields_of(fit, names))
     return SUCCESS if fit.success else NOT_CONVERGED
 
 

@@ -25,13 +25,11 @@ def run(options: argparse.Namespace) -> int:
         **outputs.fields_of(options, ("region", "direction", "reference", "method", "unit")),
     )
     columns, units = _table(options, motion, log)
-    outputs.write(
-        {
-            options.out: lambda: outputs.table(options.out, columns, units),
-            options.plot: lambda: _picture(motion),
-        },
-        outputs.printed(options, lambda: _document(motion), motion.summary),
-    )
+    files: outputs.Files = {
+        options.out: lambda: outputs.table(options.out, columns, units),
+        options.plot: lambda: _picture(motion),
+    }
+    outputs.write(options, files, motion.summary, lambda: _document(motion))
     return 0
 
 

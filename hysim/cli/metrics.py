@@ -33,12 +33,15 @@ def run(options: argparse.Namespace) -> int:
         loop = loop_metrics(record.u, record.y, cycles=options.cycles, **tolerance)
         lines = [*_lines(loop, record.units)]
         document, convention = outputs.scalars(loop), loop.sign_convention
-    printed = outputs.printed(
-        options,
-        lambda: document | {"sign_convention": convention, "units": record.units},
-        lambda: "\n".join([*lines, *_step(record)]),
-    )
-    outputs.write(files | {options.out: printed}, printed)
+
+    def text() -> str:
+        return "\n".join([*lines, *_step(record)])
+
+    def with_units() -> dict[str, Any]:
+        return document | {"sign_convention": convention, "units": record.units}
+
+    files[options.out] = lambda: outputs.printed(options, text, with_units)
+    outputs.write(options, files, text, with_units)
     return 0
 
 

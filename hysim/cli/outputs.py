@@ -2,8 +2,6 @@
 
 import argparse
 import contextlib
-import csv
-import io
 import json
 import math
 import os
@@ -22,6 +20,9 @@ if TYPE_CHECKING:
     from hysim.plot import Figure
     from hysim.records import Record
     from hysim.simulation import Simulation
+
+Files = Mapping[str | None, Callable[[], Any]]
+"""Functions of the contents of files, which are texts, bytes or figures, by the paths; None stands for no file."""
 
 _ENDINGS = (".svg", ".png", ".pdf")
 
@@ -85,15 +86,18 @@ def _files(source: str) -> Iterator[os.stat_result]:
 
 
 def write(
-    files: "Mapping[str | None, Callable[[], str | bytes | Figure]]", printed: Callable[[], str] | None = None
+    options: argparse.Namespace,
+    files: Files,
+    text: Callable[[], str] | None = None,
+    document: Callable[[], Mapping[str, Any]] | None = None,
 ) -> None:
-    """Write a content to each path that is not None: all of the files or none.
+    """Write a content to each path that is not None, all of the files or none, and print the result.
 
-    `printed` goes to the standard output, unless one of the paths is the standard output.
+    The result is a text, or with ``--json`` a document; it is not printed if a path is the standard output.
     """
     contents = {path: _encoded(path, content()) for path, content in files.items() if path is not None}
-    if printed is not None and STANDARD not in contents:
-        contents[STANDARD] = printed().encode()
+    if text is not None and STANDARD not in contents:
+        contents[STANDARD] = printed(options, text, document).encode()
     write_all({path: content for path, content in contents.items() if path != STANDARD})
     if STANDARD in contents:
         print(contents[STANDARD].decode(), end="", flush=True)
@@ -108,10 +112,10 @@ def _encoded(path: str, content: "str | bytes | Figure") -> bytes:
 
 
 def printed(
-    options: argparse.Namespace, document: Callable[[], Mapping[str, Any]], text: Callable[[], str]
-) -> Callable[[], str]:
-    """The result for the standard output: as JSON with ``--json``, else as text."""
-    return lambda: to_json(document()) if options.json else text().rstrip("\n") + "\n"
+    options: argparse.Namespace, text: Callable[[], str], document: Callable[[], Mapping[str, Any]] | None
+) -> str:
+    """The result as a text, or with ``--json`` as a document if there is one."""
+    return to_json(document()) if document is not None and options.json else text().rstrip("\n") + "\n"
 
 
 def to_json(document: Mapping[str, Any]) -> str:
@@ -137,25 +141,15 @@ def fields_of(result: Any, names: Iterable[str]) -> dict[str, Any]:
     return {name: vars(result)[name] for name in names}
 
 
-def table(path: str, columns: Mapping[str, "FloatArray"], units: Mapping[str, str]) -> str | bytes:
+def table(path: str, columns: Mapping[str, "FloatArray"], units: Mapping[str, str]) -> bytes:
     """Columns in the format of their path's ending; the standard output gets comma-separated text.
 
     A ValueError is raised if the ending is unknown, or its format needs an extra.
     """
-    if path == STANDARD:
-        return to_csv(columns, units)
     from hysim.files import Notes, packed
 
-    return packed(columns, path, Notes({name: units[name] for name in columns if name in units}))
-
-
-def to_csv(columns: Mapping[str, "FloatArray"], units: Mapping[str, str]) -> str:
-    """Columns under their names and units, every digit kept."""
-    buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow([f"{name} [{units[name]}]" if name in units else name for name in columns])
-    writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
-    return buffer.getvalue()
+    notes = Notes({name: units[name] for name in columns if name in units})
+    return packed(columns, "output.csv" if path == STANDARD else path, notes)
 
 
 class Curve(NamedTuple):

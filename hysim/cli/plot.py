@@ -104,7 +104,7 @@ def run(options: argparse.Namespace) -> int:
     from hysim import plot
 
     contents = _contents(options, files)
-    outputs.write({options.out: lambda: outputs.drawn(lambda canvas: kind.draw(plot, canvas, contents))})
+    outputs.write(options, {options.out: lambda: outputs.drawn(lambda canvas: kind.draw(plot, canvas, contents))})
     return 0
 
 

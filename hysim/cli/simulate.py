@@ -22,11 +22,11 @@ def run(options: argparse.Namespace) -> int:
         values = {name: column.tolist() for name, column in columns.items()}
         return {"units": {name: units[name] for name in columns if name in units}, "columns": values}
 
-    files = {
+    files: outputs.Files = {
         options.out: lambda: outputs.table(options.out, columns, units),
         options.plot: lambda: outputs.loop(simulation),
     }
-    outputs.write(files, outputs.printed(options, document, lambda: outputs.to_csv(columns, units)))
+    outputs.write(options, files, lambda: outputs.table(records.STANDARD, columns, units).decode(), document)
     return 0
 
 

@@ -29,13 +29,8 @@ def run(options: argparse.Namespace) -> int:
     if options.show is not None and (options.study or options.out):
         raise ValueError("--show takes a database and computes nothing: leave the study and --out out")
     result = _computed(options) if options.show is None else load_sweep(options.show)
-    outputs.write(
-        {
-            options.csv: result.to_csv,
-            options.plot: lambda: _picture(result, options.of),
-        },
-        outputs.printed(options, lambda: _document(result), result.summary),
-    )
+    files: outputs.Files = {options.csv: result.to_csv, options.plot: lambda: _picture(result, options.of)}
+    outputs.write(options, files, result.summary, lambda: _document(result))
     return SOME_FAILED if result.errors and options.show is None else SUCCESS
 
 

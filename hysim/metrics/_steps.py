@@ -33,12 +33,14 @@ class StepMetrics:
     ----------
     initial, final : float
         First value, and mean of the last tenth [unit of y].
-    rise_time, t98 : float
-        Time from 10 to 90 %, and time at which 98 % is first reached [unit of t].
+    rise_time : float
+        Time from 10 to 90 % [unit of t].
     overshoot : float
         Largest excess over the final value [% of the step], at least 0.
     settling_time : float
         Time after which the response stays within 2 %; nan if it does not before the last tenth [unit of t].
+    t98 : float
+        Time at which 98 % is first reached [unit of t].
     """
 
     initial: float
