@@ -78,7 +78,7 @@ def resolved(path: str) -> Any:
             raise  # the module is there, and imports another one that is missing
         raise ValueError(f"there is no module {module!r} in {os.getcwd()} or among the installed packages") from None
     except AttributeError:
-        raise ValueError(f"the module {module} ({sys.modules[module].__file__}) has no {name!r}") from None
+        raise ValueError(f"{sys.modules[module]!r} has no {name!r}") from None
 
 
 def is_import_path(text: str) -> bool:
