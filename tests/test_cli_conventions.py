@@ -16,7 +16,7 @@ import pytest
 import hysim as hs
 from hysim._atomic import write_all
 from hysim.cli import COMMANDS, control, designs, main, outputs, parsers
-from hysim.cli.options import REAL
+from hysim.cli.options import REAL, Command
 from hysim.cli.plot import KINDS
 
 LAW = hs.BoucWen(beta=0.03, gamma=0.02, gain=-0.01, feedthrough=0.03)
@@ -73,6 +73,46 @@ def test_every_option_has_help_and_every_quantity_a_unit(name):
     assert action.help, name
     if action.metavar in QUANTITIES:
         assert re.search(r"\[(1|s|Hz|%%|units? of .+)\]", action.help), (name, action.help)
+
+
+def test_options_are_declared_as_their_help_shows_them():
+    text = """
+file FILE  an argument
+others FILE...  more of them
+
+some numbers:
+--limits LOW,HIGH  a text that goes on
+    in another line, 100 %
+--unit SIGNAL=UNIT...  more than once
+--hold zoh|foh  one of two words [default: zoh]
+either --t COLUMN  this
+or --no-t  or that
+--cycles [CYCLES]  with or without a number [default: 1]
+--plot LOOP.svg  a picture
+--scale LENGTH  a number [required]
+"""
+    parser = argparse.ArgumentParser()
+    commands = parser.add_subparsers()
+    own = Command("try", "help", "description", text, lambda _: 0).add_to(commands)
+    options = parser.parse_args(
+        ["try", "a", "b", "c", "--limits", "1,2", "--unit", "u=V", "--unit", "y=m", "--scale", "3"]
+    )
+    assert (options.file, options.others, options.limits, options.scale) == ("a", ["b", "c"], (1.0, 2.0), 3.0)
+    assert (options.unit, options.hold, options.cycles) == ([("u", "V"), ("y", "m")], "zoh", 1)
+    assert options.roles == {
+        "file": "input", "others": "input", "limits": "", "unit": "", "hold": "", "t": "", "no_t": "", "cycles": "",
+        "plot": "picture", "scale": "",
+    }  # fmt: skip
+    assert parser.parse_args(["try", "a", "--scale", "3", "--cycles"]).cycles is None
+    help_ = " ".join(own.format_help().split())
+    assert "a text that goes on in another line, 100 %" in help_
+    assert "a picture; written as SVG, PNG or PDF by its ending" in help_
+    assert "one of two words (default: zoh)" in help_
+    for wrong in (["--t", "0", "--no-t"], ["--limits", "1"], ["--hold", "hold"]):
+        with pytest.raises(SystemExit):
+            parser.parse_args(["try", "a", "--scale", "3", *wrong])
+    with pytest.raises(ValueError, match="expected an option, its value, two spaces and a text, got '--t COLUMN time'"):
+        Command("wrong", "help", "description", "--t COLUMN time", lambda _: 0).add_to(commands)
 
 
 def test_without_a_command_help_is_printed_and_nothing_done(run):
