@@ -146,28 +146,28 @@ def file_rms(actuator: Actuator, controller: Any, reference: "Reference", kind: 
 
 
 class Reference(NamedTuple):
-    """Reference of the tuning: times [s], values, the first seconds that do not count, and the objective."""
+    """Reference of the tuning: evenly sampled values, the first seconds that do not count, and the objective."""
 
-    t: FloatArray
+    sample_time: float
     values: FloatArray
     transient: float
     objective: str
+
+    @property
+    def t(self) -> FloatArray:
+        """Times of the values [s]."""
+        return read_only(self.sample_time * np.arange(self.values.size))
 
 
 def reference(task: Task, rest: float, kind: str) -> Reference:
     """The triangle, the step from a displacement at rest, or the reference in a file."""
     h = task.sample_time
     if kind == "step":
-        samples = round(task.duration / h) + 1
-        return _evenly(np.full(samples, rest + task.step), h, 0.0, "itae")
+        return Reference(h, np.full(round(task.duration / h) + 1, rest + task.step), 0.0, "itae")
     if kind == "triangle":
         values = signals.triangle(task.low, task.high, cycles=2, samples_per_cycle=task.samples_per_cycle)
-        return _evenly(values, h, task.period, "rms")
-    return _evenly(load(kind, t=0, u=1, y=1).resample(h).u, h, 0.0, "rms")
-
-
-def _evenly(values: FloatArray, sample_time: float, transient: float, objective: str) -> Reference:
-    return Reference(read_only(sample_time * np.arange(values.size)), values, transient, objective)
+        return Reference(h, values, task.period, "rms")
+    return Reference(h, load(kind, t=0, u=1, y=1).resample(h).u, 0.0, "rms")
 
 
 def feedback(actuator: Actuator, kind: str, within: Pair | None) -> PID | TrackingController | None:
@@ -230,11 +230,6 @@ def _reach(actuator: Actuator, within: Pair | None) -> Pair:
     return float(y.min()) + margin, float(y.max()) - margin
 
 
-def _modes(actuator: Actuator) -> list[tuple[float, float]]:
-    """Natural frequencies [rad/s] and damping ratios."""
-    return [(float(abs(pole)), float(-pole.real / abs(pole))) for pole in _poles(actuator) if pole.imag > 0.0]
-
-
 def _poles(actuator: Actuator) -> Any:
     return np.empty(0) if actuator.vibration is None else actuator.vibration.poles
 
@@ -252,26 +247,24 @@ def _resting_voltage(actuator: Actuator, displacement: float, within: Pair | Non
 
 
 def _only_mode(actuator: Actuator, user: str) -> tuple[float, float]:
-    modes = _modes(actuator)
+    """Natural frequency [rad/s] and damping ratio of the only mode, which the `user` of this function needs."""
+    modes = [(float(abs(pole)), float(-pole.real / abs(pole))) for pole in _poles(actuator) if pole.imag > 0.0]
     if len(modes) != 1:
-        raise ValueError(
-            f"{user} needs a plant with one mode, this one has {len(modes)}: give --mode FREQUENCY,DAMPING"
-        )
+        number = f"a plant with one mode, this one has {len(modes)}"
+        raise ValueError(f"{user} needs {number}: give --mode FREQUENCY,DAMPING")
     return modes[0]
 
 
 def _slow(actuator: Actuator) -> float:
     """A frequency beside which the plant is fast [Hz]; infinite for a plant without vibration."""
-    poles = _poles(actuator)
-    slower = np.where(poles.imag == 0.0, _SLOWER_THAN_LAG, _SLOWER_THAN_MODE)
-    return float((np.abs(poles) / (2.0 * math.pi * slower)).min()) if poles.size else math.inf
+    slower = {True: _SLOWER_THAN_LAG, False: _SLOWER_THAN_MODE}
+    frequencies = (abs(pole) / (2.0 * math.pi * slower[pole.imag == 0.0]) for pole in _poles(actuator))
+    return float(min(frequencies, default=math.inf))
 
 
 def _slowest_decay(actuator: Actuator) -> float:
     """The smallest decay rate of a free motion [1/s]; infinite for a plant without vibration."""
-    poles = _poles(actuator)
-    rates = -poles.real[poles.real < 0.0]
-    return float(rates.min()) if rates.size else math.inf
+    return float(min((-pole.real for pole in _poles(actuator) if pole.real < 0.0), default=math.inf))
 
 
 def _positive(name: str, value: float) -> float:
