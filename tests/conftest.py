@@ -1,7 +1,10 @@
 """Settings of the whole test suite."""
 
+import contextlib
 import hashlib
 import os
+import pickle
+import sqlite3
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -37,12 +40,25 @@ def pyplot_keeps_no_figure():
         pyplot.close("all")
 
 
+def once_for_all_processes(tmp_path_factory, name, compute):
+    """What `compute` returns for a folder of its own, in the first process that asks; the others read it from a file."""
+    folder = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        folder = folder.parent  # which all processes share
+    with contextlib.closing(sqlite3.connect(folder / f"{name}.lock", timeout=600.0)) as lock:
+        lock.execute("BEGIN EXCLUSIVE")  # waits until no other process holds it
+        stored = folder / f"{name}.pickle"
+        if not stored.exists():
+            stored.write_bytes(pickle.dumps(compute(folder / name)))
+        return pickle.loads(stored.read_bytes())
+
+
 @pytest.fixture(scope="session")
 def reproduction(tmp_path_factory):
-    """The paper, reproduced once for all its tests."""
+    """The paper, reproduced once for all its tests, those that another process runs among them."""
     from hysim.paper import reproduce
 
-    return reproduce(tmp_path_factory.mktemp("reproduction") / "out")
+    return once_for_all_processes(tmp_path_factory, "reproduction", reproduce)
 
 
 @pytest.fixture(scope="session")

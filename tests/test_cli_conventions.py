@@ -16,11 +16,13 @@ import pytest
 import hysim as hs
 from hysim._atomic import write_all
 from hysim.cli import COMMANDS, control, designs, main, outputs, parsers
+from hysim.cli.options import REAL, Command
 from hysim.cli.plot import KINDS
 
 LAW = hs.BoucWen(beta=0.03, gamma=0.02, gain=-0.01, feedthrough=0.03)
 COLUMNS = ("--u", "voltage", "--y", "displacement")
 PARSER, PARSERS = parsers()
+QUANTITIES = (*REAL, "LOW,HIGH", "FREQUENCY,DAMPING", "NAME=VALUE", "NAME=LOW:HIGH", "QUANTUM")
 OPTIONS = {
     f"{name} {action.dest}": action
     for name, parser in (("hysim", PARSER), *PARSERS.items())
@@ -69,8 +71,48 @@ def test_the_commands_are_those_of_the_design():
 def test_every_option_has_help_and_every_quantity_a_unit(name):
     action = OPTIONS[name]
     assert action.help, name
-    if getattr(action.type, "__name__", "") in ("float", "_pair", "_value", "_bounds", "_quantum"):
+    if action.metavar in QUANTITIES:
         assert re.search(r"\[(1|s|Hz|%%|units? of .+)\]", action.help), (name, action.help)
+
+
+def test_options_are_declared_as_their_help_shows_them():
+    text = """
+file FILE  an argument
+others FILE...  more of them
+
+some numbers:
+--limits LOW,HIGH  a text that goes on
+    in another line, 100 %
+--unit SIGNAL=UNIT...  more than once
+--hold zoh|foh  one of two words [default: zoh]
+either --t COLUMN  this
+or --no-t  or that
+--cycles [CYCLES]  with or without a number [default: 1]
+--plot LOOP.svg  a picture
+--scale LENGTH  a number [required]
+"""
+    parser = argparse.ArgumentParser()
+    commands = parser.add_subparsers()
+    own = Command("try", "help", "description", text, lambda _: 0).add_to(commands)
+    options = parser.parse_args(
+        ["try", "a", "b", "c", "--limits", "1,2", "--unit", "u=V", "--unit", "y=m", "--scale", "3"]
+    )
+    assert (options.file, options.others, options.limits, options.scale) == ("a", ["b", "c"], (1.0, 2.0), 3.0)
+    assert (options.unit, options.hold, options.cycles) == ([("u", "V"), ("y", "m")], "zoh", 1)
+    assert options.roles == {
+        "file": "input", "others": "input", "limits": "", "unit": "", "hold": "", "t": "", "no_t": "", "cycles": "",
+        "plot": "picture", "scale": "",
+    }  # fmt: skip
+    assert parser.parse_args(["try", "a", "--scale", "3", "--cycles"]).cycles is None
+    help_ = " ".join(own.format_help().split())
+    assert "a text that goes on in another line, 100 %" in help_
+    assert "a picture; written as SVG, PNG or PDF by its ending" in help_
+    assert "one of two words (default: zoh)" in help_
+    for wrong in (["--t", "0", "--no-t"], ["--limits", "1"], ["--hold", "hold"]):
+        with pytest.raises(SystemExit):
+            parser.parse_args(["try", "a", "--scale", "3", *wrong])
+    with pytest.raises(ValueError, match="expected an option, its value, two spaces and a text, got '--t COLUMN time'"):
+        Command("wrong", "help", "description", "--t COLUMN time", lambda _: 0).add_to(commands)
 
 
 def test_without_a_command_help_is_printed_and_nothing_done(run):
@@ -319,7 +361,7 @@ def test_bounds_that_cannot_be_kept_exit_with_1(run):
         (("law.json", *DESIGN, "--step", "0"), "--step must be a number that is not zero"),
         (("law.json", *DESIGN, "--range", "2,1"), "LOW below HIGH, got 2,1"),
         (("law.json", "--sample-time", "1", "--limits", "1,0"), "--limits must be LOW,HIGH"),
-        (("law.json", *DESIGN, "--limits", "1"), "expected two numbers with a comma between them"),
+        (("law.json", *DESIGN, "--limits", "1"), "expected LOW,HIGH with numbers"),
         (("law.json", *DESIGN, "--controller", "notch"), "needs a plant with one mode, this one has 0"),
         (("law.json", *DESIGN, "--vary-mode", "10"), "needs a plant with one mode"),
         (("law.json", *DESIGN, "--mode", "1,0.1", "--vary-mode", "100"), "--vary-mode must be above 0 and below 100"),
@@ -340,8 +382,8 @@ def test_the_kinds_of_controllers_are_the_same_in_help_and_in_designs():
     made = hs.Actuator(hysteresis=LAW, vibration=hs.mode(10.0, 0.1))
     for kind in control.CONTROLLERS:
         tuned = designs.feedback(made, kind, None) or hs.PID(kp=1.0)
-        whole = designs.whole(made, kind, None, tuned, preview=False)
-        assert (getattr(whole, "feedforward", None) is not None) == (kind in designs.INVERTING)
+        controller = designs.controller(made, kind, None, tuned, preview=False)
+        assert (getattr(controller, "feedforward", None) is not None) == (kind in designs.INVERTING)
 
 
 def test_a_plant_without_a_resting_voltage_steps_from_none():

@@ -4,6 +4,7 @@ import dataclasses
 import io
 import json
 import re
+import sys
 import xml.etree.ElementTree as ET
 from itertools import pairwise
 from pathlib import Path
@@ -15,6 +16,7 @@ from hypothesis import strategies as st
 
 import hysim as hs
 from hysim.cli import main, models, outputs
+from hysim.models.candidates import is_identifiable
 
 LAW = hs.BoucWen(beta=0.03, gamma=0.02, gain=0.01, feedthrough=0.015)
 COLUMNS = ["--u", "voltage", "--y", "displacement"]
@@ -120,10 +122,13 @@ def test_every_cycle_has_a_row_in_text_csv_and_json(run, tmp_path):
     ("options", "message"),
     [
         (("--csv", "x.csv"), "--csv writes the table of every cycle: give --cycles without a number too"),
-        (("--cycles", "0"), "expected a number of cycles, at least 1, got '0'"),
-        (("--cycles", "loop.csv"), "for the table put the file before --cycles"),
+        (
+            ("--cycles", "0"),
+            "expected a number of cycles, at least 1; the table needs the file before --cycles, got '0'",
+        ),
+        (("--cycles", "loop.csv"), "the table needs the file before --cycles"),
         (("--cycles", "3"), "asked for 3 complete cycle(s) of the input, found 1"),
-        (("--json", "--cycles", "--csv", "-"), "--json and --csv - both write to the standard output"),
+        (("--json", "--cycles", "--csv", "-"), "two results would go to the standard output"),
         (("--cycles", "--csv", "-", "--out", "-"), "two results would go to the standard output"),
     ],
 )
@@ -189,11 +194,14 @@ def test_a_structure_takes_its_own_options_and_no_other_family_does(run):
     assert (code, err) == (2, "hysim: error: the model transfer-function needs --zeros\n")
 
 
-@pytest.mark.parametrize("name", models.FAMILIES)
-def test_every_name_of_a_model_stands_for_something_that_can_be_identified(name):
-    family = getattr(hs, models.FAMILIES[name])
-    ways = ("structure",) if name in models.STRUCTURES else ("search_space", "fitted")
-    assert any(callable(getattr(family, way, None)) for way in ways)
+def test_every_name_of_a_model_stands_for_something_that_can_be_identified(run):
+    names = models.names()
+    assert {"bouc-wen", "zhu-wang", "baber-noori", "duhem", "preisach", "play", "line"} <= set(names)
+    for name in names:
+        family = models.family(name)
+        assert is_identifiable(family) or (name, family) == ("transfer-function", hs.TransferFunction)
+    text = run("identify", "--help")[1].partition("Names of models: ")[2]
+    assert "".join(text.split()) == f"{','.join(names)}."  # lines may be broken at hyphens
 
 
 def test_models_are_compared_side_by_side_and_the_tables_written(run, tmp_path):
@@ -332,12 +340,15 @@ def test_any_file_ends_in_an_exit_code_and_at_most_one_line_of_error(text, has_m
     assert (err.getvalue().count("\n"), bool(out.getvalue())) == ((1, False) if code == 2 else (0, True))
 
 
-def test_the_commands_of_the_documentation_run_in_order(run, folder):
+def test_the_commands_of_the_documentation_run_in_order(run, folder, monkeypatch):
     page = (Path(__file__).parent.parent / "docs" / "command_line.md").read_text()
+    (folder / "my_laws.py").write_text("import hysim as hs\nMyLaw = hs.Line\nmy_law = hs.Line(slope=0.02)\n")
+    monkeypatch.syspath_prepend(folder)
     for block in re.findall(r"^```shell\n(.*?)^```", page, flags=re.MULTILINE | re.DOTALL):
         for line in block.splitlines():
             piped = None
             for command in line.split(" | "):
                 code, piped, err = run(*command.split()[1:], stdin=piped)
                 assert (code, err) == (0, ""), command
+    del sys.modules["my_laws"]
     assert {"law.json", "fit.svg", "simulated.csv", "both.svg"} <= {path.name for path in folder.iterdir()}

@@ -314,7 +314,7 @@ def test_each_reversal_curve_is_a_minor_loop():
     growing = hs.signals.growing_sine(4.0, cycles=4, samples_per_cycle=8)[2:]  # begins with a way down
     ax = hs.plot.minor_loops(hs.Record(u=growing, y=growing), hs.plot.figure().add_subplot())
     assert [line.get_xdata().max() for line in ax.lines] == [4.0, 3.0, 2.0, 1.0]
-    with pytest.raises(ValueError, match="stands still"):
+    with pytest.raises(ValueError, match="is constant"):
         hs.plot.minor_loops(hs.Record(u=[1.0, 1.0], y=[0.0, 0.0]))
 
 
@@ -395,7 +395,7 @@ def test_a_residual_map_takes_what_can_be_simulated(record):
     [
         (lambda rec: hs.plot.residual_map(rec, hs.simulate(LAW, None, rec.u[1:])), "52 samples, got 51"),
         (lambda rec: hs.plot.residual_map(rec, LAW, bins=0), "bins must be at least 1, got 0"),
-        (lambda rec: hs.plot.residual_map(hs.Record(u=[0, 0], y=[0, 0]), LAW), "stands still"),
+        (lambda rec: hs.plot.residual_map(hs.Record(u=[0, 0], y=[0, 0]), LAW), "is constant"),
         (lambda rec: hs.plot.forc(hs.Preisach()), "the law has no relays"),
         (lambda rec: hs.plot.forc(rec, coordinates="polar"), '"thresholds" or "centre"'),
         (lambda rec: hs.plot.animate(rec, frames=1), "at least 2 frames"),

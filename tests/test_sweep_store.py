@@ -320,7 +320,7 @@ def test_the_command_is_interrupted_and_goes_on(study, path, capsys):
     n_kept = rows(path)
     assert 5 < n_kept < 100
     assert main(["sweep", str(study), "--out", str(path)]) == 2
-    assert "--resume goes on with it" in capsys.readouterr().err
+    assert "continue it with --resume" in capsys.readouterr().err
     assert main(["sweep", str(study), "--out", str(path), "--resume", "--processes"]) == 1
     out, err = capsys.readouterr()
     assert out.startswith("100 of 100 tasks: 99 succeeded, 1 failed\n  1 x ValueError: seven\n")
@@ -345,7 +345,7 @@ def rows(path):
         ("task = 'none'", "give one of grid, list, sample"),
         ("task = 'none'\n[grid]\na = [1]", "file.py:function"),
         ("tusk = 'none'\n[grid]\na = [1]", "a study has no tusk"),
-        ("task = 'math:hippo'\n[grid]\na = [1]", "no attribute 'hippo'"),
+        ("task = 'math:hippo'\n[grid]\na = [1]", "has no 'hippo'"),
         ("[response]\nlaw = 'bouc-wen'\n[grid]\nbeta = [1]", "'record' is missing"),
         ("task = 'math:sin'\n[sample]\nn = 3\ndistributions.x = [0, 1]", "take 2 or 4"),
         ("task = ", "study.toml"),

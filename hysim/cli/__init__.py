@@ -13,11 +13,26 @@ from difflib import get_close_matches
 from typing import NoReturn
 
 from hysim import __version__
-from hysim.cli import compare, control, discover, identify, measure, metrics, plot, reproduce, signals, simulate, sweep
+from hysim.cli import (
+    compare,
+    control,
+    discover,
+    identify,
+    measure,
+    metrics,
+    models,
+    outputs,
+    plot,
+    reproduce,
+    signals,
+    simulate,
+    sweep,
+)
+from hysim.cli.options import Command
 from hysim.errors import SimulationError
 
 _MODULES = (metrics, identify, discover, compare, simulate, control, plot, sweep, measure, reproduce)
-COMMANDS = {module.__name__.rpartition(".")[2]: module for module in _MODULES}
+COMMANDS = {module.COMMAND.name: module.COMMAND for module in _MODULES}
 """Every command by its name."""
 
 DONE, BAD_INPUT = 0, 2
@@ -27,20 +42,26 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         self.exit(BAD_INPUT, f"{self.prog}: error: {_one_line(message)} (see {self.prog} --help)\n")
 
+    def format_help(self) -> str:
+        command: Command | None = self.get_default("command")
+        if command is not None and models.FORMS in command.options:  # here, since loading every family takes seconds
+            self.epilog = f"Names of models: {', '.join(models.names())}."
+        return super().format_help()
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     try:
         try:
-            with signals.heeded():
+            with signals.handled():
                 return _run(sys.argv[1:] if arguments is None else list(arguments))
         finally:
             print(end="", flush=True)
     except KeyboardInterrupt:
-        return _failed(signals.INTERRUPTED, signals.words(signal.SIGINT))
+        return _failed(signals.INTERRUPTED, signals.message(signal.SIGINT))
     except signals.Ended as request:
-        return _failed(128 + request.number, signals.words(request.number))
-    except BrokenPipeError:  # who reads the output has had enough of it
+        return _failed(128 + request.number, signals.message(request.number))
+    except BrokenPipeError:  # the reader of the output has closed it
         return _discard(DONE)
     except MemoryError:
         return _failed(BAD_INPUT, "error: there is not enough memory for this")
@@ -49,7 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def parsers(only: str | None = None) -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParser]]:
-    """The parser of the whole command line, and that of each command, or of one alone."""
+    """The parser of the whole command line, and the parsers of each command, or of one command only."""
     parser = _Parser(prog="hysim", description="Simulate, identify, discover, compare and compensate hysteresis.")
     parser.add_argument("--version", action="version", version=f"hysim {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND")
@@ -64,20 +85,21 @@ def _run(arguments: list[str]) -> int:
     parser, _ = parsers(named if named in COMMANDS and arguments[0] == named else None)
     if named is not None and named not in COMMANDS:
         near = get_close_matches(named, COMMANDS, n=1)
-        mend = f"did you mean {near[0]}?" if near else f"there are {', '.join(COMMANDS)}"
-        parser.error(f"there is no command {named!r}: {mend}")
+        advice = f"did you mean {near[0]}?" if near else f"there are {', '.join(COMMANDS)}"
+        parser.error(f"there is no command {named!r}: {advice}")
     options = parser.parse_args(arguments)
     if named is None:
         parser.print_help(sys.stderr)
         return BAD_INPUT
     import numpy as np
 
-    with np.errstate(all="ignore"):  # what overflows is inf or nan in the result, and null in JSON
-        return int(options.command(options))
+    with np.errstate(all="ignore"):  # an overflow is inf or nan in the result, and null in JSON
+        outputs.check(options)
+        return int(options.command.run(options))
 
 
 def _failed(code: int, text: str) -> int:
-    """Say in one line what happened, over a line of progress if there is one."""
+    """Print in one line what happened, over a line of progress if there is one."""
     start = "\r\x1b[K" if sys.stderr.isatty() else ""
     print(f"{start}hysim: {text}", file=sys.stderr)
     try:
@@ -88,7 +110,7 @@ def _failed(code: int, text: str) -> int:
 
 
 def _discard(code: int) -> int:
-    """Let the interpreter write to nowhere what it still holds of the output, which nobody takes."""
+    """Send the output that is still buffered to nowhere, since nobody reads it."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return code
 
@@ -100,5 +122,5 @@ def _line(error: BaseException) -> str:
 
 
 def _one_line(text: str) -> str:
-    """The text in one line, and what a terminal would take for a command as its code."""
+    """The text in one line; characters that a terminal would obey are printed as their codes."""
     return "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in " ".join(text.split()))

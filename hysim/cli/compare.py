@@ -1,107 +1,65 @@
 """`hysim compare`: models side by side on a record in a file."""
 
 import argparse
-from collections.abc import Mapping
-from dataclasses import fields
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hysim.cli import models, outputs, records
-from hysim.cli.identify import folds
+from hysim.cli.options import JSON, SEED, Command
 
 if TYPE_CHECKING:
-    from hysim.comparison import Comparison, ComparisonRow, Contrast
+    from hysim.comparison import Comparison
     from hysim.plot import Figure
     from hysim.records import Record
 
-
-def add_to(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        "compare",
-        help="compare models on a file of your own",
-        description="Identify models on a record, all by the same protocol, and print them side by side with what the "
-        "record cannot decide.",
-    )
-    records.add_to(parser)
-    parser.add_argument(
-        "--model",
-        metavar="NAME|MODEL.json",
-        action="append",
-        default=[],
-        help="a family to identify or a model to take as it is, once or more (default: all families)",
-    )
-    parser.add_argument(
-        "--cross-validate",
-        metavar="loo|cycles|K",
-        type=folds,
-        help="leave one sample out at a time, one cycle, or one of K blocks (default: loo up to 200 samples, then 10)",
-    )
-    test = parser.add_mutually_exclusive_group()
-    test.add_argument("--test", metavar="FILE", help="another record with the same columns, which no fit sees")
-    test.add_argument("--test-cycles", metavar="N", type=int, help="keep the last N cycles for the test")
-    parser.add_argument("--seed", type=int, default=0, help="of the random starts (default: %(default)s)")
-    parser.add_argument("--timings", action="store_true", help="add the seconds of each fit to the tables")
-    for form in ("csv", "markdown", "latex"):
-        parser.add_argument(f"--{form}", metavar="PATH", help="write the table there, - for the standard output")
-    parser.add_argument("--out", metavar="MODEL.json", help="write the model that predicts best, as identify does")
-    parser.add_argument("--plot", metavar="LOOPS.svg", help=f"draw the best models; {outputs.PICTURE}")
-    parser.add_argument("--json", action="store_true", help="print the whole table as JSON")
-    parser.set_defaults(command=run)
+_CONTRASTED = ("rmse_ratio", "typical_ratio", "probability", "diverged")
 
 
 def run(options: argparse.Namespace) -> int:
     """Compare, write the files that are asked for, and print the table."""
     from hysim.comparison import compare
 
-    tables = options.csv, options.markdown, options.latex
-    inputs = [options.file, options.test, *options.model]
-    is_taken = outputs.check(options.out, *tables, inputs=inputs, pictures=[options.plot], printed=options.json)
     record, test = records.read(options), options.test_cycles
     if options.test is not None:
-        test = records.read(argparse.Namespace(**{**vars(options), "file": options.test}))
+        test = records.read(options, options.test)
+    subjects: dict[str, Any] = {}
+    for name in options.model:
+        subjects |= _subjects(name)
     table = compare(
-        _chosen(options.model),
+        subjects or None,
         record,
         cross_validate=options.cross_validate or "auto",
         test=test,
         seed=options.seed,
         progress=outputs.progress(),
     )
-    texts: dict[str | None, Any] = {
-        options.out: _best(table, record) if options.out else "",
-        options.csv: table.to_csv(timings=options.timings),
-        options.markdown: table.to_markdown(timings=options.timings) + "\n",
-        options.latex: table.to_latex(timings=options.timings) + "\n",
+    timings = options.timings
+    files: outputs.Files = {
+        options.out: lambda: _best(table, record),
+        options.csv: lambda: table.to_csv(timings=timings),
+        options.markdown: lambda: table.to_markdown(timings=timings) + "\n",
+        options.latex: lambda: table.to_latex(timings=timings) + "\n",
+        options.plot: lambda: _picture(table),
     }
-    if options.plot:
-        texts[options.plot] = _picture(table)
-    if not is_taken:
-        text = table.to_text(timings=options.timings) + "\n"
-        texts[records.STANDARD] = outputs.to_json(_document(table, options.timings)) if options.json else text
-    outputs.write(texts)
+    outputs.write(options, files, lambda: table.to_text(timings=timings), lambda: _document(table, timings))
     return 0
 
 
-def _chosen(names: list[str]) -> Mapping[str, Any] | None:
-    """What `compare` takes for these names; None for all families."""
+def _subjects(name: str) -> dict[str, Any]:
+    """Subjects of the comparison for a family's name, a file or an import path."""
     from hysim.models.candidates import candidates
 
-    if not names:
-        return None
-    families, chosen = candidates(), {}
-    for name in names:
-        if Path(name).suffix == ".json":
-            chosen[Path(name).stem] = models.read(name)[0]
-        elif models.FAMILIES.get(name) in families:
-            chosen[name] = families[models.FAMILIES[name]]
-        else:
-            raise ValueError(f"there is no model {name!r}: give a .json file or one of {', '.join(models.FAMILIES)}")
-    return chosen
+    model = models.chosen(name)
+    if name.endswith(".json") or models.is_import_path(name):
+        return {models.name_of(name): model}
+    family = model.__name__
+    of_family = {each: subject for each, subject in candidates().items() if each.split()[0] == family}
+    if not of_family:
+        raise ValueError(f"the model {name} cannot be compared without further arguments: give a .json file")
+    return of_family if len(of_family) > 1 else dict.fromkeys([name], *of_family.values())
 
 
 def _best(table: "Comparison", record: "Record") -> str:
-    """The model that predicts best; of one without errors of prediction, that of the least rmse."""
+    """The model that predicts best; if no errors of prediction are known, the one with the smallest rmse."""
     from hysim.models.storage import to_json
 
     ranked = table.ranked() or table.ranked("rmse")
@@ -111,8 +69,8 @@ def _best(table: "Comparison", record: "Record") -> str:
 
 
 def _document(table: "Comparison", timings: bool) -> dict[str, Any]:
-    contrasts = {each.name: each for each in table.contrasts}
-    rows = [_plain(row) | _effects(contrasts.get(row.name)) for row in table.rows]
+    contrasts = {each.name: outputs.fields_of(each, _CONTRASTED) for each in table.contrasts}
+    rows = [outputs.scalars(row) | contrasts.get(row.name, dict.fromkeys(_CONTRASTED)) for row in table.rows]
     return {
         "record": table.record.name,
         "units": table.record.units,
@@ -125,24 +83,35 @@ def _document(table: "Comparison", timings: bool) -> dict[str, Any]:
     }
 
 
-def _plain(row: "ComparisonRow") -> dict[str, Any]:
-    """The row's numbers and words."""
-    values = {field.name: getattr(row, field.name) for field in fields(row)}
-    return {name: value for name, value in values.items() if isinstance(value, (str, int, float))}
-
-
-def _effects(contrast: "Contrast | None") -> dict[str, Any]:
-    """How a model compares with the best one; null for the best one itself, and where there is none."""
-    names = ("rmse_ratio", "typical_ratio", "probability", "diverged")
-    return {name: None if contrast is None else getattr(contrast, name) for name in names}
-
-
 def _picture(table: "Comparison") -> "Figure":
-    """Picture of the best models."""
     from hysim import plot
 
-    with plot.house_style():
-        rows = min(4, len(table.rows))
-        canvas = plot.figure(width=9.0, height=2.2 * rows)
-        plot.comparison(table, axes=plot.panels(canvas, 3 * rows, columns=3))
-    return canvas
+    rows = min(4, len(table.rows))
+    return outputs.drawn(
+        lambda canvas: plot.comparison(table, axes=plot.panels(canvas, 3 * rows, columns=3)), 9.0, 2.2 * rows
+    )
+
+
+COMMAND = Command(
+    "compare",
+    "compare models on a file of your own",
+    "Identify models on a record, all by the same protocol, and print them side by side with what the record cannot "
+    "decide.",
+    f"""
+{records.OPTIONS}
+--model MODEL...  {models.FORMS}; once or more (default: all families)
+--cross-validate loo|cycles|K  leave out one sample at a time, one cycle, or one of K blocks (default: loo up to 200
+    samples, then 10)
+either --test FILE  another record with the same columns, for the test only
+or --test-cycles N  keep the last N cycles for the test
+{SEED}
+--timings  add the seconds of each fit to the tables
+--csv PATH  write the table; - writes it to the standard output, so too with the next two options
+--markdown PATH  write the table in Markdown
+--latex PATH  write the table in LaTeX
+--out MODEL.json  write the model that predicts best, as identify does
+--plot LOOPS.svg  draw the best models
+{JSON}
+""",
+    run,
+)

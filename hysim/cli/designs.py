@@ -1,7 +1,7 @@
-"""What `hysim control` designs with: the plant, the template of its controller, and what the loop is asked to follow.
+"""Parts of a design by `hysim control`: the plant, the controller before its tuning, and the task of the loop.
 
-Unless they are given, the triangle is slow beside the plant, a step lasts until the slowest mode has come to rest, and
-the range is what the plant reaches within the limits, a tenth of it left free at either end.
+By default the triangle is slow beside the plant, a step lasts until the slowest mode has come to rest, and the range is
+the middle 80 % of the displacements that the plant reaches within the limits.
 """
 
 import argparse
@@ -38,19 +38,19 @@ INVERTING = ("inverse", "tracking", "model-following")
 """Kinds of controllers that begin with the inverse of the plant."""
 
 CYCLES = 10
-"""Of the triangle, the last of which is measured."""
+"""Number of cycles of the triangle, of which the last one is measured."""
 
-_MARGIN = 0.1  # of what is reached, left free at either end
+_MARGIN = 0.1  # of the reachable range, kept free at either end
 _SAMPLES = 1000  # of a cycle and of a step, at least
 _MOST_SAMPLES = 500_000
 _SLOWER_THAN_LAG, _SLOWER_THAN_MODE = 20.0, 200.0  # periods of the slowest pole in a cycle
 _AT_REST = 12.0  # of its time constants in a step
-_DOUBLINGS = 40  # of a voltage, until it brackets the one that is looked for
+_DOUBLINGS = 40  # of a voltage, until it brackets the resting voltage
 _SMOOTHING = 0.3  # of a mode's period, in which a step of the reference becomes a motion
 
 
 class Task(NamedTuple):
-    """What a loop is asked to follow: a triangle and a step [unit of y] from a voltage, with their times [s]."""
+    """Task of a loop: to follow a triangle and a step [unit of y] from a voltage, with their times [s]."""
 
     low: float
     high: float
@@ -62,12 +62,12 @@ class Task(NamedTuple):
 
     @property
     def samples_per_cycle(self) -> int:
-        """Of the triangle."""
+        """Samples of a cycle of the triangle."""
         return round(self.period / self.sample_time)
 
 
 def plant(model: Any, options: argparse.Namespace) -> Actuator:
-    """The model as an actuator, with the stages that the options add to it or put in place of its own."""
+    """The model as an actuator, with the stages that the options add or replace."""
     actuator = as_actuator(model)
     stages: dict[str, Any] = {}
     if options.mode is not None:
@@ -75,14 +75,14 @@ def plant(model: Any, options: argparse.Namespace) -> Actuator:
         stages["vibration"] = mode(2.0 * math.pi * frequency, ratio)
     if options.creep is not None:
         stages["creep"] = Creep.per_decade(options.creep)
-    given = {name: getattr(options, name) for name in ("noise", "quantum", "delay")}
-    if sensed := {name: value for name, value in given.items() if value is not None}:
-        stages["sensor"] = replace(actuator.sensor or Sensor(), **sensed)
+    settings = {name: vars(options)[name] for name in ("noise", "quantum", "delay") if vars(options)[name] is not None}
+    if settings:
+        stages["sensor"] = replace(actuator.sensor or Sensor(), **settings)
     return replace(actuator, **stages)
 
 
 def variations(actuator: Actuator, percent: float | None) -> list[Actuator]:
-    """The plant with its only mode lower and higher."""
+    """The plant with its only mode at a lower and at a higher frequency."""
     if percent is None:
         return []
     if not 0.0 < percent < 100.0:
@@ -94,7 +94,7 @@ def variations(actuator: Actuator, percent: float | None) -> list[Actuator]:
 
 
 def limits(options: argparse.Namespace, record: Record | None) -> Pair | None:
-    """The controller's: those given, or the extremes of the measured input."""
+    """Limits of the command: those of the options, or the extremes of the measured input."""
     if options.limits is not None:
         low, high = options.limits
         if not low < high:
@@ -104,13 +104,7 @@ def limits(options: argparse.Namespace, record: Record | None) -> Pair | None:
 
 
 def task(actuator: Actuator, options: argparse.Namespace, within: Pair | None) -> Task:
-    """What the loop is asked to follow.
-
-    Raises
-    ------
-    ValueError
-        If nothing says how far, or a number is outside its range.
-    """
+    """The task of the loop; a ValueError if no option limits the range, or a number is outside its bounds."""
     h = _positive("--sample-time", options.sample_time)
     low, high = options.range or _reach(actuator, within)
     if not low < high:
@@ -133,53 +127,53 @@ def task(actuator: Actuator, options: argparse.Namespace, within: Pair | None) -
 
 
 def rest(actuator: Actuator, u: float) -> float:
-    """Where the plant is at rest at a command."""
+    """Displacement at which the plant rests at a command [unit of y]."""
     return float(replace(actuator, amplifier=None).dc_gain * actuator.level([u])[0])
 
 
 def fit_percent(model: Any, record: Record | None) -> float:
-    """Of the model's free run along the record; nan without one, or for a model that takes time."""
+    """Fit of the model's free run to the record; nan without a record, or for a model that depends on time."""
     if record is None or needs_time(model):
         return math.nan
     return metrics.fit_percent(record.y, model.response(record.u))
 
 
-def file_rms(actuator: Actuator, controller: Any, wanted: "Reference", kind: str) -> float:
-    """Tracking rms along the reference of a file; nan for the others, which are measured by themselves."""
+def file_rms(actuator: Actuator, controller: Any, reference: "Reference", kind: str) -> float:
+    """Tracking rms along the reference in a file; nan for the triangle and the step, which have other measures."""
     if kind in ("triangle", "step"):
         return math.nan
-    return metrics.rmse(wanted.values, close_loop(actuator, controller, wanted.t, wanted.values).y)
+    return metrics.rmse(reference.values, close_loop(actuator, controller, reference.t, reference.values).y)
 
 
 class Reference(NamedTuple):
-    """What a controller is tuned for: times [s], values, what of them does not count [s], and the objective."""
+    """Reference of the tuning: evenly sampled values, the first seconds that do not count, and the objective."""
 
-    t: FloatArray
+    sample_time: float
     values: FloatArray
     transient: float
     objective: str
 
+    @property
+    def t(self) -> FloatArray:
+        """Times of the values [s]."""
+        return read_only(self.sample_time * np.arange(self.values.size))
 
-def reference(asked: Task, rest: float, kind: str) -> Reference:
-    """The triangle, the step from a displacement at rest, or what a file holds."""
-    h = asked.sample_time
+
+def reference(task: Task, rest: float, kind: str) -> Reference:
+    """The triangle, the step from a displacement at rest, or the reference in a file."""
+    h = task.sample_time
     if kind == "step":
-        samples = round(asked.duration / h) + 1
-        return _evenly(np.full(samples, rest + asked.step), h, 0.0, "itae")
+        return Reference(h, np.full(round(task.duration / h) + 1, rest + task.step), 0.0, "itae")
     if kind == "triangle":
-        values = signals.triangle(asked.low, asked.high, cycles=2, samples_per_cycle=asked.samples_per_cycle)
-        return _evenly(values, h, asked.period, "rms")
-    return _evenly(load(kind, t=0, u=1, y=1).resample(h).u, h, 0.0, "rms")
-
-
-def _evenly(values: FloatArray, sample_time: float, transient: float, objective: str) -> Reference:
-    return Reference(read_only(sample_time * np.arange(values.size)), values, transient, objective)
+        values = signals.triangle(task.low, task.high, cycles=2, samples_per_cycle=task.samples_per_cycle)
+        return Reference(h, values, task.period, "rms")
+    return Reference(h, load(kind, t=0, u=1, y=1).resample(h).u, 0.0, "rms")
 
 
 def feedback(actuator: Actuator, kind: str, within: Pair | None) -> PID | TrackingController | None:
-    """What of a controller is tuned, with the gains that are not zero free; None for what `tune` takes by itself.
+    """The feedback before its tuning, whose nonzero gains are free; None for the default of `tune`.
 
-    What is put before it knows the plant, so that a simulation finds no use in feedback beside it: it is tuned alone.
+    It is tuned without the inverse: the inverse knows the simulated plant exactly, and would leave it nothing to do.
     """
     if kind == "pid":
         return None
@@ -190,28 +184,26 @@ def feedback(actuator: Actuator, kind: str, within: Pair | None) -> PID | Tracki
     return TrackingController(feedback=PID(ki=1.0), notch=notch, limits=within)
 
 
-def whole(actuator: Actuator, kind: str, within: Pair | None, tuned: Any, *, preview: bool) -> Any:
-    """The controller of a kind, with a feedback that is tuned.
+def controller(actuator: Actuator, kind: str, within: Pair | None, tuned: Any, *, preview: bool) -> Any:
+    """The controller of a kind, with a tuned feedback.
 
-    Raises
-    ------
-    TypeError, ValueError
-        If the plant has no inverse where one is needed, or more than one mode; or a preview is wanted without one.
+    A TypeError or ValueError is raised if the plant lacks the inverse or the single mode that the kind needs, or a
+    preview has no inverse to serve.
     """
     if kind not in INVERTING:
         if preview:
             raise ValueError(f"--preview is for {', '.join(INVERTING)}: the controller {kind} has no inverse")
         return tuned
     inverse = InverseFeedforward.of(actuator)
-    controller = TrackingController(feedforward=inverse, preview=preview, limits=within)
+    open_loop = TrackingController(feedforward=inverse, preview=preview, limits=within)
     if kind == "inverse":
-        return controller
-    controller = replace(controller, feedback=replace(tuned, limits=None))
-    return controller if kind == "tracking" else _following(controller, actuator)
+        return open_loop
+    tracking = replace(open_loop, feedback=replace(tuned, limits=None))
+    return tracking if kind == "tracking" else _following(tracking, actuator)
 
 
 def _following(controller: TrackingController, actuator: Actuator) -> TrackingController:
-    """With the plant as its model; before a mode the reference becomes a smooth motion that is known ahead."""
+    """A controller with the plant as its model; before a mode, the reference is smoothed and known ahead."""
     if actuator.vibration is None:
         return replace(controller, model=actuator)
     frequency, ratio = _only_mode(actuator, "the controller model-following")
@@ -225,11 +217,11 @@ def _following(controller: TrackingController, actuator: Actuator) -> TrackingCo
 
 
 def _reach(actuator: Actuator, within: Pair | None) -> Pair:
-    """What is reached at rest within the limits, the margins left out."""
+    """The range that is reached at rest within the limits, less the margins."""
     span = within or (actuator.amplifier.limits if actuator.amplifier else None)
     if span is None or not np.isfinite(span).all():
         raise ValueError(
-            "nothing says how far the loop shall go: give --range LOW,HIGH, or --limits LOW,HIGH, or --record FILE"
+            "the range of the loop is unknown: give --range LOW,HIGH, or --limits LOW,HIGH, or --record FILE"
         )
     u = signals.triangle(float(span[0]), float(span[1]), cycles=2, samples_per_cycle=2 * _SAMPLES)
     behind = replace(actuator, amplifier=None).dc_gain
@@ -238,14 +230,12 @@ def _reach(actuator: Actuator, within: Pair | None) -> Pair:
     return float(y.min()) + margin, float(y.max()) - margin
 
 
-def _modes(actuator: Actuator) -> list[tuple[float, float]]:
-    """Natural frequencies [rad/s] and damping ratios."""
-    poles = np.empty(0) if actuator.vibration is None else actuator.vibration.poles
-    return [(float(abs(pole)), float(-pole.real / abs(pole))) for pole in poles if pole.imag > 0.0]
+def _poles(actuator: Actuator) -> Any:
+    return np.empty(0) if actuator.vibration is None else actuator.vibration.poles
 
 
 def _resting_voltage(actuator: Actuator, displacement: float, within: Pair | None) -> float:
-    """The command at which the plant is at rest at a displacement; none where there is no such command."""
+    """The command at which the plant rests at a displacement; 0 if there is no such command."""
 
     def excess(u: float) -> float:
         return rest(actuator, u) - displacement
@@ -256,27 +246,25 @@ def _resting_voltage(actuator: Actuator, displacement: float, within: Pair | Non
     return 0.0
 
 
-def _only_mode(actuator: Actuator, what: str) -> tuple[float, float]:
-    found = _modes(actuator)
-    if len(found) != 1:
-        raise ValueError(
-            f"{what} needs a plant with one mode, this one has {len(found)}: give --mode FREQUENCY,DAMPING"
-        )
-    return found[0]
+def _only_mode(actuator: Actuator, user: str) -> tuple[float, float]:
+    """Natural frequency [rad/s] and damping ratio of the only mode, which the `user` of this function needs."""
+    modes = [(float(abs(pole)), float(-pole.real / abs(pole))) for pole in _poles(actuator) if pole.imag > 0.0]
+    if len(modes) != 1:
+        number = f"a plant with one mode, this one has {len(modes)}"
+        raise ValueError(f"{user} needs {number}: give --mode FREQUENCY,DAMPING")
+    return modes[0]
 
 
 def _slow(actuator: Actuator) -> float:
-    """A frequency beside which the plant is fast [Hz]; infinite where nothing moves."""
-    poles = np.empty(0) if actuator.vibration is None else actuator.vibration.poles
-    slower = np.where(poles.imag == 0.0, _SLOWER_THAN_LAG, _SLOWER_THAN_MODE)
-    return float((np.abs(poles) / (2.0 * math.pi * slower)).min()) if poles.size else math.inf
+    """A frequency beside which the plant is fast [Hz]; infinite for a plant without vibration."""
+    slower = {True: _SLOWER_THAN_LAG, False: _SLOWER_THAN_MODE}
+    frequencies = (abs(pole) / (2.0 * math.pi * slower[pole.imag == 0.0]) for pole in _poles(actuator))
+    return float(min(frequencies, default=math.inf))
 
 
 def _slowest_decay(actuator: Actuator) -> float:
-    """The least rate at which a free motion dies out [1/s]; infinite where nothing moves."""
-    poles = np.empty(0) if actuator.vibration is None else actuator.vibration.poles
-    rates = -poles.real[poles.real < 0.0]
-    return float(rates.min()) if rates.size else math.inf
+    """The smallest decay rate of a free motion [1/s]; infinite for a plant without vibration."""
+    return float(min((-pole.real for pole in _poles(actuator) if pole.real < 0.0), default=math.inf))
 
 
 def _positive(name: str, value: float) -> float:

@@ -1,94 +1,149 @@
-"""The models of the command line: what they are called there, and those in files."""
+"""Models of the command line: families by name, models in files, and laws of the user by import path."""
 
 import argparse
+import os
+import pkgutil
+import re
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import hysim
+from hysim._frozen import FloatArray
 from hysim.cli.records import STANDARD
 
-FAMILIES = {
-    "bouc-wen": "BoucWen",
-    "polynomial-bouc-wen": "PolynomialBoucWen",
-    "zhu-wang": "ZhuWangBoucWen",
-    "generalized-bouc-wen": "GeneralizedBoucWen",
-    "transfer-function": "TransferFunction",
-    "prandtl-ishlinskii": "PrandtlIshlinskii",
-    "modified-prandtl-ishlinskii": "ModifiedPrandtlIshlinskii",
-    "generalized-prandtl-ishlinskii": "GeneralizedPrandtlIshlinskii",
-    "rate-dependent-prandtl-ishlinskii": "RateDependentPrandtlIshlinskii",
-    "maxwell-slip": "MaxwellSlip",
-    "dahl": "Dahl",
-    "coleman-hodgdon": "ColemanHodgdon",
-    "baber-noori": "BoucWenBaberNoori",
-    "preisach": "Preisach",
-    "line": "Line",
-    "single-valued": "SingleValued",
-}
-"""Name on the command line to public name of what `identify` takes."""
+FORMS = "name of a family, such as bouc-wen; MODEL.json; or module:name of your own"
+"""Values of an option for models."""
 
-STRUCTURES: dict[str, tuple[str, ...]] = {"transfer-function": ("poles", "zeros", "hold", "sample")}
-"""Families that are identified through their `structure`, and its arguments."""
+OPTIONS = f"""
+--model MODEL  {FORMS}; an unknown name lists the names [required]
 
-_REQUIRED = ("poles", "zeros")
+transfer function:
+--poles N  number of poles
+--zeros N  number of zeros, at most that of the poles
+--hold zoh|foh  input between samples: held (zoh) or linear (foh)
+--sample start|end  whether an output was read at the start or at the end of the hold
+"""
+"""The choice of a family and the options of its structure."""
+
+_SHORT = {"zhu-wang": "ZhuWangBoucWen", "baber-noori": "BoucWenBaberNoori"}
+_STRUCTURE = ("poles", "zeros", "hold", "sample")
+_NEEDED = ("poles", "zeros")
 
 
-def add_to(parser: argparse.ArgumentParser) -> None:
-    """Add the choice of a family and the options of its structure."""
-    parser.add_argument(
-        "--model",
-        metavar="NAME|MODEL.json",
-        required=True,
-        help=f"{', '.join(FAMILIES)}; or a file with the model to begin from",
-    )
-    group = parser.add_argument_group("transfer function")
-    group.add_argument("--poles", metavar="N", type=int, help="number of poles")
-    group.add_argument("--zeros", metavar="N", type=int, help="number of zeros, at most that of the poles")
-    group.add_argument("--hold", choices=("zoh", "foh"), help="input between samples: held (zoh) or linear (foh)")
-    group.add_argument("--sample", choices=("start", "end"), help="when of the hold an output was taken")
+@runtime_checkable
+class Responding(Protocol):
+    """A law or a plant."""
+
+    def response(self, u: FloatArray, /) -> FloatArray: ...
 
 
-def family(options: argparse.Namespace) -> Any:
-    """What `identify` takes for these options.
+def names() -> list[str]:
+    """Names of all families that can be compared without further arguments; loads every family."""
+    from hysim.models.candidates import candidates
 
-    Raises
-    ------
-    ValueError
-        If there is no such family, an option belongs to another one, or one that this family needs is missing.
+    short = {family: name for name, family in _SHORT.items()}
+    families = dict.fromkeys(name.split()[0] for name in candidates())
+    return [short.get(name, _hyphenated(name)) for name in families]
+
+
+def family(name: str) -> Any:
+    """The family with a name such as ``bouc-wen``; a ValueError, which lists the names, if there is none."""
+    from hysim.models.model import FAMILIES
+
+    public = {_hyphenated(each): each for each in hysim.__all__ if each[0].isupper()} | _SHORT
+    law = resolved(f"hysim:{public[name]}") if name in public else None
+    if law is None or FAMILIES.get(public[name]) is not law:
+        raise ValueError(f"there is no model {name!r}: give MODEL.json, module:name, or one of {', '.join(names())}")
+    return law
+
+
+def _hyphenated(name: str) -> str:
+    """``bouc-wen`` of ``BoucWen``."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "-", name).lower()
+
+
+def resolved(path: str) -> Any:
+    """The object at an import path, `module:name`; modules in the current folder are importable.
+
+    A ValueError is raised if there is no such module, or it does not have the name.
     """
-    if options.model not in FAMILIES and Path(options.model).suffix != ".json":
-        raise ValueError(f"there is no model {options.model!r}: give a .json file or one of {', '.join(FAMILIES)}")
-    own = STRUCTURES.get(options.model, ())
-    given = {name: getattr(options, name) for names in STRUCTURES.values() for name in names}
-    for name, value in given.items():
-        if value is not None and name not in own:
-            raise ValueError(f"--{name} is no option of the model {options.model}")
-        if value is None and name in own and name in _REQUIRED:
-            raise ValueError(f"the model {options.model} needs --{name}")
-    if options.model not in FAMILIES:
-        return read(options.model)[0]
-    model = getattr(hysim, FAMILIES[options.model])
-    return model.structure(**{name: value for name, value in given.items() if value is not None}) if own else model
+    module, _, name = path.partition(":")
+    if os.getcwd() not in sys.path:
+        sys.path.insert(0, os.getcwd())  # as `python -m hysim` has it
+    try:
+        return pkgutil.resolve_name(path)
+    except ModuleNotFoundError as error:
+        if error.name is None or module.split(".")[0] != error.name.split(".")[0]:
+            raise  # the module is there, and imports another one that is missing
+        raise ValueError(f"there is no module {module!r} in {os.getcwd()} or among the installed packages") from None
+    except AttributeError:
+        raise ValueError(f"{sys.modules[module]!r} has no {name!r}") from None
+
+
+def is_import_path(text: str) -> bool:
+    """Whether a text is `module:name`, and not the path of a file."""
+    return bool(re.fullmatch(r"[^\W\d]\w*(\.\w+)*:\w+(\.\w+)*", text)) and not Path(text).exists()
+
+
+def imported(path: str) -> Any:
+    """The family or model at an import path; a ValueError if there is no such name, or it is no law."""
+    from hysim.models.candidates import is_identifiable
+
+    law = resolved(path)
+    if not (isinstance(law, Responding) or is_identifiable(law)):
+        raise ValueError(f"{path} is no law: expected a model, or a class of models, with a response; got {law!r}")
+    return law
+
+
+def chosen(text: str) -> Any:
+    """The family or model that ``--model`` names: a family's name, a JSON file, or an import path."""
+    if Path(text).suffix == ".json":
+        return read(text)[0]
+    return imported(text) if is_import_path(text) else family(text)
+
+
+def to_identify(options: argparse.Namespace) -> Any:
+    """The argument of `identify` for these options.
+
+    A ValueError is raised if there is no such model, an option belongs to another one, or one that this model needs is
+    missing.
+    """
+    structure = {name: vars(options)[name] for name in _STRUCTURE if vars(options)[name] is not None}
+    if options.model != "transfer-function":
+        if structure:
+            raise ValueError(f"--{next(iter(structure))} is no option of the model {options.model}")
+        return chosen(options.model)
+    if missing := [name for name in _NEEDED if name not in structure]:
+        raise ValueError(f"the model transfer-function needs --{missing[0]}")
+    return hysim.TransferFunction.structure(**structure)
 
 
 def read(path: str) -> tuple[Any, dict[str, str]]:
-    """The model that a file or the standard input holds, and its units."""
+    """The model in a file, on the standard input, or at an import path, and its units.
+
+    A class at an import path stands for the model with its default values.
+    """
     from hysim.models.storage import from_json
 
+    if is_import_path(path):
+        law = imported(path)
+        try:
+            return (law() if isinstance(law, type) else law), {}
+        except TypeError as error:
+            raise ValueError(f"{path} needs values for its parameters: give an instance ({error})") from None
     if path == STANDARD:
         return from_json(sys.stdin.read(), "the standard input")
     return from_json(Path(path).read_bytes(), path)
 
 
-def simulated(model: Any, record: "hysim.Record", units: dict[str, str]) -> "hysim.Simulation":
-    """The model's free run over the record's input.
+def name_of(path: str) -> str:
+    """The name under which tables and pictures show a model: of its file without the ending, or in its module."""
+    return path.rpartition(":")[2] if is_import_path(path) else Path(path).stem
 
-    Raises
-    ------
-    ValueError
-        If the model has no response, such as a controller.
-    """
-    if not callable(getattr(model, "response", None)):
+
+def simulated(model: Any, record: "hysim.Record", units: dict[str, str]) -> "hysim.Simulation":
+    """The model's free run over the record's input; a ValueError if it has no response, such as a controller."""
+    if not isinstance(model, Responding):
         raise ValueError(f"a {type(model).__name__} has no response to simulate: give a law or a plant")
     return hysim.simulate(model, record.t, record.u, units=units)

@@ -1,8 +1,7 @@
-"""What commands write: whole files, text on the standard output, progress on a terminal."""
+"""Writing of results: whole files, text on the standard output, progress on a terminal."""
 
+import argparse
 import contextlib
-import csv
-import io
 import json
 import math
 import os
@@ -13,6 +12,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hysim._atomic import write_all
+from hysim.cli.options import INPUT, PICTURE, PRINTED, TABLE
 from hysim.cli.records import STANDARD
 
 if TYPE_CHECKING:
@@ -21,59 +21,55 @@ if TYPE_CHECKING:
     from hysim.records import Record
     from hysim.simulation import Simulation
 
-PICTURE = "written as SVG, PNG or PDF by its ending; - writes SVG to the standard output"
-TABLE = "written as .csv, .tsv, .npz, .mat or .h5 by its ending; - writes comma-separated text to the standard output"
+Files = Mapping[str | None, Callable[[], Any]]
+"""Functions of the contents of files, which are texts, bytes or figures, by the paths; None stands for no file."""
+
 _ENDINGS = (".svg", ".png", ".pdf")
 
 
-def check(
-    *paths: str | None,
-    inputs: Iterable[str | None],
-    pictures: Iterable[str | None] = (),
-    table: str | None = None,
-    printed: bool = False,
-) -> bool:
-    """Refuse what cannot be written, before anything is computed; whether a path is the standard output.
+def check(options: argparse.Namespace) -> None:
+    """Refuse results of a command that cannot be written, before anything is computed.
 
-    Raises
-    ------
-    ValueError
-        If a folder does not exist or may not be written to, a picture or a table has another ending than those known,
-        two results would go to one place, such as the standard output beside what is `printed` there, or a result
-        would take the place of one of the `inputs`.
+    A ValueError is raised if a folder does not exist or may not be written to, the ending of a picture or a table is
+    unknown, two results would go to one place, such as the standard output, or a result would overwrite an input.
     """
-    drawn = [path for path in pictures if path is not None]
-    given = [path for path in (*paths, table) if path is not None] + drawn
-    for path in given:
-        if path == STANDARD:
-            continue
-        if Path(path).is_dir() or not Path(path).parent.is_dir():
-            raise ValueError(f"cannot write {path}: it is a folder, or its folder does not exist")
-        if not os.access(Path(path).parent, os.W_OK):
-            raise ValueError(f"cannot write {path}: its folder may not be written to")
-    if table not in (None, STANDARD):
+    inputs: list[str] = []
+    results: list[tuple[str, str]] = []
+    for name, role in options.roles.items():
+        value = vars(options)[name] if role else None
+        paths = value if isinstance(value, list) else [] if value is None else [value]
+        if role == INPUT:
+            inputs += paths
+        else:
+            results += [(path, role) for path in paths]
+    for path, role in results:
+        if path != STANDARD:
+            _check_path(path, role)
+    streams = [role for path, role in results if path == STANDARD]
+    if "json" in options and options.json and PRINTED not in streams:
+        streams.append(PRINTED)
+    if len(streams) > 1:
+        raise ValueError("two results would go to the standard output: write one of them to a file, or leave it out")
+    if len({os.path.realpath(path) for path, _ in results}) < len(results):
+        raise ValueError(f"two results would go to one file, {results[0][0]}")
+    keep(inputs, [path for path, _ in results])
+
+
+def _check_path(path: str, role: str) -> None:
+    if Path(path).is_dir() or not Path(path).parent.is_dir():
+        raise ValueError(f"cannot write {path}: it is a folder, or its folder does not exist")
+    if not os.access(Path(path).parent, os.W_OK):
+        raise ValueError(f"cannot write {path}: its folder may not be written to")
+    if role == TABLE:
         from hysim.files import ending
 
-        ending(str(table))
-    for path in drawn:
-        if path != STANDARD and Path(path).suffix.lower() not in _ENDINGS:
-            raise ValueError(f"pictures are SVG, PNG or PDF: call the file .svg, .png or .pdf, got {path}")
-    if given.count(STANDARD) + printed > 1:
-        raise ValueError("two results would go to the standard output: give one of them a file, or leave it out")
-    if len({os.path.realpath(path) for path in given}) < len(given):
-        raise ValueError(f"two results would go to one file, {given[0]}")
-    keep(inputs, given)
-    return STANDARD in given
+        ending(path)
+    if role == PICTURE and Path(path).suffix.lower() not in _ENDINGS:
+        raise ValueError(f"pictures are SVG, PNG or PDF: call the file .svg, .png or .pdf, got {path}")
 
 
 def keep(inputs: Iterable[str | None], results: Iterable[str | None]) -> None:
-    """Refuse results that would take the place of an input, by whatever path or link.
-
-    Raises
-    ------
-    ValueError
-        If there is one.
-    """
+    """Raise a ValueError if a result would overwrite an input, by whatever path or link."""
     targets = {path: os.stat(path) for path in results if path not in (None, STANDARD) and os.path.isfile(path)}
     for source in inputs:
         for path, target in targets.items():
@@ -85,19 +81,29 @@ def _files(source: str) -> Iterator[os.stat_result]:
     """Files behind an input: itself, the files of a folder, or the file that the standard input is read from."""
     paths = [os.path.join(source, name) for name in os.listdir(source)] if os.path.isdir(source) else [source]
     for path in paths:
-        with contextlib.suppress(OSError, ValueError):  # what cannot be read is said where it is read
+        with contextlib.suppress(OSError, ValueError):  # a file that cannot be read is an error where it is read
             yield os.fstat(sys.stdin.fileno()) if path == STANDARD else os.stat(path)
 
 
-def write(contents: "Mapping[str | None, str | bytes | Figure]") -> None:
-    """Write each content or figure to its path, to the standard output, or nowhere: all of the files or none."""
-    made = {path: _content(path, content) for path, content in contents.items() if path is not None}
-    write_all({path: content for path, content in made.items() if path != STANDARD})
-    if STANDARD in made:
-        print(made[STANDARD].decode(), end="", flush=True)
+def write(
+    options: argparse.Namespace,
+    files: Files,
+    text: Callable[[], str] | None = None,
+    document: Callable[[], Mapping[str, Any]] | None = None,
+) -> None:
+    """Write a content to each path that is not None, all of the files or none, and print the result.
+
+    The result is a text, or with ``--json`` a document; it is not printed if a path is the standard output.
+    """
+    contents = {path: _encoded(path, content()) for path, content in files.items() if path is not None}
+    if text is not None and STANDARD not in contents:
+        contents[STANDARD] = printed(options, text, document).encode()
+    write_all({path: content for path, content in contents.items() if path != STANDARD})
+    if STANDARD in contents:
+        print(contents[STANDARD].decode(), end="", flush=True)
 
 
-def _content(path: str, content: "str | bytes | Figure") -> bytes:
+def _encoded(path: str, content: "str | bytes | Figure") -> bytes:
     if isinstance(content, str | bytes):
         return content.encode() if isinstance(content, str) else content
     from hysim import plot
@@ -105,37 +111,49 @@ def _content(path: str, content: "str | bytes | Figure") -> bytes:
     return plot.to_bytes(content, "svg" if path == STANDARD else Path(path).suffix[1:].lower(), name="picture")
 
 
+def printed(
+    options: argparse.Namespace, text: Callable[[], str], document: Callable[[], Mapping[str, Any]] | None
+) -> str:
+    """The result as a text, or with ``--json`` as a document if there is one."""
+    return to_json(document()) if document is not None and options.json else text().rstrip("\n") + "\n"
+
+
 def to_json(document: Mapping[str, Any]) -> str:
     """JSON with null for numbers that are not finite."""
-    return json.dumps(_plain(document), indent=2, allow_nan=False) + "\n"
+    return json.dumps(_jsonable(document), indent=2, allow_nan=False) + "\n"
 
 
-def table(path: str, columns: Mapping[str, "FloatArray"], units: Mapping[str, str]) -> str | bytes:
-    """Columns in the format that the ending of their path names; the standard output gets comma-separated text.
+def _jsonable(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {name: _jsonable(item) for name, item in value.items()}
+    if isinstance(value, (tuple, list)):
+        return [_jsonable(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
-    Raises
-    ------
-    ValueError
-        If the ending names none, or its format needs an extra.
+
+def scalars(result: Any) -> dict[str, Any]:
+    """The fields of a result that are numbers, words or truth values, by name."""
+    return {name: value for name, value in vars(result).items() if isinstance(value, (str, int, float))}
+
+
+def fields_of(result: Any, names: Iterable[str]) -> dict[str, Any]:
+    """Some fields of a result, or values of options, by name."""
+    return {name: vars(result)[name] for name in names}
+
+
+def table(path: str, columns: Mapping[str, "FloatArray"], units: Mapping[str, str]) -> bytes:
+    """Columns in the format of their path's ending; the standard output gets comma-separated text.
+
+    A ValueError is raised if the ending is unknown, or its format needs an extra.
     """
-    if path == STANDARD:
-        return to_csv(columns, units)
     from hysim.files import Notes, packed
 
-    return packed(columns, path, Notes({name: units[name] for name in columns if name in units}))
-
-
-def to_csv(columns: Mapping[str, "FloatArray"], units: Mapping[str, str]) -> str:
-    """Columns under their names and units, every digit kept."""
-    buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow([f"{name} [{units[name]}]" if name in units else name for name in columns])
-    writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
-    return buffer.getvalue()
+    notes = Notes({name: units[name] for name in columns if name in units})
+    return packed(columns, "output.csv" if path == STANDARD else path, notes)
 
 
 class Curve(NamedTuple):
-    """What pictures take: input, output and time, with a name and units."""
+    """A loop to draw: input, output and time, with a name and units."""
 
     u: "FloatArray"
     y: "FloatArray"
@@ -144,20 +162,33 @@ class Curve(NamedTuple):
     units: Mapping[str, str] = MappingProxyType({})
 
 
-def loop(*results: "Record | Simulation", model: Any = None) -> "Figure":
-    """Picture of loops; the last is of a `model`, and has its family's name."""
+def drawn(draw: "Callable[[Figure], object]", width: float = 6.0, height: float = 4.0) -> "Figure":
+    """A figure in the house style, which a function has drawn on."""
     from hysim import plot
 
-    *others, last = results
-    run = last if model is None else Curve(last.u, last.y, last.t, type(model).__name__, last.units)
     with plot.house_style():
-        canvas = plot.figure()
-        plot.loop(*others, run, ax=canvas.add_subplot())
+        canvas = plot.figure(width, height)
+        draw(canvas)
     return canvas
 
 
+def loop(*results: "Record | Simulation | Curve") -> "Figure":
+    """Picture of loops over each other."""
+    from hysim import plot
+
+    return drawn(lambda canvas: plot.loop(*results, ax=canvas.add_subplot()))
+
+
+def loop_of_model(record: "Record", model: Any) -> "Figure":
+    """Picture of a record and of a model's free run over its input, under the name of the model's family."""
+    from hysim.simulation import simulate
+
+    run = simulate(model, record.t, record.u, units=dict(record.units))
+    return loop(record, Curve(run.u, run.y, run.t, type(model).__name__, run.units))
+
+
 def progress() -> Callable[[int, int], None] | None:
-    """A counter on the standard error, if that is a terminal; a total of 0 is one that is not known."""
+    """A counter on the standard error, if that is a terminal; a total of 0 stands for an unknown total."""
     if not sys.stderr.isatty():
         return None
 
@@ -166,11 +197,3 @@ def progress() -> Callable[[int, int], None] | None:
         print(f"\r{text}", end="\n" if 0 < total <= done else "", file=sys.stderr, flush=True)
 
     return show
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {name: _plain(item) for name, item in value.items()}
-    if isinstance(value, (tuple, list)):
-        return [_plain(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,8 +1,7 @@
-"""How a command ends on Ctrl-C, SIGTERM or SIGHUP: in order if it can, and in any case soon.
+"""The end of a command on Ctrl-C, SIGTERM or SIGHUP: in order if possible, and in any case soon.
 
-Python raises an exception between two steps of its own, never inside a call of a compiled library: what such a call
-computes for long would keep a signal waiting. A thread therefore waits for `PATIENCE` and then ends the process, unless
-the command has ended by itself.
+Python raises an exception between two steps of its own, never inside a call of a compiled library, so that a long call
+would delay the end. A thread therefore waits for `PATIENCE` and then ends the process, unless the command has ended.
 """
 
 import contextlib
@@ -15,7 +14,7 @@ from types import FrameType
 from typing import NoReturn
 
 INTERRUPTED = 128 + signal.SIGINT
-"""Exit code after Ctrl-C; after another signal it is 128 and its number too, as shells have it."""
+"""Exit code after Ctrl-C; after any signal it is 128 plus its number, as in shells."""
 
 PATIENCE = 1.3
 """Seconds in which a command can end in order."""
@@ -24,37 +23,37 @@ _NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
 
 
 class Ended(BaseException):
-    """A signal asks the process to end: what is half written is removed on the way out, as after Ctrl-C."""
+    """A signal asks the process to end: unfinished files are removed on the way out, as after Ctrl-C."""
 
     def __init__(self, number: int) -> None:
         super().__init__(number)
         self.number = number
 
 
-def words(number: int) -> str:
+def message(number: int) -> str:
     """Message for an end by a signal."""
     return "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
 
 
 @contextlib.contextmanager
-def heeded() -> Iterator[None]:
-    """Make signals that would end the process at once raise an exception, unless someone else handles them.
+def handled() -> Iterator[None]:
+    """Turn signals that would end the process at once into an exception, unless they have a handler already.
 
-    In another thread than the main one, where Python lets nobody say what happens on a signal, this does nothing.
+    This does nothing outside the main thread, where Python does not allow handlers to be set.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    wanted = [signal.Signals[name] for name in _NAMES if name in signal.Signals.__members__]
-    ours = [number for number in wanted if signal.getsignal(number) is signal.SIG_DFL]
-    watched = [*ours, *(number for number in wanted if signal.getsignal(number) is signal.default_int_handler)]
-    for number in ours:
+    numbers = [signal.Signals[name] for name in _NAMES if name in signal.Signals.__members__]
+    unhandled = [number for number in numbers if signal.getsignal(number) is signal.SIG_DFL]
+    watched = [*unhandled, *(number for number in numbers if signal.getsignal(number) is signal.default_int_handler)]
+    for number in unhandled:
         signal.signal(number, _raise)
     try:
         with _watched(frozenset(watched)):
             yield
     finally:
-        for number in ours:
+        for number in unhandled:
             signal.signal(number, signal.SIG_DFL)
 
 
@@ -64,8 +63,8 @@ def _raise(number: int, _: FrameType | None) -> NoReturn:
 
 @contextlib.contextmanager
 def _watched(numbers: frozenset[int]) -> Iterator[None]:
-    """Let a thread read which signals come, as they come, and end the process if the block does not end in time."""
-    if sys.platform == "win32":  # where only a socket could be written to
+    """Let a thread read the signals that arrive, and end the process if the block does not end in time."""
+    if sys.platform == "win32":  # where signals can be written to sockets only
         yield
         return
     reader, writer = os.pipe()
@@ -85,9 +84,9 @@ def _watched(numbers: frozenset[int]) -> Iterator[None]:
 
 
 def _watch(reader: int, numbers: frozenset[int], is_over: threading.Event) -> None:
-    """Wait for a signal, and then for the end; the other side of the pipe is closed at the end."""
-    while came := os.read(reader, 1):
-        if came[0] in numbers and not is_over.wait(PATIENCE):
+    """Wait for a signal, then for the end of the block, which closes the other side of the pipe."""
+    while received := os.read(reader, 1):
+        if received[0] in numbers and not is_over.wait(PATIENCE):
             start = b"\r\x1b[K" if sys.stderr is not None and sys.stderr.isatty() else b""
-            os.write(2, start + f"hysim: {words(came[0])}\n".encode())
-            os._exit(128 + came[0])
+            os.write(2, start + f"hysim: {message(received[0])}\n".encode())
+            os._exit(128 + received[0])

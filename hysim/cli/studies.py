@@ -1,32 +1,12 @@
-"""Studies in TOML files: what is computed, for which parameters, from which seed.
+"""Studies in TOML files: a task or a law on a record, its parameters, and the seed; docs/studies.md has the format.
 
-seed = 1
-task = "width.py:width"                 a function of a file beside this one, or "package.module:function"
-
-[response]                              or, in place of the task, a law on a record
-law = "law.json"                        or a name that `hysim identify --model` takes
-record = "loop.csv"                     beside this file; or "table1"
-u = "voltage"                           its columns
-y = "displacement"
-measure = "rmse"
-
-[grid]                                  values of each parameter, all combinations
-beta = [0.2, 0.5]
-n = {from = 1.0, to = 2.0, number = 5}
-
-[[list]]                                or one table for each task
-beta = 0.2
-
-[sample]                                or a sample
-n = 64
-method = "sobol"
-distributions.beta = [0.2, 0.5]         low, high
-distributions.n = {name = "norm", loc = 1.5, scale = 0.1}       of scipy.stats
+A study with a task is code: its module or file is executed. A study with a response is data only.
 """
 
-import importlib
+import functools
 import importlib.util
 import math
+import pkgutil
 import sys
 import tomllib
 from collections.abc import Callable, Mapping
@@ -48,51 +28,37 @@ class Study(NamedTuple):
 
 
 def read(path: str) -> Study:
-    """The study in a file.
-
-    Raises
-    ------
-    ValueError
-        If the file is not such a study; the message names it.
-    OSError
-        If it cannot be read.
-    """
+    """The study in a file; a ValueError that names the file if it is no study, an OSError if it cannot be read."""
     try:
         document = tomllib.loads(Path(path).read_text(encoding="utf-8"))
         _check(document, {"seed", "task", "response", *_SPACES}, "a study")
-        task, space = _one_of(document, ("task", "response")), _one_of(document, _SPACES)
-        folder = Path(path).resolve().parent
-        made = _named_task(document["task"], folder) if task == "task" else _response(document["response"], folder)
-        files = _files(document[task], folder)
-        return Study(made, _space(space, document[space]), document.get("seed", 0), files)
+        source, space = _one_of(document, ("task", "response")), _one_of(document, _SPACES)
+        folder, content = Path(path).resolve().parent, document[source]
+        task = _function(content, folder) if source == "task" else _response(content, folder)
+        names = [content.rpartition(":")[0]] if source == "task" else [content["law"], content["record"]]
+        files = tuple(str(folder / name) for name in names)
+        return Study(task, _space(space, document[space]), document.get("seed", 0), files)
     except (ValueError, TypeError, KeyError, AttributeError, ImportError) as error:
-        missing = f"{error} is missing" if isinstance(error, KeyError) else str(error)
-        raise ValueError(f"{path}: {missing}") from error
-
-
-def _files(source: Any, folder: Path) -> tuple[str, ...]:
-    """The files that a task or a response is read from."""
-    names = [source["law"], source["record"]] if isinstance(source, Mapping) else [source.rpartition(":")[0]]
-    return tuple(str(folder / name) for name in names)
+        message = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+        raise ValueError(f"{path}: {message}") from error
 
 
 class FileTask:
-    """A function of a file, which is loaded again where it is unpickled."""
+    """A function in a file, which is loaded again in the process where it is unpickled."""
 
     def __init__(self, path: str, name: str) -> None:
         self.path, self.name = path, name
-        self.__wrapped__ = getattr(_module(path), name)
+        function = vars(_module(path)).get(name)
+        if not callable(function):
+            raise ValueError(f"{path} has no function {name!r}")
+        self.function: Callable[..., Any] = function
+        functools.update_wrapper(self, function)  # with its attribute `batch`, if it has one
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
-        return self.__wrapped__(*arguments, **named)
+        return self.function(*arguments, **named)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return FileTask, (self.path, self.name)
-
-    def __getattr__(self, name: str) -> Any:
-        if name == "batch":
-            return getattr(self.__wrapped__, name)
-        raise AttributeError(name)
 
 
 def _module(path: str) -> Any:
@@ -106,13 +72,11 @@ def _module(path: str) -> Any:
     return module
 
 
-def _named_task(text: str, folder: Path) -> Any:
-    where, _, name = text.rpartition(":")
-    if not where or not name:
+def _function(text: str, folder: Path) -> Any:
+    place, _, name = text.rpartition(":")
+    if not place or not name:
         raise ValueError(f'task must be "module:function" or "file.py:function", got {text!r}')
-    if where.endswith(".py"):
-        return FileTask(str(folder / where), name)
-    return getattr(importlib.import_module(where), name)
+    return FileTask(str(folder / place), name) if place.endswith(".py") else models.resolved(text)
 
 
 def _response(table: Mapping[str, Any], folder: Path) -> Any:
@@ -120,7 +84,10 @@ def _response(table: Mapping[str, Any], folder: Path) -> Any:
 
     _check(table, {"law", "record", "u", "y", "measure"}, "[response]")
     name = table["law"]
-    law = getattr(hysim, models.FAMILIES[name]) if name in models.FAMILIES else hysim.load_model(folder / name)
+    is_file = name.endswith(".json") or (folder / name).is_file()
+    if not is_file and models.is_import_path(name):
+        raise ValueError(f"law takes a family or a file, got {name!r}: a law of your own is code, which a task can use")
+    law = hysim.load_model(folder / name) if is_file else models.family(name)
     if table["record"] == "table1":
         record = hysim.datasets.table1()
     else:
@@ -137,7 +104,7 @@ def _space(kind: str, content: Any) -> Any:
     from hysim.sweeps import Sample
 
     _check(content, {"n", "method", "seed", "distributions"}, "[sample]")
-    distributions = {name: _distribution(given) for name, given in content["distributions"].items()}
+    distributions = {name: _distribution(value) for name, value in content["distributions"].items()}
     return Sample(**{**content, "distributions": distributions})
 
 
@@ -153,22 +120,20 @@ def _values(values: Any) -> Any:
     return np.linspace(first, last, values["number"])
 
 
-def _distribution(given: Any) -> Any:
-    if not isinstance(given, Mapping):
-        return tuple(given)
-    from scipy import stats
-
-    arguments = dict(given)
-    return getattr(stats, arguments.pop("name"))(**arguments)
+def _distribution(value: Any) -> Any:
+    if not isinstance(value, Mapping):
+        return tuple(value)
+    arguments = dict(value)
+    return pkgutil.resolve_name(f"scipy.stats:{arguments.pop('name')}")(**arguments)
 
 
-def _check(table: Mapping[str, Any], names: set[str], what: str) -> None:
+def _check(table: Mapping[str, Any], names: set[str], title: str) -> None:
     if unknown := table.keys() - names:
-        raise ValueError(f"{what} has no {', '.join(sorted(unknown))}: there are {', '.join(sorted(names))}")
+        raise ValueError(f"{title} has no {', '.join(sorted(unknown))}: there are {', '.join(sorted(names))}")
 
 
 def _one_of(document: Mapping[str, Any], names: tuple[str, ...]) -> str:
-    given = [name for name in names if name in document]
-    if len(given) != 1:
-        raise ValueError(f"give one of {', '.join(names)}, got {', '.join(given) or 'none'}")
-    return given[0]
+    present = [name for name in names if name in document]
+    if len(present) != 1:
+        raise ValueError(f"give one of {', '.join(names)}, got {', '.join(present) or 'none'}")
+    return present[0]

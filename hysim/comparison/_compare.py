@@ -1,15 +1,14 @@
 """The verb `compare`: models side by side on one record, all by the same protocol.
 
-Every model is identified on the same samples, cross-validated by the same splits and tried on the same test. It is
-simulated in free run and judged by the same measures, those of `hysim.metrics`: how well its output fits, and how wide
-its loop is.
+Every model is identified on the same samples, cross-validated by the same splits and judged on the same test. It is
+simulated in free run and judged by the measures of `hysim.metrics`: the fit of its output, and the width of its loop.
 """
 
 import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -29,7 +28,7 @@ from hysim.simulation import simulate
 
 _SHORT = 200  # samples; leaving one out at a time costs as many fits as there are samples
 _BLOCKS = 10
-_SAME = 1e-6  # of the output's range: what a change of rate may change in a model that does not know rates
+_SAME = 1e-6  # of the output's range: largest effect of a change of rate on a rate-independent model
 _FAILURES = (ValueError, TypeError, ArithmeticError, SimulationError)
 
 
@@ -48,20 +47,20 @@ def compare(
     Parameters
     ----------
     models : mapping, "all" or None
-        Name to what is to be compared: a model, which is taken as it is; a result of `identify` or
-        `discover`; or a class or structure, which is identified on the record. ``"all"``, or None, is every family
-        that can be identified without being told more; those that cannot be on this record say why.
+        Name to a model, which is not changed; to a result of `identify` or `discover`; or to a class or structure,
+        which is identified on the record. ``"all"``, or None, is every family that can be identified without further
+        arguments; families that cannot be identified on this record are listed with the reason.
     record : Record
         With at least one complete cycle of the input.
     cross_validate : {"auto", "loo", "cycles", None} or int
-        How the classes and structures are cross-validated; see `identify`. ``"auto"`` leaves one sample out at
-        a time on records of up to 200 samples, and one of 10 blocks on longer ones.
+        Cross-validation of the classes and structures; see `identify`. ``"auto"`` leaves out one sample at a time on
+        records of up to 200 samples, and one of 10 blocks on longer ones.
     test : Record or int, optional
-        What no fit sees: another record, or the number of last complete cycles of this one that are kept from it.
-        A model that was identified here begins another record with a state that is identified on it, everything
-        else fixed; the last cycles it meets in the state that it reaches in free run.
+        Data that no fit uses: another record, or a number of last complete cycles of this one. On another record, the
+        initial state of a model that was identified here is identified, with everything else fixed; on the last cycles
+        the free run continues.
     seed : int
-        Of the starts of the searches.
+        Seed of the random starts of the searches.
     workers : int, optional
         Number of threads; by default one for each core. The result does not depend on it.
     progress : callable, optional
@@ -76,7 +75,7 @@ def compare(
     ValueError
         If there is nothing to compare, or the record has no complete cycle, or fewer than the test needs.
     TypeError
-        If the record is none, or a subject is nothing that can be compared.
+        If `record` is no Record, or a subject cannot be compared.
 
     Examples
     --------
@@ -99,12 +98,12 @@ def compare(
     results = map_on_threads(
         lambda k: protocol.row(names[k], subjects[names[k]]), len(names), workers=workers, progress=progress
     )
-    found = dict(zip(names, results, strict=True))
+    by_name = dict(zip(names, results, strict=True))
     return Comparison(
         record=training,
         loop=protocol.measured,
-        rows=tuple(row for row in found.values() if isinstance(row, ComparisonRow)),
-        failed={name: reason for name, reason in found.items() if isinstance(reason, str)},
+        rows=tuple(row for row in by_name.values() if isinstance(row, ComparisonRow)),
+        failed={name: reason for name, reason in by_name.items() if isinstance(reason, str)},
         test=trial.record if trial else None,
     )
 
@@ -116,9 +115,25 @@ def _last_loop(record: Record) -> LoopMetrics:
         raise ValueError(f"compare judges models by the loop of the record, and it has none: {error}") from None
 
 
+@runtime_checkable
+class _Responding(Protocol):
+    """A model."""
+
+    def response(self, u: FloatArray, /) -> FloatArray: ...
+
+
+@runtime_checkable
+class _Result(Protocol):
+    """A result of `identify` or `discover`."""
+
+    model: Any
+    n_parameters: int
+    cv_rmse: float
+
+
 @dataclass(frozen=True)
 class _Trial:
-    """What is fitted, what drives the models in the test, and from which sample of it on they are judged."""
+    """A test: the record for the fits, the record that drives the models, and the first sample that is judged."""
 
     training: Record
     drive: Record
@@ -133,7 +148,7 @@ class _Trial:
 
 @dataclass(frozen=True)
 class _Protocol:
-    """What is done to every model."""
+    """The treatment of every model."""
 
     record: Record
     measured: LoopMetrics
@@ -142,37 +157,42 @@ class _Protocol:
     trial: _Trial | None
 
     def row(self, name: str, subject: Any) -> ComparisonRow | str:
-        """The row of one subject, or why there is none."""
+        """The row of one subject, or the reason why there is none."""
         begin, seconds = time.perf_counter(), math.nan
         try:
             if _is_family(subject):
                 fitted = identify(subject, self.record, cross_validate=self.cross_validate, seed=self.seed)
                 seconds = time.perf_counter() - begin
                 return self._judged(name, fitted, seconds, fitted.success, fitted.message)
-            return self._judged(name, subject, seconds, bool(getattr(subject, "success", True)), "")
+            return self._judged(name, subject, seconds, True, "")
         except _FAILURES as error:
             return " ".join(str(error).split())
 
-    def _judged(self, name: str, fitted: Any, seconds: float, success: bool, message: str) -> ComparisonRow:
-        record, measured = self.record, self.measured
-        model = getattr(fitted, "model", fitted)
+    def _judged(self, name: str, subject: Any, seconds: float, success: bool, message: str) -> ComparisonRow:
+        record, measured, model = self.record, self.measured, _model_of(subject)
         y = simulate(model, record.t, record.u).y
         loop = _loop(model, record, y)
         residual = record.y - y
         rmse = metrics.rmse(record.y, y)
-        is_fitted = fitted is not model
-        n_parameters = int(fitted.n_parameters) if is_fitted else 0
+        n_parameters, cv_rmse, cv_residual = 0, rmse, residual
+        warnings: tuple[str, ...] = ()
+        fpe = aic = bic = math.nan
+        if isinstance(subject, _Result):
+            n_parameters, cv_rmse, cv_residual = int(subject.n_parameters), float(subject.cv_rmse), np.empty(0)
+            fpe, aic, bic = (of(residual, n_parameters) for of in (metrics.fpe, metrics.aic, metrics.bic))
+        if isinstance(subject, Identification):
+            cv_residual, warnings, success = subject.cv_residual, tuple(subject.warnings), subject.success
         sense = -1.0 if {loop.orientation, measured.orientation} == {"clockwise", "counterclockwise"} else 1.0
         deviation = _rate_deviation(model, record, y)
-        test_fit, test_rmse = self._tested(fitted, model, math.isfinite(seconds))
+        test_fit, test_rmse = self._tested(subject, model, math.isfinite(seconds))
         return ComparisonRow(
             name=name,
             model=model,
             n_parameters=n_parameters,
             fit_percent=metrics.fit_percent(record.y, y),
             rmse=rmse,
-            cv_rmse=float(fitted.cv_rmse) if is_fitted else rmse,
-            cv_residual=getattr(fitted, "cv_residual", np.empty(0)) if is_fitted else residual,
+            cv_rmse=cv_rmse,
+            cv_residual=cv_residual,
             max_residual=float(np.abs(residual).max()),
             max_width=loop.max_width,
             max_width_at=loop.max_width_at,
@@ -180,9 +200,9 @@ class _Protocol:
             width_rmse=metrics.width_rmse(measured, loop),
             width_error_percent=_excess_percent(sense * loop.max_width, measured.max_width),
             area_error_percent=_excess_percent(sense * loop.area, measured.area),
-            fpe=metrics.fpe(residual, n_parameters) if is_fitted else math.nan,
-            aic=metrics.aic(residual, n_parameters) if is_fitted else math.nan,
-            bic=metrics.bic(residual, n_parameters) if is_fitted else math.nan,
+            fpe=fpe,
+            aic=aic,
+            bic=bic,
             is_rate_independent=deviation <= _SAME,
             rate_deviation=deviation,
             y=y,
@@ -191,17 +211,17 @@ class _Protocol:
             test_rmse=test_rmse,
             success=success,
             message=message,
-            warnings=tuple(fitted.warnings) if isinstance(fitted, Identification) else (),
+            warnings=warnings,
             seconds=seconds,
         )
 
-    def _tested(self, fitted: Any, model: Any, identified_here: bool) -> tuple[float, float]:
+    def _tested(self, subject: Any, model: Any, identified_here: bool) -> tuple[float, float]:
         """Fit and rmse on the test."""
         if self.trial is None:
             return math.nan, math.nan
         drive, judged = self.trial.drive, self.trial.record
         if self.trial.own_state and identified_here:
-            model = _at_the_start_of(drive, fitted, self.seed)
+            model = _with_initial_state(drive, subject, self.seed)
         y = simulate(model, drive.t, drive.u).y[self.trial.begin :]
         return metrics.fit_percent(judged.y, y), metrics.rmse(judged.y, y)
 
@@ -214,7 +234,7 @@ def _subjects(models: Mapping[str, Any] | str | None) -> dict[str, Any]:
     if not models:
         raise ValueError("there is nothing to compare: give at least one model by name")
     for name, subject in models.items():
-        if not (is_identifiable(subject) or callable(getattr(getattr(subject, "model", subject), "response", None))):
+        if not (is_identifiable(subject) or isinstance(_model_of(subject), _Responding)):
             raise TypeError(f"compare takes a model, a result, a model class or a structure, got {subject!r} as {name}")
     return dict(models)
 
@@ -229,17 +249,21 @@ def _trial(record: Record, test: Record | int | None) -> _Trial | None:
     loops = measured_cycles(record.u, test, TOLERANCE)
     begin = loops.first_sample(loops.cycles[-1]) + 1
     if begin < 3:
-        raise ValueError(f"a test on {test} of the record's cycles leaves nothing to identify from")
+        raise ValueError(f"a test on {test} of the record's cycles leaves no samples to identify from")
     return _Trial(training=record[:begin], drive=record, begin=begin, own_state=False)
 
 
 def _is_family(subject: Any) -> bool:
-    """Whether the subject is a class or a structure, and still to be identified."""
-    return isinstance(subject, type) or not (hasattr(subject, "response") or hasattr(subject, "model"))
+    """Whether the subject is a class or a structure, to be identified."""
+    return isinstance(subject, type) or not isinstance(subject, _Responding | _Result)
 
 
-def _at_the_start_of(record: Record, fitted: Identification, seed: int) -> Any:
-    """The identified model, with the state at the first sample that suits another record best."""
+def _model_of(subject: Any) -> Any:
+    return subject.model if isinstance(subject, _Result) else subject
+
+
+def _with_initial_state(record: Record, fitted: Identification, seed: int) -> Any:
+    """The identified model, with the initial state that fits another record best."""
     model = fitted.model
     if not is_searched(model):
         return model
@@ -252,30 +276,24 @@ def _at_the_start_of(record: Record, fitted: Identification, seed: int) -> Any:
 
 
 def _loop(model: Any, record: Record, y: FloatArray) -> LoopMetrics:
-    """The model's loop; that of a curve without memory has no width, whatever inputs its branches were sampled at."""
+    """The model's loop; a curve without memory has width 0, at whatever inputs its branches were sampled."""
     loop = loop_metrics(record.u, y)
     if not isinstance(model, Direct):
         return loop
-    curve, nothing = model.response(loop.u), np.zeros(loop.u.size)
-    return replace(
-        loop,
-        max_width=0.0,
-        mean_width=0.0,
-        mid_width=0.0,
-        area=0.0,
-        relative_width=0.0,
-        energy=0.0,
-        max_width_at=float(loop.u[0]),
-        orientation="none",
-        equivalent_damping=0.0 if loop.secant_stiffness > 0.0 else math.nan,
-        loading=curve,
-        unloading=curve,
-        width=nothing,
+    curve, zeros = model.response(loop.u), np.zeros(loop.u.size)
+    none: dict[str, Any] = dict.fromkeys(
+        ("max_width", "mean_width", "mid_width", "area", "relative_width", "energy"), 0.0
     )
+    damping = 0.0 if loop.secant_stiffness > 0.0 else math.nan
+    at = float(loop.u[0])
+    return replace(
+        loop, **none, max_width_at=at, orientation="none", equivalent_damping=damping, loading=curve, unloading=curve,
+        width=zeros,
+    )  # fmt: skip
 
 
 def _rate_deviation(model: Any, record: Record, y: FloatArray) -> float:
-    """Largest change of the output, over its range, where the input takes twice as long on the same path."""
+    """Largest change of the output, over its range, if the input takes twice as long on the same path."""
     n = len(record)
     slow = np.arange(2 * n - 1) / 2.0
     t = record.sample_time * np.arange(2 * n - 1) if needs_time(model) else None

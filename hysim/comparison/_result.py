@@ -1,4 +1,4 @@
-"""What `compare` returns."""
+"""The result of `compare`."""
 
 import math
 from collections.abc import Mapping
@@ -25,46 +25,44 @@ class ComparisonRow:
     Parameters
     ----------
     name : str
-        What the model is called.
+        Name of the model.
     model : model
         The model itself.
     n_parameters : int
-        How many of its parameters were fitted to this record.
+        Number of its parameters that were fitted to this record.
     fit_percent, rmse : float
-        Of the free-run output [unit of y].
+        Fit [%] and rmse [unit of y] of the free-run output.
     cv_rmse : float
-        Cross-validated rmse, nan if unknown [unit of y]. A model that was not fitted has its rmse.
+        Cross-validated rmse, nan if unknown [unit of y]; the rmse of a model that was not fitted.
     cv_residual : array, shape (n,)
-        Measured minus model at the samples that were left out, nan elsewhere; empty if unknown [unit of y].
+        Measured minus model at left-out samples, nan elsewhere; empty if unknown [unit of y].
     max_residual : float
         Largest residual [unit of y].
     max_width, max_width_at, area, width_rmse : float
-        Of the model's loop, as in `hysim.loop_metrics`; `width_rmse` is the rms difference from the
-        measured width over the measured inputs.
+        Measures of the model's loop, as in `hysim.loop_metrics`, and the rms difference from the measured width.
     width_error_percent, area_error_percent : float
-        By how much the model's largest width and area exceed the measured ones [%]; -200 and thereabouts where
-        its loop runs the other way round, nan where nothing was measured to open.
+        Excess of the model's largest width and area over the measured ones [%]; about -200 if its loop has the other
+        orientation, nan if the measured loop is not open.
     fpe, aic, bic : float
-        Final prediction error and the two criteria, nan where nothing was fitted.
+        Final prediction error and the two criteria; nan for a model that was not fitted.
     is_rate_independent : bool
-        Whether its output stays the same, to 1e-6 of its range, when the same path of the input is run through at
-        half the rate.
+        Whether the output stays the same, to 1e-6 of its range, if the input follows the same path at half the rate.
     rate_deviation : float
-        The largest change of the output by that, as a fraction of its range.
+        The largest change of the output in that test, as a fraction of its range.
     y : array, shape (n,)
         Output at the record's samples.
     loop : LoopMetrics
         The model's loop.
     test_fit_percent, test_rmse : float
-        On what was kept for the test; nan without one [unit of y].
+        Fit [%] and rmse [unit of y] on the test; nan without a test.
     success : bool
         Whether its identification converged.
     message : str
-        How that ended; empty for a model that was not identified here.
+        Message of the identification; empty for a model that was not identified here.
     warnings : tuple of str
-        Those of its identification; empty for a model that was not identified.
+        Warnings of the identification.
     seconds : float
-        How long that took; nan where it was not done here. Rows that differ in it are equal [s].
+        Duration of the identification, nan without one; not part of the equality of rows [s].
     """
 
     name: str
@@ -119,15 +117,15 @@ class Comparison:
     Parameters
     ----------
     record : Record
-        What they were compared on.
+        The record of the comparison.
     loop : LoopMetrics
-        Its loop.
+        The measured loop.
     rows : tuple of ComparisonRow
-        One for each model, in the order given.
+        One for each model, in the order of the argument of `compare`.
     failed : mapping
-        Name to the reason, for candidates that could not be identified or simulated on the record.
+        Name to the reason, for models that could not be identified or simulated on the record.
     test : Record or None
-        What was kept for the test.
+        The samples of the test.
     """
 
     record: Record
@@ -151,21 +149,10 @@ class Comparison:
         raise KeyError(f"no model {name!r}: there are {', '.join(row.name for row in self.rows)}")
 
     def ranked(self, criterion: str = "cv_rmse") -> tuple[ComparisonRow, ...]:
-        """The rows by a measure of which less is better, the best first; those that lack it are left out.
+        """The rows by a measure, the smallest first; rows without the measure are left out.
 
-        Parameters
-        ----------
-        criterion : {"cv_rmse", "bic", "aic", "fpe", "rmse", "test_rmse"}
-            The measure.
-
-        Returns
-        -------
-        tuple of ComparisonRow
-
-        Raises
-        ------
-        ValueError
-            If there is no such measure.
+            `criterion` is one of ``"cv_rmse"``, ``"bic"``, ``"aic"``, ``"fpe"``, ``"rmse"`` and ``"test_rmse"``; any
+            other word is a ValueError.
 
         Examples
         --------
@@ -177,18 +164,18 @@ class Comparison:
         known = ("cv_rmse", "bic", "aic", "fpe", "rmse", "test_rmse")
         if criterion not in known:
             raise ValueError(f"criterion must be one of {', '.join(known)}, got {criterion!r}")
-        scores = [(float(getattr(row, criterion)), row) for row in self.rows]
+        scores = [(float(vars(row)[criterion]), row) for row in self.rows]
         return tuple(row for score, row in sorted(scores, key=lambda pair: pair[0]) if score == score)
 
     @property
     def winner(self) -> str | None:
-        """The model with the least cross-validated rmse; None unless at least two models have one."""
+        """The model with the smallest cross-validated rmse; None unless at least two models have one."""
         best = self.ranked()
         return best[0].name if len(best) > 1 else None
 
     @property
     def contrasts(self) -> tuple[Contrast, ...]:
-        """Each other model held against the winner, by their errors on samples left out; the nearest first."""
+        """Each other model compared with the winner by their errors on left-out samples, the nearest first."""
         if self.winner is None:
             return ()
         best, *others = self.ranked()
@@ -203,11 +190,11 @@ class Comparison:
 
     @property
     def probabilities(self) -> dict[str, float]:
-        """How surprising each other model's left-out errors would be if it predicted as well as the winner.
+        """Probability of each other model's left-out errors, if it predicted as well as the winner.
 
-        Name to the two-sided probability of signed ranks as one-sided as these, which large single errors do not
-        sway, with the correlation of neighbours and Holm's correction for the number of models; nan where errors are
-        unknown.
+        Name to the two-sided probability of equally one-sided signed ranks, on which single large errors have
+        little influence, with the correlation of neighbours and Holm's correction for the number of models; nan if
+        errors are unknown.
         """
         return {each.name: each.probability for each in self.contrasts}
 
@@ -218,7 +205,7 @@ class Comparison:
 
     @property
     def verdict(self) -> str:
-        """The winner, what the record cannot decide, and which models diverged, in words."""
+        """The winner, the models that the record cannot tell from it, and the models that diverged, in words."""
         by_bic = self.ranked("bic")
         sentences = [f"The BIC prefers {by_bic[0].name}."] if len(by_bic) > 1 and by_bic[0].bic > -math.inf else []
         if self.winner is not None:
@@ -230,24 +217,24 @@ class Comparison:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """One sentence for each thing that should not be overlooked.
+        """Warnings about the comparison, one sentence each.
 
-        They are a constant output; the warnings of the best model, the one that predicts best, or where that is unknown
-        has the least rmse; and of the best model that doubts it, that the input and the output may be swapped. Models
-        that diverged are named in `verdict`, those that could not be compared in `failed`.
+        They say that the output is constant; the warnings of the best model, which predicts best, or else has the
+        smallest rmse; and, from the best model that says so, that input and output may be swapped. `verdict` names
+        models that diverged, and `failed` those that could not be compared.
         """
         constant = [CONSTANT] if np.ptp(self.record.y) == 0.0 else []
         ranked = self.ranked() or self.ranked("rmse")
-        told = [(row.name, each) for row in ranked for each in row.warnings]
-        found = [f"{name}: {each}" for name, each in told if name == ranked[0].name and each != CONSTANT]
-        doubts = [f"{name}: {each}" for name, each in told if each.startswith(SWAPPED)][:1]
-        return (*constant, *dict.fromkeys([*found, *doubts]))
+        every = [(row.name, each) for row in ranked for each in row.warnings]
+        of_best = [f"{name}: {each}" for name, each in every if name == ranked[0].name and each != CONSTANT]
+        swapped = [f"{name}: {each}" for name, each in every if each.startswith(SWAPPED)][:1]
+        return (*constant, *dict.fromkeys([*of_best, *swapped]))
 
     def _undecided_in_words(self) -> str:
         method = "(signed ranks of left-out errors, 5 % after Holm's correction)"
         smaller = tuple(each.name for each in self.contrasts if each.contradicts)
-        if even := tuple(name for name in self.undecided if name not in smaller):
-            return f"{len(self.record)} samples show no significant difference to {_listed(even)} {method}"
+        if similar := tuple(name for name in self.undecided if name not in smaller):
+            return f"{len(self.record)} samples show no significant difference to {_listed(similar)} {method}"
         if any(math.isnan(each.probability) and not each.diverged for each in self.contrasts):
             return "the errors that would show a difference to the others are not all known"
         if smaller:
@@ -262,9 +249,9 @@ class Comparison:
 
     def _exceptions_in_words(self) -> list[str]:
         """Models that diverged, and those whose ranks and rmse disagree."""
-        lost = tuple(each.name for each in self.contrasts if each.diverged)
+        diverged = tuple(each.name for each in self.contrasts if each.diverged)
         smaller = tuple(each.name for each in self.contrasts if each.contradicts)
-        sentences = [f"{_listed(lost)} diverged on samples left out."] if lost else []
+        sentences = [f"{_listed(diverged)} diverged on samples left out."] if diverged else []
         if smaller:
             has = "has" if len(smaller) == 1 else "have"
             sentences.append(
@@ -274,17 +261,7 @@ class Comparison:
         return sentences
 
     def to_text(self, *, timings: bool = True) -> str:
-        """The table for a terminal, and the verdict under it.
-
-        Parameters
-        ----------
-        timings : bool
-            Whether the seconds that each fit took are shown, where fits were made.
-
-        Returns
-        -------
-        str
-        """
+        """The table for a terminal, and the verdict below it; `timings` adds the seconds of each fit."""
         return _tables.to_text(self, timings=timings and any(row.seconds == row.seconds for row in self.rows))
 
     def to_markdown(self, *, timings: bool = False) -> str:
@@ -296,25 +273,13 @@ class Comparison:
         return _tables.to_latex(self, timings=timings)
 
     def to_csv(self, *, timings: bool = False) -> str:
-        """Every measure as comma-separated values, every digit kept; `timings` adds the seconds of each fit."""
+        """Every measure as comma-separated values with all digits; `timings` adds the seconds of each fit."""
         return _tables.to_csv(self, timings=timings)
 
     def to_frame(self, *, timings: bool = False) -> Any:
-        """Every measure as a pandas DataFrame, one row a model.
+        """Every measure as a pandas DataFrame, one row a model; `timings` adds the seconds of each fit.
 
-        Parameters
-        ----------
-        timings : bool
-            Whether to add the seconds that each fit took.
-
-        Returns
-        -------
-        pandas.DataFrame
-
-        Raises
-        ------
-        ImportError
-            If pandas is not installed: it comes with the extra ``tables`` only.
+        An ImportError is raised if pandas, of the extra ``tables``, is not installed.
         """
         return _tables.to_frame(self, timings=timings)
 

@@ -1,4 +1,4 @@
-"""A comparison as text, CSV, Markdown, LaTeX and columns: one list of columns, and how each form writes them."""
+"""A comparison as text, CSV, Markdown, LaTeX and columns, all written from one list of columns."""
 
 import csv
 import html
@@ -6,139 +6,149 @@ import io
 import math
 import re
 import textwrap
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hysim._words import LETTERS, words
 
 if TYPE_CHECKING:
-    from hysim.comparison._result import Comparison, ComparisonRow
-    from hysim.comparison._verdict import Contrast
+    from hysim.comparison._result import Comparison
 
 Value = str | int | float | bool
 _WIDE = 110  # letters in a line of text
 _PRINTED = 5  # rows in words
 
 
-@dataclass(frozen=True)
-class Column:
-    """A column: its heading, the value in a row, the decimals in print, and whether short tables have it."""
+class Column(NamedTuple):
+    """A column: its heading, the value in a row by name, the decimals in print, and whether short tables have it."""
 
     heading: str
-    value: "Callable[[ComparisonRow], Value]"
+    name: str
     digits: int = 0
     short: bool = True
 
 
 def columns(comparison: "Comparison", *, timings: bool) -> list[Column]:
     """The columns that this comparison can fill."""
-    units, quantum = comparison.record.units, comparison.record.resolution
+    units = comparison.record.units
     u, y = (f" [{units[name]}]" if name in units else "" for name in ("u", "y"))
     area = f" [{units['y']} {units['u']}]" if {"u", "y"} <= units.keys() else ""
-    test = [
-        Column(f"test rmse{y}", lambda row: row.test_rmse, 4),
-        Column("test fit [%]", lambda row: row.test_fit_percent, 2),
+    contrasts = [
+        Column("cv rmse / best", "rmse_ratio", 2),
+        Column("typical error / best", "typical_ratio", 2, short=False),
+        Column("p", "probability", 3),
+        Column("diverged", "diverged", short=False),
     ]
-    contrasts = {each.name: each for each in comparison.contrasts}
-    effect = [
-        Column("cv rmse / best", lambda row: _of(contrasts, row, "rmse_ratio"), 2),
-        Column("typical error / best", lambda row: _of(contrasts, row, "typical_ratio"), 2, short=False),
-        Column("p", lambda row: _of(contrasts, row, "probability"), 3),
-        Column("diverged", lambda row: row.name in contrasts and contrasts[row.name].diverged, short=False),
-    ]
+    test = [Column(f"test rmse{y}", "test_rmse", 4), Column("test fit [%]", "test_fit_percent", 2)]
     return [
-        Column("model", lambda row: row.name),
-        Column("parameters", lambda row: row.n_parameters),
-        Column("fit [%]", lambda row: row.fit_percent, 2),
-        Column(f"rmse{y}", lambda row: row.rmse, 4),
-        Column(f"cv rmse{y}", lambda row: row.cv_rmse, 4),
-        *(effect if contrasts else []),
+        Column("model", "name"),
+        Column("parameters", "n_parameters"),
+        Column("fit [%]", "fit_percent", 2),
+        Column(f"rmse{y}", "rmse", 4),
+        Column(f"cv rmse{y}", "cv_rmse", 4),
+        *(contrasts if comparison.contrasts else []),
         *(test if comparison.test else []),
-        *([Column("max residual [quanta]", lambda row: row.max_residual / quantum, 2)] if quantum else []),
-        Column(f"max width{y}", lambda row: row.max_width, 3),
-        Column(f"at{u}", lambda row: row.max_width_at, 1, short=False),
-        Column(f"area{area}", lambda row: row.area, 2, short=False),
-        Column(f"width rmse{y}", lambda row: row.width_rmse, 4, short=False),
-        Column("width error [%]", lambda row: row.width_error_percent, 1),
-        Column("area error [%]", lambda row: row.area_error_percent, 1),
-        Column("BIC", lambda row: _defined(row.bic), 1),
-        Column("AIC", lambda row: _defined(row.aic), 1, short=False),
-        Column("FPE", lambda row: row.fpe, 6, short=False),
-        Column("rate independent", lambda row: row.is_rate_independent),
-        Column("rate deviation", lambda row: row.rate_deviation, 9, short=False),
-        *([Column("time [s]", lambda row: row.seconds, 1)] if timings else []),
-        Column("converged", lambda row: row.success, short=False),
-        Column("message", lambda row: row.message, short=False),
-        Column("warnings", lambda row: "; ".join(row.warnings), short=False),
+        *([Column("max residual [quanta]", "residual_quanta", 2)] if comparison.record.resolution else []),
+        Column(f"max width{y}", "max_width", 3),
+        Column(f"at{u}", "max_width_at", 1, short=False),
+        Column(f"area{area}", "area", 2, short=False),
+        Column(f"width rmse{y}", "width_rmse", 4, short=False),
+        Column("width error [%]", "width_error_percent", 1),
+        Column("area error [%]", "area_error_percent", 1),
+        Column("BIC", "bic", 1),
+        Column("AIC", "aic", 1, short=False),
+        Column("FPE", "fpe", 6, short=False),
+        Column("rate independent", "is_rate_independent"),
+        Column("rate deviation", "rate_deviation", 9, short=False),
+        *([Column("time [s]", "seconds", 1)] if timings else []),
+        Column("converged", "success", short=False),
+        Column("message", "message", short=False),
+        Column("warnings", "warnings", short=False),
     ]
+
+
+def rows(comparison: "Comparison") -> list[dict[str, Any]]:
+    """The values of each model by name; the best model compares with itself as 1."""
+    contrasts = {each.name: vars(each) for each in comparison.contrasts}
+    quantum, values = comparison.record.resolution, []
+    for row in comparison.rows:
+        same = math.nan if math.isnan(row.cv_rmse) else 1.0
+        best = {"rmse_ratio": same, "typical_ratio": same, "probability": math.nan, "diverged": False}
+        criteria = {name: math.nan if vars(row)[name] == -math.inf else vars(row)[name] for name in ("bic", "aic")}
+        derived = {"residual_quanta": row.max_residual / quantum if quantum else math.nan}
+        text = {"warnings": "; ".join(row.warnings)}
+        values.append(contrasts.get(row.name, best) | vars(row) | criteria | derived | text)
+    return values
 
 
 def to_text(comparison: "Comparison", *, timings: bool) -> str:
-    """The short table for a terminal, what could not be compared, and the verdict."""
+    """The short table for a terminal, the models that could not be compared, and the verdict."""
     lines = _aligned(_short(comparison, timings))
     notes = [f"not compared: {name}: {reason}" for name, reason in comparison.failed.items()] + [comparison.verdict]
     folded = textwrap.TextWrapper(_WIDE, subsequent_indent="  ", break_on_hyphens=False)
     wrapped = [line for note in notes if note for line in folded.wrap(note)]
     inside = textwrap.TextWrapper(_WIDE, initial_indent="  ", subsequent_indent="    ", break_on_hyphens=False)
-    warned = [line for each in comparison.warnings for line in inside.wrap(each)]
-    return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:], *wrapped, *(["Warnings"] if warned else []), *warned])
+    warnings = [line for each in comparison.warnings for line in inside.wrap(each)]
+    return "\n".join(
+        [lines[0], "-" * len(lines[0]), *lines[1:], *wrapped, *(["Warnings"] if warnings else []), *warnings]
+    )
 
 
 def to_words(comparison: "Comparison") -> str:
     """The rows that predict best, and the verdict."""
-    best = [*comparison.ranked(), *(row for row in comparison.rows if row.cv_rmse != row.cv_rmse)]
-    wanted = ("model", "parameters", "fit [%]", "rmse", "cv rmse", "max width")
-    chosen = [column for column in columns(comparison, timings=False) if column.heading.startswith(wanted)]
+    best = [row.name for row in comparison.ranked()]
+    unknown = [row.name for row in comparison.rows if math.isnan(row.cv_rmse)]
+    by_name = {row["name"]: row for row in rows(comparison)}
+    names = ("name", "n_parameters", "fit_percent", "rmse", "cv_rmse", "rmse_ratio", "max_width")
+    chosen = [column for column in columns(comparison, timings=False) if column.name in names]
+    ordered = [by_name[name] for name in best + unknown]
     table = [["", *(column.heading for column in chosen[1:])]]
-    table += [[_printed(column.value(row), column.digits) for column in chosen] for row in best[:_PRINTED]]
-    more, many = len(best) - _PRINTED, len(comparison.rows)
+    table += [[_printed(row[column.name], column.digits) for column in chosen] for row in ordered[:_PRINTED]]
+    more, many = len(ordered) - _PRINTED, len(ordered)
     head = f"Comparison of {many} model{'' if many == 1 else 's'} on {comparison.record.name or 'a record'}, "
     notes = [f"  ... and {more} more"] if more > 0 else []
-    told = [
+    sentences = [
         f"Not compared: {', '.join(comparison.failed)}." if comparison.failed else "",
         comparison.verdict,
         f"Warnings: {'; '.join(comparison.warnings)}" if comparison.warnings else "",
     ]
     notes += textwrap.wrap(
-        " ".join(filter(None, told)), LETTERS, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False
+        " ".join(filter(None, sentences)), LETTERS, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False
     )
     return words([f"{head}{len(comparison.record)} samples", *(f"  {line}" for line in _aligned(table)), *notes])
 
 
 def to_html(comparison: "Comparison") -> str:
     """The short table for a notebook, and the verdict."""
-    header, *rows = ([html.escape(cell) for cell in cells] for cells in _short(comparison, timings=False))
+    header, *body = ([html.escape(cell) for cell in cells] for cells in _short(comparison, timings=False))
     head = "".join(f"<th>{cell}</th>" for cell in header)
-    body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>" for cells in rows)
+    lines = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>" for cells in body)
     listed = "".join(f"<li>{html.escape(each)}</li>" for each in comparison.warnings)
-    warned = f"<p>Warnings</p><ul>{listed}</ul>" if listed else ""
+    warnings = f"<p>Warnings</p><ul>{listed}</ul>" if listed else ""
     verdict = f"<p>{html.escape(comparison.verdict)}</p>"
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{verdict}{warned}"
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{lines}</tbody></table>{verdict}{warnings}"
 
 
 def to_markdown(comparison: "Comparison", *, timings: bool) -> str:
-    """The short table in Markdown, with a row for what could not be compared."""
-    header, *rows = _short(comparison, timings)
-    rows += [[name, reason, *[""] * (len(header) - 2)] for name, reason in comparison.failed.items()]
-    lines = [header, ["---", *("---:" for _ in header[1:])], *rows]
+    """The short table in Markdown, with a row for each model that could not be compared."""
+    header, *body = _short(comparison, timings)
+    body += [[name, reason, *[""] * (len(header) - 2)] for name, reason in comparison.failed.items()]
+    lines = [header, ["---", *("---:" for _ in header[1:])], *body]
     return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |" for cells in lines)
 
 
 def to_latex(comparison: "Comparison", *, timings: bool) -> str:
     """The short table as a plain tabular, which needs no package."""
-    header, *rows = _short(comparison, timings)
-    body = [" & ".join(map(_escaped, cells)) for cells in rows]
-    body += [
-        rf"{_escaped(name)} & \multicolumn{{{len(header) - 1}}}{{l}}{{{_escaped(reason)}}}"
-        for name, reason in comparison.failed.items()
-    ]
-    lines = [rf"\begin{{tabular}}{{l{'r' * (len(header) - 1)}}}", r"\hline", " & ".join(map(_escaped, header)) + r" \\"]
-    return "\n".join([*lines, r"\hline", *(rf"{line} \\" for line in body), r"\hline", r"\end{tabular}"])
+    (header, *body), failed = _short(comparison, timings), comparison.failed.items()
+    spans = rf"\multicolumn{{{len(header) - 1}}}{{l}}"
+    lines = [" & ".join(map(_escaped, cells)) for cells in body]
+    lines += [rf"{_escaped(name)} & {spans}{{{_escaped(reason)}}}" for name, reason in failed]
+    head = [rf"\begin{{tabular}}{{l{'r' * (len(header) - 1)}}}", r"\hline", " & ".join(map(_escaped, header)) + r" \\"]
+    return "\n".join([*head, r"\hline", *(rf"{line} \\" for line in lines), r"\hline", r"\end{tabular}"])
 
 
 def to_csv(comparison: "Comparison", *, timings: bool) -> str:
-    """Every column, every digit kept; an unknown number is an empty cell."""
+    """Every column with all digits; an unknown number is an empty cell."""
     buffer = io.StringIO()
     table = to_columns(comparison, timings=timings)
     writer = csv.writer(buffer, lineterminator="\n")
@@ -148,16 +158,10 @@ def to_csv(comparison: "Comparison", *, timings: bool) -> str:
 
 
 def to_columns(comparison: "Comparison", *, timings: bool) -> dict[str, list[Value | None]]:
-    """Heading to values, a failed candidate with its name and message alone."""
-    chosen = columns(comparison, timings=timings)
-    failed: Iterable[Mapping[str, Value]] = (
-        {"model": name, "converged": False, "message": reason} for name, reason in comparison.failed.items()
-    )
-    rows: Sequence[Mapping[str, Value]] = [
-        *({column.heading: column.value(row) for column in chosen} for row in comparison.rows),
-        *failed,
-    ]
-    return {column.heading: [row.get(column.heading) for row in rows] for column in chosen}
+    """Heading to values; a model that could not be compared has its name and message only."""
+    failed = [{"name": name, "success": False, "message": reason} for name, reason in comparison.failed.items()]
+    every = [*rows(comparison), *failed]
+    return {column.heading: [row.get(column.name) for row in every] for column in columns(comparison, timings=timings)}
 
 
 def to_frame(comparison: "Comparison", *, timings: bool) -> Any:
@@ -173,7 +177,7 @@ def to_frame(comparison: "Comparison", *, timings: bool) -> Any:
 
 
 def _aligned(table: Sequence[Sequence[str]]) -> list[str]:
-    """Lines of cells, the first column to the left, the others to the right."""
+    """Lines of cells; the first column is aligned to the left, the others to the right."""
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     return [
         "  ".join([cells[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(cells[1:], widths[1:], strict=True))])
@@ -184,15 +188,8 @@ def _aligned(table: Sequence[Sequence[str]]) -> list[str]:
 def _short(comparison: "Comparison", timings: bool) -> list[list[str]]:
     """Headings and printed cells of the short columns, one row a model."""
     chosen = [column for column in columns(comparison, timings=timings) if column.short]
-    rows = [[_printed(column.value(row), column.digits) for column in chosen] for row in comparison.rows]
-    return [[column.heading for column in chosen], *rows]
-
-
-def _of(contrasts: "Mapping[str, Contrast]", row: "ComparisonRow", name: str) -> float:
-    """How a model compares with the best one, which compares with itself as 1."""
-    if row.name in contrasts:
-        return float(getattr(contrasts[row.name], name))
-    return 1.0 if name != "probability" and row.cv_rmse == row.cv_rmse else math.nan
+    body = [[_printed(row[column.name], column.digits) for column in chosen] for row in rows(comparison)]
+    return [[column.heading for column in chosen], *body]
 
 
 def _printed(value: Value, digits: int) -> str:
@@ -211,8 +208,3 @@ def _exact(value: Value | None) -> str:
 
 def _escaped(text: str) -> str:
     return re.sub(r"([%&_#$])", r"\\\1", text)
-
-
-def _defined(criterion: float) -> float:
-    """An information criterion; nan where it is minus infinity, since every residual is zero."""
-    return math.nan if criterion == -math.inf else criterion

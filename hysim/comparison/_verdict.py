@@ -1,4 +1,4 @@
-"""Whether left-out samples show that one model predicts worse than another.
+"""Significance of the differences between the errors of models on left-out samples.
 
 With a and b the errors of two models at N samples that neither was fitted to, d = |a| - |b|, and s the signed ranks of
 d, the rank of |d| with the sign of d: one huge error counts as the largest, and no more. Neighbours along a loop are
@@ -10,13 +10,13 @@ for its bias, and sd the standard deviation of s,
 
 If d is as often positive as negative, and as large, T has about Student's distribution with M - 1 degrees of freedom.
 With fewer than 6 independent samples no difference could be shown, however large. Differences below a thousandth of the
-typical error count as none. Several models are held against the best one by Holm's correction. The best one was chosen
+typical error count as none. Several models are compared with the best one by Holm's correction. The best one was chosen
 by the same errors, which makes a small probability less remarkable.
 
 With normal and with heavy-tailed noise (t, 2 degrees of freedom), and a correlation of neighbours up to 0.9, equal
 models are called unequal in 4 to 8 % of 1500 simulated records of 52, 200 and 1000 samples at the level of 5 %, with
 errors along a loop in less; at 0.95 in 15 % of those with 52 samples. A mean of squared errors with 3 to 6 lags
-(Diebold and Mariano 1995) does so in up to 26 % of them, in 42 % at 0.95, and is blind where one error is huge.
+(Diebold and Mariano 1995) does so in up to 26 % of them, in 42 % at 0.95, and fails where one error is huge.
 
 Sources: F. Wilcoxon, Biometrics Bull. 1 (1945) 80 for signed ranks; F. W. Zwiers and H. von Storch, J. Climate 8
 (1995) 336 for M; F. H. C. Marriott and J. A. Pope, Biometrika 41 (1954) 390 for the bias; S. Holm, Scand. J. Stat. 6
@@ -31,10 +31,10 @@ import numpy as np
 from hysim._frozen import FloatArray, frozen
 
 LEVEL = 0.05
-"""Two models are told apart where the probability is below this."""
+"""Two models differ significantly if the probability is below this."""
 
 DIVERGED = 10.0
-"""A fitted model diverged where a left-out error is larger than so many ranges of the measured output."""
+"""A fitted model diverged if a left-out error is larger than so many ranges of the measured output."""
 
 _MOST_CORRELATED = 0.99
 _INDEPENDENT = 6.0  # samples at least, where there are as many
@@ -45,19 +45,19 @@ _ROUNDING = 1e-9  # of the output's range
 
 @frozen
 class Contrast:
-    """A model held against the best one, by their errors at the samples that were left out of both.
+    """A model compared with the best one, by their errors at samples that were left out of both.
 
     Parameters
     ----------
     name : str
-        What the model is called.
+        Name of the model.
     rmse_ratio : float
         Its cross-validated rmse over that of the best model.
     typical_ratio : float
-        Its median absolute error over that of the best model; nan where errors are unknown.
+        Its median absolute error over that of the best model; nan if errors are unknown.
     probability : float
-        Two-sided probability of signed ranks as one-sided as these if both predicted equally well, after Holm's
-        correction for the number of models; nan where errors are unknown.
+        Two-sided probability of equally one-sided signed ranks if both predicted equally well, after Holm's correction
+        for the number of models; nan if errors are unknown.
     has_larger_errors : bool
         Whether its errors are the larger ones by their signed ranks.
     diverged : bool
@@ -86,7 +86,7 @@ def contrasts(
     others: Mapping[str, FloatArray], best: FloatArray, rmses: Mapping[str, float], best_rmse: float, *,
     span: float, fitted: Sequence[str],
 ) -> tuple[Contrast, ...]:  # fmt: skip
-    """Each of the others held against the best model by its left-out errors (n,); `span` is the output's range."""
+    """Each of the others compared with the best model by left-out errors (n,); `span` is the output's range."""
     tests = {name: _tested(errors, best, _ROUNDING * span) for name, errors in others.items()}
     adjusted = holm({name: p for name, (p, _) in tests.items()})
     return tuple(
@@ -103,15 +103,15 @@ def contrasts(
 
 
 def diverged(errors: FloatArray, span: float) -> bool:
-    """Whether one of the errors that are known is infinite, or far beyond the output's range."""
+    """Whether a known error is infinite, or far beyond the output's range."""
     known = errors[~np.isnan(errors)]
     return bool(known.size and np.abs(known).max() > DIVERGED * span > 0.0)
 
 
 def probability(a: FloatArray, b: FloatArray, *, tie: float = 0.0) -> float:
-    """Two-sided probability of signed ranks as one-sided as these if both models predicted equally well.
+    """Two-sided probability of equally one-sided signed ranks if both models predicted equally well.
 
-    It is nan where fewer than 4 samples have both errors, and 1 where no difference is above `tie` [unit of y] and a
+    It is nan if fewer than 4 samples have both errors, and 1 if no difference is above `tie` [unit of y] and a
     thousandth of the typical error.
     """
     return _tested(a, b, tie)[0]

@@ -1,7 +1,7 @@
 """The measures of every cycle of a record, one row a cycle.
 
 Cycles begin and end at a level of the input (see `hysim._excursions`), and each is measured by the code of
-`loop_metrics`. Where a cycle begins and ends at exactly the same input, which is the rule,
+`loop_metrics`. If a cycle begins and ends at exactly the same input, which is the rule,
 
     energy = integral of y du over the cycle = -signed area
 
@@ -37,7 +37,7 @@ from hysim.metrics._loop import COUNTERCLOCKWISE, FORCE, LoopMetrics, measure, s
 
 @dataclass(frozen=True)
 class _Column:
-    """A column: its field, its heading in text and unit there, from those of u and y, and whether text has it."""
+    """A column: its field, its heading and unit in the text, and whether the text has it."""
 
     field: str
     heading: str
@@ -45,7 +45,7 @@ class _Column:
     in_text: bool = True
 
     def cell(self, value: float | int) -> str:
-        """A number as text shows it."""
+        """A number in the text."""
         if isinstance(value, int):
             return f"{value}"
         if math.isnan(value):
@@ -53,7 +53,7 @@ class _Column:
         return f"{100.0 * value:.2f}" if self.unit == "%" else f"{value:.4g}"
 
     def unit_in(self, units: Mapping[str, str]) -> str:
-        """The unit, empty where that of u or y is unknown."""
+        """The unit made of those of u and y; empty if one of them is unknown."""
         if not {"u", "y"} & set(self.unit) <= units.keys():
             return ""
         return self.unit.replace("y", "\0").replace("u", units.get("u", "")).replace("\0", units.get("y", ""))
@@ -89,7 +89,7 @@ class CycleMetrics:
     start, stop : array of int
         ``u[start:stop]`` are the fewest samples that hold the cycle.
     amplitude, mean_input : array
-        Half of the input's span, and the middle of it [unit of u].
+        Half of the input's span, and its middle [unit of u].
     lowest_input, highest_input : array
         The input's extremes [unit of u].
     max_width, stroke : array
@@ -97,23 +97,22 @@ class CycleMetrics:
     area : array
         Enclosed area, at least 0 [unit of y times unit of u].
     energy : array
-        Integral of y du over the cycle [unit of y times unit of u]: what a force y on a displacement u dissipates.
-        Negative for a counterclockwise loop.
+        Integral of y du over the cycle, which a force y on a displacement u dissipates; negative for a counterclockwise
+        loop [unit of y times unit of u].
     secant_stiffness : array
         Slope of the line through the loop's ends [unit of y / unit of u].
     equivalent_damping : array
         Damping ratio of the viscous oscillator of that stiffness that dissipates the magnitude of the energy at its
-        resonance, at least 0 whatever the orientation [1]; nan where the stiffness is not positive. Where u and y
-        have their extremes together, it is the same with u as the force and y as the displacement, for which a
-        counterclockwise loop dissipates.
+        resonance, at least 0 [1]; nan if the stiffness is not positive. It is the same with u as the force and y as the
+        displacement, if both have their extremes together.
     closure_gap : array
         Output at the cycle's end minus output at its start [unit of y].
     orientation : tuple of {"counterclockwise", "clockwise", "none"}
-        Sense in which each loop runs.
+        Sense of each loop.
     level : float
         Input at which the cycles begin and end [unit of u].
     energy_outside : float
-        Integral of y du over what belongs to no cycle [unit of y times unit of u].
+        Integral of y du over the samples that belong to no cycle [unit of y times unit of u].
     loops : tuple of LoopMetrics
         The loop of each cycle.
     """
@@ -137,10 +136,10 @@ class CycleMetrics:
     loops: tuple[LoopMetrics, ...]
 
     def __post_init__(self) -> None:
-        for name in ("start", "stop"):
-            samples = np.array(getattr(self, name), dtype=np.intp)
-            samples.setflags(write=False)
-            object.__setattr__(self, name, samples)
+        for name, samples in (("start", self.start), ("stop", self.stop)):
+            integers = np.array(samples, dtype=np.intp)
+            integers.setflags(write=False)
+            object.__setattr__(self, name, integers)
 
     def __len__(self) -> int:
         return len(self.loops)
@@ -173,7 +172,7 @@ class CycleMetrics:
 
     @property
     def sign_convention(self) -> str:
-        """How the sign of the energies is to be read, in a sentence."""
+        """The meaning of the energies' signs, in a sentence."""
         against = [k for k, orientation in enumerate(self.orientation, start=1) if orientation == "counterclockwise"]
         if not against:
             return FORCE
@@ -185,23 +184,13 @@ class CycleMetrics:
 
     def rows(self) -> list[dict[str, Any]]:
         """The measures of each cycle by name, with the cycle's number from 1 as ``"cycle"``."""
-        columns = {column.field: getattr(self, column.field) for column in _COLUMNS}
-        plain = {
-            name: list(values) if isinstance(values, tuple) else values.tolist() for name, values in columns.items()
-        }
-        return [{"cycle": k + 1, **{name: values[k] for name, values in plain.items()}} for k in range(len(self))]
+        columns = {column.field: np.asarray(vars(self)[column.field]).tolist() for column in _COLUMNS}
+        return [{"cycle": k + 1} | {name: values[k] for name, values in columns.items()} for k in range(len(self))]
 
     def to_text(self, units: Mapping[str, str] | None = None) -> str:
-        """The table for a terminal, one row a cycle, and below it how the energy's sign is to be read.
+        """The table for a terminal, one row a cycle, and below it the meaning of the energy's sign.
 
-        Parameters
-        ----------
-        units : mapping, optional
-            Labels of the units of ``"u"`` and ``"y"``, such as those of a `Record`.
-
-        Returns
-        -------
-        str
+        `units` are labels of the units of ``"u"`` and ``"y"``, such as those of a `Record`.
         """
         shown = [column for column in _COLUMNS if column.in_text]
         header = ["cycle", *(column.heading for column in shown)]
@@ -222,16 +211,9 @@ class CycleMetrics:
         return "\n".join([*lines[: len(heads)], rule, *lines[len(heads) :], *wrapped])
 
     def to_csv(self, units: Mapping[str, str] | None = None) -> str:
-        """Every column as comma-separated values, every digit kept; an unknown number is an empty cell.
+        """Every column as comma-separated values with all digits; an unknown number is an empty cell.
 
-        Parameters
-        ----------
-        units : mapping, optional
-            Labels of the units of ``"u"`` and ``"y"``, which are put behind the names.
-
-        Returns
-        -------
-        str
+        `units` are labels of the units of ``"u"`` and ``"y"``, which are added to the names.
         """
         buffer = io.StringIO()
         writer = csv.writer(buffer, lineterminator="\n")
@@ -249,15 +231,14 @@ def cycle_metrics(
 ) -> CycleMetrics:
     """Measure every cycle of a record: 0 -> max -> min -> 0, growing and one-sided protocols, steady cycles.
 
-    A cycle leaves a level of the input to one side, comes back to it, leaves it to the other side and comes back
-    again: two half cycles, as ATC-24 and FEMA 461 pair them. A half cycle whose neighbours lie on its own side, as in
-    0 -> 5 -> 0 -> 8 -> 0, is a cycle of its own. What is left at the record's ends, such as a last half cycle, is in
-    no row; `energy_outside` counts it. Cycles that are passed between two samples are cut there, with the output
-    linear between the samples, so that each of them is closed in u.
+    A cycle leaves a level of the input to one side, returns to it, leaves it to the other side and returns again: two
+    half cycles, as ATC-24 and FEMA 461 pair them. A half cycle whose neighbours lie on its own side, as in
+    0 -> 5 -> 0 -> 8 -> 0, is a cycle of its own. Samples before the first and after the last cycle, such as a last half
+    cycle, are in no row; `energy_outside` counts them. A cycle that begins between two samples is cut there, with the
+    output linear between the samples, so that each cycle is closed in u.
 
-    `loop_metrics` measures the last cycle from one extreme of the record to the other and back, which in a protocol of
-    two and more cycles an amplitude begins and ends at an extreme; the last row here begins and ends at the level.
-    Both run by the same code.
+    `loop_metrics` measures the last cycle from one extreme of the record to the other and back; the last row here
+    begins and ends at the level. Both use the same code.
 
     Parameters
     ----------
@@ -266,11 +247,11 @@ def cycle_metrics(
     y : array, shape (n,)
         Output.
     level : float, optional
-        Input at which cycles begin and end [unit of u]; by default the first input, or else the middle of the
-        levels that most of the branches' length reaches: whichever gives cycles of the larger total span.
+        Input at which cycles begin and end [unit of u]; by default the first input, or else the middle of the levels
+        that most of the branches' length reaches: whichever gives cycles of the larger total span.
     tolerance : float
-        Reversals of the input smaller than this fraction of its span are ignored, and a turning point this near to
-        the level counts as at the level: noise. Larger reversals inside a half cycle do not divide it: the energy is
+        Reversals of the input smaller than this fraction of its span are ignored as noise, and a turning point this
+        near to the level counts as at the level. Larger reversals inside a half cycle do not divide it: the energy is
         that of the whole path, while the width, from branches sorted by their input, then depends on the minor loops.
 
     Returns
@@ -294,36 +275,31 @@ def cycle_metrics(
     inputs, outputs = samples_of_a_loop(u, y)
     if level is not None and not math.isfinite(level):
         raise ValueError(f"level must be finite, got {level}")
-    found = protocol(inputs, tolerance, None if level is None else float(level))
-    if not found.spans:
+    cut = protocol(inputs, tolerance, None if level is None else float(level))
+    if not cut.spans:
         raise ValueError(too_few(inputs, tolerance, 1, 0))
-    at_u, at_y = found.loops.of(inputs), found.loops.of(outputs)
-    loops = tuple(measure(at_u, at_y, [cycle]) for cycle in found.loops.cycles)
-    low, high = (np.array([end(at_u[cycle.path]) for cycle in found.loops.cycles]) for end in (np.min, np.max))
-    energy = np.array([loop.energy for loop in loops])
+    at_u, at_y = cut.loops.of(inputs), cut.loops.of(outputs)
+    loops = tuple(measure(at_u, at_y, [cycle]) for cycle in cut.loops.cycles)
+    low, high = (np.array([end(at_u[cycle.path]) for cycle in cut.loops.cycles]) for end in (np.min, np.max))
+    same = ("max_width", "stroke", "area", "energy", "secant_stiffness", "closure_gap")
     return CycleMetrics(
-        start=np.array([part.start for part in found.slices]),
-        stop=np.array([part.stop for part in found.slices]),
+        start=np.array([part.start for part in cut.slices]),
+        stop=np.array([part.stop for part in cut.slices]),
         amplitude=(high - low) / 2,
         mean_input=(high + low) / 2,
         lowest_input=low,
         highest_input=high,
-        max_width=np.array([loop.max_width for loop in loops]),
-        stroke=np.array([loop.stroke for loop in loops]),
-        area=np.array([loop.area for loop in loops]),
-        energy=energy,
-        secant_stiffness=np.array([loop.secant_stiffness for loop in loops]),
         equivalent_damping=np.abs([loop.equivalent_damping for loop in loops]),
-        closure_gap=np.array([loop.closure_gap for loop in loops]),
         orientation=tuple(loop.orientation for loop in loops),
-        level=found.level,
-        energy_outside=_outside(at_u, at_y, found.loops),
+        **{name: np.array([vars(loop)[name] for loop in loops]) for name in same},
+        level=cut.level,
+        energy_outside=_outside(at_u, at_y, cut.loops),
         loops=loops,
     )
 
 
 def _outside(u: FloatArray, y: FloatArray, loops: Loops) -> float:
-    """Integral of y du over the parts between cycles, and against the lines by which cycles are closed."""
+    """Integral of y du over the parts between cycles, less that over the lines that close cycles."""
     begins, ends = (
         np.array(sides) for sides in zip(*((c.path.start, c.path.stop - 1) for c in loops.cycles), strict=True)
     )

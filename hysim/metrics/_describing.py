@@ -1,25 +1,20 @@
-"""The describing function of a law: what its steady cycle under a sine has in common with a linear system's.
+"""The describing function of a law: the first harmonic of its steady cycle under a sine.
 
     u = mean + a sin(phi)
     y = y_0 + a (Re N sin(phi) + Im N cos(phi)) + harmonics
     N(a) = 1 / (pi a) times the integral of y (sin(phi) + i cos(phi)) d phi over a cycle
-
-|N| is the gain of the first harmonic and arg N its phase, negative where y lags. As du = a cos(phi) d phi, the
-imaginary part is the loop's area and nothing else:
-
     Im N = -(signed area) / (pi a^2),    negative for a counterclockwise loop
 
-A rate-independent law needs the extremes of the input alone to come to its steady cycle, two samples a cycle, and gives
-the samples of the cycle itself without an error that depends on their number. The mean over n samples that takes the
-place of the integral errs by the order of 1 / n where the loop jumps between two of them, 1 / n^2 where it has a kink,
-and less where it is smooth. Its imaginary part is the area of the polygon through the samples, which `loop_metrics`
-measures, times (2 pi / n) / sin(2 pi / n).
+A rate-independent law needs only the extremes of the input, two samples a cycle, to come to its steady cycle. The
+integral is a mean over n samples: its error is of the order 1 / n where the loop jumps between two of them, 1 / n^2
+where it has a kink, and smaller where it is smooth. The area is that of the polygon through the samples, which
+`loop_metrics` measures, times (2 pi / n) / sin(2 pi / n).
 
 Source: A. Gelb and W. E. Vander Velde, Multiple-Input Describing Functions and Nonlinear System Design, 1968.
 """
 
 import math
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -28,8 +23,20 @@ from hysim._cycles import ROUNDING
 from hysim._frozen import FloatArray, read_only
 from hysim.errors import SimulationError
 
-_BATCHES = tuple(2**k for k in range(4, 18))  # cycles that are run in one go, one after the other
-_SLOW = 1e-6  # of the output's span, by which it may still move in half of the last batch
+_BATCHES = tuple(2**k for k in range(4, 18))  # cycles of each of the successive runs
+_SLOW = 1e-6  # of the output's span: largest change during half of the last run
+
+
+@runtime_checkable
+class _Stepped(Protocol):
+    """A law that can be cut and continued."""
+
+    def advance(self, u: Any, state: Any = None) -> Any: ...
+
+
+@runtime_checkable
+class _Dynamic(Protocol):
+    dynamic: bool
 
 
 def describing_function(
@@ -41,9 +48,9 @@ def describing_function(
 
         N(a) = 1 / (pi a) times the integral of y (sin(phi) + i cos(phi)) d phi,    u = mean + a sin(phi)
 
-    The law begins with its own memory at the input `mean`, and is taken to and fro until its output repeats, to 1e-12
-    of its span or after 262 128 cycles to 1e-6. The gain is ``abs(N)``, the phase ``np.angle(N)`` [rad], negative where
-    the output lags.
+    The law begins with its own memory at the input `mean`, and cycles until its output repeats, to 1e-12 of its span
+    or, after 262 128 cycles, to 1e-6. The gain is ``abs(N)``, the phase ``np.angle(N)`` [rad], negative where the
+    output lags.
 
     Parameters
     ----------
@@ -67,7 +74,7 @@ def describing_function(
     ValueError
         If an amplitude is not positive, a number is not finite, or `samples_per_cycle` is odd or below 4.
     SimulationError
-        If the output does not come to repeat, or leaves the finite numbers.
+        If the output does not repeat, or diverges.
 
     Examples
     --------
@@ -75,7 +82,7 @@ def describing_function(
     >>> hs.metrics.describing_function(hs.Play(threshold=1.0), [1.0, 2.0, 1e3]).round(3).tolist()
     [0j, (0.5-0.318j), (1-0.001j)]
     """
-    if not callable(getattr(law, "advance", None)) or getattr(law, "dynamic", False):
+    if not isinstance(law, _Stepped) or (isinstance(law, _Dynamic) and law.dynamic):
         raise TypeError(
             f"a describing function of the amplitude alone needs a law without time, got {type(law).__name__}; "
             "for a transfer function see hysim.to_control"
@@ -89,8 +96,8 @@ def describing_function(
     turn = np.append(turn, turn[-2:0:-1].conj())  # from the lowest input, phi = -pi / 2, up and back
     rise = -turn.real
     harmonic = rise + 1j * turn.imag
-    found = [2.0 * np.mean(_steady_cycle(law, mean + a * rise, float(a), mean) * harmonic) / a for a in swings]
-    return np.array(found, dtype=complex)
+    values = [2.0 * np.mean(_steady_cycle(law, mean + a * rise, float(a), mean) * harmonic) / a for a in swings]
+    return np.array(values, dtype=complex)
 
 
 def _steady_cycle(law: Any, u: FloatArray, amplitude: float, mean: float) -> FloatArray:
@@ -100,10 +107,10 @@ def _steady_cycle(law: Any, u: FloatArray, amplitude: float, mean: float) -> Flo
     for cycles in _BATCHES:
         y, state = law.advance(extremes * cycles, state)
         ends = np.reshape(y, (cycles, 2))
-        moved, span = np.abs(ends[-1] - ends[cycles // 2]).max(), abs(ends[-1, 0] - ends[-1, 1])
-        if moved <= ROUNDING * span + 4.0 * np.spacing(np.abs(ends[-1]).max()):
+        change, span = np.abs(ends[-1] - ends[cycles // 2]).max(), abs(ends[-1, 0] - ends[-1, 1])
+        if change <= ROUNDING * span + 4.0 * np.spacing(np.abs(ends[-1]).max()):
             break
     else:
-        if moved > _SLOW * span:
+        if change > _SLOW * span:
             raise SimulationError(f"the output does not repeat after {sum(_BATCHES)} cycles of amplitude {amplitude:g}")
     return np.asarray(law.advance(u, state)[0])

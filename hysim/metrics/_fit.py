@@ -6,7 +6,7 @@ counted):
     rmse = sqrt(V),    nrmse = rmse / (max y - min y),    fit = 100 (1 - ||e|| / ||y - mean(y)||) %
     FPE = V (1 + d/N) / (1 - d/N),    AIC = N ln V + 2 d,    BIC = N ln V + d ln N
 
-What does not exist is nan: a fit to a constant y, a criterion with d >= N.
+A measure that does not exist is nan: a fit to a constant y, a criterion with d >= N.
 """
 
 import math
@@ -20,19 +20,8 @@ from hysim._frozen import FloatArray, read_only
 def rmse(y: npt.ArrayLike, y_model: npt.ArrayLike) -> float:
     """Root mean square of y - y_model [unit of y].
 
-    Parameters
-    ----------
-    y, y_model : array, shape (N,)
-        Measured and modelled output [unit of y].
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    ValueError
-        If lengths differ, a value is not finite or there is no sample.
+    `y` and `y_model` are the measured and the modelled output, shape (N,) [unit of y]. A ValueError is raised if
+    lengths differ, a value is not finite or there is no sample.
 
     Examples
     --------
@@ -43,21 +32,9 @@ def rmse(y: npt.ArrayLike, y_model: npt.ArrayLike) -> float:
 
 
 def nrmse(y: npt.ArrayLike, y_model: npt.ArrayLike) -> float:
-    """Root mean square error over the range of y: rmse / (max y - min y); nan for a constant y.
+    """Root mean square error over the range of y, rmse / (max y - min y); nan for a constant y.
 
-    Parameters
-    ----------
-    y, y_model : array, shape (N,)
-        Measured and modelled output [unit of y].
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    ValueError
-        If lengths differ, a value is not finite or there is no sample.
+    Arguments and errors are those of `rmse`.
 
     Examples
     --------
@@ -72,21 +49,8 @@ def nrmse(y: npt.ArrayLike, y_model: npt.ArrayLike) -> float:
 def fit_percent(y: npt.ArrayLike, y_model: npt.ArrayLike) -> float:
     """Fit 100 (1 - ||y - y_model|| / ||y - mean(y)||) [%]; nan for a constant y.
 
-    100 is a perfect model, 0 is as good as the mean of y, and a worse one is negative.
-
-    Parameters
-    ----------
-    y, y_model : array, shape (N,)
-        Measured and modelled output [unit of y].
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    ValueError
-        If lengths differ, a value is not finite or there is no sample.
+    100 is a perfect model, 0 is as good as the mean of y, and a worse one is negative. Arguments and errors are those
+    of `rmse`.
 
     Examples
     --------
@@ -102,23 +66,9 @@ def fit_percent(y: npt.ArrayLike, y_model: npt.ArrayLike) -> float:
 def fpe(residual: npt.ArrayLike, n_parameters: int) -> float:
     """Final prediction error V (1 + d/N) / (1 - d/N) [unit of y, squared]; nan where d >= N.
 
-    Source: H. Akaike, Ann. Inst. Statist. Math. 21 (1969) 243.
-
-    Parameters
-    ----------
-    residual : array, shape (N,)
-        Measured minus model [unit of y].
-    n_parameters : int
-        Number d of fitted parameters.
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    ValueError
-        If there is no sample, a value is not finite or `n_parameters` is negative.
+    `residual` is measured minus model, shape (N,) [unit of y], and `n_parameters` the number d of fitted parameters. A
+    ValueError is raised if there is no sample, a value is not finite or the number is negative. Source: H. Akaike, Ann.
+    Inst. Statist. Math. 21 (1969) 243.
 
     Examples
     --------
@@ -132,23 +82,8 @@ def fpe(residual: npt.ArrayLike, n_parameters: int) -> float:
 def aic(residual: npt.ArrayLike, n_parameters: int) -> float:
     """Akaike's information criterion N ln V + 2 d; nan where d >= N, -inf where the residual is zero.
 
-    Source: H. Akaike, IEEE Trans. Autom. Control 19 (1974) 716, without the constant that all models share.
-
-    Parameters
-    ----------
-    residual : array, shape (N,)
-        Measured minus model [unit of y].
-    n_parameters : int
-        Number d of fitted parameters.
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    ValueError
-        If there is no sample, a value is not finite or `n_parameters` is negative.
+    Arguments and errors are those of `fpe`. Source: H. Akaike, IEEE Trans. Autom. Control 19 (1974) 716, without the
+    constant that all models share.
 
     Examples
     --------
@@ -162,23 +97,8 @@ def aic(residual: npt.ArrayLike, n_parameters: int) -> float:
 def bic(residual: npt.ArrayLike, n_parameters: int) -> float:
     """Bayesian information criterion N ln V + d ln N; nan where d >= N, -inf where the residual is zero.
 
-    Source: G. Schwarz, Ann. Statist. 6 (1978) 461, without the constant that all models share.
-
-    Parameters
-    ----------
-    residual : array, shape (N,)
-        Measured minus model [unit of y].
-    n_parameters : int
-        Number d of fitted parameters.
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    ValueError
-        If there is no sample, a value is not finite or `n_parameters` is negative.
+    Arguments and errors are those of `fpe`. Source: G. Schwarz, Ann. Statist. 6 (1978) 461, without the constant that
+    all models share.
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """The measures of a loop.
 
-A cycle of the input has a loading branch, on which u rises, and an unloading branch, on which it falls. Both
-are linear between their samples, y_l(u) and y_u(u).
+A cycle of the input has a loading branch, on which u rises, and an unloading branch, on which it falls. Both are linear
+between their samples, y_l(u) and y_u(u).
 
     w(u)           = y_u(u) - y_l(u)                             signed width
     max_width      = max |w|,    mid_width = |w| at mid span
@@ -9,22 +9,20 @@ are linear between their samples, y_l(u) and y_u(u).
     mean_width     = area / (max u - min u)
     relative_width = max_width / stroke,    stroke = max y - min y
 
-A positive signed area is a counterclockwise loop: unloading above loading, as a piezoelectric actuator has
-it. `area` is its magnitude.
-
-Where u is a displacement and y the force that it takes, with y+ and y- the forces at the largest and the
-smallest displacement (the mean of the two branches there) and D half the span of u:
+A positive signed area is a counterclockwise loop, as of a piezoelectric actuator: unloading above loading. `area` is
+its magnitude. If u is a displacement and y a force, with y+ and y- the forces at the largest and the smallest
+displacement (the mean of the two branches there) and D half the span of u,
 
     energy             = integral of y du = -signed area         dissipated in a cycle; positive is clockwise
     secant_stiffness   = (y+ - y-) / (max u - min u)
     equivalent_damping = energy / (4 pi E_S),    E_S = secant_stiffness D^2 / 2
 
 The last is the damping ratio of the viscous oscillator that dissipates as much at its resonance. Energy and ratio are
-negative for a counterclockwise loop, as a piezo has: there y lags u, and the loss is the integral of u dy. The ratio's
-magnitude is the same whichever of u and y is taken as the force, where both have their extremes together.
+negative for a counterclockwise loop: there y lags u, and the loss is the integral of u dy. The magnitude of the ratio
+is the same whichever of u and y is the force, if both have their extremes together.
 
-Sources: L. S. Jacobsen, Trans. ASME 52 (1930) 169, for the equivalence; FEMA 356 (2000), section 2.8.4, and
-ASCE 41 for the secant stiffness between the extremes of displacement, not of force.
+Sources: L. S. Jacobsen, Trans. ASME 52 (1930) 169, for the equivalence; FEMA 356 (2000), section 2.8.4, and ASCE 41 for
+the secant stiffness between the extremes of displacement, not of force.
 """
 
 import math
@@ -49,7 +47,7 @@ FORCE = "Energy is the integral of y du: what a force y on a displacement u diss
 @printed
 @frozen
 class LoopMetrics:
-    """The measures of one loop.
+    """The measures of one loop; the equations stand at the head of `hysim.metrics._loop`.
 
     Parameters
     ----------
@@ -64,22 +62,20 @@ class LoopMetrics:
     relative_width : float
         `max_width` over `stroke`; nan for a constant output.
     orientation : {"counterclockwise", "clockwise", "none"}
-        Sense in which the path runs in the plane of u (to the right) and y (up); "none" where the area is
-        zero to rounding.
+        Sense of the path in the plane of u (to the right) and y (up); "none" if the area is zero to rounding.
     closure_gap : float
-        Output at the cycle's end minus output at its start [unit of y]: positive where y has drifted up, 0
-        for a steady cycle. Of several cycles the mean.
+        Output at the cycle's end minus output at its start, of several cycles the mean [unit of y]. Positive for an
+        upward drift, 0 for a steady cycle.
     n_cycles : int
-        How many cycles were averaged.
+        Number of averaged cycles.
     energy : float
-        Integral of y du around the cycle [unit of y times unit of u]: what a force y on a displacement u
-        dissipates, negative where it gives energy away; minus the area for a counterclockwise loop.
+        Integral of y du around the cycle [unit of y times unit of u], which a force y on a displacement u dissipates;
+        minus the area for a counterclockwise loop.
     secant_stiffness : float
         Slope of the line through the loop's ends [unit of y / unit of u].
     equivalent_damping : float
         Damping ratio of the viscous oscillator of that stiffness that dissipates as much at its resonance, with the
-        sign of the energy: printed is the magnitude, with the sign convention in words. nan where the stiffness is
-        not positive.
+        sign of the energy; texts show its magnitude. nan if the stiffness is not positive.
     u : array, shape (m,)
         Increasing inputs: every input of either branch, over their common range [unit of u].
     loading, unloading, width : array, shape (m,)
@@ -136,17 +132,7 @@ class LoopMetrics:
     @overload
     def width_at(self, u: Sequence[float] | FloatArray) -> FloatArray: ...
     def width_at(self, u: float | Sequence[float] | FloatArray) -> float | FloatArray:
-        """Signed width at an input.
-
-        Parameters
-        ----------
-        u : float or array, any shape
-            Inputs [unit of u].
-
-        Returns
-        -------
-        float or array
-            Unloading minus loading [unit of y]; nan outside the loop's range.
+        """Signed width, unloading minus loading, at inputs of any shape [unit of y]; nan outside the loop's range.
 
         Examples
         --------
@@ -162,19 +148,19 @@ class LoopMetrics:
 def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, tolerance: float = TOLERANCE) -> LoopMetrics:
     """Measure the loop of the last complete cycle, or the average loop of the last few.
 
-    A cycle is three consecutive turning points of the input, the outer two within 5 % of the input's span of
-    one extreme of the record, the middle one within 5 % of the other: min-max-min or max-min-max. The record's
-    ends count as turning points. Between the outer two the path may miss being closed by those 5 %, and its energy
-    the part beyond: in a protocol that grows by 4 % of the largest amplitude a cycle, 2.3 % of a Bouc-Wen law's loop.
+    A cycle is three consecutive turning points of the input, the outer two within 5 % of the input's span of one
+    extreme of the record, the middle one within 5 % of the other: min-max-min or max-min-max. The record's ends count
+    as turning points. The path may fail to close by those 5 %, and its energy lacks that part: in a protocol whose
+    amplitude grows by 4 % a cycle, 2.3 % of a Bouc-Wen law's loop.
 
-    Where the record has fewer such cycles than asked for, as 0 -> max -> min -> 0 and growing protocols, the cycles are
-    those of `hysim.cycle_metrics`, which begin and end at one level of the input, as far as they have at least 90 % of
-    the widest one's span and no minor loops. They are closed in u.
+    If the record has too few such cycles, as 0 -> max -> min -> 0 and growing protocols, the cycles are those of
+    `hysim.cycle_metrics`, which begin and end at one level of the input, as far as they have at least 90 % of the
+    widest one's span and no minor loops. They are closed in u.
 
-    A plateau at a turning point is divided in its middle, half to each branch (a
-    sample in the very middle to both); at the record's ends it belongs to the cycle as a whole. Of several
-    samples of a branch at one input the last, settled one is taken. The samples of a branch are sorted by
-    input, so that wiggles below the tolerance do not break the interpolation.
+    A plateau at a turning point is divided in its middle, half to each branch (a sample in the very middle to both); at
+    the record's ends it belongs to the cycle. Of several samples of a branch at one input the last, settled one is
+    taken. The samples of a branch are sorted by input, so that reversals below the tolerance do not break the
+    interpolation.
 
     Parameters
     ----------
@@ -183,10 +169,10 @@ def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, toleran
     y : array, shape (n,)
         Output.
     cycles : int
-        Number of last complete cycles whose branches are averaged, at their common inputs, against noise. All
-        measures are then those of the averaged loop.
+        Number of last complete cycles whose branches are averaged at their common inputs, against noise. All measures
+        are then those of the averaged loop.
     tolerance : float
-        Reversals of the input smaller than this fraction of its span are ignored: noise, glitches.
+        Reversals of the input smaller than this fraction of its span are ignored as noise.
 
     Returns
     -------
@@ -195,8 +181,8 @@ def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, toleran
     Raises
     ------
     ValueError
-        If lengths differ, a value is not finite, there are fewer than 3 samples, the input is constant, or it
-        has fewer cycles of either kind than asked for.
+        If lengths differ, a value is not finite, there are fewer than 3 samples, the input is constant, or it has fewer
+        cycles than asked for.
 
     Examples
     --------
@@ -211,19 +197,15 @@ def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, toleran
     return measure(loops.of(inputs), loops.of(outputs), loops.cycles)
 
 
-def measure(inputs: FloatArray, outputs: FloatArray, found: list[Cycle]) -> LoopMetrics:
+def measure(inputs: FloatArray, outputs: FloatArray, cycles: list[Cycle]) -> LoopMetrics:
     """The measures of one cycle, or of the mean of several."""
-    cycles = len(found)
-    loadings = [_curve(inputs[cycle.loading], outputs[cycle.loading]) for cycle in found]
-    unloadings = [_curve(inputs[cycle.unloading], outputs[cycle.unloading]) for cycle in found]
+    loadings = [_curve(inputs[cycle.loading], outputs[cycle.loading]) for cycle in cycles]
+    unloadings = [_curve(inputs[cycle.unloading], outputs[cycle.unloading]) for cycle in cycles]
     grid = common_inputs([x for x, _ in loadings + unloadings])
-    loading = _mean_curve(grid, loadings)
-    unloading = _mean_curve(grid, unloadings)
-    if cycles == 1:
-        path_u, path_y = inputs[found[0].path], outputs[found[0].path]
-    else:
-        path_u, path_y = np.append(grid, grid[::-1]), np.append(loading, unloading[::-1])
-
+    loading, unloading = _mean_curve(grid, loadings), _mean_curve(grid, unloadings)
+    path_u, path_y = np.append(grid, grid[::-1]), np.append(loading, unloading[::-1])
+    if len(cycles) == 1:
+        path_u, path_y = inputs[cycles[0].path], outputs[cycles[0].path]
     width = unloading - loading
     magnitude = np.abs(width)
     span, stroke = float(np.ptp(path_u)), float(np.ptp(path_y))
@@ -239,8 +221,8 @@ def measure(inputs: FloatArray, outputs: FloatArray, found: list[Cycle]) -> Loop
         stroke=stroke,
         relative_width=max_width / stroke if stroke > 0 else math.nan,
         orientation=_orientation(area, ROUNDING * span * stroke),
-        closure_gap=float(np.mean([outputs[cycle.path][-1] - outputs[cycle.path][0] for cycle in found])),
-        n_cycles=cycles,
+        closure_gap=float(np.mean([outputs[cycle.path][-1] - outputs[cycle.path][0] for cycle in cycles])),
+        n_cycles=len(cycles),
         energy=0.0 - area,
         secant_stiffness=stiffness,
         equivalent_damping=(0.0 - area) * 2.0 / (math.pi * stiffness * span**2) if stiffness > 0 else math.nan,
@@ -252,21 +234,9 @@ def measure(inputs: FloatArray, outputs: FloatArray, found: list[Cycle]) -> Loop
 
 
 def width_rmse(a: LoopMetrics, b: LoopMetrics) -> float:
-    """Root mean square difference of the signed widths, at the inputs of `a` that `b` reaches [unit of y].
+    """Root mean square difference of the signed widths of two loops [unit of y].
 
-    Parameters
-    ----------
-    a, b : LoopMetrics
-        Two loops over the same input.
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    ValueError
-        If the two loops have no input in common.
+    It is taken at the inputs of `a` that `b` reaches; loops without a common input are a ValueError.
 
     Examples
     --------
@@ -303,7 +273,7 @@ def _mean_curve(grid: FloatArray, curves: list[tuple[FloatArray, FloatArray]]) -
 
 
 def signed_area(u: FloatArray, y: FloatArray) -> FloatArray:
-    """Shoelace formula for outputs of shape (n,) or (n_sets, n)."""
+    """Signed area by the shoelace formula, for outputs of shape (n,) or (n_sets, n)."""
     x, v = u - u.mean(), y - y.mean(axis=-1, keepdims=True)
     return np.asarray(np.sum(x * np.roll(v, -1, axis=-1) - np.roll(x, -1) * v, axis=-1) / 2)
 
@@ -321,5 +291,5 @@ def samples_of_a_loop(u: npt.ArrayLike, y: npt.ArrayLike) -> tuple[FloatArray, F
     if inputs.size < 3:
         raise ValueError(f"a loop needs at least 3 samples, got {inputs.size}")
     if np.ptp(inputs) == 0:
-        raise ValueError(f"the input is constant at {inputs[0]}: a loop needs one that goes to and fro")
+        raise ValueError(f"the input is constant at {inputs[0]}: a loop needs an input that rises and falls")
     return inputs, outputs

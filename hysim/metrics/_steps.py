@@ -1,4 +1,4 @@
-"""The measures of a response to a step, and of what a loop takes away from its vibration.
+"""The measures of a response to a step, and of the vibration that a loop removes.
 
     eta(t) = (y - y0) / (yf - y0),    y0 the first sample, yf the mean of the last tenth of the samples
 
@@ -9,7 +9,7 @@ so that negative gains and creep need no special case. Of a plant in open and in
     t98            when eta first reaches 98 %
     residual       rms of eta - 1 from the open loop's t98, for 2 ln(50) / decay rate of its slowest vibration
 
-and each reduction is 100 (1 - closed / open) %. Crossings are interpolated. What does not exist is nan.
+and each reduction is 100 (1 - closed / open) %. Crossings are interpolated. A measure that does not exist is nan.
 """
 
 import math
@@ -22,7 +22,7 @@ from hysim._frozen import FloatArray, frozen, read_only
 from hysim._words import printed, words
 
 SETTLED = 0.02
-"""How near to its final value a response has settled."""
+"""Distance from the final value within which a response has settled, as a fraction of the step."""
 
 
 @frozen
@@ -34,13 +34,13 @@ class StepMetrics:
     initial, final : float
         First value, and mean of the last tenth [unit of y].
     rise_time : float
-        From 10 to 90 % [unit of t].
+        Time from 10 to 90 % [unit of t].
     overshoot : float
         Largest excess over the final value [% of the step], at least 0.
     settling_time : float
-        After which the response stays within 2 % [unit of t]; nan if it does not before the last tenth.
+        Time after which the response stays within 2 %; nan if it does not before the last tenth [unit of t].
     t98 : float
-        When 98 % is first reached [unit of t].
+        Time at which 98 % is first reached [unit of t].
     """
 
     initial: float
@@ -54,7 +54,7 @@ class StepMetrics:
 @printed
 @frozen
 class VibrationReduction:
-    """What a loop takes away from the vibration after a step, always three figures together.
+    """The reduction of the vibration after a step by a loop, always three figures together.
 
     Parameters
     ----------
@@ -91,20 +91,9 @@ def _in_words(response: StepMetrics) -> str:
 def step_metrics(t: npt.ArrayLike, y: npt.ArrayLike) -> StepMetrics:
     """Measure a response to a step at the first sample.
 
-    Parameters
-    ----------
-    t, y : array, shape (n,)
-        Increasing times and outputs; long enough for the output to come to rest.
-
-    Returns
-    -------
-    StepMetrics
-        All nan, beside the two levels, if the output ends where it began.
-
-    Raises
-    ------
-    ValueError
-        If lengths differ, a value is not finite, or there are fewer than 10 samples.
+    `t` and `y` are increasing times and outputs, shape (n,), long enough for the output to come to rest. All measures
+    but the two levels are nan if the output ends where it began. A ValueError is raised if lengths differ, a value is
+    not finite, or there are fewer than 10 samples.
 
     Examples
     --------
@@ -172,16 +161,7 @@ def vibration_reduction(
 
 
 def reduction_percent(before: float, after: float) -> float:
-    """100 (1 - after / before) %; nan if there was nothing before.
-
-    Parameters
-    ----------
-    before, after : float
-        A measure of the open and of the closed loop, in one unit.
-
-    Returns
-    -------
-    float
+    """100 (1 - after / before) %, of a measure in open and in closed loop; nan if `before` is not positive.
 
     Examples
     --------

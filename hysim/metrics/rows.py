@@ -1,7 +1,7 @@
 """Measures of many loops that share their input, to the same definitions and in the same arithmetic as `loop_metrics`.
 
-The input fixes the cycle, the order of its samples and the weights of the interpolation; they are found
-once. See `hysim.metrics._loop` for the definitions.
+The input determines the cycle and the order of its samples, which are computed once. `hysim.metrics._loop` has the
+definitions.
 """
 
 from dataclasses import dataclass
@@ -41,7 +41,7 @@ class LoopRows:
 
 
 def _interpolated(grid: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
-    """`numpy.interp` of rows."""
+    """`numpy.interp` for each row."""
     below = np.clip(np.searchsorted(x, grid, side="right") - 1, 0, x.size - 1)
     above = np.minimum(below + 1, x.size - 1)
     spans = np.where(above > below, x[above] - x[below], 1.0)

@@ -1,26 +1,26 @@
-"""Pictures of results: functions of a result and, if wanted, of the Axes to draw on.
+"""Pictures of results: functions of a result and, optionally, of the Axes to draw on.
 
-Each returns the Axes it drew on, or an array of them, and shows nothing; `animate` returns the animation. On given
-Axes a picture takes their look and pyplot is not imported; without them it is a new pyplot figure in the house style.
+All functions have in common
+
+- the argument `ax`, or `axes` for several: the Axes to draw on. They keep their look, and pyplot is not imported.
+Without
+  them, a picture is a new pyplot figure in the house style. Too few Axes are a ValueError.
+- the result: the Axes that were drawn on, or an array of them; `animate` returns the animation. Nothing is shown.
+
 Nothing here changes matplotlib's settings outside its own calls.
 """
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hysim.plot._comparisons import comparison, loops, residuals, widths
-from hysim.plot._discoveries import selection
-from hysim.plot._frames import displacement
-from hysim.plot._harmonics import describing_function
-from hysim.plot._identifications import identification
+from hysim.plot._comparisons import comparison, identification, loops, residuals, widths
+from hysim.plot._files import FORMATS, save_svg, to_bytes, to_svg
 from hysim.plot._loops import animate, minor_loops, width
 from hysim.plot._maps import forc, residual_map
-from hysim.plot._pictures import FORMATS, to_bytes
+from hysim.plot._outcomes import describing_function, displacement, selection, trade_off
 from hysim.plot._records import history, loop, response, traces
 from hysim.plot._style import DIVERGING, SEQUENTIAL, figure, house_style, panels
-from hysim.plot._svg import save_svg, to_svg
 from hysim.plot._sweeps import heat_map, parallel_coordinates, quantile_bands, sensitivities
-from hysim.plot._tunings import trade_off
 
 __all__ = [
     "DIVERGING",

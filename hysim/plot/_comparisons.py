@@ -1,4 +1,4 @@
-"""Pictures of a comparison: each model's loop, its residuals and its loop width, on one record."""
+"""Pictures of comparisons and identifications: loops, residuals, loop widths and profiles of the likelihood."""
 
 import math
 from collections.abc import Sequence
@@ -9,34 +9,24 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from hysim import metrics
 from hysim._frozen import FloatArray
 from hysim.comparison import Comparison, ComparisonRow
+from hysim.identification import Identification
 from hysim.plot._style import GUIDE, MEASURED, POINTS, AxesArray, in_unit, label, line, one, printed, several
+from hysim.records import Record
 
 _FILLED: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 3.8, "markeredgewidth": 0.8}
-_TIGHT: dict[str, Any] = {"borderaxespad": 0.1, "columnspacing": 1.0, "handlelength": 1.2, "handletextpad": 0.3}
-_SHOWN = 4  # models in a figure, where none are named
 _OPEN = _FILLED | {"markerfacecolor": "white"}
+_DOTS: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 3.8}
+_TIGHT: dict[str, Any] = {"borderaxespad": 0.1, "columnspacing": 1.0, "handlelength": 1.2, "handletextpad": 0.3}
+_SHOWN = 4  # models in a figure, unless names are chosen
 
 
 def loops(comparison: Comparison, axes: Sequence[Axes] | AxesArray | None = None) -> AxesArray:
-    """Draw each model's loop over the measured points, a panel a model, with its fit and its largest width.
+    """Draw each model's loop over the measured points, one panel per model, with its fit and its largest width.
 
-    Parameters
-    ----------
-    comparison : Comparison
-        The models on one record.
-    axes : Axes, one for each model, optional
-        Where to draw.
-
-    Returns
-    -------
-    array of Axes, shape (n_models,)
-
-    Raises
-    ------
-    ValueError
-        If there are fewer Axes than models.
+    The result has one Axes for each row of `comparison`.
 
     Examples
     --------
@@ -56,30 +46,13 @@ def loops(comparison: Comparison, axes: Sequence[Axes] | AxesArray | None = None
 def residuals(
     comparison: Comparison, axes: Sequence[Axes] | AxesArray | None = None, *, quanta: str = "quanta"
 ) -> AxesArray:
-    """Draw measured minus model against the input, a panel a model: loading filled, unloading open.
+    """Draw measured minus model against the input, one panel per model: loading filled, unloading open.
 
-    Residuals are counted in quanta of the sensor, with lines at half a quantum (what rounding alone leaves)
-    and at one; where the record has no resolution, they are in the unit of y and the lines are left out.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        The models on one record.
-    axes : Axes, one for each model, optional
-        Where to draw.
-    quanta : str
-        What the sensor's quanta are called, for instance ``"pixels"``.
-
-    Returns
-    -------
-    array of Axes, shape (n_models,)
-
-    Raises
-    ------
-    ValueError
-        If there are fewer Axes than models.
+    Residuals are counted in quanta of the sensor, with lines at half a quantum, which rounding alone leaves, and at
+    one; `quanta` is their name, such as ``"pixels"``. If the record has no resolution, residuals have the unit of y.
+    The result has one Axes for each row of `comparison`.
     """
-    quantum, unit = _quantum(comparison, quanta)
+    quantum, unit = _quantum(comparison.record, quanta)
     with _panels(axes, comparison) as panels:
         for ax, row in zip(panels, comparison.rows, strict=True):
             _draw_residual(ax, comparison, row, quanta)
@@ -89,19 +62,7 @@ def residuals(
 
 
 def widths(comparison: Comparison, ax: Axes | None = None) -> Axes:
-    """Draw the signed loop width, unloading minus loading, against the input: measured as points, models as lines.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        The models on one record.
-    ax : Axes, optional
-        Where to draw.
-
-    Returns
-    -------
-    Axes
-    """
+    """Draw the loop widths of a comparison, unloading minus loading, against the input: measured and of models."""
     with one(ax, height=4.8) as axes:
         _draw_width(axes, comparison)
         for k, row in enumerate(comparison.rows):
@@ -117,32 +78,12 @@ def comparison(
     *,
     quanta: str = "quanta",
 ) -> AxesArray:
-    """Draw the best models side by side: a row a model, with its loop, its residuals and its loop width.
+    """Draw the best models side by side: one row per model, with its loop, its residuals and its loop width.
 
-    Measured points are grey or dark and the model is a line, loading residuals are filled and unloading ones open, so
-    that nothing rests on colour alone.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        The models on one record.
-    names : sequence of str, optional
-        Which models, in this order; by default the four with the least cross-validated rmse, or the first four.
-    axes : Axes, three for each model, optional
-        Where to draw, row by row.
-    quanta : str
-        What the sensor's quanta are called, for instance ``"pixels"``.
-
-    Returns
-    -------
-    array of Axes, shape (n_models, 3)
-
-    Raises
-    ------
-    ValueError
-        If there is nothing to draw, or too few Axes.
-    KeyError
-        If there is no model of a name.
+    `names` are those of the models, in this order; by default the four with the smallest cross-validated rmse, or the
+    first four. `axes` are three for each model, row by row, and `quanta` is the name of the sensor's quanta, as in
+    `residuals`. The result has shape (n_models, 3). A ValueError is raised if there is nothing to draw, a KeyError if
+    there is no model of a name.
 
     Examples
     --------
@@ -152,7 +93,8 @@ def comparison(
     ...     hs.plot.comparison(tab, axes=hs.plot.figure().subplots(2, 3)).shape
     (2, 3)
     """
-    rows = [comparison[name] for name in names] if names is not None else _best(comparison)
+    best = (comparison.ranked() or comparison.rows)[:_SHOWN]
+    rows = best if names is None else [comparison[name] for name in names]
     if not rows:
         raise ValueError("there is no model to draw")
     with several(axes, 3 * len(rows), height=1.9, columns=3) as panels:
@@ -164,20 +106,88 @@ def comparison(
             width.plot(row.loop.u, row.loop.width, label="model", **line(0))
             loop.set_title(f"{row.name}: fit {row.fit_percent:.1f} %", loc="left", fontsize="medium")
         for column in grid.T[1:]:
-            _same_height(column)
+            ends = np.array([ax.get_ylim() for ax in column])  # one range for all, so that heights compare
+            for ax in column:
+                ax.set_ylim(ends[:, 0].min(), ends[:, 1].max())
             column[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize="small", **_TIGHT)
     return grid
 
 
-def _best(comparison: Comparison) -> Sequence[ComparisonRow]:
-    return (comparison.ranked() or comparison.rows)[:_SHOWN]
+def identification(
+    fit: Identification, record: Record | Sequence[Record], axes: Sequence[Axes] | AxesArray | None = None
+) -> AxesArray:
+    """Draw the model over the measured loop, the residuals, and the profiles of the likelihood if there are any.
+
+    `record` is the Record, or the sequence of them, from which `fit` was identified; another one is a ValueError. The
+    band is two standard errors of the model's output wide to each side. Residuals are counted in quanta of the sensor
+    if its resolution is known, with lines at one quantum. A profile is the signed root of the deviance over the
+    distance from the estimate in standard errors: the diagonal, where the likelihood is that of a normal distribution.
+    The interval at 95 % lies between the horizontal lines. The result has shape (2,), or (3,) with profiles.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> rec = hs.datasets.table1()
+    >>> fit = hs.identify(hs.Line, rec)
+    >>> len(hs.plot.identification(fit, rec, hs.plot.figure().subplots(1, 2)))
+    2
+    """
+    records = (record,) if isinstance(record, Record) else tuple(record)
+    u, y = np.concatenate([each.u for each in records]), np.concatenate([each.y for each in records])
+    if u.size != fit.residual.size:
+        raise ValueError(f"the result is of {fit.residual.size} samples, the record has {u.size}")
+    percent = metrics.fit_percent(y, y - fit.residual)
+    if not np.isclose(percent, fit.fit_percent, rtol=1e-6, equal_nan=True):
+        raise ValueError(f"the result is of another record: its fit is {fit.fit_percent:g} %, not {percent:g} %")
+    ends = np.cumsum([len(each) for each in records])[:-1]
+    parts = np.split(np.arange(u.size), ends)
+    with several(axes, 3 if fit.profiles else 2, height=3.0, sharex=False) as panels:
+        _draw_fit(panels[0], u, y, fit, parts)
+        panels[0].set(xlabel=label(records[0].units, "u"), ylabel=label(records[0].units, "y"))
+        quanta = fit.residual_quanta
+        _draw_guides(panels[1], {} if quanta is None else {1.0: "dashed"})
+        panels[1].plot(u, fit.residual if quanta is None else quanta, color=MEASURED, **_DOTS)
+        unit = records[0].units.get("y", "") if quanta is None else "quanta"
+        panels[1].set(xlabel=label(records[0].units, "u"), ylabel=in_unit("Residual", unit))
+        panels[1].margins(y=0.15)
+        if fit.profiles:
+            _draw_profiles(panels[2], fit)
+    return panels
 
 
-def _same_height(column: AxesArray) -> None:
-    """Give Axes one range, so that their heights compare."""
-    ends = [ax.get_ylim() for ax in column]
-    for ax in column:
-        ax.set_ylim(min(low for low, _ in ends), max(high for _, high in ends))
+def _draw_fit(ax: Axes, u: FloatArray, y: FloatArray, fit: Identification, parts: list[NDArray[np.intp]]) -> None:
+    model = y - fit.residual
+    ax.plot(u, y, label="measured", color=POINTS, **_DOTS)
+    for k, part in enumerate(parts):
+        ax.plot(u[part], model[part], label=None if k else f"model, fit {fit.fit_percent:.2f} %", **line(0))
+        if np.isfinite(fit.response_stderr[part]).all():
+            reach = 2.0 * fit.response_stderr[part]
+            corners = np.concatenate([model[part] + reach, (model[part] - reach)[::-1]])
+            ax.fill(np.concatenate([u[part], u[part][::-1]]), corners, color=line(0)["color"], alpha=0.25, linewidth=0)
+    ax.legend(loc="best")
+
+
+def _draw_profiles(ax: Axes, fit: Identification) -> None:
+    reach = 1.0
+    for k, (name, curve) in enumerate(fit.profiles.items()):
+        distance = (curve.values - fit.estimates[name]) / fit.stderr[name]
+        root = np.sign(distance) * np.sqrt(np.maximum(curve.deviance, 0.0))
+        shown = np.abs(root) <= 1.3 * np.sqrt(curve.limit)
+        ax.plot(distance[shown], root[shown], label=name, **line(k))
+        reach = max(reach, 1.1 * float(np.sqrt(curve.limit)))
+    ax.axline((0.0, 0.0), slope=1.0, color=GUIDE, linewidth=0.8)
+    for side in (-1.0, 1.0):
+        ax.axhline(side * reach / 1.1, color=GUIDE, linewidth=0.8, linestyle="dashed")
+    ax.set(xlabel="Distance from the estimate [standard errors]", ylabel="Signed root of the deviance")
+    ax.legend(loc="upper left", bbox_to_anchor=(0.0, 1.0), fontsize="small")
+
+
+def _draw_guides(ax: Axes, sizes: dict[float, str]) -> None:
+    """Lines at zero, and at both signs of some sizes."""
+    ax.axhline(0.0, color=GUIDE, linewidth=0.8)
+    for size, dashes in sizes.items():
+        for height in (size, -size):
+            ax.axhline(height, color=GUIDE, linewidth=0.8, linestyle=dashes)
 
 
 def _draw_loop(ax: Axes, comparison: Comparison, row: ComparisonRow) -> None:
@@ -189,14 +199,9 @@ def _draw_loop(ax: Axes, comparison: Comparison, row: ComparisonRow) -> None:
 
 def _draw_residual(ax: Axes, comparison: Comparison, row: ComparisonRow, quanta: str) -> None:
     record = comparison.record
-    quantum, unit = _quantum(comparison, quanta)
-    rising = _rising(record.u)
-    residual = (record.y - row.y) / quantum
-    ax.axhline(0.0, color=GUIDE, linewidth=0.8)
-    if record.resolution:
-        for size, dashes in ((0.5, "dotted"), (1.0, "dashed")):
-            ax.axhline(size, color=GUIDE, linewidth=0.8, linestyle=dashes)
-            ax.axhline(-size, color=GUIDE, linewidth=0.8, linestyle=dashes)
+    quantum, unit = _quantum(record, quanta)
+    rising, residual = _rising(record.u), (record.y - row.y) / quantum
+    _draw_guides(ax, {0.5: "dotted", 1.0: "dashed"} if record.resolution else {})
     ax.plot(record.u[rising], residual[rising], color=MEASURED, label="loading", **_FILLED)
     ax.plot(record.u[~rising], residual[~rising], color=MEASURED, label="unloading", **_OPEN)
     ax.set(xlabel=label(record.units, "u"), ylabel=in_unit("Residual", unit))
@@ -210,9 +215,8 @@ def _draw_width(ax: Axes, comparison: Comparison) -> None:
     ax.set(xlabel=label(units, "u"), ylabel=in_unit("Loop width", units.get("y", "")))
 
 
-def _quantum(comparison: Comparison, quanta: str) -> tuple[float, str]:
-    """What residuals are divided by, and the unit that leaves."""
-    record = comparison.record
+def _quantum(record: Record, quanta: str) -> tuple[float, str]:
+    """The divisor of residuals, and their unit after the division."""
     return (record.resolution, quanta) if record.resolution else (1.0, printed(record.units.get("y", "")))
 
 
@@ -232,7 +236,7 @@ def _in_unit(length: float, comparison: Comparison) -> str:
 
 
 def _rising(u: FloatArray) -> NDArray[np.bool_]:
-    """Whether each sample is on a loading branch; where the input rests, as before."""
+    """Whether each sample is on a loading branch; while the input rests, as before."""
     slope = np.gradient(u)
-    moved = np.maximum.accumulate(np.where(slope != 0.0, np.arange(u.size), 0))
-    return np.asarray(slope[moved] >= 0.0)
+    latest_motion = np.maximum.accumulate(np.where(slope != 0.0, np.arange(u.size), 0))
+    return np.asarray(slope[latest_motion] >= 0.0)

@@ -1,4 +1,4 @@
-"""Pictures of loops in themselves: the nested ones of an input that fades, their width, and a point that runs round."""
+"""Pictures of loops: the nested loops of a fading input, loop widths, and a point that moves along a loop."""
 
 import itertools
 
@@ -12,7 +12,7 @@ from matplotlib.colors import Normalize
 from hysim._cycles import TOLERANCE, turns
 from hysim._frozen import FloatArray
 from hysim.metrics import LoopMetrics, loop_metrics
-from hysim.plot._results import InputOutput, names_of, units_of
+from hysim.plot._records import InputOutput, names_of, times_of, units_of
 from hysim.plot._style import GUIDE, MARKERS, MEASURED, POINTS, SEQUENTIAL, in_unit, label, line, one
 from hysim.records import Record
 
@@ -20,26 +20,11 @@ from hysim.records import Record
 def minor_loops(result: InputOutput, ax: Axes | None = None, *, tolerance: float = TOLERANCE) -> Axes:
     """Draw each cycle of an input whose extremes change as a loop of its own, the smaller the darker.
 
-    A cycle is a way up and the way down after it: of a sine that fades or grows a nested loop, of reversal curves one
-    of them. Its amplitude is half of what the input falls by. Small loops lie over large ones.
+    A cycle is a rising branch and the falling branch after it: one nested loop of a fading or growing sine, one of the
+    reversal curves. Its amplitude is half of the fall of the input. Small loops are drawn over large ones.
 
-    Parameters
-    ----------
-    result : Record, Simulation or anything with `u` and `y`
-        Whose cycles are drawn.
-    ax : Axes, optional
-        Where to draw.
-    tolerance : float
-        Retreats of the input up to this fraction of its span are no turning points.
-
-    Returns
-    -------
-    Axes
-
-    Raises
-    ------
-    ValueError
-        If the input stands still, or the tolerance is not from 0 to below 0.5.
+    `result` is a Record, a Simulation or anything with arrays `u` and `y`. Reversals of the input up to the fraction
+    `tolerance` of its span are ignored; it is from 0 to below 0.5. A constant input is a ValueError.
 
     Examples
     --------
@@ -51,9 +36,9 @@ def minor_loops(result: InputOutput, ax: Axes | None = None, *, tolerance: float
     """
     cycles = _cycles_up_and_down(result.u, tolerance)
     if not cycles:
-        raise ValueError("the input stands still: there is no loop to draw")
+        raise ValueError("the input is constant: there is no loop to draw")
     norm = Normalize(0.0, max(cycles.values()))
-    units = units_of([result])
+    units = units_of(result)
     with one(ax) as axes:
         for (first, stop), amplitude in sorted(cycles.items(), key=lambda cycle: -cycle[1]):
             axes.plot(result.u[first:stop], result.y[first:stop], color=SEQUENTIAL(norm(amplitude)), linewidth=1.2)
@@ -66,22 +51,9 @@ def minor_loops(result: InputOutput, ax: Axes | None = None, *, tolerance: float
 def width(*results: InputOutput | LoopMetrics, ax: Axes | None = None) -> Axes:
     """Draw signed loop widths, unloading minus loading, against the input.
 
-    Parameters
-    ----------
-    *results : Record, Simulation, LoopMetrics or anything with `u` and `y`
-        Of a record or simulation the last complete cycle is measured, by `hysim.loop_metrics`; that of a protocol
-        such as 0 -> max -> min -> 0 begins and ends at a level. A record is drawn as points, anything else as a line.
-    ax : Axes, optional
-        Where to draw.
-
-    Returns
-    -------
-    Axes
-
-    Raises
-    ------
-    ValueError
-        If no result is given, or one has no complete cycle.
+    Each of `results` is a Record, a Simulation, a LoopMetrics or anything with arrays `u` and `y`; `hysim.loop_metrics`
+    measures its last complete cycle. A record is drawn as points, anything else as a line. A ValueError is raised if
+    there is no result, or one has no complete cycle.
 
     Examples
     --------
@@ -92,19 +64,15 @@ def width(*results: InputOutput | LoopMetrics, ax: Axes | None = None) -> Axes:
     """
     if not results:
         raise ValueError("there is nothing to draw: give at least one record, simulation or loop")
-    units = units_of(results)
-    n_records = n_others = 0
+    units = units_of(*results)
+    points = ({"marker": marker, "linestyle": "none", "color": MEASURED} for marker in itertools.cycle(MARKERS))
+    lines = map(line, itertools.count())
     with one(ax) as axes:
         axes.axhline(0.0, color=GUIDE, linewidth=0.8)
         for result, name in zip(results, names_of(results), strict=True):
             loop = result if isinstance(result, LoopMetrics) else loop_metrics(result.u, result.y)
-            if isinstance(result, Record):
-                marker = MARKERS[n_records % len(MARKERS)]
-                axes.plot(loop.u, loop.width, marker, label=name, color=MEASURED, markersize=3.8, zorder=3)
-                n_records += 1
-            else:
-                axes.plot(loop.u, loop.width, label=name, **line(n_others))
-                n_others += 1
+            style = next(points) | {"markersize": 3.8, "zorder": 3} if isinstance(result, Record) else next(lines)
+            axes.plot(loop.u, loop.width, label=name, **style)
         axes.set(xlabel=label(units, "u"), ylabel=in_unit("Loop width", units.get("y", "")))
         if len(results) > 1:
             axes.legend()
@@ -114,33 +82,12 @@ def width(*results: InputOutput | LoopMetrics, ax: Axes | None = None) -> Axes:
 def animate(
     result: InputOutput, ax: Axes | None = None, *, frames: int = 100, interval: float = 40.0, trail: float = 0.15
 ) -> FuncAnimation:
-    """Let a point run round the loop, with a trail behind it.
+    """Animate a point that moves along the loop, with a trail behind it, over the whole path in light grey.
 
-    The whole path is drawn in light grey underneath. Where the result has a time, frames are evenly spaced in it, else
-    in the samples; the first one shows the first sample and the last one the last.
-
-    Parameters
-    ----------
-    result : Record, Simulation or anything with `u` and `y`
-        Whose path the point takes.
-    ax : Axes, optional
-        Where to draw; they are the animation's to move in until it is saved or shown.
-    frames : int
-        Number of pictures, at least 2.
-    interval : float
-        From one to the next [ms].
-    trail : float
-        Length of the trail, as a fraction of the record.
-
-    Returns
-    -------
-    matplotlib.animation.FuncAnimation
-        Keep it: it stops when nobody holds it. ``save("loop.gif", writer="pillow")`` writes it to a file.
-
-    Raises
-    ------
-    ValueError
-        If there are fewer than 2 frames.
+    `result` is a Record, a Simulation or anything with arrays `u` and `y`. The number of `frames` is at least 2, else a
+    ValueError is raised; they are evenly spaced in the result's time, if it has one, or in its samples, from the first
+    to the last. `interval` is the time between two frames [ms], `trail` the length of the trail as a fraction of the
+    record. Keep a reference to the animation, or it stops; ``save("loop.gif", writer="pillow")`` writes it to a file.
 
     Examples
     --------
@@ -152,12 +99,12 @@ def animate(
     """
     if frames < 2:
         raise ValueError(f"an animation needs at least 2 frames, got {frames}")
-    time = getattr(result, "t", None)
+    time = times_of(result)
     clock = np.arange(float(result.u.size)) if time is None else time
     moments = np.linspace(clock[0], clock[-1], frames)
     heads = np.searchsorted(clock, moments, side="right") - 1
     tails = np.searchsorted(clock, moments - trail * (clock[-1] - clock[0]))
-    units = units_of([result])
+    units = units_of(result)
     with one(ax) as axes:
         canvas = axes.figure.canvas.figure
         axes.plot(result.u, result.y, color=POINTS, linewidth=0.8)
@@ -167,7 +114,7 @@ def animate(
         engine = canvas.get_layout_engine()
         if ax is None and engine is not None:
             engine.execute(canvas)
-            canvas.set_layout_engine("none")  # what is laid out once need not be for every frame
+            canvas.set_layout_engine("none")  # one layout serves every frame
 
     def move(k: int) -> tuple[Artist, ...]:
         passed = slice(tails[k], heads[k] + 1)
@@ -179,9 +126,9 @@ def animate(
 
 
 def _cycles_up_and_down(u: FloatArray, tolerance: float) -> dict[tuple[int, int], float]:
-    """First sample and stop of each way up with the way down after it, and half of what the input falls by.
+    """First sample and stop of each rising branch with the falling one after it, and half of the fall of the input.
 
-    What is left at either end is a cycle of its own at the beginning, and belongs to the last one at the end.
+    A falling branch at the beginning is a cycle of its own; a rising one at the end belongs to the last cycle.
     """
     branches = turns(u, tolerance).branches
     rises = [float(u[branch.stop - 1] - u[branch.start]) for branch in branches]

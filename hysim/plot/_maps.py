@@ -1,4 +1,4 @@
-"""Pictures of planes: residuals over inputs and cycles, the density of relays over their thresholds."""
+"""Maps: residuals over inputs and cycles, and the density of relays over their thresholds."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
@@ -12,10 +12,11 @@ from matplotlib.ticker import MaxNLocator
 
 from hysim._cycles import TOLERANCE, turns
 from hysim._frozen import FloatArray
+from hysim.identification import Identification
 from hysim.models.preisach import Preisach, PreisachRelays
 from hysim.plot._style import DIVERGING, GUIDE, AxesArray, in_unit, label, one, several
 from hysim.records import Record
-from hysim.simulation import simulate
+from hysim.simulation import Simulation, simulate
 
 _MOST_BINS = 40
 _SEAMLESS: dict[str, Any] = {"edgecolors": "face", "linewidth": 0.7, "antialiased": True}
@@ -37,34 +38,19 @@ def residual_map(
 ) -> AxesArray:
     """Draw the residual, measured minus model, over the input and the cycles, loading beside unloading.
 
-    What differs from left to right is wrong with the loop's shape; with another sign in the two panels, with its width;
-    what differs from bottom to top is drift. Grey is zero, lighter is more, darker is less. A cell is the mean over
-    the samples of one branch in one interval of the input, and white where there are none.
+    A change from left to right is an error of the loop's shape, a change of sign between the panels one of its width,
+    and a change from bottom to top is drift. Grey is zero, lighter is more, darker is less. A cell is the mean over the
+    samples of one branch in one interval of the input, and white if there are none.
 
-    Parameters
-    ----------
-    record : Record
-        What was measured.
-    model : model, Simulation or Identification
-        What is subtracted: a simulation of the record's input, or what is simulated.
-    axes : two Axes, optional
-        For loading and for unloading.
-    bins : int, optional
-        Number of intervals of the input; by default half as many as a branch has samples, at most 40.
-    tolerance : float
-        Retreats of the input up to this fraction of its span do not end a branch.
-    quanta : str
-        What the sensor's quanta are called, in which residuals are counted where the record has a resolution.
-
-    Returns
-    -------
-    array of Axes, shape (2,)
+    `model` is a model, a Simulation of the record's input, or an Identification. `bins` is the number of intervals of
+    the input, by default half as many as a branch has samples, at most 40. Reversals of the input up to the fraction
+    `tolerance` of its span do not end a branch. `quanta` is the name of the sensor's quanta, in which residuals are
+    counted if the record has a resolution. The result has shape (2,).
 
     Raises
     ------
     ValueError
-        If the simulation has another length than the record, the input stands still, there are fewer than two Axes,
-        or `bins` is below 1.
+        If the simulation and the record differ in length, the input is constant, or `bins` is below 1.
 
     Examples
     --------
@@ -103,27 +89,14 @@ def forc(
     """Draw the density of relays over their thresholds: the diagram of first-order reversal curves.
 
     The density is the weight of the relays in a cell over its area; from reversal curves, half the mixed second
-    difference of the output, as `hysim.Preisach.from_reversal_curves` reads it, without smoothing. Grey is zero,
+    difference of the output, as `hysim.Preisach.from_reversal_curves` computes it, without smoothing. Grey is zero,
     lighter is more, darker is less. The cells along the diagonal, of relays that switch up and down at one input, are
     triangles.
 
-    Parameters
-    ----------
-    source : Preisach, PreisachRelays or Record
-        A law, or a record of reversal curves such as those of `hysim.signals.reversal_curves`.
-    ax : Axes, optional
-        Where to draw.
-    coordinates : {"thresholds", "centre"}
-        The upper threshold a over the lower one b; or the middle (a + b) / 2, known as bias or interaction field, over
-        half the distance (a - b) / 2, known as coercivity.
-    units : mapping, optional
-        Labels of the units of ``"u"`` and ``"y"``; by default the record's.
-    tolerance : float
-        Retreats of a record's input up to this fraction of its span are ignored: noise.
-
-    Returns
-    -------
-    Axes
+    `source` is a Preisach, a PreisachRelays, or a Record of curves such as `hysim.signals.reversal_curves`, whose
+    reversals up to the fraction `tolerance` of its span are ignored. `coordinates` are ``"thresholds"``, the upper one
+    a over the lower one b; or ``"centre"``, the middle (a + b) / 2, known as bias or interaction field, over half the
+    distance (a - b) / 2, known as coercivity. `units` are labels of the units of ``"u"`` and ``"y"``.
 
     Raises
     ------
@@ -165,9 +138,9 @@ def forc(
 
 
 def _residual(record: Record, model: Any) -> FloatArray:
-    """Measured minus model, of a simulation or of what can be simulated."""
-    plant = getattr(model, "model", model)
-    y = plant.y if hasattr(plant, "y") else simulate(plant, record.t, record.u).y
+    """Measured minus model, of a simulation or of a model to simulate."""
+    plant = model.model if isinstance(model, Identification) else model
+    y = plant.y if isinstance(plant, Simulation) else simulate(plant, record.t, record.u).y
     if y.shape != record.y.shape:
         raise ValueError(f"the model's output must be as long as the record, {len(record)} samples, got {y.size}")
     return np.asarray(record.y - y)
@@ -176,23 +149,23 @@ def _residual(record: Record, model: Any) -> FloatArray:
 def _mean_residuals(
     record: Record, residual: FloatArray, bins: int | None, tolerance: float
 ) -> tuple[FloatArray, list[FloatArray]]:
-    """Edges of the input's intervals, and the means (n_branches, n_bins) in them: of ways up, and of ways down."""
+    """Edges of the input's intervals, and means (n_branches, n_bins) in them: of rising, and of falling branches."""
     branches = turns(record.u, tolerance).branches
     if not branches:
-        raise ValueError("the input stands still: there is no branch to draw")
+        raise ValueError("the input is constant: there is no branch to draw")
     typical = int(np.median([branch.stop - branch.start for branch in branches]))
     n_bins = bins or max(1, min(_MOST_BINS, typical // 2))
     edges = np.linspace(record.u.min(), record.u.max(), n_bins + 1)
     tables = []
     for sign in (1.0, -1.0):
-        ways = [way for way in branches if sign * (record.u[way.stop - 1] - record.u[way.start]) > 0.0]
-        rows = [_means(record.u[way], residual[way], edges) for way in ways]
+        same_way = [part for part in branches if sign * (record.u[part.stop - 1] - record.u[part.start]) > 0.0]
+        rows = [_means(record.u[part], residual[part], edges) for part in same_way]
         tables.append(np.array(rows).reshape(-1, n_bins))
     return edges, tables
 
 
 def _means(u: FloatArray, values: FloatArray, edges: FloatArray) -> FloatArray:
-    """Mean of the values whose input lies between two edges, nan where there is none."""
+    """Mean of the values whose input is between two edges, nan if there are none."""
     place = np.clip(np.searchsorted(edges, u, side="right") - 1, 0, edges.size - 2)
     count, total = (np.bincount(place, weights, edges.size - 1) for weights in (None, values))
     return np.asarray(np.divide(total, count, out=np.full(count.size, np.nan), where=count > 0))

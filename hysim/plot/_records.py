@@ -1,13 +1,13 @@
 """Pictures of records and simulations: the loop, and the signals against time."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from hysim._frozen import FloatArray
-from hysim.plot._results import InputOutput, names_of, units_of
+from hysim.control import ClosedLoop
 from hysim.plot._style import MARKERS, MEASURED, POINTS, AxesArray, label, line, one, several
 from hysim.records import Record
 
@@ -22,39 +22,64 @@ _POINTS: dict[str, Any] = {
 _ARROW = 0.03  # its length along the input, of the span
 
 
-class Response(Protocol):
-    """What can be drawn as a response: a closed loop or the like."""
+class InputOutput(Protocol):
+    """A result that can be drawn as a loop: a Record, a Simulation or anything with `u` and `y`.
+
+    Its `units`, `name`, times `t` and memory `z` are used if it has them.
+    """
 
     @property
-    def t(self) -> FloatArray: ...
-    @property
-    def reference(self) -> FloatArray: ...
+    def u(self) -> FloatArray: ...
     @property
     def y(self) -> FloatArray: ...
-    @property
-    def measurement(self) -> FloatArray: ...
-    @property
-    def units(self) -> Mapping[str, str]: ...
+
+
+@runtime_checkable
+class _Named(Protocol):
+    name: str
+
+
+@runtime_checkable
+class _WithUnits(Protocol):
+    units: Mapping[str, str]
+
+
+@runtime_checkable
+class _WithTime(Protocol):
+    t: FloatArray | None
+
+
+@runtime_checkable
+class _WithMemory(Protocol):
+    z: FloatArray | None
+
+
+def times_of(result: InputOutput) -> FloatArray | None:
+    """The times of a result, if it has any."""
+    return result.t if isinstance(result, _WithTime) else None
+
+
+def names_of(results: Sequence[Any]) -> list[str]:
+    """Own names of results, or the names of their classes; the same names are numbered."""
+    own = [result.name if isinstance(result, _Named) else "" for result in results]
+    names = [name or type(result).__name__.lower() for name, result in zip(own, results, strict=True)]
+    return [name if names.count(name) == 1 else f"{name} {names[:k].count(name) + 1}" for k, name in enumerate(names)]
+
+
+def units_of(*results: Any) -> dict[str, str]:
+    """The units of all results; where they differ, those of the first one."""
+    units: dict[str, str] = {}
+    for result in results:
+        units = (dict(result.units) if isinstance(result, _WithUnits) else {}) | units
+    return units
 
 
 def loop(*results: InputOutput, ax: Axes | None = None) -> Axes:
     """Draw outputs against inputs, over each other.
 
-    Parameters
-    ----------
-    *results : Record, Simulation or anything with `u` and `y`
-        A record is drawn as points, anything else as a line with an arrow on its last loading and unloading branch.
-    ax : Axes, optional
-        Where to draw.
-
-    Returns
-    -------
-    Axes
-
-    Raises
-    ------
-    ValueError
-        If no result is given.
+    Each of `results` is a Record, a Simulation or anything with arrays `u` and `y` of one length. A record is drawn as
+    points, anything else as a line with an arrow on its last loading and unloading branch. A ValueError is raised if
+    there is no result.
 
     Examples
     --------
@@ -74,7 +99,7 @@ def loop(*results: InputOutput, ax: Axes | None = None) -> Axes:
         for k, (result, name) in enumerate(others):
             (drawn,) = axes.plot(result.u, result.y, label=name, **line(k))
             _arrows(axes, result, drawn.get_color())
-        units = units_of(results)
+        units = units_of(*results)
         axes.set(xlabel=label(units, "u"), ylabel=label(units, "y"))
         if len(results) > 1:
             axes.legend()
@@ -82,26 +107,12 @@ def loop(*results: InputOutput, ax: Axes | None = None) -> Axes:
 
 
 def history(result: InputOutput, axes: Sequence[Axes] | AxesArray | None = None, *, hold: str = "zoh") -> AxesArray:
-    """Draw output, input and, where there is one, memory against time, one over the other.
+    """Draw output, input and, if there is one, memory against time, one over the other.
 
-    Parameters
-    ----------
-    result : Record, Simulation or anything with `u` and `y`
-        A record's output is drawn as points, any other as a line. Without a time it is drawn against the sample's
-        number.
-    axes : two or three Axes, optional
-        For the output, for the input and for the memory z, which is left out where there are two.
-    hold : {"zoh", "foh"}
-        How the input runs between samples: held, which makes steps, or along a straight line.
-
-    Returns
-    -------
-    array of Axes, shape (2,) or (3,)
-
-    Raises
-    ------
-    ValueError
-        If `hold` is another word or fewer than two Axes are given.
+    `result` is a Record, whose output is drawn as points, a Simulation or anything with arrays `u` and `y`; without
+    times they are drawn against the sample's number. With two `axes` the memory z is left out. `hold` is ``"zoh"``,
+    which draws the input as steps, or ``"foh"``, straight lines between samples; another word is a ValueError. The
+    result has shape (2,) or (3,).
 
     Examples
     --------
@@ -112,10 +123,10 @@ def history(result: InputOutput, axes: Sequence[Axes] | AxesArray | None = None,
     """
     if hold not in _DRAWN:
         raise ValueError(f'hold must be "zoh" or "foh", got {hold!r}')
-    time, z = getattr(result, "t", None), getattr(result, "z", None)
+    time, z = times_of(result), result.z if isinstance(result, _WithMemory) else None
     t = np.arange(float(result.u.size)) if time is None else time
     end = 2.0 * t[-1] - t[-2] if t.size > 1 else t[-1]
-    units = units_of([result])
+    units = units_of(result)
     style = {"marker": "o", **_POINTS} if isinstance(result, Record) else line(0)
     n = 2 if z is None or (axes is not None and np.size(np.asarray(axes)) == 2) else 3
     with several(axes, n, height=2.1 if n == 2 else 1.9) as panels:
@@ -137,18 +148,8 @@ def traces(
 ) -> Axes:
     """Draw outputs against time, over each other.
 
-    Parameters
-    ----------
-    series : mapping
-        Name to times and outputs, arrays of one length each.
-    ax : Axes, optional
-        Where to draw.
-    units : mapping, optional
-        Labels of the units of ``"t"`` and ``"y"``.
-
-    Returns
-    -------
-    Axes
+    `series` maps names to pairs of times and outputs, arrays of the same shape (n,); `units` are labels of the units of
+    ``"t"`` and ``"y"``.
 
     Examples
     --------
@@ -167,19 +168,10 @@ def traces(
     return axes
 
 
-def response(run: Response, ax: Axes | None = None) -> Axes:
-    """Draw what a closed loop made of its reference, against time.
+def response(run: ClosedLoop, ax: Axes | None = None) -> Axes:
+    """Draw reference and displacement of a closed loop against time, and the measurement where it differs.
 
-    Parameters
-    ----------
-    run : ClosedLoop, or anything with t, reference, y, measurement and units
-        The measurement is drawn where it is not the true displacement.
-    ax : Axes, optional
-        Where to draw.
-
-    Returns
-    -------
-    Axes
+    `run` is a result of `hysim.close_loop`, or anything with t, reference, y, measurement, shape (n,), and units.
 
     Examples
     --------
@@ -202,6 +194,6 @@ def _arrows(ax: Axes, result: InputOutput, colour: Any) -> None:
     style = {"arrowstyle": "-|>", "color": colour, "mutation_scale": 14, "shrinkA": 0, "shrinkB": 0}
     for crossing in (above[1:] > above[:-1], above[1:] < above[:-1]):
         for head in np.flatnonzero(crossing)[-1:] + 1:
-            away = np.abs(u[:head] - u[head]) >= _ARROW * np.ptp(u)
-            tail = np.flatnonzero(away)[-1] if away.any() else head - 1
+            far = np.abs(u[:head] - u[head]) >= _ARROW * np.ptp(u)
+            tail = np.flatnonzero(far)[-1] if far.any() else head - 1
             ax.annotate("", xy=(u[head], y[head]), xytext=(u[tail], y[tail]), arrowprops=style)

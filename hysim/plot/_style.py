@@ -1,4 +1,4 @@
-"""The house style: thin spines, a light grid, and lines told apart by dash and lightness as well as by colour.
+"""The house style: thin spines, a light grid, and lines that differ in dashes and lightness as well as in colour.
 
 The colours are those of M. Okabe and K. Ito (2008), chosen for the colour-blind.
 """
@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import matplotlib.style
@@ -19,7 +20,7 @@ from matplotlib.figure import Figure
 AxesArray = npt.NDArray[np.object_]
 
 WIDTH = 6.0
-"""Of a figure [in]: narrow enough to be read on a phone, where it shrinks to 360 pixels."""
+"""Width of a figure [in]: narrow enough to be read on a phone, where it shrinks to 360 pixels."""
 
 MEASURED = "#333333"
 POINTS = "#b0b0b0"
@@ -28,7 +29,7 @@ GUIDE = "#777777"
 MARKERS = "os^D"
 
 SEQUENTIAL = ListedColormap(matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, 256)), "hysim_sequential")
-"""From dark to light; its light end is still seen on white."""
+"""From dark to light; its light end is still visible on white."""
 
 DIVERGING = LinearSegmentedColormap.from_list(
     "hysim_diverging", ["#0a1f4d", "#27569a", "#888888", "#d8ad45", "#fff3b0"]
@@ -45,36 +46,7 @@ _LINES = (
     ("#E69F00", (0, (1, 2.5))),
 )
 
-_STYLE = {
-    "axes.axisbelow": True,
-    "axes.edgecolor": "#555555",
-    "axes.grid": True,
-    "axes.labelsize": 10,
-    "axes.linewidth": 0.6,
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "axes.titlelocation": "left",
-    "axes.titlesize": 10,
-    "figure.constrained_layout.h_pad": 0.06,
-    "figure.constrained_layout.w_pad": 0.06,
-    "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial", "Helvetica"],
-    "font.size": 10,
-    "grid.color": "#e2e2e2",
-    "grid.linewidth": 0.6,
-    "legend.fontsize": 9.5,
-    "legend.frameon": False,
-    "legend.handlelength": 2.4,
-    "lines.linewidth": 1.5,
-    "svg.fonttype": "none",
-    "xtick.color": "#555555",
-    "xtick.labelcolor": "#222222",
-    "xtick.labelsize": 9.5,
-    "xtick.major.width": 0.6,
-    "ytick.color": "#555555",
-    "ytick.labelcolor": "#222222",
-    "ytick.labelsize": 9.5,
-    "ytick.major.width": 0.6,
-}
+_STYLE = Path(__file__).with_name("house.mplstyle")
 
 _QUANTITIES = {
     **dict.fromkeys(("V", "mV", "kV"), "Voltage"),
@@ -87,22 +59,13 @@ _NAMES = {"t": "Time", "u": "Input", "y": "Output", "z": "Memory z"}
 
 @contextmanager
 def house_style() -> Iterator[None]:
-    """Context, or decorator, in which figures and Axes are made in the house style whatever the user's settings."""
+    """Context, or decorator, in which figures and Axes have the house style whatever the user's settings."""
     with matplotlib.style.context(_STYLE, after_reset=True):
         yield
 
 
 def figure(width: float = WIDTH, height: float = 4.0) -> Figure:
-    """An empty figure, made without pyplot.
-
-    Parameters
-    ----------
-    width, height : float
-        Its size [in].
-
-    Returns
-    -------
-    Figure
+    """Make an empty figure of some width and height [in], without pyplot.
 
     Examples
     --------
@@ -117,27 +80,27 @@ def figure(width: float = WIDTH, height: float = 4.0) -> Figure:
 
 
 def panels(canvas: Figure, n: int, *, columns: int = 1, sharex: bool = True, sharey: bool = False) -> AxesArray:
-    """Add `n` Axes row by row to a figure, over one input axis, and label what they share on the outer ones."""
+    """Add `n` Axes row by row to a figure; shared axes have labels on the outer panels only."""
     rows = math.ceil(n / columns)
-    made = np.empty(n, dtype=object)
+    axes = np.empty(n, dtype=object)
     for k in range(n):
-        first = made[0] if k else None
-        made[k] = canvas.add_subplot(
+        first = axes[0] if k else None
+        axes[k] = ax = canvas.add_subplot(
             rows, columns, k + 1, sharex=first if sharex else None, sharey=first if sharey else None
         )
         if sharex and k < (rows - 1) * columns:
-            made[k].tick_params(labelbottom=columns > 1)
-            made[k].xaxis.label.set_visible(False)
+            ax.tick_params(labelbottom=columns > 1)
+            ax.xaxis.label.set_visible(False)
         if sharey and k % columns:
-            made[k].tick_params(labelleft=False)
-            made[k].yaxis.label.set_visible(False)
-    canvas.align_ylabels(made)
-    return made
+            ax.tick_params(labelleft=False)
+            ax.yaxis.label.set_visible(False)
+    canvas.align_ylabels(axes)
+    return axes
 
 
 @contextmanager
 def one(ax: Axes | None, height: float = 4.0) -> Iterator[Axes]:
-    """The given Axes; or new ones, and the house style while they are drawn on."""
+    """The Axes `ax`; without them new ones, and the house style while they are drawn on."""
     with several(None if ax is None else [ax], 1, height) as axes:
         yield axes[0]
 
@@ -152,12 +115,12 @@ def several(
     sharex: bool = True,
     sharey: bool = False,
 ) -> Iterator[AxesArray]:
-    """The first `n` of the given Axes; or new ones in rows of `height` [in], and the house style meanwhile."""
+    """The first `n` of `axes`; without them new ones in rows of `height` [in], and the house style meanwhile."""
     if axes is not None:
-        given = np.ravel(np.asarray(axes, dtype=object))
-        if given.size < n:
-            raise ValueError(f"{n} Axes are needed, got {given.size}")
-        yield given[:n]
+        existing = np.ravel(np.asarray(axes, dtype=object))
+        if existing.size < n:
+            raise ValueError(f"{n} Axes are needed, got {existing.size}")
+        yield existing[:n]
         return
     import matplotlib.pyplot as plt
 
@@ -167,13 +130,13 @@ def several(
 
 
 def line(k: int) -> dict[str, Any]:
-    """Colour and dashes of the k-th of several lines."""
+    """Colour and dashes of the line with the number `k`."""
     colour, dashes = _LINES[k % len(_LINES)]
     return {"color": colour, "linestyle": dashes}
 
 
 def label(units: Mapping[str, str], signal: str) -> str:
-    """`Voltage [V]` of ``{"u": "V"}`` and ``"u"``; `Input` where no unit is known."""
+    """`Voltage [V]` for ``{"u": "V"}`` and ``"u"``; `Input` if the unit is unknown."""
     if signal not in units:
         return _NAMES[signal]
     unit = units[signal]
@@ -182,10 +145,10 @@ def label(units: Mapping[str, str], signal: str) -> str:
 
 
 def in_unit(name: str, unit: str) -> str:
-    """`Loop width [µm]` of a name and a unit; the name alone without one."""
+    """`Loop width [µm]` for a name and a unit; the name alone without a unit."""
     return f"{name} [{printed(unit)}]" if unit else name
 
 
 def printed(unit: str) -> str:
-    """A unit with its micro sign: `µm` of ``"um"``."""
+    """A unit with its micro sign: `µm` for ``"um"``."""
     return re.sub(r"\bu(?=(m|s|V|A|N)\b)", "µ", unit)

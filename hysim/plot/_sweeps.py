@@ -1,4 +1,4 @@
-"""Pictures of studies: where the variance comes from, maps over a grid, bands of quantiles, one line for each task."""
+"""Pictures of studies: sensitivities, maps over a grid, bands of quantiles, and one line for each task."""
 
 import numpy as np
 from matplotlib import colormaps
@@ -15,18 +15,7 @@ _COLOURS = "viridis"
 def sensitivities(indices: SobolIndices, output: str, ax: Axes | None = None) -> Axes:
     """Draw the Sobol indices of an output, first order beside total, with their intervals.
 
-    Parameters
-    ----------
-    indices : SobolIndices
-        What `hysim.sobol_indices` found.
-    output : str
-        Name of the output.
-    ax : Axes, optional
-        Where to draw.
-
-    Returns
-    -------
-    Axes
+    `indices` is a result of `hysim.sobol_indices`, and `output` the name of one of its outputs.
 
     Examples
     --------
@@ -53,27 +42,10 @@ def sensitivities(indices: SobolIndices, output: str, ax: Axes | None = None) ->
 
 
 def heat_map(result: Sweep, x: str, y: str, output: str, ax: Axes | None = None) -> Axes:
-    """Draw an output over two parameters of a grid, as the median over all others.
+    """Draw an output of a study over two parameters of its grid, as the median over all others.
 
-    Parameters
-    ----------
-    result : Sweep
-        Of a grid with these parameters.
-    x, y : str
-        Names of the parameters.
-    output : str
-        Name of the output.
-    ax : Axes, optional
-        Where to draw.
-
-    Returns
-    -------
-    Axes
-
-    Raises
-    ------
-    ValueError
-        If the study is not of a grid, or not with these parameters.
+    `x`, `y` and `output` are the names of the parameters and of the output. A ValueError is raised if the study
+    `result` is not of a grid with these parameters.
 
     Examples
     --------
@@ -84,12 +56,9 @@ def heat_map(result: Sweep, x: str, y: str, output: str, ax: Axes | None = None)
     """
     if result.axes is None or not {x, y} <= result.axes.keys() or x == y:
         raise ValueError(f"a heat map needs a grid with the parameters {x} and {y}")
-    table = np.array(
-        [
-            [_median(result[output][(result[x] == across) & (result[y] == up)]) for across in result.axes[x]]
-            for up in result.axes[y]
-        ]
-    )
+    columns, rows = result.axes[x], result.axes[y]
+    medians = [_median(result[output][(result[x] == across) & (result[y] == up)]) for up in rows for across in columns]
+    table = np.reshape(medians, (len(rows), len(columns)))
     with one(ax) as axes:
         picture = axes.pcolormesh(range(table.shape[1]), range(table.shape[0]), table, cmap=_COLOURS, shading="nearest")
         for axis, name in ((axes.xaxis, x), (axes.yaxis, y)):
@@ -104,20 +73,8 @@ def heat_map(result: Sweep, x: str, y: str, output: str, ax: Axes | None = None)
 def quantile_bands(result: Sweep, parameter: str, output: str, ax: Axes | None = None, *, slices: int = 20) -> Axes:
     """Draw the median of an output against a parameter, and the bands that hold half and nine tenths of the tasks.
 
-    Parameters
-    ----------
-    result : Sweep
-        The study.
-    parameter, output : str
-        Their names.
-    ax : Axes, optional
-        Where to draw.
-    slices : int
-        Into how many slices with as many tasks each the parameter is cut, if it has more values.
-
-    Returns
-    -------
-    Axes
+    `parameter` and `output` are names in the study `result`. If the parameter has more values than `slices`, it is cut
+    into as many slices with equally many tasks.
 
     Examples
     --------
@@ -145,20 +102,9 @@ def quantile_bands(result: Sweep, parameter: str, output: str, ax: Axes | None =
 
 
 def parallel_coordinates(result: Sweep, output: str, ax: Axes | None = None) -> Axes:
-    """Draw one line for each task across its parameters, each scaled to its range, in the colour of an output.
+    """Draw one line for each task of a study across its parameters, scaled to their ranges, coloured by an output.
 
-    Parameters
-    ----------
-    result : Sweep
-        The study.
-    output : str
-        Name of the output.
-    ax : Axes, optional
-        Where to draw.
-
-    Returns
-    -------
-    Axes
+    `result` is a study, and `output` the name of one of its outputs.
 
     Examples
     --------
@@ -186,7 +132,7 @@ def _median(values: FloatArray) -> float:
 
 
 def _scaled(values: FloatArray) -> FloatArray:
-    """Fractions of the range; of strings, of their order."""
+    """Fractions of the range of numbers, or of the order of strings."""
     numbers = np.unique(values, return_inverse=True)[1] if values.dtype.kind == "U" else np.asarray(values, dtype=float)
     return np.asarray((numbers - numbers.min()) / (np.ptp(numbers) or 1.0))
 

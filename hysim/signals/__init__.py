@@ -1,8 +1,8 @@
 """Inputs for loop studies, exact to the bit at their extremes.
 
-Each returns the samples of a signal in the unit of the values that it is given, without time: a cycle starts at its
-lowest value (a sine at its mean), and every cycle of one amplitude has the same bits. A rate-independent law needs no
-time. Where one is needed, `sample_times` has it.
+Each function returns the samples of a signal, without times, in the unit of its arguments. A cycle starts at its lowest
+value (a sine at its mean), and all cycles of one amplitude have the same bits. A rate-independent law needs no times;
+`sample_times` computes them.
 """
 
 from hysim.signals._cycles import sawtooth, sine, square, staircase, triangle

@@ -1,4 +1,4 @@
-"""Signals of which every cycle has the same bits."""
+"""Periodic signals; every cycle has the same bits."""
 
 import math
 
@@ -11,17 +11,17 @@ from hysim.signals._parts import checked_count, checked_span, unit_sine
 def staircase(low: float, high: float, step: float, *, cycles: int = 1, samples_per_step: int = 1) -> FloatArray:
     """Steps from low to high and back.
 
-    Every level of the way up comes again on the way down, so that both extremes occur twice in a row:
+    Every level of the rise occurs again on the fall, so that both extremes occur twice in a row:
     0, 5, ..., 125, 125, ..., 5, 0.
 
     Parameters
     ----------
     low, high, step : float
-        Extremes, and height of a step, of which the span has a whole number [unit of u].
+        Extremes, and height of a step, which divides the span [unit of u].
     cycles : int
-        Number of ways up and down.
+        Number of rises and falls.
     samples_per_step : int
-        How often each level is sampled.
+        Number of samples at each level.
 
     Returns
     -------
@@ -57,7 +57,7 @@ def triangle(low: float, high: float, *, cycles: int, samples_per_cycle: int) ->
     low, high : float
         Extremes, both hit exactly [unit of u].
     cycles : int
-        Number of ways up and down.
+        Number of rises and falls.
     samples_per_cycle : int
         Even number of samples of a cycle.
 
@@ -85,26 +85,12 @@ def triangle(low: float, high: float, *, cycles: int, samples_per_cycle: int) ->
 
 
 def sine(amplitude: float, *, mean: float = 0.0, cycles: int, samples_per_cycle: int) -> FloatArray:
-    """Samples of mean + amplitude sin(2 pi k / samples_per_cycle).
+    """Samples of mean + amplitude sin(2 pi k / samples_per_cycle), from the mean to the mean.
 
-    Parameters
-    ----------
-    amplitude, mean : float
-        Half the span, and the value in its middle [unit of u].
-    cycles : int
-        Number of periods. A loop needs two: it is cut from extreme to extreme.
-    samples_per_cycle : int
-        Samples of a period; with a multiple of 4 both extremes are hit.
-
-    Returns
-    -------
-    array, shape (cycles * samples_per_cycle + 1,) [unit of u]
-        Starts and ends at the mean.
-
-    Raises
-    ------
-    ValueError
-        If the amplitude is not positive, or a count is below 1.
+    `amplitude` is half the span, and `mean` the value in its middle [unit of u]. With a multiple of 4 as
+    `samples_per_cycle` both extremes are hit. A loop needs two `cycles`: it is measured from extreme to extreme. The
+    result has shape (cycles * samples_per_cycle + 1,) [unit of u]. A ValueError is raised if the amplitude is not
+    positive, or a count is below 1.
 
     Examples
     --------
@@ -119,29 +105,12 @@ def sine(amplitude: float, *, mean: float = 0.0, cycles: int, samples_per_cycle:
 
 
 def sawtooth(low: float, high: float, *, cycles: int, samples_per_cycle: int) -> FloatArray:
-    """Straight lines from low to high, and back at once, sampled evenly.
+    """Straight lines from low to high, and back in one step, sampled evenly.
 
-    Back takes one step from sample to sample, as long as any other. Reversed, ``[::-1]``, the signal falls along the
-    lines and rises at once.
-
-    Parameters
-    ----------
-    low, high : float
-        Extremes, both hit exactly [unit of u].
-    cycles : int
-        Number of lines.
-    samples_per_cycle : int
-        Samples of a line, both ends among them; at least 2.
-
-    Returns
-    -------
-    array, shape (cycles * samples_per_cycle,) [unit of u]
-        Starts at low and ends at high.
-
-    Raises
-    ------
-    ValueError
-        If high is not above low, `cycles` is below 1, or `samples_per_cycle` below 2.
+    The step back takes as long as any other step. Reversed, ``[::-1]``, the signal falls along the lines and rises in
+    one step. `low` and `high` are both hit exactly [unit of u]; a line has `samples_per_cycle` samples, at least 2,
+    with both ends among them. The result has shape (cycles * samples_per_cycle,), starts at low and ends at high [unit
+    of u]. A ValueError is raised if high is not above low, or a count is too small.
 
     Examples
     --------
@@ -156,26 +125,10 @@ def sawtooth(low: float, high: float, *, cycles: int, samples_per_cycle: int) ->
 
 
 def square(low: float, high: float, *, cycles: int, samples_per_half: int) -> FloatArray:
-    """Low and high in turn, each held as long.
+    """Low and high in turn, each held for `samples_per_half` samples.
 
-    Parameters
-    ----------
-    low, high : float
-        The two values [unit of u].
-    cycles : int
-        Number of periods.
-    samples_per_half : int
-        How often each value is sampled before the other follows.
-
-    Returns
-    -------
-    array, shape (2 * cycles * samples_per_half,) [unit of u]
-        Starts at low and ends at high.
-
-    Raises
-    ------
-    ValueError
-        If high is not above low, or a count is below 1.
+    `low` and `high` are the two values [unit of u]. The result has shape (2 * cycles * samples_per_half,), starts at
+    low and ends at high [unit of u]. A ValueError is raised if high is not above low, or a count is below 1.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Signals whose loops lie inside one another: fading and growing sines, reversal curves, and turning points at will."""
+"""Signals with nested loops: fading and growing sines, reversal curves, and any sequence of turning points."""
 
 import math
 from collections.abc import Sequence
@@ -14,29 +14,12 @@ _ROUNDING = 1e-12  # of a number of steps
 
 
 def reversal_curves(low: float, high: float, *, curves: int, samples_per_step: int = 1) -> FloatArray:
-    """First-order reversal curves: up from low to one level after the other, and back each time.
+    """First-order reversal curves: from low up to one level after the other, and back each time.
 
-    The levels divide the span evenly, and the highest one is last. With N curves and m samples for the way from
-    one level to the next, sampled evenly, curve k = 1 ... N takes 2 k m samples.
-
-    Parameters
-    ----------
-    low, high : float
-        Extremes, both hit exactly [unit of u].
-    curves : int
-        Number N of levels above low from which a curve falls.
-    samples_per_step : int
-        Samples m from level to level; every level is hit exactly.
-
-    Returns
-    -------
-    array, shape (curves * (curves + 1) * samples_per_step + 1,) [unit of u]
-        Starts and ends at low.
-
-    Raises
-    ------
-    ValueError
-        If high is not above low, or a count is below 1.
+    `low` and `high` are both hit exactly [unit of u]. The levels above low divide the span evenly into N = `curves`
+    parts, and the highest one is last. With m = `samples_per_step` from one level to the next, curve k = 1 ... N takes
+    2 k m samples. The result has shape (N (N + 1) m + 1,), starts and ends at low [unit of u]. A ValueError is raised
+    if high is not above low, or a count is below 1.
 
     Examples
     --------
@@ -54,7 +37,7 @@ def reversal_curves(low: float, high: float, *, curves: int, samples_per_step: i
 def decaying_sine(
     amplitude: float, *, mean: float = 0.0, cycles: int, samples_per_cycle: int, ratio: float | None = None
 ) -> FloatArray:
-    """Cycles of a sine, each smaller than the one before: nested loops, and what takes a memory back to its middle.
+    """Cycles of a sine, each smaller than the one before: nested loops, which also erase a memory.
 
     Cycle k = 0 ... N - 1 is mean + a_k sin(2 pi j / samples_per_cycle). The amplitude changes where the sine crosses
     its mean, and with it the slope there, but not the value.
@@ -62,16 +45,15 @@ def decaying_sine(
     Parameters
     ----------
     amplitude : float
-        That of the first cycle, a_0 [unit of u].
+        Amplitude a_0 of the first cycle [unit of u].
     mean : float
-        Value about which it swings [unit of u].
+        Value in the middle of the cycles [unit of u].
     cycles : int
         Number N of cycles.
     samples_per_cycle : int
         Samples of a cycle; with a multiple of 4 both extremes of every cycle are hit exactly.
     ratio : float, optional
-        a_k / a_(k-1), above 0 and at most 1. By default the amplitudes divide the first one evenly,
-        a_k = a_0 (N - k) / N.
+        a_k / a_(k-1), above 0 and at most 1. By default the amplitudes fall evenly, a_k = a_0 (N - k) / N.
 
     Returns
     -------
@@ -95,30 +77,10 @@ def decaying_sine(
 def growing_sine(
     amplitude: float, *, mean: float = 0.0, cycles: int, samples_per_cycle: int, ratio: float | None = None
 ) -> FloatArray:
-    """Cycles of a sine, each larger than the one before; its amplitudes are those of `decaying_sine` backwards.
+    """Cycles of a sine, each larger than the one before: the amplitudes of `decaying_sine` in reverse order.
 
-    Parameters
-    ----------
-    amplitude : float
-        That of the last cycle [unit of u].
-    mean : float
-        Value about which it swings [unit of u].
-    cycles : int
-        Number N of cycles.
-    samples_per_cycle : int
-        Samples of a cycle; with a multiple of 4 both extremes of every cycle are hit exactly.
-    ratio : float, optional
-        Amplitude of a cycle over that of the next, above 0 and at most 1. By default the amplitudes rise evenly.
-
-    Returns
-    -------
-    array, shape (cycles * samples_per_cycle + 1,) [unit of u]
-        Starts and ends at the mean.
-
-    Raises
-    ------
-    ValueError
-        If the amplitude is not positive, the ratio is not in its range, or a count is below 1.
+    The arguments and errors are those of `decaying_sine`, with the `amplitude` of the last cycle; `ratio` is the
+    amplitude of a cycle over that of the next one. The result has the same shape.
 
     Examples
     --------
@@ -132,17 +94,17 @@ def growing_sine(
 def extremes(
     levels: npt.ArrayLike, *, samples_per_line: int | Sequence[int] | None = None, max_step: float | None = None
 ) -> FloatArray:
-    """Turning points of any kind, joined by straight lines that are sampled evenly.
+    """Any turning points, joined by straight lines that are sampled evenly.
 
     Parameters
     ----------
     levels : array, shape (n_levels,)
         Turning points in the order of time, each hit exactly [unit of u]. Two equal ones are a rest.
     samples_per_line : int or sequence of int, length n_levels - 1, optional
-        Samples from a level to the next, of all lines or of each. Lines then take equally long, or as long as said.
+        Samples from a level to the next, the same for all lines or for each.
     max_step : float, optional
-        In place of it, the largest step from sample to sample [unit of u]: a rate times the sample time. A line takes
-        as many even steps as it needs, a rest one.
+        Instead of it, the largest step from sample to sample [unit of u]: a rate times the sample time. A line has as
+        many even steps as it needs, a rest has one.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Signals with a spectrum at will: the multisine and the sweep, and the times of samples."""
+"""Signals with a chosen spectrum: the multisine and the sweep; and the times of samples."""
 
 import math
 from typing import Literal
@@ -33,7 +33,7 @@ def multisine(
     lines : array of int, shape (n_lines,)
         Increasing multiples, from 1 to below n / 2.
     rms : float
-        Root mean square about the mean, which sets c [unit of u].
+        Root mean square about the mean, which determines c [unit of u].
     periods : int
         Number of periods.
     samples_per_period : int
@@ -41,10 +41,10 @@ def multisine(
     mean : float
         [unit of u]
     phases : {"random", "schroeder"}
-        Phases phi_k drawn evenly from a turn; or those of Schroeder, -pi m (m - 1) / n_lines for the m-th line, which
-        keep the peaks of a whole band of lines low.
+        Uniformly random phases phi_k; or those of Schroeder, -pi m (m - 1) / n_lines for the m-th line, which keep the
+        peaks of a whole band of lines low.
     seed : int or numpy.random.Generator
-        Of random phases.
+        Seed of random phases.
 
     Returns
     -------
@@ -106,8 +106,8 @@ def sweep(
         linear         p(t) = start t + (stop - start) t^2 / (2 D)
         logarithmic    p(t) = start D ((stop / start)^(t / D) - 1) / ln(stop / start)
 
-    The phase p, in turns, is this closed form and no sum over samples. The frequency would be `stop` one sample after
-    the last. Extremes lie between samples.
+    The phase p, in turns, is computed from this closed form. The frequency would be `stop` one sample after the last.
+    Extremes lie between samples.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def sweep(
     sample_time : float
         T [unit of t].
     spacing : {"linear", "logarithmic"}
-        Whether equal times add to the frequency, or multiply it.
+        Whether the frequency grows by equal steps or by equal factors in equal times.
 
     Returns
     -------
@@ -161,25 +161,10 @@ def sweep(
 
 
 def sample_times(n_samples: int, sample_time: float) -> FloatArray:
-    """Times 0, T, 2 T, ... of the samples, each rounded once: the error does not grow along the record.
+    """Times 0, T, 2 T, ... of samples, shape (n_samples,), each rounded once: errors do not grow along the record.
 
-    Where T is one over a whole number, as 0.1 or 0.001 are, the times are k over that: 0.3, not 0.30000000000000004.
-
-    Parameters
-    ----------
-    n_samples : int
-        Number of samples.
-    sample_time : float
-        T [unit of t].
-
-    Returns
-    -------
-    array, shape (n_samples,) [unit of t]
-
-    Raises
-    ------
-    ValueError
-        If the number is below 1, or the time is not positive and finite.
+    If the sample time T is one over a whole number, as 0.1 or 0.001, the times are k over that number: 0.3, not
+    0.30000000000000004. A ValueError is raised if `n_samples` is below 1, or `sample_time` is not positive and finite.
 
     Examples
     --------

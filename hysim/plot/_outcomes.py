@@ -1,0 +1,141 @@
+"""Pictures of discoveries, tunings, camera measurements and describing functions."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+
+from hysim.control import Tuning
+from hysim.discovery import Discovery
+from hysim.metrics import describing_function as describing_function_of
+from hysim.plot._style import MEASURED, POINTS, AxesArray, in_unit, label, line, one, several
+from hysim.vision import Displacement
+
+_WORST_FIT = 5.0  # below the best fit [%]: worse structures would hide the differences that matter
+_WORST_OBJECTIVE = 30.0  # over the chosen objective
+_BAND = 2.0  # standard errors
+
+
+def selection(discovery: Discovery, axes: Sequence[Axes] | AxesArray | None = None) -> AxesArray:
+    """Draw the fit and the BIC of the free run of a discovery against the number of terms, on two Axes.
+
+    `discovery` is a result of `hysim.discover`. The structures on the path of thresholds are circles, and the chosen
+    law is a diamond, which need not be on the path: the search removes further terms from it. A structure that fits
+    5 % worse than the best, or whose free run diverges, is a cross on the edge. The result has shape (2,).
+    """
+    n_terms, fits, scores = discovery.path_n_terms, discovery.path_fit_percent, discovery.scores
+    shown = fits >= fits.max(initial=scores["fit_percent"]) - _WORST_FIT
+    with several(axes, 2, height=2.2) as (upper, lower):
+        for ax, path, measure, edge in ((upper, fits, "fit_percent", 0.0), (lower, discovery.path_bic, "bic", 1.0)):
+            circles: dict[str, Any] = {"color": MEASURED, "markerfacecolor": "white", "label": "path of thresholds"}
+            ax.plot(n_terms[shown], path[shown], "o", **circles)
+            ax.plot(scores["n_terms"], scores[measure], "D", color=line(0)["color"], markersize=7, label="chosen law")
+            if not shown.all():
+                edges = np.full(np.count_nonzero(~shown), edge)
+                on_edge = {"transform": ax.get_xaxis_transform(), "clip_on": False, "label": "off the scale"}
+                ax.plot(n_terms[~shown], edges, "x", color=MEASURED, **on_edge)
+            ax.margins(y=0.15)
+        upper.set_ylabel("Fit in free run [%]")
+        lower.set(xlabel="Number of terms", ylabel="BIC")
+        lower.xaxis.get_major_locator().set_params(integer=True)
+        upper.legend()
+    return np.array([upper, lower])
+
+
+def trade_off(tuning: Tuning, ax: Axes | None = None) -> Axes:
+    """Draw the objective of a tuning against the maximum sensitivity: all trials, the best of them, and the chosen one.
+
+    `tuning` is a result of `hysim.tune`. Trials that are 30 times worse than the chosen one, or twice as sensitive, are
+    left out.
+
+    Examples
+    --------
+    >>> import numpy as np, hysim as hs
+    >>> lag = hs.TransferFunction(num=(1.0,), den=(1.0, 1.0))
+    >>> tuning = hs.tune(lag, 0.1 * np.arange(100), np.ones(100))
+    >>> hs.plot.trade_off(tuning, ax=hs.plot.figure().add_subplot()).get_xlabel()
+    'Maximum sensitivity'
+    """
+    chosen = tuning.max_sensitivity, tuning.objective
+    worst = 2.0 * tuning.max_sensitivity, _WORST_OBJECTIVE * tuning.objective
+    simulated: dict[str, Any] = {"linestyle": "none", "color": POINTS, "markersize": 3.0, "label": "simulated"}
+    best: dict[str, Any] = {"markersize": 4.0, "drawstyle": "steps-post", "label": "best so robust", **line(0)}
+    with one(ax) as axes:
+        for trials, style in ((tuning.trials, simulated), (tuning.trade_off, best)):
+            points = np.array([(trial.max_sensitivity, trial.objective) for trial in trials])
+            axes.plot(*points[(points <= worst).all(axis=1)].T, marker="o", **style)
+        axes.plot(*chosen, "D", color=MEASURED, markersize=7, label="chosen")
+        axes.set(xlabel="Maximum sensitivity", ylabel="Objective [of the reference's span]", yscale="log")
+        axes.legend()
+    return axes
+
+
+def displacement(result: Displacement, ax: Axes | None = None) -> Axes:
+    """Draw the displacement of each frame with a band of two standard errors; lost frames are marked below.
+
+    `result` is a result of `hysim.vision.displacement`.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> motion = hs.vision.Displacement(
+    ...     y=[0.0, 0.1, 0.3], uncertainty=[0.0, 0.01, 0.01], shift=[[0, 0], [1, 0], [3, 0]], across=[0, 0, 0],
+    ...     quality=[1, 0.99, 0.99], status=("ok", "ok", "ok"), scale=0.1, direction=0.0,
+    ... )
+    >>> hs.plot.displacement(motion, hs.plot.figure().add_subplot()).get_ylabel()
+    'Displacement [µm]'
+    """
+    frames, half, colour = np.arange(len(result)), _BAND * result.uncertainty, line(0)["color"]
+    is_blurred, is_lost = (np.array([status == word for status in result.status]) for word in ("blurred", "lost"))
+    with one(ax) as axes:
+        shade = {"color": colour, "alpha": 0.25, "linewidth": 0.0, "label": "± 2 standard errors"}
+        axes.fill_between(frames, result.y - half, result.y + half, **shade)
+        axes.plot(frames, result.y, marker=".", markersize=4.0, linewidth=0.8, color=colour)
+        if is_blurred.any():
+            rings = {"mfc": "none", "color": line(1)["color"], "label": "blurred"}
+            axes.plot(frames[is_blurred], result.y[is_blurred], "o", **rings)
+        if is_lost.any():
+            at = np.full(is_lost.sum(), 0.03)
+            axes.plot(frames[is_lost], at, "x", color=MEASURED, transform=axes.get_xaxis_transform(), label="lost")
+        axes.set(xlabel="Frame", ylabel=label(result.units, "y"))
+        axes.legend()
+    return axes
+
+
+def describing_function(
+    law: Any,
+    amplitudes: npt.ArrayLike,
+    axes: Sequence[Axes] | AxesArray | None = None,
+    *,
+    mean: float = 0.0,
+    units: Mapping[str, str] | None = None,
+) -> AxesArray:
+    """Draw gain and phase of a law's first harmonic against the amplitude of a sine, on two Axes.
+
+    `law` is a rate-independent law, or a mapping of names to laws; `amplitudes`, shape (n,), increase [unit of u];
+    `mean` is the input in the middle of the cycle [unit of u]; `units` are labels of the units of ``"u"`` and ``"y"``.
+    A phase is left out where the gain is zero. Errors are those of `hysim.metrics.describing_function`.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> laws = {"play": hs.Play(threshold=1.0), "stop": hs.Stop(threshold=1.0)}
+    >>> gain, phase = hs.plot.describing_function(laws, [1.5, 2.0, 4.0], hs.plot.figure().subplots(2))
+    >>> gain.get_ylabel(), phase.get_ylabel()
+    ('Gain', 'Phase [degrees]')
+    """
+    known = units or {}
+    laws = law if isinstance(law, Mapping) else {type(law).__name__: law}
+    with several(axes, 2, height=2.4) as (upper, lower):
+        for k, (name, each) in enumerate(laws.items()):
+            harmonic = describing_function_of(each, amplitudes, mean=mean)
+            phase = np.where(harmonic == 0.0, np.nan, np.degrees(np.angle(harmonic)))
+            upper.plot(amplitudes, np.abs(harmonic), label=name, **line(k))
+            lower.plot(amplitudes, phase, label=name, **line(k))
+        upper.set_ylabel(in_unit("Gain", f"{known['y']}/{known['u']}" if {"u", "y"} <= known.keys() else ""))
+        lower.set(xlabel=in_unit("Amplitude", known.get("u", "")), ylabel="Phase [degrees]")
+        if len(laws) > 1:
+            upper.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4)
+    return np.array([upper, lower])
