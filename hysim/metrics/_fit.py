@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
+from hysim.metrics.criteria import information
 
 
 def rmse(y: npt.ArrayLike, y_model: npt.ArrayLike) -> float:
@@ -159,8 +160,8 @@ def aic(residual: npt.ArrayLike, n_parameters: int) -> float:
     return n * _log(v) + 2 * d if d < n else math.nan
 
 
-def bic(residual: npt.ArrayLike, n_parameters: int) -> float:
-    """Bayesian information criterion N ln V + d ln N; nan where d >= N, -inf where the residual is zero.
+def bic(residual: npt.ArrayLike, n_parameters: int, *, floor: float = 0.0) -> float:
+    """Bayesian information criterion N ln(V + floor^2) + d ln N; nan where d >= N, -inf where V + floor^2 is zero.
 
     Source: G. Schwarz, Ann. Statist. 6 (1978) 461, without the constant that all models share.
 
@@ -170,6 +171,8 @@ def bic(residual: npt.ArrayLike, n_parameters: int) -> float:
         Measured minus model [unit of y].
     n_parameters : int
         Number d of fitted parameters.
+    floor : float
+        Residuals below it are no evidence for one model over another [unit of y].
 
     Returns
     -------
@@ -186,7 +189,7 @@ def bic(residual: npt.ArrayLike, n_parameters: int) -> float:
     2.772589
     """
     v, n, d = _mean_square(residual, n_parameters)
-    return n * _log(v) + d * math.log(n) if d < n else math.nan
+    return information(v, n, d, floor=floor) if d < n else math.nan
 
 
 def _measured_and_model(y: npt.ArrayLike, y_model: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
