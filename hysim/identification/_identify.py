@@ -142,10 +142,10 @@ def _searched(
         raise ValueError("every parameter set tried diverged: check the units, or pass bounds=")
     if isinstance(density, Quantised):
         density = density.at_least(squares[0].cost, n_samples - n_names)
-    search = Search(whole, density, noise, seed)
-    result, found = search.described(search.likely(squares), intervals, squares[0].x)
-    errors = left_out_errors(whole, search.noise, np.array([optimum.theta for optimum in found]), folds)
-    return replace(result, regions=search.regions(found[0]), cv_residual=errors, cv_rmse=rms_of_known(errors))
+    search = Search(whole, density, seed)
+    result, likely = search.described(search.likely(squares), intervals, squares[0].x)
+    errors = left_out_errors(whole, density, np.array([optimum.theta for optimum in likely]), folds)
+    return replace(result, regions=search.regions(likely[0]), cv_residual=errors, cv_rmse=rms_of_known(errors))
 
 
 def _records(given: Record | Sequence[Record]) -> tuple[Record, ...]:

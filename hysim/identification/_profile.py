@@ -108,7 +108,7 @@ def profiles(
     limit : float
         Deviance at the end of an interval.
     """
-    problem, n_x = descent.problem, len(descent.problem.space.coordinates)
+    problem = descent.problem
     variance = np.diag(covariance)
     known = np.flatnonzero(np.isfinite(variance) & (variance > 0.0))
     if not known.size:
@@ -116,7 +116,7 @@ def profiles(
     grid = np.meshgrid(known, [-1.0, 1.0], np.arange(len(optima)), indexing="ij")
     place, start = grid[0].ravel(), grid[2].ravel()
     side: FloatArray = grid[1].ravel().astype(float)
-    values = problem.named(optima[:, :n_x], optima[:, n_x:])[start, place]
+    values = problem.named(optima)[start, place]
     stderr, root = np.sqrt(variance[place]), float(np.sqrt(limit))
     deviance = 2.0 * np.maximum(losses[start] - losses[0], 0.0)
     slope = (spread[:, place] / variance[place]).T

@@ -44,7 +44,7 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
     slopes, way_back = output_slopes(problem, theta), named_slopes(problem, theta[np.newaxis])[0]
     if not np.isfinite(slopes).all():
         return _unknown(problem, theta, "no standard errors: the output is not finite beside the optimum")
-    x, linear = np.split(theta, [len(space.coordinates)])
+    x, linear = np.split(theta, [problem.n_x])
     width = space.upper - space.lower
     at_side = (x - space.lower < _AT_SIDE * width) | (space.upper - x < _AT_SIDE * width)
     at_bound = np.logical_or(*(linear == bound for bound in problem.linear_box()))
@@ -79,7 +79,7 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
 
 def output_slopes(problem: Problem, theta: FloatArray) -> FloatArray:
     """dm/dtheta, (n_samples, n_theta), by central differences."""
-    n_x = len(problem.space.coordinates)
+    n_x = problem.n_x
     x, linear = theta[np.newaxis, :n_x], theta[n_x:]
     ahead, behind, steps = (values[0] for values in problem.neighbours(x))
     columns, fixed_part = problem.split(np.concatenate([ahead, behind, x]))
