@@ -14,19 +14,11 @@ from discovered import COLEMAN_HODGDON, CYCLES, DAHL, QUADRATIC, duhem, record_o
 import hysim as hs
 from hysim.discovery import _pysindy
 from hysim.discovery._derivatives import branches, smoothed, weak_rows
-from hysim.discovery._library import (
-    duhem_terms,
-    feature,
-    memory_terms,
-    named_terms,
-    signs_of,
-    slopes,
-    symmetric,
-)
+from hysim.discovery._library import feature, signs_of, slopes
 from hysim.discovery._selection import is_complete, preferred, thinned
 from hysim.discovery._structures import Terms
 from hysim.discovery._subsets import best_subsets
-from hysim.models.duhem_terms import Term
+from hysim.models.terms import Term, duhem_terms, memory_terms, named_terms, symmetric
 
 
 def test_slopes_are_never_taken_across_a_reversal():

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Any
 from hysim.cli import models, outputs, records
 
 if TYPE_CHECKING:
-    from hysim.discovery import Discovery
+    from hysim.discovery import Discovery, OscillatorDiscovery
     from hysim.records import Record
 
 SUCCESS = 0
 NO_MODEL = 1
+PLANT = ("mass", "damping", "stiffness")
+ONLY_WITHOUT_PLANT = ("library", "cross_validate", "initial")
 
 
 def add_to(commands: Any) -> None:
@@ -27,13 +29,13 @@ def add_to(commands: Any) -> None:
         "--route",
         choices=("auto", "memory", "output", "oscillator"),
         default="auto",
-        help="what the output is: the memory, a feedthrough and a memory, or the displacement of an oscillator "
-        "(default: %(default)s)",
+        help="what the output is: the memory, a feedthrough and a memory, or the displacement of an oscillator; auto "
+        "tries the first two (default: %(default)s)",
     )
     parser.add_argument(
         "--library", metavar="NAME|TERM,...", type=_library, help="bouc-wen, duhem, or terms: \"u',|u'| z,u' |z|\""
     )
-    parser.add_argument("--degree", type=int, default=2, help="of the library's monomials (default: %(default)s)")
+    parser.add_argument("--degree", type=int, help="highest degree of the terms (default: 2, of an oscillator's 3)")
     parser.add_argument("--symmetry", choices=("odd", "even"), help="of the response; an oscillator's may be odd")
     for name, unit in (("mass", "u s^2/y"), ("damping", "u s/y"), ("stiffness", "u/y")):
         parser.add_argument(
@@ -48,8 +50,8 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--initial",
         choices=("auto", "free", "rest"),
-        default="auto",
-        help="whether the memory begins at a value of its own or at rest, at zero (default: %(default)s, by BIC)",
+        help="whether the memory begins at a value of its own or at rest, at zero (default: auto, by BIC); not for an "
+        "oscillator",
     )
     parser.add_argument("--seed", type=int, default=0, help="of the random restarts (default: %(default)s)")
     parser.add_argument("--out", metavar="MODEL.json", help="write the law, - for the standard output")
@@ -60,25 +62,13 @@ def add_to(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Discover, write the files that are asked for, and print the result."""
-    from hysim.discovery import discover
+    from hysim.discovery import discover, discover_oscillator
 
     is_taken = outputs.check(options.out, inputs=[options.file], pictures=[options.plot], printed=options.json)
-    _check(options)
+    is_oscillator, arguments = _arguments(options)
     record = records.read(options)
-    found = discover(
-        record,
-        route=options.route,
-        library=options.library,
-        degree=options.degree,
-        symmetry=options.symmetry,
-        mass=options.mass,
-        damping=options.damping,
-        stiffness=options.stiffness,
-        cross_validate=options.cross_validate,
-        initial=options.initial,
-        seed=options.seed,
-        progress=outputs.progress(),
-    )
+    verb = discover_oscillator if is_oscillator else discover
+    found = verb(record, **arguments, seed=options.seed, progress=outputs.progress())
     texts = _files(options, found, record)
     if not is_taken:
         texts[records.STANDARD] = found.to_json() if options.json else found.summary() + "\n"
@@ -89,20 +79,25 @@ def run(options: argparse.Namespace) -> int:
     return SUCCESS
 
 
-def _check(options: argparse.Namespace) -> None:
-    """Refuse options that the route does not use, in the words of the shell."""
-    from hysim.discovery import arguments
+def _arguments(options: argparse.Namespace) -> tuple[bool, dict[str, Any]]:
+    """Whether the records are an oscillator's, and the arguments that are given, refused in the words of the shell."""
+    names = (*PLANT, *ONLY_WITHOUT_PLANT, "degree", "symmetry")
+    given = {name: value for name, value in vars(options).items() if name in names and value is not None}
+    is_oscillator = options.route == "oscillator" or (options.route == "auto" and any(name in given for name in PLANT))
+    for name in ONLY_WITHOUT_PLANT if is_oscillator else PLANT:
+        if name in given:
+            route = "an oscillator" if is_oscillator else f"--route {options.route}"
+            raise ValueError(f"--{name.replace('_', '-')} is not used by {route}: leave it out")
+    if is_oscillator and options.symmetry == "even":
+        raise ValueError("--symmetry even is not used by an oscillator: leave it out, or use --symmetry odd")
+    if "degree" in given and isinstance(options.library, list):
+        raise ValueError("--degree is not used with a library of names: leave it out")
+    return is_oscillator, given if is_oscillator else {"route": options.route, **given}
 
-    named = {name: getattr(options, name) for name in arguments.DEFAULTS if name in options}
-    arguments.routes(options.route, arguments.given(named), called=_option)
 
-
-def _option(name: str, value: Any) -> str:
-    option = f"--{name.replace('_', '-')}"
-    return f"{option} {value}" if isinstance(value, str) else option
-
-
-def _files(options: argparse.Namespace, found: "Discovery", record: "Record") -> dict[str | None, Any]:
+def _files(
+    options: argparse.Namespace, found: "Discovery | OscillatorDiscovery", record: "Record"
+) -> dict[str | None, Any]:
     """The model and its picture for the files that are asked for; nothing where there is no model."""
     from hysim.models.storage import to_json
 

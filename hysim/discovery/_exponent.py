@@ -13,7 +13,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.discovery._derivatives import Feature
-from hysim.discovery._refinement import POLISH, Candidate, FreeRun, information
+from hysim.discovery._refinement import POLISH, Candidate, FreeRun, bic_of
 from hysim.discovery._search import Library, Outcome
 from hysim.discovery._selection import ALIKE, INDISTINCT, gap
 from hysim.discovery._structures import AnyExponent, Terms
@@ -33,7 +33,7 @@ def or_any_exponent(free_run: FreeRun, hidden: Outcome, chosen: Outcome) -> Cand
     found = [_refined(thin, hidden, structure) for structure in _structures(hidden.library)[:1]]
     least = min((c.cost for c in found if c is not None), default=math.inf)
     fewest = _structures(hidden.library)[-1].size + (0 if True in hidden.library.rests else len(thin.records))
-    if not information(least, thin.n_samples, fewest) < best.bic - INDISTINCT:
+    if not bic_of(least, thin.n_samples, fewest) < best.bic - INDISTINCT:
         return chosen.candidate
     found += [_refined(thin, hidden, structure) for structure in _structures(hidden.library)[1:]]
     sound = [candidate for candidate in found if candidate is not None and candidate.settles]

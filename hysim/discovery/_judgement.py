@@ -186,7 +186,7 @@ def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, others: 
     trial = law_held_out(others.trial, records, refit)
     longest = max(range(len(records)), key=lambda k: len(records[k]))
     loops = _loops(laws[longest], records[longest].u)
-    areas = np.array([math.nan if loop is None else _signed_area(loop) for loop in loops])
+    areas = np.array([math.nan if loop is None else signed_area(loop) for loop in loops])
     stable = all(_response(law, record) is not None for law, record in zip(laws, records, strict=True))
     stable = stable and loops[-1] is not None
     single_valued = all(loop is not None and loop.relative_width < LEAST for loop in loops)
@@ -279,7 +279,8 @@ def _loops(law: Law, u: FloatArray) -> list[metrics.LoopMetrics | None]:
     return loops
 
 
-def _signed_area(loop: metrics.LoopMetrics) -> float:
+def signed_area(loop: metrics.LoopMetrics) -> float:
+    """Area of a loop, negative where it runs clockwise."""
     return {"counterclockwise": loop.area, "clockwise": -loop.area, "none": 0.0}[loop.orientation]
 
 

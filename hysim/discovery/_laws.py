@@ -8,7 +8,7 @@ the output and the gain is 1.
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +18,7 @@ from hysim.discovery._refinement import Candidate
 from hysim.discovery._structures import AnyExponent, Terms
 from hysim.models.boucwen import BoucWen
 from hysim.models.duhem import Duhem
-from hysim.models.duhem_terms import Term, equation
+from hysim.models.terms import bouc_wen_exponent, bouc_wen_terms, equation
 from hysim.records import Record
 
 _STEP = 1e-6
@@ -64,19 +64,6 @@ def coefficients(structure: Terms, unknowns: FloatArray, letter: str) -> dict[st
     return _coefficients(_numbers(structure, letter)(unknowns[: structure.size]))
 
 
-def bouc_wen_terms(n: int) -> tuple[Term, Term, Term]:
-    """u', |u'| |z|^(n-1) z and u' |z|^n for a whole n."""
-    even = n % 2 == 0
-    return Term(False, 0, 0), Term(True, n, n - even, even), Term(False, n, n - (not even), not even)
-
-
-def whole_exponent(terms: Iterable[Term]) -> int | None:
-    """The whole exponent of the Bouc-Wen law that has these terms, or None."""
-    present = set(terms)
-    n = max((term.degree for term in present), default=0)
-    return n if n > 0 and present <= set(bouc_wen_terms(n)) else None
-
-
 def _numbers(structure: Terms | AnyExponent, letter: str) -> Callable[[FloatArray], dict[str, float]]:
     """From a structure's unknowns to the numbers that a user reads: a Bouc-Wen law with a feedthrough has A = 1."""
     shifts = ["feedthrough"] * structure.feedthrough + ["offset"] * structure.offset
@@ -84,7 +71,7 @@ def _numbers(structure: Terms | AnyExponent, letter: str) -> Callable[[FloatArra
     if isinstance(structure, AnyExponent):
         return lambda unknowns: _of_any_exponent(unknowns, shifts)
     names = [*(term.named(letter) for term in structure.terms), *shifts]
-    n = whole_exponent(structure.terms)
+    n = bouc_wen_exponent(structure.terms)
 
     def numbers(unknowns: FloatArray) -> dict[str, float]:
         values = dict(zip(names, unknowns.tolist(), strict=True))
@@ -96,7 +83,8 @@ def _numbers(structure: Terms | AnyExponent, letter: str) -> Callable[[FloatArra
 def _of_any_exponent(unknowns: FloatArray, shifts: Sequence[str]) -> dict[str, float]:
     n = float(unknowns[3])
     A, dissipative, conservative, *others = unknowns.tolist()
-    terms = {_A: A, f"u' |z|^{n:.4g}": conservative, f"|u'| |z|^{n - 1.0:.4g} z": dissipative}
+    _, rectified, plain = bouc_wen_terms(n)
+    terms = {_A: A, plain.named("z"): conservative, rectified.named("z"): dissipative}
     values = terms | dict(zip(["n", *shifts], others, strict=True))
     return _normalised(values, n) if "feedthrough" in shifts else values
 
@@ -130,7 +118,7 @@ def _stderr(candidate: Candidate[Any], numbers: Callable[[FloatArray], dict[str,
 
 def _model(structure: Terms | AnyExponent, values: dict[str, float], letter: str, y0: float, u0: float) -> Any:
     feedthrough, offset, gain = values.get("feedthrough", 0.0), values.get("offset", 0.0), values.get("gain", 1.0)
-    n = values["n"] if isinstance(structure, AnyExponent) else whole_exponent(structure.terms)
+    n = values["n"] if isinstance(structure, AnyExponent) else bouc_wen_exponent(structure.terms)
     if isinstance(structure, Terms) and (letter == "y" or n is None):
         return Duhem.from_terms(_coefficients(values), feedthrough=feedthrough, offset=offset, y0=y0)
     terms = {name: value for name, value in _coefficients(values).items() if name != _A}

@@ -10,54 +10,18 @@ the share of a term in the slope.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.discovery._derivatives import MIN_SAMPLES, Feature, Rows, smoothed_rows, weak_rows
-from hysim.models.duhem_terms import Term
+from hysim.models.terms import Term
 from hysim.records import Record
 
 DEPENDENT = 1e-6  # share of a column that those before it do not explain, below which it is left out
 FORMS = {"smoothed": smoothed_rows, "weak": weak_rows}
-
-
-def duhem_terms(degree: int) -> tuple[Term, ...]:
-    """All terms u' u^i y^j and |u'| u^i y^j with i + j <= degree, in the one order."""
-    powers = [(total, j) for total in range(_whole(degree) + 1) for j in range(total + 1)]
-    return tuple(Term(rectified, total, j) for rectified in (False, True) for total, j in powers)
-
-
-def memory_terms(degree: int) -> tuple[Term, ...]:
-    """All terms u' and |u'| times z^j, or |z| z^(j - 1) for j > 0, with j <= degree, in the one order."""
-    powers = [(j, j, False) for j in range(_whole(degree) + 1)] + [(j, j - 1, True) for j in range(1, degree + 1)]
-    return tuple(sorted(Term(rectified, *power) for rectified in (False, True) for power in powers))
-
-
-def named_terms(names: Iterable[str]) -> tuple[Term, ...]:
-    """The terms of these names, in the one order."""
-    given = [names] if isinstance(names, str) else list(names)
-    terms = tuple(sorted({Term.parse(name) for name in given}))
-    if len(terms) < len(given) or not terms:
-        raise ValueError(f"a library is a list of different terms, got {given}")
-    return terms
-
-
-def symmetric(terms: Iterable[Term], symmetry: str | None) -> tuple[Term, ...]:
-    """The terms of an odd law, whose response to -u is -y, or of an even one, whose response to -u is y.
-
-    With u and z, u' turns its sign and |u'| does not: an odd law has of u' the monomials that are even in (u, z) and
-    of |u'| those that are odd; an even one has of u' those that are odd in u and of |u'| those that are even.
-    """
-    if symmetry is None:
-        return tuple(terms)
-    if symmetry == "odd":
-        return tuple(term for term in terms if (term.i + term.j) % 2 == int(term.rectified))
-    if symmetry == "even":
-        return tuple(term for term in terms if term.i % 2 != int(term.rectified))
-    raise ValueError(f'symmetry must be None, "odd" or "even", got {symmetry!r}')
 
 
 def signs_of(terms: Sequence[Term], signs: Mapping[str, int] | None) -> dict[Term, int]:
@@ -170,12 +134,6 @@ def feature(term: Term, u: FloatArray, z: FloatArray, direction: FloatArray | fl
     if term.absolute:
         column = column * np.abs(z)
     return column if term.rectified else direction * column
-
-
-def _whole(degree: int) -> int:
-    if not isinstance(degree, int) or isinstance(degree, bool) or degree < 0:
-        raise ValueError(f"degree must be a whole number from 0 up, got {degree!r}")
-    return degree
 
 
 def _independent(columns: FloatArray, order: list[int]) -> list[int]:

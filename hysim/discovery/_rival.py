@@ -14,6 +14,7 @@ from hysim import metrics
 from hysim._frozen import FloatArray, checked
 from hysim.errors import SimulationError
 from hysim.identification import identify
+from hysim.metrics.criteria import information
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.transfer_function import FREQUENCY, TransferFunction, TransferFunctionStructure
 from hysim.records import Record
@@ -172,5 +173,4 @@ def _line(records: Sequence[Record], weights: Sequence[FloatArray]) -> Rival:
 
 def _information(records: Sequence[Record], residual: FloatArray, n_parameters: int) -> float:
     stroke = max(float(np.ptp(record.y)) for record in records)
-    n = residual.size
-    return n * float(np.log(np.mean(residual**2) + (FLOOR * stroke) ** 2)) + n_parameters * float(np.log(n))
+    return information(float(np.mean(residual**2)), residual.size, n_parameters, floor=FLOOR * stroke)

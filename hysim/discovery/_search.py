@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from hysim.discovery._refinement import POLISH, Candidate, FreeRun, Samples
 from hysim.discovery._selection import SEARCHED, Search, Start, preferred, pruned, thinning, turning
 from hysim.discovery._shifts import shifted
 from hysim.discovery._structures import Terms, shifts
-from hysim.models.duhem_terms import Term
+from hysim.models.terms import Term
 from hysim.records import Record
 
 LINE = Terms((Term(False, 0, 0),))
@@ -53,6 +53,20 @@ class Library:
     def structure(self, terms: Sequence[Term]) -> Terms:
         """The largest structure of these terms."""
         return Terms(tuple(terms), self.feedthrough != "no", self.offset, all(self.rests))
+
+
+@dataclass(frozen=True)
+class Options:
+    """How laws are looked for: the signs that coefficients must have, and the arguments of `discover`.
+
+    `enough` is the rmse that a law must come near for the search to go beyond the optimizer's path [unit of y].
+    """
+
+    signs: Mapping[Term, int] = field(default_factory=dict)
+    optimizer: str = "STLSQ"
+    derivative: str = "auto"
+    seed: int = 0
+    enough: Callable[[], float] | None = None
 
 
 @dataclass(frozen=True)
@@ -107,23 +121,21 @@ class Outcome:
 def searched(
     records: Sequence[Record],
     library: Library,
+    options: Options,
     *,
-    signs: Mapping[Term, int],
-    optimizer: str,
-    derivative: str,
-    seed: int,
     best: float = math.inf,
     seen: Sequence[Samples] | None = None,
-    enough: Callable[[], float] = lambda: math.inf,
 ) -> Outcome | None:
     """The best law of a library; None if none can come near the BIC `best`.
 
     Only the outputs `seen`, (n_samples,) for each record, are looked at. If no law on the optimizer's path, on which
-    are the largest ones, comes near an rmse of `enough()`, the search ends there: a smaller law does not fit better.
+    are the largest ones, comes near an rmse that is enough, the search ends there: a smaller law does not fit better.
     """
-    whole = FreeRun(tuple(records), None if seen is None else tuple(seen), signs)
+    whole = FreeRun(tuple(records), None if seen is None else tuple(seen), options.signs)
     some = _thinned(whole)
-    form = derivative if derivative != "auto" else _better_form(some.visible, library, optimizer)
+    optimizer, form = options.optimizer, options.derivative
+    if form == "auto":
+        form = _better_form(some.visible, library, optimizer)
     found = slopes(whole.visible, form)
     starts = shifted(found, library.terms, feedthrough=library.feedthrough != "no", offset=library.offset)
     held = frozenset({"feedthrough"} if library.feedthrough == "must" else ())
@@ -141,10 +153,10 @@ def searched(
             f"every law that was tried diverges on these records, whose output moves by {whole.stroke:.3g} about "
             f"{float(records[0].y[0]):.3g}: check the units, or subtract the offset"
         )
-    is_short = not _least_rmse(search) <= _HOPELESS * enough()
+    is_short = options.enough is not None and not _least_rmse(search) <= _HOPELESS * options.enough()
     if not is_short:
         search.explore(library.structure(starts[0].regression.terms))
-    chosen = _on_all_samples(whole, search, library, seed, restarts=0 if is_short else _RESTARTS)
+    chosen = _on_all_samples(whole, search, library, options.seed, restarts=0 if is_short else _RESTARTS)
     start = _start_at(found, library, chosen)
     return Outcome(library, chosen, search, start, found, form, _path(start, library, optimizer), is_short)
 

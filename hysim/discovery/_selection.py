@@ -34,12 +34,11 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
-from hysim.discovery._laws import whole_exponent
 from hysim.discovery._library import Regression
-from hysim.discovery._refinement import Candidate, FreeRun, cost_of, information
+from hysim.discovery._refinement import Candidate, FreeRun, bic_of, cost_of
 from hysim.discovery._structures import Terms
 from hysim.discovery._subsets import Subsets, best_subsets
-from hysim.models.duhem_terms import Term
+from hysim.models.terms import Term, bouc_wen_exponent
 from hysim.records import Record
 
 MET = 24
@@ -98,7 +97,7 @@ def is_complete(terms: Iterable[Term]) -> bool:
 
 def is_plain(structure: Terms, letter: str) -> bool:
     """Whether a structure in u and y is complete, or one in z a Bouc-Wen law."""
-    return is_complete(structure.terms) if letter == "y" else whole_exponent(structure.terms) is not None
+    return is_complete(structure.terms) if letter == "y" else bouc_wen_exponent(structure.terms) is not None
 
 
 @dataclass(frozen=True)
@@ -184,7 +183,7 @@ class Search:
         sound = self.sound
         least = min((candidate.cost for candidate in self.found), default=0.0)
         starts = 0 if True in self.rests else len(self.free_run.records)
-        bound = information(least, self.free_run.n_samples, size + starts)
+        bound = bic_of(least, self.free_run.n_samples, size + starts)
         return not sound or bound <= min(sound[0].bic, best) + INDISTINCT
 
     def _linearly(self, candidate: Candidate[Terms], largest: Terms, rest: bool) -> Iterator[Prediction]:
@@ -192,8 +191,8 @@ class Search:
         free_run, size = self.free_run, largest.size
         u0 = np.array([record.u[0] for record in free_run.records])
         x = _placed(candidate, largest)
-        at = free_run.linearised(largest._replace(rest=False), x)
-        jacobian, residual = at.jacobian / free_run.units(largest), at.residual
+        residual, jacobian = free_run.linearised(largest._replace(rest=False), x)
+        jacobian /= free_run.units(largest)
         shift = _shift_columns(largest, u0)
         jacobian[:, :size] += jacobian[:, size:] @ shift
         x[size:] -= shift @ x[:size]
@@ -206,7 +205,7 @@ class Search:
         for subsets in best_subsets(jacobian, residual, x, removable):
             for k in self._worth_refining(subsets, largest):
                 kept, unknowns = subsets.kept[k], subsets.x[k]
-                bic = information(float(subsets.cost[k]), free_run.n_samples, int(kept.sum()))
+                bic = bic_of(float(subsets.cost[k]), free_run.n_samples, int(kept.sum()))
                 starts = (np.zeros(u0.size) if rest else unknowns[size:]) + shift @ unknowns[:size]
                 numbers = unknowns[:size][kept[:size]]
                 yield Prediction(bic, _of(largest, kept, rest), np.concatenate([numbers, starts]))

@@ -12,9 +12,9 @@ where the free runs begin.
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.discovery._library import Slopes, symmetric
+from hysim.discovery._library import Slopes
 from hysim.discovery._selection import Start
-from hysim.models.duhem_terms import Term
+from hysim.models.terms import Term, symmetric
 
 _FEEDTHROUGHS = np.linspace(-1.0, 2.0, 46)  # of the slope of the chord from end to end
 _OFFSETS = np.linspace(0.05, 0.95, 10)  # of the range of z

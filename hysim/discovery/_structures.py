@@ -17,7 +17,7 @@ import numpy as np
 from hysim._frozen import FloatArray
 from hysim.models.boucwen import BoucWen
 from hysim.models.duhem_runs import free_runs
-from hysim.models.duhem_terms import Term, coefficient_units
+from hysim.models.terms import Term, coefficient_units
 from hysim.records import Record
 
 Bounds = tuple[FloatArray, FloatArray]

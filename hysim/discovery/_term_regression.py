@@ -12,8 +12,9 @@ from functools import cached_property
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.discovery._memory_terms import MemoryTerm
 from hysim.discovery._pysindy import sparse_path
+from hysim.metrics.criteria import information
+from hysim.models.terms import Term
 
 FLOOR = 1e-5  # of the rms output: smaller residuals are no evidence of a term
 BLOCKS = 4  # that are held out in turn, where there are no periods
@@ -31,8 +32,8 @@ class TermRegression:
     plant's nor coefficients, such as an exponent.
     """
 
-    terms: tuple[MemoryTerm, ...]
-    dependent: tuple[MemoryTerm, ...]
+    terms: tuple[Term, ...]
+    dependent: tuple[Term, ...]
     features: FloatArray
     target: FloatArray
     units: FloatArray
@@ -47,12 +48,12 @@ class TermRegression:
         """The R of [features, target]."""
         return np.asarray(np.linalg.qr(np.column_stack([self.features, self.target]), mode="r"))
 
-    def thresholded(self) -> list[tuple[MemoryTerm, ...]]:
+    def thresholded(self) -> list[tuple[Term, ...]]:
         """Structures on the path of PySINDy's STLSQ, from dense to sparse."""
         path = sparse_path(self.features, self.target) if self.terms else []
         return [tuple(t for t, value in zip(self.terms, values, strict=True) if value != 0.0) for _, values in path]
 
-    def eliminated(self) -> list[tuple[MemoryTerm, ...]]:
+    def eliminated(self) -> list[tuple[Term, ...]]:
         """Structures from dense to sparse, each without the term that the last one loses least by."""
         R, kept, path = self.triangle, list(range(len(self.terms))), []
         sizes = np.linalg.norm(R[:, :-1], axis=0)
@@ -64,11 +65,11 @@ class TermRegression:
             kept.pop(int(np.argmin((inverse @ right[kept]) ** 2 / np.diag(inverse))))
         return path
 
-    def best(self, structures: Sequence[tuple[MemoryTerm, ...]]) -> tuple[MemoryTerm, ...]:
+    def best(self, structures: Sequence[tuple[Term, ...]]) -> tuple[Term, ...]:
         """The structure of the lowest BIC, that without terms among them."""
         return min([*structures, ()], key=self.bic)
 
-    def inclusion(self, rng: np.random.Generator, n_draws: int) -> dict[MemoryTerm, float]:
+    def inclusion(self, rng: np.random.Generator, n_draws: int) -> dict[Term, float]:
         """Share of regressions on samples drawn with replacement whose best structure has each term."""
         counts = dict.fromkeys(self.terms, 0)
         for _ in range(n_draws):
@@ -84,23 +85,22 @@ class TermRegression:
         R = self.triangle[:, :-1]
         return float(np.linalg.cond(R / np.linalg.norm(R, axis=0))) if R.shape[1] else 1.0
 
-    def places(self, terms: Sequence[MemoryTerm]) -> list[int]:
+    def places(self, terms: Sequence[Term]) -> list[int]:
         """Columns of some terms."""
         return [self.terms.index(term) for term in terms]
 
-    def squares(self, terms: Sequence[MemoryTerm]) -> float:
+    def squares(self, terms: Sequence[Term]) -> float:
         """Sum of squares that a structure leaves, in units of the noise."""
         kept, goal = self.triangle[:, self.places(terms)], self.triangle[:, -1]
         left = goal - kept @ np.linalg.lstsq(kept, goal, rcond=None)[0]
         return float(left @ left)
 
-    def bic(self, terms: Sequence[MemoryTerm]) -> float:
+    def bic(self, terms: Sequence[Term]) -> float:
         """Bayesian information criterion of a structure, [squared unit of y]."""
-        n = self.target.size
-        variance = self.squares(terms) / n * self.sigma**2 + self.floor**2
-        return float(n * np.log(variance) + (self.n_plant + self.n_others + len(terms)) * np.log(n))
+        n, n_parameters = self.target.size, self.n_plant + self.n_others + len(terms)
+        return information(self.squares(terms) / n * self.sigma**2, n, n_parameters, floor=self.floor)
 
-    def held_out_rmse(self, terms: Sequence[MemoryTerm]) -> float:
+    def held_out_rmse(self, terms: Sequence[Term]) -> float:
         """Root mean square error on each block of a structure that the other blocks have fitted [unit of y]."""
         X, y = self.features[:, self.places(terms)], self.target
         whole, right, total = X.T @ X, X.T @ y, 0.0
@@ -112,7 +112,7 @@ class TermRegression:
 
 
 def term_regression(
-    terms: tuple[MemoryTerm, ...],
+    terms: tuple[Term, ...],
     plant: FloatArray,
     slopes: FloatArray,
     target: FloatArray,

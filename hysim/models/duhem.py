@@ -31,9 +31,9 @@ from hysim.kernels import duhem as kernels
 from hysim.models import _duhem_search, _numeric_inverse
 from hysim.models.composable import Composable
 from hysim.models.duhem_runs import branches, free_runs, outputs
-from hysim.models.duhem_terms import Polynomials, Term, equation, latex, polynomials, terms_of
 from hysim.models.model import CompiledLaw, model
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.terms import Polynomials, Term, equation, latex, polynomials, terms_of
 from hysim.records import Record
 
 if TYPE_CHECKING:

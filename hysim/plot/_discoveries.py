@@ -6,14 +6,16 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from hysim.discovery import Discovery
+from hysim.discovery import Discovery, OscillatorDiscovery
 from hysim.plot._style import MEASURED, AxesArray, line, several
 
 _OPEN: dict[str, Any] = {"color": MEASURED, "markerfacecolor": "white"}
 _SCALE = 5.0  # of the fit below the best one [%]: what is worse would hide the differences that matter
 
 
-def selection(discovery: Discovery, axes: Sequence[Axes] | AxesArray | None = None) -> AxesArray:
+def selection(
+    discovery: Discovery | OscillatorDiscovery, axes: Sequence[Axes] | AxesArray | None = None
+) -> AxesArray:
     """Draw the fit and the BIC of the free run against the number of terms, one over the other.
 
     The structures on the path of thresholds are circles, the chosen law is a diamond. It need not be on the
@@ -22,8 +24,8 @@ def selection(discovery: Discovery, axes: Sequence[Axes] | AxesArray | None = No
 
     Parameters
     ----------
-    discovery : Discovery
-        What `hysim.discover` found.
+    discovery : Discovery or OscillatorDiscovery
+        The result of `hysim.discover` or `hysim.discover_oscillator`.
     axes : two Axes, optional
         For the fit and for the BIC.
 
