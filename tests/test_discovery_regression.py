@@ -13,9 +13,8 @@ from discovered import COLEMAN_HODGDON, CYCLES, DAHL, QUADRATIC, duhem, record_o
 
 import hysim as hs
 from hysim.discovery import _pysindy
-from hysim.discovery._derivatives import branches, smoothed, weak_rows
-from hysim.discovery._library import feature, signs_of, slopes
 from hysim.discovery._selection import is_complete, preferred, thinned
+from hysim.discovery._slopes import branches, feature, signs_of, slopes, smoothed, weak_rows
 from hysim.discovery._structures import Terms
 from hysim.discovery._subsets import best_subsets
 from hysim.models.terms import Term, duhem_terms, memory_terms, named_terms, symmetric

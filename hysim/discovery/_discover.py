@@ -21,13 +21,11 @@ from hysim._blas import one_blas_thread
 from hysim._frozen import FloatArray
 from hysim._parallel import Progress
 from hysim.discovery import _laws, _pysindy
-from hysim.discovery._doubts import doubts
-from hysim.discovery._exponent import or_any_exponent
-from hysim.discovery._judgement import HYSTERESIS, NO_STRUCTURE, Competitors, Judgement, competitors, judge
-from hysim.discovery._library import FORMS, signs_of
+from hysim.discovery._judgement import HYSTERESIS, NO_STRUCTURE, Competitors, Judgement, competitors, doubts, judge
 from hysim.discovery._refinement import Candidate, FreeRun, Samples
 from hysim.discovery._result import Discovery
-from hysim.discovery._search import Library, Options, Outcome, searched
+from hysim.discovery._search import Library, Options, Outcome, or_any_exponent, searched
+from hysim.discovery._slopes import FORMS, signs_of
 from hysim.discovery._structures import AnyExponent
 from hysim.discovery._validation import left_out_rmse
 from hysim.identification.columns import swapped_columns

@@ -15,7 +15,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.discovery._refinement import Candidate
-from hysim.discovery._structures import AnyExponent, Terms
+from hysim.discovery._structures import AnyExponent, Structure, Terms
 from hysim.models.boucwen import BoucWen
 from hysim.models.duhem import Duhem
 from hysim.models.terms import bouc_wen_exponent, bouc_wen_terms, equation
@@ -64,7 +64,7 @@ def coefficients(structure: Terms, unknowns: FloatArray, letter: str) -> dict[st
     return _coefficients(_numbers(structure, letter)(unknowns[: structure.size]))
 
 
-def _numbers(structure: Terms | AnyExponent, letter: str) -> Callable[[FloatArray], dict[str, float]]:
+def _numbers(structure: Structure, letter: str) -> Callable[[FloatArray], dict[str, float]]:
     """From a structure's unknowns to the numbers that a user reads: a Bouc-Wen law with a feedthrough has A = 1."""
     shifts = ["feedthrough"] * structure.feedthrough + ["offset"] * structure.offset
 
@@ -116,7 +116,7 @@ def _stderr(candidate: Candidate[Any], numbers: Callable[[FloatArray], dict[str,
     return dict(zip(numbers(unknowns), spread.tolist(), strict=True))
 
 
-def _model(structure: Terms | AnyExponent, values: dict[str, float], letter: str, y0: float, u0: float) -> Any:
+def _model(structure: Structure, values: dict[str, float], letter: str, y0: float, u0: float) -> Any:
     feedthrough, offset, gain = values.get("feedthrough", 0.0), values.get("offset", 0.0), values.get("gain", 1.0)
     n = values["n"] if isinstance(structure, AnyExponent) else bouc_wen_exponent(structure.terms)
     if isinstance(structure, Terms) and (letter == "y" or n is None):

@@ -19,8 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
-from hysim.discovery._library import Regression
-from hysim.discovery._structures import Structure, Terms
+from hysim.discovery._slopes import Regression
+from hysim.discovery._structures import AnyExponent, Structure, Terms, output_at_rest
 from hysim.identification.marquardt import Schedule, SumOfSquares, descend, differences
 from hysim.metrics.criteria import information
 from hysim.models.terms import Term
@@ -43,7 +43,7 @@ _STEADY = 1e-2  # strokes by which the last two may differ
 
 Samples = npt.NDArray[np.bool_]
 
-S = TypeVar("S", bound=Structure)
+S = TypeVar("S", Terms, AnyExponent)
 
 
 @dataclass(frozen=True)
@@ -235,7 +235,7 @@ class FreeRun:
         if not structure.rest:
             return unknowns
         numbers = unknowns[np.newaxis, : structure.size]
-        starts = [structure.output_at_rest(numbers, float(record.u[0])) for record in self.records]
+        starts = [output_at_rest(structure, numbers, float(record.u[0])) for record in self.records]
         return np.concatenate([unknowns[: structure.size], *starts])
 
     def _run(self, structure: Structure, unknowns: FloatArray, k: int) -> FloatArray:
@@ -243,7 +243,7 @@ class FreeRun:
         bound = BOUND * self.stroke + float(np.abs(visible.y).max())
         numbers, y0 = unknowns[:, : structure.size], unknowns[:, structure.size + k]
         if structure.rest:
-            y0 = structure.output_at_rest(numbers, float(record.u[0]))
+            y0 = output_at_rest(structure, numbers, float(record.u[0]))
         return structure.run(record.u, numbers, y0, bound)
 
     def _settles(self, structure: Structure, unknowns: FloatArray) -> bool:

@@ -162,7 +162,8 @@ def _identified(
 
 
 def _line(records: Sequence[Record], weights: Sequence[FloatArray]) -> Rival:
-    u, y = (np.concatenate([getattr(record, name) for record in records]) for name in ("u", "y"))
+    u = np.concatenate([record.u for record in records])
+    y = np.concatenate([record.y for record in records])
     shares = np.concatenate(weights)
     mean = float(shares @ u / shares.sum())  # so that the columns are orthogonal
     columns = np.stack([u - mean, np.ones(u.size)], axis=1)

@@ -1,4 +1,16 @@
-"""One library on some records: from slopes to refined structures."""
+"""One library on some records: from slopes to refined structures.
+
+**Shifts.** The slope of z = y - feedthrough u - offset is linear in the coefficients of its law, not in the two shifts.
+These are scanned, and the coefficients solved for at each (variable projection). The left side loses what the term u'
+gains by a feedthrough, so that misfits are comparable. The free runs begin at the best few places.
+
+**Any exponent.** A Bouc-Wen law whose exponent is no whole number has terms that are in no finite library,
+
+    z' = A u' - beta |u'| |z|^(n-1) z - gamma u' |z|^n.
+
+Its exponent is scanned: at each one the slope is regressed on the three terms, and from the best of these the free run
+is refined, n with the other numbers. The law is taken where its BIC is lower by more than INDISTINCT.
+"""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -6,14 +18,25 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from hysim._frozen import FloatArray
 from hysim.discovery import _pysindy
 from hysim.discovery._held_out import about_trends, rms
-from hysim.discovery._library import FORMS, Slopes, slopes
-from hysim.discovery._refinement import POLISH, Candidate, FreeRun, Samples
-from hysim.discovery._selection import SEARCHED, Search, Start, preferred, pruned, thinning, turning
-from hysim.discovery._shifts import shifted
-from hysim.discovery._structures import Terms, shifts
-from hysim.models.terms import Term
+from hysim.discovery._refinement import POLISH, Candidate, FreeRun, Samples, bic_of
+from hysim.discovery._selection import (
+    ALIKE,
+    INDISTINCT,
+    SEARCHED,
+    Search,
+    Start,
+    gap,
+    preferred,
+    pruned,
+    thinning,
+    turning,
+)
+from hysim.discovery._slopes import FORMS, Feature, Slopes, slopes
+from hysim.discovery._structures import AnyExponent, Terms, shifts
+from hysim.models.terms import Term, symmetric
 from hysim.records import Record
 
 LINE = Terms((Term(False, 0, 0),))
@@ -25,6 +48,11 @@ _SPREAD = 0.3  # of a random restart, in units of what each term contributes ove
 _HELD_OUT = 3  # every third sample decides between the forms of the slope
 _ENSEMBLE = 50
 _ENSEMBLE_ROWS = 500
+_FEEDTHROUGHS = np.linspace(-1.0, 2.0, 46)  # of the slope of the chord from end to end
+_OFFSETS = np.linspace(0.05, 0.95, 10)  # of the range of z
+_KEPT = 3
+_EXPONENTS = np.geomspace(0.4, 6.0, 16)
+_RIDGES = (1e-9, 1e-4, 1e-2)
 
 
 @dataclass(frozen=True)
@@ -242,3 +270,93 @@ def _restarted(free_run: FreeRun, chosen: Candidate[Terms], seed: int, restarts:
         if found is not None and found.cost < best.cost * (1.0 - _SAME):
             best = found
     return best
+
+
+def shifted(slopes: Slopes, terms: tuple[Term, ...], *, feedthrough: bool, offset: bool) -> tuple[Start, ...]:
+    """The regressions to begin at: that of the output itself, and those at the best places of the scan."""
+    trial = symmetric(terms, "odd") or terms  # about the origin of z a law is odd, or nearly
+    places = sorted(
+        (slopes.misfit(trial, slope, level), slope, level)
+        for slope in (_slopes_tried(slopes) if feedthrough else (0.0,))
+        for level in (_levels(slopes, slope) if offset else (0.0,))
+    )
+    chosen = [(0.0, 0.0)] if feedthrough or offset else []
+    chosen += [(slope, level) for _, slope, level in places[:_KEPT]]
+    return tuple(Start(slopes.regression(terms, *place), *place) for place in dict.fromkeys(chosen))
+
+
+def _slopes_tried(slopes: Slopes) -> list[float]:
+    """The chord of y over u, on the whole, sets the scale, and the sign."""
+    chord = max((_chord(rows.u, rows.y) for rows in slopes.rows), key=abs)
+    return [0.0, *(chord * _FEEDTHROUGHS).tolist()]
+
+
+def _chord(u: FloatArray, y: FloatArray) -> float:
+    return float(np.copysign(np.ptp(y) / np.ptp(u), np.cov(u, y)[0, 1]))
+
+
+def _levels(slopes: Slopes, feedthrough: float) -> list[float]:
+    memory = np.concatenate([rows.y - feedthrough * rows.u for rows in slopes.rows])
+    low, high = float(memory.min()), float(memory.max())
+    return [0.0, *(low + (high - low) * _OFFSETS).tolist()]
+
+
+def or_any_exponent(free_run: FreeRun, hidden: Outcome, chosen: Outcome) -> Candidate[Terms] | Candidate[AnyExponent]:
+    """The chosen law, or the Bouc-Wen law of any exponent where that explains the records of `free_run` better.
+
+    `hidden` is the outcome of the library of z, from which the scan takes its slopes and shifts.
+    """
+    thin, best = hidden.search.free_run, chosen.searched
+    if chosen.candidate.cost < free_run.n_samples * ALIKE**2:
+        return chosen.candidate
+    found = [_refined(thin, hidden, structure) for structure in _structures(hidden.library)[:1]]
+    least = min((c.cost for c in found if c is not None), default=math.inf)
+    fewest = _structures(hidden.library)[-1].size + (0 if True in hidden.library.rests else len(thin.records))
+    if not bic_of(least, thin.n_samples, fewest) < best.bic - INDISTINCT:
+        return chosen.candidate
+    found += [_refined(thin, hidden, structure) for structure in _structures(hidden.library)[1:]]
+    sound = [candidate for candidate in found if candidate is not None and candidate.settles]
+    lowest = min(sound, key=lambda candidate: candidate.bic, default=None)
+    if lowest is None or lowest.bic >= best.bic - INDISTINCT or gap(best, lowest) < ALIKE:
+        return chosen.candidate
+    return free_run.refine(lowest.structure, lowest.unknowns[np.newaxis], tolerance=POLISH) or chosen.candidate
+
+
+def _structures(library: Library) -> list[AnyExponent]:
+    """With all shifts first, with as few as the route allows last."""
+    feedthroughs = {"no": (False,), "may": (True, False), "must": (True,)}[library.feedthrough]
+    offsets = (True, False) if library.offset else (False,)
+    return [
+        AnyExponent(feedthrough, offset, rest)
+        for feedthrough in feedthroughs
+        for offset in offsets
+        for rest in library.rests
+    ]
+
+
+def _refined(free_run: FreeRun, hidden: Outcome, structure: AnyExponent) -> Candidate[AnyExponent] | None:
+    starts = []
+    for start in hidden.search.starts:
+        for n in _EXPONENTS.tolist():
+            columns, left = hidden.slopes.equations(_features(n), start.feedthrough, start.offset)
+            shift = [start.feedthrough] * structure.feedthrough + [start.offset] * structure.offset
+            ends = [n, *shift, *free_run.measured_starts]
+            starts += [[*_ridge(columns, left, weight), *ends] for weight in _RIDGES]
+    return free_run.refine(structure, np.array(starts))
+
+
+def _features(n: float) -> Feature:
+    def features(u: FloatArray, z: FloatArray, direction: FloatArray) -> FloatArray:
+        power = np.abs(z) ** n
+        return np.stack([direction, np.copysign(power, z), direction * power], axis=1)
+
+    return features
+
+
+def _ridge(columns: FloatArray, left: FloatArray, weight: float) -> list[float]:
+    sizes = np.sqrt(np.mean(columns**2, axis=0))
+    sizes[sizes == 0.0] = 1.0
+    scaled = columns / sizes
+    normal = scaled.T @ scaled / len(left) + weight * np.eye(3)
+    solution = np.linalg.solve(normal, scaled.T @ left / len(left)) / sizes
+    return [float(value) for value in solution]

@@ -34,8 +34,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
-from hysim.discovery._library import Regression
 from hysim.discovery._refinement import Candidate, FreeRun, bic_of, cost_of
+from hysim.discovery._slopes import Regression
 from hysim.discovery._structures import Terms
 from hysim.discovery._subsets import Subsets, best_subsets
 from hysim.models.terms import Term, bouc_wen_exponent

@@ -41,7 +41,8 @@ def identified(
     family: Direct, records: Sequence[Record], folds: Sequence[npt.NDArray[np.intp]], seed: int
 ) -> Identification:
     """The fit to all records together, described as a search is."""
-    u, y = (np.concatenate([getattr(record, name) for record in records]) for name in ("u", "y"))
+    u = np.concatenate([record.u for record in records])
+    y = np.concatenate([record.y for record in records])
     fit = family.fitted(u, y)
     residual, n_parameters = y - fit.model.response(u), max(1, round(fit.degrees_of_freedom))
     measures = fit_measures(y, residual, n_parameters)

@@ -20,6 +20,7 @@ Flags = npt.NDArray[np.bool_]
 Sets = npt.NDArray[np.intp]
 
 _LEAST_DAMPING = 1e-9  # in norms of columns: keeps a number where it is that has no effect
+_LEAST_RIDGE = 1e-15  # likewise, in squared norms of columns
 _PASSES = 4
 _CENTRAL = 1e-6  # truncation and rounding of a central difference are both near 1e-10
 _ONE_SIDED = 1e-7  # those of a one-sided one near 1e-7, at half the cost
@@ -130,12 +131,13 @@ def bounded_steps(
 ) -> FloatArray:
     """Damped steps (n_sets, n_x) between `lower` and `upper`, but for numbers that are free of bounds.
 
-    A step that would go beyond a bound ends there, and the other numbers make the best of it.
+    A step that would go beyond a bound ends there, and the other numbers make the best of it. The first `n_damped`
+    numbers are damped, by default all.
     """
     held, steps = np.zeros(lower.shape, dtype=bool), np.zeros(lower.shape)
     for _ in range(_PASSES):
         short = goal - (jacobian @ np.where(held, steps, 0.0)[..., np.newaxis])[..., 0]
-        others = damped_steps(np.where(held[:, np.newaxis], 0.0, jacobian), short, damping, n_damped=n_damped)
+        others = _regressed(np.where(held[:, np.newaxis], 0.0, jacobian), short, damping, n_damped)
         steps = np.where(held, steps, others)
         beyond = ((steps < lower) | (steps > upper)) & ~held
         if is_free is not None:
@@ -147,19 +149,9 @@ def bounded_steps(
     return steps
 
 
-def damped_steps(
-    jacobian: FloatArray,
-    goal: FloatArray,
-    damping: FloatArray,
-    *,
-    n_damped: int | None = None,
-    sizes: FloatArray | None = None,
-) -> FloatArray:
-    """Least-squares steps (n_sets, n_x), of which the first `n_damped` numbers are damped, by default all.
-
-    D are `sizes` (n_sets, n_x), by default the norms of the columns.
-    """
-    norms = np.linalg.norm(jacobian, axis=1) if sizes is None else sizes.copy()
+def _regressed(jacobian: FloatArray, goal: FloatArray, damping: FloatArray, n_damped: int | None) -> FloatArray:
+    """Least-squares steps (n_sets, n_x), damped in the first `n_damped` elements."""
+    norms = np.linalg.norm(jacobian, axis=1)
     norms[norms == 0.0] = 1.0
     strength = np.full(norms.shape, _LEAST_DAMPING)
     strength[:, :n_damped] += np.sqrt(damping)[:, np.newaxis]
@@ -191,19 +183,25 @@ class SumOfSquares:
         return np.where(np.isfinite(squares), squares, np.inf), (residual,)
 
     def linearised(self, x: FloatArray, sets: Sets, evaluated: tuple[FloatArray, ...]) -> tuple[FloatArray, FloatArray]:
-        """See `Problem`; as many rows as numbers have the same least squares as all samples."""
+        """J^T J and minus the gradient, of which `stepped` makes the normal equations."""
         residual = evaluated[0][0]
-        Q, R = np.linalg.qr(self.slopes(x[0], residual))
-        return R[np.newaxis], -(Q.T @ residual)[np.newaxis]
+        jacobian = self.slopes(x[0], residual)
+        return (jacobian.T @ jacobian)[np.newaxis], -(jacobian.T @ residual)[np.newaxis]
 
     def stepped(
         self, x: FloatArray, sets: Sets, jacobian: FloatArray, goal: FloatArray, damping: FloatArray
     ) -> FloatArray:
         """See `Problem`; numbers at a bound against which the gradient pushes stay."""
-        sizes = None if self.sizes is None else np.array([self.sizes(each) for each in x])
-        descent = (goal[:, np.newaxis] @ jacobian)[:, 0]
-        stays = ((x <= self.lower) & (descent < 0.0)) | ((x >= self.upper) & (descent > 0.0))
-        steps = damped_steps(np.where(stays[:, np.newaxis], 0.0, jacobian), goal, damping, sizes=sizes)
+        sizes = np.sqrt(np.diagonal(jacobian, axis1=1, axis2=2))
+        stays = ((x <= self.lower) & (goal < 0.0)) | ((x >= self.upper) & (goal > 0.0)) | (sizes == 0.0)
+        if self.sizes is not None:
+            sizes = np.array([self.sizes(each) for each in x])
+        sizes = np.where(stays, 1.0, sizes)
+        scaled = jacobian / (sizes[:, :, np.newaxis] * sizes[:, np.newaxis, :])
+        scaled[stays[:, :, np.newaxis] | stays[:, np.newaxis, :]] = 0.0
+        scaled += (damping[:, np.newaxis, np.newaxis] + _LEAST_RIDGE) * np.eye(x.shape[1])
+        goal = np.where(stays, 0.0, goal / sizes)
+        steps = np.linalg.solve(scaled, goal[..., np.newaxis])[..., 0] / sizes
         return np.clip(x + steps, self.lower, self.upper)
 
 
