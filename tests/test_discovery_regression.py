@@ -48,7 +48,7 @@ def test_the_weak_form_of_a_law_linear_in_the_input_is_exact(feedthrough, per_br
     def features(u, z, direction):
         return np.stack([direction * u, np.ones_like(u)], axis=1)
 
-    errors = rows.left(feedthrough) - rows.columns(features, feedthrough, 4.0) @ [1.0, 0.5]
+    errors = rows.target(feedthrough) - rows.columns(features, feedthrough, 4.0) @ [1.0, 0.5]
     assert np.abs(errors).max() < 1e-14 * 10.0  # rounding of outputs up to 10
 
 

@@ -2,10 +2,9 @@
 
     z' = sum c_k phi_k(u', |u'|, u, z),    y = offset + feedthrough u + gain z
 
-Regression of the slope along the loading length (`_derivatives`, `_library`, `_shifts`), PySINDy's optimizers from
-dense to sparse (`_pysindy`), refinement by simulation error (`_refinement`), choice of one structure (`_selection`,
-`_subsets`, `_search`, `_exponent`), the error of repeated searches (`_validation`), and the question whether it is
-hysteresis at all (`_judgement`).
+Regression of the slope along the loading length (`_slopes`), PySINDy's optimizers from dense to sparse (`_pysindy`),
+refinement by simulation error (`_refinement`), choice of one structure (`_selection`, `_subsets`, `_search`), and the
+verdict on the records (`_judgement`).
 """
 
 import math
@@ -28,8 +27,8 @@ from hysim.discovery._search import Library, Options, Outcome, or_any_exponent, 
 from hysim.discovery._slopes import FORMS, signs_of
 from hysim.discovery._structures import AnyExponent
 from hysim.discovery._validation import left_out_rmse
-from hysim.identification.columns import swapped_columns
 from hysim.identification.folds import folds
+from hysim.identification.swapped import swapped_columns
 from hysim.models.terms import duhem_terms, memory_terms, named_terms, symmetric
 from hysim.records import Record
 
@@ -63,17 +62,15 @@ def discover(
 ) -> Discovery:
     """Discover the law of a memory in one or several records.
 
-    The slope of the memory along the loading length, dL = ``|du|``, is regressed on a library of terms by PySINDy,
-    from a dense law to a sparse one. Every structure on that path is refined by its error in free run, and the search
-    goes on among all smaller structures of the library. Among structures that fit equally well, the one of fewest
-    numbers is taken. Models without a law are fitted beside it, and all are judged on data they have not seen.
+    The slope of the memory along the loading length, dL = ``|du|``, is regressed on a library of terms by PySINDy.
+    Structures are refined by their error in free run; of those that fit equally well the one of fewest numbers is
+    taken. Models without a law are fitted beside it, and all are judged on data that they were not fitted to.
 
     Parameters
     ----------
     record_or_records : Record or sequence of Record
-        Input and output. The input is taken as exact, and must reverse. Several records share the law; each begins
-        at a memory of its own. A law with memory does not need the time; whether it is hysteresis cannot be told
-        without. Records with gaps are given as several (``hs.load(..., on_missing="split")``).
+        Input and output. The input is taken as exact, and must reverse. Several records share the law; each has its
+        own initial state. The law needs no time, but without it nothing distinguishes hysteresis from a lag.
     route : {"auto", "memory", "output"}
         What is measured: the memory itself, y = z; or an output, y = offset + feedthrough u + gain z. By default both
         are tried, and a Duhem law, and the one of lowest BIC is taken. Where all of these explain little of records
@@ -94,13 +91,11 @@ def discover(
         Slopes of smoothed branches, or the integral form, which needs none; by default the one whose regressions run
         nearest to samples that they have not seen.
     initial : {"auto", "free", "rest"}
-        Whether the memory at the first sample is a number of each record, or rest, which is zero and no number: z = 0,
-        or y = 0 in a Duhem law. By default both are tried, and the lower BIC decides; a Duhem law begins at rest only
-        in records that begin at u = 0.
+        Whether the memory at the first sample is fitted for each record, or zero. By default both are tried, and the
+        lower BIC decides; a Duhem law begins at rest only in records that begin at u = 0.
     cross_validate : {None, "loo"} or int, optional
         ``"loo"`` leaves one output sample out at a time, an int that many blocks of samples; the input is kept. The
-        whole search is repeated without them, for the structure as for the numbers, so that it takes as many times as
-        long as `discover` alone: minutes for ``"loo"`` on 50 samples. Fills `Discovery.cv_rmse`.
+        whole search is repeated for each fold: minutes for ``"loo"`` on 50 samples. Fills `Discovery.cv_rmse`.
     seed : int
         Of random restarts, and of the ensemble.
     progress : callable, optional
@@ -109,20 +104,15 @@ def discover(
     Returns
     -------
     Discovery
-        Its verdict is about the records. Beside the law it rests on models that need no library: a single-valued
-        curve, a linear plant, linear creep, and a superposition of functions of plays, all judged on held-out samples.
+        Its verdict is about the records, and rests on the law and on models that need no library: a single-valued
+        curve, a linear plant, linear creep, and a superposition of functions of plays.
 
-        - ``"rate-independent hysteresis"``: under several rates the law or the plays predict what they have not seen
-          better than all models that know time, and than the curve;
-        - ``"linear lag"``: a linear dynamic model does;
-        - ``"cannot be told from one rate"``: there is a loop, but the input passes each place at one rate only, or
-          there is no time. Under a triangle at one rate the output of a linear lag is a function of u, y and the
-          direction, so on that record the lag *is* a rate-independent law;
-        - ``"no structure found"``: a single-valued curve does as well, since there is no loop or noise is wider; or
-          no model explains the records; or the law diverges in free run, and the plays show no hysteresis.
-
-        `Discovery.warnings` says which of these it is, that a linear model predicts better than the law, and that a
-        law describes the hysteresis only in part.
+        - ``"rate-independent hysteresis"``: under several rates the law or the plays predict held-out samples better
+          than all models that depend on time, and than the curve;
+        - ``"linear lag"``: a linear dynamic model predicts them better;
+        - ``"cannot be told from one rate"``: the records show a loop, but have one rate only, or no time;
+        - ``"no structure found"``: a single-valued curve predicts as well; or no model explains the records; or the
+          law diverges in free run, and the plays show no hysteresis.
 
     Raises
     ------
@@ -136,9 +126,7 @@ def discover(
 
     Notes
     -----
-    Structures are compared by BIC = N ln V + d ln N with V the mean squared residual in free run plus 1e-8 squared
-    strokes: smaller residuals are no evidence. d counts the numbers of the law, and y0 of each record where it is free
-    (`Discovery.n_parameters`).
+    Structures are compared by the BIC of their free runs; residuals below 1e-4 strokes are no evidence.
 
     Sources: S. L. Brunton, J. L. Proctor and J. N. Kutz, PNAS 113 (2016); PySINDy 2.1.
 
@@ -165,12 +153,12 @@ def discover(
     ):
         if value not in allowed:
             raise ValueError(f"{name} must be one of {', '.join(map(repr, allowed))}, got {value!r}")
-    hidden, *shown = (
+    of_memory, *of_output = (
         replace(each, rests=_rests(initial, each, records)) for each in _libraries(route, library, degree, symmetry)
     )
     others = cache(lambda: competitors(records))
     options = Options(
-        signs=signs_of([term for each in (hidden, *shown) for term in each.terms], signs),
+        signs=signs_of([term for each in (of_memory, *of_output) for term in each.terms], signs),
         optimizer=optimizer,
         derivative=derivative,
         seed=seed,
@@ -178,19 +166,19 @@ def discover(
         enough=None if n_folds else lambda: others().enough,
     )
     report = progress or (lambda done, total: None)
-    outcomes = _searched(records, (hidden,), options)
+    outcomes = _searched(records, (of_memory,), options)
     report(1, _STAGES + n_folds)
     any_exponent = library is None and symmetry is None and not signs
 
     def chosen(first: list[Outcome], seen: tuple[Samples, ...] | None) -> tuple[Outcome, Candidate[Any]]:
-        more = _searched(records, shown, options, first[0].searched.bic, seen)
+        more = _searched(records, of_output, options, first[0].searched.bic, seen)
         outcome = min([*first, *more], key=lambda each: each.candidate.bic)
         if not any_exponent or outcome.is_short:
             return outcome, outcome.candidate
         return outcome, or_any_exponent(FreeRun(records, seen), first[0], outcome)
 
     def again(seen: tuple[Samples, ...]) -> Candidate[Any]:
-        return chosen(_searched(records, (hidden,), options, seen=seen), seen)[1]
+        return chosen(_searched(records, (of_memory,), options, seen=seen), seen)[1]
 
     outcome, candidate = chosen(outcomes, None)
     report(_STAGES - 1, _STAGES + n_folds)
@@ -242,20 +230,20 @@ def _libraries(
         raise ValueError("degree is not used with a library of names: leave it out")
     degree = 2 if degree is None else degree
     feedthrough = {"auto": "may", "memory": "no", "output": "must"}[route]
-    hidden = Library(symmetric(memory_terms(degree), symmetry), "z", feedthrough, offset=route != "memory")
-    shown = Library(symmetric(duhem_terms(degree), symmetry), "y")
+    of_memory = Library(symmetric(memory_terms(degree), symmetry), "z", feedthrough, offset=route != "memory")
+    of_output = Library(symmetric(duhem_terms(degree), symmetry), "y")
     if library is None:
-        return (hidden, shown) if route == "auto" else (hidden,)
+        return (of_memory, of_output) if route == "auto" else (of_memory,)
     if library == "bouc-wen":
-        return (hidden,)
+        return (of_memory,)
     if library == "duhem":
-        chosen = shown
+        chosen = of_output
     elif isinstance(library, str):
         raise ValueError(f'library must be "bouc-wen", "duhem" or names of terms, got {library!r}')
     else:
         terms = symmetric(named_terms(library), symmetry)
         of_z = any("z" in name for name in library)
-        chosen = replace(hidden, terms=terms) if of_z else Library(terms, "y")
+        chosen = replace(of_memory, terms=terms) if of_z else Library(terms, "y")
     if chosen.letter == "y" and route == "output":
         raise ValueError("a library in u and y has its feedthrough in the terms: take the memory route for it")
     return (chosen,)
@@ -287,29 +275,29 @@ def _discovery(
     seed: int,
 ) -> Discovery:
     letter, structure = outcome.library.letter, candidate.structure
-    found = _laws.found(candidate, records, "z" if isinstance(structure, AnyExponent) else letter)
-    judgement = _judged(records, candidate, letter, found.models, others)
+    law = _laws.law_from(candidate, records, "z" if isinstance(structure, AnyExponent) else letter)
+    judgement = _judged(records, candidate, letter, law.models, others)
     path = [(threshold, outcome.search.refine(each)) for threshold, each in outcome.path]
     path_scores = [_scores(each, outcome.search.free_run.records) for _, each in path]
     return Discovery(
-        model=found.models[0],
-        models=found.models,
-        coefficients=found.coefficients,
-        stderr=found.stderr,
-        equation=found.equation,
+        model=law.models[0],
+        models=law.models,
+        coefficients=law.coefficients,
+        stderr=law.stderr,
+        equation=law.equation,
         verdict=NO_STRUCTURE if outcome.unstable and judgement.verdict != HYSTERESIS else judgement.verdict,
         route="output" if structure.feedthrough or structure.offset else "memory",
         scores={
             **_scores(candidate, records),
-            "n_terms": len(found.coefficients),
+            "n_terms": len(law.coefficients),
             "threshold": outcome.threshold,
             "n_structures": len(outcome.search.tried),
             "condition": outcome.start.regression.condition,
         },
         n_parameters=candidate.n_parameters,
-        parameters=found.parameters,
+        parameters=law.parameters,
         initial="rest" if structure.rest else "free",
-        initial_states=found.initial_states,
+        initial_states=law.initial_states,
         judgement=judgement,
         cv_rmse=math.nan,
         left_out=tuple(term.named(letter) for term in outcome.start.regression.dependent),
@@ -350,7 +338,7 @@ def _judged(
         )
         if refined is None:
             raise ValueError("the law diverges")
-        return _laws.found(refined, some, letter).models
+        return _laws.law_from(refined, some, letter).models
 
     return judge(records, models, refit, others)
 

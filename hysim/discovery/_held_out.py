@@ -1,16 +1,15 @@
-"""A law and its rivals on samples that they have not seen.
+"""The errors of a law and its rivals on samples that were left out of the fit, and the rates of the input.
 
-What is left out at a time is a record, if there are several and none goes beyond the range of the others; of one
-record a rate, if its cycles have several; else a cycle, if there are three; else a few blocks. The start of each record
-is always seen, since it tells the memory, or the state, at the first sample. Samples beyond the range of the others do
-not count, unless all are: nothing is judged by what it says beyond the range that it has seen.
+A record is left out at a time, if there are several and none goes beyond the range of the others; of one record a rate,
+if its cycles have several; else a cycle, if there are three; else a few blocks. The start of each record is always
+seen, since it determines the memory, or the state, at the first sample. Samples beyond the range of the others do not
+count, unless all are: no model is judged by extrapolation.
 
-The rivals are the linear plant, and the yardsticks that need no law. Of every residual a slow trend of each record is
-taken away before it counts: a drift is neither a fault of the law nor hysteresis.
+The rivals are the linear plant, and the yardsticks that need no law. A slow trend of each record is taken out of every
+residual: a drift is neither a fault of the law nor hysteresis.
 
-An error explains the samples if it is not above FACTOR times the error of the same model on what it has seen, where
-records or rates are left out, or else times the noise. It does so too if it is not above UNEXPLAINED times what a curve
-leaves.
+A model explains the samples if its error is not above FACTOR times that on the fitted samples, where records or rates
+are left out, or else times the noise; or not above UNEXPLAINED times the error of a curve.
 """
 
 import itertools
@@ -84,10 +83,10 @@ class Trial:
     parts: Mapping[str, FloatArray]
 
     def explains(self, name: str) -> bool:
-        """Whether a model predicts the held-out samples nearly as well as those it has seen, or most of the memory.
+        """Whether a model predicts the held-out samples nearly as well as the fitted ones, or most of the memory.
 
-        Plays have many numbers, and may have seen too little to predict another path of the input. They explain the
-        records where the same numbers fit all of them nearly as well as each of them alone.
+        Plays have too many numbers to predict another path of the input from few samples: their error may also be that
+        of one fit to all samples.
         """
         usual = self.seen[name] if self.by in ("record", "rate") else self.noise
         error = min(self.errors[name], self.together) if name == PLAYS else self.errors[name]
@@ -174,21 +173,21 @@ def _models(records: Sequence[Record], y: FloatArray, linear: Rival | None) -> d
 
 def about_trends(residual: FloatArray, records: Sequence[Record]) -> list[FloatArray]:
     """The residual of each record about its own trend; nan where it is nan, and all of it where that is all trend."""
-    found = []
-    for left, record in zip(_of_each(residual, records), records, strict=True):
-        counts = ~np.isnan(left)
+    residuals = []
+    for own, record in zip(_of_each(residual, records), records, strict=True):
+        counts = ~np.isnan(own)
         slow = yardsticks.trend(record)[counts]
         if np.count_nonzero(counts) <= slow.shape[1]:
-            left, counts = np.full(left.size, math.nan), np.zeros(left.size, dtype=bool)
-        elif np.isfinite(left[counts]).all():
-            left[counts] -= slow @ np.linalg.lstsq(slow, left[counts])[0]
-        found.append(left)
-    return found
+            own, counts = np.full(own.size, math.nan), np.zeros(own.size, dtype=bool)
+        elif np.isfinite(own[counts]).all():
+            own[counts] -= slow @ np.linalg.lstsq(slow, own[counts])[0]
+        residuals.append(own)
+    return residuals
 
 
 def _in_parts(held: Sequence[FloatArray], records: Sequence[Record]) -> list[FloatArray]:
     """The residuals of consecutive samples, as many parts of each record as may be independent of each other."""
-    pieces = [piece for left in held for piece in np.array_split(left, _PARTS)]
+    pieces = [piece for residual in held for piece in np.array_split(residual, _PARTS)]
     return [piece[~np.isnan(piece)] for piece in pieces if np.count_nonzero(~np.isnan(piece)) > 1]
 
 
@@ -251,12 +250,10 @@ def rate_spread(records: Sequence[Record]) -> float:
     """How much the input's rate differs between passes at the same input; 1 for one rate, nan without time.
 
     The input's range, all records together, has nine equal bands between 5 and 95 % of it. A branch that crosses a
-    band whole has there the rate band over time of crossing, a stop at an edge being divided in its middle. In each
-    band the 95th percentile of the rates is divided by the 5th, where every record has the same weight however many
-    passes it has. The median over the bands that are crossed more than once is taken; where two records cross the same
-    bands, only over these, since the others do not compare the records. So a sine that slows down
-    before it turns, always at the same place, has one rate, and so has a triangle of any amplitude; sines of two
-    amplitudes, or of a decaying one, have several.
+    band has there the rate band over time of crossing, a stop at an edge being divided in its middle. In each band the
+    95th percentile of the rates is divided by the 5th, all records having the same weight. The median over the bands
+    that are crossed more than once is taken, or over those that two records cross. So a sine has one rate, and so has a
+    triangle of any amplitude; sines of two amplitudes, or of a decaying one, have several.
     """
     if any(record.t is None for record in records):
         return math.nan
@@ -284,17 +281,17 @@ def at_one_rate(record: Record) -> list[Samples]:
 
 def _crossings(record: Record, edges: FloatArray) -> list[list[float]]:
     """Rates of the passes of one record through each band."""
-    found: list[list[float]] = [[] for _ in itertools.pairwise(edges)]
+    bands: list[list[float]] = [[] for _ in itertools.pairwise(edges)]
     for branch in record.branches(TOLERANCE):
         sign = 1.0 if branch.u[-1] > branch.u[0] else -1.0
         reached, first, count = np.unique(np.maximum.accumulate(sign * branch.u), return_index=True, return_counts=True)
         t = np.asarray(branch.t, dtype=float)
         times = 0.5 * (t[first] + t[first + count - 1])
         at_edges = np.interp(sign * edges, reached, times, left=math.nan, right=math.nan)
-        for rates, height, duration in zip(found, np.diff(edges), np.abs(np.diff(at_edges)), strict=True):
+        for rates, height, duration in zip(bands, np.diff(edges), np.abs(np.diff(at_edges)), strict=True):
             if duration > 0.0:
                 rates.append(float(height / duration))
-    return found
+    return bands
 
 
 def _ratio(band: Sequence[list[float]]) -> float | None:

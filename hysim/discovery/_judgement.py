@@ -1,21 +1,19 @@
-"""Is it hysteresis, a lag that looks like it, or nothing that these records could tell?
+"""The verdict on records: hysteresis, a lag that looks like it, or neither.
 
-Hysteresis is the part of memory that does not know time. Models of three kinds are fitted to the same records and
-judged on samples that none has seen (`_held_out`):
+Models of three kinds are fitted to the same records and judged on samples that were left out (`_held_out`):
 
     still     a curve, or a line: no memory
-    lagging   a linear plant of one or two poles, or relaxations: memory that knows time
-    turning   the law, or a superposition of plays: memory that knows the order of the extremes only
+    lagging   a linear plant of one or two poles, or relaxations: memory that depends on time
+    turning   the law, or a superposition of plays: memory that depends on the order of the extremes only
 
-The plays need no library, so that the verdict is about the records and does not depend on whether the library has a
-good law for them. Better means an rmse on held-out samples below BETTER times the other's. A loop that is narrower than
-the noise leaves no such difference.
+The plays need no library, so that the verdict does not depend on whether the library has a good law for the records.
+Better means an rmse on held-out samples below BETTER times the other's.
 
 1. Neither a lagging nor a turning model is better than the still ones: "no structure found".
 2. One rate, or no time: "cannot be told from one rate".
-3. Several rates. Of the models that explain what they have not seen: "linear lag" if a lagging one is better than all
-   others, "rate-independent hysteresis" if a turning one is. Else "no structure found": the memory is neither, such as
-   hysteresis followed by a lag, or noise hides what it is.
+3. Several rates. Of the models that explain the held-out samples: "linear lag" if a lagging one is better than all
+   others, "rate-independent hysteresis" if a turning one is. Else "no structure found": hysteresis followed by a lag,
+   or noise.
 4. A law that diverges in free run, on the records or on steady cycles over their range, is no law: "no structure
    found", unless the plays show at several rates that the records are hysteretic.
 """
@@ -133,8 +131,7 @@ class Competitors:
     def enough(self) -> float:
         """The rmse that a law must reach to change the verdict [unit of y]; inf if any law may change it.
 
-        Without a law the verdict may be that a curve or a linear model suffices. Only a law that predicts better than
-        these changes it. A verdict of hysteresis is one for which the best law is wanted.
+        Only a law that predicts better changes the verdict that a curve or a linear model suffices.
         """
         verdict = _verdict(self.trial, self.linear, single_valued=False, spread=self.spread)
         if verdict == NO_STRUCTURE:
@@ -156,31 +153,8 @@ def competitors(records: Sequence[Record]) -> Competitors:
 def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, others: Competitors | None = None) -> Judgement:
     """Judge a law that was fitted to records beside its rivals.
 
-    Parameters
-    ----------
-    records : sequence of Record
-        What the law was fitted to. Of long ones fewer samples are judged. Uneven times are made even by straight
-        lines.
-    laws : sequence of Law
-        The law, once for each record: all is shared but the memory at the first sample.
-    refit : callable
-        ``refit(records, weights)`` gives such laws, fitted to the samples whose weights are not zero.
-    others : Competitors, optional
-        ``competitors(records)``, where they are known already.
-
-    Returns
-    -------
-    Judgement
-
-    Examples
-    --------
-    >>> import hysim as hs
-    >>> from hysim.discovery._judgement import judge
-    >>> u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=40)
-    >>> law = hs.Duhem.from_terms({"u'": 1.0, "|u'| y": -1.0})
-    >>> rec = hs.Record(u=u, y=law.response(u))
-    >>> judge([rec], [law], lambda recs, weights: [law]).verdict
-    'cannot be told from one rate'
+    `laws` is the law once for each record: all is shared but the memory at the first sample. `refit(records, weights)`
+    returns such laws, fitted to the samples whose weights are not zero.
     """
     others = others or competitors(records)
     records, linear, spread = others.records, others.linear, others.spread
@@ -304,25 +278,25 @@ def doubts(judgement: Judgement) -> tuple[str, ...]:
     errors = judgement.held_out
     law, plays, curve = errors[LAW], errors[PLAYS], errors[CURVE]
     linear = min((errors[name] for name in (RIVAL, RELAXATIONS) if not math.isnan(errors[name])), default=math.inf)
-    found = []
+    sentences = []
     if not judgement.stable:
-        found.append(
+        sentences.append(
             "The law diverges in free run, on the records or on steady cycles over their range: do not simulate "
             "with it."
         )
     if linear < BETTER * law:
-        found.append(
+        sentences.append(
             f"A linear dynamic model predicts held-out samples better than the law (rmse {linear:.3g} against "
             f"{law:.3g})."
         )
     if judgement.verdict == HYSTERESIS and plays < BETTER * law:
-        found.append(
+        sentences.append(
             f"The law describes the hysteresis only in part: its rmse on held-out samples is {law:.3g}, that of a "
             f"superposition of plays {plays:.3g}. Identify hs.PrandtlIshlinskii or hs.Preisach too."
         )
     if judgement.verdict == NO_STRUCTURE and judgement.stable:
-        found.append(_no_structure(judgement, min(law, plays), linear, curve))
-    return tuple(found)
+        sentences.append(_no_structure(judgement, min(law, plays), linear, curve))
+    return tuple(sentences)
 
 
 def _no_structure(judgement: Judgement, turning: float, linear: float, curve: float) -> str:

@@ -28,7 +28,7 @@ OTHERS = ("n", "feedthrough", "offset", "gain")
 """Numbers of a law that are no coefficients."""
 
 
-class Found(NamedTuple):
+class ModelledLaw(NamedTuple):
     """A law: a model for each record, its numbers and their standard errors by name, and the law as text.
 
     `parameters` are the numbers that are no coefficients, `initial_states` the memory at the first sample of each
@@ -43,7 +43,7 @@ class Found(NamedTuple):
     equation: str
 
 
-def found(candidate: Candidate[Any], records: Sequence[Record], letter: str) -> Found:
+def law_from(candidate: Candidate[Any], records: Sequence[Record], letter: str) -> ModelledLaw:
     """The law of a structure refined on `records`, its memory called `letter`."""
     structure, unknowns = candidate.structure, candidate.unknowns
     numbers = _numbers(structure, letter)
@@ -56,7 +56,9 @@ def found(candidate: Candidate[Any], records: Sequence[Record], letter: str) -> 
     parameters = {name: value for name, value in values.items() if name in OTHERS}
     shifts = {name: value for name, value in parameters.items() if name != "n"}
     states = tuple({f"{letter}0": float(m.memory(r.u[:1])[0])} for m, r in zip(models, records, strict=True))
-    return Found(models, terms, parameters, states, _stderr(candidate, numbers), equation(terms, letter, **shifts))
+    return ModelledLaw(
+        models, terms, parameters, states, _stderr(candidate, numbers), equation(terms, letter, **shifts)
+    )
 
 
 def coefficients(structure: Terms, unknowns: FloatArray, letter: str) -> dict[str, float]:

@@ -160,11 +160,11 @@ class Search(NamedTuple):
         """The rival without a memory. Where the stiffness is given, z = A y is the rest of the spring."""
         plant: dict[str, float] = {**linear._asdict(), **self.response.known}
         springs = {SPRING: linear.stiffness - plant["stiffness"]} if "stiffness" in self.response.known else {}
-        found = self._simulated(Oscillator(plant, springs))
-        plant, law = found.oscillator
+        refined = self._simulated(Oscillator(plant, springs))
+        plant, law = refined.oscillator
         plant = plant | {"stiffness": plant["stiffness"] + law.get(SPRING, 0.0)}
-        stderr = {"stiffness" if name == SPRING.name else name: value for name, value in found.stderr.items()}
-        return found._replace(oscillator=Oscillator(plant, {}), stderr=stderr)
+        stderr = {"stiffness" if name == SPRING.name else name: value for name, value in refined.stderr.items()}
+        return refined._replace(oscillator=Oscillator(plant, {}), stderr=stderr)
 
     def _refined(self, nearest: Regressed) -> _Fitted:
         """Step 3."""
@@ -174,20 +174,20 @@ class Search(NamedTuple):
 
     def _candidates(self, first: _Tried) -> list[_Tried]:
         """Step 4: the first law; where it lacks terms, also n free, n at the nearest whole number, and these terms."""
-        found, is_free = self._pruned(first), not _is_polynomial(first.fitted.terms)
-        if not found[-1].beyond and not is_free:
-            return found
+        candidates, is_free = self._pruned(first), not _is_polynomial(first.fitted.terms)
+        if not candidates[-1].beyond and not is_free:
+            return candidates
         with contextlib.suppress(ValueError):  # the first law stays
             free = first if is_free else self._about(self._bouc_wen(()))
-            found += [] if is_free else [free]
+            candidates += [] if is_free else [free]
             n = float(max(round(bouc_wen_exponent(free.fitted.terms) or 1.0), 1))
             if n != bouc_wen_exponent(first.fitted.terms):
-                found += self._pruned(self._about(self._bouc_wen(bouc_wen_terms(n))))
-        if not min(found, key=self._bic).beyond:
-            return found
-        lacking = [each for each in found if each.beyond and _is_polynomial(each.chosen)]
+                candidates += self._pruned(self._about(self._bouc_wen(bouc_wen_terms(n))))
+        if not min(candidates, key=self._bic).beyond:
+            return candidates
+        lacking = [each for each in candidates if each.beyond and _is_polynomial(each.chosen)]
         more = self._extended(min(lacking, key=self._bic)) if lacking else None
-        return found if more is None else [*found, more]
+        return candidates if more is None else [*candidates, more]
 
     def _pruned(self, tried: _Tried) -> list[_Tried]:
         """A Bouc-Wen law, and the same without those of its terms that are not chosen."""

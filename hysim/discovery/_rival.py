@@ -69,7 +69,7 @@ def rival(records: Sequence[Record]) -> Rival:
     most = sum(len(record) for record in records) // _PER_PARAMETER
     orders = [(poles, zeros) for poles, zeros in ORDERS if poles * (1 + len(records)) + zeros + 2 <= most]
     plants = [_identified(records, everything, poles, zeros) for poles, zeros in orders]
-    return min([_line(records, everything), *plants], key=lambda found: found.bic)
+    return min([_line(records, everything), *plants], key=lambda plant: plant.bic)
 
 
 def steady_width(plant: TransferFunction, cycle: Record, rate: float) -> float:
@@ -157,8 +157,8 @@ def _identified(
         Seen(u=record.u, y=record.y * shares, t=record.t, shares=shares)
         for record, shares in zip(records, weights, strict=True)
     ]
-    found = identify(_Affine(structure, records, start), seen)
-    return Rival(found.models, found.estimates["offset"], _information(records, found.residual, found.n_parameters))
+    fit = identify(_Affine(structure, records, start), seen)
+    return Rival(fit.models, fit.estimates["offset"], _information(records, fit.residual, fit.n_parameters))
 
 
 def _line(records: Sequence[Record], weights: Sequence[FloatArray]) -> Rival:

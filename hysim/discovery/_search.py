@@ -159,49 +159,49 @@ def searched(
     Only the outputs `seen`, (n_samples,) for each record, are looked at. If no law on the optimizer's path, on which
     are the largest ones, comes near an rmse that is enough, the search ends there: a smaller law does not fit better.
     """
-    whole = FreeRun(tuple(records), None if seen is None else tuple(seen), options.signs)
-    some = _thinned(whole)
+    free_run = FreeRun(tuple(records), None if seen is None else tuple(seen), options.signs)
+    thin = _thinned(free_run)
     optimizer, form = options.optimizer, options.derivative
     if form == "auto":
-        form = _better_form(some.visible, library, optimizer)
-    found = slopes(whole.visible, form)
-    starts = shifted(found, library.terms, feedthrough=library.feedthrough != "no", offset=library.offset)
+        form = _better_form(thin.visible, library, optimizer)
+    rows = slopes(free_run.visible, form)
+    starts = shifted(rows, library.terms, feedthrough=library.feedthrough != "no", offset=library.offset)
     held = frozenset({"feedthrough"} if library.feedthrough == "must" else ())
-    search = Search(some, starts, held, library.rests)
+    search = Search(thin, starts, held, library.rests)
     for start in starts:
         search.refine(library.structure(start.regression.terms))
     if not search.could_win(1, best):
         return None
-    search.refine(LINE._replace(rest=all(library.rests)), some.line)
+    search.refine(LINE._replace(rest=all(library.rests)), thin.line)
     for start in starts:
         for _, structure in _path(start, library, optimizer):
             search.refine(structure)
-    if not search.found:
+    if not search.candidates:
         raise ValueError(
-            f"every law that was tried diverges on these records, whose output moves by {whole.stroke:.3g} about "
+            f"every law that was tried diverges on these records, whose output moves by {free_run.stroke:.3g} about "
             f"{float(records[0].y[0]):.3g}: check the units, or subtract the offset"
         )
     is_short = options.enough is not None and not _least_rmse(search) <= _HOPELESS * options.enough()
     if not is_short:
         search.explore(library.structure(starts[0].regression.terms))
-    chosen = _on_all_samples(whole, search, library, options.seed, restarts=0 if is_short else _RESTARTS)
-    start = _start_at(found, library, chosen)
-    return Outcome(library, chosen, search, start, found, form, _path(start, library, optimizer), is_short)
+    chosen = _on_all_samples(free_run, search, library, options.seed, restarts=0 if is_short else _RESTARTS)
+    start = _start_at(rows, library, chosen)
+    return Outcome(library, chosen, search, start, rows, form, _path(start, library, optimizer), is_short)
 
 
 def _least_rmse(search: Search) -> float:
     """The smallest rmse of the laws about a slow trend of each record [unit of y], as the judgement takes it."""
     free_run = search.free_run
-    errors = (rms(about_trends(found.residual, free_run.visible)) for found in search.found)
+    errors = (rms(about_trends(candidate.residual, free_run.visible)) for candidate in search.candidates)
     return min(errors, default=math.inf) * free_run.stroke
 
 
-def _thinned(whole: FreeRun) -> FreeRun:
+def _thinned(free_run: FreeRun) -> FreeRun:
     """The problem on about SEARCHED samples of the records."""
-    samples = [thinning(record, SEARCHED // len(whole.records)) for record in whole.records]
-    records = tuple(Record(u=r.u[kept], y=r.y[kept]) for r, kept in zip(whole.records, samples, strict=True))
-    seen = whole.seen and tuple(mask[kept] for mask, kept in zip(whole.seen, samples, strict=True))
-    return FreeRun(records, seen, whole.signs)
+    samples = [thinning(record, SEARCHED // len(free_run.records)) for record in free_run.records]
+    records = tuple(Record(u=r.u[kept], y=r.y[kept]) for r, kept in zip(free_run.records, samples, strict=True))
+    seen = free_run.seen and tuple(mask[kept] for mask, kept in zip(free_run.seen, samples, strict=True))
+    return FreeRun(records, seen, free_run.signs)
 
 
 def _path(start: Start, library: Library, optimizer: str) -> list[tuple[float, Terms]]:
@@ -210,11 +210,11 @@ def _path(start: Start, library: Library, optimizer: str) -> list[tuple[float, T
     return [(threshold, library.structure(regression.kept(coefficients))) for threshold, coefficients in path]
 
 
-def _start_at(found: Slopes, library: Library, candidate: Candidate[Terms]) -> Start:
+def _start_at(rows: Slopes, library: Library, candidate: Candidate[Terms]) -> Start:
     """The regression at the shifts of a refined candidate."""
     feedthrough, offset = shifts(candidate.structure, candidate.unknowns[np.newaxis, : candidate.structure.size])
     place = float(feedthrough[0]), float(offset[0])
-    return Start(found.regression(library.terms, *place), *place)
+    return Start(rows.regression(library.terms, *place), *place)
 
 
 def _better_form(records: Sequence[Record], library: Library, optimizer: str) -> str:
@@ -226,10 +226,10 @@ def _better_form(records: Sequence[Record], library: Library, optimizer: str) ->
     unseen = np.concatenate([np.arange(len(record)) % _HELD_OUT == 1 for record in records])
     for form in FORMS:
         try:
-            found = slopes([_seen(record) for record in records], form)
+            rows = slopes([_seen(record) for record in records], form)
         except ValueError:
             continue
-        starts = shifted(found, library.terms, feedthrough=library.feedthrough != "no", offset=library.offset)
+        starts = shifted(rows, library.terms, feedthrough=library.feedthrough != "no", offset=library.offset)
         runs = [
             free_run.residuals(structure, free_run.regressed(start.regression, structure, *start[1:]))[:, unseen]
             for start in starts[:2]  # the output itself, and the best place of the scan
@@ -266,9 +266,9 @@ def _restarted(free_run: FreeRun, chosen: Candidate[Terms], seed: int, restarts:
     best = chosen
     for _ in range(restarts):
         start = chosen.unknowns + spread * random.standard_normal(len(spread))
-        found = free_run.refine(chosen.structure, start[np.newaxis], hopeless=best.cost)
-        if found is not None and found.cost < best.cost * (1.0 - _SAME):
-            best = found
+        refined = free_run.refine(chosen.structure, start[np.newaxis], hopeless=best.cost)
+        if refined is not None and refined.cost < best.cost * (1.0 - _SAME):
+            best = refined
     return best
 
 
@@ -301,21 +301,23 @@ def _levels(slopes: Slopes, feedthrough: float) -> list[float]:
     return [0.0, *(low + (high - low) * _OFFSETS).tolist()]
 
 
-def or_any_exponent(free_run: FreeRun, hidden: Outcome, chosen: Outcome) -> Candidate[Terms] | Candidate[AnyExponent]:
+def or_any_exponent(
+    free_run: FreeRun, of_memory: Outcome, chosen: Outcome
+) -> Candidate[Terms] | Candidate[AnyExponent]:
     """The chosen law, or the Bouc-Wen law of any exponent where that explains the records of `free_run` better.
 
     `hidden` is the outcome of the library of z, from which the scan takes its slopes and shifts.
     """
-    thin, best = hidden.search.free_run, chosen.searched
+    thin, best = of_memory.search.free_run, chosen.searched
     if chosen.candidate.cost < free_run.n_samples * ALIKE**2:
         return chosen.candidate
-    found = [_refined(thin, hidden, structure) for structure in _structures(hidden.library)[:1]]
-    least = min((c.cost for c in found if c is not None), default=math.inf)
-    fewest = _structures(hidden.library)[-1].size + (0 if True in hidden.library.rests else len(thin.records))
+    candidates = [_refined(thin, of_memory, structure) for structure in _structures(of_memory.library)[:1]]
+    least = min((c.cost for c in candidates if c is not None), default=math.inf)
+    fewest = _structures(of_memory.library)[-1].size + (0 if True in of_memory.library.rests else len(thin.records))
     if not bic_of(least, thin.n_samples, fewest) < best.bic - INDISTINCT:
         return chosen.candidate
-    found += [_refined(thin, hidden, structure) for structure in _structures(hidden.library)[1:]]
-    sound = [candidate for candidate in found if candidate is not None and candidate.settles]
+    candidates += [_refined(thin, of_memory, structure) for structure in _structures(of_memory.library)[1:]]
+    sound = [candidate for candidate in candidates if candidate is not None and candidate.settles]
     lowest = min(sound, key=lambda candidate: candidate.bic, default=None)
     if lowest is None or lowest.bic >= best.bic - INDISTINCT or gap(best, lowest) < ALIKE:
         return chosen.candidate
@@ -334,14 +336,14 @@ def _structures(library: Library) -> list[AnyExponent]:
     ]
 
 
-def _refined(free_run: FreeRun, hidden: Outcome, structure: AnyExponent) -> Candidate[AnyExponent] | None:
+def _refined(free_run: FreeRun, of_memory: Outcome, structure: AnyExponent) -> Candidate[AnyExponent] | None:
     starts = []
-    for start in hidden.search.starts:
+    for start in of_memory.search.starts:
         for n in _EXPONENTS.tolist():
-            columns, left = hidden.slopes.equations(_features(n), start.feedthrough, start.offset)
+            columns, target = of_memory.slopes.equations(_features(n), start.feedthrough, start.offset)
             shift = [start.feedthrough] * structure.feedthrough + [start.offset] * structure.offset
             ends = [n, *shift, *free_run.measured_starts]
-            starts += [[*_ridge(columns, left, weight), *ends] for weight in _RIDGES]
+            starts += [[*_ridge(columns, target, weight), *ends] for weight in _RIDGES]
     return free_run.refine(structure, np.array(starts))
 
 
@@ -353,10 +355,10 @@ def _features(n: float) -> Feature:
     return features
 
 
-def _ridge(columns: FloatArray, left: FloatArray, weight: float) -> list[float]:
+def _ridge(columns: FloatArray, target: FloatArray, weight: float) -> list[float]:
     sizes = np.sqrt(np.mean(columns**2, axis=0))
     sizes[sizes == 0.0] = 1.0
     scaled = columns / sizes
-    normal = scaled.T @ scaled / len(left) + weight * np.eye(3)
-    solution = np.linalg.solve(normal, scaled.T @ left / len(left)) / sizes
+    normal = scaled.T @ scaled / len(target) + weight * np.eye(3)
+    solution = np.linalg.solve(normal, scaled.T @ target / len(target)) / sizes
     return [float(value) for value in solution]

@@ -72,7 +72,7 @@ class Rows:
         values = feature(self.u, self.y - feedthrough * self.u - offset, self.direction)
         return self._summed(values * self.length[:, np.newaxis])
 
-    def left(self, feedthrough: float = 0.0) -> FloatArray:
+    def target(self, feedthrough: float = 0.0) -> FloatArray:
         """The left side for z = y - feedthrough u, shape (n_rows,)."""
         return self.slope - feedthrough * self._summed((self.direction * self.length)[:, np.newaxis])[:, 0]
 
@@ -220,7 +220,7 @@ class Slopes:
     ) -> tuple[FloatArray, FloatArray]:
         """Right sides (n_rows, n_terms) and left side (n_rows,) for z = y - feedthrough u - offset."""
         columns = np.concatenate([rows.columns(features, feedthrough, offset) for rows in self.rows])
-        return columns, np.concatenate([rows.left(feedthrough) for rows in self.rows])
+        return columns, np.concatenate([rows.target(feedthrough) for rows in self.rows])
 
     def misfit(self, terms: Sequence[Term], feedthrough: float, offset: float) -> float:
         """Rms of the slope that all terms together leave over."""
@@ -252,14 +252,14 @@ def slopes(records: Sequence[Record], form: str) -> Slopes:
     ValueError
         If the records cannot tell u' from |u'|: their input never reverses, or their branches are too short.
     """
-    found = tuple(rows for record in records if (rows := FORMS[form](record.u, record.y)) is not None)
-    directions = {sign for rows in found for sign in np.unique(rows.direction).tolist()}
+    parts = tuple(rows for record in records if (rows := FORMS[form](record.u, record.y)) is not None)
+    directions = {sign for rows in parts for sign in np.unique(rows.direction).tolist()}
     if len(directions) < 2:
         raise ValueError(
             f"a memory law needs a rising and a falling branch of at least {MIN_SAMPLES} samples each: with one of "
             "them alone u' and |u'| are the same thing. Give a record whose input reverses, sampled more finely"
         )
-    return Slopes(found)
+    return Slopes(parts)
 
 
 def _features(terms: Sequence[Term]) -> Feature:
@@ -282,11 +282,11 @@ def _independent(columns: FloatArray, order: list[int]) -> list[int]:
     basis = np.empty((len(columns), 0))
     kept = []
     for k in order:
-        left = columns[:, k] / np.sqrt(len(columns))
+        rest = columns[:, k] / np.sqrt(len(columns))
         for _ in range(2):  # twice is enough for orthogonality to rounding
-            left = left - basis @ (basis.T @ left)
-        size = float(np.linalg.norm(left))
+            rest = rest - basis @ (basis.T @ rest)
+        size = float(np.linalg.norm(rest))
         if size > DEPENDENT:
             kept.append(k)
-            basis = np.column_stack([basis, left / size])
+            basis = np.column_stack([basis, rest / size])
     return kept

@@ -92,8 +92,8 @@ class TermRegression:
     def squares(self, terms: Sequence[Term]) -> float:
         """Sum of squares that a structure leaves, in units of the noise."""
         kept, goal = self.triangle[:, self.places(terms)], self.triangle[:, -1]
-        left = goal - kept @ np.linalg.lstsq(kept, goal, rcond=None)[0]
-        return float(left @ left)
+        rest = goal - kept @ np.linalg.lstsq(kept, goal, rcond=None)[0]
+        return float(rest @ rest)
 
     def bic(self, terms: Sequence[Term]) -> float:
         """Bayesian information criterion of a structure, [squared unit of y]."""
@@ -103,11 +103,11 @@ class TermRegression:
     def held_out_rmse(self, terms: Sequence[Term]) -> float:
         """Root mean square error on each block of a structure that the other blocks have fitted [unit of y]."""
         X, y = self.features[:, self.places(terms)], self.target
-        whole, right, total = X.T @ X, X.T @ y, 0.0
+        normal, right, total = X.T @ X, X.T @ y, 0.0
         for block in self.blocks:
-            rest = whole - X[block].T @ X[block], right - X[block].T @ y[block]
-            left = y[block] - X[block] @ np.linalg.lstsq(*rest, rcond=None)[0]
-            total += float(left @ left)
+            rest = normal - X[block].T @ X[block], right - X[block].T @ y[block]
+            error = y[block] - X[block] @ np.linalg.lstsq(*rest, rcond=None)[0]
+            total += float(error @ error)
         return float(self.sigma * np.sqrt(total / y.size))
 
 
@@ -139,9 +139,9 @@ def term_regression(
     features, goal = features - Q.T @ (Q @ features), goal - Q.T @ (Q @ goal)
     size = np.linalg.norm(features, axis=0)
     scaled = features / size
-    left = goal - scaled @ np.linalg.lstsq(scaled, goal, rcond=None)[0]
+    residual = goal - scaled @ np.linalg.lstsq(scaled, goal, rcond=None)[0]
     freedom = max(goal.size - n_plant - len(independent), 1)
-    sigma = max(float(np.sqrt(left @ left / freedom)), floor)
+    sigma = max(float(np.sqrt(residual @ residual / freedom)), floor)
     units = sigma * np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled))) / size
     return TermRegression(
         terms=tuple(terms[k] for k in independent),

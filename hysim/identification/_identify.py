@@ -11,15 +11,14 @@ import numpy.typing as npt
 from hysim._blas import one_blas_thread
 from hysim._parallel import Progress, at_most
 from hysim.identification import _direct as direct
-from hysim.identification._direction import swapped_for
 from hysim.identification._noise import Gaussian, Noise, Quantised, Robust
 from hysim.identification._problem import Problem, problem
 from hysim.identification._resampling import left_out_errors, rms_of_known
 from hysim.identification._result import Identification
 from hysim.identification._search import PERFECT, optima
 from hysim.identification._searched import Search
-from hysim.identification.columns import swapped_columns
 from hysim.identification.folds import left_out
+from hysim.identification.swapped import swapped_columns, swapped_for
 from hysim.models.model import needs_time
 from hysim.models.search_space import Direct, Freedom, Identifiable
 from hysim.records import Record
@@ -123,7 +122,7 @@ def identify(
 
 
 def _searched(
-    whole: Problem,
+    problem: Problem,
     noise: str,
     intervals: str,
     folds: Sequence[npt.NDArray[np.intp]],
@@ -131,20 +130,20 @@ def _searched(
     progress: Progress | None,
 ) -> Identification:
     """The result of the search for a family's parameters."""
-    n_samples, n_names = whole.y.size, len(whole.space.names)
+    n_samples, n_names = problem.y.size, len(problem.space.names)
     if not n_names:
         raise ValueError("every parameter is fixed: nothing is left to identify")
     if n_samples < n_names:
         raise ValueError(f"{n_names} parameters cannot be estimated from {n_samples} samples; fix some of them")
-    density = _density(noise, whole)
-    squares = optima(whole, seed=seed, progress=progress)
+    density = _density(noise, problem)
+    squares = optima(problem, seed=seed, progress=progress)
     if not squares:
         raise ValueError("every parameter set tried diverged: check the units, or pass bounds=")
     if isinstance(density, Quantised):
         density = density.at_least(squares[0].cost, n_samples - n_names)
-    search = Search(whole, density, seed)
+    search = Search(problem, density, seed)
     result, likely = search.described(search.likely(squares), intervals, squares[0].x)
-    errors = left_out_errors(whole, density, np.array([optimum.theta for optimum in likely]), folds)
+    errors = left_out_errors(problem, density, np.array([optimum.theta for optimum in likely]), folds)
     return replace(result, regions=search.regions(likely[0]), cv_residual=errors, cv_rmse=rms_of_known(errors))
 
 
@@ -185,13 +184,13 @@ def _family(model_or_class: Any) -> Identifiable:
     return family  # type: ignore[no-any-return]
 
 
-def _density(noise: str, whole: Problem) -> Noise:
-    floor = PERFECT * (float(np.abs(whole.y).max()) or 1.0)
+def _density(noise: str, problem: Problem) -> Noise:
+    floor = PERFECT * (float(np.abs(problem.y).max()) or 1.0)
     if noise == "gaussian":
         return Gaussian(floor)
     if noise == "robust":
         return Robust(floor)
-    quanta = {part.record.resolution for part in whole.parts}
+    quanta = {part.record.resolution for part in problem.parts}
     if len(quanta) != 1 or None in quanta:
         raise ValueError("quantised noise needs the sensor's quantum, the same for all records: Record(resolution=...)")
     return Quantised(float(quanta.pop() or 0.0))

@@ -186,20 +186,20 @@ class Problem:
         normalised = columns / norms[:, np.newaxis, :]
         if self.space.bounds:
             return self._bounded(normalised, target, norms)
-        left, singular, right = np.linalg.svd(normalised, full_matrices=False)
+        basis, singular, right = np.linalg.svd(normalised, full_matrices=False)
         inverse = np.where(singular > _RANK, 1.0 / np.maximum(singular, _RANK), 0.0)
-        projected = inverse[..., np.newaxis] * (left.transpose(0, 2, 1) @ target[..., np.newaxis])
+        projected = inverse[..., np.newaxis] * (basis.transpose(0, 2, 1) @ target[..., np.newaxis])
         return np.asarray((right.transpose(0, 2, 1) @ projected)[..., 0] / norms)
 
     def _bounded(self, columns: FloatArray, target: FloatArray, norms: FloatArray) -> FloatArray:
         from scipy.optimize import lsq_linear
 
         lower, upper = self.linear_box()
-        left, square = np.linalg.qr(columns)  # the same problem with as many equations as unknowns
-        short = (left.transpose(0, 2, 1) @ target[..., np.newaxis])[..., 0]
+        basis, triangle = np.linalg.qr(columns)  # the same problem with as many equations as unknowns
+        short = (basis.transpose(0, 2, 1) @ target[..., np.newaxis])[..., 0]
         solutions = [
             lsq_linear(one, goal, bounds=(lower * norm, upper * norm), method="bvls").x / norm
-            for one, goal, norm in zip(square, short, norms, strict=True)
+            for one, goal, norm in zip(triangle, short, norms, strict=True)
         ]
         return np.array(solutions).reshape(len(columns), lower.size)
 
@@ -222,9 +222,9 @@ def problem(
         `search_space`.
     """
     kinds = _kinds(initial, len(records))
-    whole = None if kinds[0] is None else "free" if "free" in kinds else "rest"
+    shared = None if kinds[0] is None else "free" if "free" in kinds else "rest"
     widest = max(records, key=lambda record: (float(np.ptp(record.u)), len(record)))  # it scales the box
-    own = family.search_space(widest, replace(freedom, initial=whole))
+    own = family.search_space(widest, replace(freedom, initial=shared))
     if "periodic" in kinds and own.state and not hasattr(family, "steady"):
         raise ValueError(f'{own.state[0]} has no steady cycle that could be computed: use initial="free"')
     if len(records) == 1:

@@ -70,14 +70,14 @@ class _Ends:
         self.origin, self.r_origin = values.copy(), root.copy()
         self.outside, self.r_outside = np.full(values.size, np.nan), np.full(values.size, np.inf)
         self.theta, self.slope = theta.copy(), slope.copy()
-        self.found = np.full(values.size, np.nan)
+        self.end = np.full(values.size, np.nan)
         self.doubtful = np.zeros(values.size, dtype=bool)  # whether the outer value was reached from farther away
 
     def move_in(self, which: npt.NDArray[np.intp], values: FloatArray, root: FloatArray, theta: FloatArray) -> None:
         """Inner values, farther out than the ones before."""
-        gone, whole = values - self.inside[which], values - self.origin[which]
-        far = np.abs(gone) > 0.1 * np.abs(whole)  # of neighbours the difference is that of how far each descended
-        self.slope[which[far]] = (theta[far] - self.theta[which[far]]) / gone[far, np.newaxis]
+        step, distance = values - self.inside[which], values - self.origin[which]
+        far = np.abs(step) > 0.1 * np.abs(distance)  # of neighbours the difference is that of how far each descended
+        self.slope[which[far]] = (theta[far] - self.theta[which[far]]) / step[far, np.newaxis]
         self.inside[which], self.r_inside[which], self.theta[which] = values, root, theta
         self.doubtful[which] = np.isfinite(self.outside[which]) & (self.outside[which] != values)
         self.outside[which] = np.where(self.doubtful[which], self.outside[which], np.nan)
@@ -144,14 +144,14 @@ def profiles(
         ends.move_in(won, at[inner], r[inner], reached.theta[inner])
         ends.move_out(lost, at[~inner], r[~inner])
         close = np.abs(r - root) <= _ENOUGH * root
-        ends.found[active[close]] = at[close]
+        ends.end[active[close]] = at[close]
         gap = np.abs(ends.outside[active] - ends.inside[active])
         step[won] = _farther(ends, won, step[won], root)
         trial[active] = _next(ends, active, side, step, root)
         active = active[~close & (ends.doubtful[active] | ~(gap <= _CLOSE * stderr[active]))]
-    at_box = np.isnan(ends.found) & np.isfinite(ends.outside) & ~np.isfinite(ends.r_outside)
+    at_box = np.isnan(ends.end) & np.isfinite(ends.outside) & ~np.isfinite(ends.r_outside)
     open_ended = np.where(np.isnan(ends.outside), side * np.inf, ends.inside)
-    end = np.where(np.isnan(ends.found), open_ended, ends.found)
+    end = np.where(np.isnan(ends.end), open_ended, ends.end)
     return _gathered(problem.space.names, place, side, end, at_box, points, limit), None if better is None else better[
         1
     ]

@@ -120,25 +120,25 @@ class Identification:
 
     model: Any
     models: tuple[Any, ...]
-    estimates: Mapping[str, float]
-    stderr: Mapping[str, float]
-    intervals: Mapping[str, tuple[float, float]]
-    interval_method: str
-    profiles: Mapping[str, Profile]
-    covariance: FloatArray
-    condition: float
-    redundant: tuple[tuple[str, ...], ...]
-    free_names: tuple[str, ...]
+    estimates: Mapping[str, float] = field(default_factory=dict)
+    stderr: Mapping[str, float] = field(default_factory=dict)
+    intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    interval_method: str = "linear"
+    profiles: Mapping[str, Profile] = field(default_factory=dict)
+    covariance: FloatArray = field(default_factory=lambda: np.empty(0))  # JSON keeps no second axis of an empty matrix
+    condition: float = float("nan")
+    redundant: tuple[tuple[str, ...], ...] = ()
+    free_names: tuple[str, ...] = ()
     n_parameters: int
     fit_percent: float
     rmse: float
     fpe: float
     aic: float
     bic: float
-    noise: str
+    noise: str = "gaussian"
     sigma: float
     log_likelihood: float
-    least_squares: Candidate | None
+    least_squares: Candidate | None = None
     residual: FloatArray
     resolution: float | None
     response_stderr: FloatArray
@@ -243,5 +243,5 @@ class Identification:
         ValueError
             If the text does not hold one.
         """
-        found: Self = json_forms.from_text("identification", text, (cls, Candidate, Width, Profile))
-        return found
+        result: Self = json_forms.from_text("identification", text, (cls, Candidate, Width, Profile))
+        return result

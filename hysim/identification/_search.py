@@ -121,10 +121,10 @@ def _apart(
     return points[chosen]
 
 
-def _distinct(found: list[Optimum]) -> list[Optimum]:
+def _distinct(optima: list[Optimum]) -> list[Optimum]:
     """Optima of different cost, best first: the same cost to 1e-6 is the same optimum."""
     kept: list[Optimum] = []
-    for optimum in sorted(found, key=lambda candidate: candidate.cost):
+    for optimum in sorted(optima, key=lambda candidate: candidate.cost):
         if not kept or optimum.cost > kept[-1].cost * (1.0 + 1e-6):
             kept.append(optimum)
     return kept

@@ -157,7 +157,6 @@ class Search:
             noise=self.noise.name,
             sigma=best.sigma,
             log_likelihood=-best.loss,
-            least_squares=None,
             residual=residual,
             resolution=problem.parts[0].record.resolution,
             response_stderr=known.output,

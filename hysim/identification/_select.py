@@ -9,17 +9,22 @@ or the cross-validated rmse. Without noise V is rounding, and none of the first 
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from hysim._frozen import frozen
 from hysim._parallel import Progress
-from hysim._words import printed, words
+from hysim._words import aligned, printed, words
 from hysim.identification._identify import identify
 from hysim.identification._result import Identification
 from hysim.records import Record
 
-CRITERIA = ("bic", "aic", "fpe", "cv_rmse")
+CRITERIA: dict[str, Callable[[Identification], float]] = {
+    "bic": lambda fit: fit.bic,
+    "aic": lambda fit: fit.aic,
+    "fpe": lambda fit: fit.fpe,
+    "cv_rmse": lambda fit: fit.cv_rmse,
+}
 
 
 @printed
@@ -51,23 +56,19 @@ class Selection:
 
     def to_text(self) -> str:
         """The table for a terminal, the best first."""
-        header = ["candidate", "parameters", "fit [%]", "rmse", self.criterion]
+        criterion = CRITERIA[self.criterion]
         rows = [
             [
                 name,
                 str(fit.n_parameters),
                 "-" if math.isnan(fit.fit_percent) else f"{fit.fit_percent:.2f}",
                 f"{fit.rmse:.4g}",
-                f"{getattr(fit, self.criterion):.6g}",
+                f"{criterion(fit):.6g}",
             ]
             for name, fit in self.fits.items()
         ]
-        widths = [max(map(len, column)) for column in zip(header, *rows, strict=True)]
-        lines = [
-            "  ".join([cells[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(cells[1:], widths[1:], strict=True))])
-            for cells in [header, *rows]
-        ]
-        return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])
+        header, *lines = aligned([["candidate", "parameters", "fit [%]", "rmse", self.criterion], *rows])
+        return "\n".join([header, "-" * len(header), *lines])
 
 
 def select(
@@ -136,7 +137,7 @@ def select(
             progress(len(fits), len(named))
 
     def score(name: str) -> float:
-        value = float(getattr(fits[name], criterion))
+        value = CRITERIA[criterion](fits[name])
         return math.inf if math.isnan(value) else value
 
     ranked = sorted(fits, key=score)

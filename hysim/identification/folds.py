@@ -50,10 +50,10 @@ def left_out(cross_validate: str | int | None, records: Sequence[Record]) -> lis
 
 def _cycles(records: Sequence[Record], cuts: Sequence[int]) -> list[npt.NDArray[np.intp]]:
     """The samples between every second turning point of each record's input, but the first, which tell its state."""
-    found = []
+    cycles = []
     for record, begin in zip(records, cuts, strict=False):
         turns = record.reversals(TOLERANCE)[1::2]
-        found += [begin + samples for samples in np.split(np.arange(len(record)), turns)[1:]]
-    if not found:
+        cycles += [begin + samples for samples in np.split(np.arange(len(record)), turns)[1:]]
+    if not cycles:
         raise ValueError('cross_validate="cycles" needs at least 2 cycles of the input')
-    return found
+    return cycles

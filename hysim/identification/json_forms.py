@@ -37,12 +37,12 @@ def from_text(name: str, text: str, kinds: Sequence[type]) -> Any:
         If the text does not hold one.
     """
     try:
-        found = from_plain(json.loads(text)[name], kinds)
+        result = from_plain(json.loads(text)[name], kinds)
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
         raise ValueError(f"this is no {name} of hysim: {type(error).__name__}: {error}") from None
-    if not isinstance(found, kinds[0]):
-        raise ValueError(f"this is no {name} of hysim, but {type(found).__name__}")
-    return found
+    if not isinstance(result, kinds[0]):
+        raise ValueError(f"this is no {name} of hysim, but {type(result).__name__}")
+    return result
 
 
 def to_plain(value: Any) -> Any:
@@ -50,7 +50,7 @@ def to_plain(value: Any) -> Any:
     if storage.is_model(value):
         return storage.to_document(value)
     if is_dataclass(value) and not isinstance(value, type):
-        contents = {field.name: to_plain(getattr(value, field.name)) for field in fields(value)}
+        contents = {field.name: to_plain(vars(value)[field.name]) for field in fields(value)}
         return {"result": type(value).__name__, "fields": contents}
     if isinstance(value, Mapping):
         return {name: to_plain(each) for name, each in value.items()}

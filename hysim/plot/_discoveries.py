@@ -13,9 +13,7 @@ _OPEN: dict[str, Any] = {"color": MEASURED, "markerfacecolor": "white"}
 _SCALE = 5.0  # of the fit below the best one [%]: what is worse would hide the differences that matter
 
 
-def selection(
-    discovery: Discovery | OscillatorDiscovery, axes: Sequence[Axes] | AxesArray | None = None
-) -> AxesArray:
+def selection(discovery: Discovery | OscillatorDiscovery, axes: Sequence[Axes] | AxesArray | None = None) -> AxesArray:
     """Draw the fit and the BIC of the free run against the number of terms, one over the other.
 
     The structures on the path of thresholds are circles, the chosen law is a diamond. It need not be on the
