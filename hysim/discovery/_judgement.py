@@ -64,7 +64,7 @@ _CYCLES = 10
 
 @frozen
 class Judgement:
-    """What a law is, beside a linear plant.
+    """The verdict on records, and the errors and loops on which it rests.
 
     Parameters
     ----------
@@ -83,13 +83,13 @@ class Judgement:
     held_out_by : str
         What was left out at a time: ``"record"``, ``"rate"``, ``"cycle"`` or ``"block"``.
     rates : array, shape (3,)
-        Multiples of the rate of the longest record, the one with most samples; of equals the first.
+        Multiples of the rate of the longest record.
     widths : mapping
-        ``"law"`` and ``"rival"`` to the relative widths of the loop at these rates: the last complete cycle of the
-        law's free run along that record, the steady loop of the rival. nan where the record has no complete cycle.
+        ``"law"`` and ``"rival"`` to the relative widths at these rates of the last complete cycle of the law's free
+        run along that record, and of the steady loop of the rival. nan where the record has no complete cycle.
     dissipation : float
-        Signed area of the law's steady loop over the range of the input [unit of y times unit of u]: positive
-        counterclockwise, as a piezoelectric actuator's is, negative for a plain spring force.
+        Signed area of the law's steady loop over the range of the input [unit of y times unit of u], positive where
+        it runs counterclockwise, as a piezoelectric actuator's does.
     one_sign : bool
         Whether loops of a quarter, a half and three quarters of that range have areas of that sign too, or none.
     rate_spread : float
@@ -97,8 +97,7 @@ class Judgement:
     stable : bool
         Whether the law's free run stays finite, on the records and on steady cycles over their range.
     explained_by : tuple of str
-        Names of the models in `held_out` that predict the held-out samples nearly as well as those they have seen, or
-        most of the memory.
+        Names of the models in `held_out` that predict the held-out samples nearly as well as the fitted ones.
     """
 
     verdict: str

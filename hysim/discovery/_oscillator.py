@@ -46,12 +46,11 @@ def discover_oscillator(
     Parameters
     ----------
     record_or_records : Record or sequence of Record
-        Force, displacement and time, evenly spaced; all of one plant. They must be long enough to hold several
-        swings, and large enough for the memory to be curved: only that tells A from k.
+        Force, displacement and time, evenly spaced; all of one plant. They must hold several swings, large enough for
+        the memory to be curved: only its curvature distinguishes A from k.
     structure : OscillatorStructure, optional
         How the records were made, from ``BoucWenOscillator.structure(...)``. By default a record whose input
-        repeats itself and whose periods are alike is taken as steady, its input as band-limited or as linear between
-        samples, whichever fits better; any other record as beginning at rest, its input as linear between samples.
+        repeats itself and whose periods are alike is taken as steady, any other record as beginning at rest.
     mass, damping, stiffness : float, optional
         Known parts of the plant [u per unit of y''; y'; y].
     degree : {1, 2, 3}

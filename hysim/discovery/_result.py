@@ -134,11 +134,10 @@ class Discovery(_Discovered):
     models : tuple of model
         One for each record: they differ in the state at the first sample.
     coefficients : mapping
-        Term to coefficient, for instance ``"|u'| z"``. With a feedthrough the scale of the memory is open, and a
-        Bouc-Wen law has that in which ``"u'"`` has the coefficient 1.
+        Term to coefficient, for instance ``"|u'| z"``. With a feedthrough a Bouc-Wen law is scaled so that ``"u'"`` has
+        the coefficient 1.
     stderr : mapping
-        Standard errors of the coefficients, and of ``"feedthrough"``, ``"gain"``, ``"offset"`` or ``"n"`` where they
-        are part of the law; nan where the records do not determine them.
+        Standard errors of the coefficients and of `parameters`; nan where the records do not determine them.
     equation : str
         The law as text.
     verdict : str
@@ -147,15 +146,13 @@ class Discovery(_Discovered):
     route : {"memory", "output"}
         What the law takes the measured output for.
     scores : mapping
-        Of the law's free run, as in `hysim.metrics`: ``"fit_percent"`` [%], ``"rmse"`` [unit of y], ``"bic"``, and
-        ``"n_terms"``; of the search: ``"threshold"``, the largest one whose structure still has all terms of the law,
-        ``"n_structures"`` refined, ``"condition"`` of the regression.
+        ``"fit_percent"`` [%], ``"rmse"`` [unit of y], ``"bic"`` and ``"n_terms"`` of the law's free run;
+        ``"threshold"``, the largest one whose structure still has all terms of the law, ``"n_structures"`` refined, and
+        ``"condition"`` of the regression.
     n_parameters : int
-        Fitted numbers: those of the law, and the initial state of each record where it is free. A state of rest, which
-        is zero, is not counted.
+        Fitted numbers: those of the law, and the initial state of each record where it is free.
     judgement : Judgement
-        The linear rival, errors of all models on data that they were not fitted to, loop widths at other rates and the
-        dissipation, on which the verdict rests.
+        The errors and loops on which the verdict rests.
     cv_rmse : float
         Cross-validated rmse [unit of y], the whole search repeated for each fold; nan if it was not asked for.
     left_out : tuple of str
@@ -165,8 +162,8 @@ class Discovery(_Discovered):
     inclusion : mapping
         Term of the library to the share of an ensemble of sparse regressions that keeps it.
     thresholds, path_n_terms, path_fit_percent, path_bic : array, shape (n_thresholds,)
-        The optimizer's path from dense to sparse, each structure refined: for a Pareto figure. A structure whose free
-        run diverges has a fit of -inf and a BIC of inf. Long records are thinned for the path.
+        The optimizer's path from dense to sparse, each structure refined on thinned records; a structure whose free run
+        diverges has a fit of -inf and a BIC of inf.
     message : str
         How the search ended; empty where there is nothing to add.
     warnings : tuple of str

@@ -44,35 +44,33 @@ def identify(
     Parameters
     ----------
     model_or_class : model, model class or structure
-        `hysim.BoucWen`, `hysim.TransferFunction.structure(poles=4, zeros=1)`, ... A class gives its
-        defaults as one start of the search, an instance its values.
+        `hysim.BoucWen`, `hysim.TransferFunction.structure(poles=4, zeros=1)`, ... The search begins at the defaults of
+        a class, or at the values of an instance.
     record_or_records : Record or sequence of Record
-        Input and output, and for models with dynamics the time. Several records share all parameters but
-        those of the state at the first sample: where it is free, each has its own, ``z0[0]``, ``z0[1]``, ...
+        Input and output, and for models with dynamics the time. Several records share all parameters but the state at
+        the first sample: where it is free, each has its own, ``z0[0]``, ``z0[1]``, ...
     fixed : mapping, optional
         Parameters that are not free, and their values.
     free : sequence of str, optional
-        Names to take out of the set that is held by default. Of each redundant group one is held, for
-        Bouc-Wen ``A = 1``, since only A times gain can be told.
+        Parameters to identify that are held by default. One of each redundant group is held, for Bouc-Wen ``A = 1``,
+        since only the product of A and gain is determined.
     bounds : mapping, optional
         Name to (lower, upper), in place of the family's own box.
     initial : {"free", "rest", "periodic"}, or one of them for each record, optional
-        Whether the state at the first sample is identified, is rest, or is that of a steady cycle (the
-        record repeats itself); by default as the family has it (free for a memory, as the structure says
-        for a transfer function).
+        Whether the state at the first sample is identified, is rest, or is that of a steady cycle; by default free for
+        a memory, and as the structure says for a transfer function.
     noise : {"gaussian", "quantised", "robust"}
-        What the output is disturbed by: normal noise; normal noise before a sensor that rounds to multiples
-        of `Record.resolution`, so that each output is an interval; or Student's t with 4 degrees of freedom,
-        for records with outliers. The likelihood of the last two begins at the optima of the first.
+        Normal noise; normal noise before a sensor that rounds to multiples of `Record.resolution`; or Student's t with
+        4 degrees of freedom, for records with outliers.
     intervals : {"linear", "profile", "bootstrap"}
-        How `Identification.intervals`, at 95 %, are found: from the standard errors, by the profile of the
+        How `Identification.intervals`, at 95 %, are computed: from the standard errors, by the profile of the
         likelihood, or from 500 records drawn anew.
     cross_validate : {None, "loo", "cycles", "records"} or int, optional
-        ``"loo"`` leaves one output sample out at a time, an int one of that many blocks of samples, ``"cycles"``
-        a cycle of the input (not the first, which tells the state), ``"records"`` a record; the input is kept.
-        Fills `Identification.cv_rmse` and `Identification.cv_residual`.
+        ``"loo"`` leaves one output sample out at a time, an int one of that many blocks of samples, ``"cycles"`` a
+        cycle of the input but the first, ``"records"`` a record; the input is kept. Fills `Identification.cv_rmse`
+        and `Identification.cv_residual`.
     seed : int
-        Of the starts of the search, and of what is drawn. The optimum does not depend on it.
+        Of the starts of the search, and of random draws. The optimum does not depend on it.
     workers : int, optional
         Number of threads; by default one for each core.
     progress : callable, optional

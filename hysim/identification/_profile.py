@@ -32,11 +32,10 @@ class Profile:
     Parameters
     ----------
     lower, upper : float
-        Interval at 95 %; infinite where the profile stays inside the limit.
     at_box : (bool, bool)
-        Whether the box ends it.
+        Interval at 95 %, infinite where the profile stays inside the limit, and whether the box ends it.
     values, deviance : array, shape (n_points,)
-        Where the profile was computed, and how much twice the logarithm of the likelihood falls there.
+        Values of the parameter, and how much twice the logarithm of the likelihood falls there.
     limit : float
         Deviance at the ends of the interval.
     """
@@ -95,18 +94,11 @@ def profiles(
     spread: FloatArray,
     limit: float,
 ) -> tuple[dict[str, Profile], FloatArray | None]:
-    """Profiles of all parameters whose standard error is known, and a better optimum if one was met on the way.
+    """Profiles of all parameters whose standard error is known, and a better optimum (n_theta,) if one was met.
 
-    Parameters
-    ----------
-    descent : Descent
-        With the targets of one record.
-    optima, losses : array, shape (n_optima, n_theta), (n_optima,)
-        The best first; the others are those inside the limit.
-    covariance, spread : array
-        Of the parameters, (n_names, n_names), and of theta with them, (n_theta, n_names).
-    limit : float
-        Deviance at the end of an interval.
+    `optima` (n_optima, n_theta) and their `losses` begin with the best; the others are those inside the `limit` of the
+    deviance. `covariance` (n_names, n_names) is that of the parameters, `spread` (n_theta, n_names) that of theta with
+    them.
     """
     problem = descent.problem
     variance = np.diag(covariance)

@@ -17,7 +17,7 @@ _INFINITE = ("inf", "-inf")
 
 
 def to_text(name: str, result: Any) -> str:
-    """A result as JSON under its name, with the version of hysim; `from_text` gives it back, every number to the bit.
+    """A result as JSON under its name, with the version of hysim; `from_text` returns it, every number to the bit.
 
     Raises
     ------
@@ -29,7 +29,7 @@ def to_text(name: str, result: Any) -> str:
 
 
 def from_text(name: str, text: str, kinds: Sequence[type]) -> Any:
-    """The result of the first of `kinds` that `to_text` wrote; it is made of the others.
+    """The result of the first of `kinds` that `to_text` wrote; its parts are of the others.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def from_text(name: str, text: str, kinds: Sequence[type]) -> Any:
 
 
 def to_plain(value: Any) -> Any:
-    """A value as JSON takes it."""
+    """The JSON form of a value."""
     if storage.is_model(value):
         return storage.to_document(value)
     if is_dataclass(value) and not isinstance(value, type):
@@ -66,7 +66,7 @@ def to_plain(value: Any) -> Any:
 
 
 def from_plain(value: Any, kinds: Sequence[type]) -> Any:
-    """What `to_plain` wrote, of results that are one of `kinds`."""
+    """The value that `to_plain` wrote, of results that are one of `kinds`."""
     if isinstance(value, dict) and value.keys() == {"result", "fields"}:
         kind = {each.__name__: each for each in kinds}[value["result"]]
         hints = typing.get_type_hints(kind)
