@@ -71,7 +71,7 @@ def of_seed(seed: int, told: bool) -> Row:
     """One discovery on the benchmark, told how the record was made or not, and its tests."""
     record = hs.benchmarks.noel_schoukens(seed=seed, periods=4, noise=NOISE)
     begin = time.perf_counter()
-    found = hs.discover(record, route="oscillator", structure=recipe() if told else None)
+    found = hs.discover_oscillator(record, structure=recipe() if told else None)
     row = described("benchmark" if told else "benchmark, recipe not told", seed, found, time.perf_counter() - begin)
     row |= tested(at_rest(found.model))
     errors = [100.0 * (found.coefficients.get(name, 0.0) / value - 1.0) for name, value in TRUTH.items()]
@@ -88,7 +88,7 @@ def of_seed(seed: int, told: bool) -> Row:
     }
 
 
-def described(case: str, seed: int, found: Any, seconds: float) -> Row:
+def described(case: str, seed: int, found: hs.OscillatorDiscovery, seconds: float) -> Row:
     """What is said of one record."""
     plant = {name: found.parameters[name] for name in PLANT}
     return {
@@ -99,8 +99,8 @@ def described(case: str, seed: int, found: Any, seconds: float) -> Row:
         **plant,
         "library": len(found.inclusion) + len(found.left_out),
         "rmse": found.scores["rmse"],
-        "held_out_rmse": found.judgement.held_out["law"],
-        "linear_held_out_rmse": found.judgement.held_out["rival"],
+        "held_out_rmse": found.scores["held_out_rmse"],
+        "linear_held_out_rmse": found.scores["linear_held_out_rmse"],
         "condition": found.scores["condition"],
         "seconds": seconds,
     }
@@ -168,7 +168,7 @@ def other_plants(n_samples: int) -> list[Row]:
     for name, force, y, given in cases:
         noisy = y + 0.01 * y.std() * np.random.default_rng(1).standard_normal(y.size)
         begin = time.perf_counter()
-        found = hs.discover(hs.Record(u=force, y=noisy, t=t), route="oscillator", **given)
+        found = hs.discover_oscillator(hs.Record(u=force, y=noisy, t=t), **given)
         rows.append(described(name, 1, found, time.perf_counter() - begin))
     return rows
 

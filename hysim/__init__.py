@@ -39,7 +39,9 @@ if TYPE_CHECKING:
     from hysim.control import to_control as to_control
     from hysim.control import tune as tune
     from hysim.discovery import Discovery as Discovery
+    from hysim.discovery import OscillatorDiscovery as OscillatorDiscovery
     from hysim.discovery import discover as discover
+    from hysim.discovery import discover_oscillator as discover_oscillator
     from hysim.errors import SimulationError as SimulationError
     from hysim.files import load as load
     from hysim.files import save_record as save_record

@@ -5,7 +5,7 @@ A result says it by ``__str__``, and its first line alone is its ``repr``; noteb
 
 import math
 import textwrap
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -54,6 +54,15 @@ def wrapped(parts: Iterable[str], *, most: int = 3, first: str = "  ") -> str:
         if len(lines) <= most:
             return "\n".join(lines).replace("\0", " ")
     return ""
+
+
+def aligned(table: Sequence[Sequence[str]]) -> list[str]:
+    """Lines of cells; the first column is aligned to the left, the others to the right."""
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    return [
+        "  ".join([cells[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(cells[1:], widths[1:], strict=True))])
+        for cells in table
+    ]
 
 
 def quantity(value: float, unit: str = "") -> str:

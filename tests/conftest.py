@@ -41,7 +41,7 @@ def pyplot_keeps_no_figure():
 
 
 def once_for_all_processes(tmp_path_factory, name, compute):
-    """What `compute` returns for a folder of its own, in the first process that asks; the others read it from a file."""
+    """The result of `compute`, called with a folder by the first process that asks; the others read a file."""
     folder = tmp_path_factory.getbasetemp()
     if "PYTEST_XDIST_WORKER" in os.environ:
         folder = folder.parent  # which all processes share

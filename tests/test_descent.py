@@ -8,6 +8,7 @@ import hysim as hs
 from hysim.identification._descent import Constraint, Descent
 from hysim.identification._noise import Gaussian
 from hysim.identification._problem import problem
+from hysim.identification.marquardt import bounded_steps
 from hysim.models.search_space import Freedom
 
 LOOP = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=60)
@@ -31,6 +32,11 @@ def drawn(descent, seed):
     return np.concatenate([x, rng.uniform(0.5, 1.0, (SETS, len(space.linear)))], axis=1)
 
 
+def named(descent, theta, places):
+    """The parameter at each set's place."""
+    return descent.problem.named(theta)[np.arange(SETS), places]
+
+
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 @pytest.mark.parametrize("place", [0, 1])
 def test_a_step_is_the_regression_inside_the_box(descent, side, place):
@@ -43,8 +49,8 @@ def test_a_step_is_the_regression_inside_the_box(descent, side, place):
     wanted = rng.uniform(-0.1, 0.1, theta.shape)
     wanted[:, place] = side * 0.1
     residual = np.einsum("snk,sk->sn", slopes, wanted) + 1e-3 * rng.standard_normal((SETS, LOOP.size))
-    weights, sigma, undamped = np.ones_like(residual), np.ones((SETS, 1)), np.full(SETS, 1e-18)
-    stepped = descent._step(theta, slopes, residual, weights, sigma, undamped, None)
+    steps = bounded_steps(slopes, residual, np.full(SETS, 1e-18), lower - theta, upper - theta, n_damped=2)
+    stepped = np.clip(theta + steps, lower, upper)
     for k in range(SETS):
         best = lsq_linear(slopes[k], residual[k], (lower - theta[k], upper - theta[k]), tol=1e-14).x
         assert stepped[k] - theta[k] == pytest.approx(best, abs=1e-6)
@@ -57,11 +63,11 @@ def test_a_step_is_the_regression_inside_the_box(descent, side, place):
 def test_a_constraint_on_a_curved_parameter_is_met_to_rounding(descent, place, factor):
     theta = drawn(descent, 3)
     places = np.full(SETS, place)
-    constraint = Constraint(places, factor * descent._named(theta, places))
-    assert not descent._kept(theta, constraint).any()
-    restored = descent._restored(theta, constraint, places)
-    assert descent._named(restored, places) == pytest.approx(constraint.value, rel=1e-11)
-    assert descent._kept(restored, constraint).all()
+    constraint = Constraint(places, factor * named(descent, theta, places))
+    assert not descent.keeps(theta, constraint).any()
+    restored = descent.restored(theta, constraint, places)
+    assert named(descent, restored, places) == pytest.approx(constraint.value, rel=1e-11)
+    assert descent.keeps(restored, constraint).all()
     others = [k for k in range(theta.shape[1]) if k != place]
     assert np.array_equal(restored[:, others], theta[:, others])
 
@@ -71,6 +77,6 @@ def test_whether_a_constraint_is_kept_does_not_depend_on_the_unit(descent, size)
     theta = drawn(descent, 4)
     theta[:, 0] = np.log(size)
     places = np.zeros(SETS, dtype=int)
-    value = descent._named(theta, places)
-    assert descent._kept(theta, Constraint(places, value * (1.0 + 1e-9))).all()
-    assert not descent._kept(theta, Constraint(places, value * (1.0 + 1e-7))).any()
+    value = named(descent, theta, places)
+    assert descent.keeps(theta, Constraint(places, value * (1.0 + 1e-9))).all()
+    assert not descent.keeps(theta, Constraint(places, value * (1.0 + 1e-7))).any()

@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 import hysim as hs
-from hysim.discovery._doubts import doubts
-from hysim.discovery._judgement import BETTER, RATES, competitors, judge
-from hysim.discovery._rates import at_one_rate, rate_spread
+from hysim.discovery._held_out import at_one_rate, rate_spread
+from hysim.discovery._judgement import BETTER, RATES, competitors, doubts, judge
 from hysim.discovery._rival import steady_width
 
 TAU = 0.05  # s

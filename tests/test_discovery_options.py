@@ -1,17 +1,17 @@
 """What `discover` is told: library, symmetry, signs, optimizer, form of the slope; and what it refuses."""
 
-import inspect
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from discovered import CYCLES, DAHL, LAW, TRUTH, duhem, multisine, record_of, zigzag
 
 import hysim as hs
-from hysim.discovery import _discover, arguments
-from hysim.discovery._library import memory_terms
+from hysim.discovery import _discover
 from hysim.discovery._refinement import FreeRun
-from hysim.discovery._search import Library, searched
+from hysim.discovery._search import Library, Options, searched
+from hysim.models.terms import memory_terms
 
 RECORD = record_of(LAW.memory, multisine(200), noise=0.01)
 NAMES = list(TRUTH)
@@ -46,9 +46,10 @@ def test_the_search_does_not_look_at_samples_that_are_left_out():
     seen = np.random.default_rng(3).uniform(size=len(RECORD)) > 0.1
     seen[0] = False
     library = Library(memory_terms(1), "z", rests=(False, True))
-    options = {"signs": {}, "optimizer": "STLSQ", "derivative": "auto", "seed": 0, "seen": (seen,)}
     found, spoilt = (
-        searched((hs.Record(u=RECORD.u, y=np.where(seen, RECORD.y, unseen)),), library, **options).candidate
+        searched(
+            (hs.Record(u=RECORD.u, y=np.where(seen, RECORD.y, unseen)),), library, Options(), seen=(seen,)
+        ).candidate
         for unseen in (RECORD.y, 1e3)
     )
     assert found.structure == spoilt.structure
@@ -58,8 +59,8 @@ def test_the_search_does_not_look_at_samples_that_are_left_out():
 def test_cross_validation_repeats_the_whole_search(monkeypatch):
     laws, masks = [], []
 
-    def kept(records, library, *, seen=None, **options):
-        outcome = searched(records, library, seen=seen, **options)
+    def kept(records, library, options, *, best, seen=None):
+        outcome = searched(records, library, options, best=best, seen=seen)
         laws.append(outcome.candidate)
         masks.append(seen)
         return outcome
@@ -191,7 +192,7 @@ def test_a_monotone_loading_is_refused_in_every_form():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"route": "input"}, "route must be one of auto, memory, output, oscillator, got 'input'"),
+        ({"route": "input"}, "route must be one of 'auto', 'memory', 'output', got 'input'"),
         ({"degree": -1}, "degree must be a whole number from 0 up, got -1"),
         ({"degree": True}, "degree must be a whole number"),
         ({"library": "fourier"}, 'library must be "bouc-wen", "duhem" or names of terms'),
@@ -203,31 +204,12 @@ def test_a_monotone_loading_is_refused_in_every_form():
         ({"signs": {"u' z^9": 1}}, "'u' y\\^9' is not in the library|\"u' y\\^9\" is not in the library"),
         ({"signs": {"u'": 2}}, "must be 1 or -1, got 2"),
         ({"optimizer": "lasso"}, "optimizer must be one of STLSQ, SR3, SSR, FROLS, got 'lasso'"),
-        ({"derivative": "spline"}, 'derivative must be "auto", "smoothed" or "weak"'),
-        ({"initial": "periodic"}, 'initial must be "auto", "free" or "rest", got \'periodic\''),
+        ({"derivative": "spline"}, "derivative must be one of 'auto', 'smoothed', 'weak', got 'spline'"),
+        ({"initial": "periodic"}, "initial must be one of 'auto', 'free', 'rest', got 'periodic'"),
         ({"cross_validate": 1}, 'cross_validate must be "loo"'),
         ({"cross_validate": "all"}, 'cross_validate must be "loo"'),
-        (
-            {"route": "memory", "mass": 3.0},
-            "mass is not used by route='memory': leave it out, or use route='oscillator'$",
-        ),
-        ({"route": "output", "damping": 3.0}, "damping is not used by route='output'"),
-        ({"route": "memory", "stiffness": 0.0}, "stiffness is not used by route='memory'"),
-        ({"route": "memory", "structure": hs.BoucWenOscillator.structure()}, "structure is not used by route='memory'"),
-        (
-            {"route": "oscillator", "optimizer": "SR3"},
-            "optimizer='SR3' is not used by route='oscillator': leave it out, or use route='memory' or route='output'",
-        ),
-        ({"route": "oscillator", "derivative": "weak"}, "derivative='weak' is not used by route='oscillator'"),
-        ({"route": "oscillator", "cross_validate": 5}, "cross_validate is not used by route='oscillator'"),
-        ({"route": "oscillator", "library": "duhem"}, "library='duhem' is not used by route='oscillator'"),
-        ({"route": "oscillator", "library": NAMES}, "library is not used by route='oscillator'"),
-        ({"route": "oscillator", "symmetry": "even"}, "symmetry='even' is not used by route='oscillator'"),
-        ({"route": "oscillator", "signs": {"u'": 1}}, "signs is not used by route='oscillator'"),
-        ({"route": "oscillator", "degree": -1}, "degree must be a whole number from 0 up, got -1"),
+        ({"route": "oscillator"}, "an oscillator has its own verb: hs.discover_oscillator"),
         ({"library": NAMES, "degree": 3}, "degree is not used with a library of names: leave it out"),
-        ({"mass": 3.0, "cross_validate": 5}, "no route uses both cross_validate and mass: the first is for"),
-        ({"mass": 3.0, "signs": {"u'": 1}}, "leave one of them out"),
     ],
 )
 def test_options_are_checked(options, message):
@@ -235,39 +217,14 @@ def test_options_are_checked(options, message):
         hs.discover(RECORD, **options)
 
 
-def test_the_table_of_arguments_is_that_of_the_verb():
-    own = {"record_or_records", "route", "seed", "progress"}
-    declared = inspect.signature(hs.discover).parameters
-    assert {name: declared[name].default for name in declared.keys() - own} == arguments.DEFAULTS
-
-
-def test_arguments_at_their_defaults_are_not_given():
-    assert arguments.given(dict(arguments.DEFAULTS)) == {}
-    assert arguments.given({"signs": {}, "mass": 0.0, "degree": 3}) == {"mass": 0.0, "degree": 3}
-
-
-@pytest.mark.parametrize(
-    ("given", "tried"),
-    [
-        ({}, ("memory", "output", "oscillator")),
-        ({"mass": 2.0}, ("oscillator",)),
-        ({"symmetry": "odd", "library": "bouc-wen"}, ("memory", "output", "oscillator")),
-        ({"symmetry": "even"}, ("memory", "output")),
-        ({"cross_validate": 3}, ("memory", "output")),
-    ],
-)
-def test_the_automatic_route_tries_the_routes_that_use_all_arguments(given, tried):
-    assert arguments.routes("auto", given) == tried
-
-
-def test_a_route_that_an_argument_rules_out_is_named_where_the_others_explain_little():
+def test_an_oscillators_records_are_pointed_to_their_own_verb():
     t = np.arange(300) / 750.0
     u = 60.0 * np.sin(2.0 * np.pi * (20.0 + 40.0 * t) * t)
     plant = hs.BoucWenOscillator(mass=2.0, damping=10.0, stiffness=5e4, law=hs.BoucWen(A=5e4, beta=800.0, gamma=-300.0))
     record = hs.Record(u=u, y=plant.response(u, t[1]), t=t)
-    found = hs.discover(record, library=NAMES)
-    assert found.route != "oscillator"
-    assert "The oscillator route was not tried, because it does not use library" in " ".join(found.warnings)
+    assert "use hs.discover_oscillator" in hs.discover(record, library=NAMES).warnings[-1]
+    uneven = replace(record, t=t**1.1)
+    assert "discover_oscillator" not in " ".join(hs.discover(uneven, library=NAMES).warnings)
 
 
 @pytest.mark.parametrize("given", [CYCLES, [], [CYCLES], None, {"u": CYCLES, "y": CYCLES}])

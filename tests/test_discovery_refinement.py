@@ -11,13 +11,13 @@ from scipy.optimize import least_squares
 
 import hysim as hs
 from hysim.discovery import _laws
-from hysim.discovery._descent import descend
-from hysim.discovery._refinement import FreeRun, information
-from hysim.discovery._search import Library, searched
+from hysim.discovery._refinement import _SCHEDULE, FreeRun, bic_of
+from hysim.discovery._search import Library, Options, searched
 from hysim.discovery._selection import Search, pruned
 from hysim.discovery._structures import AnyExponent, Terms
 from hysim.discovery._validation import left_out_rmse
-from hysim.models.duhem_terms import Term
+from hysim.identification.marquardt import SumOfSquares, descend, differences
+from hysim.models.terms import Term, bouc_wen_terms
 
 OPEN = np.full(2, np.inf)
 
@@ -26,6 +26,17 @@ def rosenbrock(x):
     """Residuals of many points (n_sets, 2)."""
     x = np.atleast_2d(x)
     return np.stack([10.0 * (x[:, 1] - x[:, 0] ** 2), 1.0 - x[:, 0]], axis=1)
+
+
+def descended(residuals, start, lower, upper, *, central, **options):
+    """The end of a descent (n_x,), and the residual there."""
+
+    def slopes(x, residual):
+        return differences(residuals, x, residual, central=central)
+
+    problem = SumOfSquares(residuals, slopes, lower, upper)
+    reached = descend(problem, start[np.newaxis], schedule=_SCHEDULE, **options)
+    return reached.x[0], reached.evaluated[0][0]
 
 
 def terms(names):
@@ -39,15 +50,15 @@ def terms(names):
 def test_the_descent_ends_where_scipys_does(central, lower, upper):
     start, lower, upper = np.array([-1.2, 1.0]), np.array(lower, dtype=float), np.array(upper, dtype=float)
     start = np.clip(start, lower, upper)
-    found = descend(rosenbrock, start, lower, upper, tolerance=1e-14, steps=300, central=central)
+    x, residual = descended(rosenbrock, start, lower, upper, relative=1e-14, steps=300, central=central)
     inside = np.clip(start, lower + 1e-9, upper - 1e-9)  # which SciPy's method asks for
     expected = least_squares(lambda x: rosenbrock(x)[0], inside, bounds=(lower, upper), xtol=1e-14, ftol=1e-14)
     # Both end where the cost, of the order of 1, changes by rounding; the bounds are reached to SciPy's 1e-6.
-    assert found.residual @ found.residual <= 2.0 * expected.cost + 1e-9
-    assert found.x == pytest.approx(expected.x, abs=1e-4)
-    assert (found.x >= lower).all()
-    assert (found.x <= upper).all()
-    assert found.residual == pytest.approx(rosenbrock(found.x)[0], abs=1e-15)
+    assert residual @ residual <= 2.0 * expected.cost + 1e-9
+    assert x == pytest.approx(expected.x, abs=1e-4)
+    assert (x >= lower).all()
+    assert (x <= upper).all()
+    assert residual == pytest.approx(rosenbrock(x)[0], abs=1e-15)
 
 
 def test_a_descent_that_cannot_win_is_given_up():
@@ -61,8 +72,8 @@ def test_a_descent_that_cannot_win_is_given_up():
             return np.column_stack([rosenbrock(x), np.full(len(x), np.sqrt(5.0))])
 
         start = np.array([-1.2, 1.0])
-        end = descend(residuals, start, -OPEN, OPEN, tolerance=1e-9, steps=40, central=False, hopeless=hopeless)
-        return len(calls), float(end.residual @ end.residual)
+        end = descended(residuals, start, -OPEN, OPEN, relative=1e-9, steps=40, central=False, hopeless=hopeless)[1]
+        return len(calls), float(end @ end)
 
     most, best = steps_and_end(np.inf)
     assert best == pytest.approx(5.0, rel=1e-6)
@@ -74,7 +85,7 @@ def test_a_descent_that_cannot_win_is_given_up():
 
 def test_a_polished_law_does_not_lose_its_numbers_to_an_earlier_worse_optimum():
     record, library = record_of(LAW.memory, CYCLES, noise=0.01), Library(terms(["u'", "|u'| z", "u' |z|"]), "z")
-    found = searched([record], library, signs={}, optimizer="STLSQ", derivative="smoothed", seed=0)
+    found = searched([record], library, Options(derivative="smoothed"))
     structure = found.candidate.structure
     worse = found.search.free_run.refine(structure, 1.5 * found.candidate.unknowns[np.newaxis], tolerance=np.inf)
     assert worse.cost > 1.01 * found.candidate.cost
@@ -88,18 +99,22 @@ def test_a_linear_problem_is_solved(seed):
     random = np.random.default_rng(seed)
     matrix, left = random.standard_normal((8, 3)), random.standard_normal(8)
     lower, upper = -0.3 * np.ones(3), 0.3 * np.ones(3)
-    found = descend(lambda x: left - x @ matrix.T, np.zeros(3), lower, upper, tolerance=1e-14, steps=300, central=True)
+
+    def residuals(x):
+        return left - x @ matrix.T
+
+    x, residual = descended(residuals, np.zeros(3), lower, upper, relative=1e-14, steps=300, central=True)
     best = least_squares(lambda x: left - matrix @ x, np.zeros(3), bounds=(lower, upper)).cost
-    assert 0.5 * found.residual @ found.residual <= best * (1.0 + 1e-5)  # what SciPy leaves at its bounds
-    assert found.jacobian == pytest.approx(-matrix, abs=1e-8)  # rounding of a difference
+    assert 0.5 * residual @ residual <= best * (1.0 + 1e-5)  # what SciPy leaves at its bounds
+    assert differences(residuals, x, residual, central=True) == pytest.approx(-matrix, abs=1e-8)  # its rounding
 
 
 def test_an_infinite_or_flat_direction_stops_nothing():
     def residuals(x):
         return np.stack([x[:, 0] - 1.0, 0.0 * x[:, 0]], axis=1)
 
-    found = descend(residuals, np.array([5.0, 3.0]), -OPEN, OPEN, tolerance=1e-12, steps=50, central=True)
-    assert found.x == pytest.approx([1.0, 3.0], abs=1e-9)  # the second coordinate has no say, and stays
+    x, _ = descended(residuals, np.array([5.0, 3.0]), -OPEN, OPEN, relative=1e-12, steps=50, central=True)
+    assert x == pytest.approx([1.0, 3.0], abs=1e-9)  # the second coordinate has no say, and stays
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4])
@@ -107,7 +122,7 @@ def test_an_infinite_or_flat_direction_stops_nothing():
 @pytest.mark.parametrize("offset", [0.0, 3.0])
 def test_the_scale_of_a_memory_is_a_convention(n, A, offset):
     """With a feedthrough the law is written with A = 1 and a gain: the response is the same."""
-    names = _laws.bouc_wen_terms(n)
+    names = bouc_wen_terms(n)
     numbers = np.array([A, -0.3, -0.2, 5.0, offset])[[0, 1, 2, 3] + [4] * bool(offset)]
     structure = Terms(tuple(sorted(names)), True, bool(offset))
     numbers[:3] = numbers[:3][[names.index(term) for term in structure.terms]]
@@ -115,7 +130,7 @@ def test_the_scale_of_a_memory_is_a_convention(n, A, offset):
     candidate = SimpleNamespace(
         structure=structure, unknowns=np.append(numbers, 0.4), covariance=np.eye(numbers.size + 1)
     )
-    found = _laws.found(candidate, [record], "z")
+    found = _laws.law_from(candidate, [record], "z")
     expected = structure.run(record.u, numbers[np.newaxis], np.array([0.4]), 1e6)[0]
     model = found.models[0]
     assert isinstance(model, hs.BoucWen)
@@ -133,7 +148,7 @@ def test_a_law_of_any_exponent_is_the_model_that_it_becomes(n, shifts):
     candidate = SimpleNamespace(
         structure=structure, unknowns=np.append(numbers, 0.4), covariance=np.eye(numbers.size + 1)
     )
-    found = _laws.found(candidate, [record], "z")
+    found = _laws.law_from(candidate, [record], "z")
     expected = structure.run(record.u, numbers[np.newaxis], np.array([0.4]), 1e6)[0]
     assert found.models[0].response(record.u) == pytest.approx(expected, abs=1e-9 * np.ptp(expected))  # its kernel's
     assert found.models[0].n == n
@@ -147,7 +162,7 @@ def test_standard_errors_are_carried_to_the_gain():
     candidate = SimpleNamespace(
         structure=structure, unknowns=np.array([-2.0, -0.3, -0.6, 5.0, 0.0]), covariance=covariance
     )
-    spread = _laws.found(candidate, [record_of(lambda u: u)], "z").stderr
+    spread = _laws.law_from(candidate, [record_of(lambda u: u)], "z").stderr
     # differences of step 1e-6; for n = 1 only the term u' |z| takes the sign of the gain, none its size
     assert spread == pytest.approx({"u'": 0.0, "u' |z|": 0.2, "|u'| z": 0.3, "feedthrough": 0.5, "gain": 0.1}, rel=1e-6)
 
@@ -174,12 +189,12 @@ def test_a_memory_at_rest_is_one_number_less_and_begins_at_zero():
     assert (of_free.n_parameters, of_rest.n_parameters) == (6, 5)
     assert of_rest.unknowns[-1] == pytest.approx(of_rest.unknowns[4] + record.u[0] * of_rest.unknowns[3], rel=1e-15)
     assert of_free.cost <= of_rest.cost < 1.1 * of_free.cost
-    assert of_rest.bic == information(of_rest.cost, len(record), 5) < of_free.bic
+    assert of_rest.bic == bic_of(of_rest.cost, len(record), 5) < of_free.bic
     spread = np.sqrt(np.diag(of_rest.covariance))
     assert spread[-1] == 0.0
     assert (spread[:-1] > 0.0).all()
     assert abs(of_rest.unknowns[4] - 7.0) < 5.0 * spread[4]
-    assert _laws.found(of_rest, [record], "z").models[0].z0 == pytest.approx(0.0, abs=1e-12)
+    assert _laws.law_from(of_rest, [record], "z").models[0].z0 == pytest.approx(0.0, abs=1e-12)
 
 
 def test_the_left_out_error_is_that_of_laws_that_have_not_seen_the_sample():

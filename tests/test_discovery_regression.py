@@ -13,20 +13,11 @@ from discovered import COLEMAN_HODGDON, CYCLES, DAHL, QUADRATIC, duhem, record_o
 
 import hysim as hs
 from hysim.discovery import _pysindy
-from hysim.discovery._derivatives import branches, smoothed, weak_rows
-from hysim.discovery._library import (
-    duhem_terms,
-    feature,
-    memory_terms,
-    named_terms,
-    signs_of,
-    slopes,
-    symmetric,
-)
 from hysim.discovery._selection import is_complete, preferred, thinned
+from hysim.discovery._slopes import branches, feature, signs_of, slopes, smoothed, weak_rows
 from hysim.discovery._structures import Terms
 from hysim.discovery._subsets import best_subsets
-from hysim.models.duhem_terms import Term
+from hysim.models.terms import Term, duhem_terms, memory_terms, named_terms, symmetric
 
 
 def test_slopes_are_never_taken_across_a_reversal():
@@ -57,7 +48,7 @@ def test_the_weak_form_of_a_law_linear_in_the_input_is_exact(feedthrough, per_br
     def features(u, z, direction):
         return np.stack([direction * u, np.ones_like(u)], axis=1)
 
-    errors = rows.left(feedthrough) - rows.columns(features, feedthrough, 4.0) @ [1.0, 0.5]
+    errors = rows.target(feedthrough) - rows.columns(features, feedthrough, 4.0) @ [1.0, 0.5]
     assert np.abs(errors).max() < 1e-14 * 10.0  # rounding of outputs up to 10
 
 

@@ -84,7 +84,7 @@ def test_the_summary_has_the_law_its_verdict_and_every_number(hidden):
     assert hidden.verdict in lines[1]
     names = [line.split(" = ")[0].strip() for line in lines if "+-" in line]
     assert names == [*TRUTH, "feedthrough", "offset", "gain"]
-    assert f"cross-validated rmse {hidden.cv_rmse:.4g}" in map(str.strip, lines)
+    assert f"cross-validated rmse: {hidden.cv_rmse:.4g}" in map(str.strip, lines)
 
 
 def test_warnings_are_printed_under_their_heading_and_stored(hidden):

@@ -54,4 +54,4 @@ def test_other_optima_are_counted(n_rivals, words):
     theta = np.zeros(len(whole.space.coordinates) + len(whole.space.linear))
     known = uncertainty(whole, theta, np.ones(whole.y.size))
     rival = Candidate(model=hs.Dahl(), estimates={}, fit_percent=90.0, rmse=0.1)
-    assert words in _phrases(True, whole, known, [rival] * n_rivals, {}, [])
+    assert words in _phrases(True, whole, known, [rival] * n_rivals, {})

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from hysim.discovery._memory_terms import MemoryTerm
 from hysim.discovery._term_regression import TermRegression
+from hysim.models.terms import power_term
 
-TERMS = tuple(MemoryTerm(rectified=False, power=power, even=False) for power in range(4))
+TERMS = tuple(power_term(False, power, even=False) for power in range(4))
 
 
 def regression(features, target):

@@ -2,6 +2,7 @@
 
 from hysim.discovery._discover import discover
 from hysim.discovery._judgement import Judgement
-from hysim.discovery._result import Discovery
+from hysim.discovery._oscillator import discover_oscillator
+from hysim.discovery._result import Discovery, OscillatorDiscovery
 
-__all__ = ["Discovery", "Judgement", "discover"]
+__all__ = ["Discovery", "Judgement", "OscillatorDiscovery", "discover", "discover_oscillator"]

@@ -1,18 +1,18 @@
-"""A law and its rivals on samples that they have not seen.
+"""The errors of a law and its rivals on samples that were left out of the fit, and the rates of the input.
 
-What is left out at a time is a record, if there are several and none goes beyond the range of the others; of one
-record a rate, if its cycles have several; else a cycle, if there are three; else a few blocks. The start of each record
-is always seen, since it tells the memory, or the state, at the first sample. Samples beyond the range of the others do
-not count, unless all are: nothing is judged by what it says beyond the range that it has seen.
+A record is left out at a time, if there are several and none goes beyond the range of the others; of one record a rate,
+if its cycles have several; else a cycle, if there are three; else a few blocks. The start of each record is always
+seen, since it determines the memory, or the state, at the first sample. Samples beyond the range of the others do not
+count, unless all are: no model is judged by extrapolation.
 
-The rivals are the linear plant, and the yardsticks that need no law. Of every residual a slow trend of each record is
-taken away before it counts: a drift is neither a fault of the law nor hysteresis.
+The rivals are the linear plant, and the yardsticks that need no law. A slow trend of each record is taken out of every
+residual: a drift is neither a fault of the law nor hysteresis.
 
-An error explains the samples if it is not above FACTOR times the error of the same model on what it has seen, where
-records or rates are left out, or else times the noise. It does so too if it is not above UNEXPLAINED times what a curve
-leaves.
+A model explains the samples if its error is not above FACTOR times that on the fitted samples, where records or rates
+are left out, or else times the noise; or not above UNEXPLAINED times the error of a curve.
 """
 
+import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -26,7 +26,6 @@ from scipy import special
 from hysim._cycles import TOLERANCE, complete_cycles
 from hysim._frozen import FloatArray
 from hysim.discovery import _yardsticks as yardsticks
-from hysim.discovery._rates import Samples, at_one_rate
 from hysim.discovery._rival import FLOOR, Rival
 from hysim.errors import SimulationError
 from hysim.identification.folds import folds as blocks
@@ -42,6 +41,13 @@ _START = 0.1  # of each record is always seen
 _PARTS = 8  # of each record, for the t test
 _DOUBT = 0.05  # probability of the t test below which a difference counts
 _INSIDE = 0.05  # spans of the input by which left-out samples may reach beyond the others
+SEVERAL = 1.5
+"""Rates whose ratio is smaller count as one."""
+
+_EDGES = np.linspace(0.05, 0.95, 10)  # of the bands, in spans of the input
+_TAILS = (0.05, 0.95)
+
+Samples = npt.NDArray[np.intp]
 
 
 class Law(Protocol):
@@ -77,10 +83,10 @@ class Trial:
     parts: Mapping[str, FloatArray]
 
     def explains(self, name: str) -> bool:
-        """Whether a model predicts the held-out samples nearly as well as those it has seen, or most of the memory.
+        """Whether a model predicts the held-out samples nearly as well as the fitted ones, or most of the memory.
 
-        Plays have many numbers, and may have seen too little to predict another path of the input. They explain the
-        records where the same numbers fit all of them nearly as well as each of them alone.
+        Plays have too many numbers to predict another path of the input from few samples: their error may also be that
+        of one fit to all samples.
         """
         usual = self.seen[name] if self.by in ("record", "rate") else self.noise
         error = min(self.errors[name], self.together) if name == PLAYS else self.errors[name]
@@ -153,39 +159,35 @@ def _with(trial: Trial, name: str, model: Model, records: Sequence[Record], left
 
 def _models(records: Sequence[Record], y: FloatArray, linear: Rival | None) -> dict[str, Model]:
     u = np.concatenate([record.u for record in records])
-    found: dict[str, Model] = {_MEANS: partial(yardsticks.means, u, y)}
+    models: dict[str, Model] = {_MEANS: partial(yardsticks.means, u, y)}
     needed = {CURVE: yardsticks.curve, PLAYS: yardsticks.plays}
     if linear is not None:
-        found[RIVAL] = lambda weights: np.concatenate(
+        models[RIVAL] = lambda weights: np.concatenate(
             linear.refitted(records, _of_each(weights, records)).outputs(records)
         )
         needed[RELAXATIONS] = yardsticks.relaxations
     for name, made in needed.items():
-        found[name] = partial(_of_yardstick, made(records), y)
-    return found
-
-
-def _of_yardstick(model: yardsticks.Yardstick, y: FloatArray, weights: FloatArray) -> FloatArray:
-    return model.outputs(y, weights)
+        models[name] = partial(made(records).outputs, y)
+    return models
 
 
 def about_trends(residual: FloatArray, records: Sequence[Record]) -> list[FloatArray]:
     """The residual of each record about its own trend; nan where it is nan, and all of it where that is all trend."""
-    found = []
-    for left, record in zip(_of_each(residual, records), records, strict=True):
-        counts = ~np.isnan(left)
+    residuals = []
+    for own, record in zip(_of_each(residual, records), records, strict=True):
+        counts = ~np.isnan(own)
         slow = yardsticks.trend(record)[counts]
         if np.count_nonzero(counts) <= slow.shape[1]:
-            left, counts = np.full(left.size, math.nan), np.zeros(left.size, dtype=bool)
-        elif np.isfinite(left[counts]).all():
-            left[counts] -= slow @ np.linalg.lstsq(slow, left[counts])[0]
-        found.append(left)
-    return found
+            own, counts = np.full(own.size, math.nan), np.zeros(own.size, dtype=bool)
+        elif np.isfinite(own[counts]).all():
+            own[counts] -= slow @ np.linalg.lstsq(slow, own[counts])[0]
+        residuals.append(own)
+    return residuals
 
 
 def _in_parts(held: Sequence[FloatArray], records: Sequence[Record]) -> list[FloatArray]:
     """The residuals of consecutive samples, as many parts of each record as may be independent of each other."""
-    pieces = [piece for left in held for piece in np.array_split(left, _PARTS)]
+    pieces = [piece for residual in held for piece in np.array_split(residual, _PARTS)]
     return [piece[~np.isnan(piece)] for piece in pieces if np.count_nonzero(~np.isnan(piece)) > 1]
 
 
@@ -242,3 +244,61 @@ def rms(parts: Sequence[FloatArray]) -> float:
     values = np.concatenate(parts) if parts else np.empty(0)
     counts = values[~np.isnan(values)]
     return float(np.sqrt(np.mean(counts**2))) if counts.size else math.nan
+
+
+def rate_spread(records: Sequence[Record]) -> float:
+    """How much the input's rate differs between passes at the same input; 1 for one rate, nan without time.
+
+    The input's range, all records together, has nine equal bands between 5 and 95 % of it. A branch that crosses a
+    band has there the rate band over time of crossing, a stop at an edge being divided in its middle. In each band the
+    95th percentile of the rates is divided by the 5th, all records having the same weight. The median over the bands
+    that are crossed more than once is taken, or over those that two records cross. So a sine has one rate, and so has a
+    triangle of any amplitude; sines of two amplitudes, or of a decaying one, have several.
+    """
+    if any(record.t is None for record in records):
+        return math.nan
+    low, high = min(record.u.min() for record in records), max(record.u.max() for record in records)
+    crossed = [_crossings(record, low + (high - low) * _EDGES) for record in records]
+    bands = list(zip(*crossed, strict=True))
+    shared = [band for band in bands if sum(map(bool, band)) > 1]
+    ratios = [ratio for band in shared or bands if (ratio := _ratio(band)) is not None]
+    return float(np.median(ratios)) if ratios else math.nan
+
+
+def at_one_rate(record: Record) -> list[Samples]:
+    """The stretches of a record whose cycles have one rate, one after the other; the whole where that is one."""
+    everything = np.arange(len(record))
+    if record.t is None:
+        return [everything]
+    begins, rate = [], 0.0
+    for cycle in reversed(complete_cycles(record.u, TOLERANCE)):
+        here = 1.0 / float(np.ptp(record.t[cycle.path]))
+        if rate == 0.0 or not 1.0 / SEVERAL < here / rate < SEVERAL:
+            begins.append(cycle.path.start)
+            rate = here
+    return np.split(everything, begins[1:])
+
+
+def _crossings(record: Record, edges: FloatArray) -> list[list[float]]:
+    """Rates of the passes of one record through each band."""
+    bands: list[list[float]] = [[] for _ in itertools.pairwise(edges)]
+    for branch in record.branches(TOLERANCE):
+        sign = 1.0 if branch.u[-1] > branch.u[0] else -1.0
+        reached, first, count = np.unique(np.maximum.accumulate(sign * branch.u), return_index=True, return_counts=True)
+        t = np.asarray(branch.t, dtype=float)
+        times = 0.5 * (t[first] + t[first + count - 1])
+        at_edges = np.interp(sign * edges, reached, times, left=math.nan, right=math.nan)
+        for rates, height, duration in zip(bands, np.diff(edges), np.abs(np.diff(at_edges)), strict=True):
+            if duration > 0.0:
+                rates.append(float(height / duration))
+    return bands
+
+
+def _ratio(band: Sequence[list[float]]) -> float | None:
+    """High over low rate of a band's passes, a list for each record; None for fewer than two passes."""
+    rates = np.concatenate(band)
+    if rates.size < 2:
+        return None
+    shares = np.concatenate([np.full(len(passes), 1.0 / max(len(passes), 1)) for passes in band])
+    slow, fast = np.quantile(rates, _TAILS, weights=shares, method="inverted_cdf")
+    return float(fast / slow)

@@ -14,23 +14,25 @@ refinement by simulation.
 """
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from hysim._frozen import FloatArray
-from hysim.discovery._marquardt import descended
-from hysim.discovery._memory_terms import RELAXATION, MemoryTerm, bouc_wen_terms, cases, law
 from hysim.discovery._term_regression import BLOCKS, FLOOR, TermRegression, term_regression
+from hysim.identification.marquardt import Schedule, SumOfSquares, descend
 from hysim.kernels import hidden as kernels
 from hysim.models.equation_of_motion import Filter, Linear, Motion, filtering
 from hysim.models.resampling import interpolated
+from hysim.models.terms import RELAXATION, Term, bouc_wen_terms
 
 POWERS = (1.0, 2.0, 3.0)
 SHARES = (0.2, 0.5, 0.8)  # of the stiffness of small motions, in A
 PLANT = ("mass", "damping", "stiffness")
+
+OSCILLATOR_SCHEDULE = Schedule(failure=5.0, least=1e-12)
 
 _FINER = 4  # increments of y for each sample
 _DEGREE = 3
@@ -39,7 +41,7 @@ _DEGREE = 3
 class Regressed(NamedTuple):
     """A law, the plant that goes with it, and the share of the filtered force that they leave unexplained."""
 
-    coefficients: dict[MemoryTerm, float]
+    coefficients: dict[Term, float]
     plant: dict[str, float]
     error: float
 
@@ -51,6 +53,42 @@ class _Along(NamedTuple):
     steps: FloatArray
     h: float
     kept: slice
+
+
+class MemoryArrays(NamedTuple):
+    """A law as `hysim.kernels.hidden` takes it: polynomials in z by direction and side, and one more power."""
+
+    polynomial: FloatArray
+    extra: FloatArray
+    power: float
+    relaxation: float
+
+
+def memory_arrays(coefficients: Mapping[Term, float], degree: int) -> MemoryArrays:
+    """The law with these coefficients, whose powers that are not whole must be one."""
+    polynomial, extra, power = np.zeros((2, 2, degree + 1)), np.zeros((2, 2)), 1.0
+    for term, value in coefficients.items():
+        if term.is_polynomial:
+            polynomial += value * cases(term, degree)
+        elif not term.relaxing:
+            extra, power = extra + value * _signs(term), term.degree
+    return MemoryArrays(polynomial, extra, power, coefficients.get(RELAXATION, 0.0))
+
+
+def cases(term: Term, degree: int) -> FloatArray:
+    """Polynomials in z of a term, shape (2, 2, degree + 1), by direction and side of z = 0."""
+    polynomials = np.zeros((2, 2, degree + 1))
+    polynomials[..., int(term.degree)] = _signs(term)
+    if term.degree % 2:
+        polynomials[:, 0] *= -1.0  # z^power = -|z|^power there
+    return polynomials
+
+
+def _signs(term: Term) -> FloatArray:
+    """Factors of |z|^power, shape (2, 2), by direction and side of z = 0."""
+    direction = np.array([1.0, 1.0] if term.rectified else [-1.0, 1.0])
+    side = np.array([1.0, 1.0] if term.is_even_in_memory else [-1.0, 1.0])
+    return np.asarray(direction[:, np.newaxis] * side)
 
 
 class HiddenMemory:
@@ -70,21 +108,19 @@ class HiddenMemory:
         self._basis = np.linalg.qr(self._columns / np.linalg.norm(self._columns, axis=0))[0]
         self._size = float(np.linalg.norm(force))
 
-    def fit(self, terms: Sequence[MemoryTerm]) -> Regressed | None:
+    def fit(self, terms: Sequence[Term]) -> Regressed | None:
         """The law of these terms, the first of which is u', from the best of several starts; None if all escape."""
         spring = self.linear.stiffness
         shares = [1.0 - self.known["stiffness"] / spring] if "stiffness" in self.known else SHARES
         starts = [np.array([max(share, 0.01) * spring, *np.zeros(len(terms) - 1)]) for share in shares]
-        found = [each for start in starts if (each := self._descended(terms, start)) is not None]
-        return min(found, key=lambda each: each.error, default=None)
+        return _best(self._descended(terms, start) for start in starts)
 
     def nearest(self) -> Regressed | None:
         """The Bouc-Wen law with a whole n, or the linear relaxation, of the smallest error; None if all diverge."""
         laws = [bouc_wen_terms(n) for n in POWERS] + [(bouc_wen_terms(1.0)[0], RELAXATION)]
-        found = [each for terms in laws if (each := self.fit(terms)) is not None]
-        return min(found, key=lambda each: each.error, default=None)
+        return _best(map(self.fit, laws))
 
-    def regression(self, library: Sequence[MemoryTerm]) -> TermRegression:
+    def regression(self, library: Sequence[Term]) -> TermRegression:
         """The regression of what a linear spring leaves on all terms, whose slopes are those about z = A y."""
         spring = bouc_wen_terms(1.0)[0]
         terms = (spring, *(term for term in library if term != spring))
@@ -99,50 +135,64 @@ class HiddenMemory:
         floor = FLOOR * self._size / float(np.sqrt(target.size))
         return term_regression(terms, self._columns, rows[1:].T, target, floor, blocks)
 
-    def _descended(self, terms: Sequence[MemoryTerm], start: FloatArray) -> Regressed | None:
-        def left(x: FloatArray) -> FloatArray | None:
+    def _descended(self, terms: Sequence[Term], start: FloatArray) -> Regressed | None:
+        def residuals(points: FloatArray) -> FloatArray:
+            values = np.full((len(points), self._target.size), np.inf)
+            for k, x in enumerate(points):
+                rows = self._memory(terms, x)
+                if rows is not None:
+                    values[k] = self._projected(self._target - rows[0])
+            return values
+
+        def columns(x: FloatArray) -> FloatArray:
             rows = self._memory(terms, x)
-            return None if rows is None else self._projected(self._target - rows[0])
+            return np.zeros((self._target.size, x.size)) if rows is None else rows[1:].T
 
-        def slopes(x: FloatArray) -> tuple[FloatArray, FloatArray]:
-            rows = self._memory(terms, x)
-            columns = np.empty((self._target.size, 0)) if rows is None else rows[1:].T
-            return self._projected(columns), np.linalg.norm(columns, axis=0)
+        problem = SumOfSquares(
+            residuals,
+            lambda x, residual: -self._projected(columns(x)),
+            sizes=lambda x: np.linalg.norm(columns(x), axis=0),  # those of slopes that the plant explains are tiny
+        )
+        reached = descend(problem, start[np.newaxis], relative=1e-7, steps=100, schedule=OSCILLATOR_SCHEDULE)
+        return self._regressed(terms, reached.x[0])
 
-        return self._regressed(terms, descended(left, slopes, start))
-
-    def _regressed(self, terms: Sequence[MemoryTerm], x: FloatArray) -> Regressed | None:
+    def _regressed(self, terms: Sequence[Term], x: FloatArray) -> Regressed | None:
+        """The law with these coefficients and the plant that goes best with it."""
         rows = self._memory(terms, x)
         if rows is None:
             return None
         goal = self._target - rows[0]
         plant = np.linalg.lstsq(self._columns, goal, rcond=None)[0].tolist()
         error = float(np.linalg.norm(self._projected(goal))) / self._size
-        found = dict(zip(terms, x.tolist(), strict=True))
-        return Regressed(found, self.known | dict(zip(self._free, plant, strict=True)), error)
+        coefficients = dict(zip(terms, x.tolist(), strict=True))
+        return Regressed(coefficients, self.known | dict(zip(self._free, plant, strict=True)), error)
 
-    def _memory(self, terms: Sequence[MemoryTerm], x: FloatArray) -> FloatArray | None:
+    def _memory(self, terms: Sequence[Term], x: FloatArray) -> FloatArray | None:
         """Filtered memory and its slopes along the coefficients, (1 + n_terms, n_rows); None if it escapes."""
-        polynomial, _, _, relaxation = law(dict(zip(terms, x.tolist(), strict=True)), _DEGREE)
-        whole = [term for term in terms if term.whole]
-        units = np.array([cases(term, _DEGREE) for term in whole])
-        place = [1 + (len(whole) if term is RELAXATION else whole.index(term)) for term in terms]
+        polynomial, _, _, relaxation = memory_arrays(dict(zip(terms, x.tolist(), strict=True)), _DEGREE)
+        polynomials = [term for term in terms if not term.relaxing]
+        units = np.array([cases(term, _DEGREE) for term in polynomials])
+        place = [1 + (len(polynomials) if term.relaxing else polynomials.index(term)) for term in terms]
         signals = []
         for each in self._along:
-            found = np.zeros((2 + len(whole), each.steps.size + 1))
-            if not kernels.along(each.steps, each.h, polynomial, relaxation, units, found[0], found[1:]):
+            memory = np.zeros((2 + len(polynomials), each.steps.size + 1))
+            if not kernels.along(each.steps, each.h, polynomial, relaxation, units, memory[0], memory[1:]):
                 return None
-            signals.append(found[[0, *place]][:, each.kept])
+            signals.append(memory[[0, *place]][:, each.kept])
         rows = self._stacked(signals, 0)
         return rows if np.isfinite(rows).all() else None
+
+    def _projected(self, rows: FloatArray) -> FloatArray:
+        return np.asarray(rows - self._basis @ (self._basis.T @ rows))
 
     def _stacked(self, signals: Sequence[FloatArray], power: int) -> FloatArray:
         return np.concatenate(
             [each.filtered(signal, power) for each, signal in zip(self._along, signals, strict=True)], axis=-1
         )
 
-    def _projected(self, rows: FloatArray) -> FloatArray:
-        return np.asarray(rows - self._basis @ (self._basis.T @ rows))
+
+def _best(laws: Iterable[Regressed | None]) -> Regressed | None:
+    return min((each for each in laws if each is not None), key=lambda each: each.error, default=None)
 
 
 def _along(motion: Motion, linear: Linear) -> _Along:

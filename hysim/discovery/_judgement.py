@@ -1,21 +1,19 @@
-"""Is it hysteresis, a lag that looks like it, or nothing that these records could tell?
+"""The verdict on records: hysteresis, a lag that looks like it, or neither.
 
-Hysteresis is the part of memory that does not know time. Models of three kinds are fitted to the same records and
-judged on samples that none has seen (`_held_out`):
+Models of three kinds are fitted to the same records and judged on samples that were left out (`_held_out`):
 
     still     a curve, or a line: no memory
-    lagging   a linear plant of one or two poles, or relaxations: memory that knows time
-    turning   the law, or a superposition of plays: memory that knows the order of the extremes only
+    lagging   a linear plant of one or two poles, or relaxations: memory that depends on time
+    turning   the law, or a superposition of plays: memory that depends on the order of the extremes only
 
-The plays need no library, so that the verdict is about the records and does not depend on whether the library has a
-good law for them. Better means an rmse on held-out samples below BETTER times the other's. A loop that is narrower than
-the noise leaves no such difference.
+The plays need no library, so that the verdict does not depend on whether the library has a good law for the records.
+Better means an rmse on held-out samples below BETTER times the other's.
 
 1. Neither a lagging nor a turning model is better than the still ones: "no structure found".
 2. One rate, or no time: "cannot be told from one rate".
-3. Several rates. Of the models that explain what they have not seen: "linear lag" if a lagging one is better than all
-   others, "rate-independent hysteresis" if a turning one is. Else "no structure found": the memory is neither, such as
-   hysteresis followed by a lag, or noise hides what it is.
+3. Several rates. Of the models that explain the held-out samples: "linear lag" if a lagging one is better than all
+   others, "rate-independent hysteresis" if a turning one is. Else "no structure found": hysteresis followed by a lag,
+   or noise.
 4. A law that diverges in free run, on the records or on steady cycles over their range, is no law: "no structure
    found", unless the plays show at several rates that the records are hysteretic.
 """
@@ -35,13 +33,14 @@ from hysim.discovery._held_out import (
     PLAYS,
     RELAXATIONS,
     RIVAL,
+    SEVERAL,
     Law,
     Refit,
     Trial,
     competitors_held_out,
     law_held_out,
+    rate_spread,
 )
-from hysim.discovery._rates import SEVERAL, rate_spread
 from hysim.discovery._rival import FLOOR, Rival, rival, steady_width
 from hysim.errors import SimulationError
 from hysim.models.transfer_function import TransferFunction
@@ -65,7 +64,7 @@ _CYCLES = 10
 
 @frozen
 class Judgement:
-    """What a law is, beside a linear plant.
+    """The verdict on records, and the errors and loops on which it rests.
 
     Parameters
     ----------
@@ -84,13 +83,13 @@ class Judgement:
     held_out_by : str
         What was left out at a time: ``"record"``, ``"rate"``, ``"cycle"`` or ``"block"``.
     rates : array, shape (3,)
-        Multiples of the rate of the longest record, the one with most samples; of equals the first.
+        Multiples of the rate of the longest record.
     widths : mapping
-        ``"law"`` and ``"rival"`` to the relative widths of the loop at these rates: the last complete cycle of the
-        law's free run along that record, the steady loop of the rival. nan where the record has no complete cycle.
+        ``"law"`` and ``"rival"`` to the relative widths at these rates of the last complete cycle of the law's free
+        run along that record, and of the steady loop of the rival. nan where the record has no complete cycle.
     dissipation : float
-        Signed area of the law's steady loop over the range of the input [unit of y times unit of u]: positive
-        counterclockwise, as a piezoelectric actuator's is, negative for a plain spring force.
+        Signed area of the law's steady loop over the range of the input [unit of y times unit of u], positive where
+        it runs counterclockwise, as a piezoelectric actuator's does.
     one_sign : bool
         Whether loops of a quarter, a half and three quarters of that range have areas of that sign too, or none.
     rate_spread : float
@@ -98,8 +97,7 @@ class Judgement:
     stable : bool
         Whether the law's free run stays finite, on the records and on steady cycles over their range.
     explained_by : tuple of str
-        Names of the models in `held_out` that predict the held-out samples nearly as well as those they have seen, or
-        most of the memory.
+        Names of the models in `held_out` that predict the held-out samples nearly as well as the fitted ones.
     """
 
     verdict: str
@@ -132,8 +130,7 @@ class Competitors:
     def enough(self) -> float:
         """The rmse that a law must reach to change the verdict [unit of y]; inf if any law may change it.
 
-        Without a law the verdict may be that a curve or a linear model suffices. Only a law that predicts better than
-        these changes it. A verdict of hysteresis is one for which the best law is wanted.
+        Only a law that predicts better changes the verdict that a curve or a linear model suffices.
         """
         verdict = _verdict(self.trial, self.linear, single_valued=False, spread=self.spread)
         if verdict == NO_STRUCTURE:
@@ -155,38 +152,15 @@ def competitors(records: Sequence[Record]) -> Competitors:
 def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, others: Competitors | None = None) -> Judgement:
     """Judge a law that was fitted to records beside its rivals.
 
-    Parameters
-    ----------
-    records : sequence of Record
-        What the law was fitted to. Of long ones fewer samples are judged. Uneven times are made even by straight
-        lines.
-    laws : sequence of Law
-        The law, once for each record: all is shared but the memory at the first sample.
-    refit : callable
-        ``refit(records, weights)`` gives such laws, fitted to the samples whose weights are not zero.
-    others : Competitors, optional
-        ``competitors(records)``, where they are known already.
-
-    Returns
-    -------
-    Judgement
-
-    Examples
-    --------
-    >>> import hysim as hs
-    >>> from hysim.discovery._judgement import judge
-    >>> u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=40)
-    >>> law = hs.Duhem.from_terms({"u'": 1.0, "|u'| y": -1.0})
-    >>> rec = hs.Record(u=u, y=law.response(u))
-    >>> judge([rec], [law], lambda recs, weights: [law]).verdict
-    'cannot be told from one rate'
+    `laws` is the law once for each record: all is shared but the memory at the first sample. `refit(records, weights)`
+    returns such laws, fitted to the samples whose weights are not zero.
     """
     others = others or competitors(records)
     records, linear, spread = others.records, others.linear, others.spread
     trial = law_held_out(others.trial, records, refit)
     longest = max(range(len(records)), key=lambda k: len(records[k]))
     loops = _loops(laws[longest], records[longest].u)
-    areas = np.array([math.nan if loop is None else _signed_area(loop) for loop in loops])
+    areas = np.array([math.nan if loop is None else signed_area(loop) for loop in loops])
     stable = all(_response(law, record) is not None for law, record in zip(laws, records, strict=True))
     stable = stable and loops[-1] is not None
     single_valued = all(loop is not None and loop.relative_width < LEAST for loop in loops)
@@ -279,7 +253,8 @@ def _loops(law: Law, u: FloatArray) -> list[metrics.LoopMetrics | None]:
     return loops
 
 
-def _signed_area(loop: metrics.LoopMetrics) -> float:
+def signed_area(loop: metrics.LoopMetrics) -> float:
+    """Area of a loop, negative where it runs clockwise."""
     return {"counterclockwise": loop.area, "clockwise": -loop.area, "none": 0.0}[loop.orientation]
 
 
@@ -295,3 +270,48 @@ def _thinned(records: Sequence[Record]) -> list[Record]:
     total = sum(len(record) for record in records)
     stride = max(1, min(total // _THINNED, int(np.median(branches)) // _PER_BRANCH if branches.size else 1))
     return [record[::stride] for record in records]
+
+
+def doubts(judgement: Judgement) -> tuple[str, ...]:
+    """Reasons to doubt a law, one sentence each, for `Discovery.warnings`."""
+    errors = judgement.held_out
+    law, plays, curve = errors[LAW], errors[PLAYS], errors[CURVE]
+    linear = min((errors[name] for name in (RIVAL, RELAXATIONS) if not math.isnan(errors[name])), default=math.inf)
+    sentences = []
+    if not judgement.stable:
+        sentences.append(
+            "The law diverges in free run, on the records or on steady cycles over their range: do not simulate "
+            "with it."
+        )
+    if linear < BETTER * law:
+        sentences.append(
+            f"A linear dynamic model predicts held-out samples better than the law (rmse {linear:.3g} against "
+            f"{law:.3g})."
+        )
+    if judgement.verdict == HYSTERESIS and plays < BETTER * law:
+        sentences.append(
+            f"The law describes the hysteresis only in part: its rmse on held-out samples is {law:.3g}, that of a "
+            f"superposition of plays {plays:.3g}. Identify hs.PrandtlIshlinskii or hs.Preisach too."
+        )
+    if judgement.verdict == NO_STRUCTURE and judgement.stable:
+        sentences.append(_no_structure(judgement, min(law, plays), linear, curve))
+    return tuple(sentences)
+
+
+def _no_structure(judgement: Judgement, turning: float, linear: float, curve: float) -> str:
+    alike = min(turning, linear) >= BETTER * curve or (linear >= BETTER * curve and CURVE in judgement.explained_by)
+    if alike or not judgement.rate_spread >= SEVERAL:
+        return (
+            f"A single-valued curve of the input predicts held-out samples as well as a model with memory (rmse "
+            f"{curve:.3g} against {min(turning, linear):.3g}): the records show no loop that is wider than their noise."
+        )
+    if set(judgement.explained_by) <= {CURVE}:
+        return (
+            "No model predicts held-out samples well: the memory may be hysteresis followed by a lag, or a lag "
+            "behind a curve. Identify the law and the dynamics together, for instance as hs.Actuator."
+        )
+    return (
+        f"Models that know time and models that do not predict held-out samples about equally well (rmse {linear:.3g} "
+        f"and {turning:.3g}): noise hides what the rates could tell. Record more cycles, or rates further "
+        "apart, with less noise."
+    )

@@ -8,17 +8,17 @@ the output and the gain is 1.
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.discovery._refinement import Candidate
-from hysim.discovery._structures import AnyExponent, Terms
+from hysim.discovery._structures import AnyExponent, Structure, Terms
 from hysim.models.boucwen import BoucWen
 from hysim.models.duhem import Duhem
-from hysim.models.duhem_terms import Term, equation
+from hysim.models.terms import bouc_wen_exponent, bouc_wen_terms, equation
 from hysim.records import Record
 
 _STEP = 1e-6
@@ -28,7 +28,7 @@ OTHERS = ("n", "feedthrough", "offset", "gain")
 """Numbers of a law that are no coefficients."""
 
 
-class Found(NamedTuple):
+class ModelledLaw(NamedTuple):
     """A law: a model for each record, its numbers and their standard errors by name, and the law as text.
 
     `parameters` are the numbers that are no coefficients, `initial_states` the memory at the first sample of each
@@ -43,7 +43,7 @@ class Found(NamedTuple):
     equation: str
 
 
-def found(candidate: Candidate[Any], records: Sequence[Record], letter: str) -> Found:
+def law_from(candidate: Candidate[Any], records: Sequence[Record], letter: str) -> ModelledLaw:
     """The law of a structure refined on `records`, its memory called `letter`."""
     structure, unknowns = candidate.structure, candidate.unknowns
     numbers = _numbers(structure, letter)
@@ -56,7 +56,9 @@ def found(candidate: Candidate[Any], records: Sequence[Record], letter: str) -> 
     parameters = {name: value for name, value in values.items() if name in OTHERS}
     shifts = {name: value for name, value in parameters.items() if name != "n"}
     states = tuple({f"{letter}0": float(m.memory(r.u[:1])[0])} for m, r in zip(models, records, strict=True))
-    return Found(models, terms, parameters, states, _stderr(candidate, numbers), equation(terms, letter, **shifts))
+    return ModelledLaw(
+        models, terms, parameters, states, _stderr(candidate, numbers), equation(terms, letter, **shifts)
+    )
 
 
 def coefficients(structure: Terms, unknowns: FloatArray, letter: str) -> dict[str, float]:
@@ -64,27 +66,14 @@ def coefficients(structure: Terms, unknowns: FloatArray, letter: str) -> dict[st
     return _coefficients(_numbers(structure, letter)(unknowns[: structure.size]))
 
 
-def bouc_wen_terms(n: int) -> tuple[Term, Term, Term]:
-    """u', |u'| |z|^(n-1) z and u' |z|^n for a whole n."""
-    even = n % 2 == 0
-    return Term(False, 0, 0), Term(True, n, n - even, even), Term(False, n, n - (not even), not even)
-
-
-def whole_exponent(terms: Iterable[Term]) -> int | None:
-    """The whole exponent of the Bouc-Wen law that has these terms, or None."""
-    present = set(terms)
-    n = max((term.degree for term in present), default=0)
-    return n if n > 0 and present <= set(bouc_wen_terms(n)) else None
-
-
-def _numbers(structure: Terms | AnyExponent, letter: str) -> Callable[[FloatArray], dict[str, float]]:
+def _numbers(structure: Structure, letter: str) -> Callable[[FloatArray], dict[str, float]]:
     """From a structure's unknowns to the numbers that a user reads: a Bouc-Wen law with a feedthrough has A = 1."""
     shifts = ["feedthrough"] * structure.feedthrough + ["offset"] * structure.offset
 
     if isinstance(structure, AnyExponent):
         return lambda unknowns: _of_any_exponent(unknowns, shifts)
     names = [*(term.named(letter) for term in structure.terms), *shifts]
-    n = whole_exponent(structure.terms)
+    n = bouc_wen_exponent(structure.terms)
 
     def numbers(unknowns: FloatArray) -> dict[str, float]:
         values = dict(zip(names, unknowns.tolist(), strict=True))
@@ -96,7 +85,8 @@ def _numbers(structure: Terms | AnyExponent, letter: str) -> Callable[[FloatArra
 def _of_any_exponent(unknowns: FloatArray, shifts: Sequence[str]) -> dict[str, float]:
     n = float(unknowns[3])
     A, dissipative, conservative, *others = unknowns.tolist()
-    terms = {_A: A, f"u' |z|^{n:.4g}": conservative, f"|u'| |z|^{n - 1.0:.4g} z": dissipative}
+    _, rectified, plain = bouc_wen_terms(n)
+    terms = {_A: A, plain.named("z"): conservative, rectified.named("z"): dissipative}
     values = terms | dict(zip(["n", *shifts], others, strict=True))
     return _normalised(values, n) if "feedthrough" in shifts else values
 
@@ -128,9 +118,9 @@ def _stderr(candidate: Candidate[Any], numbers: Callable[[FloatArray], dict[str,
     return dict(zip(numbers(unknowns), spread.tolist(), strict=True))
 
 
-def _model(structure: Terms | AnyExponent, values: dict[str, float], letter: str, y0: float, u0: float) -> Any:
+def _model(structure: Structure, values: dict[str, float], letter: str, y0: float, u0: float) -> Any:
     feedthrough, offset, gain = values.get("feedthrough", 0.0), values.get("offset", 0.0), values.get("gain", 1.0)
-    n = values["n"] if isinstance(structure, AnyExponent) else whole_exponent(structure.terms)
+    n = values["n"] if isinstance(structure, AnyExponent) else bouc_wen_exponent(structure.terms)
     if isinstance(structure, Terms) and (letter == "y" or n is None):
         return Duhem.from_terms(_coefficients(values), feedthrough=feedthrough, offset=offset, y0=y0)
     terms = {name: value for name, value in _coefficients(values).items() if name != _A}

@@ -1,75 +1,70 @@
-"""The oscillator route: a memory found from an oscillator's input and output alone.
+"""The verb `discover_oscillator`: a memory found from an oscillator's input and output alone.
 
     m y'' + c y' + k y + z = u,    z' = sum of coefficients times terms in (y', z)
 
-1. A rival without memory, a mass on a linear spring, is identified. About it all terms of the library are tried: if
-   none is worth its parameter (BIC), there is no structure.
-2. Along the measured motion, with z from the equation of motion and m, c and k projected out, the laws of Bouc and Wen
-   with n = 1, 2 and 3 and a linear relaxation are regressed (`_hidden_memory`): the nearest one begins.
-3. It is refined by simulation error (`hysim.identify`).
-4. About the refined law the whole library is regressed, the law's own terms like all others: PySINDy's STLSQ and plain
-   elimination from dense to sparse, one structure by BIC, inclusion by bagging (`_oscillator_response`). Terms that are
-   not chosen leave the law, which is refined again. If terms come in, the Bouc-Wen law is refined with n free and with
-   n at the nearest whole number, and where terms come in about the best of these too, the law of these terms. All this
-   is done for each way in which the records may have been made.
-5. Of all refined laws that do not diverge, the linear spring among them, the one of the lowest BIC is taken:
-
-       BIC = N ln(V + floor^2) + d ln N
-
-   with the same N samples and the same floor for each, V the mean squared residual of its free run, and d the number
-   of its fitted parameters.
+The search is `hysim.discovery._oscillator_search`; here its arguments are checked, and records are looked at for how
+they were made.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
+from hysim._frozen import FloatArray
 from hysim._parallel import Progress
-from hysim.discovery._memory_terms import memory_terms
-from hysim.discovery._oscillator_records import checked, known_plant
 from hysim.discovery._oscillator_response import Response
-from hysim.discovery._oscillator_result import FoundOscillator
 from hysim.discovery._oscillator_search import Search
+from hysim.discovery._result import OscillatorDiscovery
+from hysim.models.oscillator import BoucWenOscillator
 from hysim.models.oscillator_structure import OscillatorStructure
+from hysim.models.terms import RELAXATION, Term, memory_terms, symmetric
 from hysim.records import Record
 
+_REPEATS = 1e-3  # of the input's rms: how nearly a period must repeat itself to be seen
+_TRANSIENT = 1.5  # rms of what changes from period to period, early in the period over late
 
-def oscillator(
-    records: Sequence[Record],
+
+def discover_oscillator(
+    record_or_records: Record | Sequence[Record],
     *,
     structure: OscillatorStructure | None = None,
     mass: float | None = None,
     damping: float | None = None,
     stiffness: float | None = None,
     degree: int = 3,
-    symmetry: str = "none",
+    symmetry: str | None = None,
     seed: int = 0,
     progress: Progress | None = None,
-) -> FoundOscillator:
-    """Find the hidden memory of ``m y'' + c y' + k y + z = u`` from u and y.
+) -> OscillatorDiscovery:
+    """Discover the law of the memory in a mass on a hysteretic spring, ``m y'' + c y' + k y + z = u``.
+
+    The plant and the law are found together, from force u and displacement y. Bouc-Wen laws, a linear relaxation and
+    laws of the terms that the records ask for are refined by the error of the simulated oscillator; the one of lowest
+    BIC is taken.
 
     Parameters
     ----------
-    records : sequence of Record
-        Force, displacement and time, evenly spaced; all of one plant. They must be long enough to hold several
-        swings, and large enough for the memory to be curved: only that tells A from k.
+    record_or_records : Record or sequence of Record
+        Force, displacement and time, evenly spaced; all of one plant. They must hold several swings, large enough for
+        the memory to be curved: only its curvature distinguishes A from k.
     structure : OscillatorStructure, optional
         How the records were made, from ``BoucWenOscillator.structure(...)``. By default a record whose input
-        repeats itself and whose periods are alike is taken as steady, its input as band-limited or as linear between
-        samples, whichever fits better; any other record as beginning at rest, its input as linear between samples.
+        repeats itself and whose periods are alike is taken as steady, any other record as beginning at rest.
     mass, damping, stiffness : float, optional
-        Known parts of the plant.
+        Known parts of the plant [u per unit of y''; y'; y].
     degree : {1, 2, 3}
-        Highest power of z in the library.
-    symmetry : {"none", "odd"}
-        Whether terms are left out that do not change their sign with u and z.
+        Highest power of z in the library of terms.
+    symmetry : {None, "odd"}
+        ``"odd"`` leaves out terms that do not change their sign with u and z.
     seed : int
-        Of the resampling behind `FoundOscillator.inclusion`.
+        Of the resampling behind `OscillatorDiscovery.inclusion`.
     progress : callable, optional
         Called as ``progress(done, total)``.
 
     Returns
     -------
-    FoundOscillator
+    OscillatorDiscovery
 
     Raises
     ------
@@ -77,24 +72,100 @@ def oscillator(
         If a record has no even time, is too short, has a constant signal or is not that of a mass on springs, or an
         option is unknown.
     TypeError
-        If an argument is not a record, or `structure` is not one.
+        If the first argument is not a record or a sequence of them, `structure` is not one, or a part of the plant is
+        no number.
 
     Examples
     --------
     >>> import numpy as np
     >>> import hysim as hs
-    >>> from hysim.discovery._oscillator import oscillator
     >>> law = hs.BoucWen(A=5e4, beta=800.0, gamma=-300.0)
     >>> plant = hs.BoucWenOscillator(mass=2.0, damping=10.0, stiffness=5e4, law=law)
     >>> t = np.arange(300) / 750
     >>> u = 60 * np.sin(2 * np.pi * (20 + 40 * t) * t)
-    >>> found = oscillator([hs.Record(u=u, y=hs.simulate(plant, t, u).y, t=t)])
-    >>> found.equation
-    "z' = 50000 u' - 800 |u'| z + 300 u' |z|"
+    >>> dis = hs.discover_oscillator(hs.Record(u=u, y=hs.simulate(plant, t, u).y, t=t))
+    >>> {term: round(value) for term, value in dis.coefficients.items()}
+    {"u'": 50000, "|u'| z": -800, "u' |z|": 300}
     """
-    known = known_plant({"mass": mass, "damping": damping, "stiffness": stiffness})
-    chosen, given = checked(records, structure, degree, symmetry), tuple(records)
-    response = Response(chosen, given, known)
-    library = memory_terms(degree, symmetry)
+    records = (record_or_records,) if isinstance(record_or_records, Record) else record_or_records
+    if not isinstance(records, Sequence) or not records or not all(isinstance(each, Record) for each in records):
+        raise TypeError(
+            f"discover_oscillator takes a Record or several, got {type(records).__name__}: hs.Record(u=u, y=y, t=t)"
+        )
+    library = _library(degree, symmetry)
+    known = _known_plant({"mass": mass, "damping": damping, "stiffness": stiffness})
+    chosen = _structure(records, structure)
     others = () if structure is not None or chosen.period is None else (replace(chosen, hold="foh"),)
-    return Search(chosen, others, given, response, library, seed, progress or (lambda done, total: None)).found()
+    search = Search(Response(chosen, tuple(records), known), library, seed, progress or (lambda done, total: None))
+    return search.result(others)
+
+
+def recorded(record: Record) -> OscillatorStructure:
+    """How a record with an even time was probably made; see `discover_oscillator`."""
+    period = _period(record.u)
+    if period is None or not _is_steady(record.y, period):
+        return BoucWenOscillator.structure()
+    return BoucWenOscillator.structure(initial="periodic", period=period, hold="band-limited")
+
+
+def _library(degree: int, symmetry: str | None) -> tuple[Term, ...]:
+    """The terms by their power of z, those that are combinations of earlier ones being left out."""
+    if degree not in (1, 2, 3):
+        raise ValueError(f"degree must be 1, 2 or 3, got {degree!r}")
+    if symmetry not in (None, "odd"):
+        raise ValueError(f'symmetry must be None or "odd", got {symmetry!r}')
+    ordered = sorted(memory_terms(degree), key=lambda term: (term.degree, term.is_even_in_memory, term.rectified))
+    return symmetric((*ordered, RELAXATION), symmetry)
+
+
+def _structure(records: Sequence[Record], structure: OscillatorStructure | None) -> OscillatorStructure:
+    if structure is None:
+        made = {recorded(record) for record in records}
+        if len(made) > 1:
+            raise ValueError("the records were not all made alike: say how by structure=, or give one at a time")
+        return made.pop()
+    if not isinstance(structure, OscillatorStructure):
+        raise TypeError(f"structure comes from BoucWenOscillator.structure(...), got {type(structure).__name__}")
+    if structure.excitation != "force":
+        raise ValueError('the input must be a force: structure(excitation="force")')
+    return structure
+
+
+def _known_plant(plant: Mapping[str, float | None]) -> dict[str, float]:
+    """The parts of the plant that are known."""
+    known = {}
+    for name, value in plant.items():
+        if value is None:
+            continue
+        if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+            raise TypeError(f"{name} must be a number, got {value!r}")
+        if not np.isfinite(value):
+            raise ValueError(f"{name} must be finite, got {value}")
+        known[name] = float(value)
+    if known.get("mass", 1.0) <= 0.0:
+        raise ValueError(f"mass must be positive, got {known['mass']}")
+    return known
+
+
+def _period(u: FloatArray) -> int | None:
+    """The smallest shift, up to half of the record, by which an input repeats itself."""
+    n = u.size
+    if np.ptp(u) == 0.0:
+        return None
+    centred = u - u.mean()
+    squares = np.concatenate([[0.0], np.cumsum(centred**2)])
+    shifts = np.arange(1, n // 2 + 1)
+    spectrum = np.fft.rfft(centred, 2 * n)
+    products = np.fft.irfft(np.abs(spectrum) ** 2, 2 * n)[shifts]
+    differences = squares[n - shifts] + squares[n] - squares[shifts] - 2.0 * products
+    repeats = differences <= _REPEATS**2 * (n - shifts) * squares[n] / n
+    first_unlike = int(np.argmax(differences > 0.5 * (n - shifts) * squares[n] / n))
+    repeats[:first_unlike] = False
+    return int(shifts[np.argmax(repeats)]) if repeats.any() else None
+
+
+def _is_steady(y: FloatArray, period: int) -> bool:
+    """Whether what changes between the first and the last period is no transient, which would be larger at first."""
+    first, last = y[:period], y[y.size // period * period - period : y.size // period * period]
+    early, late = (float(np.std(part)) for part in np.array_split(first - last, 4)[::3])
+    return early <= max(_TRANSIENT * late, 1e-6 * float(np.std(y)))

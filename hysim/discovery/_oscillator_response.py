@@ -18,15 +18,15 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim._parallel import in_chunks
-from hysim.discovery._hidden_memory import PLANT
-from hysim.discovery._marquardt import descended
-from hysim.discovery._memory_terms import MemoryTerm, law
+from hysim.discovery._hidden_memory import OSCILLATOR_SCHEDULE, PLANT, memory_arrays
 from hysim.discovery._oscillator_models import State
 from hysim.discovery._term_regression import BLOCKS, FLOOR, TermRegression, term_regression
 from hysim.errors import SimulationError
+from hysim.identification.marquardt import SumOfSquares, descend
 from hysim.kernels import hidden as kernels
 from hysim.models.oscillator_structure import OscillatorStructure
 from hysim.models.steady_state import ATTEMPTS, attracting_state
+from hysim.models.terms import Term
 from hysim.records import Record
 
 _DIFFERENCES = (3e-4, 3e-5, 3e-6)  # of a parameter, for its slope: the first with which nothing escapes
@@ -37,7 +37,7 @@ class Oscillator(NamedTuple):
     """A plant and the coefficients of its memory."""
 
     plant: dict[str, float]
-    coefficients: dict[MemoryTerm, float]
+    coefficients: dict[Term, float]
 
 
 @dataclass(frozen=True)
@@ -52,6 +52,11 @@ class Response:
     def measured(self) -> FloatArray:
         """Outputs of all records, one after the other, (n_samples,)."""
         return np.concatenate([record.y for record in self.records])
+
+    @cached_property
+    def widest(self) -> FloatArray:
+        """The displacements of the record in which they have the largest range."""
+        return max((record.y for record in self.records), key=lambda y: float(np.ptp(y)))
 
     @cached_property
     def floor(self) -> float:
@@ -69,38 +74,31 @@ class Response:
         return [(self.structure.fine_input(r.u), r.sample_time / self.structure.oversampling) for r in self.records]
 
     def outputs(self, oscillators: Sequence[Oscillator]) -> FloatArray:
-        """Simulated outputs, (n_oscillators, n_samples); inf where one escapes or never is steady."""
-        found = np.empty((len(oscillators), self.measured.size))
+        """Simulated outputs, (n_oscillators, n_samples); inf where one diverges or never is steady."""
+        outputs = np.full((len(oscillators), self.measured.size), np.inf)
+        begins = np.cumsum([0, *map(len, self.records)])
 
         def work(start: int, stop: int) -> None:
             for k in range(start, stop):
-                parts = []
-                for record, given in zip(self.records, self._inputs, strict=True):
-                    y = self._simulated(oscillators[k], *given)
-                    parts.append(np.full(len(record), np.inf) if y is None else np.resize(y, len(record)))
-                found[k] = np.concatenate(parts)
+                for record, begin, given in zip(self.records, begins, self._inputs, strict=False):
+                    run = self._run(oscillators[k], *given)
+                    if run is not None:
+                        y = np.resize(self.structure.sampled(run[0]), len(record))
+                        outputs[k, begin : begin + len(record)] = y
 
         in_chunks(work, len(oscillators), minimum=1)
-        return found
+        return outputs
 
     def initial_states(self, oscillator: Oscillator) -> tuple[State, ...]:
         """State at the first sample of each record: rest, or that of the steady motion under a periodic input."""
-        if self.structure.period is None:
-            return (State(0.0, 0.0, 0.0),) * len(self.records)
-        found = []
-        for force, h in self._inputs:
-            run = self._run(oscillator, force, h)
-            found.append(State(*([np.nan] * 3 if run is None else run[1].tolist())))
-        return tuple(found)
-
-    def _simulated(self, oscillator: Oscillator, force: FloatArray, h: float) -> FloatArray | None:
-        run = self._run(oscillator, force, h)
-        return None if run is None else self.structure.sampled(run[0])
+        runs = [self._run(oscillator, *given) if self.structure.period else None for given in self._inputs]
+        missing = np.nan if self.structure.period else 0.0
+        return tuple(State(*([missing] * 3 if run is None else run[1].tolist())) for run in runs)
 
     def _run(self, oscillator: Oscillator, force: FloatArray, h: float) -> tuple[FloatArray, FloatArray] | None:
         """Displacement at the ends of the steps, and the last state, in a steady motion that of the first sample."""
-        degree = max((int(term.power) for term in oscillator.coefficients if term.whole), default=0)
-        polynomial, extra, power, relaxation = law(oscillator.coefficients, degree)
+        degree = max((int(term.degree) for term in oscillator.coefficients if term.is_polynomial), default=0)
+        polynomial, extra, power, relaxation = memory_arrays(oscillator.coefficients, degree)
         plant = np.array([*(oscillator.plant[name] for name in PLANT), relaxation, power])
         state = np.zeros(3)
         if self.structure.period is None:
@@ -127,7 +125,7 @@ class Response:
             return None
         return None
 
-    def slopes(self, oscillator: Oscillator, terms: Sequence[MemoryTerm]) -> FloatArray:
+    def slopes(self, oscillator: Oscillator, terms: Sequence[Term]) -> FloatArray:
         """Derivatives of the output by the plant's free parameters and the coefficients of `terms`, (n_samples, n).
 
         Zero where the motion would escape, or never be steady, with any of the differences.
@@ -136,14 +134,14 @@ class Response:
         missing = np.arange(slopes.shape[1])
         for difference in _DIFFERENCES:
             if missing.size:
-                found = self._differences(oscillator, terms, missing, difference)
-                whole = np.isfinite(found).all(axis=0)
-                slopes[:, missing[whole]] = found[:, whole]
-                missing = missing[~whole]
+                columns = self._differences(oscillator, terms, missing, difference)
+                is_finite = np.isfinite(columns).all(axis=0)
+                slopes[:, missing[is_finite]] = columns[:, is_finite]
+                missing = missing[~is_finite]
         return slopes
 
     def _differences(
-        self, oscillator: Oscillator, terms: Sequence[MemoryTerm], places: npt.NDArray[np.intp], difference: float
+        self, oscillator: Oscillator, terms: Sequence[Term], places: npt.NDArray[np.intp], difference: float
     ) -> FloatArray:
         """Central differences by the parameters at some places; not finite where one escapes."""
         plant, coefficients = oscillator
@@ -152,16 +150,16 @@ class Response:
         frequency = np.sqrt(abs(spring) / plant["mass"])
         units = {"mass": plant["mass"], "damping": plant["mass"] * frequency, "stiffness": spring}
         steps = [units[name] for name in self.free]
-        steps += [frequency if term.relaxing else spring / size**term.power for term in terms]
+        steps += [frequency if term.relaxing else spring / size**term.degree for term in terms]
 
-        def moved(k: int, by: float) -> Oscillator:
+        def displaced(k: int, by: float) -> Oscillator:
             if k < len(self.free):
                 return Oscillator(plant | {self.free[k]: plant[self.free[k]] + by}, coefficients)
             term = terms[k - len(self.free)]
             return Oscillator(plant, coefficients | {term: coefficients.get(term, 0.0) + by})
 
         by = difference * np.array(steps)[places]
-        both = [moved(int(k), sign * step) for sign in (1.0, -1.0) for k, step in zip(places, by, strict=True)]
+        both = [displaced(int(k), sign * step) for sign in (1.0, -1.0) for k, step in zip(places, by, strict=True)]
         with np.errstate(invalid="ignore"):
             ahead, behind = np.split(self.outputs(both), 2)
             return np.asarray((ahead - behind).T / (2.0 * by))
@@ -174,19 +172,21 @@ class Response:
             plant = oscillator.plant | dict(zip(self.free, x.tolist(), strict=False))
             return Oscillator(plant, dict(zip(terms, x[len(self.free) :].tolist(), strict=True)))
 
-        def left(x: FloatArray) -> FloatArray | None:
-            there = at(x)
-            found = self.measured - self.outputs([there])[0] if there.plant["mass"] > 0.0 else None
-            return found if found is not None and np.isfinite(found).all() else None
+        def residuals(points: FloatArray) -> FloatArray:
+            oscillators = [at(x) for x in points]
+            possible = [k for k, each in enumerate(oscillators) if each.plant["mass"] > 0.0]
+            residuals = np.full((len(points), self.measured.size), np.inf)
+            residuals[possible] = self.measured - self.outputs([oscillators[k] for k in possible])
+            return residuals
 
-        def slopes(x: FloatArray) -> tuple[FloatArray, FloatArray]:
-            J = self.slopes(at(x), terms)
-            return J, np.linalg.norm(J, axis=0)
+        def slopes(x: FloatArray, residual: FloatArray) -> FloatArray:
+            return -self.slopes(at(x), terms)
 
         start = [oscillator.plant[name] for name in self.free] + list(oscillator.coefficients.values())
-        return at(descended(left, slopes, np.array(start)))
+        problem = SumOfSquares(residuals, slopes)
+        return at(descend(problem, np.array([start]), relative=1e-7, steps=100, schedule=OSCILLATOR_SCHEDULE).x[0])
 
-    def regression(self, oscillator: Oscillator, residual: FloatArray, library: Sequence[MemoryTerm]) -> TermRegression:
+    def regression(self, oscillator: Oscillator, residual: FloatArray, library: Sequence[Term]) -> TermRegression:
         """The regression about an oscillator with this residual on all terms of the library and its own."""
         terms = (*library, *(term for term in oscillator.coefficients if term not in library))
         slopes = self.slopes(oscillator, terms)

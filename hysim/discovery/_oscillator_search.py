@@ -1,4 +1,18 @@
-"""The search behind `hysim.discovery._oscillator`: candidates for the law of the memory, and the choice of one."""
+"""The search behind `hysim.discover_oscillator`: candidates for the law of the memory, and the choice of one.
+
+1. A rival without memory, a mass on a linear spring, is identified. About it all terms of the library are tried: if
+   none is worth its parameter (BIC), there is no structure.
+2. Along the measured motion, with z from the equation of motion and m, c and k projected out, the laws of Bouc and Wen
+   with n = 1, 2 and 3 and a linear relaxation are regressed (`_hidden_memory`): the nearest one begins.
+3. It is refined by simulation error (`hysim.identify`).
+4. About the refined law the whole library is regressed, the law's own terms like all others: PySINDy's STLSQ and plain
+   elimination from dense to sparse, one structure by BIC, inclusion by bagging (`_oscillator_response`). Terms that are
+   not chosen leave the law, which is refined again. If terms come in, the Bouc-Wen law is refined with n free and with
+   n at the nearest whole number, and where terms come in about the best of these too, the law of these terms. All this
+   is done for each way in which the records may have been made.
+5. Of all refined laws that do not diverge, the linear spring among them, the one of the lowest BIC is taken, each with
+   the same samples and the same floor; every number that has a standard error counts as a parameter.
+"""
 
 import contextlib
 from collections.abc import Mapping, Sequence
@@ -11,25 +25,25 @@ from hysim import metrics
 from hysim._frozen import FloatArray
 from hysim._parallel import Progress
 from hysim.discovery._hidden_memory import PLANT, HiddenMemory, Regressed
-from hysim.discovery._judgement import HYSTERESIS, NO_STRUCTURE
-from hysim.discovery._memory_terms import RELAXATION, MemoryTerm, bouc_wen_terms, equation
+from hysim.discovery._judgement import NO_STRUCTURE
 from hysim.discovery._oscillator_models import (
     RATE_DEPENDENT,
     SPRING,
     State,
     diverges,
-    exponent,
     model,
+    steady_loop,
     verdict,
 )
 from hysim.discovery._oscillator_response import Oscillator, Response
-from hysim.discovery._oscillator_result import FoundOscillator
+from hysim.discovery._result import OscillatorDiscovery
 from hysim.discovery._term_regression import TermRegression
 from hysim.identification import identify
+from hysim.metrics.criteria import information
 from hysim.models.equation_of_motion import Linear, linear_plant
 from hysim.models.oscillator_structure import OscillatorStructure
+from hysim.models.terms import RELAXATION, Term, bouc_wen_exponent, bouc_wen_terms, law_text
 from hysim.models.transfer_function import TransferFunction
-from hysim.records import Record
 
 N_DRAWS = 20
 
@@ -56,19 +70,13 @@ class _Fitted(NamedTuple):
     warnings: tuple[str, ...] = ()
 
     @property
-    def terms(self) -> tuple[MemoryTerm, ...]:
+    def terms(self) -> tuple[Term, ...]:
         """The terms of the law."""
         return tuple(self.oscillator.coefficients)
 
-    @property
-    def verdict(self) -> str:
-        """The kind of law."""
-        return verdict(self.terms)
-
     def bic(self, floor: float) -> float:
         """Bayesian information criterion; each number that has a standard error counts as a parameter."""
-        n = self.residual.size
-        return float(n * np.log(np.mean(self.residual**2) + floor**2) + len(self.stderr) * np.log(n))
+        return information(float(np.mean(self.residual**2)), self.residual.size, len(self.stderr), floor=floor)
 
 
 class _Tried(NamedTuple):
@@ -76,30 +84,34 @@ class _Tried(NamedTuple):
 
     fitted: _Fitted
     regression: TermRegression
-    structures: list[tuple[MemoryTerm, ...]]
-    chosen: tuple[MemoryTerm, ...]
+    structures: list[tuple[Term, ...]]
+    chosen: tuple[Term, ...]
 
     @property
-    def beyond(self) -> set[MemoryTerm]:
+    def beyond(self) -> set[Term]:
         """Terms that are chosen and not in the law."""
         return set(self.chosen) - set(self.fitted.terms)
 
 
 class Search(NamedTuple):
-    """Records, how they were made, and the library; `others` are other beliefs about how they were made."""
+    """The response of oscillators on some records, which says how these were made, and the library of terms."""
 
-    structure: OscillatorStructure
-    others: tuple[OscillatorStructure, ...]
-    records: tuple[Record, ...]
     response: Response
-    library: tuple[MemoryTerm, ...]
+    library: tuple[Term, ...]
     seed: int
     progress: Progress
 
-    def found(self) -> FoundOscillator:
-        """Steps 1 to 5."""
-        memory = self._along()
-        elastic = self._without_memory(memory.linear)
+    def result(self, others: Sequence[OscillatorStructure] = ()) -> OscillatorDiscovery:
+        """Steps 1 to 5; `others` are other ways in which the records may have been made."""
+        motions = [self.response.structure.motion(record) for record in self.response.records]
+        linear = linear_plant(motions[0])
+        if linear is None:
+            raise ValueError(
+                "no plant with a positive mass is near: check the sign of u and y, and the time; or the motion is too "
+                "far from that of a linear spring"
+            )
+        memory = HiddenMemory(motions, linear, self.response.known)
+        elastic = self._without_memory(linear)
         self.progress(1, _STEPS)
         first = _tried(elastic, memory.regression(self.library))
         self.progress(2, _STEPS)
@@ -110,7 +122,7 @@ class Search(NamedTuple):
         if nearest is None:
             return self._described(first, elastic, {}, ("Every law tried diverges along the measured displacement.",))
         refined, failures = [], []
-        for search in (self, *map(self._made, self.others)):
+        for search in (self, *(self._made(structure) for structure in others)):
             try:
                 refined.append((search, search._refined(nearest)))
             except ValueError as error:
@@ -119,7 +131,7 @@ class Search(NamedTuple):
         if not refined:
             return self._described(first, elastic, {}, tuple(failures[:1]))
         best, fitted = min(refined, key=lambda each: float(each[1].residual @ each[1].residual))
-        first = best._tried(fitted)
+        first = best._about(fitted)
         candidates = [(best, each) for each in best._candidates(first)]
         if first.beyond:  # a law that is not the one decided how the records were made
             candidates += [pair for search, _ in refined if search is not best for pair in search._again(candidates)]
@@ -127,46 +139,32 @@ class Search(NamedTuple):
 
     def _made(self, structure: OscillatorStructure) -> "Search":
         """The same search under another assumption of how the records were made."""
-        return self._replace(structure=structure, response=replace(self.response, structure=structure))
+        return self._replace(response=replace(self.response, structure=structure))
 
     def _again(self, candidates: "Sequence[tuple[Search, _Tried]]") -> "list[tuple[Search, _Tried]]":
         """Candidates by this belief about how the records were made; none if it suits the best Bouc-Wen law less."""
-        laws = [each for _, each in candidates if each.fitted.verdict == HYSTERESIS]
+        laws = [each for _, each in candidates if bouc_wen_exponent(each.fitted.terms) is not None]
         if not laws:
             return []
         law = min(laws, key=self._bic).fitted
         with contextlib.suppress(ValueError):  # the candidates by the other belief stay
-            begun = self._bouc_wen(law.terms if _is_whole(law.terms) else ())
-            if begun.bic(self._floor) < law.bic(self._floor):
-                return [(self, each) for each in self._candidates(self._tried(begun))]
+            begun = self._bouc_wen(law.terms if _is_polynomial(law.terms) else ())
+            if begun.bic(self.response.floor) < law.bic(self.response.floor):
+                return [(self, each) for each in self._candidates(self._about(begun))]
         return []
 
-    @property
-    def _floor(self) -> float:
-        return self.response.floor
-
     def _bic(self, tried: _Tried) -> float:
-        return tried.fitted.bic(self._floor)
-
-    def _along(self) -> HiddenMemory:
-        motions = [self.structure.motion(record) for record in self.records]
-        linear = linear_plant(motions[0])
-        if linear is None:
-            raise ValueError(
-                "no plant with a positive mass is near: check the sign of u and y, and the time; or the motion is too "
-                "far from that of a linear spring"
-            )
-        return HiddenMemory(motions, linear, self.response.known)
+        return tried.fitted.bic(self.response.floor)
 
     def _without_memory(self, linear: Linear) -> _Fitted:
         """The rival without a memory. Where the stiffness is given, z = A y is the rest of the spring."""
         plant: dict[str, float] = {**linear._asdict(), **self.response.known}
         springs = {SPRING: linear.stiffness - plant["stiffness"]} if "stiffness" in self.response.known else {}
-        found = self._simulated(Oscillator(plant, springs))
-        plant, law = found.oscillator
+        refined = self._simulated(Oscillator(plant, springs))
+        plant, law = refined.oscillator
         plant = plant | {"stiffness": plant["stiffness"] + law.get(SPRING, 0.0)}
-        stderr = {"stiffness" if name == SPRING.name else name: value for name, value in found.stderr.items()}
-        return found._replace(oscillator=Oscillator(plant, {}), stderr=stderr)
+        stderr = {"stiffness" if name == SPRING.name else name: value for name, value in refined.stderr.items()}
+        return refined._replace(oscillator=Oscillator(plant, {}), stderr=stderr)
 
     def _refined(self, nearest: Regressed) -> _Fitted:
         """Step 3."""
@@ -176,30 +174,30 @@ class Search(NamedTuple):
 
     def _candidates(self, first: _Tried) -> list[_Tried]:
         """Step 4: the first law; where it lacks terms, also n free, n at the nearest whole number, and these terms."""
-        found, is_free = self._pruned(first), not _is_whole(first.fitted.terms)
-        if not found[-1].beyond and not is_free:
-            return found
+        candidates, is_free = self._pruned(first), not _is_polynomial(first.fitted.terms)
+        if not candidates[-1].beyond and not is_free:
+            return candidates
         with contextlib.suppress(ValueError):  # the first law stays
-            free = first if is_free else self._tried(self._bouc_wen(()))
-            found += [] if is_free else [free]
-            n = float(max(round(exponent(free.fitted.terms) or 1.0), 1))
-            if n != exponent(first.fitted.terms):
-                found += self._pruned(self._tried(self._bouc_wen(bouc_wen_terms(n))))
-        if not min(found, key=self._bic).beyond:
-            return found
-        lacking = [each for each in found if each.beyond and _is_whole(each.chosen)]
+            free = first if is_free else self._about(self._bouc_wen(()))
+            candidates += [] if is_free else [free]
+            n = float(max(round(bouc_wen_exponent(free.fitted.terms) or 1.0), 1))
+            if n != bouc_wen_exponent(first.fitted.terms):
+                candidates += self._pruned(self._about(self._bouc_wen(bouc_wen_terms(n))))
+        if not min(candidates, key=self._bic).beyond:
+            return candidates
+        lacking = [each for each in candidates if each.beyond and _is_polynomial(each.chosen)]
         more = self._extended(min(lacking, key=self._bic)) if lacking else None
-        return found if more is None else [*found, more]
+        return candidates if more is None else [*candidates, more]
 
     def _pruned(self, tried: _Tried) -> list[_Tried]:
         """A Bouc-Wen law, and the same without those of its terms that are not chosen."""
         law = tried.fitted.terms
         kept = tuple(term for term in law if term == SPRING or term in tried.chosen)
-        n = exponent(kept)
-        if tried.fitted.verdict != HYSTERESIS or len(kept) == len(law) or n is None or not _is_whole(kept):
+        n = bouc_wen_exponent(kept)
+        if bouc_wen_exponent(law) is None or len(kept) == len(law) or n is None or n != int(n):
             return [tried]
         with contextlib.suppress(ValueError):  # the law with all terms stays
-            return [tried, self._tried(self._bouc_wen(kept))]
+            return [tried, self._about(self._bouc_wen(kept))]
         return [tried]
 
     def _extended(self, tried: _Tried) -> _Tried | None:
@@ -208,7 +206,7 @@ class Search(NamedTuple):
             plant, coefficients = tried.fitted.oscillator
             law = {term: coefficients.get(term, 0.0) for term in tried.regression.terms if term in tried.chosen}
             try:
-                again = self._tried(self._simulated(Oscillator(plant, law)))
+                again = self._about(self._simulated(Oscillator(plant, law)))
             except ValueError:
                 return None
             if set(again.chosen) == set(law) or not again.chosen:
@@ -216,15 +214,15 @@ class Search(NamedTuple):
             tried = again
         return tried
 
-    def _bouc_wen(self, terms: Sequence[MemoryTerm]) -> _Fitted:
+    def _bouc_wen(self, terms: Sequence[Term]) -> _Fitted:
         """Identified with these terms of a Bouc-Wen law; without any, with all of them and n free."""
-        fixed: dict[str, float] = {} if not terms else {"n": exponent(terms) or 1.0}
+        fixed: dict[str, float] = {} if not terms else {"n": bouc_wen_exponent(terms) or 1.0}
         for rectified, name in ((True, "beta"), (False, "gamma")):
             if terms and all(term.rectified != rectified for term in terms if term != SPRING):
                 fixed[name] = 0.0
         fit = identify(
-            self.structure,
-            self.records,
+            self.response.structure,
+            self.response.records,
             fixed={**fixed, **self.response.known},
             bounds={} if terms else {"n": _EXPONENTS},
         )
@@ -235,7 +233,7 @@ class Search(NamedTuple):
             if name not in fixed
         }
         stderr = {name: value for name, value in fit.stderr.items() if name not in _LAW}
-        stderr |= {term.name: fit.stderr[name] for term, (_, name) in law.items()}
+        stderr |= {term.named("z"): fit.stderr[name] for term, (_, name) in law.items()}
         plant = {name: numbers[name] for name in PLANT}
         warnings: list[str] = [] if fit.success else [f"The refinement did not converge: {fit.message}."]
         if not terms:
@@ -252,10 +250,10 @@ class Search(NamedTuple):
         ValueError
             If it diverges.
         """
-        found = self.response.descended(oscillator)
-        terms = tuple(found.coefficients)
-        residual = self.response.measured - self.response.outputs([found])[0]
-        J = self.response.slopes(found, terms)
+        refined = self.response.descended(oscillator)
+        terms = tuple(refined.coefficients)
+        residual = self.response.measured - self.response.outputs([refined])[0]
+        J = self.response.slopes(refined, terms)
         size = np.linalg.norm(J, axis=0)
         if not (np.isfinite(residual).all() and (size > 0.0).all()):
             raise ValueError(
@@ -264,82 +262,88 @@ class Search(NamedTuple):
             )
         variance = float(residual @ residual) / max(residual.size - size.size, 1)
         errors = np.sqrt(variance * np.diag(np.linalg.pinv((J / size).T @ (J / size)))) / size
-        names = (*self.response.free, *(term.name for term in terms))
-        return _Fitted(found, dict(zip(names, errors.tolist(), strict=True)), residual)
+        names = (*self.response.free, *(term.named("z") for term in terms))
+        return _Fitted(refined, dict(zip(names, errors.tolist(), strict=True)), residual)
 
-    def _tried(self, fitted: _Fitted) -> _Tried:
+    def _about(self, fitted: _Fitted) -> _Tried:
         """The library about a law; where n is free, the terms that differ from the law's own by their power are none.
 
         The law itself is among the structures: a path of elimination need not meet it.
         """
         law = fitted.oscillator.coefficients
-        same = {(term.rectified, term.even) for term in law if not (term.whole or term.relaxing)}
-        library = [term for term in self.library if not term.power or (term.rectified, term.even) not in same]
+        same = {(t.rectified, t.is_even_in_memory) for t in law if not (t.is_polynomial or t.relaxing)}
+        library = [t for t in self.library if not t.degree or (t.rectified, t.is_even_in_memory) not in same]
         regression = self.response.regression(fitted.oscillator, fitted.residual, library)
-        return _tried(fitted, regression if _is_whole(fitted.terms) else replace(regression, n_others=1))
+        return _tried(fitted, regression if _is_polynomial(fitted.terms) else replace(regression, n_others=1))
 
     def _diverges(self, fitted: _Fitted) -> bool:
         plant, law = fitted.oscillator
-        largest = max((record.y for record in self.records), key=lambda y: float(np.ptp(y)))
-        return diverges(model(plant, law, self.structure, State(0.0, 0.0, 0.0)), largest)
+        return diverges(model(plant, law, self.response.structure, State(0.0, 0.0, 0.0)), self.response.widest)
 
     def _described(
         self,
         tried: _Tried,
         elastic: _Fitted,
-        regressed: Mapping[MemoryTerm, float],
+        regressed: Mapping[Term, float],
         warnings: tuple[str, ...] = (),
-    ) -> FoundOscillator:
-        fitted, regression = tried.fitted, tried.regression
-        measured = self.response.measured
+    ) -> OscillatorDiscovery:
+        fitted, regression, structures = tried.fitted, tried.regression, tried.structures
         plant, law = fitted.oscillator
-        coefficients = {term.name: value for term, value in law.items()}
+        measured, response = self.response.measured, self.response
+        coefficients = {term.named("z"): value for term, value in law.items()}
         shares = regression.inclusion(np.random.default_rng(self.seed), N_DRAWS)
-        inclusion = {term.name: share for term, share in shares.items()}
-        states = self.response.initial_states(fitted.oscillator)
-        models = [model(plant, law, self.structure, state) for state in states]
-        structures = tried.structures
+        inclusion = {term.named("z"): share for term, share in shares.items()}
+        states = response.initial_states(fitted.oscillator)
+        models = [model(plant, law, response.structure, state) for state in states]
         nothing = (_NO_MODEL,) if models[0] is None else ()
         warnings = (*nothing, *warnings, *fitted.warnings, *_warnings(tried, inclusion))
+        free_exponent = {"n": bouc_wen_exponent(law) or np.nan} if "n" in fitted.stderr else {}
+        held_out = np.array([regression.held_out_rmse(terms) for terms in structures])
+        width, area = steady_loop(models[0] if law else None, response.widest)
         self.progress(_STEPS, _STEPS)
-        return FoundOscillator(
+        return OscillatorDiscovery(
             model=models[0],
             models=tuple(each for each in models if each is not None),
             coefficients=coefficients,
             stderr=fitted.stderr,
-            equation=equation(coefficients),
-            verdict=fitted.verdict,
-            **plant,
-            initial="rest" if self.structure.period is None else "periodic",
-            initial_states=states,
-            rival=_transfer_function(elastic),
-            regressed={term.name: value for term, value in regressed.items()},
-            inclusion=inclusion,
-            left_out=tuple(term.name for term in regression.dependent),
+            equation=f"{law_text(coefficients, 'z')}, {_motion(plant)}",
+            verdict=verdict(fitted.terms),
             scores={
                 "fit_percent": metrics.fit_percent(measured, measured - fitted.residual),
                 "rmse": float(np.sqrt(np.mean(fitted.residual**2))),
-                "bic": fitted.bic(self._floor),
-                "held_out_rmse": self.response.held_out_rmse(fitted.oscillator, fitted.residual),
+                "bic": fitted.bic(response.floor),
+                "held_out_rmse": response.held_out_rmse(fitted.oscillator, fitted.residual),
                 "linear_rmse": float(np.sqrt(np.mean(elastic.residual**2))),
-                "linear_held_out_rmse": self.response.held_out_rmse(elastic.oscillator, elastic.residual),
-                "linear_bic": elastic.bic(self._floor),
+                "linear_held_out_rmse": response.held_out_rmse(elastic.oscillator, elastic.residual),
+                "linear_bic": elastic.bic(response.floor),
+                "n_terms": len(coefficients),
+                "n_structures": len(structures),
                 "condition": regression.condition,
             },
+            n_parameters=len(fitted.stderr),
+            parameters=plant | free_exponent,
+            initial="rest" if response.structure.period is None else "periodic",
+            initial_states=tuple(dict(zip(("y0", "y'0", "z0"), state, strict=True)) for state in states),
+            rival=TransferFunction(num=(1.0,), den=tuple(elastic.oscillator.plant[name] for name in PLANT), hold="foh"),
+            regressed={term.named("z"): value for term, value in regressed.items()},
+            inclusion=inclusion,
+            left_out=tuple(term.named("z") for term in regression.dependent),
             path_n_terms=np.array([len(terms) for terms in structures], dtype=float),
             path_bic=np.array([regression.bic(terms) for terms in structures]),
-            path_held_out_rmse=np.array([regression.held_out_rmse(terms) for terms in structures]),
-            path_terms=tuple(", ".join(term.name for term in terms) for terms in structures),
-            message=_message(fitted, warnings),
+            path_fit_percent=100.0 * (1.0 - held_out / float(np.std(measured))),
+            path_terms=tuple(", ".join(term.named("z") for term in terms) for terms in structures),
+            relative_width=width,
+            dissipation=area,
+            message=_message(verdict(fitted.terms), warnings),
             warnings=warnings,
         )
 
 
-def _chosen(candidates: Sequence[tuple[Search, _Tried]], elastic: _Fitted, nearest: Regressed) -> FoundOscillator:
+def _chosen(candidates: Sequence[tuple[Search, _Tried]], elastic: _Fitted, nearest: Regressed) -> OscillatorDiscovery:
     """Step 5: the law of the lowest BIC of those that do not diverge, or none."""
     ranked = sorted(candidates, key=lambda each: each[0]._bic(each[1]))
     search, lowest = ranked[0]
-    linear = elastic.bic(search._floor)
+    linear = elastic.bic(search.response.floor)
     for rank, (believed, each) in enumerate(ranked):
         if believed._bic(each) < linear and not believed._diverges(each.fitted):
             return believed._described(each, elastic, nearest.coefficients, (_DIVERGES,) if rank else ())
@@ -354,20 +358,22 @@ def _tried(fitted: _Fitted, regression: TermRegression) -> _Tried:
     return _Tried(fitted, regression, structures, regression.best(structures))
 
 
-def _transfer_function(elastic: _Fitted) -> TransferFunction:
-    plant = elastic.oscillator.plant
-    return TransferFunction(num=(1.0,), den=tuple(plant[name] for name in PLANT), hold="foh")
+def _is_polynomial(terms: Sequence[Term]) -> bool:
+    """Whether no power in a law is a free number."""
+    return all(term.is_polynomial or term.relaxing for term in terms)
 
 
-def _is_whole(terms: Sequence[MemoryTerm]) -> bool:
-    return all(term.whole or term.relaxing for term in terms)
+def _motion(plant: Mapping[str, float]) -> str:
+    """The equation of motion as text."""
+    text = f"{plant['mass']:.6g} y'' + {plant['damping']:.6g} y' + {plant['stiffness']:.6g} y + z = u"
+    return text.replace("+ -", "- ")
 
 
-def _message(fitted: _Fitted, warnings: Sequence[str]) -> str:
+def _message(kind: str, warnings: Sequence[str]) -> str:
     """How the search ended."""
-    if fitted.verdict == NO_STRUCTURE:
+    if kind == NO_STRUCTURE:
         return "no term of the library is worth its parameter beside a linear spring"
-    if fitted.verdict == RATE_DEPENDENT:
+    if kind == RATE_DEPENDENT:
         return "the memory depends on the rate"
     return "" if warnings else "every term is needed, and no other"
 
@@ -375,9 +381,10 @@ def _message(fitted: _Fitted, warnings: Sequence[str]) -> str:
 def _warnings(tried: _Tried, inclusion: Mapping[str, float]) -> tuple[str, ...]:
     """Reasons to doubt the law, the gravest first."""
     parts = []
-    if tried.fitted.verdict != NO_STRUCTURE and tried.beyond:
-        parts.append(f"The records ask for more terms: {', '.join(term.name for term in sorted(tried.beyond))}.")
-    doubtful = [term.name for term in tried.fitted.terms if inclusion.get(term.name, 0.0) < _SURE]
+    if verdict(tried.fitted.terms) != NO_STRUCTURE and tried.beyond:
+        parts.append(f"The records ask for more terms: {', '.join(term.named('z') for term in sorted(tried.beyond))}.")
+    names = [term.named("z") for term in tried.fitted.terms]
+    doubtful = [name for name in names if inclusion.get(name, 0.0) < _SURE]
     if doubtful:
         parts.append(f"Some terms are not in every fit to resampled data: {', '.join(doubtful)}.")
     if tried.fitted.terms and tried.regression.condition > _LARGEST_CONDITION:

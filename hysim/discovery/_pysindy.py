@@ -6,6 +6,7 @@ and put back.
 """
 
 import contextlib
+import importlib.util
 import warnings
 from collections.abc import Iterator
 from typing import Any
@@ -58,10 +59,10 @@ def compressed(features: FloatArray, slope: FloatArray) -> tuple[FloatArray, Flo
 
 def sparse_fit(features: FloatArray, slope: FloatArray, threshold: float, optimizer: str = "STLSQ") -> FloatArray:
     """Coefficients (n_terms,) at one threshold, zero where the optimizer removed the term."""
-    found = _thresholding(optimizer, threshold, features)
+    fitted = _thresholding(optimizer, threshold, features)
     with _quiet():
-        found.fit(features, slope[:, np.newaxis])
-    return np.array(found.coef_[0])
+        fitted.fit(features, slope[:, np.newaxis])
+    return np.array(fitted.coef_[0])
 
 
 def inclusion(features: FloatArray, slope: FloatArray, threshold: float, *, n_models: int, seed: int) -> FloatArray:
@@ -87,11 +88,8 @@ def check(optimizer: str) -> None:
     if optimizer in OPTIMIZERS:
         return
     extra = _EXTRAS.get(optimizer)
-    if extra is not None:
-        import pysindy
-
-        if not hasattr(pysindy, optimizer):
-            raise ImportError(f"PySINDy's {optimizer} needs its extra: pip install 'pysindy[{extra}]'")
+    if extra is not None and importlib.util.find_spec(extra) is None:
+        raise ImportError(f"PySINDy's {optimizer} needs its extra: pip install 'pysindy[{extra}]'")
     raise ValueError(f"optimizer must be one of {', '.join(OPTIMIZERS)}, got {optimizer!r}")
 
 
@@ -112,15 +110,12 @@ def _ridge(features: FloatArray) -> float:
 def _greedy_path(features: FloatArray, slope: FloatArray, optimizer: str) -> list[tuple[float, FloatArray]]:
     import pysindy
 
-    n_terms = features.shape[1]
-    if optimizer == "SSR":
-        found = pysindy.SSR(alpha=_ridge(features), max_iter=n_terms, unbias=False)
-    else:
-        found = pysindy.FROLS(alpha=_ridge(features), max_iter=n_terms, unbias=False)
+    kinds = {"SSR": pysindy.SSR, "FROLS": pysindy.FROLS}
+    fitted = kinds[optimizer](alpha=_ridge(features), max_iter=features.shape[1], unbias=False)
     with _quiet():
-        found.fit(features, slope[:, np.newaxis])
+        fitted.fit(features, slope[:, np.newaxis])
     structures: dict[tuple[bool, ...], FloatArray] = {}
-    for coefficients in (np.ravel(each) for each in found.history_):
+    for coefficients in (np.ravel(each) for each in fitted.history_):
         if coefficients.any():
             structures.setdefault(tuple(coefficients != 0.0), np.array(coefficients))
     ordered = sorted(structures.values(), key=np.count_nonzero, reverse=True)

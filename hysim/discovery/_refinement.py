@@ -19,10 +19,11 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
-from hysim.discovery._descent import Reached, descend, linearised
-from hysim.discovery._library import Regression
-from hysim.discovery._structures import Structure, Terms
-from hysim.models.duhem_terms import Term
+from hysim.discovery._slopes import Regression
+from hysim.discovery._structures import AnyExponent, Structure, Terms, output_at_rest
+from hysim.identification.marquardt import Schedule, SumOfSquares, descend, differences
+from hysim.metrics.criteria import information
+from hysim.models.terms import Term
 from hysim.records import Record
 
 BOUND = 30.0
@@ -32,6 +33,7 @@ RANKING = 1e-5  # relative change of the cost at which a descent ends: far less 
 POLISH = 1e-12
 _STEPS_TO_RANK = 20  # a structure that is still on its way then is not taken for its last digits
 _STEPS = 200
+_SCHEDULE = Schedule(factors=(1e-3, 1e-1, 1.0, 10.0), success=1.0, failure=1e4, least=1e-12, most=1e8)
 _RIDGES = tuple(10.0**power for power in range(-9, 1))
 _SINGULAR = 1e-10
 _STIFFEST = 200.0  # units that a number may reach: a memory that turns within 1/200 of the range of u is a step
@@ -41,7 +43,7 @@ _STEADY = 1e-2  # strokes by which the last two may differ
 
 Samples = npt.NDArray[np.bool_]
 
-S = TypeVar("S", bound=Structure)
+S = TypeVar("S", Terms, AnyExponent)
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,7 @@ class Candidate(Generic[S]):
     @cached_property
     def bic(self) -> float:
         """Bayesian information criterion, the lower the better."""
-        return information(self.cost, self.residual.size, self.n_parameters)
+        return bic_of(self.cost, self.residual.size, self.n_parameters)
 
     @property
     def covariance(self) -> FloatArray:
@@ -102,13 +104,13 @@ def _covariance(jacobian: FloatArray, cost: float) -> FloatArray:
 
 
 def cost_of(bic: float, n_samples: int, n_parameters: int) -> float:
-    """The sum of squared residuals, in squared strokes, of which `information` is `bic`; negative if there is none."""
+    """The sum of squared residuals, in squared strokes, of which `bic_of` is `bic`; negative if there is none."""
     return n_samples * (math.exp((bic - n_parameters * math.log(n_samples)) / n_samples) - FLOOR**2)
 
 
-def information(cost: float, n_samples: int, n_parameters: int) -> float:
+def bic_of(cost: float, n_samples: int, n_parameters: int) -> float:
     """BIC of a sum of squared residuals in squared strokes."""
-    return n_samples * math.log(cost / n_samples + FLOOR**2) + n_parameters * math.log(n_samples)
+    return information(cost / n_samples, n_samples, n_parameters, floor=FLOOR)
 
 
 @dataclass(frozen=True)
@@ -180,25 +182,36 @@ class FreeRun:
         costs = np.sum(self.residuals(structure, starts) ** 2, axis=1)
         if costs.min() >= DIVERGED**2:
             return None
-        reached = descend(
-            lambda x: self.residuals(structure, x * units),
-            starts[np.argmin(costs)] / units,
-            lower / units,
-            upper / units,
-            tolerance=tolerance,
-            steps=_STEPS_TO_RANK if tolerance >= RANKING else _STEPS,
-            central=tolerance < RANKING,
-            hopeless=hopeless,
-        )
-        unknowns = self._with_starts(structure, reached.x * units)
-        return Candidate(
-            structure, unknowns, reached.jacobian / units, reached.residual, self._settles(structure, unknowns)
-        )
+        is_ranked = tolerance >= RANKING  # else polished
 
-    def linearised(self, structure: Structure, unknowns: FloatArray) -> Reached:
-        """Residual and Jacobian at some unknowns (size + n_records,), all three in the units of the unknowns."""
+        def residuals(x: FloatArray) -> FloatArray:
+            return self.residuals(structure, x * units)
+
+        def slopes(x: FloatArray, residual: FloatArray) -> FloatArray:
+            return differences(residuals, x, residual, central=not is_ranked)
+
+        reached = descend(
+            SumOfSquares(residuals, slopes, lower / units, upper / units),
+            starts[[np.argmin(costs)]] / units,
+            relative=tolerance,
+            steps=_STEPS_TO_RANK if is_ranked else _STEPS,
+            hopeless=hopeless,
+            schedule=_SCHEDULE,
+        )
+        x, residual = reached.x[0], reached.evaluated[0][0]
+        unknowns = self._with_starts(structure, x * units)
+        return Candidate(structure, unknowns, slopes(x, residual) / units, residual, self._settles(structure, unknowns))
+
+    def linearised(self, structure: Structure, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Residual (n_samples,) at some unknowns (size + n_records,), and its Jacobian in their units."""
         units = self.units(structure)
-        return linearised(lambda x: self.residuals(structure, x * units), unknowns / units, central=True)
+
+        def residuals(x: FloatArray) -> FloatArray:
+            return self.residuals(structure, x * units)
+
+        x = unknowns / units
+        residual = residuals(x[np.newaxis])[0]
+        return residual, differences(residuals, x, residual, central=True)
 
     def regressed(
         self, regression: Regression, structure: Terms, feedthrough: float = 0.0, offset: float = 0.0
@@ -222,7 +235,7 @@ class FreeRun:
         if not structure.rest:
             return unknowns
         numbers = unknowns[np.newaxis, : structure.size]
-        starts = [structure.output_at_rest(numbers, float(record.u[0])) for record in self.records]
+        starts = [output_at_rest(structure, numbers, float(record.u[0])) for record in self.records]
         return np.concatenate([unknowns[: structure.size], *starts])
 
     def _run(self, structure: Structure, unknowns: FloatArray, k: int) -> FloatArray:
@@ -230,7 +243,7 @@ class FreeRun:
         bound = BOUND * self.stroke + float(np.abs(visible.y).max())
         numbers, y0 = unknowns[:, : structure.size], unknowns[:, structure.size + k]
         if structure.rest:
-            y0 = structure.output_at_rest(numbers, float(record.u[0]))
+            y0 = output_at_rest(structure, numbers, float(record.u[0]))
         return structure.run(record.u, numbers, y0, bound)
 
     def _settles(self, structure: Structure, unknowns: FloatArray) -> bool:

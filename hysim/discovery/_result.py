@@ -1,6 +1,7 @@
-"""What `discover` returns."""
+"""The results of `discover` and `discover_oscillator`."""
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import field
 from typing import Any, Self
@@ -9,71 +10,13 @@ from hysim._frozen import FloatArray, frozen
 from hysim._words import printed, words, wrapped
 from hysim.discovery._judgement import Judgement
 from hysim.identification import json_forms
-from hysim.models.duhem_terms import latex
+from hysim.models.terms import latex
+from hysim.models.transfer_function import TransferFunction
 
 
-@printed
 @frozen
-class Discovery:
-    """A law that was found in records.
-
-    Parameters
-    ----------
-    model : BoucWen, Duhem, BoucWenOscillator, TransferFunction or None
-        The law of `equation`, refined by simulation error, from the initial state of the first record. None where hysim
-        has no model of this law; `warnings` says why.
-    models : tuple of model
-        One for each record: they differ in the state at the first sample. Empty where there is no model.
-    coefficients : mapping
-        Term to coefficient, for instance ``"|u'| z"``. With a feedthrough the scale of the memory is open, and a
-        Bouc-Wen law has that in which ``"u'"`` has the coefficient 1.
-    stderr : mapping
-        Standard errors of the coefficients, and of ``"feedthrough"``, ``"gain"``, ``"offset"`` or ``"n"`` where they
-        are part of the law; nan where the records cannot tell.
-    equation : str
-        The law as text.
-    verdict : str
-        ``"rate-independent hysteresis"``, ``"linear lag"``, ``"cannot be told from one rate"`` or
-        ``"no structure found"``; see `discover`.
-    route : {"memory", "output", "oscillator"}
-        What the law takes the measured output for.
-    scores : mapping
-        Of the law's free run, as in `hysim.metrics`: ``"fit_percent"`` [%], ``"rmse"`` [unit of y], ``"bic"``, and
-        ``"n_terms"``; of the search: ``"threshold"``, the largest one whose structure still has all terms of the law,
-        ``"n_structures"`` refined, ``"condition"`` of the regression.
-    n_parameters : int
-        Fitted numbers: those of the law, and the initial state of each record where it is free. A state of rest, which
-        is zero, is none.
-    judgement : Judgement
-        What the verdict rests on: the linear rival, errors of all models on data that they were not fitted to, loop
-        widths at other rates, the dissipation.
-    cv_rmse : float
-        Cross-validated rmse [unit of y], the whole search repeated for each fold; nan if it was not asked for, and for
-        an oscillator.
-    left_out : tuple of str
-        Terms of the library that the records cannot tell from those of lower degree.
-    regressed : mapping
-        The coefficients before their refinement, from the regression of slopes; empty for a scanned exponent.
-    inclusion : mapping
-        Term of the library to the share of an ensemble of sparse regressions that keeps it.
-    thresholds, path_n_terms, path_fit_percent, path_bic : array, shape (n_thresholds,)
-        The optimizer's path from dense to sparse, each structure refined: for a Pareto figure. A structure whose free
-        run diverges has a fit of -inf and a BIC of inf. Long records are thinned for the path.
-    message : str
-        How the search ended; empty where there is nothing to add.
-    warnings : tuple of str
-        Reasons to doubt the law or its scores, one plain sentence each; empty where there are none.
-    parameters : mapping
-        Numbers of the law that are no coefficients: ``"n"`` where it was searched, ``"feedthrough"``, ``"gain"``,
-        ``"offset"``; of an oscillator ``"mass"``, ``"damping"`` and ``"stiffness"``.
-    initial : {"free", "rest", "periodic"}
-        Where the initial states come from. ``"free"``: they were fitted. ``"rest"``: the
-        memory is held at zero at the first sample, an oscillator at rest. ``"periodic"``, of an oscillator: the records
-        begin in the steady motion under a periodic input. Only free ones count as parameters.
-    initial_states : tuple of mapping
-        The state at the first sample of each record, in the letters of `equation`: ``"z0"`` or ``"y0"``; of an
-        oscillator ``"y0"``, ``"y'0"`` and ``"z0"``.
-    """
+class _Discovered(ABC):
+    """The fields and the text that both results have."""
 
     model: Any | None
     models: tuple[Any, ...]
@@ -81,15 +24,11 @@ class Discovery:
     stderr: Mapping[str, float]
     equation: str
     verdict: str
-    route: str
     scores: Mapping[str, float]
     n_parameters: int
-    judgement: Judgement
-    cv_rmse: float
     left_out: tuple[str, ...]
     regressed: Mapping[str, float]
     inclusion: Mapping[str, float]
-    thresholds: FloatArray
     path_n_terms: FloatArray
     path_fit_percent: FloatArray
     path_bic: FloatArray
@@ -104,21 +43,23 @@ class Discovery:
         """The law for LaTeX, without dollar signs."""
         return latex(self.equation)
 
+    @abstractmethod
+    def _rows(self, *, full: bool) -> dict[str, str]:
+        """Name and text of what only this result has, for `summary` in full and for `str` in short."""
+
     def __str__(self) -> str:
         scores = self.scores
         numbers = [f"{name} {value:.4g}{self._spread(name)}" for name, value in self._numbers.items()]
         return words(
             [
-                f"Discovery: {self.verdict}, fit {scores['fit_percent']:.2f} %, rmse {scores['rmse']:.4g}, "
+                f"{type(self).__name__}: {self.verdict}, fit {scores['fit_percent']:.2f} %, rmse {scores['rmse']:.4g}, "
                 f"{self.n_parameters} parameters",
                 f"  {self.equation}",
                 wrapped(numbers),
             ],
             {
                 "initial state": self._initial_state("{:.4g}"),
-                "route": self.route,
-                "held-out rmse": ", ".join(f"{name} {value:.4g}" for name, value in self.judgement.held_out.items()),
-                "cross-validated": "" if math.isnan(self.cv_rmse) else f"rmse {self.cv_rmse:.4g}",
+                **self._rows(full=False),
                 "warnings": " ".join(self.warnings),
                 "search": self.message,
             },
@@ -126,23 +67,15 @@ class Discovery:
 
     def summary(self) -> str:
         """The result in a few lines."""
-        scores, judged = self.scores, self.judgement
+        scores = self.scores
         lines = [
             f"{self.equation}",
-            f"  {self.verdict}; route {self.route}, fit {scores['fit_percent']:.2f} %, rmse {scores['rmse']:.4g}, "
-            f"BIC {scores['bic']:.1f}, {self.n_parameters} parameters{self._counted}",
+            f"  {self.verdict}; fit {scores['fit_percent']:.2f} %, rmse {scores['rmse']:.4g}, BIC {scores['bic']:.1f}, "
+            f"{self.n_parameters} parameters{self._counted}",
         ]
         lines += [f"  {name} = {value:.6g}{self._spread(name)}" for name, value in self._numbers.items()]
         lines += [f"  initial state ({self.initial}): {self._initial_state('{:.6g}')}"] * bool(self.initial_states)
-        errors = [f"{name} {value:.4g}" for name, value in judged.held_out.items()]
-        lines.append(f"  held-out rmse: {', '.join(errors)}")
-        lines += [
-            f"  relative width of the {name} at {', '.join(f'{rate:g}' for rate in judged.rates)} times the rate: "
-            + ", ".join(f"{100.0 * width:.2f} %" for width in widths)
-            for name, widths in judged.widths.items()
-        ]
-        if not math.isnan(self.cv_rmse):
-            lines.append(f"  cross-validated rmse {self.cv_rmse:.4g}")
+        lines += [f"  {name}: {text}" for name, text in self._rows(full=True).items() if text]
         lines += [f"  {self.message}"] * bool(self.message)
         lines += ["Warnings"] * bool(self.warnings) + [f"  {warning}" for warning in self.warnings]
         return "\n".join(lines)
@@ -173,7 +106,7 @@ class Discovery:
         return "" if math.isnan(value) else f" +- {value:.2g}"
 
     def to_json(self) -> str:
-        """The whole result as JSON, with the version of hysim; `from_json` gives it back, every number to the bit."""
+        """The whole result as JSON, with the version of hysim; `from_json` returns it, every number to the bit."""
         return json_forms.to_text("discovery", self)
 
     @classmethod
@@ -185,5 +118,152 @@ class Discovery:
         ValueError
             If the text does not hold one.
         """
-        found: Self = json_forms.from_text("discovery", text, (cls, Judgement))
-        return found
+        result: Self = json_forms.from_text("discovery", text, (cls, Judgement))
+        return result
+
+
+@printed
+@frozen
+class Discovery(_Discovered):
+    """A law that was discovered in records.
+
+    Parameters
+    ----------
+    model : BoucWen or Duhem
+        The law of `equation`, refined by simulation error, from the initial state of the first record.
+    models : tuple of model
+        One for each record: they differ in the state at the first sample.
+    coefficients : mapping
+        Term to coefficient, for instance ``"|u'| z"``. With a feedthrough a Bouc-Wen law is scaled so that ``"u'"`` has
+        the coefficient 1.
+    stderr : mapping
+        Standard errors of the coefficients and of `parameters`; nan where the records do not determine them.
+    equation : str
+        The law as text.
+    verdict : str
+        ``"rate-independent hysteresis"``, ``"linear lag"``, ``"cannot be told from one rate"`` or
+        ``"no structure found"``; see `discover`.
+    route : {"memory", "output"}
+        What the law takes the measured output for.
+    scores : mapping
+        ``"fit_percent"`` [%], ``"rmse"`` [unit of y], ``"bic"`` and ``"n_terms"`` of the law's free run;
+        ``"threshold"``, the largest one whose structure still has all terms of the law, ``"n_structures"`` refined, and
+        ``"condition"`` of the regression.
+    n_parameters : int
+        Fitted numbers: those of the law, and the initial state of each record where it is free.
+    judgement : Judgement
+        The errors and loops on which the verdict rests.
+    cv_rmse : float
+        Cross-validated rmse [unit of y], the whole search repeated for each fold; nan if it was not asked for.
+    left_out : tuple of str
+        Terms of the library that the records cannot tell from those of lower degree.
+    regressed : mapping
+        The coefficients before their refinement, from the regression of slopes; empty for a scanned exponent.
+    inclusion : mapping
+        Term of the library to the share of an ensemble of sparse regressions that keeps it.
+    thresholds, path_n_terms, path_fit_percent, path_bic : array, shape (n_thresholds,)
+        The optimizer's path from dense to sparse, each structure refined on thinned records; a structure whose free run
+        diverges has a fit of -inf and a BIC of inf.
+    message : str
+        How the search ended; empty where there is nothing to add.
+    warnings : tuple of str
+        Reasons to doubt the law or its scores, one plain sentence each; empty where there are none.
+    parameters : mapping
+        Numbers of the law that are no coefficients: ``"n"`` where it was searched, ``"feedthrough"``, ``"gain"``,
+        ``"offset"``.
+    initial : {"free", "rest"}
+        ``"free"``: the initial states were fitted. ``"rest"``: the memory is held at zero at the first sample.
+    initial_states : tuple of mapping
+        The state at the first sample of each record, in the letters of `equation`: ``"z0"`` or ``"y0"``.
+    """
+
+    route: str
+    judgement: Judgement
+    cv_rmse: float
+    thresholds: FloatArray
+
+    def _rows(self, *, full: bool) -> dict[str, str]:
+        """The route, held-out errors, the cross-validation, and loop widths."""
+        judged, rates = self.judgement, ", ".join(f"{rate:g}" for rate in self.judgement.rates)
+        rows = {
+            "route": self.route,
+            "held-out rmse": ", ".join(f"{name} {value:.4g}" for name, value in judged.held_out.items()),
+            "cross-validated rmse": "" if math.isnan(self.cv_rmse) else f"{self.cv_rmse:.4g}",
+        }
+        for name, widths in judged.widths.items() if full else ():
+            percent = ", ".join(f"{100.0 * width:.2f} %" for width in widths)
+            rows[f"relative width of the {name} at {rates} times the rate"] = percent
+        return rows
+
+
+@printed
+@frozen
+class OscillatorDiscovery(_Discovered):
+    """A plant and the law of its memory, discovered from the oscillator's input and output.
+
+    Parameters
+    ----------
+    model : BoucWenOscillator, TransferFunction or None
+        The law of `equation` in its plant, from the initial state of the first record. Without a memory a linear
+        oscillator whose law has A = 0; with a lag a transfer function; None where hysim has no model of the law, as
+        `warnings` says.
+    models : tuple of model
+        One for each record, each from its initial state; empty where there is no model.
+    coefficients : mapping
+        Term to coefficient. Of a Bouc-Wen law with n = 1 A is that of ``"u'"``, -beta that of ``"|u'| z"`` and -gamma
+        that of ``"u' |z|"``.
+    stderr : mapping
+        Standard errors of the coefficients, of the parts of the plant that were not given, and of ``"n"`` where it was
+        free.
+    equation : str
+        The law and the equation of motion as text.
+    verdict : str
+        ``"rate-independent hysteresis"``, ``"rate-dependent hysteresis"``, ``"linear lag"`` or
+        ``"no structure found"``.
+    scores : mapping
+        ``"fit_percent"`` [%], ``"rmse"`` [unit of y] and ``"bic"`` of the free run; ``"held_out_rmse"`` [unit of y], on
+        each period (or quarter) with plant and coefficients of the others; ``"linear_rmse"``,
+        ``"linear_held_out_rmse"`` and ``"linear_bic"`` of the rival without memory; ``"n_terms"``; ``"n_structures"``
+        compared; ``"condition"`` of the regression on all terms.
+    n_parameters : int
+        Fitted numbers of the plant and the law.
+    left_out : tuple of str
+        Terms whose effects on these records are linear combinations of those of the plant and of terms of lower degree.
+    regressed : mapping
+        Coefficients before the refinement, from the regression along the measured motion.
+    inclusion : mapping
+        Term to the share of fits to resampled data that keep it, for every term of the library that is not `left_out`.
+    path_terms : tuple of str
+        The structures that were compared, from dense to sparse, each as its terms joined by commas.
+    path_n_terms, path_bic, path_fit_percent : array, shape (n_structures,)
+        Their sizes, BIC, and the fit [%] of what is held out: for a Pareto figure.
+    message : str
+        How the search ended.
+    warnings : tuple of str
+        Reasons to doubt the law, one sentence each.
+    parameters : mapping
+        ``"mass"``, ``"damping"`` and ``"stiffness"`` of the plant, and ``"n"`` where it was free. Without a memory the
+        stiffness is that of all springs.
+    initial : {"rest", "periodic"}
+        Whether the records begin at rest, or in the steady motion under a periodic input.
+    initial_states : tuple of mapping
+        Displacement, velocity and memory at the first sample of each record: ``"y0"``, ``"y'0"`` and ``"z0"``.
+    rival : TransferFunction
+        The same mass on a linear spring, fitted to the records without a memory.
+    relative_width, dissipation : float
+        Relative width and signed area [unit of y times unit of u] of the memory's steady loop over the range of the
+        displacements, as in `Judgement`; nan where the memory is no Bouc-Wen law.
+    """
+
+    rival: TransferFunction
+    path_terms: tuple[str, ...]
+    relative_width: float
+    dissipation: float
+
+    def _rows(self, *, full: bool) -> dict[str, str]:
+        """Held-out errors and the loop of the memory."""
+        scores, width = self.scores, self.relative_width
+        return {
+            "held-out rmse": f"law {scores['held_out_rmse']:.4g}, rival {scores['linear_held_out_rmse']:.4g}",
+            "relative width of the memory": "" if math.isnan(width) else f"{100.0 * width:.2f} %",
+        }

@@ -14,6 +14,7 @@ from hysim import metrics
 from hysim._frozen import FloatArray, checked
 from hysim.errors import SimulationError
 from hysim.identification import identify
+from hysim.metrics.criteria import information
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.transfer_function import FREQUENCY, TransferFunction, TransferFunctionStructure
 from hysim.records import Record
@@ -68,7 +69,7 @@ def rival(records: Sequence[Record]) -> Rival:
     most = sum(len(record) for record in records) // _PER_PARAMETER
     orders = [(poles, zeros) for poles, zeros in ORDERS if poles * (1 + len(records)) + zeros + 2 <= most]
     plants = [_identified(records, everything, poles, zeros) for poles, zeros in orders]
-    return min([_line(records, everything), *plants], key=lambda found: found.bic)
+    return min([_line(records, everything), *plants], key=lambda plant: plant.bic)
 
 
 def steady_width(plant: TransferFunction, cycle: Record, rate: float) -> float:
@@ -156,12 +157,13 @@ def _identified(
         Seen(u=record.u, y=record.y * shares, t=record.t, shares=shares)
         for record, shares in zip(records, weights, strict=True)
     ]
-    found = identify(_Affine(structure, records, start), seen)
-    return Rival(found.models, found.estimates["offset"], _information(records, found.residual, found.n_parameters))
+    fit = identify(_Affine(structure, records, start), seen)
+    return Rival(fit.models, fit.estimates["offset"], _information(records, fit.residual, fit.n_parameters))
 
 
 def _line(records: Sequence[Record], weights: Sequence[FloatArray]) -> Rival:
-    u, y = (np.concatenate([getattr(record, name) for record in records]) for name in ("u", "y"))
+    u = np.concatenate([record.u for record in records])
+    y = np.concatenate([record.y for record in records])
     shares = np.concatenate(weights)
     mean = float(shares @ u / shares.sum())  # so that the columns are orthogonal
     columns = np.stack([u - mean, np.ones(u.size)], axis=1)
@@ -172,5 +174,4 @@ def _line(records: Sequence[Record], weights: Sequence[FloatArray]) -> Rival:
 
 def _information(records: Sequence[Record], residual: FloatArray, n_parameters: int) -> float:
     stroke = max(float(np.ptp(record.y)) for record in records)
-    n = residual.size
-    return n * float(np.log(np.mean(residual**2) + (FLOOR * stroke) ** 2)) + n_parameters * float(np.log(n))
+    return information(float(np.mean(residual**2)), residual.size, n_parameters, floor=FLOOR * stroke)

@@ -1,19 +1,42 @@
-"""One library on some records: from slopes to refined structures."""
+"""One library on some records: from slopes to refined structures.
+
+**Shifts.** The slope of z = y - feedthrough u - offset is linear in the coefficients of its law, not in the two shifts.
+These are scanned, and the coefficients solved for at each (variable projection). The left side loses what the term u'
+gains by a feedthrough, so that misfits are comparable. The free runs begin at the best few places.
+
+**Any exponent.** A Bouc-Wen law whose exponent is no whole number has terms that are in no finite library,
+
+    z' = A u' - beta |u'| |z|^(n-1) z - gamma u' |z|^n.
+
+Its exponent is scanned: at each one the slope is regressed on the three terms, and from the best of these the free run
+is refined, n with the other numbers. The law is taken where its BIC is lower by more than INDISTINCT.
+"""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from hysim._frozen import FloatArray
 from hysim.discovery import _pysindy
 from hysim.discovery._held_out import about_trends, rms
-from hysim.discovery._library import FORMS, Slopes, slopes
-from hysim.discovery._refinement import POLISH, Candidate, FreeRun, Samples
-from hysim.discovery._selection import SEARCHED, Search, Start, preferred, pruned, thinning, turning
-from hysim.discovery._shifts import shifted
-from hysim.discovery._structures import Terms, shifts
-from hysim.models.duhem_terms import Term
+from hysim.discovery._refinement import POLISH, Candidate, FreeRun, Samples, bic_of
+from hysim.discovery._selection import (
+    ALIKE,
+    INDISTINCT,
+    SEARCHED,
+    Search,
+    Start,
+    gap,
+    preferred,
+    pruned,
+    thinning,
+    turning,
+)
+from hysim.discovery._slopes import FORMS, Feature, Slopes, slopes
+from hysim.discovery._structures import AnyExponent, Terms, shifts
+from hysim.models.terms import Term, symmetric
 from hysim.records import Record
 
 LINE = Terms((Term(False, 0, 0),))
@@ -25,6 +48,11 @@ _SPREAD = 0.3  # of a random restart, in units of what each term contributes ove
 _HELD_OUT = 3  # every third sample decides between the forms of the slope
 _ENSEMBLE = 50
 _ENSEMBLE_ROWS = 500
+_FEEDTHROUGHS = np.linspace(-1.0, 2.0, 46)  # of the slope of the chord from end to end
+_OFFSETS = np.linspace(0.05, 0.95, 10)  # of the range of z
+_KEPT = 3
+_EXPONENTS = np.geomspace(0.4, 6.0, 16)
+_RIDGES = (1e-9, 1e-4, 1e-2)
 
 
 @dataclass(frozen=True)
@@ -53,6 +81,20 @@ class Library:
     def structure(self, terms: Sequence[Term]) -> Terms:
         """The largest structure of these terms."""
         return Terms(tuple(terms), self.feedthrough != "no", self.offset, all(self.rests))
+
+
+@dataclass(frozen=True)
+class Options:
+    """How laws are looked for: the signs that coefficients must have, and the arguments of `discover`.
+
+    `enough` is the rmse that a law must come near for the search to go beyond the optimizer's path [unit of y].
+    """
+
+    signs: Mapping[Term, int] = field(default_factory=dict)
+    optimizer: str = "STLSQ"
+    derivative: str = "auto"
+    seed: int = 0
+    enough: Callable[[], float] | None = None
 
 
 @dataclass(frozen=True)
@@ -107,61 +149,59 @@ class Outcome:
 def searched(
     records: Sequence[Record],
     library: Library,
+    options: Options,
     *,
-    signs: Mapping[Term, int],
-    optimizer: str,
-    derivative: str,
-    seed: int,
     best: float = math.inf,
     seen: Sequence[Samples] | None = None,
-    enough: Callable[[], float] = lambda: math.inf,
 ) -> Outcome | None:
     """The best law of a library; None if none can come near the BIC `best`.
 
     Only the outputs `seen`, (n_samples,) for each record, are looked at. If no law on the optimizer's path, on which
-    are the largest ones, comes near an rmse of `enough()`, the search ends there: a smaller law does not fit better.
+    are the largest ones, comes near an rmse that is enough, the search ends there: a smaller law does not fit better.
     """
-    whole = FreeRun(tuple(records), None if seen is None else tuple(seen), signs)
-    some = _thinned(whole)
-    form = derivative if derivative != "auto" else _better_form(some.visible, library, optimizer)
-    found = slopes(whole.visible, form)
-    starts = shifted(found, library.terms, feedthrough=library.feedthrough != "no", offset=library.offset)
+    free_run = FreeRun(tuple(records), None if seen is None else tuple(seen), options.signs)
+    thin = _thinned(free_run)
+    optimizer, form = options.optimizer, options.derivative
+    if form == "auto":
+        form = _better_form(thin.visible, library, optimizer)
+    rows = slopes(free_run.visible, form)
+    starts = shifted(rows, library.terms, feedthrough=library.feedthrough != "no", offset=library.offset)
     held = frozenset({"feedthrough"} if library.feedthrough == "must" else ())
-    search = Search(some, starts, held, library.rests)
+    search = Search(thin, starts, held, library.rests)
     for start in starts:
         search.refine(library.structure(start.regression.terms))
     if not search.could_win(1, best):
         return None
-    search.refine(LINE._replace(rest=all(library.rests)), some.line)
+    search.refine(LINE._replace(rest=all(library.rests)), thin.line)
     for start in starts:
         for _, structure in _path(start, library, optimizer):
             search.refine(structure)
-    if not search.found:
+    if not search.candidates:
         raise ValueError(
-            f"every law that was tried diverges on these records, whose output moves by {whole.stroke:.3g} about "
+            f"every law that was tried diverges on these records, whose output moves by {free_run.stroke:.3g} about "
             f"{float(records[0].y[0]):.3g}: check the units, or subtract the offset"
         )
-    is_short = not _least_rmse(search) <= _HOPELESS * enough()
+    is_short = options.enough is not None and not _least_rmse(search) <= _HOPELESS * options.enough()
     if not is_short:
         search.explore(library.structure(starts[0].regression.terms))
-    chosen = _on_all_samples(whole, search, library, seed, restarts=0 if is_short else _RESTARTS)
-    start = _start_at(found, library, chosen)
-    return Outcome(library, chosen, search, start, found, form, _path(start, library, optimizer), is_short)
+    chosen = _on_all_samples(free_run, search, library, options.seed, restarts=0 if is_short else _RESTARTS)
+    start = _start_at(rows, library, chosen)
+    return Outcome(library, chosen, search, start, rows, form, _path(start, library, optimizer), is_short)
 
 
 def _least_rmse(search: Search) -> float:
     """The smallest rmse of the laws about a slow trend of each record [unit of y], as the judgement takes it."""
     free_run = search.free_run
-    errors = (rms(about_trends(found.residual, free_run.visible)) for found in search.found)
+    errors = (rms(about_trends(candidate.residual, free_run.visible)) for candidate in search.candidates)
     return min(errors, default=math.inf) * free_run.stroke
 
 
-def _thinned(whole: FreeRun) -> FreeRun:
+def _thinned(free_run: FreeRun) -> FreeRun:
     """The problem on about SEARCHED samples of the records."""
-    samples = [thinning(record, SEARCHED // len(whole.records)) for record in whole.records]
-    records = tuple(Record(u=r.u[kept], y=r.y[kept]) for r, kept in zip(whole.records, samples, strict=True))
-    seen = whole.seen and tuple(mask[kept] for mask, kept in zip(whole.seen, samples, strict=True))
-    return FreeRun(records, seen, whole.signs)
+    samples = [thinning(record, SEARCHED // len(free_run.records)) for record in free_run.records]
+    records = tuple(Record(u=r.u[kept], y=r.y[kept]) for r, kept in zip(free_run.records, samples, strict=True))
+    seen = free_run.seen and tuple(mask[kept] for mask, kept in zip(free_run.seen, samples, strict=True))
+    return FreeRun(records, seen, free_run.signs)
 
 
 def _path(start: Start, library: Library, optimizer: str) -> list[tuple[float, Terms]]:
@@ -170,11 +210,11 @@ def _path(start: Start, library: Library, optimizer: str) -> list[tuple[float, T
     return [(threshold, library.structure(regression.kept(coefficients))) for threshold, coefficients in path]
 
 
-def _start_at(found: Slopes, library: Library, candidate: Candidate[Terms]) -> Start:
+def _start_at(rows: Slopes, library: Library, candidate: Candidate[Terms]) -> Start:
     """The regression at the shifts of a refined candidate."""
     feedthrough, offset = shifts(candidate.structure, candidate.unknowns[np.newaxis, : candidate.structure.size])
     place = float(feedthrough[0]), float(offset[0])
-    return Start(found.regression(library.terms, *place), *place)
+    return Start(rows.regression(library.terms, *place), *place)
 
 
 def _better_form(records: Sequence[Record], library: Library, optimizer: str) -> str:
@@ -186,10 +226,10 @@ def _better_form(records: Sequence[Record], library: Library, optimizer: str) ->
     unseen = np.concatenate([np.arange(len(record)) % _HELD_OUT == 1 for record in records])
     for form in FORMS:
         try:
-            found = slopes([_seen(record) for record in records], form)
+            rows = slopes([_seen(record) for record in records], form)
         except ValueError:
             continue
-        starts = shifted(found, library.terms, feedthrough=library.feedthrough != "no", offset=library.offset)
+        starts = shifted(rows, library.terms, feedthrough=library.feedthrough != "no", offset=library.offset)
         runs = [
             free_run.residuals(structure, free_run.regressed(start.regression, structure, *start[1:]))[:, unseen]
             for start in starts[:2]  # the output itself, and the best place of the scan
@@ -226,7 +266,99 @@ def _restarted(free_run: FreeRun, chosen: Candidate[Terms], seed: int, restarts:
     best = chosen
     for _ in range(restarts):
         start = chosen.unknowns + spread * random.standard_normal(len(spread))
-        found = free_run.refine(chosen.structure, start[np.newaxis], hopeless=best.cost)
-        if found is not None and found.cost < best.cost * (1.0 - _SAME):
-            best = found
+        refined = free_run.refine(chosen.structure, start[np.newaxis], hopeless=best.cost)
+        if refined is not None and refined.cost < best.cost * (1.0 - _SAME):
+            best = refined
     return best
+
+
+def shifted(slopes: Slopes, terms: tuple[Term, ...], *, feedthrough: bool, offset: bool) -> tuple[Start, ...]:
+    """The regressions to begin at: that of the output itself, and those at the best places of the scan."""
+    trial = symmetric(terms, "odd") or terms  # about the origin of z a law is odd, or nearly
+    places = sorted(
+        (slopes.misfit(trial, slope, level), slope, level)
+        for slope in (_slopes_tried(slopes) if feedthrough else (0.0,))
+        for level in (_levels(slopes, slope) if offset else (0.0,))
+    )
+    chosen = [(0.0, 0.0)] if feedthrough or offset else []
+    chosen += [(slope, level) for _, slope, level in places[:_KEPT]]
+    return tuple(Start(slopes.regression(terms, *place), *place) for place in dict.fromkeys(chosen))
+
+
+def _slopes_tried(slopes: Slopes) -> list[float]:
+    """The chord of y over u, on the whole, sets the scale, and the sign."""
+    chord = max((_chord(rows.u, rows.y) for rows in slopes.rows), key=abs)
+    return [0.0, *(chord * _FEEDTHROUGHS).tolist()]
+
+
+def _chord(u: FloatArray, y: FloatArray) -> float:
+    return float(np.copysign(np.ptp(y) / np.ptp(u), np.cov(u, y)[0, 1]))
+
+
+def _levels(slopes: Slopes, feedthrough: float) -> list[float]:
+    memory = np.concatenate([rows.y - feedthrough * rows.u for rows in slopes.rows])
+    low, high = float(memory.min()), float(memory.max())
+    return [0.0, *(low + (high - low) * _OFFSETS).tolist()]
+
+
+def or_any_exponent(
+    free_run: FreeRun, of_memory: Outcome, chosen: Outcome
+) -> Candidate[Terms] | Candidate[AnyExponent]:
+    """The chosen law, or the Bouc-Wen law of any exponent where that explains the records of `free_run` better.
+
+    `hidden` is the outcome of the library of z, from which the scan takes its slopes and shifts.
+    """
+    thin, best = of_memory.search.free_run, chosen.searched
+    if chosen.candidate.cost < free_run.n_samples * ALIKE**2:
+        return chosen.candidate
+    candidates = [_refined(thin, of_memory, structure) for structure in _structures(of_memory.library)[:1]]
+    least = min((c.cost for c in candidates if c is not None), default=math.inf)
+    fewest = _structures(of_memory.library)[-1].size + (0 if True in of_memory.library.rests else len(thin.records))
+    if not bic_of(least, thin.n_samples, fewest) < best.bic - INDISTINCT:
+        return chosen.candidate
+    candidates += [_refined(thin, of_memory, structure) for structure in _structures(of_memory.library)[1:]]
+    sound = [candidate for candidate in candidates if candidate is not None and candidate.settles]
+    lowest = min(sound, key=lambda candidate: candidate.bic, default=None)
+    if lowest is None or lowest.bic >= best.bic - INDISTINCT or gap(best, lowest) < ALIKE:
+        return chosen.candidate
+    return free_run.refine(lowest.structure, lowest.unknowns[np.newaxis], tolerance=POLISH) or chosen.candidate
+
+
+def _structures(library: Library) -> list[AnyExponent]:
+    """With all shifts first, with as few as the route allows last."""
+    feedthroughs = {"no": (False,), "may": (True, False), "must": (True,)}[library.feedthrough]
+    offsets = (True, False) if library.offset else (False,)
+    return [
+        AnyExponent(feedthrough, offset, rest)
+        for feedthrough in feedthroughs
+        for offset in offsets
+        for rest in library.rests
+    ]
+
+
+def _refined(free_run: FreeRun, of_memory: Outcome, structure: AnyExponent) -> Candidate[AnyExponent] | None:
+    starts = []
+    for start in of_memory.search.starts:
+        for n in _EXPONENTS.tolist():
+            columns, target = of_memory.slopes.equations(_features(n), start.feedthrough, start.offset)
+            shift = [start.feedthrough] * structure.feedthrough + [start.offset] * structure.offset
+            ends = [n, *shift, *free_run.measured_starts]
+            starts += [[*_ridge(columns, target, weight), *ends] for weight in _RIDGES]
+    return free_run.refine(structure, np.array(starts))
+
+
+def _features(n: float) -> Feature:
+    def features(u: FloatArray, z: FloatArray, direction: FloatArray) -> FloatArray:
+        power = np.abs(z) ** n
+        return np.stack([direction, np.copysign(power, z), direction * power], axis=1)
+
+    return features
+
+
+def _ridge(columns: FloatArray, target: FloatArray, weight: float) -> list[float]:
+    sizes = np.sqrt(np.mean(columns**2, axis=0))
+    sizes[sizes == 0.0] = 1.0
+    scaled = columns / sizes
+    normal = scaled.T @ scaled / len(target) + weight * np.eye(3)
+    solution = np.linalg.solve(normal, scaled.T @ target / len(target)) / sizes
+    return [float(value) for value in solution]

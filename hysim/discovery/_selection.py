@@ -1,7 +1,7 @@
 """Which structure: from the optimizer's path to one law.
 
 Sparse regression of slopes orders the terms, but on short, noisy or quantised records features such as u^2, u y and
-y^2 are nearly one, and the order is rough. So the path is where the search begins:
+y^2 are nearly the same. So the path is where the search begins:
 
 1. The law of all terms and every structure on the threshold path are refined by simulation error.
 2. About the best of these the free run is linearised in all numbers of the library, and of that linear problem all
@@ -9,20 +9,17 @@ y^2 are nearly one, and the order is rough. So the path is where the search begi
    value of its own. The MET ones of lowest BIC are refined. This is repeated about the new best ones until there are
    none, at most ROUNDS times.
 3. The best structures are refined both with their memory at zero at the first sample and with a free one.
-4. Laws that come to no steady loop when the input goes on to and fro are out. Structures within INDISTINCT of the
-   lowest BIC cannot be told apart by the records ("not worth more than a bare mention", Kass and Raftery 1995), nor
-   can smaller ones whose free runs differ by less than ALIKE strokes in rms. Among them the one of fewest numbers is
-   taken, then a plain one, then the lowest BIC.
+4. Laws that come to no steady loop under a cyclic input are out. Structures within INDISTINCT of the lowest BIC are
+   equally good (Kass and Raftery 1995), and so are smaller ones whose free runs differ by less than ALIKE strokes in
+   rms. Among them the one of fewest numbers is taken, then a plain one, then the lowest BIC.
 5. Numbers within SIGNIFICANT standard errors of zero are taken out, the least certain first, as long as BIC does not
    rise by more than INDISTINCT.
 
 A structure in u and y is *plain* if it is complete: with each monomial it has all that divide it, so that its form
-does not depend on where the zeros of u and y are, which are conventions of the instrument. A structure in z is plain
-if it is a Bouc-Wen law.
+does not depend on the zeros of u and y. A structure in z is plain if it is a Bouc-Wen law.
 
-Long records are searched on about SEARCHED of their samples, the reversals among them: the output of a
-rate-independent law at a sample does not depend on the samples between it and the last reversal. The best structures
-are then refined on all samples, where step 4 is taken again.
+Long records are searched on about SEARCHED of their samples, the reversals among them. The best structures are then
+refined on all samples, where step 4 is taken again.
 """
 
 import math
@@ -34,12 +31,11 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
-from hysim.discovery._laws import whole_exponent
-from hysim.discovery._library import Regression
-from hysim.discovery._refinement import Candidate, FreeRun, cost_of, information
+from hysim.discovery._refinement import Candidate, FreeRun, bic_of, cost_of
+from hysim.discovery._slopes import Regression
 from hysim.discovery._structures import Terms
 from hysim.discovery._subsets import Subsets, best_subsets
-from hysim.models.duhem_terms import Term
+from hysim.models.terms import Term, bouc_wen_exponent
 from hysim.records import Record
 
 MET = 24
@@ -98,7 +94,7 @@ def is_complete(terms: Iterable[Term]) -> bool:
 
 def is_plain(structure: Terms, letter: str) -> bool:
     """Whether a structure in u and y is complete, or one in z a Bouc-Wen law."""
-    return is_complete(structure.terms) if letter == "y" else whole_exponent(structure.terms) is not None
+    return is_complete(structure.terms) if letter == "y" else bouc_wen_exponent(structure.terms) is not None
 
 
 @dataclass(frozen=True)
@@ -132,15 +128,15 @@ class Search:
         return self.tried[structure]
 
     @property
-    def found(self) -> list[Candidate[Terms]]:
+    def candidates(self) -> list[Candidate[Terms]]:
         """The refined structures, lowest BIC first."""
         return sorted((c for c in self.tried.values() if c is not None), key=lambda c: (c.bic, c.structure))
 
     @property
     def sound(self) -> list[Candidate[Terms]]:
         """Those that come to a steady loop; all, if none does."""
-        found = self.found
-        return [candidate for candidate in found if candidate.settles] or found
+        refined = self.candidates
+        return [candidate for candidate in refined if candidate.settles] or refined
 
     def followed(self, candidates: Sequence[Candidate[Terms]]) -> list[Candidate[Terms]]:
         """Those of some candidates that are near the best one."""
@@ -182,9 +178,9 @@ class Search:
         To be preferred its BIC must come near the lowest found, and `best`.
         """
         sound = self.sound
-        least = min((candidate.cost for candidate in self.found), default=0.0)
+        least = min((candidate.cost for candidate in self.candidates), default=0.0)
         starts = 0 if True in self.rests else len(self.free_run.records)
-        bound = information(least, self.free_run.n_samples, size + starts)
+        bound = bic_of(least, self.free_run.n_samples, size + starts)
         return not sound or bound <= min(sound[0].bic, best) + INDISTINCT
 
     def _linearly(self, candidate: Candidate[Terms], largest: Terms, rest: bool) -> Iterator[Prediction]:
@@ -192,8 +188,8 @@ class Search:
         free_run, size = self.free_run, largest.size
         u0 = np.array([record.u[0] for record in free_run.records])
         x = _placed(candidate, largest)
-        at = free_run.linearised(largest._replace(rest=False), x)
-        jacobian, residual = at.jacobian / free_run.units(largest), at.residual
+        residual, jacobian = free_run.linearised(largest._replace(rest=False), x)
+        jacobian /= free_run.units(largest)
         shift = _shift_columns(largest, u0)
         jacobian[:, :size] += jacobian[:, size:] @ shift
         x[size:] -= shift @ x[:size]
@@ -206,7 +202,7 @@ class Search:
         for subsets in best_subsets(jacobian, residual, x, removable):
             for k in self._worth_refining(subsets, largest):
                 kept, unknowns = subsets.kept[k], subsets.x[k]
-                bic = information(float(subsets.cost[k]), free_run.n_samples, int(kept.sum()))
+                bic = bic_of(float(subsets.cost[k]), free_run.n_samples, int(kept.sum()))
                 starts = (np.zeros(u0.size) if rest else unknowns[size:]) + shift @ unknowns[:size]
                 numbers = unknowns[:size][kept[:size]]
                 yield Prediction(bic, _of(largest, kept, rest), np.concatenate([numbers, starts]))
@@ -243,11 +239,11 @@ def _of(largest: Terms, kept: npt.NDArray[np.bool_], rest: bool) -> Terms:
     return Terms(terms, "feedthrough" in names, "offset" in names, rest)
 
 
-def preferred(found: Sequence[Candidate[Terms]], letter: str) -> Candidate[Terms]:
+def preferred(candidates: Sequence[Candidate[Terms]], letter: str) -> Candidate[Terms]:
     """Step 4, for structures whose memory is called `letter`."""
-    lowest = min(candidate.bic for candidate in found)
-    best = min(found, key=lambda candidate: candidate.bic)
-    rivals = [c for c in found if c.bic <= lowest + INDISTINCT or _is_as_good(c, best)]
+    lowest = min(candidate.bic for candidate in candidates)
+    best = min(candidates, key=lambda candidate: candidate.bic)
+    rivals = [c for c in candidates if c.bic <= lowest + INDISTINCT or _is_as_good(c, best)]
     return min(rivals, key=lambda c: (c.n_parameters, not is_plain(c.structure, letter), c.bic))
 
 

@@ -10,47 +10,17 @@ Then z is zero at the first sample of every record, so that y0 = offset + feedth
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.models.boucwen import BoucWen
 from hysim.models.duhem_runs import free_runs
-from hysim.models.duhem_terms import Term, coefficient_units
+from hysim.models.terms import Term, coefficient_units
 from hysim.records import Record
 
 Bounds = tuple[FloatArray, FloatArray]
-
-
-class Structure(Protocol):
-    """What refinement needs of a structure."""
-
-    @property
-    def size(self) -> int:
-        """How many numbers it has."""
-        ...
-
-    @property
-    def rest(self) -> bool:
-        """Whether the memory is zero at the first sample of every record."""
-        ...
-
-    def output_at_rest(self, numbers: FloatArray, u0: float) -> FloatArray:
-        """Outputs (n_sets,) at the input `u0` where the memory is zero, of numbers (n_sets, size)."""
-        ...
-
-    def units(self, record: Record, stroke: float) -> FloatArray:
-        """What of each number moves the output by about a stroke, (size,)."""
-        ...
-
-    def bounds(self, signs: Mapping[Term, int]) -> Bounds:
-        """Lower and upper bounds of the numbers, (size,) each."""
-        ...
-
-    def run(self, u: FloatArray, numbers: FloatArray, y0: FloatArray, bound: float) -> FloatArray:
-        """Outputs (n_sets, n_samples) of numbers (n_sets, size) from y0 (n_sets,), rows of inf where one diverges."""
-        ...
 
 
 class Terms(NamedTuple):
@@ -75,22 +45,17 @@ class Terms(NamedTuple):
         return self._replace(offset=False)
 
     def units(self, record: Record, stroke: float) -> FloatArray:
-        """See `Structure`."""
+        """Changes of the numbers (size,) that move the output by about a stroke."""
         of_terms = coefficient_units(record.u, record.y, self.terms)
         return np.concatenate([of_terms, _shift_units(self, record, stroke)])
 
     def bounds(self, signs: Mapping[Term, int]) -> Bounds:
-        """See `Structure`."""
+        """Lower and upper bounds of the numbers, (size,) each."""
         wanted = np.array([signs.get(term, 0) for term in self.terms] + [0] * (self.feedthrough + self.offset))
         return np.where(wanted > 0, 0.0, -np.inf), np.where(wanted < 0, 0.0, np.inf)
 
-    def output_at_rest(self, numbers: FloatArray, u0: float) -> FloatArray:
-        """See `Structure`."""
-        feedthrough, offset = shifts(self, numbers)
-        return offset + feedthrough * u0
-
     def run(self, u: FloatArray, numbers: FloatArray, y0: FloatArray, bound: float) -> FloatArray:
-        """See `Structure`."""
+        """Outputs (n_sets, n_samples) of numbers (n_sets, size) from y0 (n_sets,), rows of inf where one diverges."""
         feedthrough, offset = shifts(self, numbers)
         coefficients = numbers[:, : len(self.terms)]
         return (
@@ -114,23 +79,18 @@ class AnyExponent:
         return 4 + self.feedthrough + self.offset
 
     def units(self, record: Record, stroke: float) -> FloatArray:
-        """See `Structure`."""
+        """See `Terms`."""
         span = float(np.ptp(record.u))
         return np.concatenate([[stroke / span, 1.0 / span, 1.0 / span, 1.0], _shift_units(self, record, stroke)])
 
     def bounds(self, signs: Mapping[Term, int]) -> Bounds:
-        """See `Structure`."""
+        """See `Terms`."""
         lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
         lower[3], upper[3] = self.LOWEST, self.HIGHEST
         return lower, upper
 
-    def output_at_rest(self, numbers: FloatArray, u0: float) -> FloatArray:
-        """See `Structure`."""
-        feedthrough, offset = shifts(self, numbers)
-        return offset + feedthrough * u0
-
     def run(self, u: FloatArray, numbers: FloatArray, y0: FloatArray, bound: float) -> FloatArray:
-        """See `Structure`."""
+        """See `Terms`."""
         feedthrough, offset = shifts(self, numbers)
         A, dissipative, conservative, n = numbers[:, :4].T
         laws = {"A": A, "beta": -dissipative, "gamma": -conservative, "n": n}
@@ -140,12 +100,21 @@ class AnyExponent:
         return y
 
 
-def shifts(structure: Terms | AnyExponent, numbers: FloatArray) -> tuple[FloatArray, FloatArray]:
+Structure = Terms | AnyExponent
+
+
+def output_at_rest(structure: Structure, numbers: FloatArray, u0: float) -> FloatArray:
+    """Outputs (n_sets,) at the input `u0` where the memory is zero, of numbers (n_sets, size)."""
+    feedthrough, offset = shifts(structure, numbers)
+    return offset + feedthrough * u0
+
+
+def shifts(structure: Structure, numbers: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Feedthrough and offset, (n_sets,) each, of numbers (n_sets, size)."""
     zero, first = np.zeros(len(numbers)), structure.size - structure.feedthrough - structure.offset
     feedthrough = numbers[:, first] if structure.feedthrough else zero
     return feedthrough, numbers[:, first + structure.feedthrough] if structure.offset else zero
 
 
-def _shift_units(structure: Terms | AnyExponent, record: Record, stroke: float) -> FloatArray:
+def _shift_units(structure: Structure, record: Record, stroke: float) -> FloatArray:
     return np.array([stroke / float(np.ptp(record.u))] * structure.feedthrough + [stroke] * structure.offset)

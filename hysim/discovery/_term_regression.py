@@ -12,8 +12,9 @@ from functools import cached_property
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.discovery._memory_terms import MemoryTerm
 from hysim.discovery._pysindy import sparse_path
+from hysim.metrics.criteria import information
+from hysim.models.terms import Term
 
 FLOOR = 1e-5  # of the rms output: smaller residuals are no evidence of a term
 BLOCKS = 4  # that are held out in turn, where there are no periods
@@ -31,8 +32,8 @@ class TermRegression:
     plant's nor coefficients, such as an exponent.
     """
 
-    terms: tuple[MemoryTerm, ...]
-    dependent: tuple[MemoryTerm, ...]
+    terms: tuple[Term, ...]
+    dependent: tuple[Term, ...]
     features: FloatArray
     target: FloatArray
     units: FloatArray
@@ -47,12 +48,12 @@ class TermRegression:
         """The R of [features, target]."""
         return np.asarray(np.linalg.qr(np.column_stack([self.features, self.target]), mode="r"))
 
-    def thresholded(self) -> list[tuple[MemoryTerm, ...]]:
+    def thresholded(self) -> list[tuple[Term, ...]]:
         """Structures on the path of PySINDy's STLSQ, from dense to sparse."""
         path = sparse_path(self.features, self.target) if self.terms else []
         return [tuple(t for t, value in zip(self.terms, values, strict=True) if value != 0.0) for _, values in path]
 
-    def eliminated(self) -> list[tuple[MemoryTerm, ...]]:
+    def eliminated(self) -> list[tuple[Term, ...]]:
         """Structures from dense to sparse, each without the term that the last one loses least by."""
         R, kept, path = self.triangle, list(range(len(self.terms))), []
         sizes = np.linalg.norm(R[:, :-1], axis=0)
@@ -64,11 +65,11 @@ class TermRegression:
             kept.pop(int(np.argmin((inverse @ right[kept]) ** 2 / np.diag(inverse))))
         return path
 
-    def best(self, structures: Sequence[tuple[MemoryTerm, ...]]) -> tuple[MemoryTerm, ...]:
+    def best(self, structures: Sequence[tuple[Term, ...]]) -> tuple[Term, ...]:
         """The structure of the lowest BIC, that without terms among them."""
         return min([*structures, ()], key=self.bic)
 
-    def inclusion(self, rng: np.random.Generator, n_draws: int) -> dict[MemoryTerm, float]:
+    def inclusion(self, rng: np.random.Generator, n_draws: int) -> dict[Term, float]:
         """Share of regressions on samples drawn with replacement whose best structure has each term."""
         counts = dict.fromkeys(self.terms, 0)
         for _ in range(n_draws):
@@ -84,35 +85,34 @@ class TermRegression:
         R = self.triangle[:, :-1]
         return float(np.linalg.cond(R / np.linalg.norm(R, axis=0))) if R.shape[1] else 1.0
 
-    def places(self, terms: Sequence[MemoryTerm]) -> list[int]:
+    def places(self, terms: Sequence[Term]) -> list[int]:
         """Columns of some terms."""
         return [self.terms.index(term) for term in terms]
 
-    def squares(self, terms: Sequence[MemoryTerm]) -> float:
+    def squares(self, terms: Sequence[Term]) -> float:
         """Sum of squares that a structure leaves, in units of the noise."""
         kept, goal = self.triangle[:, self.places(terms)], self.triangle[:, -1]
-        left = goal - kept @ np.linalg.lstsq(kept, goal, rcond=None)[0]
-        return float(left @ left)
+        rest = goal - kept @ np.linalg.lstsq(kept, goal, rcond=None)[0]
+        return float(rest @ rest)
 
-    def bic(self, terms: Sequence[MemoryTerm]) -> float:
+    def bic(self, terms: Sequence[Term]) -> float:
         """Bayesian information criterion of a structure, [squared unit of y]."""
-        n = self.target.size
-        variance = self.squares(terms) / n * self.sigma**2 + self.floor**2
-        return float(n * np.log(variance) + (self.n_plant + self.n_others + len(terms)) * np.log(n))
+        n, n_parameters = self.target.size, self.n_plant + self.n_others + len(terms)
+        return information(self.squares(terms) / n * self.sigma**2, n, n_parameters, floor=self.floor)
 
-    def held_out_rmse(self, terms: Sequence[MemoryTerm]) -> float:
+    def held_out_rmse(self, terms: Sequence[Term]) -> float:
         """Root mean square error on each block of a structure that the other blocks have fitted [unit of y]."""
         X, y = self.features[:, self.places(terms)], self.target
-        whole, right, total = X.T @ X, X.T @ y, 0.0
+        normal, right, total = X.T @ X, X.T @ y, 0.0
         for block in self.blocks:
-            rest = whole - X[block].T @ X[block], right - X[block].T @ y[block]
-            left = y[block] - X[block] @ np.linalg.lstsq(*rest, rcond=None)[0]
-            total += float(left @ left)
+            rest = normal - X[block].T @ X[block], right - X[block].T @ y[block]
+            error = y[block] - X[block] @ np.linalg.lstsq(*rest, rcond=None)[0]
+            total += float(error @ error)
         return float(self.sigma * np.sqrt(total / y.size))
 
 
 def term_regression(
-    terms: tuple[MemoryTerm, ...],
+    terms: tuple[Term, ...],
     plant: FloatArray,
     slopes: FloatArray,
     target: FloatArray,
@@ -139,9 +139,9 @@ def term_regression(
     features, goal = features - Q.T @ (Q @ features), goal - Q.T @ (Q @ goal)
     size = np.linalg.norm(features, axis=0)
     scaled = features / size
-    left = goal - scaled @ np.linalg.lstsq(scaled, goal, rcond=None)[0]
+    residual = goal - scaled @ np.linalg.lstsq(scaled, goal, rcond=None)[0]
     freedom = max(goal.size - n_plant - len(independent), 1)
-    sigma = max(float(np.sqrt(left @ left / freedom)), floor)
+    sigma = max(float(np.sqrt(residual @ residual / freedom)), floor)
     units = sigma * np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled))) / size
     return TermRegression(
         terms=tuple(terms[k] for k in independent),

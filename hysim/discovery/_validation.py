@@ -20,15 +20,15 @@ def left_out_rmse(records: Sequence[Record], search: Search, count: str | int, p
     Each fold repeats the whole search, for structure and numbers. The inputs are kept, only the outputs of the
     left-out samples are not seen. `progress` counts the folds.
     """
-    whole, edges = FreeRun(tuple(records)), np.cumsum([len(record) for record in records])
-    left_out = folds(count, whole.n_samples)
-    errors = np.empty(whole.n_samples)
+    free_run, edges = FreeRun(tuple(records)), np.cumsum([len(record) for record in records])
+    left_out = folds(count, free_run.n_samples)
+    errors = np.empty(free_run.n_samples)
     for done, samples in enumerate(left_out, 1):
-        seen = np.ones(whole.n_samples, dtype=bool)
+        seen = np.ones(free_run.n_samples, dtype=bool)
         seen[samples] = False
         law = search(tuple(np.split(seen, edges[:-1])))
-        errors[samples] = whole.residuals(law.structure, law.unknowns[np.newaxis])[0, samples]
+        errors[samples] = free_run.residuals(law.structure, law.unknowns[np.newaxis])[0, samples]
         progress(done, len(left_out))
     if np.abs(errors).max() >= DIVERGED:
         return float("inf")
-    return float(np.sqrt(np.mean(errors**2))) * whole.stroke
+    return float(np.sqrt(np.mean(errors**2))) * free_run.stroke

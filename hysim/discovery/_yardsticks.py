@@ -149,8 +149,8 @@ def _yardstick(
 
 def _ridge(design: FloatArray, target: FloatArray, n: int) -> FloatArray:
     """The numbers of least squares with the ridge of least GCV, one number of the n samples being their mean."""
-    left, singular, right = np.linalg.svd(design, full_matrices=False)
-    along = left.T @ target
+    basis, singular, right = np.linalg.svd(design, full_matrices=False)
+    along = basis.T @ target
     beyond = max(float(target @ target - along @ along), 0.0)
     best, chosen = np.inf, np.zeros(singular.size)
     for ridge in _RIDGES * singular[0] ** 2:

@@ -1,13 +1,39 @@
-"""What the residual says of the model, and how uncertain the loop width is."""
+"""Measures of a fit, whether its residuals are white, and how uncertain the loop width is."""
+
+from typing import TypedDict
 
 import numpy as np
 
+from hysim import metrics
 from hysim._frozen import FloatArray
 from hysim.identification._descent import Descent
 from hysim.metrics.rows import LoopRows
 
 _STEP = 1e-3  # of a difference, in standard errors: the place of the largest width may move
 _MOST_LAGS = 20
+
+
+class FitMeasures(TypedDict):
+    """The fields of `Identification` that follow from the residual alone."""
+
+    fit_percent: float
+    rmse: float
+    fpe: float
+    aic: float
+    bic: float
+    whiteness: float
+
+
+def fit_measures(y: FloatArray, residual: FloatArray, n_parameters: int) -> FitMeasures:
+    """Measures of a fit of `n_parameters` to outputs `y` (n,) with this residual (n,)."""
+    return {
+        "fit_percent": metrics.fit_percent(y, y - residual),
+        "rmse": metrics.rmse(residual, 0.0 * residual),
+        "fpe": metrics.fpe(residual, n_parameters),
+        "aic": metrics.aic(residual, n_parameters),
+        "bic": metrics.bic(residual, n_parameters),
+        "whiteness": whiteness(residual, n_parameters),
+    }
 
 
 def whiteness(residual: FloatArray, n_parameters: int) -> float:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from hysim import metrics
 from hysim._frozen import FloatArray
-from hysim.identification._diagnostics import whiteness
+from hysim.identification._diagnostics import fit_measures
 from hysim.identification._resampling import rms_of_known
 from hysim.identification._result import Identification, Width
 from hysim.identification.sentences import CONSTANT
@@ -42,40 +42,25 @@ def identified(
     family: Direct, records: Sequence[Record], folds: Sequence[npt.NDArray[np.intp]], seed: int
 ) -> Identification:
     """The fit to all records together, described as a search is."""
-    u, y = (np.concatenate([getattr(record, name) for record in records]) for name in ("u", "y"))
+    u = np.concatenate([record.u for record in records])
+    y = np.concatenate([record.y for record in records])
     fit = family.fitted(u, y)
-    residual = y - fit.model.response(u)
-    rmse, n_parameters = metrics.rmse(residual, 0.0 * residual), max(1, round(fit.degrees_of_freedom))
+    residual, n_parameters = y - fit.model.response(u), max(1, round(fit.degrees_of_freedom))
+    measures = fit_measures(y, residual, n_parameters)
     freedom = y.size - fit.degrees_of_freedom
     sigma = float(np.sqrt(np.sum(residual**2) / freedom)) if freedom > 0.5 else float("nan")
     errors = _left_out_errors(family, u, y, folds)
     return Identification(
         model=fit.model,
         models=(fit.model,) * len(records),
-        estimates={},
-        stderr={},
-        intervals={},
-        interval_method="linear",
-        profiles={},
-        covariance=np.empty(0),  # JSON keeps no second axis of an empty matrix
-        condition=float("nan"),
-        redundant=(),
-        free_names=(),
         n_parameters=n_parameters,
-        fit_percent=metrics.fit_percent(y, y - residual),
-        rmse=rmse,
-        fpe=metrics.fpe(residual, n_parameters),
-        aic=metrics.aic(residual, n_parameters),
-        bic=metrics.bic(residual, n_parameters),
-        noise="gaussian",
-        sigma=rmse,
+        **measures,
+        sigma=measures["rmse"],
         log_likelihood=-0.5 * metrics.aic(residual, 0) - 0.5 * y.size,
-        least_squares=None,
         residual=residual,
         resolution=records[0].resolution,
         response_stderr=sigma * fit.spread,
         loop_width=_no_width(records[0]),
-        whiteness=whiteness(residual, n_parameters),
         success=True,
         message="fitted in one step",
         cv_residual=errors,

@@ -11,15 +11,14 @@ import numpy.typing as npt
 from hysim._blas import one_blas_thread
 from hysim._parallel import Progress, at_most
 from hysim.identification import _direct as direct
-from hysim.identification._direction import swapped_for
 from hysim.identification._noise import Gaussian, Noise, Quantised, Robust
 from hysim.identification._problem import Problem, problem
 from hysim.identification._resampling import left_out_errors, rms_of_known
 from hysim.identification._result import Identification
 from hysim.identification._search import PERFECT, optima
 from hysim.identification._searched import Search
-from hysim.identification.columns import swapped_columns
 from hysim.identification.folds import left_out
+from hysim.identification.swapped import swapped_columns, swapped_for
 from hysim.models.protocols import Direct, Identifiable, needs_time
 from hysim.models.search_space import Freedom
 from hysim.records import Record
@@ -45,35 +44,33 @@ def identify(
     Parameters
     ----------
     model_or_class : model, model class or structure
-        `hysim.BoucWen`, `hysim.TransferFunction.structure(poles=4, zeros=1)`, ... A class gives its
-        defaults as one start of the search, an instance its values.
+        `hysim.BoucWen`, `hysim.TransferFunction.structure(poles=4, zeros=1)`, ... The search begins at the defaults of
+        a class, or at the values of an instance.
     record_or_records : Record or sequence of Record
-        Input and output, and for models with dynamics the time. Several records share all parameters but
-        those of the state at the first sample: where it is free, each has its own, ``z0[0]``, ``z0[1]``, ...
+        Input and output, and for models with dynamics the time. Several records share all parameters but the state at
+        the first sample: where it is free, each has its own, ``z0[0]``, ``z0[1]``, ...
     fixed : mapping, optional
         Parameters that are not free, and their values.
     free : sequence of str, optional
-        Names to take out of the set that is held by default. Of each redundant group one is held, for
-        Bouc-Wen ``A = 1``, since only A times gain can be told.
+        Parameters to identify that are held by default. One of each redundant group is held, for Bouc-Wen ``A = 1``,
+        since only the product of A and gain is determined.
     bounds : mapping, optional
         Name to (lower, upper), in place of the family's own box.
     initial : {"free", "rest", "periodic"}, or one of them for each record, optional
-        Whether the state at the first sample is identified, is rest, or is that of a steady cycle (the
-        record repeats itself); by default as the family has it (free for a memory, as the structure says
-        for a transfer function).
+        Whether the state at the first sample is identified, is rest, or is that of a steady cycle; by default free for
+        a memory, and as the structure says for a transfer function.
     noise : {"gaussian", "quantised", "robust"}
-        What the output is disturbed by: normal noise; normal noise before a sensor that rounds to multiples
-        of `Record.resolution`, so that each output is an interval; or Student's t with 4 degrees of freedom,
-        for records with outliers. The likelihood of the last two begins at the optima of the first.
+        Normal noise; normal noise before a sensor that rounds to multiples of `Record.resolution`; or Student's t with
+        4 degrees of freedom, for records with outliers.
     intervals : {"linear", "profile", "bootstrap"}
-        How `Identification.intervals`, at 95 %, are found: from the standard errors, by the profile of the
+        How `Identification.intervals`, at 95 %, are computed: from the standard errors, by the profile of the
         likelihood, or from 500 records drawn anew.
     cross_validate : {None, "loo", "cycles", "records"} or int, optional
-        ``"loo"`` leaves one output sample out at a time, an int one of that many blocks of samples, ``"cycles"``
-        a cycle of the input (not the first, which tells the state), ``"records"`` a record; the input is kept.
-        Fills `Identification.cv_rmse` and `Identification.cv_residual`.
+        ``"loo"`` leaves one output sample out at a time, an int one of that many blocks of samples, ``"cycles"`` a
+        cycle of the input but the first, ``"records"`` a record; the input is kept. Fills `Identification.cv_rmse`
+        and `Identification.cv_residual`.
     seed : int
-        Of the starts of the search, and of what is drawn. The optimum does not depend on it.
+        Of the starts of the search, and of random draws. The optimum does not depend on it.
     workers : int, optional
         Number of threads; by default one for each core.
     progress : callable, optional
@@ -123,7 +120,7 @@ def identify(
 
 
 def _searched(
-    whole: Problem,
+    problem: Problem,
     noise: str,
     intervals: str,
     folds: Sequence[npt.NDArray[np.intp]],
@@ -131,21 +128,21 @@ def _searched(
     progress: Progress | None,
 ) -> Identification:
     """The result of the search for a family's parameters."""
-    n_samples, n_names = whole.y.size, len(whole.space.names)
+    n_samples, n_names = problem.y.size, len(problem.space.names)
     if not n_names:
         raise ValueError("every parameter is fixed: nothing is left to identify")
     if n_samples < n_names:
         raise ValueError(f"{n_names} parameters cannot be estimated from {n_samples} samples; fix some of them")
-    density = _density(noise, whole)
-    squares = optima(whole, seed=seed, progress=progress)
+    density = _density(noise, problem)
+    squares = optima(problem, seed=seed, progress=progress)
     if not squares:
         raise ValueError("every parameter set tried diverged: check the units, or pass bounds=")
     if isinstance(density, Quantised):
         density = density.at_least(squares[0].cost, n_samples - n_names)
-    search = Search(whole, density, noise, seed)
-    result, found = search.described(search.likely(squares), intervals, squares[0].x)
-    errors = left_out_errors(whole, search.noise, np.array([optimum.theta for optimum in found]), folds)
-    return replace(result, regions=search.regions(found[0]), cv_residual=errors, cv_rmse=rms_of_known(errors))
+    search = Search(problem, density, seed)
+    result, likely = search.described(search.likely(squares), intervals, squares[0].x)
+    errors = left_out_errors(problem, density, np.array([optimum.theta for optimum in likely]), folds)
+    return replace(result, regions=search.regions(likely[0]), cv_residual=errors, cv_rmse=rms_of_known(errors))
 
 
 def _records(given: Record | Sequence[Record]) -> tuple[Record, ...]:
@@ -185,13 +182,13 @@ def _family(model_or_class: Any) -> Identifiable:
     return family  # type: ignore[no-any-return]
 
 
-def _density(noise: str, whole: Problem) -> Noise:
-    floor = PERFECT * (float(np.abs(whole.y).max()) or 1.0)
+def _density(noise: str, problem: Problem) -> Noise:
+    floor = PERFECT * (float(np.abs(problem.y).max()) or 1.0)
     if noise == "gaussian":
         return Gaussian(floor)
     if noise == "robust":
         return Robust(floor)
-    quanta = {part.record.resolution for part in whole.parts}
+    quanta = {part.record.resolution for part in problem.parts}
     if len(quanta) != 1 or None in quanta:
         raise ValueError("quantised noise needs the sensor's quantum, the same for all records: Record(resolution=...)")
     return Quantised(float(quanta.pop() or 0.0))

@@ -33,6 +33,11 @@ class Terms(NamedTuple):
 class Noise(Protocol):
     """One of the densities."""
 
+    @property
+    def name(self) -> str:
+        """Its name, as `identify` takes it."""
+        ...
+
     def scale(self, residual: FloatArray, weights: FloatArray) -> FloatArray:
         """The most likely sigma, (n_sets, 1)."""
         ...
@@ -51,6 +56,7 @@ class Gaussian:
     """Normal noise. `floor` keeps sigma off zero where a model is perfect [unit of y]."""
 
     floor: float
+    name: str = "gaussian"
 
     def scale(self, residual: FloatArray, weights: FloatArray) -> FloatArray:
         mean_square = np.sum(weights * residual**2, axis=1, keepdims=True) / weights.sum(axis=1, keepdims=True)
@@ -69,6 +75,7 @@ class Robust:
     """Student's t, for records with outliers."""
 
     floor: float
+    name: str = "robust"
 
     def scale(self, residual: FloatArray, weights: FloatArray) -> FloatArray:
         total = weights.sum(axis=1, keepdims=True)
@@ -100,6 +107,7 @@ class Quantised:
 
     quantum: float
     floor: float = 0.0
+    name: str = "quantised"
 
     def at_least(self, sum_of_squares: float, freedom: int) -> "Quantised":
         """With the floor that the least sum of squares on so many degrees of freedom leaves."""

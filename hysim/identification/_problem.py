@@ -51,6 +51,11 @@ class Problem:
     own: SearchSpace
     parts: tuple[Part, ...]
 
+    @property
+    def n_x(self) -> int:
+        """Number of coordinates: theta (n_theta,) is the coordinates x and then the linear parameters b."""
+        return len(self.space.coordinates)
+
     @cached_property
     def y(self) -> FloatArray:
         """All measured outputs, one record after the other."""
@@ -66,13 +71,10 @@ class Problem:
         """Where each record begins, and the number of samples."""
         return [0, *np.cumsum([len(part.record) for part in self.parts]).tolist()]
 
-    def solve(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Linear parameters (n_sets, n_linear) and residuals (n_sets, n_samples) at the coordinates `x`.
-
-        A set that leaves the finite numbers has residuals of inf.
-        """
-        linear, residuals = zip(*[self._solve(x[part]) for part in self._chunks(len(x))], strict=True)
-        return np.concatenate(linear), np.concatenate(residuals)
+    def completed(self, x: FloatArray) -> FloatArray:
+        """Theta (n_sets, n_theta): the coordinates `x` and the best linear parameters."""
+        linear = [self._solve(x[part])[0] for part in self._chunks(len(x))]
+        return np.concatenate([x, np.concatenate(linear)], axis=1)
 
     def costs(self, x: FloatArray) -> FloatArray:
         """Sums of squares (n_sets,), without holding the residuals of all sets at once."""
@@ -87,9 +89,9 @@ class Problem:
         return self.regression(columns, self.y - fixed_part)
 
     def regression(self, columns: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Linear parameters and residuals as `solve` gives them, for given columns.
+        """Linear parameters (n_sets, n_linear) and residuals (n_sets, n_samples), inf for a set that diverges.
 
-        What is not finite in the columns and in the target is set to zero in place.
+        Sets that are not finite in the columns or the target are set to zero in place.
         """
         broken = ~((np.abs(columns) < _LARGEST).all(axis=(1, 2)) & (np.abs(target) < _LARGEST).all(axis=1))
         columns[broken], target[broken] = 0.0, 0.0
@@ -98,13 +100,13 @@ class Problem:
         residual[broken] = np.inf
         return linear, residual
 
-    def model(self, x: FloatArray, linear: FloatArray) -> FloatArray:
+    def model(self, theta: FloatArray) -> FloatArray:
         """Outputs (n_sets, n_samples), without holding the columns of all sets at once."""
-        outputs = np.empty((len(x), self.y.size))
-        for sets in self._chunks(len(x)):
-            columns, fixed_part = self.split(x[sets])
+        outputs = np.empty((len(theta), self.y.size))
+        for sets in self._chunks(len(theta)):
+            columns, fixed_part = self.split(theta[sets, : self.n_x])
             with np.errstate(over="ignore", invalid="ignore"):
-                outputs[sets] = fixed_part + (columns @ linear[sets, :, np.newaxis])[..., 0]
+                outputs[sets] = fixed_part + (columns @ theta[sets, self.n_x :, np.newaxis])[..., 0]
         return outputs
 
     def split(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -149,19 +151,22 @@ class Problem:
         resting = {self.own.coordinates[place]: np.zeros(len(x)) for place in np.flatnonzero(~present)}
         return self.own.parameters(own) | resting
 
-    def named(self, x: FloatArray, linear: FloatArray) -> FloatArray:
+    def named(self, theta: FloatArray) -> FloatArray:
         """The user's free parameters, shape (n_sets, n_names), in the order of `space.names`."""
-        known = dict(zip(self.space.linear, linear.T, strict=True))
+        x = theta[:, : self.n_x]
+        known = dict(zip(self.space.linear, theta[:, self.n_x :].T, strict=True))
         for part in self.parts:
             known |= {part.names.get(name, name): values for name, values in self._decoded(x, part).items()}
         return np.stack([np.broadcast_to(known[name], len(x)) for name in self.space.names], axis=1)
 
-    def estimates(self, x: FloatArray, linear: FloatArray, k: int = 0) -> dict[str, float]:
+    def estimates(self, theta: FloatArray, k: int = 0) -> dict[str, float]:
         """Every parameter of the family by name at one point, as the record `k` has it."""
+        x, linear = np.split(theta, [self.n_x])
         searched = {name: float(np.ravel(values)[0]) for name, values in self.parameters(x[np.newaxis], k).items()}
-        found = [float(linear[column]) if column >= 0 else 0.0 for column in self.parts[k].linear.tolist()]
+        columns = self.parts[k].linear.tolist()
+        regressed = [float(linear[column]) if column >= 0 else 0.0 for column in columns]
         state = {name: searched[name] for name in self.own.state if name in searched}
-        return searched | dict(self.own.held) | dict(zip(self.own.linear, found, strict=True)) | state
+        return searched | dict(self.own.held) | dict(zip(self.own.linear, regressed, strict=True)) | state
 
     def beside(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Points (n_sets, n_x, n_x) a small step from each `x` along each coordinate, inside the box, and the steps."""
@@ -182,20 +187,20 @@ class Problem:
         normalised = columns / norms[:, np.newaxis, :]
         if self.space.bounds:
             return self._bounded(normalised, target, norms)
-        left, singular, right = np.linalg.svd(normalised, full_matrices=False)
+        basis, singular, right = np.linalg.svd(normalised, full_matrices=False)
         inverse = np.where(singular > _RANK, 1.0 / np.maximum(singular, _RANK), 0.0)
-        projected = inverse[..., np.newaxis] * (left.transpose(0, 2, 1) @ target[..., np.newaxis])
+        projected = inverse[..., np.newaxis] * (basis.transpose(0, 2, 1) @ target[..., np.newaxis])
         return np.asarray((right.transpose(0, 2, 1) @ projected)[..., 0] / norms)
 
     def _bounded(self, columns: FloatArray, target: FloatArray, norms: FloatArray) -> FloatArray:
         from scipy.optimize import lsq_linear
 
         lower, upper = self.linear_box()
-        left, square = np.linalg.qr(columns)  # the same problem with as many equations as unknowns
-        short = (left.transpose(0, 2, 1) @ target[..., np.newaxis])[..., 0]
+        basis, triangle = np.linalg.qr(columns)  # the same problem with as many equations as unknowns
+        short = (basis.transpose(0, 2, 1) @ target[..., np.newaxis])[..., 0]
         solutions = [
             lsq_linear(one, goal, bounds=(lower * norm, upper * norm), method="bvls").x / norm
-            for one, goal, norm in zip(square, short, norms, strict=True)
+            for one, goal, norm in zip(triangle, short, norms, strict=True)
         ]
         return np.array(solutions).reshape(len(columns), lower.size)
 
@@ -218,9 +223,9 @@ def problem(
         `search_space`.
     """
     kinds = _kinds(initial, len(records))
-    whole = None if kinds[0] is None else "free" if "free" in kinds else "rest"
+    shared = None if kinds[0] is None else "free" if "free" in kinds else "rest"
     widest = max(records, key=lambda record: (float(np.ptp(record.u)), len(record)))  # it scales the box
-    own = family.search_space(widest, replace(freedom, initial=whole))
+    own = family.search_space(widest, replace(freedom, initial=shared))
     if len(records) == 1:
         every = np.arange(len(own.coordinates)), np.arange(len(own.linear))
         return Problem(family, own, own, (Part(records[0], *every, kinds[0] == "periodic", {}),))

@@ -32,11 +32,10 @@ class Profile:
     Parameters
     ----------
     lower, upper : float
-        Interval at 95 %; infinite where the profile stays inside the limit.
     at_box : (bool, bool)
-        Whether the box ends it.
+        Interval at 95 %, infinite where the profile stays inside the limit, and whether the box ends it.
     values, deviance : array, shape (n_points,)
-        Where the profile was computed, and how much twice the logarithm of the likelihood falls there.
+        Values of the parameter, and how much twice the logarithm of the likelihood falls there.
     limit : float
         Deviance at the ends of the interval.
     """
@@ -70,14 +69,14 @@ class _Ends:
         self.origin, self.r_origin = values.copy(), root.copy()
         self.outside, self.r_outside = np.full(values.size, np.nan), np.full(values.size, np.inf)
         self.theta, self.slope = theta.copy(), slope.copy()
-        self.found = np.full(values.size, np.nan)
+        self.end = np.full(values.size, np.nan)
         self.doubtful = np.zeros(values.size, dtype=bool)  # whether the outer value was reached from farther away
 
     def move_in(self, which: npt.NDArray[np.intp], values: FloatArray, root: FloatArray, theta: FloatArray) -> None:
         """Inner values, farther out than the ones before."""
-        gone, whole = values - self.inside[which], values - self.origin[which]
-        far = np.abs(gone) > 0.1 * np.abs(whole)  # of neighbours the difference is that of how far each descended
-        self.slope[which[far]] = (theta[far] - self.theta[which[far]]) / gone[far, np.newaxis]
+        step, distance = values - self.inside[which], values - self.origin[which]
+        far = np.abs(step) > 0.1 * np.abs(distance)  # of neighbours the difference is that of how far each descended
+        self.slope[which[far]] = (theta[far] - self.theta[which[far]]) / step[far, np.newaxis]
         self.inside[which], self.r_inside[which], self.theta[which] = values, root, theta
         self.doubtful[which] = np.isfinite(self.outside[which]) & (self.outside[which] != values)
         self.outside[which] = np.where(self.doubtful[which], self.outside[which], np.nan)
@@ -95,20 +94,13 @@ def profiles(
     spread: FloatArray,
     limit: float,
 ) -> tuple[dict[str, Profile], FloatArray | None]:
-    """Profiles of all parameters whose standard error is known, and a better optimum if one was met on the way.
+    """Profiles of all parameters whose standard error is known, and a better optimum (n_theta,) if one was met.
 
-    Parameters
-    ----------
-    descent : Descent
-        With the targets of one record.
-    optima, losses : array, shape (n_optima, n_theta), (n_optima,)
-        The best first; the others are those inside the limit.
-    covariance, spread : array
-        Of the parameters, (n_names, n_names), and of theta with them, (n_theta, n_names).
-    limit : float
-        Deviance at the end of an interval.
+    `optima` (n_optima, n_theta) and their `losses` begin with the best; the others are those inside the `limit` of the
+    deviance. `covariance` (n_names, n_names) is that of the parameters, `spread` (n_theta, n_names) that of theta with
+    them.
     """
-    problem, n_x = descent.problem, len(descent.problem.space.coordinates)
+    problem = descent.problem
     variance = np.diag(covariance)
     known = np.flatnonzero(np.isfinite(variance) & (variance > 0.0))
     if not known.size:
@@ -116,7 +108,7 @@ def profiles(
     grid = np.meshgrid(known, [-1.0, 1.0], np.arange(len(optima)), indexing="ij")
     place, start = grid[0].ravel(), grid[2].ravel()
     side: FloatArray = grid[1].ravel().astype(float)
-    values = problem.named(optima[:, :n_x], optima[:, n_x:])[start, place]
+    values = problem.named(optima)[start, place]
     stderr, root = np.sqrt(variance[place]), float(np.sqrt(limit))
     deviance = 2.0 * np.maximum(losses[start] - losses[0], 0.0)
     slope = (spread[:, place] / variance[place]).T
@@ -144,14 +136,14 @@ def profiles(
         ends.move_in(won, at[inner], r[inner], reached.theta[inner])
         ends.move_out(lost, at[~inner], r[~inner])
         close = np.abs(r - root) <= _ENOUGH * root
-        ends.found[active[close]] = at[close]
+        ends.end[active[close]] = at[close]
         gap = np.abs(ends.outside[active] - ends.inside[active])
         step[won] = _farther(ends, won, step[won], root)
         trial[active] = _next(ends, active, side, step, root)
         active = active[~close & (ends.doubtful[active] | ~(gap <= _CLOSE * stderr[active]))]
-    at_box = np.isnan(ends.found) & np.isfinite(ends.outside) & ~np.isfinite(ends.r_outside)
+    at_box = np.isnan(ends.end) & np.isfinite(ends.outside) & ~np.isfinite(ends.r_outside)
     open_ended = np.where(np.isnan(ends.outside), side * np.inf, ends.inside)
-    end = np.where(np.isnan(ends.found), open_ended, ends.found)
+    end = np.where(np.isnan(ends.end), open_ended, ends.end)
     return _gathered(problem.space.names, place, side, end, at_box, points, limit), None if better is None else better[
         1
     ]

@@ -22,15 +22,15 @@ def left_out_errors(
     problem: Problem, noise: Noise, optima: FloatArray, left_out: Sequence[npt.NDArray[np.intp]]
 ) -> FloatArray:
     """Error of each sample, shape (n,), in the fit that leaves it out; nan where none does, inf where it diverged."""
-    found = np.full(problem.y.size, np.nan)
+    errors_of_all = np.full(problem.y.size, np.nan)
     if not left_out:
-        return found
+        return errors_of_all
     starts = optima[:_AT_FOLD]
     at_once = max(1, _SAMPLES_AT_ONCE // (len(starts) * problem.y.size))
     groups = [left_out[k : k + at_once] for k in range(0, len(left_out), at_once)]
     errors = [_left_out_errors(problem, noise, starts, group) for group in groups]
-    found[np.concatenate(left_out)] = np.concatenate(errors)
-    return found
+    errors_of_all[np.concatenate(left_out)] = np.concatenate(errors)
+    return errors_of_all
 
 
 def rms_of_known(errors: FloatArray) -> float:
@@ -73,10 +73,10 @@ def bootstrap(
         targets = noise.draw(y_model, sigma * np.sqrt(residual.size / freedom), rng)
     at_once = max(1, _SAMPLES_AT_ONCE // problem.y.size)
     weights = np.ones((1, residual.size))
-    found = [
+    descents = [
         Descent(problem, noise, targets[k : k + at_once], weights).run(
             np.tile(theta, (len(targets[k : k + at_once]), 1))
         )
         for k in range(0, draws, at_once)
     ]
-    return np.concatenate([reached.theta[np.isfinite(reached.loss)] for reached in found])
+    return np.concatenate([reached.theta[np.isfinite(reached.loss)] for reached in descents])

@@ -1,4 +1,4 @@
-"""What `identify` returns."""
+"""The result of `identify`."""
 
 from collections.abc import Mapping
 from dataclasses import field
@@ -14,19 +14,7 @@ from hysim.identification._profile import Profile
 
 @frozen
 class Candidate:
-    """One optimum: a model and how well it fits.
-
-    Parameters
-    ----------
-    model : model
-        The identified model.
-    estimates : mapping
-        Every parameter by name, the held ones included.
-    fit_percent : float
-        100 (1 - ||residual|| / ||y - mean(y)||).
-    rmse : float
-        Root mean square of the residual [unit of y].
-    """
+    """One optimum: a model and how well it fits; the fields are those of `Identification`."""
 
     model: Any
     estimates: Mapping[str, float]
@@ -57,10 +45,10 @@ class Identification:
     estimates : mapping
         Every parameter by name, the held ones included.
     stderr : mapping
-        Standard error of each free parameter by the linearised model; nan where the data cannot tell,
-        with the reason in `message`.
+        Standard error of each free parameter by the linearised model; nan where the data do not determine it, with
+        the reason in `message`.
     intervals : mapping
-        Name to (lower, upper) at 95 %; nan where the data cannot tell.
+        Name to (lower, upper) at 95 %; nan where the data do not determine it.
     interval_method : {"linear", "profile", "bootstrap"}
         How they were found.
     profiles : mapping
@@ -72,73 +60,65 @@ class Identification:
     redundant : tuple of tuples of str
         Groups of parameters that the data cannot tell apart.
     free_names : tuple of str
-        The parameters that were identified.
     n_parameters : int
-        Their number, d.
+        The parameters that were identified, and their number d.
     fit_percent, rmse : float
         100 (1 - ||residual|| / ||y - mean(y)||), and the residual's root mean square [unit of y].
     fpe, aic, bic : float
         V (1 + d/N) / (1 - d/N), N ln V + 2 d, N ln V + d ln N, with V the mean squared residual.
     noise : {"gaussian", "quantised", "robust"}
-        The density whose likelihood is at its largest.
-    sigma : float
-        Its scale, the most likely one [unit of y].
-    log_likelihood : float
-        Without the constants; see `hysim.identification._noise`.
+    sigma, log_likelihood : float
+        Density of the noise, its most likely scale [unit of y], and the largest likelihood without constants.
     least_squares : Candidate or None
         The optimum of the sum of squares, where the noise is not Gaussian.
-    residual : array, shape (n,)
-        Measured minus model, one record after the other [unit of y].
+    residual, response_stderr : array, shape (n,)
+        Measured minus model, one record after the other, and the standard error of the model's output [unit of y].
     resolution : float or None
         Quantum of the sensor [unit of y].
-    response_stderr : array, shape (n,)
-        Standard error of the model's output [unit of y].
     loop_width : Width or None
         The largest width of the first record's loop with its band; None if the record has no complete cycle.
     whiteness : float
         Probability of residuals at least as correlated if they were white (Ljung and Box); nan if unknown.
     success : bool
-        Whether the search converged.
     message : str
-        How it ended, and what the data cannot tell.
+        Whether the search converged, how it ended, and which parameters the data do not determine.
     rivals : tuple of Candidate
-        Other optima that the data hardly tell from this one, best first: their likelihood ratio is inside
-        the 95 % region of the optimum.
+        Other optima whose likelihood ratio is inside the 95 % region of this one, best first.
     regions : mapping
         Name to the best candidate inside a region that the family names (for Bouc-Wen ``"admissible"``),
         where the optimum lies outside.
     cv_rmse : float
-        Cross-validated rmse [unit of y]; nan if it was not asked for.
     cv_residual : array, shape (n,)
-        Measured minus model at each sample, by the fit that leaves it out; nan where none does.
+        Cross-validated rmse, and measured minus model at each sample by the fit that leaves it out [unit of y]; nan
+        where there is none.
     seed : int
         Of the starts of the search.
     warnings : tuple of str
-        One sentence for each thing that should not be overlooked: a search that did not converge, a constant output,
-        standard errors that are unknown, correlated residuals, input and output that may be swapped.
+        Sentences on a search that did not converge, a constant output, unknown standard errors, correlated residuals,
+        or input and output that may be swapped.
     """
 
     model: Any
     models: tuple[Any, ...]
-    estimates: Mapping[str, float]
-    stderr: Mapping[str, float]
-    intervals: Mapping[str, tuple[float, float]]
-    interval_method: str
-    profiles: Mapping[str, Profile]
-    covariance: FloatArray
-    condition: float
-    redundant: tuple[tuple[str, ...], ...]
-    free_names: tuple[str, ...]
+    estimates: Mapping[str, float] = field(default_factory=dict)
+    stderr: Mapping[str, float] = field(default_factory=dict)
+    intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    interval_method: str = "linear"
+    profiles: Mapping[str, Profile] = field(default_factory=dict)
+    covariance: FloatArray = field(default_factory=lambda: np.empty(0))  # JSON keeps no second axis of an empty matrix
+    condition: float = float("nan")
+    redundant: tuple[tuple[str, ...], ...] = ()
+    free_names: tuple[str, ...] = ()
     n_parameters: int
     fit_percent: float
     rmse: float
     fpe: float
     aic: float
     bic: float
-    noise: str
+    noise: str = "gaussian"
     sigma: float
     log_likelihood: float
-    least_squares: Candidate | None
+    least_squares: Candidate | None = None
     residual: FloatArray
     resolution: float | None
     response_stderr: FloatArray
@@ -225,7 +205,7 @@ class Identification:
         return ", ".join(words)
 
     def to_json(self) -> str:
-        """The whole result as JSON, with the version of hysim; `from_json` gives it back, every number to the bit.
+        """The whole result as JSON, with the version of hysim; `from_json` returns it, every number to the bit.
 
         Raises
         ------
@@ -243,5 +223,5 @@ class Identification:
         ValueError
             If the text does not hold one.
         """
-        found: Self = json_forms.from_text("identification", text, (cls, Candidate, Width, Profile))
-        return found
+        result: Self = json_forms.from_text("identification", text, (cls, Candidate, Width, Profile))
+        return result

@@ -47,20 +47,17 @@ def optima(problem: Problem, *, seed: int, progress: Progress | None = None) -> 
         return polish(problem, np.empty((1, 0)))
     share = min(1.0, _LONG / problem.y.size)
     screened = max(256, round(N_SCREENED * share)) if space.screened is None else space.screened
-    candidates = np.concatenate([space.starts, _uniform(space, screened, seed)])
     n_starts = max(16, round(N_DESCENDING * share))
-    starts = _apart(space, candidates, problem.costs(candidates), _APART, n_starts, len(space.starts))
+    starts = _starts(problem, screened, seed, n_starts, len(space.starts))
     if not len(starts):
         return []
     reached = _descended(problem, starts, exact=False)
-    x, cost = reached.theta[:, : space.lower.size], reached.loss
-    best = _apart(space, x, cost, _SAME, N_POLISHED)
-    if progress is not None:
-        progress(1, 2)
-    found = polish(problem, best) if len(best) else []
-    if progress is not None:
-        progress(2, 2)
-    return _distinct(found)
+    best = _apart(space, reached.theta[:, : problem.n_x], reached.loss, _SAME, N_POLISHED)
+    report = progress or (lambda done, total: None)
+    report(1, 2)
+    polished = polish(problem, best) if len(best) else []
+    report(2, 2)
+    return _distinct(polished)
 
 
 def brief_cost(problem: Problem) -> float:
@@ -69,13 +66,10 @@ def brief_cost(problem: Problem) -> float:
     if not space.coordinates:
         return float(problem.costs(np.empty((1, 0)))[0])
     screened = N_BRIEF_SCREENED if space.screened is None else min(space.screened, N_BRIEF_SCREENED)
-    candidates = np.concatenate([space.starts, _uniform(space, screened, seed=0)])
-    costs = problem.costs(candidates)
-    best = _apart(space, candidates, costs, _APART, N_BRIEF_DESCENDING)
+    best = _starts(problem, screened, 0, N_BRIEF_DESCENDING)
     if not len(best):
         return math.inf
-    x = _descended(problem, best, exact=False).theta[:, : space.lower.size]
-    return float(problem.costs(x).min())
+    return float(problem.costs(_descended(problem, best, exact=False).theta[:, : problem.n_x]).min())
 
 
 def polish(problem: Problem, starts: FloatArray) -> list[Optimum]:
@@ -90,12 +84,16 @@ def polish(problem: Problem, starts: FloatArray) -> list[Optimum]:
 
 def _descended(problem: Problem, starts: FloatArray, *, exact: bool) -> Reached:
     """Where the points `starts` (n, n_x) descend to, on the way or at the end."""
-    theta = np.concatenate([starts, problem.solve(starts)[0]], axis=1)
     noise, everything = Gaussian(floor=PERFECT * problem.scale), np.ones((1, problem.y.size))
-    projected = not problem.space.bounds
-    descent = Descent(problem, noise, problem.y[np.newaxis], everything, projected=projected)
+    descent = Descent(problem, noise, problem.y[np.newaxis], everything, projected=not problem.space.bounds)
     gain, steps = (_TOLERANCE, N_POLISHING) if exact else (_GAIN, N_STEPS)
-    return descent.run(theta, tolerance=0.5 * problem.y.size * gain, steps=steps)
+    return descent.run(problem.completed(starts), tolerance=0.5 * problem.y.size * gain, steps=steps)
+
+
+def _starts(problem: Problem, screened: int, seed: int, most: int, n_given: int = 0) -> FloatArray:
+    """The family's first `n_given` starts, and the best of the others and of points drawn from the box."""
+    candidates = np.concatenate([problem.space.starts, _uniform(problem.space, screened, seed)])
+    return _apart(problem.space, candidates, problem.costs(candidates), _APART, most, n_given)
 
 
 def _uniform(space: SearchSpace, n: int, seed: int) -> FloatArray:
@@ -123,10 +121,10 @@ def _apart(
     return points[chosen]
 
 
-def _distinct(found: list[Optimum]) -> list[Optimum]:
+def _distinct(optima: list[Optimum]) -> list[Optimum]:
     """Optima of different cost, best first: the same cost to 1e-6 is the same optimum."""
     kept: list[Optimum] = []
-    for optimum in sorted(found, key=lambda candidate: candidate.cost):
+    for optimum in sorted(optima, key=lambda candidate: candidate.cost):
         if not kept or optimum.cost > kept[-1].cost * (1.0 + 1e-6):
             kept.append(optimum)
     return kept

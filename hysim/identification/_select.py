@@ -1,25 +1,26 @@
-"""The verb `select`: which of several candidates the data prefer.
+"""The verb `select`: several candidates identified on the same records, and ranked by a criterion.
 
-Each is identified on the same records, and they are ranked by a criterion that charges for parameters, the least
-first. With V the mean squared residual of N samples and d parameters these are
-
-    BIC = N ln V + d ln N,    AIC = N ln V + 2 d,    FPE = V (1 + d/N) / (1 - d/N),
-
-or the cross-validated rmse. Without noise V is rounding, and none of the first three means anything.
+The criteria are those of `hysim.metrics`, or the cross-validated rmse. Without noise the residual is rounding, and BIC,
+AIC and FPE mean nothing.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from hysim._frozen import frozen
 from hysim._parallel import Progress
-from hysim._words import printed, words
+from hysim._words import aligned, printed, words
 from hysim.identification._identify import identify
 from hysim.identification._result import Identification
 from hysim.records import Record
 
-CRITERIA = ("bic", "aic", "fpe", "cv_rmse")
+CRITERIA: dict[str, Callable[[Identification], float]] = {
+    "bic": lambda fit: fit.bic,
+    "aic": lambda fit: fit.aic,
+    "fpe": lambda fit: fit.fpe,
+    "cv_rmse": lambda fit: fit.cv_rmse,
+}
 
 
 @printed
@@ -30,9 +31,9 @@ class Selection:
     Parameters
     ----------
     criterion : {"bic", "aic", "fpe", "cv_rmse"}
-        What they are ranked by.
+        By which they are ranked.
     name : str
-        The best one's name.
+        Name of the best one.
     fits : mapping
         Name to `Identification`, the best first.
     """
@@ -51,23 +52,19 @@ class Selection:
 
     def to_text(self) -> str:
         """The table for a terminal, the best first."""
-        header = ["candidate", "parameters", "fit [%]", "rmse", self.criterion]
+        criterion = CRITERIA[self.criterion]
         rows = [
             [
                 name,
                 str(fit.n_parameters),
                 "-" if math.isnan(fit.fit_percent) else f"{fit.fit_percent:.2f}",
                 f"{fit.rmse:.4g}",
-                f"{getattr(fit, self.criterion):.6g}",
+                f"{criterion(fit):.6g}",
             ]
             for name, fit in self.fits.items()
         ]
-        widths = [max(map(len, column)) for column in zip(header, *rows, strict=True)]
-        lines = [
-            "  ".join([cells[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(cells[1:], widths[1:], strict=True))])
-            for cells in [header, *rows]
-        ]
-        return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])
+        header, *lines = aligned([["candidate", "parameters", "fit [%]", "rmse", self.criterion], *rows])
+        return "\n".join([header, "-" * len(header), *lines])
 
 
 def select(
@@ -89,11 +86,9 @@ def select(
     candidates : mapping or sequence
         Name to what `identify` takes: a class, a model as the start, or a structure. Those of a sequence are
         named by themselves, a class by its name.
-    record_or_records : Record or sequence of Record
-        What they are identified on.
     criterion : {"bic", "aic", "fpe", "cv_rmse"}
-        What they are ranked by; the last needs `cross_validate`.
-    initial, noise, cross_validate, seed, workers
+        By which they are ranked; the last needs `cross_validate`.
+    record_or_records, initial, noise, cross_validate, seed, workers
         As in `identify`, the same for all.
     progress : callable, optional
         Called as ``progress(done, total)`` after each candidate.
@@ -120,7 +115,7 @@ def select(
         raise ValueError(f"criterion must be one of {', '.join(CRITERIA)}, got {criterion!r}")
     if criterion == "cv_rmse" and cross_validate is None:
         raise ValueError('criterion="cv_rmse" needs a cross-validation: cross_validate="loo", or a number of blocks')
-    named = _named(candidates)
+    named, report = _named(candidates), progress or (lambda done, total: None)
     fits: dict[str, Identification] = {}
     for name, candidate in named.items():
         fits[name] = identify(
@@ -132,11 +127,10 @@ def select(
             seed=seed,
             workers=workers,
         )
-        if progress is not None:
-            progress(len(fits), len(named))
+        report(len(fits), len(named))
 
     def score(name: str) -> float:
-        value = float(getattr(fits[name], criterion))
+        value = CRITERIA[criterion](fits[name])
         return math.inf if math.isnan(value) else value
 
     ranked = sorted(fits, key=score)

@@ -44,32 +44,34 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
     slopes, way_back = output_slopes(problem, theta), named_slopes(problem, theta[np.newaxis])[0]
     if not np.isfinite(slopes).all():
         return _unknown(problem, theta, "no standard errors: the output is not finite beside the optimum")
-    x, linear = np.split(theta, [len(space.coordinates)])
+    x, linear = np.split(theta, [problem.n_x])
     width = space.upper - space.lower
     at_side = (x - space.lower < _AT_SIDE * width) | (space.upper - x < _AT_SIDE * width)
     at_bound = np.logical_or(*(linear == bound for bound in problem.linear_box()))
     ended = zip((*space.coordinates, *space.linear), np.concatenate([at_side, at_bound]), strict=True)
     reasons = [f"{name} is at a side of its box" for name, side in ended if side]
     reach = np.linalg.norm(slopes[:, : x.size], axis=0) * width
-    felt = reach > _SINGULAR * reach.max(initial=0.0)
-    known = np.concatenate([at_side & felt, np.zeros(linear.size, dtype=bool)])
-    slopes[:, : x.size][:, at_side & ~felt] = 0.0
+    has_effect = reach > _SINGULAR * reach.max(initial=0.0)
+    known = np.concatenate([at_side & has_effect, np.zeros(linear.size, dtype=bool)])
+    slopes[:, : x.size][:, at_side & ~has_effect] = 0.0
     scaled, way_back = np.where(known, 0.0, slopes) * np.sqrt(curvature)[:, np.newaxis], np.where(known, 0.0, way_back)
     norms = np.linalg.norm(scaled, axis=0)
     norms[norms == 0.0] = 1.0
     _, singular, right = np.linalg.svd(scaled / norms, full_matrices=False)
-    told = singular > _SINGULAR * singular[0]
+    is_determined = singular > _SINGULAR * singular[0]
     factor = np.sqrt(n_samples / (n_samples - n_names))
-    spread = factor * (right[told].T / singular[told]) / norms[:, np.newaxis]
+    spread = factor * (right[is_determined].T / singular[is_determined]) / norms[:, np.newaxis]
     directions = way_back / norms @ right.T
     covariance = (way_back @ spread) @ (way_back @ spread).T
     size = np.abs(directions).max(axis=1)
-    blind = np.flatnonzero(~told & (np.abs(right[:, ~known]).max(axis=1, initial=0.0) > 0.5 / np.sqrt(known.size)))
-    redundant = tuple(_named(space.names, directions[:, k], size) for k in blind)
+    undetermined = np.flatnonzero(
+        ~is_determined & (np.abs(right[:, ~known]).max(axis=1, initial=0.0) > 0.5 / np.sqrt(known.size))
+    )
+    redundant = tuple(_named(space.names, directions[:, k], size) for k in undetermined)
     redundant = tuple(dict.fromkeys(names for names in redundant if names))
     reasons += [_in_words(names, space.redundant) for names in redundant]
-    lost = (np.abs(directions[:, ~told]).max(axis=1, initial=0.0) > 1e-3 * size) | (size == 0.0)
-    covariance[lost], covariance[:, lost] = np.nan, np.nan
+    unknown = (np.abs(directions[:, ~is_determined]).max(axis=1, initial=0.0) > 1e-3 * size) | (size == 0.0)
+    covariance[unknown], covariance[:, unknown] = np.nan, np.nan
     free = singular[: np.count_nonzero(~known)]
     condition = float(free[0] / free[-1]) if free.size and free[-1] > 0.0 else np.inf
     output = np.linalg.norm(slopes @ spread, axis=1)
@@ -79,7 +81,7 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
 
 def output_slopes(problem: Problem, theta: FloatArray) -> FloatArray:
     """dm/dtheta, (n_samples, n_theta), by central differences."""
-    n_x = len(problem.space.coordinates)
+    n_x = problem.n_x
     x, linear = theta[np.newaxis, :n_x], theta[n_x:]
     ahead, behind, steps = (values[0] for values in problem.neighbours(x))
     columns, fixed_part = problem.split(np.concatenate([ahead, behind, x]))

@@ -1,4 +1,4 @@
-"""Which samples are left out together in a cross-validation."""
+"""Samples that are left out together in a cross-validation."""
 
 from collections.abc import Sequence
 
@@ -15,12 +15,7 @@ def folds(count: str | int, n: int, *, name: str = "folds") -> list[npt.NDArray[
     Raises
     ------
     ValueError
-        If `count` is neither; it is called `name`.
-
-    Examples
-    --------
-    >>> [fold.tolist() for fold in folds(2, 5)]
-    [[0, 1, 2], [3, 4]]
+        If `count`, which the message calls `name`, is neither.
     """
     number = n if count == "loo" else count
     if not isinstance(number, int) or isinstance(number, bool) or not 2 <= number <= n:
@@ -29,7 +24,7 @@ def folds(count: str | int, n: int, *, name: str = "folds") -> list[npt.NDArray[
 
 
 def left_out(cross_validate: str | int | None, records: Sequence[Record]) -> list[npt.NDArray[np.intp]]:
-    """Samples of each fold of records that follow each other, as `identify` is asked for them; none for None.
+    """Samples of each fold of records that follow each other, by `cross_validate` of `identify`.
 
     Raises
     ------
@@ -50,10 +45,10 @@ def left_out(cross_validate: str | int | None, records: Sequence[Record]) -> lis
 
 def _cycles(records: Sequence[Record], cuts: Sequence[int]) -> list[npt.NDArray[np.intp]]:
     """The samples between every second turning point of each record's input, but the first, which tell its state."""
-    found = []
+    cycles = []
     for record, begin in zip(records, cuts, strict=False):
         turns = record.reversals(TOLERANCE)[1::2]
-        found += [begin + samples for samples in np.split(np.arange(len(record)), turns)[1:]]
-    if not found:
+        cycles += [begin + samples for samples in np.split(np.arange(len(record)), turns)[1:]]
+    if not cycles:
         raise ValueError('cross_validate="cycles" needs at least 2 cycles of the input')
-    return found
+    return cycles

@@ -17,7 +17,7 @@ _INFINITE = ("inf", "-inf")
 
 
 def to_text(name: str, result: Any) -> str:
-    """A result as JSON under its name, with the version of hysim; `from_text` gives it back, every number to the bit.
+    """A result as JSON under its name, with the version of hysim; `from_text` returns it, every number to the bit.
 
     Raises
     ------
@@ -29,7 +29,7 @@ def to_text(name: str, result: Any) -> str:
 
 
 def from_text(name: str, text: str, kinds: Sequence[type]) -> Any:
-    """The result of the first of `kinds` that `to_text` wrote; it is made of the others.
+    """The result of the first of `kinds` that `to_text` wrote; its parts are of the others.
 
     Raises
     ------
@@ -37,20 +37,20 @@ def from_text(name: str, text: str, kinds: Sequence[type]) -> Any:
         If the text does not hold one.
     """
     try:
-        found = from_plain(json.loads(text)[name], kinds)
+        result = from_plain(json.loads(text)[name], kinds)
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
         raise ValueError(f"this is no {name} of hysim: {type(error).__name__}: {error}") from None
-    if not isinstance(found, kinds[0]):
-        raise ValueError(f"this is no {name} of hysim, but {type(found).__name__}")
-    return found
+    if not isinstance(result, kinds[0]):
+        raise ValueError(f"this is no {name} of hysim, but {type(result).__name__}")
+    return result
 
 
 def to_plain(value: Any) -> Any:
-    """A value as JSON takes it."""
+    """The JSON form of a value."""
     if storage.is_model(value):
         return storage.to_document(value)
     if is_dataclass(value) and not isinstance(value, type):
-        contents = {field.name: to_plain(getattr(value, field.name)) for field in fields(value)}
+        contents = {field.name: to_plain(vars(value)[field.name]) for field in fields(value)}
         return {"result": type(value).__name__, "fields": contents}
     if isinstance(value, Mapping):
         return {name: to_plain(each) for name, each in value.items()}
@@ -66,7 +66,7 @@ def to_plain(value: Any) -> Any:
 
 
 def from_plain(value: Any, kinds: Sequence[type]) -> Any:
-    """What `to_plain` wrote, of results that are one of `kinds`."""
+    """The value that `to_plain` wrote, of results that are one of `kinds`."""
     if isinstance(value, dict) and value.keys() == {"result", "fields"}:
         kind = {each.__name__: each for each in kinds}[value["result"]]
         hints = typing.get_type_hints(kind)

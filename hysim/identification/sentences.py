@@ -25,12 +25,12 @@ def sentences(
 
     `reasons` say why standard errors are unknown.
     """
-    found = [] if success else ["the search did not converge: better parameters may exist"]
+    warnings = [] if success else ["the search did not converge: better parameters may exist"]
     if spread == 0.0:
-        found.append(CONSTANT)
+        warnings.append(CONSTANT)
     if unknown := [name for name, value in stderr.items() if np.isnan(value)]:
         why = f": {'; '.join(reasons)}" if reasons else ""
-        found.append(f"no standard error for {', '.join(unknown)}{why}")
+        warnings.append(f"no standard error for {', '.join(unknown)}{why}")
     if stderr and whiteness < _CORRELATED and rmse > max(_RESTING * spread, _ROUNDING * size):
-        found.append("residuals are correlated (p < 0.001): the intervals are too narrow")
-    return tuple(found)
+        warnings.append("residuals are correlated (p < 0.001): the intervals are too narrow")
+    return tuple(warnings)

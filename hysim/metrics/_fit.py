@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
+from hysim.metrics.criteria import information
 
 
 def rmse(y: npt.ArrayLike, y_model: npt.ArrayLike) -> float:
@@ -94,11 +95,11 @@ def aic(residual: npt.ArrayLike, n_parameters: int) -> float:
     return n * _log(v) + 2 * d if d < n else math.nan
 
 
-def bic(residual: npt.ArrayLike, n_parameters: int) -> float:
-    """Bayesian information criterion N ln V + d ln N; nan where d >= N, -inf where the residual is zero.
+def bic(residual: npt.ArrayLike, n_parameters: int, *, floor: float = 0.0) -> float:
+    """Bayesian information criterion N ln(V + floor^2) + d ln N; nan where d >= N, -inf where V + floor^2 is zero.
 
-    Arguments and errors are those of `fpe`. Source: G. Schwarz, Ann. Statist. 6 (1978) 461, without the constant that
-    all models share.
+    Arguments and errors are those of `fpe`; residuals below `floor` are no evidence for one model over another
+    [unit of y]. Source: G. Schwarz, Ann. Statist. 6 (1978) 461, without the constant that all models share.
 
     Examples
     --------
@@ -106,7 +107,7 @@ def bic(residual: npt.ArrayLike, n_parameters: int) -> float:
     2.772589
     """
     v, n, d = _mean_square(residual, n_parameters)
-    return n * _log(v) + d * math.log(n) if d < n else math.nan
+    return information(v, n, d, floor=floor) if d < n else math.nan
 
 
 def _measured_and_model(y: npt.ArrayLike, y_model: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:

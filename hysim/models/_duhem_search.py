@@ -12,8 +12,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.models.duhem_terms import Term, coefficient_units
 from hysim.models.search_space import Freedom, SearchSpace
+from hysim.models.terms import Term, coefficient_units
 from hysim.records import Record
 
 _REACH = 10.0

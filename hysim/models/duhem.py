@@ -29,11 +29,11 @@ from hysim.kernels import duhem as kernels
 from hysim.models import _duhem_search, _inverse_search, duhem_structure
 from hysim.models.duhem_runs import branches, free_runs, outputs
 from hysim.models.duhem_structure import DuhemStructure
-from hysim.models.duhem_terms import Polynomials, Term, equation, latex, polynomials, terms_of
 from hysim.models.law import Law, Packed, State, Tables
 from hysim.models.model import model
 from hysim.models.protocols import CompiledLaw
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.terms import Polynomials, Term, equation, latex, polynomials, terms_of
 from hysim.records import Record
 
 _BOUND = 1e3

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, read_only
 from hysim._parallel import in_chunks
 from hysim.kernels import duhem as kernels
-from hysim.models.duhem_terms import Polynomials, Term, polynomials
+from hysim.models.terms import Polynomials, Term, polynomials
 
 _SAMPLES_PER_THREAD = 20_000
 

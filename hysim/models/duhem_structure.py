@@ -18,9 +18,9 @@ import numpy as np
 from hysim._frozen import FloatArray
 from hysim.models import _duhem_search
 from hysim.models.composable import Composable
-from hysim.models.duhem_terms import RATES, Term
 from hysim.models.protocols import Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.terms import Term, duhem_terms
 from hysim.records import Record
 
 _RANK = 1e-6  # singular values of the normalised columns below this are taken as zero
@@ -65,7 +65,7 @@ class DuhemStructure(Identifiable, Composable):
         with np.errstate(over="ignore"):
             return float(np.sum((record.y - y) ** 2))
 
-    def _regression(self, record: Record, degree: int) -> dict[str, float]:
+    def _regression(self, record: Record, degree: float) -> dict[str, float]:
         """The coefficients of the terms up to this degree."""
         terms = [term for term in self.terms if term.degree <= degree]
         du = np.diff(record.u)
@@ -93,9 +93,7 @@ def of_degree(degree: int, family: Identifiable) -> DuhemStructure:
         raise TypeError(f"degree must be a whole number, got {degree!r}")
     if degree < 0:
         raise ValueError(f"degree must not be negative, got {degree}")
-    powers = [(total, j) for total in range(degree + 1) for j in range(total + 1)]
-    terms = tuple(Term(rate == RATES[1], total, j) for rate in RATES for total, j in powers)
-    return DuhemStructure(family=family, terms=terms)
+    return DuhemStructure(family=family, terms=duhem_terms(degree))
 
 
 def of_terms(names: tuple[str, ...], family: Identifiable) -> DuhemStructure:

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 
 from hysim.control import Tuning
-from hysim.discovery import Discovery
+from hysim.discovery import Discovery, OscillatorDiscovery
 from hysim.metrics import describing_function as describing_function_of
 from hysim.plot._style import MEASURED, POINTS, AxesArray, in_unit, label, line, one, several
 from hysim.vision import Displacement
@@ -18,10 +18,12 @@ _WORST_OBJECTIVE = 30.0  # over the chosen objective
 _BAND = 2.0  # standard errors
 
 
-def selection(discovery: Discovery, axes: Sequence[Axes] | AxesArray | None = None) -> AxesArray:
+def selection(discovery: Discovery | OscillatorDiscovery, axes: Sequence[Axes] | AxesArray | None = None) -> AxesArray:
     """Draw the fit and the BIC of the free run of a discovery against the number of terms, on two Axes.
 
-    `discovery` is a result of `hysim.discover`. The structures on the path of thresholds are circles, and the chosen
+    `discovery` is a result of `hysim.discover` or `hysim.discover_oscillator`.
+
+    The structures on the path of thresholds are circles, and the chosen
     law is a diamond, which need not be on the path: the search removes further terms from it. A structure that fits
     5 % worse than the best, or whose free run diverges, is a cross on the edge. The result has shape (2,).
     """

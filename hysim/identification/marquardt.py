@@ -1,0 +1,217 @@
+"""Levenberg and Marquardt's method, for many sets of numbers at once.
+
+    minimise the loss f(x), near x about f = 1/2 ||J d - goal||^2,    step d:  min ||J d - goal||^2 + damping ||D d||^2
+
+D are the norms of the columns of J. Each set has its own damping, which falls after a step that lowers the loss and
+rises after one that does not. Several dampings may be tried at once, which pays where many evaluations together cost
+little more than one.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray
+
+Flags = npt.NDArray[np.bool_]
+Sets = npt.NDArray[np.intp]
+
+_LEAST_DAMPING = 1e-9  # in norms of columns: keeps a number where it is that has no effect
+_LEAST_RIDGE = 1e-15  # likewise, in squared norms of columns
+_PASSES = 4
+_CENTRAL = 1e-6  # truncation and rounding of a central difference are both near 1e-10
+_ONE_SIDED = 1e-7  # those of a one-sided one near 1e-7, at half the cost
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """How the damping begins and changes.
+
+    Each trial has the set's damping times one of `factors`. After a step that lowers the loss the next damping is that
+    of the best trial times `success`, otherwise the last one times `failure`; a set ends beyond `most`.
+    """
+
+    factors: tuple[float, ...] = (1.0,)
+    success: float = 0.1
+    failure: float = 10.0
+    first: float = 1e-3
+    least: float = 0.0
+    most: float = 1e7
+
+
+class Problem(Protocol):
+    """A loss to minimise; `sets` (n,) says which set each point belongs to."""
+
+    def evaluate(self, x: FloatArray, sets: Sets) -> tuple[FloatArray, tuple[FloatArray, ...]]:
+        """Losses (n,) at points `x` (n, n_x), inf where it diverges, and arrays of n rows that `linearised` takes.
+
+        Numbers that follow from the others may be changed in `x`, in place.
+        """
+        ...
+
+    def linearised(self, x: FloatArray, sets: Sets, evaluated: tuple[FloatArray, ...]) -> tuple[FloatArray, FloatArray]:
+        """J (n, n_rows, n_x) and goal (n, n_rows)."""
+        ...
+
+    def stepped(
+        self, x: FloatArray, sets: Sets, jacobian: FloatArray, goal: FloatArray, damping: FloatArray
+    ) -> FloatArray:
+        """The next points (n, n_x), for dampings (n,)."""
+        ...
+
+
+class Reached(NamedTuple):
+    """Ends of a descent (n_sets, n_x), their losses, what was evaluated there, and whether each set came to rest."""
+
+    x: FloatArray
+    loss: FloatArray
+    evaluated: tuple[FloatArray, ...]
+    at_rest: Flags
+
+
+def descend(
+    problem: Problem,
+    x: FloatArray,
+    *,
+    steps: int,
+    tolerance: float = 0.0,
+    relative: float = 0.0,
+    hopeless: float = np.inf,
+    schedule: Schedule = Schedule(),
+) -> Reached:
+    """Descend from `x` (n_sets, n_x) until a step lowers the loss by at most `tolerance` + `relative` times the loss.
+
+    A set also ends where the remaining steps, each lowering the loss by as much as the last one, would not bring it
+    below `hopeless`: steps become smaller near an optimum.
+    """
+    x, every, factors = x.copy(), np.arange(len(x)), np.array(schedule.factors)
+    loss, evaluated = problem.evaluate(x, every)
+    damping, is_stale = np.full(len(x), schedule.first), np.ones(len(x), dtype=bool)
+    moving = every[np.isfinite(loss)]
+    jacobian = goal = np.empty(0)
+    for remaining in range(steps - 1, -1, -1):
+        if not moving.size:
+            break
+        fresh = moving[is_stale[moving]]
+        if fresh.size:
+            system = problem.linearised(x[fresh], fresh, tuple(each[fresh] for each in evaluated))
+            if not jacobian.size:
+                jacobian, goal = (np.zeros((len(x), *each.shape[1:])) for each in system)
+            jacobian[fresh], goal[fresh], is_stale[fresh] = *system, False
+        sets = np.repeat(moving, factors.size)
+        dampings = np.outer(damping[moving], factors).ravel()
+        trial = problem.stepped(x[sets], sets, jacobian[sets], goal[sets], dampings)
+        losses, evaluated_there = problem.evaluate(trial, sets)
+        best = losses.reshape(-1, factors.size).argmin(axis=1) + factors.size * np.arange(moving.size)
+        before, gained = loss[moving], loss[moving] - losses[best]
+        is_better = losses[best] < before
+        won, place = moving[is_better], best[is_better]
+        x[won], loss[won], is_stale[won] = trial[place], losses[place], True
+        for kept, there in zip(evaluated, evaluated_there, strict=True):
+            kept[won] = there[place]
+        lowered = np.clip(dampings[best] * schedule.success, schedule.least, schedule.most)
+        damping[moving] = np.where(is_better, lowered, damping[moving] * schedule.failure)
+        rests = (gained <= tolerance + relative * before) | (before - (1 + remaining) * gained > hopeless)
+        moving = moving[~(is_better & rests | (damping[moving] > schedule.most))]
+    return Reached(x, loss, evaluated, ~np.isin(every, moving))
+
+
+def bounded_steps(
+    jacobian: FloatArray,
+    goal: FloatArray,
+    damping: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    *,
+    is_free: Flags | None = None,
+    n_damped: int | None = None,
+) -> FloatArray:
+    """Damped steps (n_sets, n_x) between `lower` and `upper`, but for numbers that are free of bounds.
+
+    A step that would go beyond a bound ends there, and the other numbers make the best of it. The first `n_damped`
+    numbers are damped, by default all.
+    """
+    held, steps = np.zeros(lower.shape, dtype=bool), np.zeros(lower.shape)
+    for _ in range(_PASSES):
+        short = goal - (jacobian @ np.where(held, steps, 0.0)[..., np.newaxis])[..., 0]
+        others = _regressed(np.where(held[:, np.newaxis], 0.0, jacobian), short, damping, n_damped)
+        steps = np.where(held, steps, others)
+        beyond = ((steps < lower) | (steps > upper)) & ~held
+        if is_free is not None:
+            beyond &= ~is_free
+        if not beyond.any():
+            break
+        steps = np.clip(steps, lower, upper)
+        held |= beyond
+    return steps
+
+
+def _regressed(jacobian: FloatArray, goal: FloatArray, damping: FloatArray, n_damped: int | None) -> FloatArray:
+    """Least-squares steps (n_sets, n_x), damped in the first `n_damped` elements."""
+    norms = np.linalg.norm(jacobian, axis=1)
+    norms[norms == 0.0] = 1.0
+    strength = np.full(norms.shape, _LEAST_DAMPING)
+    strength[:, :n_damped] += np.sqrt(damping)[:, np.newaxis]
+    below = strength[..., np.newaxis] * np.eye(norms.shape[1])
+    Q, R = np.linalg.qr(np.concatenate([jacobian / norms[:, np.newaxis], below], axis=1))
+    projected = Q[:, : goal.shape[1]].transpose(0, 2, 1) @ goal[..., np.newaxis]
+    return np.asarray(np.linalg.solve(R, projected)[..., 0] / norms)
+
+
+@dataclass(frozen=True)
+class SumOfSquares:
+    """The problem of one set: the sum of squared residuals between bounds.
+
+    `residuals` maps points (n, n_x) to residuals (n, n_samples), not finite where they diverge; `slopes` maps one point
+    (n_x,) and its residual to the derivatives (n_samples, n_x). `sizes`, where it is given, maps one point to D (n_x,).
+    """
+
+    residuals: Callable[[FloatArray], FloatArray]
+    slopes: Callable[[FloatArray, FloatArray], FloatArray]
+    lower: FloatArray | float = -np.inf
+    upper: FloatArray | float = np.inf
+    sizes: Callable[[FloatArray], FloatArray] | None = None
+
+    def evaluate(self, x: FloatArray, sets: Sets) -> tuple[FloatArray, tuple[FloatArray, ...]]:
+        """See `Problem`."""
+        residual = self.residuals(x)
+        with np.errstate(over="ignore", invalid="ignore"):
+            squares = np.sum(residual**2, axis=1)
+        return np.where(np.isfinite(squares), squares, np.inf), (residual,)
+
+    def linearised(self, x: FloatArray, sets: Sets, evaluated: tuple[FloatArray, ...]) -> tuple[FloatArray, FloatArray]:
+        """J^T J and minus the gradient, of which `stepped` makes the normal equations."""
+        residual = evaluated[0][0]
+        jacobian = self.slopes(x[0], residual)
+        return (jacobian.T @ jacobian)[np.newaxis], -(jacobian.T @ residual)[np.newaxis]
+
+    def stepped(
+        self, x: FloatArray, sets: Sets, jacobian: FloatArray, goal: FloatArray, damping: FloatArray
+    ) -> FloatArray:
+        """See `Problem`; numbers at a bound against which the gradient pushes stay."""
+        sizes = np.sqrt(np.diagonal(jacobian, axis1=1, axis2=2))
+        stays = ((x <= self.lower) & (goal < 0.0)) | ((x >= self.upper) & (goal > 0.0)) | (sizes == 0.0)
+        if self.sizes is not None:
+            sizes = np.array([self.sizes(each) for each in x])
+        sizes = np.where(stays, 1.0, sizes)
+        scaled = jacobian / (sizes[:, :, np.newaxis] * sizes[:, np.newaxis, :])
+        scaled[stays[:, :, np.newaxis] | stays[:, np.newaxis, :]] = 0.0
+        scaled += (damping[:, np.newaxis, np.newaxis] + _LEAST_RIDGE) * np.eye(x.shape[1])
+        goal = np.where(stays, 0.0, goal / sizes)
+        steps = np.linalg.solve(scaled, goal[..., np.newaxis])[..., 0] / sizes
+        return np.clip(x + steps, self.lower, self.upper)
+
+
+def differences(
+    residuals: Callable[[FloatArray], FloatArray], x: FloatArray, residual: FloatArray, *, central: bool
+) -> FloatArray:
+    """Derivatives (n_samples, n_x) of the residual at `x` (n_x,), by central or one-sided differences."""
+    width = _CENTRAL if central else _ONE_SIDED
+    steps = width * np.eye(x.size)
+    if not central:
+        return np.asarray(((residuals(x + steps) - residual) / width).T)
+    ahead, behind = np.split(residuals(np.concatenate([x + steps, x - steps])), 2)
+    return np.asarray(((ahead - behind) / (2.0 * width)).T)
