@@ -144,12 +144,13 @@ def _as_mapping(values: Mapping[Any, Any], name: str) -> Mapping[Any, Any]:
     return MappingProxyType(dict(values))
 
 
-def _items(value: Any) -> dict[str, Any]:
-    return {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+def field_values(value: Any) -> dict[str, Any]:
+    """The fields of a frozen value by name."""
+    return {field.name: vars(value)[field.name] for field in dataclasses.fields(value)}
 
 
 def _compared(value: Any) -> tuple[Any, ...]:
-    return tuple(getattr(value, field.name) for field in dataclasses.fields(value) if field.compare)
+    return tuple(vars(value)[field.name] for field in dataclasses.fields(value) if field.compare)
 
 
 def _key(value: Any) -> Any:
@@ -173,7 +174,9 @@ def _hash(self: Any) -> int:
 
 
 def _reduce(self: Any) -> tuple[Any, ...]:
-    plain = {name: dict(item) if isinstance(item, MappingProxyType) else item for name, item in _items(self).items()}
+    plain = {
+        name: dict(item) if isinstance(item, MappingProxyType) else item for name, item in field_values(self).items()
+    }
     return _rebuild, (type(self), plain)
 
 

@@ -35,7 +35,7 @@ def test_workers_do_not_change_a_bit(serial, executor):
 
 @pytest.mark.parametrize("size", [1, 7, 1000])
 def test_chunks_do_not_change_a_bit(serial, size, monkeypatch):
-    monkeypatch.setattr(_sweep._Study, "_size", lambda self, remaining, number: min(size, remaining))
+    monkeypatch.setattr(_sweep._Run, "_size", lambda self, remaining, number: min(size, remaining))
     assert bits(hs.sweep(sweep_tasks.noisy, sweep_tasks.SPACE)) == bits(serial)
 
 

@@ -1,6 +1,6 @@
-"""The facts of a study, read from rows of a store that may be damaged or of another study.
+"""The facts of a study, checked when they are read from a store, which may be damaged.
 
-identity     name to text, by which two studies are known to be the same
+identity     name to text, which must be equal for two studies to be the same
 n_tasks      number of tasks
 parameters   name to column of the table of results
 kinds        name to kind of its values, as NumPy has it
@@ -54,20 +54,13 @@ class Study(NamedTuple):
 
     @property
     def rows(self) -> dict[str, str]:
-        """The facts as texts, under their names."""
-        axes = self.axes and [[name, values] for name, values in self.axes]
-        values = {**self._asdict(), "axes": axes, "layout": self.layout and [list(output) for output in self.layout]}
-        return {name: json.dumps(value) for name, value in values.items() if name != "layout" or value is not None}
+        """The facts as texts in JSON, by their names; without a layout before it is known."""
+        facts = {name: json.dumps(value) for name, value in self._asdict().items()}
+        return facts if self.layout is not None else {name: text for name, text in facts.items() if name != "layout"}
 
 
 def study_of(rows: Mapping[str, Any]) -> Study:
-    """The study that the rows of a store describe.
-
-    Raises
-    ------
-    ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError
-        If they describe none; see `damage_named`.
-    """
+    """The study in the rows of a store; any of `_DAMAGE` if they are damaged."""
     facts = {name: json.loads(text) for name, text in rows.items()}
     study = Study(
         identity=_texts(facts["identity"]),
@@ -82,25 +75,25 @@ def study_of(rows: Mapping[str, Any]) -> Study:
     if not study.parameters or study.parameters.keys() != study.kinds.keys():
         raise ValueError("parameters and kinds do not have the same names")
     if not {*study.kinds.values()} <= {*_KINDS}:
-        raise ValueError(f"kinds are of {', '.join(_KINDS)}, got {', '.join(study.kinds.values())}")
+        raise ValueError(f"kinds must be among {', '.join(_KINDS)}, got {', '.join(study.kinds.values())}")
     if study.axes is not None:
         if [name for name, _ in study.axes] != [*study.parameters]:
             raise ValueError("axes and parameters do not have the same names")
         if math.prod(len(values) for _, values in study.axes) != study.n_tasks:
             raise ValueError(f"its axes do not have {study.n_tasks} combinations")
     if not _TOKEN.fullmatch(study.shards):
-        raise ValueError("shards are not called by 16 hexadecimal digits")
+        raise ValueError("the names of shards do not begin with 16 hexadecimal digits")
     return study
 
 
 @contextmanager
 def damage_named(path: str | Path) -> Iterator[None]:
-    """Turn what goes wrong with values that are not what a store holds into a ValueError that names the store."""
+    """Turn the errors of damaged values into a ValueError that names the store."""
     try:
         yield
     except _DAMAGE as error:
         reason = f"{error} is missing" if isinstance(error, KeyError) else str(error) or type(error).__name__
-        raise ValueError(f"{path} is a damaged store, which is to be moved away: {reason}") from error
+        raise ValueError(f"{path} is a damaged store, move it away: {reason}") from error
 
 
 def _output(name: Any, shape: Any, column: Any) -> Output:
