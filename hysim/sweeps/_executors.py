@@ -53,7 +53,8 @@ def workers_of(executor: Any, number: int | None, task: Task) -> Iterator[Worker
             lambda: number or max(1, sum(executor.nthreads().values())),
         )
     elif isinstance(executor, _Submits):
-        size = executor._max_workers if isinstance(executor, (ThreadPoolExecutor, ProcessPoolExecutor)) else cores()
+        is_pool = isinstance(executor, (ThreadPoolExecutor, ProcessPoolExecutor))
+        size: int = vars(executor)["_max_workers"] if is_pool else cores()
         yield Workers(lambda chunk: executor.submit(computed, task, chunk), lambda: number or size)
     else:
         raise TypeError(f"executor must have the method submit of concurrent.futures.Executor, got {executor!r}")

@@ -62,7 +62,7 @@ class Store:
             self._refuse_arrays_of_others(before)
             self._create(identity, space, before)
         self._commit()
-        for study in {self._study.shards: self._study, **({before.shards: before} if before else {})}.values():
+        for study in (self._study, before or self._study):
             self._remove_shards_without_rows(study)
 
     def space(self) -> Space:
@@ -325,16 +325,19 @@ def opened(path: str | Path, *, to_read: bool = False) -> Iterator[Store]:
     if to_read and not path.is_file():
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
     with _built_in_errors(path):
-        # also a reader opens it for writing: the unfinished transaction of a killed writer is first rolled back
-        uri = f"{path.resolve().as_uri()}?mode={'rw' if to_read else 'rwc'}"
-        timeout = _FOR_A_COMMIT if to_read else _FOR_A_WRITER
-        database = sqlite3.connect(uri, uri=True, timeout=timeout, isolation_level=None)
+        database = _connected(path, "rw" if to_read else "rwc")
         try:
             if to_read:
                 database.execute("BEGIN")  # so that all rows are of one moment
             yield Store(path, database)
         finally:
             database.close()  # which rolls back what is not committed
+
+
+def _connected(path: Path, mode: str) -> sqlite3.Connection:
+    """A connection; a reader may write too: the unfinished transaction of a killed writer is first rolled back."""
+    timeout = _FOR_A_WRITER if mode == "rwc" else _FOR_A_COMMIT
+    return sqlite3.connect(f"{path.resolve().as_uri()}?mode={mode}", uri=True, timeout=timeout, isolation_level=None)
 
 
 @contextmanager
