@@ -186,7 +186,7 @@ else:
         if name in _MODULES:
             value = importlib.import_module(f"hysim.{name}")
         elif name in _HOME:
-            value = getattr(importlib.import_module(_HOME[name]), name)
+            value = vars(importlib.import_module(_HOME[name]))[name]
         else:
             raise AttributeError(f"module 'hysim' has no attribute {name!r}")
         globals()[name] = value

@@ -7,7 +7,7 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import field
 from itertools import pairwise
-from typing import Self, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,7 @@ from hysim._excursions import full_amplitude, protocol
 from hysim._frozen import FloatArray, checked
 from hysim._prefixes import power_of_ten
 from hysim._quanta import output_quantum
+from hysim._times import check_times, even_step
 from hysim._words import extent, printed, quantity, words
 
 T = TypeVar("T", float, FloatArray)
@@ -70,20 +71,15 @@ class Record:
     name: str = ""
 
     def __post_init__(self) -> None:
-        for name in ("u", "y", "t"):
-            values = getattr(self, name)
-            if values is not None and values.ndim != 1:
+        for name, values in (("u", self.u), ("y", self.y)):
+            if values.ndim != 1:
                 raise ValueError(f"{name} must have one axis, got shape {values.shape}")
         if self.u.size < 2:
             raise ValueError(f"a record needs at least 2 samples, got {self.u.size}")
-        for name, values in (("y", self.y), ("t", self.t)):
-            if values is not None and values.size != self.u.size:
-                raise ValueError(f"u and {name} must have equal lengths, got {self.u.size} and {values.size}")
-        if self.t is not None and not (np.diff(self.t) > 0).all():
-            k = int(np.argmax(np.diff(self.t) <= 0)) + 1
-            raise ValueError(
-                f"time must increase from sample to sample, got {self.t[k]} after {self.t[k - 1]} at sample {k}"
-            )
+        if self.y.size != self.u.size:
+            raise ValueError(f"u and y must have equal lengths, got {self.u.size} and {self.y.size}")
+        if self.t is not None:
+            check_times(self.t, self.u.size)
         if unknown := set(self.units) - {"t", "u", "y"}:
             raise ValueError(f'units are labels of "t", "u" and "y", got {sorted(unknown)}')
         if self.resolution is not None and self.resolution <= 0:
@@ -136,13 +132,7 @@ class Record:
         """
         if self.t is None:
             raise ValueError("the record has no time: give t, or use a rate-independent law")
-        steps = np.diff(self.t)
-        mean = float(steps.mean())
-        if np.ptp(steps) > 1e-6 * mean:
-            raise ValueError(
-                f"the time must be evenly spaced, got steps from {steps.min()} to {steps.max()}: resample first"
-            )
-        return mean
+        return even_step(self.t)
 
     def reversals(self, tolerance: float = 0.0) -> npt.NDArray[np.intp]:
         """Samples at which the input turns.
@@ -392,7 +382,7 @@ class Record:
         """
         changed = self
         for signal, unit in units.items():
-            values = getattr(changed, signal) if signal in ("t", "u", "y") else None
+            values: Any = {"t": changed.t, "u": changed.u, "y": changed.y}.get(signal)
             if values is None or signal not in changed.units:
                 raise ValueError(f"the record has no {signal!r} with a unit to convert: give it units first")
             power = power_of_ten(changed.units[signal], unit)

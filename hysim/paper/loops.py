@@ -299,10 +299,13 @@ def _hysteresis_row(found: HysteresisAssessment) -> Row:
 
 
 def _step_row(found: VibrationReduction | None) -> Row:
-    names = ("overshoot_reduction_percent", "residual_rms_reduction_percent", "settling_time_reduction_percent")
     if found is None:
+        names = ("overshoot_reduction_percent", "residual_rms_reduction_percent", "settling_time_reduction_percent")
         return dict.fromkeys((*names, "t98_open", "t98_closed"))
-    return {name: getattr(found, name) for name in names} | {
+    return {
+        "overshoot_reduction_percent": found.overshoot_reduction_percent,
+        "residual_rms_reduction_percent": found.residual_rms_reduction_percent,
+        "settling_time_reduction_percent": found.settling_time_reduction_percent,
         "t98_open": found.open.t98,
         "t98_closed": found.closed.t98,
         "overshoot_open_percent": found.open.overshoot,

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from hysim._atomic import write_all
+from hysim._blas import one_blas_thread
 from hysim._frozen import frozen
 from hysim._parallel import awaited, second_process
 from hysim.comparison import Comparison
@@ -79,8 +80,9 @@ def reproduce(
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=folder):
         pass
-    computed = find(quick=quick, progress=progress)
-    files = contents(computed)
+    with one_blas_thread():
+        computed = find(quick=quick, progress=progress)
+        files = contents(computed)
     for name in files:
         (folder / name).parent.mkdir(exist_ok=True)
     write_all({folder / name: text for name, text in files.items()})
@@ -152,7 +154,7 @@ def _summary(computed: Findings) -> dict[str, Any]:
             "area_um_V": loop.area,
         },
         "models": model_measures(computed.study),
-        "claims": [{key: getattr(claim, key) for key in _CLAIM} for claim in computed.claims],
+        "claims": [{key: vars(claim)[key] for key in _CLAIM} for claim in computed.claims],
         "control": control_measures(computed.loops),
         "dwell": [dwell_measures(width) for width in computed.dwell],
     }

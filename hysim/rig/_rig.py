@@ -69,8 +69,8 @@ class Rig:
 
     def __post_init__(self) -> None:
         for name, kind in (("actuator", Actuator), ("camera", Camera)):
-            if not isinstance(getattr(self, name), kind):
-                raise TypeError(f"{name} must be of {kind.__name__}, got {type(getattr(self, name)).__name__}")
+            if not isinstance(vars(self)[name], kind):
+                raise TypeError(f"{name} must be of {kind.__name__}, got {type(vars(self)[name]).__name__}")
 
     def run(self, drive: Drive) -> "Experiment":
         """Drive the actuator; frames are rendered when they are asked for.

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen, read_only
+from hysim._times import increasing_times
 from hysim.records import Record
 
 STATUSES = ("ok", "blurred", "lost")
@@ -59,9 +60,7 @@ class Displacement:
     units: Mapping[str, str] = field(default_factory=lambda: {"y": "um"})
 
     def __post_init__(self) -> None:
-        lengths = {
-            name: len(getattr(self, name)) for name in ("y", "uncertainty", "shift", "across", "quality", "status")
-        }
+        lengths = {name: len(vars(self)[name]) for name in ("y", "uncertainty", "shift", "across", "quality", "status")}
         if len(set(lengths.values())) > 1:
             raise ValueError(f"a displacement has one value of each kind for each frame, got {lengths}")
 
@@ -169,8 +168,7 @@ class Displacement:
             return voltages
         if at is None:
             raise ValueError("u_times are given without frame_times: give both to join by time")
-        log = Record(u=voltages, y=voltages, t=read_only(u_times, "u_times", ndim=1)).t
-        assert log is not None
+        log = increasing_times(u_times, voltages.size, "u_times")
         place = np.searchsorted(log, at + _ROUNDING * (log[-1] - log[0]), side="right") - 1
         if (place < 0).any():
             k = int(np.argmax(place < 0))
