@@ -147,8 +147,8 @@ def _as_mapping(values: Mapping[Any, Any], name: str) -> Mapping[Any, Any]:
     return MappingProxyType(dict(values))
 
 
-def field_values(value: Any) -> dict[str, Any]:
-    """The fields of a frozen value by name."""
+def items(value: Any) -> dict[str, Any]:
+    """Fields of a frozen value by name."""
     return {field.name: vars(value)[field.name] for field in dataclasses.fields(value)}
 
 
@@ -177,9 +177,7 @@ def _hash(self: Any) -> int:
 
 
 def _reduce(self: Any) -> tuple[Any, ...]:
-    plain = {
-        name: dict(item) if isinstance(item, MappingProxyType) else item for name, item in field_values(self).items()
-    }
+    plain = {name: dict(item) if isinstance(item, MappingProxyType) else item for name, item in items(self).items()}
     return _rebuild, (type(self), plain)
 
 

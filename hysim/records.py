@@ -18,7 +18,6 @@ from hysim._excursions import full_amplitude, protocol
 from hysim._frozen import FloatArray, checked
 from hysim._prefixes import power_of_ten
 from hysim._quanta import output_quantum
-from hysim._times import check_times, even_step
 from hysim._words import extent, printed, quantity, words
 
 T = TypeVar("T", float, FloatArray)
@@ -71,15 +70,16 @@ class Record:
     name: str = ""
 
     def __post_init__(self) -> None:
-        for name, values in (("u", self.u), ("y", self.y)):
-            if values.ndim != 1:
+        for name, values in (("u", self.u), ("y", self.y), ("t", self.t)):
+            if values is not None and values.ndim != 1:
                 raise ValueError(f"{name} must have one axis, got shape {values.shape}")
         if self.u.size < 2:
             raise ValueError(f"a record needs at least 2 samples, got {self.u.size}")
-        if self.y.size != self.u.size:
-            raise ValueError(f"u and y must have equal lengths, got {self.u.size} and {self.y.size}")
+        for name, values in (("y", self.y), ("t", self.t)):
+            if values is not None and values.size != self.u.size:
+                raise ValueError(f"u and {name} must have equal lengths, got {self.u.size} and {values.size}")
         if self.t is not None:
-            check_times(self.t, self.u.size)
+            check_increasing(self.t)
         if unknown := set(self.units) - {"t", "u", "y"}:
             raise ValueError(f'units are labels of "t", "u" and "y", got {sorted(unknown)}')
         if self.resolution is not None and self.resolution <= 0:
@@ -425,6 +425,33 @@ class Record:
         if isinstance(place, (float, np.floating)) and 0.0 < place < 1.0:
             return round(place * len(self))
         raise TypeError(f"a place is a sample's number or a fraction between 0 and 1, got {place!r}")
+
+
+def check_increasing(t: FloatArray) -> None:
+    """Raise a ValueError if times do not increase from sample to sample."""
+    if not (np.diff(t) > 0).all():
+        k = int(np.argmax(np.diff(t) <= 0)) + 1
+        raise ValueError(f"time must increase from sample to sample, got {t[k]} after {t[k - 1]} at sample {k}")
+
+
+def even_step(t: FloatArray) -> float:
+    """The constant step of increasing times, shape (n_samples,).
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than 2 samples, times do not increase, or steps differ by more than 1e-6 of their mean.
+    """
+    if t.size < 2:
+        raise ValueError(f"t must hold at least 2 samples, got {t.size}")
+    check_increasing(t)
+    steps = np.diff(t)
+    mean = float(steps.mean())
+    if np.ptp(steps) > 1e-6 * mean:
+        raise ValueError(
+            f"the time must be evenly spaced, got steps from {steps.min()} to {steps.max()}: resample first"
+        )
+    return mean
 
 
 def _scaled(values: T, power: int) -> T:

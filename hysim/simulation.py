@@ -7,9 +7,9 @@ from typing import Any, Protocol, runtime_checkable
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen, read_only
-from hysim._times import even_step, increasing_times
 from hysim._words import extent, printed, words
 from hysim.models.model import needs_time
+from hysim.records import check_increasing, even_step
 
 
 @printed
@@ -101,7 +101,11 @@ def simulate(
     if not isinstance(plant, _HasResponse):
         raise TypeError(f"simulate takes a model with a response, got {type(plant).__name__}")
     inputs = read_only(u, "u", ndim=1)
-    times = None if t is None else increasing_times(t, inputs.size)
+    times = None if t is None else read_only(t, "t", ndim=1)
+    if times is not None:
+        if times.size != inputs.size:
+            raise ValueError(f"u and t must have equal lengths, got {inputs.size} and {times.size}")
+        check_increasing(times)
     signals = _signals(plant, inputs, times)
     memory = plant.memory(inputs) if "z" not in signals and isinstance(plant, _HasMemory) else signals.get("z")
     every = {"t": times, "u": inputs, "z": memory, **signals}

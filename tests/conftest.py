@@ -32,14 +32,11 @@ def pytest_configure(config):
 def pytest_collection_modifyitems(items):
     """Skip tests that need missing packages, and divide the tests for ``--dist loadgroup``.
 
-    A group runs in one worker: a file, or all files that need the reproduction of the paper, which takes 10 s. The
-    experiments and the pages of the documentation take seconds each: they are divided one by one.
+    The tests of a file run in one worker, because they share fixtures; the experiments and the pages of the
+    documentation, which take seconds each, are divided one by one.
     """
-    with_reproduction = {item.path for item in items if "reproduction" in getattr(item, "fixturenames", ())}
     for item in items:
-        if item.path in with_reproduction:
-            item.add_marker(pytest.mark.xdist_group("reproduction"))
-        elif item.path.name not in ("test_experiments.py", "test_docs.py"):
+        if item.path.name not in ("test_experiments.py", "test_docs.py"):
             item.add_marker(pytest.mark.xdist_group(str(item.path)))
         wanted = {package for mark in item.iter_markers("extra") for package in mark.args}
         if missing := sorted(package for package in wanted if find_spec(package) is None):

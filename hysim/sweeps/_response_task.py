@@ -7,7 +7,7 @@ from typing import Any, Literal, Protocol, get_args, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, checked, field_values, read_only
+from hysim._frozen import FloatArray, checked, items, read_only
 
 Measure = Literal["rmse", "sse", "max_width", "area", "final", "response"]
 _WITH_TARGET = ("rmse", "sse")
@@ -89,7 +89,7 @@ def response_task(
         raise TypeError(f"{family.__name__} cannot compute many laws at once with the measure {measure!r}")
     if (measure in _WITH_TARGET) != (y is not None):
         raise ValueError(f"y is needed for the measures {' and '.join(_WITH_TARGET)}, and for no other")
-    fixed = {} if isinstance(law, type) else field_values(law)
+    fixed = {} if isinstance(law, type) else items(law)
     inputs = read_only(u, "u", ndim=1)
     target = None if y is None else read_only(y, "y", ndim=1)
     if target is not None and target.size != inputs.size:

@@ -8,8 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen, read_only
-from hysim._times import increasing_times
-from hysim.records import Record
+from hysim.records import Record, check_increasing
 
 STATUSES = ("ok", "blurred", "lost")
 _ROUNDING = 1e-9  # of a log's span: a frame at the very time of a switch sees the new voltage
@@ -168,7 +167,10 @@ class Displacement:
             return voltages
         if at is None:
             raise ValueError("u_times are given without frame_times: give both to join by time")
-        log = increasing_times(u_times, voltages.size, "u_times")
+        log = read_only(u_times, "u_times", ndim=1)
+        if log.size != voltages.size:
+            raise ValueError(f"u and u_times must have equal lengths, got {voltages.size} and {log.size}")
+        check_increasing(log)
         place = np.searchsorted(log, at + _ROUNDING * (log[-1] - log[0]), side="right") - 1
         if (place < 0).any():
             k = int(np.argmax(place < 0))
