@@ -1,4 +1,4 @@
-"""The two tables of measurements that the paper prints.
+"""The two tables of measurements in the paper.
 
 Source: B. B. Muhammad, M. H. Rahman, M. R. Ahmad, M. Bashir, "A novel model of PZT actuator and its application
 in hysteresis and vibration controls", Jurnal Teknologi, 2016. The files in `hysim/data` hold the values as
@@ -26,7 +26,7 @@ def table1(dwell: float = 1.0) -> Record:
     Parameters
     ----------
     dwell : float
-        Time from one sample to the next [s], which the paper does not print.
+        Time from one sample to the next [s]; the paper prints none.
 
     Returns
     -------

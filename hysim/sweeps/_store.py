@@ -22,7 +22,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from hysim._atomic import whole
+from hysim._atomic import replacing
 from hysim._frozen import FloatArray
 from hysim.sweeps._chunks import Group, Layout, Outcome
 from hysim.sweeps._space import Column, Space
@@ -257,7 +257,7 @@ class Store:
         places = np.concatenate([group.places for group in groups])
         name = f"{self._study.shards}-{places.min():09d}.npz"
         self._folder.mkdir(exist_ok=True)
-        with whole(self._shard(name), "xb") as file:
+        with replacing(self._shard(name), "xb") as file:
             np.savez(file, task=places, **arrays)  # type: ignore[arg-type]
             file.flush()
             os.fsync(file.fileno())
