@@ -222,7 +222,7 @@ def test_units_change_by_their_prefix():
     [
         ({"y": "V"}, "'um' cannot become 'V': only the prefix of a unit can change"),
         ({"y": "px"}, "'px' is not a known unit with an SI prefix"),
-        ({"y": ""}, "'' is no unit"),
+        ({"y": ""}, "'' is not a known unit"),
         ({"z": "m"}, "the record has no 'z' with a unit to convert"),
     ],
 )
