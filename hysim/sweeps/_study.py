@@ -12,12 +12,15 @@ shards       what the names of the files with arrays begin with
 import json
 import math
 import re
+import reprlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 from zipfile import BadZipFile
 from zlib import error as CompressionError  # noqa: N812
+
+T = TypeVar("T")
 
 _KINDS = "fibU"
 _TOKEN = re.compile(r"[0-9a-f]{16}")
@@ -55,8 +58,7 @@ class Study(NamedTuple):
     @property
     def rows(self) -> dict[str, str]:
         """The facts as texts in JSON, by their names; without a layout before it is known."""
-        facts = {name: json.dumps(value) for name, value in self._asdict().items()}
-        return facts if self.layout is not None else {name: text for name, text in facts.items() if name != "layout"}
+        return {name: json.dumps(value) for name, value in self._asdict().items() if (name, value) != ("layout", None)}
 
 
 def study_of(rows: Mapping[str, Any]) -> Study:
@@ -67,11 +69,13 @@ def study_of(rows: Mapping[str, Any]) -> Study:
         n_tasks=_number(facts["n_tasks"]),
         parameters=_texts(facts["parameters"]),
         kinds=_texts(facts["kinds"]),
-        axes=None if facts["axes"] is None else tuple((_text(name), _listed(values)) for name, values in facts["axes"]),
-        layout=tuple(_output(*each) for each in _listed(facts["layout"])) if "layout" in facts else None,
-        shards=_text(facts["shards"]),
+        axes=None if facts["axes"] is None else tuple((_of(str, name), _of(list, v)) for name, v in facts["axes"]),
+        layout=tuple(_output(*each) for each in _of(list, facts["layout"])) if "layout" in facts else None,
+        shards=_of(str, facts["shards"]),
     )
     int(study.identity["seed"])
+    if study.layout == ():
+        raise ValueError("the layout has no output")
     if not study.parameters or study.parameters.keys() != study.kinds.keys():
         raise ValueError("parameters and kinds do not have the same names")
     if not {*study.kinds.values()} <= {*_KINDS}:
@@ -97,33 +101,22 @@ def damage_named(path: str | Path) -> Iterator[None]:
 
 
 def _output(name: Any, shape: Any, column: Any) -> Output:
-    return Output(_text(name), tuple(_number(length) for length in shape), _text(column))
-
-
-def _listed(value: Any) -> list[Any]:
-    if not isinstance(value, list) or not value:
-        raise TypeError(f"a list was expected, got {_shown(value)}")
-    return value
+    return Output(_of(str, name), tuple(_number(length) for length in shape), _of(str, column))
 
 
 def _texts(value: Any) -> dict[str, str]:
-    if not isinstance(value, dict):
-        raise TypeError(f"a mapping was expected, got {_shown(value)}")
-    return {name: _text(text) for name, text in value.items()}
-
-
-def _text(value: Any) -> str:
-    if not isinstance(value, str):
-        raise TypeError(f"a text was expected, got {_shown(value)}")
-    return value
+    return {name: _of(str, text) for name, text in _of(dict, value).items()}
 
 
 def _number(value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 2**63:
-        raise TypeError(f"a number of tasks or samples was expected, got {_shown(value)}")
+    number = _of(int, value)
+    if not 0 <= number < 2**63:
+        raise ValueError(f"expected a number of tasks or samples, got {reprlib.repr(number)}")
+    return number
+
+
+def _of(kind: type[T], value: Any) -> T:
+    """The value, if it is of this type; true and false are no numbers."""
+    if type(value) is not kind:
+        raise TypeError(f"expected a value of type {kind.__name__}, got {reprlib.repr(value)}")
     return value
-
-
-def _shown(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 40 else f"{text[:37]}..."
