@@ -212,7 +212,7 @@ def corpus() -> dict[str, tuple[bytes, str]]:
         "array.npy": (npy(np.zeros((9, 2))), "one array, array .9 x 2.: choose its columns by the numbers 0 to 1"),
         "objects.npy": (npy(np.array([None, 1]), allow_pickle=True), "no array 'u', the arrays are: 0: array .pickled"),
         "cut.npy": (npy(U)[:-3], "the file is cut: its array has 40 bytes, there are 37"),
-        "empty.mat": (MAT_TITLE, "the MAT file is cut: it has no whole header"),
+        "empty.mat": (MAT_TITLE, "the MAT file is cut: its header is incomplete"),
         "none.mat": (mat({}), "the file holds no array"),
         "cut.mat": (mat({"u": U, "y": Y})[:-9], "the MAT file is cut: a variable has"),
         "cells.mat": (mat({"u": np.array([U, 1], object), "y": Y}), "array 'u' holds cells"),

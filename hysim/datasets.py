@@ -17,7 +17,7 @@ PIXEL = 0.0763
 """Table 1's resolution [um]: every displacement is a whole multiple of it, to 5 nm."""
 
 SQUARE_WAVE_FREQUENCY = 1.01626
-"""Of Table 2's input [Hz]; a period has four samples."""
+"""Frequency of Table 2's input [Hz]; a period has four samples."""
 
 
 def table1(dwell: float = 1.0) -> Record:

@@ -88,7 +88,7 @@ def mat(file: BinaryIO) -> Arrays:
     """The arrays of a file, also those in structs; ValueError if it is damaged."""
     with damaged("MAT"):
         header = file.read(_HEADER_BYTES)
-        require(len(header) == _HEADER_BYTES, "the MAT file is cut: it has no whole header")
+        require(len(header) == _HEADER_BYTES, "the MAT file is cut: its header is incomplete")
         return with_notes(list(_variables(file, "<" if header[126:] == b"IM" else ">")), "MAT")
 
 
@@ -183,6 +183,6 @@ def _matrix(element: _Element) -> _Matrix:
 
 def _tag(data: bytes | memoryview, order: str) -> tuple[int, int]:
     """The two numbers with which an element begins."""
-    require(len(data) >= 8, "the MAT file is cut: an element has no whole tag")
+    require(len(data) >= 8, "the MAT file is cut: the tag of an element is incomplete")
     first, second = np.frombuffer(data, f"{order}u4", 2).tolist()
     return first, second

@@ -1,4 +1,4 @@
-"""What the formats have in common: columns with names, whose numbers are read when they are chosen."""
+"""Columns with names, whose numbers are read when they are chosen: common to all formats."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence

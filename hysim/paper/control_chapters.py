@@ -115,7 +115,7 @@ def _squares(cases: Sequence[SquareCase], drawn: markup.Drawn) -> str:
 
 
 def _which_definition(loops: Loops) -> str:
-    """Which definition reaches the paper's 90 and 97."""
+    """The definitions of a reduction that reach the paper's 90 and 97 %."""
     rows = [
         [
             "hysteresis, 90 %",
@@ -228,7 +228,7 @@ def _reduction(case: HysteresisCase) -> float:
 
 
 def _best_of_each(cases: Sequence[HysteresisCase]) -> list[HysteresisCase]:
-    """Of each plant within limits, the best that is robust, and the best that is not if there is one."""
+    """The best robust loop of each plant within limits, and the best of the others if there is one."""
     best: dict[tuple[str, bool], HysteresisCase] = {}
     for case in cases:
         key = case.plant, case.max_sensitivity <= MAX_SENSITIVITY

@@ -74,7 +74,7 @@ def model_widths(comparison: Comparison) -> plot.Figure:
 
 @plot.house_style()
 def discovery_path(discovery: Discovery) -> plot.Figure:
-    """What each number of terms buys."""
+    """The fit against the number of terms."""
     canvas = plot.figure(height=4.4)
     plot.selection(discovery, plot.panels(canvas, 2))
     return canvas

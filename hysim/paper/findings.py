@@ -20,7 +20,7 @@ from hysim.paper.study import Progress, Study, asymmetric_law, study
 
 @frozen
 class Findings:
-    """What was computed.
+    """Results of the reproduction.
 
     Parameters
     ----------

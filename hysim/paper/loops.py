@@ -129,7 +129,7 @@ def loops(law: Any) -> Loops:
 
 
 def control_measures(loops: Loops) -> dict[str, list[Row]]:
-    """What `summary.json` says about control: a row for each loop, under "hysteresis" and "vibration"."""
+    """The entries about control in `summary.json`: a row for each loop, under "hysteresis" and "vibration"."""
     return {
         "hysteresis": [
             _head(case, case.found.closed.conditions) | _hysteresis_row(case.found) for case in loops.hysteresis

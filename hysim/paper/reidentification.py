@@ -135,7 +135,7 @@ class TimeUnit:
 
 @frozen
 class Information:
-    """What Table 2 holds.
+    """Information in Table 2 about a plant.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ class Information:
 
 @frozen
 class Reidentification:
-    """What `reidentify` found.
+    """Result of `reidentify`.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def time_units() -> tuple[TimeUnit, ...]:
 
 
 def information() -> Information:
-    """What Table 2 holds, and how much of a plant it determines."""
+    """The information in Table 2, and the part of a plant that it determines."""
     record = table2()
     response = _line(record.y) / _line(record.u)
     period = _period(record.u)

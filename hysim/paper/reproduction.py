@@ -36,12 +36,12 @@ _CLAIM = ("id", "where", "statement", "printed", "recomputed", "unit", "verdict"
 
 @frozen
 class Reproduction:
-    """What `reproduce` wrote.
+    """Result of `reproduce`.
 
     Parameters
     ----------
     folder : Path
-        Where it wrote.
+        Folder of the files.
     files : tuple of str
         The files, relative to the folder.
     findings : Findings

@@ -1,4 +1,4 @@
-"""What `reproduce` computes: every model on the 52 points of Table 1."""
+"""Every model on the 52 points of Table 1, for `reproduce`."""
 
 import math
 from collections.abc import Callable, Mapping

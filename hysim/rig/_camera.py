@@ -129,7 +129,7 @@ class Camera:
         return round(math.sin(angle), 15), round(math.cos(angle), 15)
 
     def light(self, y: npt.ArrayLike, t: float = 0.0) -> FloatArray:
-        """What a frame would show without noise, counts or jitter.
+        """The picture of a frame without noise, counts or jitter.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""What `displacement` returns."""
+"""The result of `displacement`."""
 
 from collections.abc import Mapping
 from dataclasses import field
@@ -16,7 +16,7 @@ _ROUNDING = 1e-9  # of a log's span: a frame at the very time of a switch sees t
 
 @frozen
 class Displacement:
-    """How far the picture has moved, frame by frame.
+    """Displacement of the picture in each frame.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ from hysim.paper.claims.rounding import Spread, stands_for
 Verdict = Literal["reproduced", "not reproduced", "inconsistent in print", "not checkable"]
 
 MATERIAL = frozenset({"text", "Table 1", "Table 2", "equations"})
-"""What of the paper can be read as numbers. Its figures are photographs, sketches and plots."""
+"""Parts of the paper with numbers. Its figures are photographs, sketches and plots."""
 
 
 @frozen

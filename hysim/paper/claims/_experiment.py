@@ -16,7 +16,7 @@ _PER_US = 1e6
 
 
 def experiment_claims(record: Record, information: Information) -> tuple[Claim, ...]:
-    """What section 2.4 says of the experiment, the amplifier and Table 2."""
+    """Claims of section 2.4 about the experiment, the amplifier and Table 2."""
     return (*_amplifier(), *_bandwidth(), *_program(), *_table2(record, information), *_unseen())
 
 

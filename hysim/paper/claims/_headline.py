@@ -21,7 +21,7 @@ VIBRATION_MEASURES = {
     "settling-time": "settling_time_reduction_percent",
 }
 MAX_SENSITIVITY = 2.0
-"""Of a loop that counts."""
+"""Largest maximum sensitivity of a loop that counts."""
 _WHERE = "Abstract and section 4"
 
 
@@ -127,7 +127,7 @@ def _sensitivity(loop: Loop) -> float:
 
 
 def _fragile(loops: Sequence[Loop], plant: str, key: str) -> str:
-    """What loops reach that do not count."""
+    """Reductions of the loops that do not count."""
     reached = {_sensitivity(loop): _number(loop.get(key)) for loop in loops if loop.get("plant") == plant}
     return " ".join(
         f"A loop with a maximum sensitivity of {sensitivity:.0f} reaches {figure:.1f} %."

@@ -23,7 +23,7 @@ _MEASURED_DIGITS = 3  # Table 1 is in 0.001 um; trailing zeros are not printed
 
 
 def hysteresis_claims(study: Study, eq7: Approximation) -> tuple[Claim, ...]:
-    """What section 2.3 says of (1) and of its estimate."""
+    """Claims of section 2.3 about (1) and its estimate."""
     return (*_poles(), *_fit(study), *_fpe(study), *_memory(study), similar("eq7-similar-to-eq1", "Figure 5", eq7))
 
 

@@ -6,7 +6,7 @@ from hysim.paper.claims.rounding import exactly
 
 
 def introduction() -> tuple[Claim, ...]:
-    """What can be said of the literature that the paper cites."""
+    """Claims about the literature that the paper cites."""
     return (
         unseen(
             "cited-vibration-33",

@@ -13,7 +13,7 @@ from hysim.paper.state_space import EQUATIONS_7_8, EQUATIONS_13_14, StateSpace
 
 
 def state_space_claims() -> tuple[Claim, ...]:
-    """What section 2.6 says of (7) to (16)."""
+    """Claims of section 2.6 about (7) to (16)."""
     return (
         *_structural("eq10", "(7), (8)", EQUATIONS_7_8, printed.A_7, printed.C_8, printed.CONTROLLABILITY_10, "eq12",
                      printed.OBSERVABILITY_12),

@@ -10,14 +10,14 @@ from hysim.paper.resolution import quantum
 from hysim.records import Record
 
 QUANTUM_TOLERANCE = 0.005
-"""How far the displacements of Table 1 lie from whole pixels [um]: more than their last digit's rounding."""
+"""Largest distance of Table 1's displacements from multiples of a pixel [um]: more than their last digit's rounding."""
 
 _PHOTOGRAPHS = "the photographs of the setup as data"
 _TIMES = "the times at which the staircase was read"
 
 
 def table1_claims(record: Record, loop: LoopMetrics) -> tuple[Claim, ...]:
-    """What the text says of Table 1, and what its figures add."""
+    """Claims of the text and the figures about Table 1."""
     return (*_staircase(record), *_displacements(record), *_loop(record, loop), *_unseen())
 
 

@@ -67,7 +67,7 @@ def half_unit(text: str) -> float:
 
 
 def stands_for(printed: Any) -> Spread:
-    """What printed numbers stand for: one, or nested sequences of one shape.
+    """The ranges of values that printed numbers stand for: one, or nested sequences of one shape.
 
     Examples
     --------
