@@ -63,13 +63,13 @@ def approximations() -> tuple[Approximation, ...]:
 
 def approximation(name: str, simpler: TransferFunction, of: str, full: TransferFunction) -> Approximation:
     """The errors of one model as an approximation of another, both stable and in the same unit of time."""
-    whole = characteristics(full)
-    matched = matched_second_order(whole)
+    exact = characteristics(full)
+    matched = matched_second_order(exact)
     return Approximation(
         name=name,
         of=of,
         simpler=characteristics(simpler),
-        full=whole,
+        full=exact,
         fit_percent=step_fit(full, simpler),
         matched=matched,
         matched_fit_percent=step_fit(full, matched),

@@ -70,7 +70,7 @@ def find(*, quick: bool = False, progress: Progress | None = None) -> Findings:
                 begun["loops"] = beside.submit(loops, fit.model)
 
         steps = _Steps(progress)
-        models = study(quick=quick, progress=steps.inner, found=begin, asymmetric=lambda _: awaited(asymmetric))
+        models = study(quick=quick, progress=steps.inner, finished=begin, asymmetric=lambda _: awaited(asymmetric))
         steps.next("closed loops")
         reidentification, closed = awaited(begun["reidentification"]), awaited(begun["loops"])
     steps.next("claims")

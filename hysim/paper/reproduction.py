@@ -171,8 +171,8 @@ def _tables(computed: Findings, summary: dict[str, Any]) -> dict[str, str]:
     parameters: list[list[Any]] = [["model", "parameter", "value", "standard error"]]
     for name, fit in study.fits.items():
         parameters += [[name, key, value, fit.stderr.get(key)] for key, value in fit.estimates.items()]
-    found = {**study.discovery.coefficients, **study.discovery.initial_states[0]}
-    parameters += [["sindy", term, value, None] for term, value in found.items()]
+    terms = {**study.discovery.coefficients, **study.discovery.initial_states[0]}
+    parameters += [["sindy", term, value, None] for term, value in terms.items()]
     control = [row for rows in summary["control"].values() for row in rows]
     named = {
         "models": _by_columns([{"model": name, **row} for name, row in summary["models"].items()]),

@@ -28,14 +28,14 @@ _WHERE = "Abstract and section 4"
 def headline_claims(control: Mapping[str, Sequence[Loop]]) -> tuple[Claim, ...]:
     """The headline claims, of the loops under "hysteresis" and "vibration"."""
     hysteresis, vibration = control.get("hysteresis", ()), control.get("vibration", ())
-    found = [
+    claims = [
         _hysteresis("bouc-wen", "bouc-wen+eq7", "hysteresis_reduction_percent", hysteresis),
         _hysteresis("eq1", "eq1", "lag_reduction_percent", hysteresis),
     ]
     for plant in ("eq4", "eq6"):
-        found += _vibration(plant, vibration)
-    found.append(_to_97(vibration))
-    return tuple(claim for claim in found if claim is not None)
+        claims += _vibration(plant, vibration)
+    claims.append(_to_97(vibration))
+    return tuple(claim for claim in claims if claim is not None)
 
 
 def _hysteresis(name: str, plant: str, key: str, loops: Sequence[Loop]) -> Claim | None:

@@ -29,7 +29,7 @@ def _staircase(record: Record) -> tuple[Claim, ...]:
             "Table 1, part 1",
             "Part 1 holds the points of increasing voltage.",
             printed=printed.POINTS_LOADING,
-            found=exactly(float(rising.size)),
+            computed=exactly(float(rising.size)),
             method="count of the samples up to the first that does not rise",
         ),
         compared(
@@ -37,7 +37,7 @@ def _staircase(record: Record) -> tuple[Claim, ...]:
             "Table 1, part 2",
             "Part 2 holds the points of decreasing voltage.",
             printed=printed.POINTS_UNLOADING,
-            found=exactly(float(falling.size)),
+            computed=exactly(float(falling.size)),
             method="count of the samples from there on, all falling",
         ),
         compared(
@@ -45,7 +45,7 @@ def _staircase(record: Record) -> tuple[Claim, ...]:
             "Section 2.1",
             "The voltage rises from 0 V to 125 V, and falls back to 0 V.",
             printed=printed.RANGE_V,
-            found=exactly([record.u.min(), record.u.max()]),
+            computed=exactly([record.u.min(), record.u.max()]),
             method="smallest and largest voltage of Table 1",
             unit="V",
         ),
