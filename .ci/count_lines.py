@@ -4,7 +4,8 @@
     python .ci/count_lines.py hysim/models       every file of one folder
     python .ci/count_lines.py --most 18000 9000  exit status 1 if the total has more lines of code or of docstrings
 
-A line of code holds a token that is no comment, of a statement that is no docstring; blank lines do not count.
+A line of code holds a token that is no comment, of a statement that is no docstring; blank lines do not count. Stubs
+(`*.pyi`) count as code.
 """
 
 import argparse
@@ -60,7 +61,7 @@ def main() -> int:
     code: Counter[str] = Counter()
     text: Counter[str] = Counter()
     files: Counter[str] = Counter()
-    for path in sorted(folder.rglob("*.py")):
+    for path in sorted([*folder.rglob("*.py"), *folder.rglob("*.pyi")]):
         parts = path.relative_to(folder).parts
         name = parts[0] if folder != package or len(parts) > 1 else "(front)"
         if folder == package and name in PARTS_APART:

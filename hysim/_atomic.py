@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all."""
+"""Files that are written completely or not at all."""
 
 import os
 import secrets
@@ -13,63 +13,50 @@ _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write `text` beside `path`, then rename it into place; a failure leaves what was there before.
-
-    Raises
-    ------
-    OSError
-        If the folder cannot be written to.
-    """
+    """Write a text to a new file, then rename it to `path`; a failure leaves the old file."""
     write_all({path: text})
 
 
 def write_all(contents: Mapping[str | Path, str | bytes]) -> None:
-    """Write texts and bytes to their paths as `write_text` does, and rename none before all are written.
+    """Write texts and bytes as `write_text` does, and rename no file before all are written.
 
-    A signal that comes while they are renamed is heeded afterwards.
-
-    Raises
-    ------
-    OSError
-        If a folder cannot be written to.
+    A signal during the renaming is handled afterwards.
     """
     with ExitStack() as last, ExitStack() as files:
         for path, content in contents.items():
             data = content.encode() if isinstance(content, str) else content
-            file = files.enter_context(whole(path, "xb"))
+            file = files.enter_context(replacing(path, "xb"))
             file.write(data)
             file.flush()
-        last.enter_context(_signals_later())  # ends after the files have been renamed
+        last.enter_context(_deferred_signals())  # ends after the files have been renamed
 
 
 @contextmanager
-def _signals_later() -> Iterator[None]:
-    """Hold back what Python does on a signal until the end of the block; it does it in the main thread alone."""
+def _deferred_signals() -> Iterator[None]:
+    """Defer the handlers of signals, which Python runs in the main thread, to the end of the block."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    wanted = [signal.Signals[name] for name in _SIGNALS if name in signal.Signals.__members__]
-    handlers = {number: signal.getsignal(number) for number in wanted}
-    came: list[int] = []
-    for number, handler in handlers.items():
-        if callable(handler):
-            signal.signal(number, lambda number, _: came.append(number))
+    numbers = [signal.Signals[name] for name in _SIGNALS if name in signal.Signals.__members__]
+    handlers = {number: handler for number in numbers if callable(handler := signal.getsignal(number))}
+    received: list[int] = []
+    for number in handlers:
+        signal.signal(number, lambda number, _: received.append(number))
     try:
         yield
     finally:
         for number, handler in handlers.items():
-            if callable(handler):
-                signal.signal(number, handler)
-        if came:
-            signal.raise_signal(came[0])
+            signal.signal(number, handler)
+        if received:
+            signal.raise_signal(received[0])
 
 
 @contextmanager
-def whole(path: str | Path, mode: str, **options: Any) -> Iterator[IO[Any]]:
-    """A file beside `path` to write to, which takes its place at the end of the block; a failure leaves what was there.
+def replacing(path: str | Path, mode: str, **options: Any) -> Iterator[IO[Any]]:
+    """A new file to write to, which replaces `path` at the end of the block; a failure leaves the old file.
 
-    `mode` is ``"x"`` or ``"xb"``, and the `options` are those of `open`. A link leads to what is renamed; a device or
-    a pipe is written to as it is.
+    `mode` is ``"x"`` or ``"xb"``, and the `options` are those of `open`. The target of a link is replaced; a device or
+    a pipe is written to directly.
     """
     target = Path(os.path.realpath(path))
     if target.exists() and not target.is_file():

@@ -1,7 +1,7 @@
 """Linear algebra on one thread, where many small problems are solved.
 
 A BLAS that divides a matrix of some hundred rows between threads loses more time by waiting than it gains: a fit of a
-law to 10 000 samples takes up to five times as long. Searches keep the cores busy with sets of parameters instead.
+law to 10 000 samples takes up to five times as long. Searches divide sets of parameters between the cores instead.
 """
 
 import threading
@@ -12,7 +12,7 @@ from functools import cache
 from threadpoolctl import ThreadpoolController
 
 _lock = threading.Lock()
-_inside = 0  # calls that have begun and not ended, in all threads
+_running = 0  # calls that have begun and not ended, in all threads
 _limiter = None
 
 
@@ -25,17 +25,17 @@ def _controller() -> ThreadpoolController:
 
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
-    """Limit BLAS to one thread until the last of the calls that are inside has ended."""
-    global _inside, _limiter
+    """Limit BLAS to one thread until the last of the running calls, in any thread, has ended."""
+    global _running, _limiter
     with _lock:
-        if _inside == 0:
+        if _running == 0:
             _limiter = _controller().limit(limits=1, user_api="blas")
-        _inside += 1
+        _running += 1
     try:
         yield
     finally:
         with _lock:
-            _inside -= 1
-            if _inside == 0 and _limiter is not None:
+            _running -= 1
+            if _running == 0 and _limiter is not None:
                 _limiter.restore_original_limits()
                 _limiter = None

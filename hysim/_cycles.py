@@ -14,15 +14,13 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray
 
 NEAR = 0.05
-"""How near to an extreme of the record a full cycle must turn, as a fraction of the input's span."""
+"""Largest distance of a full cycle's turning points from the record's extremes, as a fraction of the input's span."""
 
 ROUNDING = 1e-12
-"""What counts as equal, as a fraction of the span or the stroke."""
-
+"""Largest difference of equal values, as a fraction of the span or the stroke."""
 
 TOLERANCE = 0.01
-"""Reversals of the input that are ignored by default, as a fraction of its span."""
-
+"""Largest reversal of the input that is ignored by default, as a fraction of its span."""
 
 Samples = slice | npt.NDArray[np.intp]
 
@@ -50,21 +48,21 @@ def complete_cycles(u: FloatArray, tolerance: float) -> list[Cycle]:
     near = NEAR * (high - low)
     side = (levels >= high - near).astype(int) - (levels <= low + near)
 
-    found = []
+    cycles = []
     k = side.size - 1
     while k >= 2:
         if side[k] == side[k - 2] == -side[k - 1] != 0:
             halves = branches[k - 2], branches[k - 1]
             loading, unloading = halves if side[k] < 0 else halves[::-1]
-            found.append(Cycle(loading, unloading, slice(halves[0].start, halves[1].stop)))
+            cycles.append(Cycle(loading, unloading, slice(halves[0].start, halves[1].stop)))
             k -= 2
         else:
             k -= 1
-    return found
+    return cycles
 
 
 def turns(u: FloatArray, tolerance: float) -> Turns:
-    """The turning points, where retreats of up to `tolerance` times the input's span are none, and the branches.
+    """The turning points after reversals of more than `tolerance` times the input's span, and the branches.
 
     Raises
     ------
@@ -80,19 +78,19 @@ def turns(u: FloatArray, tolerance: float) -> Turns:
 
 
 def settled(u: FloatArray) -> npt.NDArray[np.intp]:
-    """The samples of a branch in the order of their inputs, of several at one input the last."""
+    """The samples of a branch in the order of their inputs; of several with equal inputs the last."""
     order = np.argsort(u, kind="stable")
     x = u[order]
     kept: npt.NDArray[np.intp] = order[np.append(x[1:] > x[:-1], True)]
     return kept
 
 
-def too_few(u: FloatArray, tolerance: float, asked: int, found: int) -> str:
-    """The message where a record has fewer cycles than asked for."""
+def too_few(u: FloatArray, tolerance: float, wanted: int, present: int) -> str:
+    """The message for a record with too few cycles."""
     levels = u[[first for first, _ in turns(u, tolerance).plateaus]]
     shown = ", ".join(f"{level:.6g}" for level in levels[:8]) + (", ..." if levels.size > 8 else "")
     return (
-        f"asked for {asked} complete cycle(s) of the input, found {found}: it turns at {shown}. A cycle goes from "
+        f"asked for {wanted} complete cycle(s) of the input, found {present}: it turns at {shown}. A cycle goes from "
         f"one extreme to the other and back, each within {NEAR:.0%} of the span, or from a level to one extreme or to "
         "both and back to the level, such as 0, max, min, 0. Give a longer record, or a larger tolerance if noise "
         "makes the input turn; hysim.cycle_metrics measures cycles with minor loops and of every amplitude"

@@ -4,8 +4,8 @@ An output that repeats itself from cycle to cycle, plus a polynomial p of time, 
 
     y_c(b, u) = g(b, u) + p(t_c(b, u))
 
-where cycle c passes the input u on branch b at time t_c. The loop g falls out of the differences between the cycles,
-and p is fitted to these: whatever the shape of the loop, it is neither tilted nor narrowed.
+where cycle c passes the input u on branch b at time t_c. The loop g cancels in the differences between the cycles, to
+which p is fitted: a loop of any shape is neither tilted nor narrowed.
 """
 
 import numpy as np

@@ -1,15 +1,15 @@
-"""Cycles from a level of the input and back to it, as cyclic tests of structures and of ferroelectrics count them.
+"""Cycles from a level of the input and back to it, as in cyclic tests of structures and of ferroelectrics.
 
 An excursion begins and ends at the level and lies on one side of it: 0 -> max -> 0. Two successive excursions, one to
 each side, are a cycle; an excursion without a partner on the other side, as in 0 -> 5 -> 0 -> 8 -> 0, is a cycle of
-its own. What lies ahead of the first excursion belongs to no cycle, nor does the last excursion of a record whose
-excursions alternate, which is half a cycle. Ends of the record within 5 % of the span of the level are no excursions.
+its own. Samples before the first excursion belong to no cycle, nor does the last excursion of a record whose excursions
+alternate, which is half a cycle. Ends of the record within 5 % of the span of the level are no excursions.
 
-The level is the input at the first sample, where tests begin at rest, or else the middle of the levels that the
-branches of the greatest total length reach: whichever gives cycles of the larger total span. The record's first and
-last branch do not count there, since they may be cut off. A turning point within the tolerance of the level counts as
-at the level. Between two samples the input is linear, and a cycle begins and ends between them where the level is
-passed. Of several passages in one branch (noise, a pause) the middle one is taken.
+The level is the input at the first sample, where tests begin at rest, or the middle of the levels that the branches of
+the greatest total length reach: the one with cycles of the larger total span. The record's first and last branch do not
+count there, since they may be incomplete. A turning point within the tolerance of the level counts as at the level.
+Between two samples the input is linear, and a cycle begins and ends between them where the input passes the level. Of
+several passages in one branch (noise, a pause) the middle one is taken.
 
 Source: ATC-24, Guidelines for Cyclic Seismic Testing of Components of Steel Structures, Applied Technology Council,
 1992, glossary ("excursion", "cycle"); FEMA 461 (2007) and ISO 16670 (2003) count their protocols in the same cycles.
@@ -26,14 +26,14 @@ from hysim._cycles import NEAR, ROUNDING, Cycle, complete_cycles, too_few, turns
 from hysim._frozen import FloatArray
 
 _FULL = 1.0 - 2.0 * NEAR
-"""How much of the widest cycle's span a cycle of full amplitude has at least: each end may miss by `NEAR`."""
+"""Least span of a cycle of full amplitude, as a fraction of the widest cycle's: each end may miss by `NEAR`."""
 
 
 class Loops(NamedTuple):
     """Cycles of a record into which samples have been inserted where the cycles begin and end.
 
-    `places` are the record's samples and those between them, as fractional numbers of samples; None where none are
-    inserted. The cycles' slices and indices refer to the samples at these places.
+    `places` are the record's samples and the inserted ones, as fractional numbers of samples; None if none is inserted.
+    The cycles' slices and indices refer to the samples at these places.
     """
 
     places: FloatArray | None
@@ -55,7 +55,7 @@ class Loops(NamedTuple):
 
 
 class Protocol(NamedTuple):
-    """The cycles about a level: where each begins and ends, in samples, and whether minor loops lie inside."""
+    """The cycles about a level: the ends of each, in samples, and whether it contains minor loops."""
 
     level: float
     spans: list[tuple[float, float]]
@@ -64,7 +64,7 @@ class Protocol(NamedTuple):
 
     @property
     def slices(self) -> list[slice]:
-        """The fewest samples that hold each cycle."""
+        """The fewest samples that contain each cycle."""
         return [slice(int(np.floor(begin)), int(np.ceil(end)) + 1) for begin, end in self.spans]
 
 
@@ -78,35 +78,35 @@ class _Excursion(NamedTuple):
 def measured_cycles(u: FloatArray, cycles: int, tolerance: float) -> Loops:
     """The last complete cycles between the record's extremes, or else the last of full amplitude about a level.
 
-    The latest comes first.
+    They are sorted from the latest to the earliest.
 
     Raises
     ------
     ValueError
-        If the record has fewer of either kind, the number is below 1, or the tolerance is not from 0 to below 0.5.
+        If the record has fewer of both kinds, the number is below 1, or the tolerance is not from 0 to below 0.5.
     """
     if cycles < 1:
         raise ValueError(f"cycles must be at least 1, got {cycles}")
     between_extremes = complete_cycles(u, tolerance)
     if len(between_extremes) >= cycles:
         return Loops(None, between_extremes[:cycles])
-    found = protocol(u, tolerance)
-    full = full_amplitude(u, found)
+    about_level = protocol(u, tolerance)
+    full = full_amplitude(u, about_level)
     if len(full) < cycles:
         raise ValueError(too_few(u, tolerance, cycles, max(len(full), len(between_extremes))))
-    return Loops(found.loops.places, [found.loops.cycles[k] for k in full[: -cycles - 1 : -1]])
+    return Loops(about_level.loops.places, [about_level.loops.cycles[k] for k in full[: -cycles - 1 : -1]])
 
 
-def full_amplitude(u: FloatArray, found: Protocol) -> list[int]:
+def full_amplitude(u: FloatArray, about_level: Protocol) -> list[int]:
     """Numbers of the cycles without minor loops whose span is at least 90 % of the widest cycle's."""
-    at_places = found.loops.of(u)
-    spans = np.array([np.ptp(at_places[cycle.path]) for cycle in found.loops.cycles])
+    at_places = about_level.loops.of(u)
+    spans = np.array([np.ptp(at_places[cycle.path]) for cycle in about_level.loops.cycles])
     is_full = spans >= _FULL * spans.max(initial=0.0)
-    return np.flatnonzero(is_full & ~np.array(found.has_inner_turns, dtype=bool)).tolist()
+    return np.flatnonzero(is_full & ~np.array(about_level.has_inner_turns, dtype=bool)).tolist()
 
 
 def protocol(u: FloatArray, tolerance: float, level: float | None = None) -> Protocol:
-    """The cycles about a level, by default the one that gives the widest cycles, in the order of time."""
+    """The cycles about a level, by default that with the widest cycles, in the order of time."""
     plateaus = turns(u, tolerance).plateaus
     reach = tolerance * float(np.ptp(u))
     levels = u[[first for first, _ in plateaus]]
@@ -125,9 +125,9 @@ def protocol(u: FloatArray, tolerance: float, level: float | None = None) -> Pro
 
 
 def _candidates(levels: FloatArray, first: float, reach: float) -> list[float]:
-    """The first input, and unless it is among them the middle of the levels that most of the branches' length reaches.
+    """The first input, and the middle of the levels that most of the branches' length reaches if it is not one of them.
 
-    The record's first and last branch, which may be parts of a branch, are not counted.
+    The record's first and last branch, which may be incomplete, are not counted.
     """
     ends = np.sort(np.column_stack([levels[1:-2], levels[2:-1]]), axis=1)
     if not ends.size:
@@ -135,15 +135,15 @@ def _candidates(levels: FloatArray, first: float, reach: float) -> list[float]:
     lengths = np.diff(ends)[:, 0]
     lows, highs = ends[:, 0] - reach, ends[:, 1] + reach
     edges = np.unique(np.concatenate([lows, highs, [first]]))
-    entered, left = (np.zeros(edges.size) for _ in range(2))
-    np.add.at(entered, np.searchsorted(edges, lows), lengths)
-    np.add.at(left, np.searchsorted(edges, highs), lengths)
-    reached = np.cumsum(entered) - np.cumsum(left) + left
+    begun, ended = (np.zeros(edges.size) for _ in range(2))
+    np.add.at(begun, np.searchsorted(edges, lows), lengths)
+    np.add.at(ended, np.searchsorted(edges, highs), lengths)
+    reached = np.cumsum(begun) - np.cumsum(ended) + ended
     is_most = reached >= (1.0 - ROUNDING) * reached.max()
     if is_most[np.searchsorted(edges, first)]:
         return [first]
     begin = int(np.argmax(is_most))
-    return [first, float(edges[begin] + edges[begin + np.argmax(left[begin:] > 0.0)]) / 2.0]
+    return [first, float(edges[begin] + edges[begin + np.argmax(ended[begin:] > 0.0)]) / 2.0]
 
 
 def _pairs_about(

@@ -64,31 +64,34 @@ def read_only(
 def _as_float_array(values: npt.ArrayLike, name: str) -> FloatArray:
     if _is_masked(values):
         raise ValueError(f"{name} must have no masked element: leave these samples out, or fill them with filled()")
-    if np.iscomplexobj(values):
-        raise TypeError(f"{name} must be real numbers, got complex ones")
-    if getattr(getattr(values, "dtype", None), "kind", "f") in "mM":  # which NumPy would take for counts of their unit
-        raise TypeError(f"{name} must be numbers, got dates or times: give seconds from the first one")
     try:
-        return np.array(values, dtype=np.float64, order="C")
+        array = np.asarray(values)
+        kind = array.dtype.kind
+        numbers = np.array(array, dtype=np.float64, order="C") if kind not in "cmM" else None
     except OverflowError:
         raise ValueError(f"{name} must be finite, got {_TOO_LARGE}") from None
     except (TypeError, ValueError, RecursionError) as error:
         raise TypeError(f"{name} must be numbers, got {type(values).__name__}: {error}") from None
+    if kind == "c":
+        raise TypeError(f"{name} must be real numbers, got complex ones")
+    if numbers is None:  # NumPy would convert dates to counts of their unit
+        raise TypeError(f"{name} must be numbers, got dates or times: give seconds from the first one")
+    return numbers
 
 
 def _is_masked(values: Any) -> bool:
-    """Whether an element is masked, of which NumPy would keep the number under the mask, or make nan with a warning."""
+    """Whether an element is masked: NumPy would take the number under the mask, or make nan with a warning."""
     if isinstance(values, (list, tuple)):
         return any(isinstance(each, np.ma.MaskedArray) and np.ma.is_masked(each) for each in values)
     return bool(np.ma.is_masked(values))
 
 
 def _freeze(cls: type[T], *, finite: bool) -> type[T]:
-    check = getattr(cls, "__post_init__", None)
+    check = getattr(cls, "__post_init__", None)  # a class may have none, or inherit it
 
     def coerce_then_check(self: Any) -> None:
         for name, coerce in _coercions(type(self), finite).items():  # type: ignore[arg-type]
-            object.__setattr__(self, name, coerce(getattr(self, name), name))
+            object.__setattr__(self, name, coerce(vars(self)[name], name))
         if check is not None:
             check(self)
 
@@ -146,11 +149,11 @@ def _as_mapping(values: Mapping[Any, Any], name: str) -> Mapping[Any, Any]:
 
 def items(value: Any) -> dict[str, Any]:
     """Fields of a frozen value by name."""
-    return {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+    return {field.name: vars(value)[field.name] for field in dataclasses.fields(value)}
 
 
 def _compared(value: Any) -> tuple[Any, ...]:
-    return tuple(getattr(value, field.name) for field in dataclasses.fields(value) if field.compare)
+    return tuple(vars(value)[field.name] for field in dataclasses.fields(value) if field.compare)
 
 
 def _key(value: Any) -> Any:

@@ -1,12 +1,10 @@
-"""Work cut into chunks over threads, and work beside one's own in other processes.
+"""Work divided between threads, and work in other processes.
 
-Kernels release the interpreter lock, so that a pool of threads keeps all cores busy. How the work is
-cut does not change a result: every item is computed by itself. Searches in Python hold the lock; they go
-to a second process.
+Kernels release the interpreter lock, so that a pool of threads keeps all cores busy. The division of the work does not
+change a result: every item is computed by itself. Searches in Python hold the lock; they run in a second process.
 
-An interrupt ends all of it: a kernel is called for a fraction of a second at a time, an exception is raised in
-the threads that are still at work, and processes are terminated. A process also ends with the one that
-started it, however that one ends.
+An interrupt ends all of it: a kernel is called for a fraction of a second at a time, an exception is raised in threads
+that still work, and processes are terminated. A process also ends with its parent, in whatever way that ends.
 """
 
 import contextlib
@@ -29,10 +27,10 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 
 _LONGEST = 2_000_000  # samples to begin with, which take some tenths of a second
-_PIECE, _GROWTH = 0.2, 16.0  # seconds of a call of a kernel, and how much longer a call may be than the last
+_PIECE, _GROWTH = 0.2, 16.0  # seconds of a call of a kernel, and largest ratio of a call to the one before
 _STRETCH = 100_000  # samples of one path: some hundredths of a second
-GLANCE = 0.1  # seconds of a wait after which signals are looked for
-_PATIENCE = 0.3  # seconds to wait for threads that have been told to stop
+GLANCE = 0.1  # longest wait without a check for signals [s]
+_PATIENCE = 0.3  # seconds to wait for threads that are being stopped
 
 _most: ContextVar[int | None] = ContextVar("most threads", default=None)
 
@@ -42,7 +40,7 @@ Progress = Callable[[int, int], None]
 
 def cores() -> int:
     """Number of processor cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 
 
 def in_chunks(
@@ -64,9 +62,9 @@ def in_chunks(
     workers : int, optional
         Number of threads; by default one for each core.
     minimum : int
-        Fewest items that are worth a thread.
+        Smallest number of items for a thread; for items of many samples it is smaller.
     n_samples : int
-        Length of an item: of long ones fewer are worth a thread.
+        Number of samples of an item.
     """
     _check(workers)
     minimum = max(1, min(minimum, _LONGEST // max(1, n_samples)))
@@ -84,10 +82,10 @@ def in_chunks(
 
 
 def in_pieces(work: Callable[[slice], int], n_samples: int) -> int:
-    """Call `work` for one stretch of samples after the other, short enough for an interrupt to come between them.
+    """Call `work` for one short stretch of samples after the other, so that interrupts are handled between them.
 
-    It returns -1, or the first sample that failed, counted from the start of its stretch; so does this, counted from
-    the first of all. The work carries its state from a stretch to the next.
+    `work` returns -1, or the first sample that failed, counted from the start of its stretch, and keeps its state
+    between stretches. The result is -1, or the first sample that failed, counted from the first of all.
     """
     for start in range(0, n_samples, _STRETCH):
         failed = work(slice(start, min(start + _STRETCH, n_samples)))
@@ -97,7 +95,7 @@ def in_pieces(work: Callable[[slice], int], n_samples: int) -> int:
 
 
 def _piece_by_piece(work: Callable[[int, int], None], start: int, stop: int, size: int) -> None:
-    """Call `work` for pieces that begin with `size` items and take about `_PIECE` seconds: interrupts come between."""
+    """Call `work` for pieces of `size` items, then of about `_PIECE` seconds, so that interrupts come between them."""
     while start < stop:
         begin, end = time.perf_counter(), min(start + size, stop)
         work(start, end)
@@ -109,31 +107,21 @@ def _piece_by_piece(work: Callable[[int, int], None], start: int, stop: int, siz
 def map_on_threads(
     work: Callable[[int], T], n_items: int, *, workers: int | None = None, progress: Progress | None = None
 ) -> list[T]:
-    """The results of `work(k)` for k in `range(n_items)`, in order; inside, `in_chunks` has a thread to itself.
+    """The results of `work(k)` for k in `range(n_items)`, in order, on one thread for each core or `workers` threads.
 
-    Parameters
-    ----------
-    work : callable
-        Computes the item k, by itself.
-    n_items : int
-        Number of items. A thread takes the next one when it is done with the last.
-    workers : int, optional
-        Number of threads; by default one for each core.
-    progress : callable, optional
-        Called as ``progress(done, total)`` after each item.
+    `in_chunks` inside `work` uses one thread. `progress(done, total)` is called after each item.
     """
     _check(workers)
     n_threads = min(workers or _most.get() or cores(), n_items)
+    context = copy_context()  # which contains numpy's error state
 
-    here = copy_context()  # of which numpy's error state is a part
-
-    def alone(k: int) -> T:
+    def on_one_thread(k: int) -> T:
         with at_most(1 if n_threads > 1 else None):
             return work(k)
 
     results = []
     with threads(n_threads) as pool:
-        for item in [pool.submit(here.copy().run, alone, k) for k in range(n_items)]:
+        for item in [pool.submit(context.copy().run, on_one_thread, k) for k in range(n_items)]:
             results.append(awaited(item))
             if progress is not None:
                 progress(len(results), n_items)
@@ -142,7 +130,7 @@ def map_on_threads(
 
 @contextmanager
 def at_most(workers: int | None) -> Iterator[None]:
-    """Let `in_chunks`, called in this thread without a number of its own, use so many threads; None for all cores."""
+    """Set the default number of threads of `in_chunks` in this thread; None for all cores."""
     _check(workers)
     token = _most.set(workers or _most.get())
     try:
@@ -157,10 +145,9 @@ def _check(workers: int | None) -> None:
 
 
 def awaited(future: Future[T]) -> T:
-    """The result of a future, for which an interrupt is never waited longer than `GLANCE`.
+    """The result of a future; during the wait an interrupt is handled within `GLANCE`.
 
-    One that comes between Python's last look for signals and the moment when a thread begins to wait without an end
-    is not seen before that wait is over: the more threads ask for the interpreter lock, the more often.
+    In a wait without an end, Python would not handle an interrupt that arrives just before the wait begins.
     """
     while not future.done():
         with contextlib.suppress(TimeoutError):
@@ -170,7 +157,7 @@ def awaited(future: Future[T]) -> T:
 
 @contextmanager
 def threads(number: int) -> Iterator[Executor]:
-    """Threads that end with the block: after their work, or if the block fails as soon as they can be stopped."""
+    """Threads that end with the block: after their work, or as soon as they can be stopped if the block fails."""
     pool = _Threads(number)
     try:
         yield pool
@@ -181,13 +168,13 @@ def threads(number: int) -> Iterator[Executor]:
 
 
 class _Stopped(BaseException):
-    """Raised in a thread whose work nobody waits for any more."""
+    """Raised in a thread to stop it."""
 
 
 class _Threads(Executor):
-    """A pool of threads that can be stopped at work, and that does not keep the interpreter from ending.
+    """A pool of threads that can be stopped during their work.
 
-    The threads of `concurrent.futures` are joined before the interpreter ends, after all of their work.
+    The interpreter waits for threads of `concurrent.futures` to finish all of their work before it ends.
     """
 
     def __init__(self, number: int) -> None:
@@ -220,7 +207,7 @@ class _Threads(Executor):
                 thread.join(GLANCE)
 
     def stop(self, patience: float) -> None:
-        """Take back what has not begun, raise an exception in every thread, and wait so many seconds for them."""
+        """Cancel work that has not begun, raise an exception in every thread, and wait so many seconds for them."""
         for thread in self._threads:
             if thread.ident is not None:
                 ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), ctypes.py_object(_Stopped))
@@ -251,10 +238,9 @@ class _Threads(Executor):
 
 @contextmanager
 def second_process() -> Iterator[Executor]:
-    """An executor of one further process, forked from this one; where that is no use, one that works at once.
+    """An executor of one further process, forked from this one; on one core, or without fork, one that works at once.
 
-    It is no use on one core, and it is not safe on systems that do not fork. An interrupt is the parent's
-    alone. The process cannot print: the standard output is the parent's.
+    Only the parent handles interrupts. The process cannot print: the standard output is the parent's.
     """
     if not sys.platform.startswith("linux") or cores() < 2:
         yield _AtOnce()
@@ -267,7 +253,7 @@ def second_process() -> Iterator[Executor]:
 def processes(number: int, begin: Callable[..., None], *arguments: Any) -> Iterator[Executor]:
     """Processes that end with the block, at once if it fails, and with this process in whatever way it ends.
 
-    Each calls `begin` first. They are forked where that is usual, so that the arguments need not be pickled.
+    Each calls `begin` first. On Linux they are forked, so that the arguments need not be pickled.
     """
     before = {*multiprocessing.active_children()}
     context = multiprocessing.get_context("fork" if sys.platform.startswith("linux") else None)
@@ -290,7 +276,7 @@ def _do_nothing() -> None:
 
 @contextmanager
 def _without_signals() -> Iterator[None]:
-    """Hold back signals until a process that is started here knows what to do with them."""
+    """Block signals until a process that is started here has set its handlers."""
     if sys.platform == "win32":
         yield
         return
@@ -302,8 +288,8 @@ def _without_signals() -> Iterator[None]:
 
 
 def _begin(begin: Callable[..., None], arguments: tuple[Any, ...]) -> None:
-    """An interrupt is the parent's alone, a request to end is obeyed at once, and no process outlives its parent."""
-    signal.set_wakeup_fd(-1)  # which is the parent's
+    """Ignore interrupts, which the parent handles, end at once on request, and end with the parent."""
+    signal.set_wakeup_fd(-1)  # it is the parent's
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     if sys.platform != "win32":
@@ -314,7 +300,7 @@ def _begin(begin: Callable[..., None], arguments: tuple[Any, ...]) -> None:
 
 
 def _end_with_parent() -> None:
-    """Wait for the end of a pipe of which the parent holds the other side."""
+    """Wait until the parent has ended."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         multiprocessing.connection.wait([parent.sentinel])
@@ -322,14 +308,14 @@ def _end_with_parent() -> None:
 
 
 def _print_to_nowhere() -> None:
-    """Give up the standard output, so that who reads it need not wait for this process."""
+    """Close the standard output, so that its reader need not wait for this process."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)
     os.close(nowhere)
 
 
 class _AtOnce(Executor):
-    """Runs what is submitted before it returns."""
+    """Runs a function in `submit`."""
 
     def submit(self, function: Callable[..., Any], /, *args: Any, **options: Any) -> Future[Any]:
         future: Future[Any] = Future()

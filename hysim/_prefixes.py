@@ -10,13 +10,7 @@ _BASES = frozenset(
 
 
 def power_of_ten(old: str, new: str) -> int:
-    """The power of ten by which a value in the old unit is multiplied to be in the new one.
-
-    Raises
-    ------
-    ValueError
-        If one of them is not a prefix and a unit, or they are of different units.
-    """
+    """The power of ten that converts a value from the old unit to the new one; ValueError if only a prefix cannot."""
     (before, base), (after, other) = _parts(old), _parts(new)
     if base != other:
         raise ValueError(f"{old!r} cannot become {new!r}: only the prefix of a unit can change")
@@ -28,4 +22,4 @@ def _parts(unit: str) -> tuple[int, str]:
     for prefix, power in _POWERS.items():
         if unit.startswith(prefix) and unit[len(prefix) :] in _BASES:
             return power, unit[len(prefix) :]
-    raise ValueError(f"{unit!r} is no unit with an SI prefix that is known: scale the values, or give units anew")
+    raise ValueError(f"{unit!r} is not a known unit with an SI prefix: scale the values, or pass other units")

@@ -1,16 +1,16 @@
-"""The quantum of a sensor, from the values that it gave.
+"""The quantum of a sensor, estimated from its values.
 
-Values that are whole multiples of q, shifted by a constant, stand at one phase of a wave of length q:
+Values that are whole multiples of q, shifted by a constant, have one phase in a wave of length q:
 
     |mean of exp(2 pi i v / q)| = 1,
 
-and this stays near 1 where each is off by a few hundredths of q, from rounding or a crooked sensor. The wave of the
-lowest frequency 1/q that has the phases so together is looked for on a grid by one Fourier transform; then q and the
-shift are those of a straight line through the values against their whole numbers.
+and this stays near 1 if each is off by a few hundredths of q, from rounding or an uneven sensor. The wave of the lowest
+frequency 1/q with such phases is searched on a grid by one Fourier transform; then q and the shift are those of a
+straight line through the values against their whole numbers.
 
-A step that is small enough fits any values, and any step fits two. What is found is believed if chance would not do
-as well: m values within a fraction e of q from whole steps do so with a probability of about (2 e)^(m - 2) for each
-of some span/q steps that could be tried.
+A small enough step fits any values, and any step fits two. A step is accepted if chance would hardly fit as well: m
+values within a fraction e of q from whole steps do so with a probability of about (2 e)^(m - 2) for each of some span/q
+steps that could be tried.
 """
 
 import math
@@ -20,22 +20,22 @@ import numpy as np
 from hysim._frozen import FloatArray
 
 MOST_LEVELS = 65_536
-"""Most steps in the span of the values: finer ones are not looked for."""
+"""Most steps in the span of the values: finer ones are not searched."""
 
 _FARTHEST = 0.1  # how far from a whole step a value may be, in steps
-_COHERENT = 0.8  # of 1: what values within that distance leave, on a grid that misses the frequency by half a cell
-_BY_CHANCE = 1e-3  # largest probability of a step that is believed
+_COHERENT = 0.8  # of 1: least mean for values within that distance, on a grid that misses the frequency by half a cell
+_BY_CHANCE = 1e-3  # largest probability of a step that is accepted
 _BINS = 8 * MOST_LEVELS  # of the values: a quarter of the finest wave is one
 _FINER = 4  # cells of the grid in a cycle over the span
 _AT_ONCE = 200_000  # values against waves
-_DIGITS = 1e-12  # of the step: what the sums keep
+_DIGITS = 1e-12  # of the step: precision of the sums
 _SMALLEST = 1e-280  # span: below it numbers lose digits
 
 
 def output_quantum(values: FloatArray) -> float | None:
-    """The greatest step of which all values are whole multiples up to a constant, None where there is none.
+    """The greatest step of which all values are whole multiples up to a constant, None if there is none.
 
-    It is given with the digits that its standard error leaves.
+    It is rounded to the digits that its standard error allows.
     """
     levels = np.unique(values)
     with np.errstate(over="ignore"):
@@ -70,19 +70,19 @@ def _fitted(places: FloatArray, waves: FloatArray) -> tuple[FloatArray, FloatArr
     """Near each number of waves the step, its standard error, and how far from a whole step a place is, in steps."""
     phases = np.angle(np.exp(2j * math.pi * np.outer(waves, places)).mean(axis=1)) / (2.0 * math.pi)
     steps, shifts = 1.0 / waves, phases / waves
-    for _ in range(3):  # the whole numbers settle at once, or after the line has moved
-        whole = np.round((places - shifts[:, None]) / steps[:, None])
-        centred = whole - whole.mean(axis=1, keepdims=True)
+    for _ in range(3):  # the whole numbers change at most while the line does
+        multiples = np.round((places - shifts[:, None]) / steps[:, None])
+        centred = multiples - multiples.mean(axis=1, keepdims=True)
         weights = np.maximum((centred**2).sum(axis=1), 1e-300)  # no step is fitted to one whole number
         steps = np.maximum(centred @ places / weights, 1e-300)
-        shifts = (places - steps[:, None] * whole).mean(axis=1)
-    off = places - shifts[:, None] - steps[:, None] * whole
+        shifts = (places - steps[:, None] * multiples).mean(axis=1)
+    off = places - shifts[:, None] - steps[:, None] * multiples
     errors = np.sqrt((off**2).sum(axis=1) / (places.size - 2) / weights)
     return steps, errors, np.abs(off).max(axis=1) / steps
 
 
 def _log_chance(n_levels: int, farthest: FloatArray, n_steps: FloatArray) -> FloatArray:
-    """Logarithm of the probability that values without a quantum do so well."""
+    """Logarithm of the probability that values without a quantum fit as well."""
     return (n_levels - 2) * np.log(2.0 * farthest) + 2.0 * np.log(n_steps)
 
 

@@ -1,6 +1,6 @@
-"""What results say when they are printed: what matters in at most ten lines of at most a hundred letters.
+"""Printed results: the important numbers in at most ten lines of at most a hundred letters.
 
-A result says it by ``__str__``, and its first line alone is its ``repr``; notebooks show all of it. No array is listed.
+The text is the ``__str__`` of a result, its first line the ``repr``; notebooks show all of it. No array is listed.
 """
 
 import math
@@ -17,39 +17,39 @@ T = TypeVar("T")
 
 
 def printed(cls: type[T]) -> type[T]:
-    """Give a class that has a ``__str__`` a ``repr`` of one line, and a notebook all of it."""
+    """Give a class that has a ``__str__`` a ``repr`` of one line, and let notebooks show all lines."""
     cls.__repr__ = _first_line  # type: ignore[method-assign]
     return shown(cls)
 
 
 def shown(cls: type[T]) -> type[T]:
-    """Let notebooks show what ``str`` says."""
+    """Let notebooks show the text of ``str``."""
     cls._repr_mimebundle_ = _bundle  # type: ignore[attr-defined]
     return cls
 
 
 def bic_in_words(bic: float) -> str:
-    """The BIC, which is minus infinity and compares nothing where every residual is zero."""
+    """The BIC; it is minus infinity and not defined if every residual is zero."""
     return "BIC not defined" if bic == -math.inf else f"BIC {bic:.1f}"
 
 
 def words(lines: Iterable[str], rows: Mapping[str, str] | None = None) -> str:
-    """Lines, and rows of a name and what there is to say of it, as far as there is room."""
+    """Lines, and rows of a name and a text, up to the largest number of lines."""
     width = max(map(len, rows or {}), default=0)
     named = [_cut(f"  {name:<{width}}  ", text) for name, text in (rows or {}).items() if text]
-    every = [part for line in [*lines, *named] for part in line.splitlines()]
-    if len(every) > LINES:
-        every = [*every[: LINES - 1], f"  ... and {len(every) - LINES + 1} lines more"]
-    return "\n".join(line if len(line) <= LETTERS else line[: LETTERS - 4].rstrip() + " ..." for line in every)
+    all_lines = [part for line in [*lines, *named] for part in line.splitlines()]
+    if len(all_lines) > LINES:
+        all_lines = [*all_lines[: LINES - 1], f"  ... and {len(all_lines) - LINES + 1} lines more"]
+    return "\n".join(line if len(line) <= LETTERS else line[: LETTERS - 4].rstrip() + " ..." for line in all_lines)
 
 
 def wrapped(parts: Iterable[str], *, most: int = 3, first: str = "  ") -> str:
-    """Short parts behind each other, over at most as many lines; how many more there are is said."""
-    given = [part.replace(" ", "\0") for part in parts]
+    """Short parts in at most `most` lines, with the number of those that have no room."""
+    unbroken = [part.replace(" ", "\0") for part in parts]
     indent = " " * len(first)
-    for number in range(len(given), 0, -1):
-        more = len(given) - number
-        text = ", ".join(given[:number]) + (f", and\0{more}\0more" if more else "")
+    for number in range(len(unbroken), 0, -1):
+        more = len(unbroken) - number
+        text = ", ".join(unbroken[:number]) + (f", and\0{more}\0more" if more else "")
         lines = textwrap.wrap(text, LETTERS, initial_indent=first, subsequent_indent=indent, break_on_hyphens=False)
         if len(lines) <= most:
             return "\n".join(lines).replace("\0", " ")
@@ -71,7 +71,7 @@ def quantity(value: float, unit: str = "") -> str:
 
 
 def extent(values: npt.ArrayLike, unit: str = "") -> str:
-    """From the least to the largest of some values."""
+    """The least and the largest of some values."""
     array = np.asarray(values)
     if not array.size:
         return "no values"
@@ -80,7 +80,7 @@ def extent(values: npt.ArrayLike, unit: str = "") -> str:
 
 
 def value_in_words(value: Any) -> str:
-    """A parameter, an array by its shape and extent alone."""
+    """The value of a parameter; an array by its shape and extent."""
     if isinstance(value, np.ndarray):
         size = " x ".join(map(str, value.shape)) or "1"
         return f"{size} values, {extent(value)}"

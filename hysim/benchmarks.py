@@ -4,8 +4,8 @@ The Bouc-Wen system-identification benchmark of J. P. Noel and M. Schoukens (201
 
     m y'' + c y' + k y + z = u,    z' = alpha y' - beta (gamma |y'| z + delta y' |z|)
 
-with u in N and y in m; in hysim's letters A = alpha, beta -> beta gamma, gamma -> beta delta, n = 1. What it
-publishes, at 750 Hz, is not the solution of this equation but of one recipe, which is repeated here:
+with u in N and y in m; in hysim's symbols A = alpha, beta -> beta gamma, gamma -> beta delta, n = 1. Its published
+records, at 750 Hz, are not the solution of this equation but the result of a recipe, which is repeated here:
 
     integration   Newmark's constant average acceleration with the trapezoidal rule for z at 15 kHz, from rest
     multisine     8192 samples a period, the lines 5.035 to 150.055 Hz with equal amplitudes and random phases;
@@ -80,15 +80,15 @@ def noel_schoukens(
     level : float, optional
         Root mean square of the multisine, by default 50 N, or amplitude of the sweep, by default 40 N.
     seed : int
-        Of the phases and of the noise.
+        Seed of the phases and of the noise.
     periods : int
         Number of periods of the multisine.
     initial : {"periodic", "rest"}
-        Whether a multisine's record begins one period after rest, when the transient has died away (to 1e-12),
-        or at rest. A sweep begins at rest.
+        Start of a multisine's record: one period after rest, when the transient has decayed (to 1e-12), or at rest.
+        A sweep begins at rest.
     noise : float
-        Root mean square of white Gaussian noise in the band to 375 Hz, added to the output at 15 kHz, anew
-        in each period [m]; the filters leave 92 % of it. The benchmark's training noise is 8e-6.
+        Root mean square of white Gaussian noise up to 375 Hz, added to the output at 15 kHz, different in each
+        period [m]; the filters pass 92 % of it. The benchmark's training noise is 8e-6.
 
     Returns
     -------
@@ -100,7 +100,7 @@ def noel_schoukens(
     ValueError
         If an option is unknown, the level or the noise is negative or not finite, or periods is below 1.
     SimulationError
-        If a level is so high that the motion leaves the finite numbers.
+        If a level is so high that the motion diverges.
 
     Examples
     --------
@@ -142,18 +142,18 @@ def noel_schoukens(
 def simulate_official(
     u: npt.ArrayLike, *, kind: str = "multisine", plant: BoucWenOscillator | None = None
 ) -> FloatArray:
-    """Output that the benchmark publishes for one of its inputs, to 1e-12 m.
+    """Published output of the benchmark for one of its inputs, to 1e-12 m.
 
     Parameters
     ----------
     u : array, shape (n,) [N]
-        Published input at 750 Hz: one period of a multisine, of any even length, or the sweep or its begin.
+        Published input at 750 Hz: one period of a multisine, of any even length, or the sweep or its beginning.
     kind : {"multisine", "sweep"}
-        The multisine is taken as periodic: of three periods from rest the second is kept. The sweep is taken
-        from its formula, which its published samples meet to 1e-10.
+        A multisine is periodic: of three periods from rest the second is returned. A sweep is computed from its
+        formula, which agrees with its published samples to 1e-10.
     plant : BoucWenOscillator, optional
-        Another plant, such as an identified one, to be simulated by the same recipe: its own method and number
-        of steps are not looked at.
+        Another plant, such as an identified one, to simulate by the same recipe; its own method and number of steps
+        are ignored.
 
     Returns
     -------

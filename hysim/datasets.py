@@ -1,4 +1,4 @@
-"""The two tables of measurements that the paper prints.
+"""The two tables of measurements in the paper.
 
 Source: B. B. Muhammad, M. H. Rahman, M. R. Ahmad, M. Bashir, "A novel model of PZT actuator and its application
 in hysteresis and vibration controls", Jurnal Teknologi, 2016. The files in `hysim/data` hold the values as
@@ -17,7 +17,7 @@ PIXEL = 0.0763
 """Table 1's resolution [um]: every displacement is a whole multiple of it, to 5 nm."""
 
 SQUARE_WAVE_FREQUENCY = 1.01626
-"""Of Table 2's input [Hz]; a period has four samples."""
+"""Frequency of Table 2's input [Hz]; a period has four samples."""
 
 
 def table1(dwell: float = 1.0) -> Record:
@@ -26,7 +26,7 @@ def table1(dwell: float = 1.0) -> Record:
     Parameters
     ----------
     dwell : float
-        Time from one sample to the next [s], which the paper does not print.
+        Time from one sample to the next [s]; the paper prints none.
 
     Returns
     -------

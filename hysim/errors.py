@@ -2,4 +2,4 @@
 
 
 class SimulationError(RuntimeError):
-    """A simulation left the finite numbers; the message names the sample or the time."""
+    """A simulation diverged; the message names the sample or the time."""

@@ -1,13 +1,13 @@
-"""Measured or simulated records: an input, an output, and what is known about them.
+"""Measured or simulated records: input, output and times, with units, resolution and a name.
 
-The sample axis is axis 0. A record never changes; a slice of it carries its units, resolution and name.
+The sample axis is axis 0. A record never changes; a slice of it keeps its units, resolution and name.
 """
 
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import field
 from itertools import pairwise
-from typing import Self, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -38,14 +38,13 @@ class Record:
     y : array, shape (n,)
         Output, for instance a displacement [``units["y"]``].
     t : array, shape (n,), optional
-        Strictly increasing times of the samples [``units["t"]``]; None where no time is known, which is
-        enough for rate-independent laws.
+        Strictly increasing times of the samples [``units["t"]``]; rate-independent laws need none.
     units : mapping, optional
-        Labels of the units of ``"t"``, ``"u"`` and ``"y"``. They are carried along, not checked.
+        Labels of the units of ``"t"``, ``"u"`` and ``"y"``, which are not checked.
     resolution : float, optional
-        Quantum of the output's sensor, in the unit of `y`.
+        Quantum of the output's sensor [unit of y].
     name : str, optional
-        What the record is called in tables and figures.
+        Name of the record in tables and figures.
 
     Raises
     ------
@@ -70,8 +69,7 @@ class Record:
     name: str = ""
 
     def __post_init__(self) -> None:
-        for name in ("u", "y", "t"):
-            values = getattr(self, name)
+        for name, values in (("u", self.u), ("y", self.y), ("t", self.t)):
             if values is not None and values.ndim != 1:
                 raise ValueError(f"{name} must have one axis, got shape {values.shape}")
         if self.u.size < 2:
@@ -89,14 +87,14 @@ class Record:
     def __str__(self) -> str:
         t, u, y = (self.units.get(signal, "") for signal in ("t", "u", "y"))
         turns = int(self.reversals().size)
-        quantum = "" if self.resolution is None else f", resolution {quantity(self.resolution, y)}"
+        resolution = "" if self.resolution is None else f", resolution {quantity(self.resolution, y)}"
         time = "" if self.t is None else f"{extent(self.t, t)}, {self._step_in_words(t)}"
         return words(
             [f"Record {self.name}".rstrip() + f": {self.u.size} samples" + (", no time" if self.t is None else "")],
             {
                 "t": time,
                 "u": f"{extent(self.u, u)}, {turns} reversal{'' if turns == 1 else 's'}",
-                "y": extent(self.y, y) + quantum,
+                "y": extent(self.y, y) + resolution,
             },
         )
 
@@ -124,32 +122,23 @@ class Record:
 
     @property
     def sample_time(self) -> float:
-        """The constant step of the time [``units["t"]``].
-
-        Raises
-        ------
-        ValueError
-            If the record has no time, or its steps differ by more than 1e-6 of their mean.
-        """
+        """The constant step of the time [``units["t"]``]; ValueError without a time or with an uneven one."""
         if self.t is None:
             raise ValueError("the record has no time: give t, or use a rate-independent law")
         return even_step(self.t)
 
     def reversals(self, tolerance: float = 0.0) -> npt.NDArray[np.intp]:
-        """Samples at which the input turns.
-
-        Of a plateau the middle sample is taken, of two in the middle the first. The record's ends are no
-        reversals.
+        """Samples at which the input turns, of a plateau the middle one; the record's ends are not counted.
 
         Parameters
         ----------
         tolerance : float
-            Retreats of the input up to this fraction of its span are ignored, as in `hysim.loop_metrics`: noise.
+            Reversals up to this fraction of the input's span are ignored, from 0 to below 0.5.
 
         Returns
         -------
         array of int, shape (n_reversals,)
-            Increasing places.
+            Increasing numbers of samples.
 
         Raises
         ------
@@ -167,16 +156,16 @@ class Record:
         return np.array(middles, dtype=np.intp)
 
     def branches(self, tolerance: float = 0.0) -> tuple[Self, ...]:
-        """The stretches on which the input runs one way, in the order of time.
+        """The branches on which the input rises or falls, in the order of time.
 
-        A plateau between two branches is divided in its middle; a sample in the very middle, and a reversal
-        without a plateau, belongs to both. An input that stands still has no branch.
+        A plateau between two branches is divided in its middle; a middle sample, and a reversal without a plateau,
+        belongs to both. A constant input has no branch.
 
         Parameters
         ----------
         tolerance : float
-            Retreats up to this fraction of the input's span do not end a branch. What comes before the first
-            extreme, and after the last one, by less than that is left out.
+            Reversals up to this fraction of the input's span do not end a branch; such ones at the record's ends
+            are left out.
 
         Returns
         -------
@@ -198,23 +187,23 @@ class Record:
     def cycles(self, tolerance: float = TOLERANCE) -> tuple[Self, ...]:
         """The complete cycles of the input, in the order of time.
 
-        A cycle goes from one extreme of the record to the other and back, each within 5 % of the input's span,
-        as `hysim.loop_metrics` has it: the last one is what that measures. Cycles are counted from the end and
-        share no branch, so that the initial rise of a record falls away.
+        A cycle goes from one extreme of the record to the other and back, each within 5 % of the input's span;
+        `hysim.loop_metrics` measures the last one. Cycles are counted from the end and share no branch, which leaves
+        out the initial rise of a record.
 
-        Where there is none, as in 0 -> max -> min -> 0 and in growing protocols, the cycles of full amplitude about
-        a level are taken, each with the fewest samples that hold it. The smaller ones of a growing protocol are in
-        ``hysim.cycle_metrics(rec.u, rec.y)``: cycle k is ``rec[table.start[k]:table.stop[k]]``.
+        A record without such cycles, as 0 -> max -> min -> 0 or a growing protocol, is divided into its cycles of full
+        amplitude about a level, each with the fewest samples that contain it. The smaller cycles of a growing protocol
+        are in ``hysim.cycle_metrics(rec.u, rec.y)``: cycle k is ``rec[table.start[k]:table.stop[k]]``.
 
         Parameters
         ----------
         tolerance : float
-            Retreats up to this fraction of the input's span are ignored.
+            Reversals up to this fraction of the input's span are ignored.
 
         Returns
         -------
         tuple of Record
-            Empty where there is no complete cycle.
+            Empty if there is no complete cycle.
 
         Raises
         ------
@@ -232,15 +221,14 @@ class Record:
         """
         if between_extremes := complete_cycles(self.u, tolerance):
             return tuple(self[cycle.path] for cycle in reversed(between_extremes))
-        found = protocol(self.u, tolerance)
-        return tuple(self[found.slices[k]] for k in full_amplitude(self.u, found))
+        about_level = protocol(self.u, tolerance)
+        return tuple(self[about_level.slices[k]] for k in full_amplitude(self.u, about_level))
 
     def resample(self, sample_time: float) -> Self:
-        """The record at even times from its first one on, by straight lines between the samples.
+        """The record at even times, with input and output linear between their samples.
 
-        Input and output are both taken as linear between their samples, and what lies after the last whole step
-        is left out. An extreme of the input between two new samples is cut off, and with it what a law would
-        remember of it: choose a step well below the time between reversals. A held input becomes one with ramps.
+        The times begin with the first one and end with the last whole step. An extreme of the input between two new
+        samples is lost, and with it its effect on a memory: choose a step well below the time between reversals.
 
         Parameters
         ----------
@@ -254,8 +242,8 @@ class Record:
         Raises
         ------
         ValueError
-            If the record has no time, or the step is not positive, longer than the record, or so short that more
-            than 1e8 samples would result.
+            If the record has no time, or the step is not positive, longer than the record, or gives more than 1e8
+            samples.
 
         Examples
         --------
@@ -274,21 +262,20 @@ class Record:
         return dataclasses.replace(self, t=t, u=u, y=y)
 
     def detrend(self, order: int = 1, *, tolerance: float = TOLERANCE) -> Self:
-        """The record without the drift of its output; the loop itself stays.
+        """The record without the drift of its output, and with an unchanged loop.
 
-        The output is taken as a loop that repeats itself from cycle to cycle plus a polynomial of the time, or of
-        the sample's number where there is no time. The polynomial is fitted to the differences between the complete
-        cycles at the same inputs of the same branch, so that the loop's slope and width do not enter, as they would
-        in a straight line through all samples (`scipy.signal.detrend`). What is taken off is the polynomial less
-        its mean over the complete cycles: their mean output stays. The input is left as it is. A first cycle that
-        begins on another curve than the others looks like drift: cut it off before.
+        The model of the output is a loop that repeats itself in every cycle plus a polynomial of the time, or of the
+        sample's number. The polynomial is fitted to the differences between complete cycles at equal inputs of the
+        same branch, so that the loop's slope and width have no influence, unlike in `scipy.signal.detrend`. The
+        polynomial less its mean over the complete cycles is subtracted. A first cycle on another curve than the
+        others looks like drift: cut it off before.
 
         Parameters
         ----------
         order : int
             Degree of the polynomial.
         tolerance : float
-            Retreats up to this fraction of the input's span are ignored when cycles are looked for.
+            Reversals up to this fraction of the input's span are ignored in the search for cycles.
 
         Returns
         -------
@@ -297,7 +284,7 @@ class Record:
         Raises
         ------
         ValueError
-            If the order is not at least 1, or there are fewer than ``order + 1`` complete cycles to compare.
+            If the order is below 1, or there are fewer than ``order + 1`` complete cycles.
 
         Examples
         --------
@@ -315,30 +302,29 @@ class Record:
         cycles = complete_cycles(self.u, tolerance)
         if len(cycles) <= order:
             raise ValueError(
-                f"a drift of order {order} needs {order + 1} complete cycles to tell it from the loop, the record has "
-                f"{len(cycles)}"
+                f"a drift of order {order} needs {order + 1} complete cycles, the record has {len(cycles)}"
             )
         times = np.arange(float(len(self))) if self.t is None else self.t
         return dataclasses.replace(self, y=self.y - drift(cycles, self.u, self.y, times, order))
 
     def split(self, *places: float) -> tuple[Self, ...]:
-        """The record cut in two or more, such as one part to identify from and one to test on.
+        """The record cut in two or more parts, such as one to identify from and one to test on.
 
         Parameters
         ----------
         *places : int or float
-            Where to cut, increasing: a whole number is the first sample of the next part, a fraction between 0 and
-            1 is that of the samples.
+            Increasing places to cut at: an integer is the number of the next part's first sample, a float between 0
+            and 1 a fraction of the samples.
 
         Returns
         -------
         tuple of Record
-            They share no sample. A law begins each with a memory of its own: that of the first sample's past.
+            Parts that share no sample. A law needs an initial memory for each of them.
 
         Raises
         ------
         ValueError
-            If no place is given, or a part has fewer than 2 samples.
+            If there is no place, or a part has fewer than 2 samples.
         TypeError
             If a place is not a number.
 
@@ -367,7 +353,7 @@ class Record:
         Returns
         -------
         Record
-            With its values, and the resolution if it is the output, multiplied by a power of ten.
+            Values, and with the output also the resolution, are multiplied by a power of ten.
 
         Raises
         ------
@@ -383,7 +369,7 @@ class Record:
         """
         changed = self
         for signal, unit in units.items():
-            values = getattr(changed, signal) if signal in ("t", "u", "y") else None
+            values: Any = {"t": changed.t, "u": changed.u, "y": changed.y}.get(signal)
             if values is None or signal not in changed.units:
                 raise ValueError(f"the record has no {signal!r} with a unit to convert: give it units first")
             power = power_of_ten(changed.units[signal], unit)
@@ -399,18 +385,17 @@ class Record:
         return changed
 
     def detect_resolution(self) -> float | None:
-        """The quantum of the output, as its values show it [unit of y].
+        """The quantum of the output, estimated from its values [unit of y].
 
         It is the greatest step of which all outputs are whole multiples, up to a constant and to a tenth of the step
-        (rounding, a crooked sensor), if values without a quantum would hardly do as well. Values printed with three
-        decimals are multiples of 0.001, and this is what they have if there is nothing coarser: of a sensor whose
-        steps are finer than the decimals, nothing else is left. A record that is even in itself, such as a noise-free
-        triangle, has a step too: this is an offer, not a judgement.
+        (rounding, an uneven sensor), if values without a quantum would hardly fit as well. Values printed with three
+        decimals have at least the step 0.001. Evenly spaced values without a sensor, such as a noise-free triangle,
+        have a step too: decide whether it is a resolution.
 
         Returns
         -------
         float or None
-            None if no step is found down to 1/65536 of the outputs' span: they are not quantised, or too few to tell.
+            None if there is no step down to 1/65536 of the outputs' span, or too few values to detect one.
 
         Examples
         --------
@@ -425,7 +410,7 @@ class Record:
             return int(place)
         if isinstance(place, (float, np.floating)) and 0.0 < place < 1.0:
             return round(place * len(self))
-        raise TypeError(f"a place is a sample's number or a fraction between 0 and 1, got {place!r}")
+        raise TypeError(f"a place must be a sample's number or a fraction between 0 and 1, got {place!r}")
 
 
 def check_increasing(t: FloatArray) -> None:

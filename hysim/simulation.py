@@ -1,22 +1,21 @@
-"""The verb `simulate`: what a plant gives for an input in time."""
+"""The verb `simulate`: the output of a plant for an input in time."""
 
 from collections.abc import Mapping
 from dataclasses import field
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
-import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen, read_only
 from hysim._words import extent, printed, words
 from hysim.models.protocols import needs_time
-from hysim.records import Record
+from hysim.records import check_increasing, even_step
 
 
 @printed
 @frozen
 class Simulation:
-    """What was simulated.
+    """Result of `simulate`.
 
     Parameters
     ----------
@@ -27,7 +26,7 @@ class Simulation:
     z : array, shape (n,), or None
         Memory of a law that has one.
     signals : mapping
-        Every signal by its name, those above among them.
+        All signals by name, also those above.
     units : mapping
         Labels of the units, by the signals' names.
     """
@@ -47,10 +46,25 @@ class Simulation:
         )
 
 
+@runtime_checkable
+class _HasResponse(Protocol):
+    def response(self, u: FloatArray, /, *time: float) -> FloatArray: ...
+
+
+@runtime_checkable
+class _HasSignals(Protocol):
+    def signals(self, u: FloatArray, /, *time: float) -> Mapping[str, FloatArray]: ...
+
+
+@runtime_checkable
+class _HasMemory(Protocol):
+    def memory(self, u: FloatArray, /) -> FloatArray: ...
+
+
 def simulate(
     plant: Any, t: npt.ArrayLike | None, u: npt.ArrayLike, *, units: Mapping[str, str] | None = None
 ) -> Simulation:
-    """Simulate a law or a plant, free running.
+    """Simulate a law or a plant without feedback.
 
     Parameters
     ----------
@@ -60,9 +74,9 @@ def simulate(
     t : array, shape (n,), or None
         Increasing times of the samples [s]; evenly spaced for a plant with dynamics. A law needs none.
     u : array, shape (n,)
-        Input. A law takes it as linear between the samples, a plant with dynamics by its own `hold`.
+        Input; between the samples linear for a law, and by its own `hold` for a plant with dynamics.
     units : mapping, optional
-        Labels to carry along.
+        Labels of units for the result.
 
     Returns
     -------
@@ -70,10 +84,12 @@ def simulate(
 
     Raises
     ------
+    TypeError
+        If the plant has no ``response``.
     ValueError
-        If lengths differ, a value is not finite, or a plant with dynamics is given no even time.
+        If lengths differ, a value is not finite, or a plant with dynamics has no even time.
     SimulationError
-        If the output leaves the finite numbers; the message names the sample.
+        If the output diverges; the message names the sample.
 
     Examples
     --------
@@ -82,30 +98,32 @@ def simulate(
     >>> sim.y.round(6).tolist()
     [0.0, 0.632121, -0.307799]
     """
-    if not callable(getattr(plant, "response", None)):
+    if not isinstance(plant, _HasResponse):
         raise TypeError(f"simulate takes a model with a response, got {type(plant).__name__}")
     inputs = read_only(u, "u", ndim=1)
     times = None if t is None else read_only(t, "t", ndim=1)
-    own = _signals(plant, inputs, times)
-    z = own["z"] if "z" in own else plant.memory(inputs) if callable(getattr(plant, "memory", None)) else None
-    signals = {"t": times, "u": inputs, "z": z, **own}
+    if times is not None:
+        if times.size != inputs.size:
+            raise ValueError(f"u and t must have equal lengths, got {inputs.size} and {times.size}")
+        check_increasing(times)
+    signals = _signals(plant, inputs, times)
+    memory = plant.memory(inputs) if "z" not in signals and isinstance(plant, _HasMemory) else signals.get("z")
+    every = {"t": times, "u": inputs, "z": memory, **signals}
     return Simulation(
         u=inputs,
-        y=own["y"],
+        y=signals["y"],
         t=times,
-        z=z,
-        signals={name: values for name, values in signals.items() if values is not None},
+        z=memory,
+        signals={name: values for name, values in every.items() if values is not None},
         units=units or {},
     )
 
 
-def _signals(plant: Any, u: FloatArray, t: FloatArray | None) -> Mapping[str, FloatArray]:
-    """The plant's own signals: its output at least."""
+def _signals(plant: _HasResponse, u: FloatArray, times: FloatArray | None) -> Mapping[str, FloatArray]:
+    """The plant's own signals, at least its output."""
     time: tuple[float, ...] = ()
     if needs_time(plant):
-        time = (Record(u=u, y=np.zeros_like(u), t=t).sample_time,)
-    elif t is not None:
-        Record(u=u, y=np.zeros_like(u), t=t)
-    signals_of = getattr(plant, "signals", None)
-    own: Mapping[str, FloatArray] = signals_of(u, *time) if signals_of else {"y": plant.response(u, *time)}
-    return own
+        if times is None:
+            raise ValueError(f"a {type(plant).__name__} needs times: pass t")
+        time = (even_step(times),)
+    return plant.signals(u, *time) if isinstance(plant, _HasSignals) else {"y": plant.response(u, *time)}

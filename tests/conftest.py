@@ -15,6 +15,8 @@ ROOT = Path(__file__).resolve().parent.parent
 kernels = b"".join(path.read_bytes() for path in sorted((ROOT / "hysim" / "kernels").glob("*.py")))
 os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".numba_cache" / hashlib.sha256(kernels).hexdigest()[:16]))
 os.environ.setdefault("MPLBACKEND", "agg")
+# Workers of the tests share the cores: threads of a BLAS that wait for each other would take most of the time.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import hypothesis  # noqa: E402  numba must not be imported before the cache folder is set
 import pytest  # noqa: E402
@@ -24,9 +26,21 @@ hypothesis.settings.register_profile("hysim", deadline=None, derandomize=True, m
 hypothesis.settings.load_profile("hysim")
 
 
+def pytest_configure(config):
+    """Know the mark of pytest-xdist without it."""
+    config.addinivalue_line("markers", "xdist_group(name): tests that run in one worker")
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """A test that is marked as needing optional packages is skipped where one is missing."""
+    """Skip tests that need missing packages, and divide the tests for ``--dist loadgroup``.
+
+    The tests of a file run in one worker, because they share fixtures; the experiments and the pages of the
+    documentation, which take seconds each, are divided one by one.
+    """
     for item in items:
+        if item.path.name not in ("test_experiments.py", "test_docs.py"):
+            item.add_marker(pytest.mark.xdist_group(str(item.path)))
         wanted = {package for mark in item.iter_markers("extra") for package in mark.args}
         if missing := sorted(package for package in wanted if find_spec(package) is None):
             item.add_marker(pytest.mark.skip(reason=f"needs {', '.join(missing)}"))

@@ -1,6 +1,7 @@
 """Imports point down only: to a lower rank, or inside one's own package."""
 
 import ast
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -30,6 +31,7 @@ ONLY_IMPORTED_IN = {"pysindy": ("discovery/_pysindy.py",), "matplotlib": ("plot/
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
 
+@cache
 def imported(path: Path) -> list[str]:
     """Every module that a file imports, at its top or inside a function."""
     names = []

@@ -2,6 +2,7 @@
 
 import pickle
 from dataclasses import replace
+from functools import cache
 
 import numba
 import numpy as np
@@ -223,11 +224,16 @@ def test_the_inverse_does_not_mind_extra_samples(law, seed):
     assert law.inverse_response(fine)[::3] == pytest.approx(coarse, abs=1e-11 * max(1.0, np.ptp(coarse)))
 
 
-@signed_kernel(CONTROLLER.signature)
-def ahead(parameters, state, reference, measurement):
+@cache
+def ahead():
     """The inverse as a controller that does not look at the measurement."""
-    state[0] = kernels.step(parameters, state[1:], reference)
-    return state[0]
+
+    @signed_kernel(CONTROLLER.signature)
+    def step(parameters, state, reference, measurement):
+        state[0] = kernels.step(parameters, state[1:], reference)
+        return state[0]
+
+    return step
 
 
 class Feedforward:
@@ -238,7 +244,7 @@ class Feedforward:
 
     def compiled(self, sample_time, u0, y0):
         _, parameters, state = self.inverse.compiled(u0=u0)
-        return ahead, parameters, np.concatenate([[u0], state])
+        return ahead(), parameters, np.concatenate([[u0], state])
 
 
 @pytest.mark.parametrize("law", [STACK, ASYMMETRIC], ids=["stack", "asymmetric"])

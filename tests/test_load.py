@@ -116,12 +116,12 @@ def test_time_may_begin_again_after_a_gap():
         ("u,z\n0,1\n", "no column 'y', the columns are: u, z"),
         ("u,y,y\n0,1,2\n", "2 columns are called 'y': choose one of the numbers 1, 2"),
         ("u,y\n0,1\n2,high\n", "line 3, column 'y': expected a finite number, got 'high'"),
-        ("u;y\n0.5;1\n2;3,5\n", r"line 3, column 'y': .* got '3,5' \(give decimal=\",\""),
-        ("u;y\n0,5;1\n2,5;1.234,5\n", r"line 3, column 'y': .* got '1.234,5' \(give decimal=\".\""),
+        ("u;y\n0.5;1\n2;3,5\n", r"line 3, column 'y': .* got '3,5' \(pass decimal=\",\""),
+        ("u;y\n0,5;1\n2,5;1.234,5\n", r"line 3, column 'y': .* got '1.234,5' \(pass decimal=\".\""),
         ("u,y\n0,1\nx,2\n3,4\n", "line 3, column 'u': expected a finite number, got 'x'"),
         ("0,x\n1,2\n3,4\n", "line 1 is half a header: column 0 holds the number '0', column 1 the text 'x'"),
         ("u,v\n1,2,3\n4,5,6\n", "line 1 names 2 columns, most lines below have 3 cells"),
-        ("0,1\n2;3\n4,5\n", r"line 2: expected 2 cells, got 1 \(parted by comma\); mend the line"),
+        ("0,1\n2;3\n4,5\n", r"line 2: expected 2 cells, got 1 \(separated by comma\); correct the line"),
         ('u,y\n"0,1\n2,3\n', "line 2: a quoted cell is not closed"),
         ("u,y\n0,1\n1_0,3\n", "line 3, column 'u': expected a finite number, got '1_0'"),
         ("u,y\n0,1\n# note\n-inf,3\n", "line 4, column 'u': expected a finite number, got '-inf'"),
@@ -187,11 +187,11 @@ def test_delimiter_and_decimal_sign_are_those_that_give_numbers(text):
 def test_a_decimal_comma_far_down_the_file_is_seen_or_can_be_said():
     far = "u;y\n" + "".join(f"{k};{k}\n" for k in range(1000)) + "1000;0,5\n"
     assert load(far, decimal=",").y[-1] == 0.5
-    with pytest.raises(ValueError, match=r"line 1002, column 'y': .* \(give decimal=\",\""):
+    with pytest.raises(ValueError, match=r"line 1002, column 'y': .* \(pass decimal=\",\""):
         load(far, decimal=".")
     often = "u;y\n" + "".join(f"{k};{k}\n" for k in range(500)) + "".join(f"{k};0,5\n" for k in range(500, 1000))
     assert load(often).y[-1] == 0.5
-    with pytest.raises(ValueError, match="both parted by ','"):
+    with pytest.raises(ValueError, match="must differ, both are ','"):
         load("u,y\n0,1\n2,3\n", delimiter=",", decimal=",")
 
 

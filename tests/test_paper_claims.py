@@ -246,7 +246,7 @@ def test_arrays_agree_where_every_element_does():
 def invented(make, text, inputs):
     """The claim that the first input over the second is `text`."""
     found = spread(lambda x: x[0] / x[1], inputs)
-    return make("ratio", "nowhere", "A ratio.", printed=text, found=found, method="division").verdict
+    return make("ratio", "nowhere", "A ratio.", printed=text, computed=found, method="division").verdict
 
 
 @pytest.mark.parametrize(("make", "otherwise"), [(compared, NO), (cross_checked, CONTRADICTION)])

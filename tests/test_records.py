@@ -190,7 +190,7 @@ def test_a_drift_is_taken_off_and_the_loop_stays(slope, curvature, has_time):
 
 
 def test_a_drift_needs_cycles_to_be_told_from_the_loop():
-    with pytest.raises(ValueError, match="order 1 needs 2 complete cycles to tell it from the loop, the record has 1"):
+    with pytest.raises(ValueError, match="order 1 needs 2 complete cycles, the record has 1"):
         hs.datasets.table1().detrend()
     with pytest.raises(ValueError, match="order must be at least 1, got 0"):
         hs.datasets.table1().detrend(0)
@@ -204,7 +204,7 @@ def test_a_record_is_split_at_samples_and_fractions():
         with pytest.raises(ValueError, match=message):
             rec.split(*places)
     for place in (True, 1.0, "half", math.nan):
-        with pytest.raises(TypeError, match="a place is a sample's number or a fraction"):
+        with pytest.raises(TypeError, match="a place must be a sample's number or a fraction"):
             rec.split(place)
 
 
@@ -221,8 +221,8 @@ def test_units_change_by_their_prefix():
     ("units", "message"),
     [
         ({"y": "V"}, "'um' cannot become 'V': only the prefix of a unit can change"),
-        ({"y": "px"}, "'px' is no unit with an SI prefix that is known"),
-        ({"y": ""}, "'' is no unit"),
+        ({"y": "px"}, "'px' is not a known unit with an SI prefix"),
+        ({"y": ""}, "'' is not a known unit"),
         ({"z": "m"}, "the record has no 'z' with a unit to convert"),
     ],
 )

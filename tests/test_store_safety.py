@@ -55,7 +55,7 @@ def test_arrays_of_others_are_never_deleted(path, shards, name, how):
         path.unlink()
     options = {"on_change": "restart"} if how == "restart" else {}
     before = None if how == "new" else bits(hs.load_sweep(path))
-    with pytest.raises(ValueError, match="is not of this study: move it") as caught:
+    with pytest.raises(ValueError, match="does not belong to this study: move it") as caught:
         hs.sweep(cubes, SPACE, store=path, **options)
     assert str(shards) in str(caught.value)
     assert (shards / name).read_bytes() == b"precious"

@@ -35,7 +35,7 @@ def test_workers_do_not_change_a_bit(serial, executor):
 
 @pytest.mark.parametrize("size", [1, 7, 1000])
 def test_chunks_do_not_change_a_bit(serial, size, monkeypatch):
-    monkeypatch.setattr(_sweep._Study, "_size", lambda self, remaining, number: min(size, remaining))
+    monkeypatch.setattr(_sweep._Run, "_size", lambda self, remaining, number: min(size, remaining))
     assert bits(hs.sweep(sweep_tasks.noisy, sweep_tasks.SPACE)) == bits(serial)
 
 
@@ -269,10 +269,10 @@ def test_a_wrong_sample_is_refused(arguments, words):
 @pytest.mark.parametrize(
     ("law", "arguments", "error", "words"),
     [
-        (hs.BoucWen, {"measure": "rmse"}, ValueError, "take y"),
+        (hs.BoucWen, {"measure": "rmse"}, ValueError, "y is needed"),
         (hs.BoucWen, {"measure": "width"}, ValueError, "one of rmse"),
         (hs.BoucWen, {"y": [1.0]}, ValueError, "equal lengths"),
-        (hs.Line, {"y": [1.0, 2.0]}, TypeError, "Line computes no many laws"),
+        (hs.Line, {"y": [1.0, 2.0]}, TypeError, "Line cannot compute many laws"),
     ],
 )
 def test_a_wrong_response_task_is_refused(law, arguments, error, words):

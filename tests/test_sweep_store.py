@@ -118,7 +118,7 @@ def other(a, b):
 @pytest.mark.parametrize(
     ("task", "space", "seed", "words"),
     [
-        (other, GRID, 0, "the task's source or what is bound to it has changed"),
+        (other, GRID, 0, "the task's source or a value bound to it has changed"),
         (sweep_tasks.product, {**GRID, "b": [1, 3]}, 0, r"other values of the parameters \(8 tasks of a, b, as before"),
         (sweep_tasks.product, {**GRID, "b": [1]}, 0, "the space was 8 tasks of a, b .* and is 4 tasks"),
         (sweep_tasks.product, GRID, 1, "the seed was 0 and is 1"),
@@ -159,7 +159,7 @@ def test_what_is_bound_to_a_task_belongs_to_its_study(path):
 
     hs.sweep(times(2.0), GRID, store=path)
     hs.sweep(times(2.0), GRID, store=path)
-    with pytest.raises(ValueError, match="what is bound to it has changed"):
+    with pytest.raises(ValueError, match="a value bound to it has changed"):
         hs.sweep(times(3.0), GRID, store=path)
     factorial = path.with_name("factorial.sqlite")
     for _ in range(2):
@@ -168,7 +168,7 @@ def test_what_is_bound_to_a_task_belongs_to_its_study(path):
     laws = path.with_name("laws.sqlite")
     for _ in range(2):
         hs.sweep(hs.response_task(hs.BoucWen, u, measure="final"), {"beta": [0.5]}, store=laws)
-    with pytest.raises(ValueError, match="what is bound to it has changed"):
+    with pytest.raises(ValueError, match="a value bound to it has changed"):
         hs.sweep(hs.response_task(hs.BoucWen, 2.0 * u, measure="final"), {"beta": [0.5]}, store=laws)
 
 

@@ -1,9 +1,8 @@
-"""Arrays with names, as a table: what NPZ, NPY, MAT and HDF5 files hold.
+"""Arrays with names, as a table: the content of NPZ, NPY, MAT and HDF5 files.
 
 A column is an array with one axis that is longer than one; of an array with more, the columns are those along its
 first axis: ``x[2]`` of shape (n, 3), ``x[0,1]`` of shape (n, 3, 2). A name leads into structs and groups with a
-point or a slash. Two conventions carry what is known beside the numbers: text arrays ``u_units`` and ``name``, and a
-number `resolution`.
+point or a slash. Text arrays ``u_units`` and ``name`` and a number `resolution` hold what is known beside the columns.
 """
 
 import math
@@ -17,10 +16,10 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
-from hysim.files._table import Column, Notes, damaged, listed, quantum, shown
+from hysim.files._table import Column, Notes, damaged, listed, number_of, positive, shown
 
 MOST_BYTES = 2_000_000_000
-"""Most bytes of one array's numbers; a file that says it has more is refused before they are read."""
+"""Most bytes of one array's numbers; a larger one is refused before it is read."""
 
 _INDEXED = re.compile(r"(.+)\[(\d{1,9}(?:, ?\d{1,9})*)\]", re.DOTALL)
 _LONGEST_TEXT = 10_000  # bytes of a unit or a name
@@ -34,12 +33,12 @@ KINDS = {
 """Contents of an array by the kind of its NumPy type."""
 
 NOTES = ("name", "resolution")
-"""Arrays or attributes that say something of the record."""
+"""Arrays or attributes that hold a note about the record."""
 
 
 @dataclass(frozen=True)
 class Array:
-    """An array of a file: what it is called, its shape, what it holds, and how its values or its text are read."""
+    """An array of a file: its name, its shape, the kind of its content, and how its values or its text are read."""
 
     label: str
     shape: tuple[int, ...]
@@ -54,10 +53,51 @@ class Array:
         return math.prod(self.shape)
 
     @property
-    def described(self) -> str:
-        """Name and shape, or what it holds where that is no number."""
+    def is_vector(self) -> bool:
+        """Whether at most one axis is longer than one."""
+        return sum(length != 1 for length in self.shape) <= 1
+
+    @property
+    def description(self) -> str:
+        """Name and shape, or the kind of the content where that is no number."""
         shape = " x ".join(map(str, self.shape)) if self.shape else "one value"
         return f"{listed([self.label])} ({shape if self.kind == NUMBERS else self.kind})"
+
+    def column(self, text: str | None = None) -> Column:
+        """The column with these numbers of the axes after the first, or the whole array if it has one long axis."""
+        name = shown(self.label)
+        if self.kind != NUMBERS:
+            raise ValueError(f"array {name} holds {self.kind}: a column must hold real numbers")
+        if self.size * max(self.item_bytes, 8) > MOST_BYTES:
+            raise ValueError(
+                f"array {name} is too large: it says it has {self.size:,} numbers, at most {MOST_BYTES // 8:,} are read"
+            )
+        if text is None:
+            if self.is_vector:
+                return Column((self, ()), self.label, self.unit or "")
+            first = f"{self.label}[{','.join('0' for _ in self.shape[1:])}]"
+            raise ValueError(
+                f"array {name} has shape {self.shape}: name one of its columns, such as {first!r}; samples run along "
+                "the first axis"
+            )
+        index = tuple(map(int, text.split(",")))
+        if (
+            self.is_vector
+            or len(index) != len(self.shape) - 1
+            or not np.less(index, self.shape[1:]).all()
+            or min(index) < 0
+        ):
+            raise ValueError(
+                f"array {name} has shape {self.shape}: it has no column [{text}]; samples run along the first axis, "
+                "and each of the others takes a number from 0"
+            )
+        return Column((self, index), f"{self.label}[{text}]", self.unit or "")
+
+    def numbers(self) -> FloatArray:
+        """All numbers, as one column if there is one long axis."""
+        with np.errstate(all="ignore"):
+            values = np.asarray(self.read(), dtype=np.float64)
+        return values.reshape(-1) if self.is_vector else values
 
 
 @dataclass(frozen=True)
@@ -68,39 +108,39 @@ class Arrays:
     notes: Notes
     format: str
 
+    @property
+    def labels(self) -> Sequence[str]:
+        """Names of the arrays."""
+        return [array.label for array in self.arrays]
+
     def column(self, key: str | int) -> Column:
         """The column of this name, or of this number: of the arrays in order, of the columns of a single array."""
-        if not isinstance(key, str):
-            place = operator.index(key)
-            if len(self.arrays) == 1 and len(self.arrays[0].shape) > 1 and not _is_vector(self.arrays[0]):
-                return _indexed(self.arrays[0], f"{place}")
-            if not 0 <= place < len(self.arrays):
-                raise ValueError(f"no array {place}, {self._there()}")
-            return _whole(self.arrays[place])
-        if found := self._called(key):
-            return _whole(found)
-        if (parts := _INDEXED.fullmatch(key)) and (found := self._called(parts[1])):
-            return _indexed(found, parts[2])
-        raise ValueError(f"no array {key!r}, {self._there()}")
-
-    def has(self, label: str) -> bool:
-        """Whether an array is called so."""
-        return any(array.label == label for array in self.arrays)
+        if isinstance(key, str):
+            array, index = self._called(key), None
+            if array is None and (parts := _INDEXED.fullmatch(key)):
+                array, index = self._called(parts[1]), parts[2]
+            if array is None:
+                raise ValueError(f"no array {key!r}, {self._overview()}")
+            return array.column(index)
+        if len(self.arrays) == 1 and not self.arrays[0].is_vector:
+            return self.arrays[0].column(f"{operator.index(key)}")
+        if not 0 <= operator.index(key) < len(self.arrays):
+            raise ValueError(f"no array {key}, {self._overview()}")
+        return self.arrays[key].column()
 
     def values(self, columns: list[Column]) -> FloatArray:
         """The numbers of the columns, shape (n_columns, n_samples), nan where one is missing."""
-        read = {id(column.place[0]): column.place[0] for column in columns}
         with damaged(self.format):
-            whole = {key: _numbers(array) for key, array in read.items()}
-        values = [whole[id(array)][(slice(None), *index)] for array, index in (column.place for column in columns)]
+            numbers = {id(array): array.numbers() for array in {id(c.place[0]): c.place[0] for c in columns}.values()}
+        values = [numbers[id(array)][(slice(None), *index)] for array, index in (column.place for column in columns)]
         if len({column.size for column in values}) > 1:
             sizes = ", ".join(f"{shown(c.label)} {v.size}" for c, v in zip(columns, values, strict=True))
             raise ValueError(f"the columns have unequal numbers of samples: {sizes}")
-        for column, numbers in zip(columns, values, strict=True):
-            if np.isinf(numbers).any():
-                k = int(np.argmax(np.isinf(numbers)))
+        for column, each in zip(columns, values, strict=True):
+            if np.isinf(each).any():
+                k = int(np.argmax(np.isinf(each)))
                 raise ValueError(
-                    f"{self.place(k)}, column {shown(column.label)}: expected a finite number, got {numbers[k]}"
+                    f"{self.place(k)}, column {shown(column.label)}: expected a finite number, got {each[k]}"
                 )
         return np.stack(values)
 
@@ -109,42 +149,43 @@ class Arrays:
         return f"sample {sample}"
 
     def _called(self, key: str) -> Array | None:
-        found = [array for array in self.arrays if array.label == key]
-        found = found or [array for array in self.arrays if _path(array.label) == _path(key)]
-        if len(found) > 1:
-            places = listed([str(k) for k, array in enumerate(self.arrays) if array in found])
-            raise ValueError(f"{len(found)} arrays are called {key!r}: choose one of the numbers {places}")
-        return found[0] if found else None
+        number = number_of(key, "arrays", self.labels)
+        if number is None:
+            number = number_of(_path(key), "arrays", [_path(label) for label in self.labels])
+        return None if number is None else self.arrays[number]
 
-    def _there(self) -> str:
+    def _overview(self) -> str:
         if not self.arrays:
             return "the file holds no array"
-        if len(self.arrays) == 1 and len(self.arrays[0].shape) == 2 and not _is_vector(self.arrays[0]):
-            last = self.arrays[0].shape[1] - 1
-            return f"there is one array, {self.arrays[0].described}: choose its columns by the numbers 0 to {last}"
-        return f"the arrays are: {listed([f'{k}: {array.described}' for k, array in enumerate(self.arrays)])}"
+        if len(self.arrays) == 1 and len(self.arrays[0].shape) == 2 and not self.arrays[0].is_vector:
+            only = self.arrays[0]
+            return f"there is one array, {only.description}: choose its columns by the numbers 0 to {only.shape[1] - 1}"
+        return f"the arrays are: {listed([f'{k}: {array.description}' for k, array in enumerate(self.arrays)])}"
 
 
 def with_notes(arrays: list[Array], form: str, attributes: Mapping[str, Any] | None = None) -> Arrays:
-    """The table of these arrays, with the units and notes that some of them, or attributes of the file, say."""
-    said = dict(attributes or {})
+    """The table of these arrays, with the units and notes in some of them or in attributes of the file."""
+    notes = dict(attributes or {})
     with damaged(form):
         for array in arrays:
             if array.label in NOTES or array.label.endswith(_UNITS):
-                said.setdefault(array.label, _said(array))
-    units = {name.removesuffix(_UNITS): text for name, text in said.items() if name.endswith(_UNITS)}
+                notes.setdefault(array.label, _short_value(array))
+    units = {name.removesuffix(_UNITS): text for name, text in notes.items() if name.endswith(_UNITS)}
     units |= {array.label: array.unit for array in arrays if array.unit is not None}
-    name, resolution = said.get("name"), said.get("resolution")
-    notes = Notes(
-        units={label: unit for label, unit in units.items() if isinstance(unit, str)},
-        resolution=quantum(resolution) if isinstance(resolution, float) else None,
-        name=name if isinstance(name, str) else None,
+    name, resolution = notes.get("name"), notes.get("resolution")
+    return Arrays(
+        arrays,
+        Notes(
+            units={label: unit for label, unit in units.items() if isinstance(unit, str)},
+            resolution=positive(resolution) if isinstance(resolution, float) else None,
+            name=name if isinstance(name, str) else None,
+        ),
+        form,
     )
-    return Arrays(arrays, notes, form)
 
 
-def _said(array: Array) -> str | float | None:
-    """The text or the number of an array that holds a short one."""
+def _short_value(array: Array) -> str | float | None:
+    """The text or the number in an array that holds a short one."""
     if array.size * array.item_bytes > _LONGEST_TEXT:
         return None
     if array.kind == TEXT:
@@ -152,51 +193,5 @@ def _said(array: Array) -> str | float | None:
     return float(np.asarray(array.read()).item()) if array.kind == NUMBERS and array.size == 1 else None
 
 
-def _numbers(array: Array) -> FloatArray:
-    """All numbers of an array, as one column if it has one long axis."""
-    with np.errstate(all="ignore"):
-        numbers = np.asarray(array.read(), dtype=np.float64)
-    return numbers.reshape(-1) if _is_vector(array) else numbers
-
-
 def _path(name: str) -> str:
     return name.strip("/").replace("/", ".")
-
-
-def _is_vector(array: Array) -> bool:
-    return sum(length != 1 for length in array.shape) <= 1
-
-
-def _whole(array: Array) -> Column:
-    _check(array)
-    if not _is_vector(array):
-        inner = ",".join("0" for _ in array.shape[1:])
-        raise ValueError(
-            f"array {shown(array.label)} has shape {array.shape}: name one of its columns, such as "
-            f"{f'{array.label}[{inner}]'!r}; samples run along the first axis"
-        )
-    return Column((array, ()), array.label, array.unit or "")
-
-
-def _indexed(array: Array, text: str) -> Column:
-    _check(array)
-    index = tuple(map(int, text.split(",")))
-    within = len(index) == len(array.shape) - 1 and all(
-        0 <= k < length for k, length in zip(index, array.shape[1:], strict=True)
-    )
-    if not within or _is_vector(array):
-        raise ValueError(
-            f"array {shown(array.label)} has shape {array.shape}: it has no column [{text}]; samples run along the "
-            "first axis, and each of the others takes a number from 0"
-        )
-    return Column((array, index), f"{array.label}[{text}]", array.unit or "")
-
-
-def _check(array: Array) -> None:
-    if array.kind != NUMBERS:
-        raise ValueError(f"array {shown(array.label)} holds {array.kind}: a column must hold real numbers")
-    if array.size * max(array.item_bytes, 8) > MOST_BYTES:
-        raise ValueError(
-            f"array {shown(array.label)} is too large: it says it has {array.size:,} numbers, at most "
-            f"{MOST_BYTES // 8:,} are read"
-        )

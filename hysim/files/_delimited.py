@@ -3,15 +3,16 @@
 import json
 import operator
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.files._cells import numbers, parse, table
+from hysim.files._cells import numbers, parse, plain_numbers
 from hysim.files._layout import COMMENTS, Layout, layout
-from hysim.files._table import Column, Notes, listed, quantum
+from hysim.files._table import Column, Notes, listed, number_of, positive
 
 T = TypeVar("T")
 
@@ -25,36 +26,32 @@ class Delimited:
     layout: Layout
     notes: Notes
 
+    @property
+    def labels(self) -> Sequence[str]:
+        """Names of the columns."""
+        return [column.label for column in self.layout.columns]
+
     def column(self, key: str | int) -> Column:
         """The column of this name, with or without its unit, or of this number from 0."""
         columns = self.layout.columns
-        if not isinstance(key, str):
-            place = operator.index(key)
-            if not 0 <= place < len(columns):
-                raise ValueError(f"no column {place}, there are columns 0 to {len(columns) - 1}")
-            return columns[place]
-        found = [column for column in columns if key in (column.label, f"{column.label} [{column.unit}]")]
-        if len(found) > 1:
-            places = listed([str(column.place) for column in found])
-            raise ValueError(f"{len(found)} columns are called {key!r}: choose one of the numbers {places}")
-        if not found:
-            there = listed([column.label for column in columns])
-            raise ValueError(f"no column {key!r}, the columns are: {there}")
-        return found[0]
-
-    def has(self, label: str) -> bool:
-        """Whether a column is called so."""
-        return any(column.label == label for column in self.layout.columns)
+        if isinstance(key, str):
+            number = number_of(key, "columns", self.labels, [f"{column.label} [{column.unit}]" for column in columns])
+            if number is None:
+                raise ValueError(f"no column {key!r}, the columns are: {listed(self.labels)}")
+            return columns[number]
+        if not 0 <= operator.index(key) < len(columns):
+            raise ValueError(f"no column {key}, there are columns 0 to {len(columns) - 1}")
+        return columns[key]
 
     def values(self, columns: list[Column]) -> FloatArray:
         """The numbers of the columns, shape (n_columns, n_samples), nan where one is missing."""
-        found = self.layout
-        quick = table(found.lines, [column.place for column in columns], found.delimiter, found.decimal)
-        if quick is not None:
-            return quick
-        rows = found.rows()
+        lines, delimiter, decimal = self.layout.lines, self.layout.delimiter, self.layout.decimal
+        values = plain_numbers(lines, [column.place for column in columns], delimiter, decimal)
+        if values is not None:
+            return values
+        rows = self.layout.rows()
         return np.stack(
-            [numbers([row[c.place] for row in rows], found.numbers, c.label, found.decimal) for c in columns]
+            [numbers([row[c.place] for row in rows], self.layout.numbers, c.label, decimal) for c in columns]
         )
 
     def place(self, sample: int) -> str:
@@ -63,35 +60,29 @@ class Delimited:
 
 
 def delimited(text: str, delimiter: str | None, decimal: str | None) -> Delimited:
-    """The table that a text holds.
-
-    Raises
-    ------
-    ValueError
-        If it is none; the message names the line.
-    """
+    """The table that a text holds; ValueError with the number of the line if it holds none."""
     return Delimited(layout(text, delimiter, decimal), _notes(text))
 
 
 def _notes(text: str) -> Notes:
-    """The name, resolution and units in the comments that a text begins with, as `hysim.save_record` writes them."""
-    said: dict[str, str] = {}
+    """The name, resolution and units in the comments above a text, as `hysim.save_record` writes them."""
+    notes: dict[str, str] = {}
     start = 0
     while text.startswith(COMMENTS, start):
         end = text.find("\n", start) % (len(text) + 1)
         if note := _NOTE.match(text, start, end):
-            said[note[1]] = text[note.end() : end].strip()
+            notes[note[1]] = text[note.end() : end].strip()
         start = end + 1
-    units = _json(said.get("units", ""), dict)
+    units = _json(notes.get("units", ""), dict) or {}
     return Notes(
-        units={str(signal): str(unit) for signal, unit in (units or {}).items()},
-        resolution=quantum(parse(said.get("resolution", ""), ".")),
-        name=_json(said.get("name", ""), str) or said.get("name"),
+        units={str(signal): str(unit) for signal, unit in units.items()},
+        resolution=positive(parse(notes.get("resolution", ""), ".")),
+        name=_json(notes.get("name", ""), str) or notes.get("name"),
     )
 
 
 def _json(text: str, kind: type[T]) -> T | None:
-    """What a text in JSON holds, None if that is of another kind."""
+    """The value that a text in JSON holds, None if it is of another kind."""
     try:
         value = json.loads(text)
     except (ValueError, RecursionError):

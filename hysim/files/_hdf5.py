@@ -1,13 +1,13 @@
 """HDF5 files, and MAT files of version 7.3, which are such files.
 
-Datasets are called by their path, ``group/displacement``. MATLAB's arrays are stored there with their axes reversed,
-its structs as groups and its text as numbers, as attributes say. Only what is in the file itself is read: links to
-other files, and datasets that are kept in them, are not followed.
+Datasets are named by their path, ``group/displacement``. MATLAB stores arrays with their axes reversed, structs as
+groups and text as numbers, and marks them by attributes. Links to other files, and datasets whose values lie in other
+files, are not followed.
 
 h5py reads the file. Three things that its library does not check are checked before: sizes; compressed chunks, which
-it would unpack into as much memory as they like; and heaps. In a heap are texts of variable length: it is ``GCOL``, a
-version, its length, and objects one behind the other, each a number, which is 0 for free space, a count, and a length.
-On an object without a length the library stays for ever, and no signal stops it.
+may unpack into any amount of memory; and heaps, which hold texts of variable length. A heap is ``GCOL``, a version, its
+length, and objects one behind the other, each with a number, which is 0 for free space, a count, and a length. At an
+object of length zero the library loops for ever, and no signal stops it.
 
 Source of the heaps: The HDF Group, HDF5 File Format Specification, Version 3.0, III.E.
 """
@@ -43,13 +43,7 @@ _KINDS = KINDS | {"O": "references or texts"}
 
 @contextmanager
 def hdf5(file: BinaryIO, path: Path | None, *, matlab: bool) -> Iterator[Arrays]:
-    """The datasets of an open file, which may have a path, as long as they are needed.
-
-    Raises
-    ------
-    ValueError
-        If it is damaged, or h5py is not installed.
-    """
+    """The datasets of an open file, which may have a path; ValueError if it is damaged, or h5py is not installed."""
     try:
         import h5py
     except ImportError:
@@ -61,30 +55,30 @@ def hdf5(file: BinaryIO, path: Path | None, *, matlab: bool) -> Iterator[Arrays]
             root = stack.enter_context(h5py.File(file, "r") if path is None else h5py.File(path, "r", locking=False))
             reader = _Reader(h5py, matlab, texts and root.id.get_create_plist().get_sizes() == _WORDS)
             arrays = [reader.array(label, dataset) for label, dataset in reader.datasets(root, "", set())]
-            said = {name: reader.attribute(root, name) for name in (*NOTES, "t_units")}
-            table = with_notes(arrays, form, {name: value for name, value in said.items() if value is not None})
+            notes = {name: reader.attribute(root, name) for name in (*NOTES, "t_units")}
+            table = with_notes(arrays, form, {name: value for name, value in notes.items() if value is not None})
         yield table
 
 
 class _Reader(NamedTuple):
-    """Reads what is in a file, MATLAB's or another one; texts of variable length only where that is safe."""
+    """Reads the datasets of a file, of MATLAB or another one; texts of variable length only if `texts` is true."""
 
     h5py: Any
     matlab: bool
     texts: bool
 
-    def datasets(self, group: Any, path: str, seen: set[int]) -> Iterator[tuple[str, Any]]:
+    def datasets(self, group: Any, path: str, visited: set[int]) -> Iterator[tuple[str, Any]]:
         """Paths and datasets below a group, in the order of their names, each group once."""
         address = self.h5py.h5o.get_info(group.id).addr
-        if address in seen:
+        if address in visited:
             return
-        seen.add(address)
+        visited.add(address)
         for name in group:
             if name.startswith("#") or not isinstance(group.get(name, getlink=True), self.h5py.HardLink):
                 continue  # MATLAB's own groups, and links
             item = group[name]
             if isinstance(item, self.h5py.Group):
-                yield from self.datasets(item, path + name + ("." if self.matlab else "/"), seen)
+                yield from self.datasets(item, path + name + ("." if self.matlab else "/"), visited)
             elif isinstance(item, self.h5py.Dataset) and item.shape is not None:
                 yield path + name, item
 
@@ -98,31 +92,31 @@ class _Reader(NamedTuple):
         return Array(label, shape, kind, dataset.dtype.itemsize, partial(self.values, dataset, shape, kind), unit)
 
     def kind(self, dataset: Any, shape: tuple[int, ...]) -> str:
-        """What a dataset holds."""
-        said, size = self.attribute(dataset, "MATLAB_class"), math.prod(shape)
+        """The kind of a dataset's content."""
+        matlab_class, size = self.attribute(dataset, "MATLAB_class"), math.prod(shape)
         if dataset.is_virtual or dataset.external:
             return "values that lie in another file"
         if "MATLAB_object_decode" in dataset.attrs or "MATLAB_sparse" in dataset.attrs:
             return "an object"
-        if said == "cell":
+        if matlab_class == "cell":
             return "cells"
-        if said == "char" or (size == 1 and self.is_text(dataset.dtype)):
+        if matlab_class == "char" or (size == 1 and self.is_text(dataset.dtype)):
             return TEXT if size in (*shape, 0, 1) else "several texts"
         return _KINDS.get(dataset.dtype.kind, "no numbers")
 
     def is_text(self, dtype: np.dtype) -> bool:
-        """Whether it is that of texts which can be read."""
-        found = self.h5py.check_string_dtype(dtype)
-        return found is not None and (self.texts or found.length is not None)
+        """Whether a type is that of texts which can be read."""
+        text = self.h5py.check_string_dtype(dtype)
+        return text is not None and (self.texts or text.length is not None)
 
     def attribute(self, item: Any, name: str) -> str | float | None:
         """The short text or the number in an attribute."""
         if name not in item.attrs:
             return None
-        found = item.attrs.get_id(name)
-        is_number = found.dtype.kind in "iuf"
-        is_short = math.prod(found.shape) == 1 and found.dtype.itemsize <= _LONGEST_ATTRIBUTE
-        if not is_short or not (is_number or self.is_text(found.dtype)):
+        shape, dtype = item.attrs.get_id(name).shape, item.attrs.get_id(name).dtype
+        is_number = dtype.kind in "iuf"
+        is_short = math.prod(shape) == 1 and dtype.itemsize <= _LONGEST_ATTRIBUTE
+        if not is_short or not (is_number or self.is_text(dtype)):
             return None
         plain = np.asarray(item.attrs[name]).item()
         return float(plain) if is_number else _decoded(plain)
@@ -164,7 +158,7 @@ def _check_chunks(dataset: Any) -> None:
 
 
 def _is_sound(dataset: Any, chunk: Any, filters: list[int], plain: int) -> bool:
-    """Whether a chunk has this length, unpacked, or that of a checksum more."""
+    """Whether a chunk has this length when unpacked, or a checksum more."""
     most, length = plain + _CHECKSUM * filters.count(_FLETCHER32), chunk.size
     if {_DEFLATE, _LZF} & {*filters} and not 0 < length <= 2 * most + _SLACK:
         return False
@@ -178,13 +172,7 @@ def _is_sound(dataset: Any, chunk: Any, filters: list[int], plain: int) -> bool:
 
 
 def _has_sound_heaps(file: BinaryIO) -> bool:
-    """Whether the heaps of an open file can be walked through; False if it is too long to look for them.
-
-    Raises
-    ------
-    ValueError
-        If one of them leads nowhere.
-    """
+    """Whether the heaps of an open file are sound; False if it is too long to search, ValueError if one is damaged."""
     if file.seek(0, 2) > MOST_SEARCHED:
         return False
     if isinstance(file, BytesIO):
@@ -196,12 +184,12 @@ def _has_sound_heaps(file: BinaryIO) -> bool:
 
 
 def _check_heaps(content: bytes | mmap.mmap) -> None:
-    start, walked = -1, 0
+    start, total = -1, 0
     while (start := content.find(b"GCOL\x01", start + 1)) >= 0:
         length, at = _number(content, start + 8), start + _HEAD_BYTES
         end = start + length if _LEAST_HEAP <= length <= len(content) - start else at
-        walked += end - at
-        require(walked <= len(content), "the HDF5 file is damaged: its heaps overlap")
+        total += end - at
+        require(total <= len(content), "the HDF5 file is damaged: its heaps overlap")
         while at + _HEAD_BYTES <= end:
             length, is_used = _number(content, at + 8), content[at : at + 2] != b"\0\0"
             step = length + -length % 8 + (_HEAD_BYTES if is_used else 0)

@@ -1,4 +1,4 @@
-"""How a text file is laid out: what parts its cells, how it writes decimals, and where its samples begin.
+"""The layout of a text file: what separates its cells, how it writes decimals, and where its samples begin.
 
 Every pair of a delimiter and a decimal sign is tried on some lines spread over the file. Its score is the share
 of the lines that have the most common number of cells, at least two, times the share of the cells that are
@@ -29,7 +29,7 @@ _WORD = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\[\]()]*[\])])?|\S+")
 
 
 class Layout(NamedTuple):
-    """The columns of a file, how its cells are parted and its numbers written, and the samples' lines."""
+    """The columns of a file, its delimiter and decimal sign, and the samples' lines with their numbers."""
 
     columns: list[Column]
     delimiter: str
@@ -39,7 +39,15 @@ class Layout(NamedTuple):
 
     def rows(self) -> list[list[str]]:
         """The cells of each sample."""
-        return _split_all(self.lines, self.numbers, self.delimiter)
+        return _rows(self.lines, self.numbers, self.delimiter)
+
+    def widths(self) -> list[int]:
+        """The number of cells of each sample."""
+        if any('"' in line for line in self.lines):
+            return [len(row) for row in self.rows()]
+        if self.delimiter == " ":
+            return [len(line.split()) for line in self.lines]
+        return [line.count(self.delimiter) + 1 for line in self.lines]
 
 
 def layout(text: str, delimiter: str | None, decimal: str | None) -> Layout:
@@ -56,41 +64,35 @@ def layout(text: str, delimiter: str | None, decimal: str | None) -> Layout:
         raise ValueError("the file is empty, there is no header and no sample")
     lines = [every[k - 1] for k in numbers]
     delimiter, decimal = _signs(lines, delimiter, decimal)
-    top = _split_all(lines[:2], numbers, delimiter)
-    below = _split_all(_spread(lines[1:]), _spread(numbers[1:]), delimiter)
+    top = _rows(lines[:2], numbers, delimiter)
+    below = _rows(_spread(lines[1:]), _spread(numbers[1:]), delimiter)
     width = _most_common([len(row) for row in [top[0], *below]])
-    header, units = _heads(top, [row for row in below if len(row) == width], numbers[0], width, decimal)
-    first = header + units
+    has_header, has_units = _heads(top, [row for row in below if len(row) == width], numbers[0], width, decimal)
+    first = has_header + has_units
     if first == len(lines):
         raise ValueError("there is a header, but no sample")
-    if header:
-        names = _words(lines[0]) if delimiter == " " else top[0]
+    if has_header:
+        names = _names(lines[0], delimiter)
     else:
         names = _commented(every[: numbers[0] - 1], delimiter, width, decimal) or [str(k) for k in range(width)]
     if len(names) != width:
         raise ValueError(f"line {numbers[0]} names {len(names)} columns, most lines below have {width} cells")
     columns = [_column(place, label) for place, label in enumerate(names)]
-    if units:
+    if has_units:
         columns = [c._replace(unit=c.unit or _unit(cell)) for c, cell in zip(columns, top[1], strict=True)]
-    found = Layout(columns, delimiter, decimal, numbers[first:], lines[first:])
-    widths = _widths(found)
-    if set(widths) != {width}:
-        k = next(k for k, cells in enumerate(widths) if cells != width)
-        raise ValueError(_uneven(found.numbers[k], width, widths[k], delimiter))
-    return found
-
-
-def _widths(found: Layout) -> list[int]:
-    """The number of cells of each sample."""
-    if any('"' in line for line in found.lines):
-        return [len(row) for row in found.rows()]
-    if found.delimiter == " ":
-        return [len(line.split()) for line in found.lines]
-    return [line.count(found.delimiter) + 1 for line in found.lines]
+    result = Layout(columns, delimiter, decimal, numbers[first:], lines[first:])
+    for number, cells in zip(result.numbers, result.widths(), strict=True):
+        if cells != width:
+            between = DELIMITERS.get(delimiter, repr(delimiter))
+            raise ValueError(
+                f"line {number}: expected {width} cells, got {cells} (separated by {between}); correct the line, begin "
+                "it with # if it is no sample, or pass the sign between the cells as delimiter="
+            )
+    return result
 
 
 def _signs(lines: list[str], delimiter: str | None, decimal: str | None) -> tuple[str, str]:
-    """The delimiter and the decimal sign, as far as they are not given."""
+    """The delimiter and the decimal sign, found where they are None."""
     looked_at = _spread(lines)
     quoted = any('"' in line for line in looked_at)
     candidates = [
@@ -100,7 +102,7 @@ def _signs(lines: list[str], delimiter: str | None, decimal: str | None) -> tupl
         if between != point or quoted
     ]
     if not candidates:
-        raise ValueError(f"the cells and the decimals are both parted by {delimiter!r}: one of them must be another")
+        raise ValueError(f"delimiter and decimal sign must differ, both are {delimiter!r}")
     best = max(candidates, key=lambda signs: _score(looked_at, *signs))
     if _score(looked_at, *best) == 0.0 and delimiter is None:
         present = (between for between in DELIMITERS if any(between in line.strip() for line in looked_at))
@@ -109,76 +111,66 @@ def _signs(lines: list[str], delimiter: str | None, decimal: str | None) -> tupl
 
 
 def _score(lines: list[str], delimiter: str, decimal: str) -> float:
-    rows = [_split(line, delimiter) for line in lines]
+    rows = [_cells(line, delimiter, strict=False) for line in lines]
     width = _most_common([len(row) for row in rows])
     if width < 2:
         return 0.0
     cells = [cell for row in rows for cell in row]
-    plain = sum(cell.lower() in MISSING or parse(cell, decimal) is not None for cell in cells)
+    plain = sum(_kind(cell, decimal) != "text" for cell in cells)
     return sum(len(row) == width for row in rows) / len(rows) * plain / len(cells)
 
 
-def _split_all(lines: list[str], numbers: list[int], delimiter: str) -> list[list[str]]:
-    if any('"' in line for line in lines):
-        rows = []
-        for line, number in zip(lines, numbers, strict=False):
-            try:
-                rows.append(_split(line, delimiter, strict=True))
-            except csv.Error as error:
-                raise ValueError(f"line {number}: a quoted cell is not closed or too long ({error})") from None
-        return rows
-    if delimiter == " ":
-        return [line.split() for line in lines]
-    return [line.strip(" ").split(delimiter) for line in lines]
-
-
-def _split(line: str, delimiter: str, *, strict: bool = False) -> list[str]:
-    if '"' in line:
+def _rows(lines: list[str], numbers: list[int], delimiter: str) -> list[list[str]]:
+    rows = []
+    for line, number in zip(lines, numbers, strict=False):
         try:
-            cells = next(csv.reader([line.strip()], delimiter=delimiter, skipinitialspace=True, strict=strict))
-        except csv.Error:
-            if strict:
-                raise
-            cells = [line]
-    elif delimiter == " ":
-        return line.split()
-    else:
-        cells = line.strip(" ").split(delimiter)
+            rows.append(_cells(line, delimiter))
+        except csv.Error as error:
+            raise ValueError(f"line {number}: a quoted cell is not closed or too long ({error})") from None
+    return rows
+
+
+def _cells(line: str, delimiter: str, *, strict: bool = True) -> list[str]:
+    """The cells of a line; one that cannot be split is a csv.Error, or unless `strict` a single cell."""
+    if '"' not in line:
+        return line.split() if delimiter == " " else [cell.strip() for cell in line.strip(" ").split(delimiter)]
+    try:
+        cells = next(csv.reader([line.strip()], delimiter=delimiter, skipinitialspace=True, strict=strict))
+    except csv.Error:
+        if strict:
+            raise
+        cells = [line]
     return [cell.strip() for cell in cells]
 
 
-def _words(line: str) -> list[str]:
-    """Names parted by white space; a unit in brackets belongs to the name before it."""
-    return (
-        next(csv.reader([line.strip()], delimiter=" ", skipinitialspace=True)) if '"' in line else _WORD.findall(line)
-    )
+def _names(line: str, delimiter: str) -> list[str]:
+    """Names of columns; between blanks a unit in brackets belongs to the name before it."""
+    return _WORD.findall(line) if delimiter == " " and '"' not in line else _cells(line, delimiter, strict=False)
 
 
 def _heads(rows: list[list[str]], below: list[list[str]], line: int, width: int, decimal: str) -> tuple[bool, bool]:
     """Whether the first line is a header, and whether the second one holds units."""
-    kinds = [[_kind(row[place], decimal) for row in below] for place in range(width)]
-    numeric = {place for place, found in enumerate(kinds) if found.count("number") >= max(1, found.count("text"))}
+    columns = [[_kind(row[place], decimal) for row in below] for place in range(width)]
+    numeric = {place for place, kinds in enumerate(columns) if kinds.count("number") >= max(1, kinds.count("text"))}
     if not numeric:  # nothing below to compare with
         kinds_above = [_kind(cell, decimal) for cell in rows[0]]
         return "text" in kinds_above or "number" not in kinds_above, False
-    found = [
+    kinds_of = [
         {place: _kind(cell, decimal) for place, cell in enumerate(row) if len(row) != width or place in numeric}
         for row in rows
     ]
-    header = "text" in found[0].values()
-    if header and "number" in found[0].values():
-        texts = [place for place, kind in found[0].items() if kind == "text"]
-        counts = [place for place, kind in found[0].items() if kind == "number"]
+    texts, counts = ([place for place, kind in kinds_of[0].items() if kind == wanted] for wanted in ("text", "number"))
+    if texts and counts:
         raise ValueError(
             f"line {line} is half a header: column {counts[0]} holds the number {rows[0][counts[0]]!r}, column "
             f"{texts[0]} the text {rows[0][texts[0]]!r}; name every column, or begin the line with #"
         )
-    return header, header and len(rows[1]) == width and set(found[1].values()) == {"text"}
+    has_units = bool(texts) and len(rows[1]) == width and set(kinds_of[1].values()) == {"text"}
+    return bool(texts), has_units
 
 
 def _kind(cell: str, decimal: str) -> str:
-    cell = cell.strip()
-    return "missing" if cell.lower() in MISSING else "text" if parse(cell, decimal) is None else "number"
+    return "missing" if cell.strip().lower() in MISSING else "text" if parse(cell, decimal) is None else "number"
 
 
 def _commented(above: list[str], delimiter: str, width: int, decimal: str) -> list[str] | None:
@@ -186,8 +178,7 @@ def _commented(above: list[str], delimiter: str, width: int, decimal: str) -> li
     comments = [line.strip() for line in above if line.strip()]
     if not comments:
         return None
-    line = comments[-1].lstrip("".join(COMMENTS))
-    names = _words(line) if delimiter == " " else _split(line, delimiter)
+    names = _names(comments[-1].lstrip("".join(COMMENTS)), delimiter)
     is_named = len(names) == width and all(_kind(name, decimal) == "text" for name in names)
     return names if is_named else None
 
@@ -201,14 +192,6 @@ def _unit(cell: str) -> str:
     text = cell.strip()
     unit = text.removeprefix("[").removeprefix("(").removesuffix("]").removesuffix(")").strip()
     return "" if unit == "-" else unit
-
-
-def _uneven(line: int, expected: int, got: int, delimiter: str) -> str:
-    between = DELIMITERS.get(delimiter, repr(delimiter))
-    return (
-        f"line {line}: expected {expected} cells, got {got} (parted by {between}); mend the line, begin it with # if "
-        "it is no sample, or say what parts the cells by delimiter="
-    )
 
 
 def _most_common(widths: list[int]) -> int:

@@ -20,7 +20,7 @@ from hysim.files._layout import DECIMALS
 from hysim.files._mat import mat
 from hysim.files._npz import npy, npz
 from hysim.files._source import Opened, Source, opened
-from hysim.files._table import Column, Table, check_gaps, check_time, pieces
+from hysim.files._table import Column, Table, shown
 from hysim.files._text import text_of
 from hysim.records import Record
 
@@ -74,49 +74,46 @@ def load(
 ) -> Record | tuple[Record, ...]:
     """Load a record from a file: text, NPZ, NPY, MAT or HDF5.
 
-    The format is read from the file's first bytes. In text, one sample a line, blank lines and lines that begin
-    with ``#`` or ``%`` are skipped. The delimiter and the decimal sign are those under which most cells of the file
-    are numbers. A first line of text over columns of numbers is the header; if there is none, a comment right above
-    the samples that names as many columns is taken for it, as `numpy.savetxt` writes one. A unit in brackets is
-    split off: under ``voltage [V]`` or ``voltage (V)`` the column is `voltage`, and its unit V. A second line of
-    text holds the units of all columns. Only the chosen columns have to be numbers. Cells may be quoted; a quoted
-    cell ends on its line. Missing values are empty cells, nan, na, n/a, null and none.
+    The format is read from the file's first bytes. A text has one sample a line; blank lines and lines that begin
+    with ``#`` or ``%`` are skipped. Delimiter and decimal sign are those under which most cells are numbers. A first
+    line of text above numbers is the header; without one, a comment right above the samples that names as many
+    columns is used, as `numpy.savetxt` writes it. Under ``voltage [V]`` or ``voltage (V)`` the column is `voltage`
+    and its unit V; a second line of text holds the units of all columns. Only the chosen columns must be numbers.
+    Missing values are empty cells, nan, na, n/a, null and none.
 
-    In the other formats a column is an array, called by its name: a variable, a field of a struct (``rec.u``), a
-    dataset (``group/displacement``). Of an array with several axes the first is that of the samples, and a column
-    is called ``x[2]`` or ``x[0,1]``. Its unit is an attribute `units` in HDF5, or a text beside it called
-    ``u_units``. A missing value is nan. Files of HDF5, and MATLAB's ``-v7.3``, need h5py.
+    In the other formats a column is an array by its name: a variable, a field of a struct (``rec.u``), a dataset
+    (``group/displacement``). Of an array with several axes the first is that of the samples, and a column is
+    ``x[2]`` or ``x[0,1]``. Its unit is an attribute `units` in HDF5, or a text beside it called ``u_units``. A
+    missing value is nan. HDF5, and MATLAB's ``-v7.3``, need h5py.
 
-    What `hysim.save_record` wrote comes back whole, resolution and name too, without further arguments.
+    A file of `hysim.save_record` needs no further arguments, and keeps resolution and name.
 
     Parameters
     ----------
     path : str, path or open file
-        An open file of text or of bytes is read from where it stands. A text, or an open file, may have 0.5 GB; an
-        array 2 GB.
+        An open file of text or of bytes is read from its current position. A text, or an open file, may have 0.5 GB;
+        an array 2 GB.
     u, y : str or int, optional
         Columns of input and output, by name or by number from 0: of the columns of a text or of a single array, of
         the arrays in their order otherwise (HDF5: of their names). By default those called u and y.
     t : str or int, optional
-        Column of time. By default that called t, if there is one; False leaves it out. A record without it has
-        no time.
+        Column of time; by default that called t, if there is one; False for a record without time.
     on_missing : {"error", "drop", "split"}
-        What to do where a chosen column has no value: raise, leave the sample out, or cut the record there
-        into several.
+        Where a chosen column has no value: raise, leave the sample out, or cut the record there into several.
     delimiter : str, optional
-        One character between the cells of a text, or a blank for any white space. By default found among tab,
+        One character between the cells of a text, or a blank for any white space; by default found among tab,
         semicolon, comma and white space.
     decimal : {".", ","}, optional
-        Sign before the decimals of a text; by default found. There is none between thousands.
+        Decimal sign of a text; by default found. There is no sign between thousands.
     encoding : str, optional
         Of a text; by default UTF-8, or UTF-16 or UTF-32 where the file begins with their byte order mark.
     units : mapping, optional
-        Labels of the units of ``"t"``, ``"u"`` and ``"y"``, before those of the file.
+        Labels of the units of ``"t"``, ``"u"`` and ``"y"``; they replace those of the file.
     resolution : float or "detect", optional
-        Quantum of the output's sensor [unit of y], before that of the file; ``"detect"`` takes what
-        `Record.detect_resolution` finds in the output.
+        Quantum of the output's sensor [unit of y], which replaces that of the file; ``"detect"`` for that of
+        `Record.detect_resolution`.
     name : str, optional
-        Name of the record; by default what the file says, or the file's name without its ending.
+        Name of the record; by default the one in the file, or the file's name without its ending.
 
     Returns
     -------
@@ -130,10 +127,9 @@ def load(
     TypeError
         If `path` is neither a path nor an open file.
     ValueError
-        If the file is damaged, too large, empty or has no samples; a column is unknown; or a row is too long or
-        short, a value is missing or not finite, columns have unequal lengths, or the time does not increase. The
-        message is one line that names the file, the line or sample, and the column, and says what to do. Also if an
-        argument that is for text comes with another format.
+        If the file is damaged, too large or has no samples; a column is unknown; a row is too long or short; a value
+        is missing or not finite; columns have unequal lengths; the time does not increase; or an argument for text
+        comes with another format. The message is one line that names the file, the line or sample, and the column.
 
     Examples
     --------
@@ -152,29 +148,29 @@ def load(
         raise ValueError(f'decimal must be "." or ",", got {decimal!r}')
     if isinstance(resolution, str) and resolution != "detect":
         raise ValueError(f'resolution must be a number or "detect", got {resolution!r}')
-    said = {"delimiter": delimiter, "decimal": decimal, "encoding": encoding}
-    with opened(path) as source, _line_named(source):
-        with _table(source, said) as table:
-            chosen = _chosen(table, {"u": u, "y": y, "t": t})
-            labels = _units(table, chosen) | dict(units or {})
-            values = table.values(list(chosen.values()))
-        parts = _parts(table, chosen, values, on_missing)
+    for_text = {"delimiter": delimiter, "decimal": decimal, "encoding": encoding}
+    with opened(path) as source, _file_named(source):
+        with _table(source, for_text) as table:
+            columns = _columns(table, {"u": u, "y": y, "t": t})
+            labels = _units(table, columns) | dict(units or {})
+            values = table.values([*columns.values()])
+        parts = _parts(table, columns, values, on_missing)
         if resolution == "detect":
             resolution = output_quantum(values[1, np.concatenate(parts)])
-        elif resolution is None and chosen["y"].label == "y":
+        elif resolution is None and columns["y"].label == "y":
             resolution = table.notes.resolution
         if name is None:
             name = Path(source.name).stem if table.notes.name is None else table.notes.name
         records = tuple(
-            Record(**dict(zip(chosen, values[:, part], strict=True)), units=labels, resolution=resolution, name=name)
+            Record(**dict(zip(columns, values[:, part], strict=True)), units=labels, resolution=resolution, name=name)
             for part in parts
         )
     return records if on_missing == "split" else records[0]
 
 
 @contextmanager
-def _line_named(source: Opened) -> Iterator[None]:
-    """What is wrong with a file is said in one line that names it."""
+def _file_named(source: Opened) -> Iterator[None]:
+    """Make every message about a file one line that begins with its name."""
     try:
         yield
     except ValueError as error:
@@ -183,13 +179,13 @@ def _line_named(source: Opened) -> Iterator[None]:
 
 
 @contextmanager
-def _table(source: Opened, said: Mapping[str, str | None]) -> Iterator[Table]:
+def _table(source: Opened, for_text: Mapping[str, str | None]) -> Iterator[Table]:
     """The table that a source holds, open to be read from."""
     if isinstance(source.content, (str, bytes)):
-        text = text_of(source.content, source.name, said["encoding"])
-        yield delimited(text, said["delimiter"], said["decimal"])
+        text = text_of(source.content, source.name, for_text["encoding"])
+        yield delimited(text, for_text["delimiter"], for_text["decimal"])
         return
-    for argument, value in said.items():
+    for argument, value in for_text.items():
         if value is not None:
             raise ValueError(f"{argument} is for text, this is a file of the format {source.format}: leave it out")
     if source.format in ("hdf5", "mat7.3"):
@@ -202,40 +198,60 @@ def _table(source: Opened, said: Mapping[str, str | None]) -> Iterator[Table]:
 _READERS = {"npz": npz, "npy": npy, "mat": mat}
 
 
-def _chosen(table: Table, asked: Mapping[str, str | int | None]) -> dict[str, Column]:
-    """The columns of the signals: those asked for, or those called like them."""
-    chosen = {signal: _column(table, signal, asked[signal]) for signal in ("u", "y")}
-    key = "t" if asked["t"] is None and table.has("t") else asked["t"]
+def _columns(table: Table, keys: Mapping[str, str | int | None]) -> dict[str, Column]:
+    """The columns of the signals by their keys, by default those with the signals' names."""
+    columns = {}
+    for signal, meaning in SIGNALS.items():
+        key = keys[signal]
+        try:
+            columns[signal] = table.column(signal if key is None else key)
+        except ValueError as error:
+            if key is not None or signal in table.labels:
+                raise
+            raise ValueError(f"{error}; pass the column of the {meaning} as {signal}=") from None
+    key = "t" if keys["t"] is None and "t" in table.labels else keys["t"]
     if key is not None and key is not False:
-        chosen["t"] = table.column(key)
-    return chosen
-
-
-def _column(table: Table, signal: str, key: str | int | None) -> Column:
-    if key is not None or table.has(signal):
-        return table.column(signal if key is None else key)
-    try:
-        return table.column(signal)
-    except ValueError as error:
-        raise ValueError(f"{error}; say which one is the {SIGNALS[signal]} by {signal}=") from None
+        columns["t"] = table.column(key)
+    return columns
 
 
 def _parts(
-    table: Table, chosen: Mapping[str, Column], values: FloatArray, on_missing: str
+    table: Table, columns: Mapping[str, Column], values: FloatArray, on_missing: str
 ) -> list[npt.NDArray[np.intp]]:
-    """The samples of each record, checked."""
-    if on_missing == "error":
-        check_gaps(table, list(chosen.values()), values)
-    parts = pieces(np.asarray(np.isnan(values).any(axis=0)), cut=on_missing == "split")
-    if "t" in chosen:
-        check_time(table, values[-1], parts)
-    return parts
+    """Places of the samples of each record."""
+    is_missing = np.isnan(values)
+    if on_missing == "error" and is_missing.any():
+        k, j = np.argwhere(is_missing.T)[0]
+        raise ValueError(
+            f"{table.place(k)}, column {shown([*columns.values()][j].label)}: the value is missing; "
+            'on_missing="drop" leaves such samples out, on_missing="split" cuts the record there'
+        )
+    kept = np.flatnonzero(~is_missing.any(axis=0))
+    is_cut = on_missing == "split"
+    parts = np.split(kept, np.flatnonzero(np.diff(kept) > 1) + 1 if is_cut else [])
+    long_enough = [part for part in parts if part.size >= 2]
+    if not long_enough:
+        longest = max(part.size for part in parts)
+        raise ValueError(f"a record needs at least 2 samples, there are {longest}{' in a row' if is_cut else ''}")
+    if "t" in columns:
+        for part in long_enough:
+            _check_time(table, values[-1], part)
+    return long_enough
 
 
-def _units(table: Table, chosen: Mapping[str, Column]) -> dict[str, str]:
-    """Units of the signals where the file has any."""
-    said = table.notes.units
-    units = {signal: said.get(column.label, column.unit or None) for signal, column in chosen.items()}
-    if "t" not in chosen and not table.has("t"):
-        units["t"] = said.get("t")
+def _check_time(table: Table, times: FloatArray, part: npt.NDArray[np.intp]) -> None:
+    wrong = np.flatnonzero(np.diff(times[part]) <= 0)
+    if wrong.size:
+        before, k = part[wrong[0]], part[wrong[0] + 1]
+        raise ValueError(
+            f"{table.place(k)}: time must increase, got {times[k]} after {times[before]}; sort the samples, remove "
+            "repeated ones, or load without time: t=False"
+        )
+
+
+def _units(table: Table, columns: Mapping[str, Column]) -> dict[str, str]:
+    """Units of the signals where the file states them."""
+    units = {signal: table.notes.units.get(c.label, c.unit or None) for signal, c in columns.items()}
+    if "t" not in columns and "t" not in table.labels:
+        units["t"] = table.notes.units.get("t")
     return {signal: unit for signal, unit in units.items() if unit is not None}

@@ -1,10 +1,10 @@
 """MAT files of version 5, which MATLAB writes by ``save -v6`` and, compressed, by ``save -v7``.
 
-A file is a header of 128 bytes and an element for each variable. An element is a type, a number of bytes, and these,
-padded to eight; four bytes or fewer may stand in the tag itself. A matrix is an element that holds elements: flags with
-its class, its dimensions, its name, and its values. They are read here and not by `scipy.io.loadmat`, which descends as
-deep as a file says: cells in cells, 100 000 deep, end its process. Here every length is compared with what is left
-around it, a variable is unpacked no further than it says, and only structs are descended into.
+A file is a header of 128 bytes and an element for each variable. An element is a type, a number of bytes, and these
+bytes, padded to a multiple of eight; up to four bytes may stand in the tag itself. A matrix is an element that holds
+elements: flags with its class, its dimensions, its name, and its values. They are read here because
+`scipy.io.loadmat` follows any nesting: cells in cells, 100 000 deep, crash the process. Here every length is compared
+with the bytes that remain, a variable is unpacked no further than its stated length, and only structs are entered.
 
 Source: MathWorks, MAT-File Format.
 """
@@ -22,7 +22,7 @@ from hysim.files._arrays import MOST_BYTES, NUMBERS, TEXT, Array, Arrays, with_n
 from hysim.files._table import damaged, require, shown
 
 _HEADER_BYTES = 128
-_BEGINNING = 8192  # bytes that hold what a matrix says of itself
+_BEGINNING = 8192  # bytes that hold the properties of a matrix
 _DEEPEST = 16  # structs in structs
 _MOST_AXES = 32
 
@@ -35,7 +35,7 @@ _KINDS = {1: "cells", 2: "several structs", 3: "an object", 5: "a sparse matrix"
 
 
 class _Element(NamedTuple):
-    """The type of an element, its bytes, and the byte order ``"<"`` or ``">"`` of the numbers in it."""
+    """The type of an element, its bytes, and the byte order ``"<"`` or ``">"`` of its numbers."""
 
     type: int
     content: memoryview
@@ -60,7 +60,7 @@ class _Element(NamedTuple):
         return np.frombuffer(self.content, self.order + _NUMBERS[self.type])
 
     def text(self) -> str:
-        """The content as letters."""
+        """The content as text."""
         require(self.type in _LETTERS, f"the MAT file is damaged: letters in an element of type {self.type}")
         encoding = _LETTERS[self.type].format("le" if self.order == "<" else "be")
         return str(self.content, encoding, "replace").rstrip("\0")
@@ -77,26 +77,18 @@ class _Matrix(NamedTuple):
 
     @property
     def size(self) -> int:
-        """Number of elements."""
         return math.prod(self.shape)
 
     @property
     def is_struct(self) -> bool:
-        """Whether it is one struct."""
         return self.kind == _STRUCT and self.size == 1
 
 
 def mat(file: BinaryIO) -> Arrays:
-    """The arrays of a file, those in structs among them.
-
-    Raises
-    ------
-    ValueError
-        If it is damaged.
-    """
+    """The arrays of a file, also those in structs; ValueError if it is damaged."""
     with damaged("MAT"):
         header = file.read(_HEADER_BYTES)
-        require(len(header) == _HEADER_BYTES, "the MAT file is cut: it has no whole header")
+        require(len(header) == _HEADER_BYTES, "the MAT file is cut: its header is incomplete")
         return with_notes(list(_variables(file, "<" if header[126:] == b"IM" else ">")), "MAT")
 
 
@@ -191,6 +183,6 @@ def _matrix(element: _Element) -> _Matrix:
 
 def _tag(data: bytes | memoryview, order: str) -> tuple[int, int]:
     """The two numbers with which an element begins."""
-    require(len(data) >= 8, "the MAT file is cut: an element has no whole tag")
+    require(len(data) >= 8, "the MAT file is cut: the tag of an element is incomplete")
     first, second = np.frombuffer(data, f"{order}u4", 2).tolist()
     return first, second

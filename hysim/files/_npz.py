@@ -1,8 +1,8 @@
 """NumPy's files: an array (NPY), or a zip archive of arrays (NPZ).
 
-NumPy reads the headers. They are believed only if the archive or the file says the same size, and then as many bytes
-are read as numbers. An array of objects is never read: it is a pickle, which could run any code. Nothing is written to
-the disk: the name of an entry is a name and no path.
+NumPy reads the headers. Their sizes are compared with that of the archive's entry or the file before the numbers are
+read. An array of objects is never read: it is a pickle, which could run any code. Nothing is written to the disk: the
+name of an entry is not used as a path.
 """
 
 import math
@@ -32,13 +32,7 @@ _Opener = Callable[[], AbstractContextManager[IO[bytes]]]
 
 
 def npz(file: BinaryIO) -> Arrays:
-    """The arrays of an archive.
-
-    Raises
-    ------
-    ValueError
-        If it is damaged, or not an archive of arrays.
-    """
+    """The arrays of an archive; ValueError if it is damaged, or not an archive of arrays."""
     with damaged("NPZ"):
         archive = zipfile.ZipFile(file)
         entries = [entry for entry in archive.infolist() if entry.filename.endswith(_ENDING)]
@@ -52,19 +46,11 @@ def npz(file: BinaryIO) -> Arrays:
 
 
 def npy(file: BinaryIO) -> Arrays:
-    """The one array of a file.
-
-    Raises
-    ------
-    ValueError
-        If it is damaged.
-    """
+    """The one array of a file; ValueError if it is damaged."""
     with damaged("NPY"):
         array, length, rest = _array("array", partial(_rewound, file), file.seek(0, 2))
-        require(
-            array.kind != NUMBERS or length <= rest,
-            f"the file is cut: its array has {length:,} bytes, there are {rest:,}",
-        )
+        is_complete = array.kind != NUMBERS or length <= rest
+        require(is_complete, f"the file is cut: its array has {length:,} bytes, there are {rest:,}")
         return with_notes([array], "NPY")
 
 
@@ -102,10 +88,8 @@ def _layout(header: BytesIO, label: str) -> tuple[tuple[int, ...], Literal["C", 
     """Shape, order and type of an array whose file begins so; the header is read to its end."""
     major, _ = np.lib.format.read_magic(header)
     length = int.from_bytes(header.getvalue()[8 : 10 if major == 1 else 12], "little")
-    require(
-        length <= _LONGEST_HEADER,
-        f"array {label} has a header of {length:,} bytes, at most {_LONGEST_HEADER:,} are read",
-    )
+    is_short = length <= _LONGEST_HEADER
+    require(is_short, f"array {label} has a header of {length:,} bytes, at most {_LONGEST_HEADER:,} are read")
     try:
         with warnings.catch_warnings(action="ignore"):  # about headers that Python 2 wrote
             shape, is_fortran, dtype = _HEADER_READERS[major](header, max_header_size=_LONGEST_HEADER)

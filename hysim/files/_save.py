@@ -5,6 +5,7 @@ import io
 import json
 import re
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,31 +20,31 @@ _PLAIN_UNIT = re.compile(r"[^\[\]()\s,;\"#%]+(?: [^\[\]()\s,;\"#%]+)*")
 
 
 def save_record(record: Record, path: str | Path) -> None:
-    """Save a record to a file, whose ending says the format.
+    """Save a record to a file, in the format that its ending names.
 
-    Stored are `u`, `y` and, if there is one, `t`, every bit of them; and where they are known the units, the
-    resolution and the name. `hysim.load` gives an equal record back from the path alone.
+    The file holds `u`, `y` and, if there is one, `t`, to the last bit; and where they are known the units, the
+    resolution and the name. `hysim.load` returns an equal record from the path alone.
 
     - ``.csv``, ``.tsv``: a header ``t [s],u [V],y [um]``, below comments ``# name:`` and ``# resolution:``;
     - ``.npz``: arrays `t`, `u`, `y`, `resolution`, and texts `name`, ``u_units`` and so on;
     - ``.mat``: the same as variables, numbers in columns, compressed; version 5, which MATLAB and Octave load;
     - ``.h5``, ``.hdf5``: datasets with an attribute `units`; attributes `resolution` and `name` of the file.
 
-    The file appears whole or not at all, with the same bytes each time.
+    The file is written completely or not at all, with the same bytes each time.
 
     Parameters
     ----------
     record : Record
-        What to save.
+        The record.
     path : str or path
-        Where to, with one of these endings.
+        File to write, with one of these endings.
 
     Raises
     ------
     ValueError
-        If the ending is another one, HDF5 is asked for without h5py, or a name or a unit cannot be written.
+        If the ending is another one, h5py is missing for HDF5, or a name or a unit cannot be written.
     TypeError
-        If it is no record.
+        If `record` is not a Record.
     OSError
         If the folder cannot be written to.
 
@@ -71,7 +72,7 @@ def packed(columns: Mapping[str, FloatArray], path: str | Path, notes: Notes) ->
     Raises
     ------
     ValueError
-        If the ending is none of these, HDF5 is asked for without h5py, or a name or a unit cannot be written.
+        If the ending is none of these, h5py is missing for HDF5, or a name or a unit cannot be written.
     """
     write = _WRITERS[ending(path)]
     for text in (notes.name or "", *notes.units.values()):
@@ -81,28 +82,14 @@ def packed(columns: Mapping[str, FloatArray], path: str | Path, notes: Notes) ->
 
 
 def ending(path: str | Path) -> str:
-    """The ending of a path, which names a format to save in.
-
-    Raises
-    ------
-    ValueError
-        If it names none.
-    """
-    found = Path(path).suffix.lower()
-    if found not in _WRITERS:
-        raise ValueError(f"{Path(path).name}: the ending must be one of {', '.join(_WRITERS)}, got {found!r}")
-    return found
+    """The ending of a path, which names a format to save in; ValueError if it names none."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in _WRITERS:
+        raise ValueError(f"{Path(path).name}: the ending must be one of {', '.join(_WRITERS)}, got {suffix!r}")
+    return suffix
 
 
-def _csv(columns: Mapping[str, FloatArray], notes: Notes) -> bytes:
-    return _text(columns, notes, ",")
-
-
-def _tsv(columns: Mapping[str, FloatArray], notes: Notes) -> bytes:
-    return _text(columns, notes, "\t")
-
-
-def _text(columns: Mapping[str, FloatArray], notes: Notes, delimiter: str) -> bytes:
+def _text(columns: Mapping[str, FloatArray], notes: Notes, *, delimiter: str) -> bytes:
     buffer = io.StringIO()
     for what, value in (("name", notes.name), ("resolution", notes.resolution)):
         if value:
@@ -117,11 +104,13 @@ def _text(columns: Mapping[str, FloatArray], notes: Notes, delimiter: str) -> by
 
 
 def _arrays(columns: Mapping[str, FloatArray], notes: Notes) -> dict[str, Any]:
-    """What formats without attributes hold: the notes beside the columns."""
-    texts = {f"{label}_units": unit for label, unit in notes.units.items()}
-    named = {"name": notes.name} if notes.name else {}
-    quantum = {} if notes.resolution is None else {"resolution": np.asarray(notes.resolution)}
-    return {**columns, **texts, **named, **quantum}
+    """The columns, and the notes beside them, by the names that they have in a file."""
+    others: dict[str, Any] = {f"{label}_units": unit for label, unit in notes.units.items()}
+    if notes.name:
+        others["name"] = notes.name
+    if notes.resolution is not None:
+        others["resolution"] = np.asarray(notes.resolution)
+    return {**columns, **others}
 
 
 def _npz(columns: Mapping[str, FloatArray], notes: Notes) -> bytes:
@@ -148,20 +137,18 @@ def _hdf5(columns: Mapping[str, FloatArray], notes: Notes) -> bytes:
         raise ValueError("a file of HDF5 needs h5py: pip install 'hysim[io]'") from None
     buffer = io.BytesIO()
     with h5py.File(buffer, "w") as root:
-        for label, values in columns.items():
-            root[label] = values
-        for label, unit in notes.units.items():
-            if label in columns:
-                root[label].attrs["units"] = unit
+        for name, value in _arrays(columns, notes).items():
+            label = name.removesuffix("_units")
+            if name in columns:
+                root[name] = value
+            elif name != label and label in columns:
+                root[label].attrs["units"] = value
             else:
-                root.attrs[f"{label}_units"] = unit
-        if notes.name:
-            root.attrs["name"] = notes.name
-        if notes.resolution is not None:
-            root.attrs["resolution"] = notes.resolution
+                root.attrs[name] = value
     return buffer.getvalue()
 
 
 _WRITERS: dict[str, Callable[[Mapping[str, FloatArray], Notes], bytes]] = {
-    ".csv": _csv, ".tsv": _tsv, ".npz": _npz, ".mat": _mat, ".h5": _hdf5, ".hdf5": _hdf5,
+    ".csv": partial(_text, delimiter=","), ".tsv": partial(_text, delimiter="\t"),
+    ".npz": _npz, ".mat": _mat, ".h5": _hdf5, ".hdf5": _hdf5,
 }  # fmt: skip

@@ -1,4 +1,4 @@
-"""What is loaded from, and which format it has: that is read from its first bytes, not from its name."""
+"""Sources to load from, and their formats, which are read from the first bytes and not from the name."""
 
 import os
 import stat
@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple, TextIO
+from typing import Any, BinaryIO, NamedTuple, Protocol, TextIO, runtime_checkable
 
 Source = str | os.PathLike[str] | TextIO | BinaryIO
 
 MOST_TEXT = 500_000_000
-"""Most bytes of a text file, and of any file that comes as a stream: a text takes ten times as much to read."""
+"""Most bytes of a text file, and of any stream: a text takes ten times as much memory to read."""
 
 _HEAD = 640  # bytes: HDF5 may begin behind a block of 512
 _HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -19,7 +19,7 @@ _PIECE = 1 << 20  # bytes that are read of a stream at once
 
 
 class Opened(NamedTuple):
-    """What to call a source, its format, its content, read if it is a text, and its path if it is a file with one."""
+    """Name, format and content of a source, which is read if it is a text, and its path if it is a file with one."""
 
     name: str
     format: str
@@ -27,19 +27,19 @@ class Opened(NamedTuple):
     path: Path | None = None
 
 
+@runtime_checkable
+class _Readable(Protocol):
+    def read(self, size: int, /) -> Any: ...
+
+
+@runtime_checkable
+class _Named(Protocol):
+    name: Any
+
+
 @contextmanager
 def opened(source: Source) -> Iterator[Opened]:
-    """Open a source to read from.
-
-    Raises
-    ------
-    OSError
-        If it cannot be read.
-    TypeError
-        If it is neither a path nor an open file.
-    ValueError
-        If it is too large.
-    """
+    """Open a source to read from; OSError, TypeError or ValueError if it cannot be read or is too large."""
     if isinstance(source, (str, os.PathLike)):
         path = Path(source)
         with path.open("rb") as file:
@@ -47,8 +47,8 @@ def opened(source: Source) -> Iterator[Opened]:
                 yield _regular(path, file)
             else:  # a pipe, a device
                 yield _stream(path.name, file)
-    elif callable(getattr(source, "read", None)):
-        yield _stream(Path(str(getattr(source, "name", "stream"))).name, source)
+    elif isinstance(source, _Readable):
+        yield _stream(Path(str(source.name)).name if isinstance(source, _Named) else "stream", source)
     else:
         raise TypeError(f"load takes a path or an open file, got {type(source).__name__}")
 
@@ -59,24 +59,22 @@ def format_of(head: bytes) -> str:
         return "npz"
     if head.startswith(b"\x93NUMPY"):
         return "npy"
-    if head[512:520] == _HDF5 and head.startswith(b"MATLAB"):
-        return "mat7.3"
     if head.startswith(_HDF5) or head[512:520] == _HDF5:
-        return "hdf5"
+        return "mat7.3" if head.startswith(b"MATLAB") else "hdf5"
     if head.startswith(b"MATLAB 5.0") or head[124:128] in (b"\x00\x01IM", b"\x01\x00MI"):
         return "mat"
     return "text"
 
 
 def _regular(path: Path, file: BinaryIO) -> Opened:
-    found = format_of(file.read(_HEAD))
+    form = format_of(file.read(_HEAD))
     file.seek(0)
-    if found != "text":
-        return Opened(path.name, found, file, path)
+    if form != "text":
+        return Opened(path.name, form, file, path)
     size = os.fstat(file.fileno()).st_size
     if size > MOST_TEXT:
-        raise ValueError(f"{path.name} is too large: {_too_large(size)}")
-    return Opened(path.name, found, file.read(), path)
+        raise ValueError(_too_large(path.name, str(size)))
+    return Opened(path.name, form, file.read(), path)
 
 
 def _stream(name: str, source: Any) -> Opened:
@@ -85,17 +83,17 @@ def _stream(name: str, source: Any) -> Opened:
     while piece := source.read(_PIECE):
         size += len(piece)
         if size > MOST_TEXT:
-            raise ValueError(f"{name} is too large: {_too_large(size)}")
+            raise ValueError(_too_large(name, "more"))
         pieces.append(piece)
     if pieces and isinstance(pieces[0], str):
         return Opened(name, "text", "".join(pieces))
     content = b"".join(pieces)
-    found = format_of(content[:_HEAD])
-    return Opened(name, found, content if found == "text" else BytesIO(content))
+    form = format_of(content[:_HEAD])
+    return Opened(name, form, content if form == "text" else BytesIO(content))
 
 
-def _too_large(size: int) -> str:
+def _too_large(name: str, size: str) -> str:
     return (
-        f"a text or a stream may have {MOST_TEXT:,} bytes, got {'more' if size < MOST_TEXT + 2 * _PIECE else size}; "
-        "cut it, or save its columns as NPZ, MAT or HDF5 and give the path"
+        f"{name} is too large: a text or a stream may have {MOST_TEXT:,} bytes, got {size}; cut it, or save its "
+        "columns as NPZ, MAT or HDF5 and pass the path"
     )

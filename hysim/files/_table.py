@@ -1,13 +1,10 @@
-"""What the formats have in common: named columns, read when they are chosen, and what makes a record of them."""
+"""Columns with names, whose numbers are read when they are chosen: common to all formats."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
-
-import numpy as np
-import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 
@@ -24,7 +21,7 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True)
 class Notes:
-    """What a file says about its record, beside the columns."""
+    """Units, resolution and name of a record, as a file states them."""
 
     units: Mapping[str, str] = field(default_factory=dict)
     resolution: float | None = None
@@ -36,13 +33,14 @@ class Table(Protocol):
 
     @property
     def notes(self) -> Notes:
-        """What the file says beside its columns."""
+        """Units, resolution and name that the file states."""
+
+    @property
+    def labels(self) -> Sequence[str]:
+        """Names of the columns."""
 
     def column(self, key: str | int) -> Column:
         """The column of this name or number; ValueError if there is none, or more than one."""
-
-    def has(self, label: str) -> bool:
-        """Whether a column is called so."""
 
     def values(self, columns: list[Column]) -> FloatArray:
         """The numbers of the columns, shape (n_columns, n_samples), nan where one is missing."""
@@ -52,33 +50,45 @@ class Table(Protocol):
 
 
 class UnreadableError(ValueError):
-    """What a reader says of a file itself."""
+    """A file that cannot be read, with a message that needs no further explanation."""
 
 
 def require(condition: object, message: str) -> None:
-    """Refuse a file that does not meet a condition.
-
-    Raises
-    ------
-    UnreadableError
-        With this message, if the condition is false.
-    """
+    """Raise an `UnreadableError` with this message if the condition is false."""
     if not condition:
         raise UnreadableError(message)
 
 
 @contextmanager
 def damaged(form: str) -> Iterator[None]:
-    """Whatever else goes wrong where a file is read: damaged files raise all kinds of errors."""
+    """Turn every error into an `UnreadableError`: readers of damaged files raise errors of all kinds."""
     try:
         yield
     except UnreadableError:
         raise
     except MemoryError:
-        raise UnreadableError(f"the {form} file asks for more memory than there is") from None
+        raise UnreadableError(f"the {form} file needs more memory than there is") from None
     except Exception as error:
         reason = f"{type(error).__name__} {error}"[:_LONGEST_REASON].strip()
         raise UnreadableError(f"the {form} file is damaged: {reason}") from None
+
+
+def number_of(key: str, kind: str, *names: Sequence[str]) -> int | None:
+    """Number of the one column with this name, looked for in each list of names in turn; None if there is none.
+
+    Raises
+    ------
+    ValueError
+        If several columns of a list have the name; `kind` is the plural that the message calls them by.
+    """
+    for labels in names:
+        matches = [k for k, label in enumerate(labels) if label == key]
+        if len(matches) > 1:
+            numbers = listed([str(k) for k in matches])
+            raise ValueError(f"{len(matches)} {kind} are called {key!r}: choose one of the numbers {numbers}")
+        if matches:
+            return matches[0]
+    return None
 
 
 def shown(text: str, longest: int = 40) -> str:
@@ -86,46 +96,12 @@ def shown(text: str, longest: int = 40) -> str:
     return repr(text if len(text) <= longest else text[: longest - 3] + "...")
 
 
-def listed(names: list[str], most: int = 20) -> str:
+def listed(names: Sequence[str], most: int = 20) -> str:
     """Names from a file, in one line."""
     plain = [name if name.isprintable() and len(name) <= 80 else shown(name, 80) for name in names[:most]]
     return ", ".join(plain) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
-def quantum(value: float | None) -> float | None:
-    """A resolution that a file says, None if that is none."""
+def positive(value: float | None) -> float | None:
+    """A resolution that a file states, None if it is not positive and finite."""
     return value if value is not None and 0.0 < value < math.inf else None
-
-
-def check_gaps(table: Table, columns: list[Column], values: FloatArray) -> None:
-    """Refuse values that are missing."""
-    if np.isnan(values).any():
-        k, j = np.argwhere(np.isnan(values.T))[0]
-        raise ValueError(
-            f"{table.place(k)}, column {shown(columns[j].label)}: the value is missing; "
-            'on_missing="drop" leaves such samples out, on_missing="split" cuts the record there'
-        )
-
-
-def pieces(is_gap: npt.NDArray[np.bool_], *, cut: bool) -> list[npt.NDArray[np.intp]]:
-    """Places of the samples of each record."""
-    kept = np.flatnonzero(~is_gap)
-    cuts = np.flatnonzero(np.diff(kept) > 1) + 1 if cut else kept[:0]
-    parts = np.split(kept, cuts)
-    long_enough = [part for part in parts if part.size >= 2]
-    if not long_enough:
-        longest = max(part.size for part in parts)
-        raise ValueError(f"a record needs at least 2 samples, there are {longest}{' in a row' if cut else ''}")
-    return long_enough
-
-
-def check_time(table: Table, times: FloatArray, parts: list[npt.NDArray[np.intp]]) -> None:
-    """Refuse times that do not increase."""
-    for part in parts:
-        back = np.flatnonzero(np.diff(times[part]) <= 0)
-        if back.size:
-            before, k = part[back[0]], part[back[0] + 1]
-            raise ValueError(
-                f"{table.place(k)}: time must increase, got {times[k]} after {times[before]}; sort the samples, leave "
-                "repeated ones out, or load without time: t=False"
-            )

@@ -21,7 +21,8 @@ from hysim.errors import SimulationError
 from hysim.identification._problem import problem
 from hysim.identification._search import brief_cost
 from hysim.identification.sentences import SWAPPED
-from hysim.models.search_space import Freedom, Identifiable
+from hysim.models.protocols import Identifiable
+from hysim.models.search_space import Freedom
 from hysim.records import Record
 
 _FEWEST = 20  # samples in which a waveform can be recognised

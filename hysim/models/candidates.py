@@ -7,7 +7,7 @@ one that makes no sense without being told more names nothing.
 
 from typing import Any
 
-from hysim._names import HOME
+from hysim._names import MODULE_OF
 from hysim.models.model import every_family
 from hysim.models.protocols import Direct, Identifiable, Offering
 
@@ -22,7 +22,7 @@ def candidates() -> dict[str, Any]:
     """
     families = every_family()
     found: dict[str, Any] = {}
-    for name in (*HOME, *(name for name in families if name not in HOME)):
+    for name in (*MODULE_OF, *(name for name in families if name not in MODULE_OF)):
         if name in families:
             found |= _of_family(name, families[name])
     return found

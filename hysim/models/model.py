@@ -11,7 +11,7 @@ from typing import Any, TypeVar, dataclass_transform
 import numpy as np
 
 from hysim._frozen import checked, items
-from hysim._names import HOME
+from hysim._names import MODULE_OF
 from hysim._words import shown, value_in_words, words, wrapped
 
 T = TypeVar("T")
@@ -68,7 +68,7 @@ def _models_in(name: str, value: Any) -> dict[str, Any]:
 
 def every_family() -> dict[str, type]:
     """The registry after every public model of hysim has entered its family."""
-    for module in dict.fromkeys(HOME.values()):
+    for module in dict.fromkeys(MODULE_OF.values()):
         if module.startswith("hysim.models."):
             importlib.import_module(module)
     return FAMILIES

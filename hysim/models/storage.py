@@ -15,7 +15,7 @@ import numpy as np
 
 from hysim._atomic import write_text
 from hysim._frozen import items
-from hysim._names import HOME
+from hysim._names import MODULE_OF
 from hysim._release import __version__
 from hysim.models.model import FAMILIES, every_family
 
@@ -149,8 +149,8 @@ def from_document(document: Mapping[str, Any], path: str | Path) -> Any:
         raise ValueError(f"{path} does not hold a model of hysim: the family must be a name, got {_shown(family)}")
     if not isinstance(given, Mapping):
         raise ValueError(f"{path} does not hold a {family}: parameters must be a mapping, got {_shown(given)}")
-    if family in HOME:
-        importlib.import_module(HOME[family])  # enters it into the families
+    if family in MODULE_OF:
+        importlib.import_module(MODULE_OF[family])  # enters it into the families
     if family not in FAMILIES:
         known = ", ".join(sorted(every_family()))
         raise ValueError(f"{path} holds a model of the family {_shown(family)}; there are {known}")

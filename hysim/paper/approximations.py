@@ -1,4 +1,4 @@
-"""Which second-order model stands for which higher one, and how well.
+"""Second-order approximations of models of higher order, and their errors.
 
 The paper derives (7) from (1), and (6) from (4), by the general form (5), and calls each pair similar. Here a
 pair is compared by the step response over the time in which both have settled (`settling_window`), and (5) is
@@ -62,14 +62,14 @@ def approximations() -> tuple[Approximation, ...]:
 
 
 def approximation(name: str, simpler: TransferFunction, of: str, full: TransferFunction) -> Approximation:
-    """How well one model stands for another, both stable and in the same unit of time."""
-    whole = characteristics(full)
-    matched = matched_second_order(whole)
+    """The errors of one model as an approximation of another, both stable and in the same unit of time."""
+    exact = characteristics(full)
+    matched = matched_second_order(exact)
     return Approximation(
         name=name,
         of=of,
         simpler=characteristics(simpler),
-        full=whole,
+        full=exact,
         fit_percent=step_fit(full, simpler),
         matched=matched,
         matched_fit_percent=step_fit(full, matched),

@@ -40,7 +40,7 @@ def definitions() -> list[str]:
 
 
 def _hysteresis(cases: Sequence[HysteresisCase], drawn: markup.Drawn) -> str:
-    first, fragile = cases[0].found, max(cases, key=lambda case: case.max_sensitivity)
+    first, fragile = cases[0].assessment, max(cases, key=lambda case: case.max_sensitivity)
     return (
         markup.heading("Hysteresis")
         + markup.paragraph(
@@ -62,7 +62,7 @@ def _hysteresis(cases: Sequence[HysteresisCase], drawn: markup.Drawn) -> str:
             "feedback itself has where the triangle turns. On (1) there is no hysteresis to reduce, only lag, and "
             "its four poles leave a PID little phase: with this margin the loop is no narrower than without it. The "
             "last PID comes from a global search that gave the margin up (experiments/02_lag_of_equation_1.py): it "
-            f"takes {fragile.found.lag_reduction_percent:.0f} % of the lag away, and a change of the plant by one "
+            f"takes {fragile.assessment.lag_reduction_percent:.0f} % of the lag away, and a change of the plant by one "
             f"part in {fragile.max_sensitivity:.0f} may make it unstable."
         )
         + markup.figure(
@@ -115,7 +115,7 @@ def _squares(cases: Sequence[SquareCase], drawn: markup.Drawn) -> str:
 
 
 def _which_definition(loops: Loops) -> str:
-    """Which definition reaches the paper's 90 and 97."""
+    """The definitions of a reduction that reach the paper's 90 and 97 %."""
     rows = [
         [
             "hysteresis, 90 %",
@@ -129,10 +129,10 @@ def _which_definition(loops: Loops) -> str:
     ]
     for plant in ("eq4", "eq6", "eq1"):
         limited = [case for case in loops.steps if case.plant == plant and case.limits]
-        best = max(limited, key=lambda case: min(_figures(case.found.reduction)))
+        best = max(limited, key=lambda case: min(_figures(case.assessment.reduction)))
         rows += [
             ["vibration, 97 %", f"{name}, {_PLANTS[plant]}", f"{value:.1f}", _reached(value, 96.5)]
-            for name, value in zip(_MEASURES, _figures(best.found.reduction), strict=True)
+            for name, value in zip(_MEASURES, _figures(best.assessment.reduction), strict=True)
         ]
     return (
         markup.heading("Which definition reaches the paper's figures")
@@ -150,8 +150,8 @@ def _triangle_table(cases: Sequence[HysteresisCase]) -> str:
             _PLANTS[case.plant], case.reference.split(",")[0].removeprefix("triangle ").removesuffix(" um"),
             _limits(case.limits), f"{_reduction(case):.1f}{'' if case.plant != 'eq1' else ' (lag)'}",
             *(f"{round(value, 4) + 0.0:.4f}" for value in (
-                case.found.open_width, case.found.closed_width, case.found.open_lag_width, case.found.lag_width,
-                case.found.tracking_rms, case.found.closure_gap,
+                case.assessment.open_width, case.assessment.closed_width, case.assessment.open_lag_width,
+                case.assessment.lag_width, case.assessment.tracking_rms, case.assessment.closure_gap,
             )),
         ]
         for case in cases
@@ -167,8 +167,8 @@ def _step_table(cases: Sequence[StepCase]) -> str:
     rows = [
         [
             _PLANTS[case.plant], case.reference.removeprefix("step ").removesuffix(" um"), _limits(case.limits),
-            *(f"{value:.1f}" for value in _figures(case.found.reduction)),
-            f"{case.found.reduction.open.t98:.2f}", f"{case.found.reduction.closed.t98:.2f}",
+            *(f"{value:.1f}" for value in _figures(case.assessment.reduction)),
+            f"{case.assessment.reduction.open.t98:.2f}", f"{case.assessment.reduction.closed.t98:.2f}",
         ]
         for case in cases
     ]  # fmt: skip
@@ -182,9 +182,9 @@ def _step_table(cases: Sequence[StepCase]) -> str:
 def _square_table(cases: Sequence[SquareCase]) -> str:
     rows = [
         [
-            _PLANTS[case.plant], f"{case.period:g}", f"{case.found.open_tracking_rms:.3f}",
-            f"{case.found.tracking_rms:.3f}", f"{case.found.open_peak_excess_percent:.1f}",
-            f"{case.found.peak_excess_percent:.1f}",
+            _PLANTS[case.plant], f"{case.period:g}", f"{case.assessment.open_tracking_rms:.3f}",
+            f"{case.assessment.tracking_rms:.3f}", f"{case.assessment.open_peak_excess_percent:.1f}",
+            f"{case.assessment.peak_excess_percent:.1f}",
         ]
         for case in cases
     ]  # fmt: skip
@@ -197,7 +197,7 @@ def _square_table(cases: Sequence[SquareCase]) -> str:
 def _gains(cases: Sequence[HysteresisCase] | Sequence[StepCase]) -> str:
     """The controllers, one for each plant."""
     controllers = {
-        (case.plant, replace(case.found.closed.conditions["controller"], limits=None)): case for case in cases
+        (case.plant, replace(case.assessment.closed.conditions["controller"], limits=None)): case for case in cases
     }
     rows = [
         [_PLANTS[plant], *_pid(pid), f"{case.max_sensitivity:.2f}", str(case.loops_tried or "–")]
@@ -214,21 +214,21 @@ def _pid(pid: PID) -> list[str]:
     return [*(f"{value:.4g}" for value in numbers), f"{pid.setpoint_weight:.2f}"]
 
 
-def _figures(found: VibrationReduction) -> tuple[float, float, float]:
+def _figures(assessment: VibrationReduction) -> tuple[float, float, float]:
     return (
-        found.overshoot_reduction_percent,
-        found.residual_rms_reduction_percent,
-        found.settling_time_reduction_percent,
+        assessment.overshoot_reduction_percent,
+        assessment.residual_rms_reduction_percent,
+        assessment.settling_time_reduction_percent,
     )
 
 
 def _reduction(case: HysteresisCase) -> float:
-    found = case.found
-    return found.lag_reduction_percent if case.plant == "eq1" else found.hysteresis_reduction_percent
+    assessment = case.assessment
+    return assessment.lag_reduction_percent if case.plant == "eq1" else assessment.hysteresis_reduction_percent
 
 
 def _best_of_each(cases: Sequence[HysteresisCase]) -> list[HysteresisCase]:
-    """Of each plant within limits, the best that is robust, and the best that is not if there is one."""
+    """The best robust loop of each plant within limits, and the best of the others if there is one."""
     best: dict[tuple[str, bool], HysteresisCase] = {}
     for case in cases:
         key = case.plant, case.max_sensitivity <= MAX_SENSITIVITY

@@ -66,7 +66,7 @@ def dwell_widths(
 
 
 def dwell_measures(width: DwellWidth) -> dict[str, float]:
-    """What `summary.json` says about one dwell."""
+    """The entry of one dwell in `summary.json`."""
     return {
         "dwell_s": width.dwell,
         "eq1_max_width_um": width.linear,

@@ -35,7 +35,7 @@ EQUATION_7 = TransferFunction(num=floats(printed.C_8[0][1:]), den=(1.0, *(-value
 
 @frozen
 class Characteristics:
-    """What a transfer function is like.
+    """Characteristics of a transfer function.
 
     Parameters
     ----------

@@ -74,7 +74,7 @@ def model_widths(comparison: Comparison) -> plot.Figure:
 
 @plot.house_style()
 def discovery_path(discovery: Discovery) -> plot.Figure:
-    """What each number of terms buys."""
+    """The fit against the number of terms."""
     canvas = plot.figure(height=4.4)
     plot.selection(discovery, plot.panels(canvas, 2))
     return canvas
@@ -85,13 +85,13 @@ def step_figure(case: StepCase, duration: float, *, seconds: bool) -> plot.Figur
     """A step with and without control, and the voltage that it takes: the paper's Figures 12 and 14."""
     canvas = plot.figure(height=5.0)
     upper, lower = plot.panels(canvas, 2)
-    closed, units = case.found.closed, _SECONDS if seconds else _SAMPLES
+    closed, units = case.assessment.closed, _SECONDS if seconds else _SAMPLES
     shown = _thinned(closed.t <= duration)
     t = closed.t[shown]
     series = {
         "reference": closed.reference,
         "with PID": closed.y,
-        "without": case.found.open_y,
+        "without": case.assessment.open_y,
     }
     plot.traces({name: (t, y[shown]) for name, y in series.items()}, upper, units=units)
     plot.traces({"voltage": (t, closed.u[shown])}, lower, units={**units, "y": "V"})
@@ -104,10 +104,10 @@ def figure13(cases: Sequence[SquareCase]) -> plot.Figure:
     canvas = plot.figure(height=2.4 * len(cases))
     axes = [canvas.add_subplot(len(cases), 1, k + 1) for k in range(len(cases))]
     for ax, case in zip(axes, cases, strict=True):
-        closed = case.found.closed
+        closed = case.assessment.closed
         begin = closed.t[-1] - 2.0 * case.period
         shown = _thinned(closed.t >= begin)
-        series = {"reference": closed.reference, "with PID": closed.y, "without": case.found.open_y}
+        series = {"reference": closed.reference, "with PID": closed.y, "without": case.assessment.open_y}
         plot.traces({name: (closed.t[shown] - begin, y[shown]) for name, y in series.items()}, ax, units=_SAMPLES)
         ax.set_title(f"period {case.period:g} samples")
         ax.set_xlabel(ax.get_xlabel() if ax is axes[-1] else "")
@@ -121,10 +121,10 @@ def hysteresis_figure(case: HysteresisCase) -> plot.Figure:
     """The triangle's last cycle: displacement, and its deviation, against the reference."""
     canvas = plot.figure(height=6.4)
     upper, lower = plot.panels(canvas, 2)
-    closed = case.found.closed
+    closed = case.assessment.closed
     shown = _thinned(closed.t >= closed.t[-1] - PERIOD)
     reference = closed.reference[shown]
-    outputs = {"with PID": closed.y[shown], "without": case.found.open_y[shown]}
+    outputs = {"with PID": closed.y[shown], "without": case.assessment.open_y[shown]}
     plot.traces({name: (reference, y) for name, y in outputs.items()}, upper)
     plot.traces({name: (reference, y - reference) for name, y in outputs.items()}, lower)
     upper.set(xlabel="", ylabel="Displacement [µm]")

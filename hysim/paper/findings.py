@@ -20,7 +20,7 @@ from hysim.paper.study import Progress, Study, asymmetric_law, study
 
 @frozen
 class Findings:
-    """What was computed.
+    """Results of the reproduction.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def find(*, quick: bool = False, progress: Progress | None = None) -> Findings:
                 begun["loops"] = beside.submit(loops, fit.model)
 
         steps = _Steps(progress)
-        models = study(quick=quick, progress=steps.inner, found=begin, asymmetric=lambda _: awaited(asymmetric))
+        models = study(quick=quick, progress=steps.inner, finished=begin, asymmetric=lambda _: awaited(asymmetric))
         steps.next("closed loops")
         reidentification, closed = awaited(begun["reidentification"]), awaited(begun["loops"])
     steps.next("claims")

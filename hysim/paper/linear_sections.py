@@ -91,7 +91,7 @@ def dwell_chapter(widths: Sequence[DwellWidth], drawn: markup.Drawn) -> str:
 
 
 def _period(model: TransferFunction) -> float:
-    """Of the oscillation [unit of time]."""
+    """Period of the oscillation [unit of time]."""
     return 2.0 * math.pi / float(model.poles.imag.max())
 
 

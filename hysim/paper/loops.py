@@ -72,7 +72,7 @@ class HysteresisCase:
     limits: tuple[float, ...] | None
     max_sensitivity: float
     loops_tried: int
-    found: HysteresisAssessment
+    assessment: HysteresisAssessment
 
 
 @frozen
@@ -84,7 +84,7 @@ class StepCase:
     limits: tuple[float, ...] | None
     max_sensitivity: float
     loops_tried: int
-    found: StepAssessment
+    assessment: StepAssessment
 
 
 @frozen
@@ -97,7 +97,7 @@ class SquareCase:
     limits: tuple[float, ...] | None
     max_sensitivity: float
     loops_tried: int
-    found: SquareWaveAssessment
+    assessment: SquareWaveAssessment
 
 
 @frozen
@@ -129,14 +129,18 @@ def loops(law: Any) -> Loops:
 
 
 def control_measures(loops: Loops) -> dict[str, list[Row]]:
-    """What `summary.json` says about control: a row for each loop, under "hysteresis" and "vibration"."""
+    """The entries about control in `summary.json`: a row for each loop, under "hysteresis" and "vibration"."""
     return {
         "hysteresis": [
-            _head(case, case.found.closed.conditions) | _hysteresis_row(case.found) for case in loops.hysteresis
+            _head(case, case.assessment.closed.conditions) | _hysteresis_row(case.assessment)
+            for case in loops.hysteresis
         ],
         "vibration": [
-            *(_head(case, case.found.closed.conditions) | _step_row(case.found.reduction) for case in loops.steps),
-            *(_head(case, case.found.closed.conditions) | _square_row(case.found) for case in loops.squares),
+            *(
+                _head(case, case.assessment.closed.conditions) | _step_row(case.assessment.reduction)
+                for case in loops.steps
+            ),
+            *(_head(case, case.assessment.closed.conditions) | _square_row(case.assessment) for case in loops.squares),
         ],
     }
 
@@ -199,7 +203,7 @@ def _followed(
         limits=pid.limits,
         max_sensitivity=max_sensitivity,
         loops_tried=loops_tried,
-        found=assess_hysteresis(plant, pid, low=low, high=2.5, period=PERIOD, sample_time=SAMPLE_TIME),
+        assessment=assess_hysteresis(plant, pid, low=low, high=2.5, period=PERIOD, sample_time=SAMPLE_TIME),
     )
 
 
@@ -230,7 +234,7 @@ def _step(
         limits=limits,
         max_sensitivity=tuned.max_sensitivity,
         loops_tried=len(tuned.trials),
-        found=assess_step(plant, pid, step=size, duration=duration, sample_time=sample_time),
+        assessment=assess_step(plant, pid, step=size, duration=duration, sample_time=sample_time),
     )
 
 
@@ -244,7 +248,7 @@ def _squares(name: str, plant: TransferFunction, tuned: Tuning) -> list[SquareCa
             limits=ABOUT_34_V,
             max_sensitivity=tuned.max_sensitivity,
             loops_tried=len(tuned.trials),
-            found=assess_square_wave(
+            assessment=assess_square_wave(
                 plant,
                 pid,
                 low=-0.5,
@@ -284,38 +288,41 @@ def _head(case: HysteresisCase | StepCase | SquareCase, conditions: Mapping[str,
     }
 
 
-def _hysteresis_row(found: HysteresisAssessment) -> Row:
+def _hysteresis_row(assessment: HysteresisAssessment) -> Row:
     return {
-        "hysteresis_reduction_percent": found.hysteresis_reduction_percent,
-        "lag_reduction_percent": found.lag_reduction_percent,
-        "open_max_width_um": found.open_width,
-        "closed_max_width_um": found.closed_width,
-        "open_lag_width_um": found.open_lag_width,
-        "lag_width_um": found.lag_width,
-        "tracking_rms_um": found.tracking_rms,
-        "closure_gap_um": found.closure_gap,
-        "secant_gain_um_per_V": found.secant_gain,
+        "hysteresis_reduction_percent": assessment.hysteresis_reduction_percent,
+        "lag_reduction_percent": assessment.lag_reduction_percent,
+        "open_max_width_um": assessment.open_width,
+        "closed_max_width_um": assessment.closed_width,
+        "open_lag_width_um": assessment.open_lag_width,
+        "lag_width_um": assessment.lag_width,
+        "tracking_rms_um": assessment.tracking_rms,
+        "closure_gap_um": assessment.closure_gap,
+        "secant_gain_um_per_V": assessment.secant_gain,
     }
 
 
-def _step_row(found: VibrationReduction | None) -> Row:
-    names = ("overshoot_reduction_percent", "residual_rms_reduction_percent", "settling_time_reduction_percent")
-    if found is None:
+def _step_row(assessment: VibrationReduction | None) -> Row:
+    if assessment is None:
+        names = ("overshoot_reduction_percent", "residual_rms_reduction_percent", "settling_time_reduction_percent")
         return dict.fromkeys((*names, "t98_open", "t98_closed"))
-    return {name: getattr(found, name) for name in names} | {
-        "t98_open": found.open.t98,
-        "t98_closed": found.closed.t98,
-        "overshoot_open_percent": found.open.overshoot,
-        "overshoot_closed_percent": found.closed.overshoot,
-        "settling_time_open": found.open.settling_time,
-        "settling_time_closed": found.closed.settling_time,
+    return {
+        "overshoot_reduction_percent": assessment.overshoot_reduction_percent,
+        "residual_rms_reduction_percent": assessment.residual_rms_reduction_percent,
+        "settling_time_reduction_percent": assessment.settling_time_reduction_percent,
+        "t98_open": assessment.open.t98,
+        "t98_closed": assessment.closed.t98,
+        "overshoot_open_percent": assessment.open.overshoot,
+        "overshoot_closed_percent": assessment.closed.overshoot,
+        "settling_time_open": assessment.open.settling_time,
+        "settling_time_closed": assessment.closed.settling_time,
     }
 
 
-def _square_row(found: SquareWaveAssessment) -> Row:
-    return _step_row(found.reduction) | {
-        "tracking_rms_open_um": found.open_tracking_rms,
-        "tracking_rms_um": found.tracking_rms,
-        "peak_excess_open_percent": found.open_peak_excess_percent,
-        "peak_excess_percent": found.peak_excess_percent,
+def _square_row(assessment: SquareWaveAssessment) -> Row:
+    return _step_row(assessment.reduction) | {
+        "tracking_rms_open_um": assessment.open_tracking_rms,
+        "tracking_rms_um": assessment.tracking_rms,
+        "peak_excess_open_percent": assessment.open_peak_excess_percent,
+        "peak_excess_percent": assessment.peak_excess_percent,
     }

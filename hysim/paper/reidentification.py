@@ -135,7 +135,7 @@ class TimeUnit:
 
 @frozen
 class Information:
-    """What Table 2 holds.
+    """Information in Table 2 about a plant.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ class Information:
 
 @frozen
 class Reidentification:
-    """What `reidentify` found.
+    """Result of `reidentify`.
 
     Parameters
     ----------
@@ -233,12 +233,12 @@ def reidentify(identified: Identification) -> Reidentification:
 
 def time_units() -> tuple[TimeUnit, ...]:
     """Equation (4) as printed in each of `CANDIDATES`, the one that repeats Table 2 best first."""
-    found = [_time_unit(name, sample_time) for name, sample_time in CANDIDATES.items()]
-    return tuple(sorted(found, key=lambda unit: -unit.fit_with_level))
+    units = [_time_unit(name, sample_time) for name, sample_time in CANDIDATES.items()]
+    return tuple(sorted(units, key=lambda unit: -unit.fit_with_level))
 
 
 def information() -> Information:
-    """What Table 2 holds, and how much of a plant it determines."""
+    """The information in Table 2, and the part of a plant that it determines."""
     record = table2()
     response = _line(record.y) / _line(record.u)
     period = _period(record.u)
@@ -272,14 +272,14 @@ def printed_choices() -> tuple[PrintedFit, ...]:
 
     The level is none of the choices: Table 1 begins and ends at 0 V and 0 um.
     """
-    found = []
+    printed_fits = []
     for sample in ("start", "end"):
         fits = _fits(EQUATION_1, table1(), _DWELLS, sample)
         for column, initial in enumerate(("rest", "free")):
             k = int(fits[:, column].argmax())
             best = float(fits[k, column])
-            found.append(PrintedFit(sample=sample, initial=initial, dwell=float(_DWELLS[k]), fit_percent=best))
-    return tuple(found)
+            printed_fits.append(PrintedFit(sample=sample, initial=initial, dwell=float(_DWELLS[k]), fit_percent=best))
+    return tuple(printed_fits)
 
 
 def without_means(record: Record) -> Record:
@@ -309,10 +309,10 @@ def _fits(model: TransferFunction, record: Record, units: FloatArray, sample: st
 def _best_unit(fits: FloatArray) -> tuple[float, float]:
     """The best time between samples near the best of the scan, and its fit."""
     k = int(np.clip(fits.argmax(), 1, fits.size - 2))
-    found = minimize_scalar(
+    optimum = minimize_scalar(
         lambda x: -printed_fits(np.array([x]))[0, 2], bounds=(_SCAN[k - 1], _SCAN[k + 1]), method="bounded"
     )
-    return float(found.x), float(-found.fun)
+    return float(optimum.x), float(-optimum.fun)
 
 
 def _projected(columns: FloatArray, target: FloatArray) -> FloatArray:

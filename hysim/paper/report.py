@@ -58,7 +58,7 @@ def report_page(findings: Findings, drawn: Drawn) -> str:
 def _lead(study: Study) -> str:
     comparison, loop = study.comparison, study.comparison.loop
     linear, single = comparison["eq1-printed"], comparison["single-valued"]
-    law, found = comparison["bouc-wen-asymmetric"], comparison["sindy"]
+    law, sindy = comparison["bouc-wen-asymmetric"], comparison["sindy"]
     return paragraph(
         "Table 1 of B. B. Muhammad, M. H. Rahman, M. R. Ahmad and M. Bashir, “A novel model of PZT actuator and "
         "its application in hysteresis and vibration controls”, Jurnal Teknologi (2016), recomputed by hysim.",
@@ -68,7 +68,7 @@ def _lead(study: Study) -> str:
         f"paper prints fits the points to {linear.fit_percent:.2f} %, and no curve that gives one displacement for "
         f"each voltage can do better than {single.fit_percent:.2f} %: what is missing is memory. With it, a Bouc-Wen "
         f"law with {law.n_parameters} parameters fits to {law.fit_percent:.2f} % and opens {law.max_width:.3f} µm; a "
-        f"law that SINDy discovers fits to {found.fit_percent:.2f} % and opens {found.max_width:.3f} µm."
+        f"law that SINDy discovers fits to {sindy.fit_percent:.2f} % and opens {sindy.max_width:.3f} µm."
     )
 
 
@@ -175,10 +175,10 @@ def _equations(findings: Findings) -> str:
     ]  # fmt: skip
     rows = [
         [
-            name, _roots(found.poles), _roots(found.zeros), f"{found.dc_gain:.5f}",
-            _distinct(found.natural_frequencies), _distinct(found.damping_ratios), f"{found.overshoot_percent:.1f}",
+            name, _roots(facts.poles), _roots(facts.zeros), f"{facts.dc_gain:.5f}",
+            _distinct(facts.natural_frequencies), _distinct(facts.damping_ratios), f"{facts.overshoot_percent:.1f}",
         ]
-        for name, found in findings.equations.items()
+        for name, facts in findings.equations.items()
     ]  # fmt: skip
     pairs = [
         f"{pair.name} fits the step response of {pair.of} to {pair.fit_percent:.0f} %; a second-order model with the "
@@ -255,7 +255,7 @@ def _discovered(study: Study, drawn: Drawn) -> str:
 
 
 def _nested() -> str:
-    found, rows = of_discovered(), nested_errors()
+    discovered, rows = of_discovered(), nested_errors()
     honest = [each for each in rows if not each.terms_kept]
     near = sum(each.behind < 2.0 for each in honest)
     header = ["model", "memory begins", "parameters", "fit [%]", "left-out rmse [µm]", "standard errors behind"]
@@ -263,9 +263,10 @@ def _nested() -> str:
         heading("With the search inside the loop")
         + paragraph(
             "A left-out error is honest where nothing was chosen with the point. So each of the "
-            f"{found.folds} points between the first and the last is taken out in turn, and the whole search or "
-            f"identification runs on the others. The discovered law then errs by {found.left_out_rmse:.4f} µm at the "
-            f"point left out, and has the terms above in {found.same_structure} of {found.folds} searches. "
+            f"{discovered.folds} points between the first and the last is taken out in turn, and the whole search or "
+            f"identification runs on the others. The discovered law then errs by {discovered.left_out_rmse:.4f} µm at "
+            f"the point left out, and has the terms above in {discovered.same_structure} of {discovered.folds} "
+            "searches. "
             f"{near} rows lie within two standard errors of the least error: the points do not tell which of them "
             "predicts better. “Duhem, 5 terms” keeps the terms above, which the points left out have helped to choose, "
             "and stands outside that order. These figures are stored, from experiments/33_nested_table1.py."

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from hysim._atomic import write_all
+from hysim._blas import one_blas_thread
 from hysim._frozen import frozen
 from hysim._parallel import awaited, second_process
 from hysim.comparison import Comparison
@@ -35,12 +36,12 @@ _CLAIM = ("id", "where", "statement", "printed", "recomputed", "unit", "verdict"
 
 @frozen
 class Reproduction:
-    """What `reproduce` wrote.
+    """Result of `reproduce`.
 
     Parameters
     ----------
     folder : Path
-        Where it wrote.
+        Folder of the files.
     files : tuple of str
         The files, relative to the folder.
     findings : Findings
@@ -79,8 +80,9 @@ def reproduce(
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=folder):
         pass
-    computed = find(quick=quick, progress=progress)
-    files = contents(computed)
+    with one_blas_thread():
+        computed = find(quick=quick, progress=progress)
+        files = contents(computed)
     for name in files:
         (folder / name).parent.mkdir(exist_ok=True)
     write_all({folder / name: text for name, text in files.items()})
@@ -152,7 +154,7 @@ def _summary(computed: Findings) -> dict[str, Any]:
             "area_um_V": loop.area,
         },
         "models": model_measures(computed.study),
-        "claims": [{key: getattr(claim, key) for key in _CLAIM} for claim in computed.claims],
+        "claims": [{key: vars(claim)[key] for key in _CLAIM} for claim in computed.claims],
         "control": control_measures(computed.loops),
         "dwell": [dwell_measures(width) for width in computed.dwell],
     }
@@ -169,8 +171,8 @@ def _tables(computed: Findings, summary: dict[str, Any]) -> dict[str, str]:
     parameters: list[list[Any]] = [["model", "parameter", "value", "standard error"]]
     for name, fit in study.fits.items():
         parameters += [[name, key, value, fit.stderr.get(key)] for key, value in fit.estimates.items()]
-    found = {**study.discovery.coefficients, **study.discovery.initial_states[0]}
-    parameters += [["sindy", term, value, None] for term, value in found.items()]
+    terms = {**study.discovery.coefficients, **study.discovery.initial_states[0]}
+    parameters += [["sindy", term, value, None] for term, value in terms.items()]
     control = [row for rows in summary["control"].values() for row in rows]
     named = {
         "models": _by_columns([{"model": name, **row} for name, row in summary["models"].items()]),

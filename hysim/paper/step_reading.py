@@ -31,7 +31,7 @@ _PER_TIME_CONSTANT = 5
 _FADED = 1e-6
 """Share of the slowest mode that remains where the evaluation ends."""
 _ROOT = 1e-12
-"""How exactly an extreme or a crossing is found, as a fraction of the time over which the response is evaluated."""
+"""Precision of the time of an extreme or a crossing, as a fraction of the time over which the response is evaluated."""
 
 
 @frozen

@@ -1,4 +1,4 @@
-"""What `reproduce` computes: every model on the 52 points of Table 1."""
+"""Every model on the 52 points of Table 1, for `reproduce`."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -33,7 +33,7 @@ class Study:
     fits : mapping
         Name to the identification of each model that was identified.
     discovery : Discovery
-        What SINDy found.
+        Law that SINDy discovered.
     """
 
     comparison: Comparison
@@ -51,7 +51,7 @@ def study(
     *,
     quick: bool = False,
     progress: Progress | None = None,
-    found: Callable[[str, Any], None] = lambda name, result: None,
+    finished: Callable[[str, Any], None] = lambda name, result: None,
     asymmetric: Callable[[bool], Identification] = asymmetric_law,
 ) -> Study:
     """Identify, discover and compare on Table 1.
@@ -62,8 +62,8 @@ def study(
         Leave the cross-validation out. That of the discovered law is stored in any case (`hysim.paper.nested`).
     progress : callable, optional
         Called as ``progress(done, total, what)`` before each step.
-    found : callable
-        Called as ``found(name, result)`` after each.
+    finished : callable
+        Called as ``finished(name, result)`` after each.
     asymmetric : callable
         Gives the asymmetric law, perhaps from where it has been computed meanwhile.
     """
@@ -84,7 +84,7 @@ def study(
         if progress is not None:
             progress(done, len(subjects), name)
         results[name] = make()
-        found(name, results[name])
+        finished(name, results[name])
     if progress is not None:
         progress(len(subjects), len(subjects), "comparison")
     return Study(

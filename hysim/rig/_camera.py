@@ -98,18 +98,18 @@ class Camera:
         if len(self.shape) != 2 or min(operator.index(size) for size in self.shape) < 1:
             raise ValueError(f"shape must be (rows, columns), got {self.shape}")
         for name in ("scale", "full_well", "frame_rate", "drift_period"):
-            if not getattr(self, name) > 0.0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+            if not vars(self)[name] > 0.0:
+                raise ValueError(f"{name} must be positive, got {vars(self)[name]}")
         for name in ("blur", "grain", "contrast", "read_noise", "exposure", "jitter"):
-            if getattr(self, name) < 0.0:
-                raise ValueError(f"{name} must not be negative, got {getattr(self, name)}")
+            if vars(self)[name] < 0.0:
+                raise ValueError(f"{name} must not be negative, got {vars(self)[name]}")
         if self.bits not in (8, 12):
             raise ValueError(f"bits must be 8 or 12, got {self.bits}")
         if self.exposure * self.frame_rate > 1.0:
             raise ValueError(f"exposure must be at most a frame's time, {1 / self.frame_rate:g} s, got {self.exposure}")
         for name, least in (("subsamples", 1), ("texture", 0), ("seed", 0)):
-            if operator.index(getattr(self, name)) < least:
-                raise ValueError(f"{name} must be at least {least}, got {getattr(self, name)}")
+            if operator.index(vars(self)[name]) < least:
+                raise ValueError(f"{name} must be at least {least}, got {vars(self)[name]}")
 
     @cached_property
     def _scene(self) -> Scene:
@@ -129,7 +129,7 @@ class Camera:
         return round(math.sin(angle), 15), round(math.cos(angle), 15)
 
     def light(self, y: npt.ArrayLike, t: float = 0.0) -> FloatArray:
-        """What a frame would show without noise, counts or jitter.
+        """The picture of a frame without noise, counts or jitter.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""What the supply does, and when the camera looks: the paper's staircase and its square waves."""
+"""Voltages of the supply and times of the camera's frames: the paper's staircase and its square waves."""
 
 import operator
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 UNITS = {"t": "s", "u": "V", "y": "um"}
 
 SUPPLY = Amplifier(limits=(0.0, 150.0))
-"""The supply of the staircase, of which the paper says nothing but its voltages."""
+"""The supply of the staircase; the paper prints only its voltages."""
 
 UA741 = Amplifier.non_inverting(feedback_resistance=9e3, input_resistance=1e3, limits=(0.0, 44.0), slew_rate=0.5e6)
 """The op-amp of the square waves, equation (2). Its supplies may be 44 V apart: the paper's 50 V are beyond them."""
@@ -36,7 +36,7 @@ LAW = PolynomialBoucWen(
     z0=-8.841,
     input_coefficients=(0.02807, -3.826e-5),
 )
-"""What `identify` makes of Table 1 with n = 1, counted from its first displacement [V, um]."""
+"""The law that `identify` finds in Table 1 with n = 1, relative to its first displacement [V, um]."""
 
 
 @checked
@@ -69,8 +69,8 @@ class Rig:
 
     def __post_init__(self) -> None:
         for name, kind in (("actuator", Actuator), ("camera", Camera)):
-            if not isinstance(getattr(self, name), kind):
-                raise TypeError(f"{name} must be of {kind.__name__}, got {type(getattr(self, name)).__name__}")
+            if not isinstance(vars(self)[name], kind):
+                raise TypeError(f"{name} must be of {kind.__name__}, got {type(vars(self)[name]).__name__}")
 
     def run(self, drive: Drive) -> "Experiment":
         """Drive the actuator; frames are rendered when they are asked for.
@@ -87,7 +87,7 @@ class Rig:
         Raises
         ------
         SimulationError
-            If the actuator leaves the finite numbers.
+            If the actuator diverges.
         ValueError
             If the frames of a level take longer than the level.
         """
@@ -100,14 +100,14 @@ class Rig:
 
 @frozen
 class Experiment:
-    """What was driven, what happened, and what the camera has of it.
+    """A run of the rig: command, voltage, true displacement and the times of the frames.
 
     Parameters
     ----------
     rig : Rig
         Actuator and camera.
     drive : Drive
-        What was done.
+        Voltages and exposures of the run.
     t, u, voltage, y : array, shape (n,)
         Times [s], command and voltage at the actuator [V], and true displacement [um].
     at : array, shape (n_frames,)

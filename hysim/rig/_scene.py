@@ -1,4 +1,4 @@
-"""What lies under the microscope: the textured end of an actuator, moved by any part of a pixel.
+"""The scene under the microscope: the textured end of an actuator, shifted by any fraction of a pixel.
 
     s(r) = sum_k c_k exp(2 pi i f_k . r)          r in pixels, frequencies f_k below half a cycle per pixel
     c_k  = H(f_k) b_k,    H = exp(-2 pi^2 blur^2 |f|^2)

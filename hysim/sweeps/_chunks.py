@@ -1,12 +1,12 @@
-"""What a worker does: some tasks one after the other, or through their batch form, with failures kept as rows.
+"""Computation of a chunk: some tasks one after the other, or through their batch form, with failures kept as rows.
 
-The values of a chunk come back by their layout, the names and shapes of what the tasks returned. Which layout
-is the study's is not known here.
+The values of a chunk are returned by their layout, the names and shapes of the tasks' outputs. A worker does not know
+which layout is that of the study.
 """
 
 import time
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -17,11 +17,18 @@ from hysim.sweeps._space import Column
 
 Task = Callable[..., Any]
 Layout = tuple[tuple[str, tuple[int, ...]], ...]
-"""Names and shapes of what a task returns, a number having the shape ()."""
+"""Names and shapes of a task's outputs; a number has the shape ()."""
+
+
+@runtime_checkable
+class Batched(Protocol):
+    """A task with a batch form, which takes and returns columns in place of single values."""
+
+    batch: Task
 
 
 class Chunk(NamedTuple):
-    """Tasks that travel together: their places in the study, shape (n,), parameters, and seeds if a task takes one."""
+    """Tasks that are sent together: places in the study, shape (n,), parameters, and seeds if the task takes one."""
 
     places: npt.NDArray[np.int64]
     columns: Mapping[str, Column]
@@ -29,7 +36,7 @@ class Chunk(NamedTuple):
 
 
 class Group(NamedTuple):
-    """What the tasks at some places returned: `columns` as the layout has them, each shape (n, *shape)."""
+    """Outputs of the tasks at some places: `columns` in the order of the layout, each of shape (n, *shape)."""
 
     layout: Layout
     places: npt.NDArray[np.int64]
@@ -46,10 +53,9 @@ class Outcome(NamedTuple):
 
 
 def computed(task: Task, chunk: Chunk) -> Outcome:
-    """The outcome of a chunk; the threads of kernels inside are one."""
+    """The outcome of a chunk; kernels inside use one thread."""
     with at_most(1):
-        batch = getattr(task, "batch", None)
-        return _singly(task, chunk) if batch is None else _together(batch, chunk)
+        return _together(task.batch, chunk) if isinstance(task, Batched) else _singly(task, chunk)
 
 
 def _singly(task: Task, chunk: Chunk) -> Outcome:
@@ -76,23 +82,18 @@ def _singly(task: Task, chunk: Chunk) -> Outcome:
 
 
 def _together(batch: Task, chunk: Chunk) -> Outcome:
-    """Through the batch form; a chunk that fails is halved until the tasks that make it fail are alone."""
+    """The outcome through the batch form; a chunk that fails is halved until each task that fails is alone."""
     begin, n = time.perf_counter(), chunk.places.size
     try:
         arguments = dict(chunk.columns) if chunk.seeds is None else {**chunk.columns, "seed": chunk.seeds}
         group = _group(chunk.places, batch(**arguments))
     except Exception as error:
         if n > 1:
-            return _joined(_together(batch, half) for half in _halves(chunk))
-        return Outcome(
-            chunk.places, (), {int(chunk.places[0]): _message(error)}, np.array([time.perf_counter() - begin])
-        )
+            halves = (slice(None, n // 2), slice(n // 2, None))
+            return _joined([_together(batch, part_of(chunk, half)) for half in halves])
+        errors = {int(chunk.places[0]): _message(error)}
+        return Outcome(chunk.places, (), errors, np.array([time.perf_counter() - begin]))
     return Outcome(chunk.places, (group,), {}, np.full(n, (time.perf_counter() - begin) / n))
-
-
-def _halves(chunk: Chunk) -> list[Chunk]:
-    middle = chunk.places.size // 2
-    return [part_of(chunk, half) for half in (slice(None, middle), slice(middle, None))]
 
 
 def part_of(chunk: Chunk, part: Any) -> Chunk:
@@ -101,8 +102,7 @@ def part_of(chunk: Chunk, part: Any) -> Chunk:
     return Chunk(chunk.places[part], columns, None if chunk.seeds is None else chunk.seeds[part])
 
 
-def _joined(outcomes: Any) -> Outcome:
-    parts = list(outcomes)
+def _joined(parts: list[Outcome]) -> Outcome:
     groups: dict[Layout, list[Group]] = {}
     for part in parts:
         for group in part.groups:

@@ -1,21 +1,33 @@
-"""Who computes: threads, processes, the user's executor, or a dask cluster.
+"""Workers of a study: threads, processes, the user's executor, or a dask cluster.
 
-The only contract is that of `concurrent.futures.Executor`; a dask client gives one by its `get_executor`.
+Of an executor only `submit` is used, as `concurrent.futures.Executor` defines it.
 """
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future
+from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 from hysim._parallel import cores, processes, threads
 from hysim.sweeps._chunks import Chunk, Outcome, Task, computed
 
-_of_process: list[Task] = []  # the task of the study that this process was started for
+_task_of_process: list[Task] = []  # the task of the study that this process was started for
+
+
+@runtime_checkable
+class _Submits(Protocol):
+    def submit(self, function: Task, /, *arguments: Any) -> Future[Any]: ...
+
+
+@runtime_checkable
+class _DaskClient(Protocol):
+    def get_executor(self) -> _Submits: ...
+
+    def nthreads(self) -> dict[str, int]: ...
 
 
 class Workers(NamedTuple):
-    """How a chunk is sent out, and how many are computed at a time."""
+    """A function that sends a chunk out, and the number of chunks that are computed at a time."""
 
     submit: Callable[[Chunk], Future[Outcome]]
     number: Callable[[], int]
@@ -23,15 +35,7 @@ class Workers(NamedTuple):
 
 @contextmanager
 def workers_of(executor: Any, number: int | None, task: Task) -> Iterator[Workers]:
-    """The workers that an argument of `sweep` stands for; own threads and processes end with the block.
-
-    Raises
-    ------
-    TypeError
-        If it is no executor.
-    ValueError
-        If it is an unknown word, or the number of workers is not at least 1.
-    """
+    """The workers that the argument `executor` of `sweep` stands for; own threads and processes end with the block."""
     if number is not None and (isinstance(number, bool) or not isinstance(number, int) or number < 1):
         raise ValueError(f"workers must be an integer of at least 1, got {number!r}")
     if executor in (None, "threads"):
@@ -42,22 +46,23 @@ def workers_of(executor: Any, number: int | None, task: Task) -> Iterator[Worker
             yield Workers(lambda chunk: pool.submit(_computed_here, chunk), lambda: number or cores())
     elif isinstance(executor, str):
         raise ValueError(f'executor must be "threads", "processes", an Executor or a dask client, got {executor!r}')
-    elif callable(getattr(executor, "get_executor", None)):
-        theirs = executor.get_executor()
+    elif isinstance(executor, _DaskClient):
+        of_client = executor.get_executor()
         yield Workers(
-            lambda chunk: theirs.submit(computed, task, chunk),
+            lambda chunk: of_client.submit(computed, task, chunk),
             lambda: number or max(1, sum(executor.nthreads().values())),
         )
-    elif callable(getattr(executor, "submit", None)):
-        known = number or getattr(executor, "_max_workers", None) or cores()
-        yield Workers(lambda chunk: executor.submit(computed, task, chunk), lambda: known)
+    elif isinstance(executor, _Submits):
+        is_pool = isinstance(executor, (ThreadPoolExecutor, ProcessPoolExecutor))
+        size: int = vars(executor)["_max_workers"] if is_pool else cores()
+        yield Workers(lambda chunk: executor.submit(computed, task, chunk), lambda: number or size)
     else:
         raise TypeError(f"executor must have the method submit of concurrent.futures.Executor, got {executor!r}")
 
 
 def _begin(task: Task) -> None:
-    _of_process[:] = [task]
+    _task_of_process[:] = [task]
 
 
 def _computed_here(chunk: Chunk) -> Outcome:
-    return computed(_of_process[0], chunk)
+    return computed(_task_of_process[0], chunk)

@@ -1,4 +1,4 @@
-"""By what two studies are known to be the same: the source of the task, the tasks, the seed, the version."""
+"""Identity of a study: the source of the task, the parameters of the tasks, the seed, and the version of hysim."""
 
 import dataclasses
 import hashlib
@@ -18,7 +18,7 @@ _PLAIN = (str, bytes, int, float, complex, type(None), type(...), np.generic)
 
 
 def identity(task: Callable[..., Any], space: Space, seed: int) -> dict[str, str]:
-    """What must not change between two calls that share a store, as short texts that are compared."""
+    """The facts that must not change between two calls that share a store, as short texts."""
     names = ", ".join(space.columns)
     return {
         "task": _digest(inspect.unwrap(task)),
@@ -29,14 +29,14 @@ def identity(task: Callable[..., Any], space: Space, seed: int) -> dict[str, str
 
 
 def _digest(value: Any) -> str:
-    seal = hashlib.sha256()
+    digest = hashlib.sha256()
     for part in _parts(value, ()):
-        seal.update(len(part).to_bytes(8, "little") + part)
-    return seal.hexdigest()[:16]
+        digest.update(len(part).to_bytes(8, "little") + part)
+    return digest.hexdigest()[:16]
 
 
 def _parts(value: Any, above: tuple[Any, ...]) -> Iterator[bytes]:
-    """What a value is, in bytes that are the same in every process; `above` are the functions that it is bound to."""
+    """The content of a value in bytes that are the same in every process; `above` are the functions that hold it."""
     if isinstance(value, (FunctionType, CodeType)) and any(value is one for one in above):
         yield b"itself"
     elif isinstance(value, FunctionType):
@@ -46,7 +46,7 @@ def _parts(value: Any, above: tuple[Any, ...]) -> Iterator[bytes]:
     elif isinstance(value, _PLAIN):
         yield repr(value).encode()
     elif isinstance(value, (type, ModuleType)):
-        yield f"{getattr(value, '__module__', '')}.{value.__name__}".encode()
+        yield f"{value.__module__ if isinstance(value, type) else ''}.{value.__name__}".encode()
     elif (members := _members(value)) is not None:
         yield str(len(members)).encode()
         for member in members:
@@ -56,7 +56,7 @@ def _parts(value: Any, above: tuple[Any, ...]) -> Iterator[bytes]:
 
 
 def _members(value: Any) -> list[Any] | None:
-    """Of what a value consists, in an order of its own; None if it does not say."""
+    """The parts of a value in a fixed order; None if it is of a type without known parts."""
     if isinstance(value, (list, tuple)):
         return [*value]
     if isinstance(value, Mapping):
@@ -72,18 +72,20 @@ def _members(value: Any) -> list[Any] | None:
     if isinstance(value, CodeType):
         return [value.co_code, value.co_names, value.co_varnames, value.co_consts]
     if dataclasses.is_dataclass(value):
+        # a user's dataclass may have slots, so that `vars` would fail
         return [type(value), *(getattr(value, field.name) for field in dataclasses.fields(value))]
     return None
 
 
 def _function_parts(function: FunctionType, above: tuple[Any, ...]) -> Iterator[bytes]:
-    """Source, or compiled code where no file holds it, with what is bound to the function."""
+    """The source, or the compiled code where no file holds it, and the values bound to the function."""
     try:
         yield inspect.getsource(function).encode()
     except (OSError, TypeError):
         yield from _parts(function.__code__, above)
     bound = inspect.getclosurevars(function).nonlocals
-    yield from _parts([function.__defaults__, function.__kwdefaults__, bound, getattr(function, "batch", None)], above)
+    batch = vars(function).get("batch")
+    yield from _parts([function.__defaults__, function.__kwdefaults__, bound, batch], above)
 
 
 def _pickled(value: Any) -> bytes:

@@ -2,38 +2,28 @@
 
 import inspect
 from collections.abc import Mapping
-from dataclasses import fields
-from typing import Any, Literal, get_args
+from typing import Any, Literal, Protocol, get_args, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, checked, read_only
+from hysim._frozen import FloatArray, checked, items, read_only
 
 Measure = Literal["rmse", "sse", "max_width", "area", "final", "response"]
-_OF_A_TARGET = ("rmse", "sse")
+_WITH_TARGET = ("rmse", "sse")
+
+
+@runtime_checkable
+class _ComputesMany(Protocol):
+    def responses(self, *arguments: Any) -> FloatArray: ...
 
 
 @checked
 class ResponseTask:
-    """What `response_task` returns: parameters of a law in, one measure of its response out.
-
-    Parameters
-    ----------
-    family : type
-        Of the law.
-    held : mapping
-        Parameters of the law that the study does not name, to their values.
-    u : array, shape (n,)
-        Input.
-    y : array, shape (n,), optional
-        What the response is compared with.
-    measure : str
-        See `response_task`.
-    """
+    """A function from parameters of a law to one measure of its response, with a batch form; see `response_task`."""
 
     family: type
-    held: Mapping[str, Any]
+    fixed: Mapping[str, Any]
     u: FloatArray
     y: FloatArray | None
     measure: Measure
@@ -45,7 +35,7 @@ class ResponseTask:
     def batch(self, **parameters: npt.ArrayLike) -> dict[str, FloatArray]:
         """The measures for many sets, shape (n_sets,), or the responses, shape (n_sets, n), by their name."""
         laws: Any = self.family
-        sets = {**self.held, **parameters}
+        sets = {**self.fixed, **parameters}
         if self.measure == "response":
             return {"response": laws.responses(sets, self.u, workers=1)}
         reduce = "sse" if self.measure == "rmse" else self.measure
@@ -61,27 +51,26 @@ def response_task(
     Parameters
     ----------
     law : law or class
-        A law, whose values hold for every parameter that the study does not name; or its class, with its defaults.
+        A law, which gives the values of the parameters that the study does not vary; or its class, for its defaults.
     u : array, shape (n,)
         Input, linear between its samples.
     y : array, shape (n,), optional
-        With ``"rmse"`` and ``"sse"`` what the response is compared with.
+        Output to compare the response with, for ``"rmse"`` and ``"sse"``.
     measure : {"rmse", "sse", "max_width", "area", "final", "response"}
         Root of the mean, or sum, of the squared differences from `y`; a measure of `loop_metrics` (last complete
-        cycle); the last sample; or the response itself as an array. inf for a law that escapes.
+        cycle); the last sample; or the response itself as an array. It is inf for a law that diverges.
 
     Returns
     -------
     ResponseTask
-        A function of the law's parameters, whose batch form computes many sets at once, as the family's
-        ``responses`` does, on one thread.
+        A function of the law's parameters, whose batch form computes many sets at once on one thread.
 
     Raises
     ------
     TypeError
-        If the law has no ``responses``, or none with this measure.
+        If the family has no ``responses``, or none with this measure.
     ValueError
-        If there is no such measure, `y` is missing or has nothing to be compared with, or the lengths differ.
+        If the measure is unknown, `y` is missing or not needed, or the lengths differ.
 
     Examples
     --------
@@ -95,14 +84,14 @@ def response_task(
     if measure not in get_args(Measure):
         raise ValueError(f"measure must be one of {', '.join(get_args(Measure))}, got {measure!r}")
     family = law if isinstance(law, type) else type(law)
-    responses = getattr(family, "responses", None)
-    if responses is None or (measure != "response" and "reduce" not in inspect.signature(responses).parameters):
-        raise TypeError(f"{family.__name__} computes no many laws at once with the measure {measure!r}")
-    if (measure in _OF_A_TARGET) != (y is not None):
-        raise ValueError(f"{' and '.join(_OF_A_TARGET)} take y to compare with, and nothing else does")
-    held = {} if isinstance(law, type) else {field.name: getattr(law, field.name) for field in fields(law)}
+    reduces = isinstance(family, _ComputesMany) and "reduce" in inspect.signature(family.responses).parameters
+    if not (isinstance(family, _ComputesMany) and (reduces or measure == "response")):
+        raise TypeError(f"{family.__name__} cannot compute many laws at once with the measure {measure!r}")
+    if (measure in _WITH_TARGET) != (y is not None):
+        raise ValueError(f"y is needed for the measures {' and '.join(_WITH_TARGET)}, and for no other")
+    fixed = {} if isinstance(law, type) else items(law)
     inputs = read_only(u, "u", ndim=1)
     target = None if y is None else read_only(y, "y", ndim=1)
     if target is not None and target.size != inputs.size:
         raise ValueError(f"u and y must have equal lengths, got {inputs.size} and {target.size}")
-    return ResponseTask(family=family, held=held, u=inputs, y=target, measure=measure)
+    return ResponseTask(family=family, fixed=fixed, u=inputs, y=target, measure=measure)

@@ -1,6 +1,7 @@
-"""What `sweep` returns: a table with one row for each task."""
+"""The result of `sweep`: a table with one row for each task."""
 
 import csv
+import importlib
 import io
 from collections import Counter
 from collections.abc import Mapping
@@ -36,13 +37,13 @@ class Sweep:
     seed : array, shape (n,)
         Seeds of the tasks.
     seconds : array, shape (n,)
-        Time that each took [s]; of tasks that went through a batch form together, the mean.
+        Computing time of each task [s]; the mean for tasks in a batch.
     errors : mapping
-        Place of a task that failed to its message.
+        Place of a failed task to its message.
     n_tasks : int
-        Number of tasks of the study; more than there are rows where it was interrupted.
+        Number of tasks of the study, also of those without a row because it was interrupted.
     axes : mapping, optional
-        Of a grid, name of a parameter to the values along its axis.
+        Name of a parameter of a grid to the values along its axis.
     """
 
     parameters: Mapping[str, Column]
@@ -97,33 +98,16 @@ class Sweep:
         return buffer.getvalue()
 
     def to_frame(self) -> Any:
-        """The columns as a `pandas.DataFrame`, its index the tasks; arrays are left out.
-
-        Raises
-        ------
-        ImportError
-            If pandas is not installed.
-        """
-        try:
-            import pandas
-        except ImportError:
-            raise ImportError("to_frame needs pandas: pip install 'hysim[tables]'") from None
+        """The columns as a `pandas.DataFrame` with the tasks as index, without arrays; ImportError without pandas."""
+        pandas = _installed("pandas", "to_frame")
         return pandas.DataFrame(self.columns, index=pandas.Index(self.task, name="task"))
 
     def to_xarray(self) -> Any:
-        """The result as an `xarray.Dataset`: along the axes of a grid, or along the tasks; nan where there is no row.
+        """The result as an `xarray.Dataset` along the axes of a grid or the tasks; ImportError without xarray.
 
-        Axis k of an array beyond these is called after it, ``name_k``.
-
-        Raises
-        ------
-        ImportError
-            If xarray is not installed.
+        Further axes of an output `name` are called ``name_0``, ``name_1``; values are nan where there is no row.
         """
-        try:
-            import xarray
-        except ImportError:
-            raise ImportError("to_xarray needs xarray: pip install 'hysim[tables]'") from None
+        xarray = _installed("xarray", "to_xarray")
         own = {"seed": self.seed, "seconds": self.seconds, "error": self.error}
         if self.axes is None:
             dims: tuple[str, ...] = ("task",)
@@ -137,7 +121,7 @@ class Sweep:
         return xarray.Dataset(variables, coords=coordinates)
 
     def summary(self) -> str:
-        """How many tasks are done and how many failed, why, and the range of every output."""
+        """Numbers of tasks that are done and that failed, the commonest errors, and the range of every output."""
         n = len(self)
         lines = [f"{n} of {self.n_tasks} tasks: {n - len(self.errors)} succeeded, {len(self.errors)} failed"]
         for message, number in Counter(self.errors.values()).most_common(5):
@@ -154,30 +138,37 @@ class Sweep:
             return values
         shape = tuple(len(axis) for axis in self.axes.values())
         missing: Any = "" if values.dtype == object else 0 if values.dtype.kind == "i" else np.nan
-        whole = np.full((self.n_tasks, *values.shape[1:]), missing, dtype=values.dtype)
-        whole[self.task] = values
-        return whole.reshape(*shape, *values.shape[1:])
+        every = np.full((self.n_tasks, *values.shape[1:]), missing, dtype=values.dtype)
+        every[self.task] = values
+        return every.reshape(*shape, *values.shape[1:])
+
+
+def _installed(library: str, method: str) -> Any:
+    try:
+        return importlib.import_module(library)
+    except ImportError:
+        raise ImportError(f"{method} needs {library}: pip install 'hysim[tables]'") from None
 
 
 def load_sweep(path: str | Path) -> Sweep:
-    """Read what a store holds, of a study that is finished, interrupted or still running.
+    """Read the store of a study that is finished, interrupted or still running.
 
     Parameters
     ----------
     path : path
-        The store that was given to `sweep`.
+        The argument `store` of `sweep`.
 
     Returns
     -------
     Sweep
-        With the rows that are there.
+        The rows that are in the store.
 
     Raises
     ------
     OSError
         If the store cannot be read.
     ValueError
-        If it is not one.
+        If the file is not a store.
 
     Examples
     --------
@@ -190,30 +181,27 @@ def load_sweep(path: str | Path) -> Sweep:
     [3.0, 4.0, 6.0, 8.0]
     """
     with opened(path, to_read=True) as store:
-        finished, layout, space = store.finished(), store.layout(), store.space()
-        n_tasks, seed = store.n_tasks, store.seed
-    table = Table(n_tasks, space.columns)
-    if layout:
-        table.begin(layout)
-    table.enter(finished)
+        finished, space, seed = store.finished(), store.space(), store.seed
+        table = Table(store.n_tasks, space.columns)
+        table.restore(store.layout(), finished)
     return result_of(table, space.columns, space.axes, seeds(seed, finished.places))
 
 
 def result_of(
-    table: Table, parameters: Mapping[str, Column], axes: Mapping[str, Column] | None, of_tasks: Column
+    table: Table, parameters: Mapping[str, Column], axes: Mapping[str, Column] | None, task_seeds: Column
 ) -> Sweep:
-    """The rows of the tasks that are done, of which `parameters` and seeds, shape (n,), are given."""
+    """The rows of the tasks that are done, with their parameters and seeds, shape (n,)."""
     places = np.flatnonzero(table.done)
-    kept = {name: values[places] for name, values in table.values.items()}
-    for column in (places, of_tasks, *parameters.values(), *kept.values()):
+    values = {name: column[places] for name, column in table.values.items()}
+    for column in (places, task_seeds, *parameters.values(), *values.values()):
         column.setflags(write=False)
     shapes = dict(table.layout or ())
     return Sweep(
         parameters=parameters,
-        outputs={name: values for name, values in kept.items() if not shapes[name]},
-        arrays={name: values for name, values in kept.items() if shapes[name]},
+        outputs={name: column for name, column in values.items() if not shapes[name]},
+        arrays={name: column for name, column in values.items() if shapes[name]},
         task=places,
-        seed=of_tasks,
+        seed=task_seeds,
         seconds=table.seconds[places],
         errors=dict(sorted(table.errors.items())),
         n_tasks=table.done.size,

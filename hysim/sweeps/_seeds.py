@@ -1,12 +1,12 @@
 """One seed for each task, from the study's seed and the task's place alone.
 
-Task k has the seed that ``numpy.random.SeedSequence(seed).spawn(n)[k]`` would give it,
+Task k has the seed of ``numpy.random.SeedSequence(seed).spawn(n)[k]``,
 
-    SeedSequence(seed, spawn_key=(k,)).generate_state(1, np.uint64) >> 1,
+    SeedSequence(seed, spawn_key=(k,)).generate_state(1, np.uint64) >> 1.
 
-whoever computes it, and whenever. Numpy's pool of four words is mixed with the words of `seed` first and with k
-last, so that all tasks share the first part, and the last is done for all of them at once (M. E. O'Neill's
-``seed_seq_fe``, which numpy keeps stable). One bit is dropped because SQL has no unsigned integers.
+NumPy needs 10 us for each. Here they are computed for all tasks at once: NumPy's pool of four words is mixed with the
+words of `seed` first, which all tasks share, and with k last (M. E. O'Neill's ``seed_seq_fe``, which NumPy keeps
+stable). One bit is dropped because SQL has no unsigned integers.
 """
 
 from typing import Any
@@ -21,13 +21,7 @@ Words = Any
 
 
 def seeds(seed: int, places: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    """Seeds of the tasks at these places, shape (n,).
-
-    Raises
-    ------
-    TypeError, ValueError
-        If the study's seed is not an integer of at least 0.
-    """
+    """Seeds of the tasks at these places, shape (n,); TypeError or ValueError unless `seed` is an integer from 0 on."""
     if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)):
         raise TypeError(f"seed must be an integer, got {seed!r}")
     if seed < 0:
@@ -62,7 +56,7 @@ def _state(pool: list[Words]) -> tuple[Words, Words]:
 
 
 class _Hash:
-    """Multiplications by a constant that moves on from one to the next."""
+    """Hash of one word after the other, by a constant that changes from word to word."""
 
     def __init__(self, start: int, factor: int) -> None:
         self.constant, self.factor = start, factor

@@ -1,10 +1,10 @@
-"""How much of the variance of an output comes from which parameter: Sobol's indices.
+"""Sobol indices: the shares of the variance of an output that are due to each parameter.
 
 Two independent samples A and B of n sets, and for each parameter i the sample AB_i, which is A with the column of
 parameter i from B, give from n (d + 2) tasks
 
-    first order   S_i = Var(E(f | x_i)) / Var(f)              what parameter i does by itself
-    total         T_i = 1 - Var(E(f | all but x_i)) / Var(f)  what it does by itself and with others
+    first order   S_i = Var(E(f | x_i)) / Var(f)              share of parameter i alone
+    total         T_i = 1 - Var(E(f | all but x_i)) / Var(f)  share of parameter i and its interactions
 
 by the estimators of Saltelli (2010), as `scipy.stats.sobol_indices` has them.
 """
@@ -23,7 +23,7 @@ _RESAMPLES = 200
 @printed
 @frozen
 class SobolIndices:
-    """Shares of the variance of outputs, by parameter.
+    """Sobol indices of the outputs of a study.
 
     Parameters
     ----------
@@ -42,8 +42,8 @@ class SobolIndices:
     total_order_interval: Mapping[str, FloatArray]
 
     def __str__(self) -> str:
-        many = f"{len(self.first_order)} outputs by {len(self.parameters)} parameters"
-        return words([f"SobolIndices: {many}", self.summary()])
+        size = f"{len(self.first_order)} outputs by {len(self.parameters)} parameters"
+        return words([f"SobolIndices: {size}", self.summary()])
 
     def summary(self) -> str:
         """The indices as a table."""
@@ -57,14 +57,14 @@ class SobolIndices:
 
 
 def sobol_indices(result: Sweep, *, seed: int = 0) -> SobolIndices:
-    """Sobol indices of every output of a study, from a sample that was made for them.
+    """Sobol indices of every output of a study of a ``Sample(..., method="saltelli")``.
 
     Parameters
     ----------
     result : Sweep
-        Of a ``Sample(..., method="saltelli")``, whole.
+        Result with every task of the sample.
     seed : int
-        Of the bootstrap.
+        Seed of the bootstrap.
 
     Returns
     -------
@@ -73,7 +73,7 @@ def sobol_indices(result: Sweep, *, seed: int = 0) -> SobolIndices:
     Raises
     ------
     ValueError
-        If the study is of another sample, tasks are missing or have failed, or an output is not finite or constant.
+        If the study has another sample, tasks are missing or have failed, or an output is not finite or constant.
 
     Examples
     --------
@@ -99,8 +99,8 @@ def sobol_indices(result: Sweep, *, seed: int = 0) -> SobolIndices:
         intervals[name] = np.quantile(again, [0.025, 0.975], axis=0)
     return SobolIndices(
         parameters=tuple(result.parameters),
-        first_order={name: found[0] for name, found in estimates.items()},
-        total_order={name: found[1] for name, found in estimates.items()},
+        first_order={name: indices[0] for name, indices in estimates.items()},
+        total_order={name: indices[1] for name, indices in estimates.items()},
         first_order_interval={name: limits[:, 0] for name, limits in intervals.items()},
         total_order_interval={name: limits[:, 1] for name, limits in intervals.items()},
     )
@@ -116,7 +116,7 @@ def _check(result: Sweep, n: int) -> None:
         a, b = values[:n], values[n : 2 * n]
         expected = np.concatenate([a, b, *(b if i == k else a for i in range(d))])
         if n == 0 or not np.array_equal(values, expected):
-            raise ValueError('Sobol indices need a sample of their own: hs.Sample(..., method="saltelli")')
+            raise ValueError('Sobol indices need the sample hs.Sample(..., method="saltelli")')
 
 
 def _estimates(parts: FloatArray) -> FloatArray:
@@ -124,6 +124,6 @@ def _estimates(parts: FloatArray) -> FloatArray:
     from scipy import stats
 
     f_a, f_b, *f_ab = parts[:, np.newaxis]
-    and_an_idle_one = np.array([*f_ab, f_a])  # scipy wants two parameters
-    found = stats.sobol_indices(func={"f_A": f_a, "f_B": f_b, "f_AB": and_an_idle_one}, n=parts.shape[1])
-    return np.array([found.first_order, found.total_order])[:, :-1]
+    with_idle_one = np.array([*f_ab, f_a])  # scipy needs at least two parameters
+    indices = stats.sobol_indices(func={"f_A": f_a, "f_B": f_b, "f_AB": with_idle_one}, n=parts.shape[1])
+    return np.array([indices.first_order, indices.total_order])[:, :-1]

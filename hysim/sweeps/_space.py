@@ -1,8 +1,8 @@
-"""Which tasks a study has: a grid, a list, or a sample of distributions, as one column for each parameter."""
+"""The tasks of a study: a grid, a list, or a sample of distributions, as one column for each parameter."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -19,12 +19,18 @@ OWN_NAMES = ("task", "seed", "seconds", "error")
 _DESIGNS = ("sobol", "latin_hypercube", "saltelli")
 
 
-class Space(NamedTuple):
-    """The tasks of a study.
+@runtime_checkable
+class _HasPpf(Protocol):
+    def ppf(self, fractions: FloatArray) -> FloatArray: ...
 
-    `columns` are the parameters, one value for each task. `axes` are the values along each axis of a grid, the
-    last parameter changing fastest, or None for what is no grid.
-    """
+
+@runtime_checkable
+class _HasIcdf(Protocol):
+    def icdf(self, fractions: FloatArray) -> FloatArray: ...
+
+
+class Space(NamedTuple):
+    """The parameters of a study, a value for each task, and for a grid the values along each axis, the last fastest."""
 
     columns: Mapping[str, Column]
     axes: Mapping[str, Column] | None
@@ -37,28 +43,27 @@ class Space(NamedTuple):
 
 @frozen
 class Sample:
-    """Tasks drawn from distributions, spread evenly over them.
+    """A space-filling sample of distributions, as the tasks of a study.
 
     Parameters
     ----------
     distributions : mapping
         Name of a parameter to its distribution: one of `scipy.stats` with its arguments, such as
-        ``scipy.stats.norm(1.0, 0.1)``, or a pair ``(low, high)`` for the uniform one between them.
+        ``scipy.stats.norm(1.0, 0.1)``, or a pair ``(low, high)`` for a uniform one.
     n : int
-        Number of tasks; for ``"sobol"`` a power of 2. For ``"saltelli"`` a power of 2 too, and the tasks of d
-        parameters are n (d + 2).
+        Number of tasks; for ``"sobol"`` a power of 2. For ``"saltelli"`` a power of 2 too, and there are n (d + 2)
+        tasks for d parameters.
     method : {"sobol", "latin_hypercube", "saltelli"}
-        Scrambled Sobol sequence, or Latin hypercube, both of `scipy.stats.qmc`; or the sample that `sobol_indices`
-        takes.
+        Scrambled Sobol sequence, or Latin hypercube, both of `scipy.stats.qmc`; or the sample for `sobol_indices`.
     seed : int
-        Of the sample. The tasks' own seeds come from that of `sweep`.
+        Seed of the sample. The tasks' own seeds come from the seed of `sweep`.
 
     Raises
     ------
     TypeError
         If a distribution is neither a pair of numbers nor one of `scipy.stats`.
     ValueError
-        If there is nothing to draw, a pair is not in order, or the number does not suit the method.
+        If there is no distribution, a pair is not in order, or `n` does not suit the method.
 
     Examples
     --------
@@ -91,13 +96,7 @@ class Sample:
             _quantiles(name, distribution)
 
     def draw(self) -> dict[str, FloatArray]:
-        """The values of each parameter, shape (n_tasks,).
-
-        Raises
-        ------
-        ValueError
-            If a distribution gives a value that is not finite.
-        """
+        """The values of each parameter, shape (n_tasks,); ValueError if a distribution gives one that is not finite."""
         drawn = {}
         for (name, distribution), fractions in zip(self.distributions.items(), self._fractions().T, strict=True):
             drawn[name] = np.asarray(_quantiles(name, distribution)(fractions), dtype=float)
@@ -120,16 +119,7 @@ class Sample:
 
 
 def space_of(space: Any) -> Space:
-    """The tasks that a mapping (a grid), a list of mappings or a `Sample` stands for.
-
-    Raises
-    ------
-    TypeError
-        If it is none of these, or a value is not a number, a string or a boolean.
-    ValueError
-        If there is no task, the mappings of a list have different names, a name is one of the result's own, or a
-        value is nan.
-    """
+    """The tasks of a mapping (a grid), a list of mappings or a `Sample`; TypeError or ValueError for anything else."""
     if isinstance(space, Sample):
         return Space(_checked(space.draw()), None)
     if isinstance(space, Mapping):
@@ -148,13 +138,14 @@ def _quantiles(name: str, distribution: Any) -> Any:
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             raise ValueError(f"the limits of {name} must be finite and in order, got ({low}, {high})")
         return lambda fractions: low + (high - low) * fractions
-    quantiles = getattr(distribution, "ppf", None) or getattr(distribution, "icdf", None)
-    if not callable(quantiles):
-        raise TypeError(
-            f"the distribution of {name} must be a pair (low, high) or one of scipy.stats with its arguments, "
-            f"got {distribution!r}"
-        )
-    return quantiles
+    if isinstance(distribution, _HasPpf):
+        return distribution.ppf
+    if isinstance(distribution, _HasIcdf):
+        return distribution.icdf
+    raise TypeError(
+        f"the distribution of {name} must be a pair (low, high) or one of scipy.stats with its arguments, "
+        f"got {distribution!r}"
+    )
 
 
 def _column(name: str, values: Any) -> Column:
@@ -172,7 +163,7 @@ def _column(name: str, values: Any) -> Column:
 def _product(axes: Mapping[str, Column]) -> dict[str, Column]:
     lengths = [len(values) for values in axes.values()]
     places = np.unravel_index(np.arange(math.prod(lengths)), lengths)
-    return {name: _held(values[place]) for (name, values), place in zip(axes.items(), places, strict=True)}
+    return _read_only({name: values[place] for (name, values), place in zip(axes.items(), places, strict=True)})
 
 
 def _listed(tasks: list[Any]) -> dict[str, Column]:
@@ -196,9 +187,10 @@ def _checked(columns: Mapping[str, Column]) -> dict[str, Column]:
             raise ValueError(f"there is no value of {name}")
         if values.dtype.kind == "f" and np.isnan(values).any():
             raise ValueError(f"the values of {name} must be numbers, got nan")
-    return {name: _held(values) for name, values in columns.items()}
+    return _read_only(dict(columns))
 
 
-def _held(values: Column) -> Column:
-    values.setflags(write=False)
-    return values
+def _read_only(columns: dict[str, Column]) -> dict[str, Column]:
+    for values in columns.values():
+        values.setflags(write=False)
+    return columns

@@ -3,11 +3,10 @@
     study      what the study is: its identity, its parameters, the axes of a grid, the layout of a row
     results    task, seed, seconds, error, shard; then the parameters, then the outputs that are numbers
 
-A row is there or not: rows are written in transactions, and the arrays that they name are in files, one for each
-transaction, which are whole before it begins. Their names begin with the study's own digits: no other file in the
-folder is ever touched, and none outside it read. Columns have no declared type, which would cost zeros their sign; an
-output that is nan is NULL in a row without an error. From one transaction to the next the writer holds SQLite's
-lock for writing, so that nobody else writes, and everybody may read.
+Rows are written in transactions. The arrays of a transaction are in one file, a shard, which is complete before the
+transaction begins. Its name begins with digits of the study: no other file in the folder is ever changed, and none
+outside it read. Columns have no declared type, which would cost zeros their sign; an output that is nan is NULL in a
+row without an error. Between transactions the writer holds SQLite's lock for writing: others may read, not write.
 """
 
 import errno
@@ -23,7 +22,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from hysim._atomic import whole
+from hysim._atomic import replacing
 from hysim._frozen import FloatArray
 from hysim.sweeps._chunks import Group, Layout, Outcome
 from hysim.sweeps._space import Column, Space
@@ -50,23 +49,24 @@ class Store:
         self.path, self._database = path, database
         self._folder = path.with_name(f"{path.name}.arrays")
         self._facts: Study | None = None  # as they were read or written last
+        self._tasks: list[Column] = []  # seeds and parameters of all tasks
 
-    def begin(self, identity: Mapping[str, str], space: Space, on_change: OnChange) -> None:
-        """Make the store that of this study, or refuse it."""
+    def begin(self, identity: Mapping[str, str], space: Space, seeds: Column, on_change: OnChange) -> None:
+        """Prepare the store for writing rows of this study, or refuse it."""
+        self._tasks = [seeds, *space.columns.values()]
         self._database.execute("BEGIN IMMEDIATE")
         before = self._read()
-        goes_on = before is not None and self._goes_on(before.identity, identity, on_change)
-        if before is None or not goes_on:
+        if before is not None and self._is_continued(before.identity, identity, on_change):
+            self._remember(before._replace(identity=identity))
+        else:
             self._refuse_arrays_of_others(before)
             self._create(identity, space, before)
-        else:
-            self._remember(before._replace(identity=identity))
         self._commit()
-        for study in (self._study, *(() if before is None else (before,))):
+        for study in (self._study, before or self._study):
             self._remove_shards_without_rows(study)
 
     def space(self) -> Space:
-        """Parameters and axes of the rows that are there."""
+        """Parameters of the finished rows, and axes of the study."""
         study = self._study
         with damage_named(self.path):
             axes = {name: _as_column(values, study.kinds[name]) for name, values in study.axes or ()} or None
@@ -82,7 +82,7 @@ class Store:
 
     @property
     def seed(self) -> int:
-        """Of the study."""
+        """Seed of the study."""
         return int(self._study.identity["seed"])
 
     def layout(self) -> Layout | None:
@@ -90,33 +90,32 @@ class Store:
         return tuple((output.name, output.shape) for output in self._study.layout or ()) or None
 
     def finished(self) -> Outcome:
-        """All rows that are there, in the order of the tasks."""
+        """All finished rows, in the order of the tasks."""
         with damage_named(self.path):
-            return self._finished()
+            places = np.array(self._column("task"), dtype=np.int64)
+            if places.size and not 0 <= places[0] <= places[-1] < self.n_tasks:
+                raise ValueError(f"it has a row of the task {places[0] if places[0] < 0 else places[-1]}")
+            messages = dict(zip(places.tolist(), self._column("error"), strict=True))
+            good = np.array([text is None for text in messages.values()], dtype=bool)
+            layout = self._study.layout or ()
+            arrays = self._arrays(places[good]) if any(output.shape for output in layout) else {}
+            columns = [
+                arrays[output.name] if output.shape else np.array(self._column(output.column), dtype=float)[good]
+                for output in layout
+            ]
+            return Outcome(
+                places,
+                (Group(self.layout() or (), places[good], tuple(columns)),) if columns else (),
+                {place: str(text) for place, text in messages.items() if text is not None},
+                np.array(self._filled("seconds"), dtype=float),
+            )
 
-    def _finished(self) -> Outcome:
-        places = np.array(self._column("task"), dtype=np.int64)
-        if places.size and not 0 <= places[0] <= places[-1] < self.n_tasks:
-            raise ValueError(f"it has a row of the task {places[0] if places[0] < 0 else places[-1]}")
-        messages = self._column("error")
-        failed = {place: str(text) for place, text in zip(places.tolist(), messages, strict=True) if text is not None}
-        seconds = np.array(self._filled("seconds"), dtype=float)
-        layout = self._study.layout or ()
-        good = np.array([text is None for text in messages], dtype=bool)
-        arrays = self._arrays(places[good]) if any(output.shape for output in layout) else {}
-        columns = [
-            arrays[output.name] if output.shape else np.array(self._column(output.column), dtype=float)[good]
-            for output in layout
-        ]
-        group = Group(tuple((output.name, output.shape) for output in layout), places[good], tuple(columns))
-        return Outcome(places, (group,) if columns else (), failed, seconds)
-
-    def commit(self, outcomes: list[Outcome], layout: Layout | None, space: Space, seeds: Column) -> None:
-        """Write the rows of finished chunks, all or none of them; what was written before may be written again."""
+    def commit(self, outcomes: list[Outcome], layout: Layout | None) -> None:
+        """Write the rows of finished chunks, all or none of them; rows may be written again."""
         if not self._database.in_transaction:  # after an interrupt
             self._database.execute("BEGIN IMMEDIATE")
         try:
-            self._write(outcomes, layout, space, seeds)
+            self._write(outcomes, layout)
             self._commit()
         except BaseException:
             self._facts = None
@@ -124,37 +123,36 @@ class Store:
                 self._database.execute("ROLLBACK")
             raise
 
-    def _write(self, outcomes: list[Outcome], layout: Layout | None, space: Space, seeds: Column) -> None:
+    def _write(self, outcomes: list[Outcome], layout: Layout | None) -> None:
         if layout and not self._study.layout:
-            self._lay_out(layout)
+            self._add_outputs(layout)
         names = [*_OWN_COLUMNS, *self._study.parameters.values()]
         outputs = [output.column for output in self._study.layout or () if not output.shape]
         shard = self._write_shard(outcomes)
         for outcome in outcomes:
             for group in outcome.groups:
                 numbers = [column for (_, shape), column in zip(group.layout, group.columns, strict=True) if not shape]
-                self._insert(outcome, group.places, shard, (space, seeds), [*names, *outputs], numbers)
-            self._insert(outcome, np.array([*outcome.errors], dtype=np.int64), None, (space, seeds), names, [])
+                self._insert(outcome, group.places, shard, [*names, *outputs], numbers)
+            self._insert(outcome, np.array([*outcome.errors], dtype=np.int64), None, names, [])
 
     def _insert(
         self,
         outcome: Outcome,
         places: npt.NDArray[np.int64],
         shard: str | None,
-        of_tasks: tuple[Space, Column],
         names: list[str],
         outputs: list[FloatArray],
     ) -> None:
-        space, seeds = of_tasks
         seconds = dict(zip(outcome.places.tolist(), outcome.seconds.tolist(), strict=True))
         keys = places.tolist()
+        seeds, *parameters = (column[places].tolist() for column in self._tasks)
         columns = [
             keys,
-            seeds[places].tolist(),
+            seeds,
             [seconds[place] for place in keys],
             [outcome.errors.get(place) for place in keys],
             [shard] * len(keys),
-            *(column[places].tolist() for column in space.columns.values()),
+            *parameters,
             *(column.tolist() for column in outputs),
         ]
         self._database.executemany(
@@ -184,20 +182,18 @@ class Store:
         self._facts = facts
         return facts
 
-    def _goes_on(self, before: Mapping[str, str], now: Mapping[str, str], on_change: OnChange) -> bool:
-        """Whether the rows that are there are kept."""
+    def _is_continued(self, before: Mapping[str, str], now: Mapping[str, str], on_change: OnChange) -> bool:
+        """Whether the finished rows are kept."""
         changes = _changes(before, now)
         if not changes or on_change == "restart":
             return not changes
-        is_other = bool({"space", "seed"} & changes.keys())
-        if on_change == "keep" and not is_other:
+        has_same_tasks = not {"space", "seed"} & changes.keys()
+        if on_change == "keep" and has_same_tasks:
             return True
-        mend = 'on_change="restart" begins anew'
-        if not is_other:
-            mend = f'on_change="keep" keeps the finished rows and goes on, {mend}'
+        keep = 'on_change="keep" to keep the finished rows and go on, or ' if has_same_tasks else ""
         raise ValueError(
-            f"{self.path} holds another study: {'; '.join(changes.values())}. Give another store, or say what to do: "
-            f"{mend}"
+            f"{self.path} holds another study: {'; '.join(changes.values())}. Pass another store, or {keep}"
+            'on_change="restart" to begin again'
         )
 
     def _create(self, identity: Mapping[str, str], space: Space, before: Study | None) -> None:
@@ -222,7 +218,7 @@ class Store:
             )
         )
 
-    def _lay_out(self, layout: Layout) -> None:
+    def _add_outputs(self, layout: Layout) -> None:
         columns = _distinct([name for name, _ in layout], (*_OWN_COLUMNS, *self._study.parameters.values()))
         for name, shape in layout:
             if not shape:
@@ -235,7 +231,7 @@ class Store:
         self._facts = study
 
     def _filled(self, name: str) -> list[Any]:
-        """A column in which each row has a value; `None` in an output is a nan, which SQLite does not know."""
+        """A column in which each row must have a value; in outputs NULL is nan, which SQLite does not know."""
         values = self._column(name)
         if None in values:
             raise ValueError(f"a row has no {name!r}")
@@ -261,7 +257,7 @@ class Store:
         places = np.concatenate([group.places for group in groups])
         name = f"{self._study.shards}-{places.min():09d}.npz"
         self._folder.mkdir(exist_ok=True)
-        with whole(self._shard(name), "xb") as file:
+        with replacing(self._shard(name), "xb") as file:
             np.savez(file, task=places, **arrays)  # type: ignore[arg-type]
             file.flush()
             os.fsync(file.fileno())
@@ -286,7 +282,7 @@ class Store:
         return arrays
 
     def _shard(self, name: Any) -> Path:
-        """The file of this name, which is one of this study's and in its folder."""
+        """Path of the shard of this name; ValueError unless it is a shard of this study and no link."""
         if not isinstance(name, str) or not self._is_shard(name, self._study):
             raise ValueError(f"{name!r} is not the name of one of its files with arrays")
         path = self._folder / name
@@ -296,36 +292,34 @@ class Store:
 
     @staticmethod
     def _is_shard(name: str, study: Study) -> bool:
-        """Whether a file of this name is a shard of the study, or was to become one."""
+        """Whether a file of this name is a shard of the study."""
         return re.fullmatch(rf"{study.shards}-[0-9]{{9,18}}\.npz", name) is not None
 
     def _refuse_arrays_of_others(self, before: Study | None) -> None:
-        """Refuse a folder with arrays that are not of the study that was here before."""
+        """Refuse a folder with arrays that do not belong to the study that was in the store before."""
         for path in sorted(self._folder.iterdir()) if self._folder.is_dir() else ():
             if path.suffix == ".npz" and not (before is not None and self._is_shard(path.name, before)):
-                raise ValueError(
-                    f"{path} is not of this study: move it, or the folder, away, or give the study another store"
-                )
+                raise ValueError(f"{path} does not belong to this study: move it or the folder, or use another store")
 
     def _remove_shards_without_rows(self, study: Study) -> None:
-        """Files of a study that were written before a transaction that never came, or of one that is no more."""
-        named = {*self._column("shard")}
+        """Remove the shards of a study that no row names: their transaction failed, or the study was replaced."""
+        used = {*self._column("shard")}
         for path in self._folder.iterdir() if self._folder.is_dir() else ():
-            name = re.sub(r"^\.(.*\.npz)\.[0-9a-f]{16}$", r"\1", path.name)  # as it is called while it is written
-            if self._is_shard(name, study) and path.name not in named:
+            name = re.sub(r"^\.(.*\.npz)\.[0-9a-f]{16}$", r"\1", path.name)  # without what the name has during writing
+            if self._is_shard(name, study) and path.name not in used:
                 path.unlink()
 
 
 @contextmanager
 def opened(path: str | Path, *, to_read: bool = False) -> Iterator[Store]:
-    """The store in a file, which is made if it is missing and to be written; SQLite's errors become built-in ones.
+    """The store in a file, which is created if it is missing and to be written.
 
     Raises
     ------
     OSError
         If it cannot be opened, read or written, with the reason.
     ValueError
-        If the file is something else.
+        If the file is not a store.
     """
     path = Path(path)
     if to_read and not path.is_file():
@@ -334,14 +328,14 @@ def opened(path: str | Path, *, to_read: bool = False) -> Iterator[Store]:
         database = _connected(path, "rw" if to_read else "rwc")
         try:
             if to_read:
-                database.execute("BEGIN")  # everything that is read is of one moment
+                database.execute("BEGIN")  # so that all rows are of one moment
             yield Store(path, database)
         finally:
-            database.close()  # what is not committed is rolled back
+            database.close()  # which rolls back what is not committed
 
 
 def _connected(path: Path, mode: str) -> sqlite3.Connection:
-    """A connection; also a reader may write, because what a killed writer left half done is first taken back."""
+    """A connection; a reader may write too: the unfinished transaction of a killed writer is first rolled back."""
     timeout = _FOR_A_WRITER if mode == "rwc" else _FOR_A_COMMIT
     return sqlite3.connect(f"{path.resolve().as_uri()}?mode={mode}", uri=True, timeout=timeout, isolation_level=None)
 
@@ -351,7 +345,7 @@ def _built_in_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except sqlite3.DatabaseError as error:
-        code = getattr(error, "sqlite_errorcode", 0) & 0xFF
+        code = vars(error).get("sqlite_errorcode", 0) & 0xFF  # errors of the module itself have none
         if code in (sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT):
             raise ValueError(f"{path} is not a store of hysim: {error}") from error
         number, message = _TROUBLE.get(code, (errno.EIO, f"the store failed: {error}"))
@@ -359,14 +353,14 @@ def _built_in_errors(path: Path) -> Iterator[None]:
 
 
 def _changes(before: Mapping[str, str], now: Mapping[str, str]) -> dict[str, str]:
-    """What differs, in words."""
+    """Descriptions of the differences."""
     words = {
         name: f"the {name} was {before.get(name)} and is {value}"
         for name, value in now.items()
         if before.get(name) != value
     }
     if "task" in words:
-        words["task"] = "the task's source or what is bound to it has changed"
+        words["task"] = "the task's source or a value bound to it has changed"
     tasks = now["space"].rpartition(" (")[0]  # without the digest of the values
     if "space" in words and before.get("space", "").rpartition(" (")[0] == tasks:
         words["space"] = f"other values of the parameters ({tasks}, as before)"
@@ -374,7 +368,7 @@ def _changes(before: Mapping[str, str], now: Mapping[str, str]) -> dict[str, str
 
 
 def _distinct(names: Iterable[str], taken: tuple[str, ...]) -> dict[str, str]:
-    """Names of columns in SQL, which does not tell A from a."""
+    """Names of columns that differ in SQL, where A equals a."""
     used, columns = {name.lower() for name in taken}, {}
     for name in names:
         column, k = name, 1
@@ -387,7 +381,7 @@ def _distinct(names: Iterable[str], taken: tuple[str, ...]) -> dict[str, str]:
 
 
 def _quoted(columns: Iterable[str]) -> str:
-    """Names as SQL takes them, whatever signs they have."""
+    """Names in SQL's quotes, so that they may have any characters."""
     return ", ".join('"' + column.replace('"', '""') + '"' for column in columns)
 
 

@@ -1,6 +1,6 @@
-"""The facts of a study, read from rows of a store that may be damaged or of another study.
+"""The facts of a study, checked when they are read from a store, which may be damaged.
 
-identity     name to text, by which two studies are known to be the same
+identity     name to text, which must be equal for two studies to be the same
 n_tasks      number of tasks
 parameters   name to column of the table of results
 kinds        name to kind of its values, as NumPy has it
@@ -12,12 +12,15 @@ shards       what the names of the files with arrays begin with
 import json
 import math
 import re
+import reprlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 from zipfile import BadZipFile
 from zlib import error as CompressionError  # noqa: N812
+
+T = TypeVar("T")
 
 _KINDS = "fibU"
 _TOKEN = re.compile(r"[0-9a-f]{16}")
@@ -54,83 +57,66 @@ class Study(NamedTuple):
 
     @property
     def rows(self) -> dict[str, str]:
-        """The facts as texts, under their names."""
-        axes = self.axes and [[name, values] for name, values in self.axes]
-        values = {**self._asdict(), "axes": axes, "layout": self.layout and [list(output) for output in self.layout]}
-        return {name: json.dumps(value) for name, value in values.items() if name != "layout" or value is not None}
+        """The facts as texts in JSON, by their names; without a layout before it is known."""
+        return {name: json.dumps(value) for name, value in self._asdict().items() if (name, value) != ("layout", None)}
 
 
 def study_of(rows: Mapping[str, Any]) -> Study:
-    """The study that the rows of a store describe.
-
-    Raises
-    ------
-    ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError
-        If they describe none; see `damage_named`.
-    """
+    """The study in the rows of a store; any of `_DAMAGE` if they are damaged."""
     facts = {name: json.loads(text) for name, text in rows.items()}
     study = Study(
         identity=_texts(facts["identity"]),
         n_tasks=_number(facts["n_tasks"]),
         parameters=_texts(facts["parameters"]),
         kinds=_texts(facts["kinds"]),
-        axes=None if facts["axes"] is None else tuple((_text(name), _listed(values)) for name, values in facts["axes"]),
-        layout=tuple(_output(*each) for each in _listed(facts["layout"])) if "layout" in facts else None,
-        shards=_text(facts["shards"]),
+        axes=None if facts["axes"] is None else tuple((_of(str, name), _of(list, v)) for name, v in facts["axes"]),
+        layout=tuple(_output(*each) for each in _of(list, facts["layout"])) if "layout" in facts else None,
+        shards=_of(str, facts["shards"]),
     )
     int(study.identity["seed"])
+    if study.layout == ():
+        raise ValueError("the layout has no output")
     if not study.parameters or study.parameters.keys() != study.kinds.keys():
         raise ValueError("parameters and kinds do not have the same names")
     if not {*study.kinds.values()} <= {*_KINDS}:
-        raise ValueError(f"kinds are of {', '.join(_KINDS)}, got {', '.join(study.kinds.values())}")
+        raise ValueError(f"kinds must be among {', '.join(_KINDS)}, got {', '.join(study.kinds.values())}")
     if study.axes is not None:
         if [name for name, _ in study.axes] != [*study.parameters]:
             raise ValueError("axes and parameters do not have the same names")
         if math.prod(len(values) for _, values in study.axes) != study.n_tasks:
             raise ValueError(f"its axes do not have {study.n_tasks} combinations")
     if not _TOKEN.fullmatch(study.shards):
-        raise ValueError("shards are not called by 16 hexadecimal digits")
+        raise ValueError("the names of shards do not begin with 16 hexadecimal digits")
     return study
 
 
 @contextmanager
 def damage_named(path: str | Path) -> Iterator[None]:
-    """Turn what goes wrong with values that are not what a store holds into a ValueError that names the store."""
+    """Turn the errors of damaged values into a ValueError that names the store."""
     try:
         yield
     except _DAMAGE as error:
         reason = f"{error} is missing" if isinstance(error, KeyError) else str(error) or type(error).__name__
-        raise ValueError(f"{path} is a damaged store, which is to be moved away: {reason}") from error
+        raise ValueError(f"{path} is a damaged store, move it away: {reason}") from error
 
 
 def _output(name: Any, shape: Any, column: Any) -> Output:
-    return Output(_text(name), tuple(_number(length) for length in shape), _text(column))
-
-
-def _listed(value: Any) -> list[Any]:
-    if not isinstance(value, list) or not value:
-        raise TypeError(f"a list was expected, got {_shown(value)}")
-    return value
+    return Output(_of(str, name), tuple(_number(length) for length in shape), _of(str, column))
 
 
 def _texts(value: Any) -> dict[str, str]:
-    if not isinstance(value, dict):
-        raise TypeError(f"a mapping was expected, got {_shown(value)}")
-    return {name: _text(text) for name, text in value.items()}
-
-
-def _text(value: Any) -> str:
-    if not isinstance(value, str):
-        raise TypeError(f"a text was expected, got {_shown(value)}")
-    return value
+    return {name: _of(str, text) for name, text in _of(dict, value).items()}
 
 
 def _number(value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 2**63:
-        raise TypeError(f"a number of tasks or samples was expected, got {_shown(value)}")
+    number = _of(int, value)
+    if not 0 <= number < 2**63:
+        raise ValueError(f"expected a number of tasks or samples, got {reprlib.repr(number)}")
+    return number
+
+
+def _of(kind: type[T], value: Any) -> T:
+    """The value, if it is of this type; true and false are no numbers."""
+    if type(value) is not kind:
+        raise TypeError(f"expected a value of type {kind.__name__}, got {reprlib.repr(value)}")
     return value
-
-
-def _shown(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 40 else f"{text[:37]}..."

@@ -1,9 +1,9 @@
 """The verb `sweep`: one function over many parameters, on whatever computes, and resumable.
 
-A chunk is a number of tasks that travel together. It begins with one task and grows, at most fourfold from one
-finished chunk to the next, until a chunk takes `_CHUNK`, so that the way there and back, about a millisecond, costs
-little; towards the end chunks shrink so that all workers end together. Finished chunks are written before they are
-reported. Nothing that is computed depends on how the tasks were cut.
+A chunk is a number of tasks that are sent together. The first chunk is one task; chunks grow at most fourfold from
+one finished chunk to the next, until one takes `_CHUNK`, so that sending, about a millisecond, costs little; at the
+end they shrink so that all workers end together. Finished chunks are written before they are reported. No result
+depends on how the tasks were divided.
 """
 
 import inspect
@@ -11,6 +11,7 @@ from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import nullcontext
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from hysim.sweeps._executors import Workers, workers_of
 from hysim.sweeps._identity import identity
 from hysim.sweeps._result import Sweep, result_of
 from hysim.sweeps._seeds import seeds
-from hysim.sweeps._space import Column, Space, space_of
+from hysim.sweeps._space import Space, space_of
 from hysim.sweeps._store import ON_CHANGE, OnChange, Store, opened
 from hysim.sweeps._table import Table
 
@@ -29,7 +30,7 @@ _CHUNK, _SHORTEST = 0.075, 0.002  # seconds
 _WITH_ARRAYS = 0.5  # seconds; a shard for each
 _MOST_A_SECOND = 500  # chunks: a scheduler takes a millisecond for each
 _GROWTH = 4
-_PATIENCE = 0.6  # seconds, after an interrupt, for what is being computed
+_PATIENCE = 0.6  # seconds to wait after an interrupt for the chunks that are being computed
 
 
 def sweep(
@@ -49,32 +50,32 @@ def sweep(
     ----------
     task : callable
         Takes the parameters by name, and an argument ``seed`` if it has one. Returns a number, an array, or a
-        mapping of names to these, in every call of the same shapes. Its attribute ``batch``, if there is one,
-        takes columns, shape (n,), in place of numbers, also of ``seed``, and returns columns, shape (n, ...).
+        mapping of names to these, in every call of the same shapes. Its attribute ``batch``, if there is one, takes
+        columns, shape (n,), in place of numbers, also of ``seed``, and returns columns, shape (n, ...).
     space : mapping, list of mappings or Sample
         Names to sequences of values, of which all combinations are computed, the last name changing fastest; or
         one mapping of names to values for each task; or a sample of distributions.
     executor : {"threads", "processes"}, Executor or dask client, optional
-        Who computes: threads by default, which suit tasks that spend their time in kernels. Any
-        `concurrent.futures.Executor` will do, and a `distributed.Client`.
+        Threads by default, which suit tasks that spend their time in kernels; or any `concurrent.futures.Executor` or
+        `distributed.Client`.
     workers : int, optional
-        Number of threads or processes, by default one for each core; or how many chunks the executor computes at
-        a time, if it does not say.
+        Number of threads or processes, by default one for each core; or number of chunks that an executor of unknown
+        size computes at a time.
     store : path, optional
-        File to keep the rows in as they are finished. A second call with the same study computes what is missing.
+        File to keep finished rows in. A second call with the same study computes only the missing ones.
     seed : int
-        Task k gets a seed of its own, from this one and k alone: an integer for `numpy.random.default_rng`.
+        Seed of the study. Task k gets its own seed from this one and k: an integer for `numpy.random.default_rng`.
     on_change : {"error", "keep", "restart"}
-        When the store holds a study with another task, space or seed, or of another version of hysim: refuse it;
-        keep the finished rows if tasks and seed are the same; or begin anew.
+        If the store holds a study with another task, space or seed, or of another version of hysim: raise; keep the
+        finished rows if space and seed are the same; or start again.
     progress : callable, optional
         Called as ``progress(done, total)`` when rows are finished and written.
 
     Returns
     -------
     Sweep
-        The same bits, but for the seconds, whatever computes and in whatever order. A task that raises, or returns
-        other names or shapes than the first that succeeded, is a row with its error.
+        Apart from the seconds the same bits with every executor. A task that raises, or returns other names or shapes
+        than the first that succeeded, is a row with its error.
 
     Raises
     ------
@@ -83,7 +84,7 @@ def sweep(
     ValueError
         If there is no task, a name or a value cannot be used, or the store holds another study.
     OSError
-        If the store is locked, read-only or full, or the executor fails. What was reported is kept.
+        If the store is locked, read-only or full, or the executor fails. Reported rows are kept.
 
     Examples
     --------
@@ -99,28 +100,20 @@ def sweep(
         raise ValueError(f"on_change must be one of {', '.join(ON_CHANGE)}, got {on_change!r}")
     tasks = space_of(space)
     takes_seed = _takes_seed(task, tasks)
-    of_tasks = seeds(seed, np.arange(tasks.n_tasks))
-    everything = Chunk(np.arange(tasks.n_tasks), tasks.columns, of_tasks if takes_seed else None)
+    task_seeds = seeds(seed, np.arange(tasks.n_tasks))
+    everything = Chunk(np.arange(tasks.n_tasks), tasks.columns, task_seeds if takes_seed else None)
     table = Table(tasks.n_tasks, tasks.columns)
-    with nullcontext() if store is None else opened(store) as kept:
-        if kept is not None:
-            kept.begin(identity(task, tasks, seed), tasks, on_change)
-            if layout := kept.layout():
-                table.begin(layout)
-            table.enter(kept.finished())
+    with nullcontext() if store is None else opened(store) as opened_store:
+        if opened_store is not None:
+            opened_store.begin(identity(task, tasks, seed), tasks, task_seeds, on_change)
+            table.restore(opened_store.layout(), opened_store.finished())
         with workers_of(executor, workers, task) as pool:
-            _Study(everything, table, kept, tasks, of_tasks, pool, progress).run()
-    return result_of(table, tasks.columns, tasks.axes, of_tasks)
+            _Run(everything, table, opened_store, pool, progress).run()
+    return result_of(table, tasks.columns, tasks.axes, task_seeds)
 
 
 def _takes_seed(task: Callable[..., Any], space: Space) -> bool:
-    """Whether the task has an argument for its seed.
-
-    Raises
-    ------
-    TypeError
-        If it does not take the parameters.
-    """
+    """Whether the task has an argument for its seed; TypeError if it does not take the parameters."""
     if not callable(task):
         raise TypeError(f"a task must be a function, got {task!r}")
     signature = inspect.signature(task)
@@ -128,32 +121,24 @@ def _takes_seed(task: Callable[..., Any], space: Space) -> bool:
     try:
         signature.bind(**dict.fromkeys([*space.columns, *(["seed"] if takes_seed else [])]))
     except TypeError as error:
-        name = getattr(task, "__name__", repr(task))
+        name = task.__name__ if isinstance(task, FunctionType) else repr(task)
         raise TypeError(f"{name}{signature} does not take the parameters {', '.join(space.columns)}: {error}") from None
     return takes_seed
 
 
-class _Study:
-    """One run: what is to be done, what is on its way, and what is done."""
+class _Run:
+    """One run of a study: the tasks that remain, the chunks that are being computed, and the rows that are done."""
 
     def __init__(
-        self,
-        everything: Chunk,
-        table: Table,
-        store: Store | None,
-        space: Space,
-        of_tasks: Column,
-        workers: Workers,
-        progress: Progress | None,
+        self, everything: Chunk, table: Table, store: Store | None, workers: Workers, progress: Progress | None
     ) -> None:
         self.remaining = part_of(everything, np.flatnonzero(~table.done))
-        self.table, self.store, self.space, self.seeds = table, store, space, of_tasks
-        self.workers, self.progress = workers, progress
+        self.table, self.store, self.workers, self.progress = table, store, workers, progress
         self.running: dict[Future[Outcome], int] = {}
         self.sent, self.largest, self.seconds_a_task = 0, 0, 0.0
 
     def run(self) -> None:
-        """Send out everything that remains, a bounded number of chunks at a time, and settle what comes back."""
+        """Compute the remaining tasks, a bounded number of chunks at a time."""
         self._report()
         try:
             while self._send() or self.running:
@@ -168,7 +153,7 @@ class _Study:
             raise
 
     def _send(self) -> bool:
-        """Fill the workers' queues; whether anything was left to send."""
+        """Fill the workers' queues; False if all was sent before."""
         total, number = self.remaining.places.size, self.workers.number()
         anything = self.sent < total
         while self.sent < total and len(self.running) < 2 * number + 1:
@@ -180,7 +165,7 @@ class _Study:
     def _future(self, chunk: Chunk) -> Future[Outcome]:
         try:
             return self.workers.submit(chunk)
-        except Exception as error:  # a pool that is broken says so here or by a future
+        except Exception as error:  # a broken pool raises here or in the future
             lost: Future[Outcome] = Future()
             lost.set_exception(error)
             return lost
@@ -196,13 +181,13 @@ class _Study:
         return max(1, min(remaining, int(min(target / cost, share, _GROWTH * self.largest))))
 
     def _wait(self) -> None:
-        """Until a chunk can be settled; before the layout is known, that is the first one."""
+        """Wait until a chunk can be settled: before the layout is known, the first one."""
         futures = [next(iter(self.running))] if self.table.layout is None else [*self.running]
         while not any(future.done() for future in futures):
-            wait(futures, timeout=GLANCE, return_when=FIRST_COMPLETED)  # and look for an interrupt
+            wait(futures, timeout=GLANCE, return_when=FIRST_COMPLETED)  # and check for an interrupt
 
     def _settle(self) -> None:
-        """Judge, write, enter and report what is finished, in the order of the tasks until the layout is known."""
+        """Judge, write, enter and report finished chunks, in the order of the tasks until the layout is known."""
         outcomes, lost = {}, None
         for future in list(self.running):
             if future.done() and not future.cancelled() and future.exception() is None:
@@ -213,7 +198,7 @@ class _Study:
             if self.table.layout is None:
                 break
         if outcomes and self.store is not None:
-            self.store.commit(list(outcomes.values()), self.table.layout, self.space, self.seeds)
+            self.store.commit(list(outcomes.values()), self.table.layout)
         for future, outcome in outcomes.items():
             self.table.enter(outcome)
             self._learn(outcome)
@@ -241,7 +226,7 @@ class _Study:
         ) from error
 
     def _end(self, patience: float) -> None:
-        """Take back what has not begun, and wait for the rest so long."""
+        """Cancel chunks that have not begun, and wait so many seconds for the others."""
         for future in list(self.running):
             if future.cancel():
                 del self.running[future]

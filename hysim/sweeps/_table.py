@@ -1,10 +1,10 @@
-"""The rows of a study as they come in, and what a row of it holds.
+"""The rows of a study that are done.
 
-The first task that succeeds, by its place in the study and not by when it ended, says which names and shapes a
-row has. A task that returns others has failed.
+The first task that succeeds, in the order of the study and not of time, sets the names and shapes of a row. A task that
+returns others has failed.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -22,12 +22,12 @@ class Table:
         self.errors: dict[int, str] = {}
         self.seconds = np.full(n_tasks, np.nan)
         self.done = np.zeros(n_tasks, dtype=bool)
-        self._taken = (*OWN_NAMES, *parameters)
+        self._other_names = (*OWN_NAMES, *parameters)
 
     def judged(self, outcome: Outcome) -> Outcome:
-        """The outcome with the values of the study's layout, and a message for every task that returned another.
+        """The outcome with the values of the study's layout, and an error for every task that returned another.
 
-        Outcomes must come in the order of their places until one has a task that succeeds.
+        Until a task has succeeded, outcomes must be passed in the order of their places.
         """
         if self.layout is None and outcome.groups:
             self.begin(min(outcome.groups, key=lambda group: int(group.places.min())).layout)
@@ -40,21 +40,21 @@ class Table:
         return outcome._replace(groups=tuple(kept), errors=errors)
 
     def begin(self, layout: Layout) -> None:
-        """Take a layout for that of the study.
-
-        Raises
-        ------
-        ValueError
-            If an output has the name of a parameter, or of a column that the result has of its own.
-        """
+        """Set the layout of the study; ValueError if an output has the name of another column."""
         for name, shape in layout:
-            if name in self._taken:
-                raise ValueError(f"the task returned {name}, which is the name of another column: call it otherwise")
+            if name in self._other_names:
+                raise ValueError(f"the task returned {name}, which is the name of another column: rename the output")
             self.values[name] = np.full((self.done.size, *shape), np.nan)
         self.layout = layout
 
+    def restore(self, layout: Layout | None, outcome: Outcome) -> None:
+        """Enter the rows of a store."""
+        if layout:
+            self.begin(layout)
+        self.enter(outcome)
+
     def enter(self, outcome: Outcome) -> None:
-        """Enter what was judged."""
+        """Enter an outcome of `judged`."""
         for group in outcome.groups:
             for (name, _), column in zip(group.layout, group.columns, strict=True):
                 self.values[name][group.places] = column
@@ -64,9 +64,7 @@ class Table:
 
     def _in_order(self, group: Group) -> Group:
         layout = self.layout or ()
-        columns: Mapping[str, FloatArray] = {
-            name: column for (name, _), column in zip(group.layout, group.columns, strict=True)
-        }
+        columns = dict(zip(dict(group.layout), group.columns, strict=True))
         return Group(layout, group.places, tuple(columns[name] for name, _ in layout))
 
     def _mismatch(self, layout: Layout) -> str:

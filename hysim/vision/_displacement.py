@@ -32,7 +32,7 @@ def displacement(
     unit: str = "um",
     progress: Progress | None = None,
 ) -> Displacement:
-    """Measure how far the picture has moved in each frame.
+    """Measure the displacement of the picture in each frame.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def displacement(
 
 
 def _source(frames: Any) -> tuple[Iterable[Any], int]:
-    """What gives the frames, and how many there are; 0 where that is not known."""
+    """The frames and their number, which is 0 if it is unknown."""
     if isinstance(frames, (str, Path)):
         frames = read_frames(frames)
     if isinstance(frames, np.ndarray) and frames.ndim not in (3, 4):

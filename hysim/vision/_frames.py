@@ -149,7 +149,7 @@ def _imageio() -> Any:
 
 
 def _count(file: Path) -> int | None:
-    """Frames in a file; None where it does not say. A file that does not open as what it is called is refused."""
+    """Number of frames in a file, None if unknown; an error if the content does not suit the ending of the name."""
     library, reader = _imageio(), _READERS[file.suffix.lower()]
     if reader == "pillow":
         return 1
@@ -195,12 +195,12 @@ class _Complaints(logging.Handler):
 
 @contextmanager
 def _reading(file: Path) -> Iterator[None]:
-    """Failures of the libraries, and what tifffile only tells its log, as one error that names the file."""
+    """Turn errors of the libraries, and messages in tifffile's log, into one error that names the file."""
     log, complaints = logging.getLogger("tifffile"), _Complaints(logging.ERROR)
     log.addHandler(complaints)
     try:
         yield
-    except Exception as error:  # each library has failures of its own kinds
+    except Exception as error:  # each library raises other kinds of errors
         raise ValueError(f"{file}: not a readable {file.suffix} file: {_line(error)}") from None
     finally:
         log.removeHandler(complaints)

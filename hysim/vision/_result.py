@@ -1,4 +1,4 @@
-"""What `displacement` returns."""
+"""The result of `displacement`."""
 
 from collections.abc import Mapping
 from dataclasses import field
@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen, read_only
-from hysim.records import Record
+from hysim.records import Record, check_increasing
 
 STATUSES = ("ok", "blurred", "lost")
 _ROUNDING = 1e-9  # of a log's span: a frame at the very time of a switch sees the new voltage
@@ -16,7 +16,7 @@ _ROUNDING = 1e-9  # of a log's span: a frame at the very time of a switch sees t
 
 @frozen
 class Displacement:
-    """How far the picture has moved, frame by frame.
+    """Displacement of the picture in each frame.
 
     Parameters
     ----------
@@ -59,9 +59,7 @@ class Displacement:
     units: Mapping[str, str] = field(default_factory=lambda: {"y": "um"})
 
     def __post_init__(self) -> None:
-        lengths = {
-            name: len(getattr(self, name)) for name in ("y", "uncertainty", "shift", "across", "quality", "status")
-        }
+        lengths = {name: len(vars(self)[name]) for name in ("y", "uncertainty", "shift", "across", "quality", "status")}
         if len(set(lengths.values())) > 1:
             raise ValueError(f"a displacement has one value of each kind for each frame, got {lengths}")
 
@@ -169,8 +167,10 @@ class Displacement:
             return voltages
         if at is None:
             raise ValueError("u_times are given without frame_times: give both to join by time")
-        log = Record(u=voltages, y=voltages, t=read_only(u_times, "u_times", ndim=1)).t
-        assert log is not None
+        log = read_only(u_times, "u_times", ndim=1)
+        if log.size != voltages.size:
+            raise ValueError(f"u and u_times must have equal lengths, got {voltages.size} and {log.size}")
+        check_increasing(log)
         place = np.searchsorted(log, at + _ROUNDING * (log[-1] - log[0]), side="right") - 1
         if (place < 0).any():
             k = int(np.argmax(place < 0))

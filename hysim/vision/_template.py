@@ -1,4 +1,4 @@
-"""What is known of the reference: a patch under a window, and how a shift shows in it.
+"""Templates of the reference, a patch under a window, and the scores by which a shift is estimated.
 
 A patch whose content has moved by a little e more than expected, under a gain a and with an offset and a slope of the
 light, is
@@ -85,7 +85,7 @@ class Grid:
         return np.asarray(fft.rfft2(patch, self.shape), dtype=np.complex64)
 
     def thumbnail(self, spectrum: Spectrum) -> Spectrum:
-        """Whole plane of the low frequencies."""
+        """The low frequencies in both half planes."""
         height, width = self.small
         rows = np.r_[0 : (height + 1) // 2, -(height // 2) : 0]
         return np.asarray(fft.fft2(fft.irfft2(spectrum[rows, : width // 2 + 1], self.small)), dtype=np.complex64)

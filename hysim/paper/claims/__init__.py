@@ -45,13 +45,13 @@ def claims(study: Study, control: Mapping[str, Sequence[Mapping[str, Any]]] | No
         With different ids.
     """
     eq7, eq6 = approximations()
-    found = information()
+    table2_information = information()
     return (
         *introduction(),
         *table1_claims(study.comparison.record, study.comparison.loop),
         *hysteresis_claims(study, eq7),
-        *experiment_claims(table2(), found),
-        *vibration_claims(eq6, {unit.name: unit for unit in time_units()}, found),
+        *experiment_claims(table2(), table2_information),
+        *vibration_claims(eq6, {unit.name: unit for unit in time_units()}, table2_information),
         *state_space_claims(),
         *controller_claims(),
         *(headline_claims(control) if control is not None else ()),

@@ -19,7 +19,7 @@ from hysim.paper.claims.rounding import Spread, stands_for
 Verdict = Literal["reproduced", "not reproduced", "inconsistent in print", "not checkable"]
 
 MATERIAL = frozenset({"text", "Table 1", "Table 2", "equations"})
-"""What of the paper can be read as numbers. Its figures are photographs, sketches and plots."""
+"""Parts of the paper with numbers. Its figures are photographs, sketches and plots."""
 
 
 @frozen
@@ -58,20 +58,20 @@ class Claim:
 
 
 def compared(
-    id: str, where: str, statement: str, *, printed: Any, found: Spread, method: str, unit: str = "", note: str = ""
+    id: str, where: str, statement: str, *, printed: Any, computed: Spread, method: str, unit: str = "", note: str = ""
 ) -> Claim:
     """A printed number, or several, against what comes out."""
-    agrees = found.agrees(stands_for(printed))
-    return _of_numbers(id, where, statement, printed, found, unit, method, note, _judged(agrees, "not reproduced"))
+    agrees = computed.agrees(stands_for(printed))
+    return _of_numbers(id, where, statement, printed, computed, unit, method, note, _judged(agrees, "not reproduced"))
 
 
 def cross_checked(
-    id: str, where: str, statement: str, *, printed: Any, found: Spread, method: str, unit: str = "", note: str = ""
+    id: str, where: str, statement: str, *, printed: Any, computed: Spread, method: str, unit: str = "", note: str = ""
 ) -> Claim:
     """A printed number, or several, against what other printed numbers say about it."""
-    agrees = found.agrees(stands_for(printed))
+    agrees = computed.agrees(stands_for(printed))
     verdict = _judged(agrees, "inconsistent in print")
-    return _of_numbers(id, where, statement, printed, found, unit, method, note, verdict)
+    return _of_numbers(id, where, statement, printed, computed, unit, method, note, verdict)
 
 
 def decided(
@@ -148,7 +148,7 @@ def _of_numbers(
     where: str,
     statement: str,
     printed: Any,
-    found: Spread,
+    computed: Spread,
     unit: str,
     method: str,
     note: str,
@@ -159,19 +159,19 @@ def _of_numbers(
         where=where,
         statement=statement,
         printed=float(printed) if isinstance(printed, str) else _text(printed),
-        recomputed=shown(found),
+        recomputed=shown(computed),
         unit=unit,
         method=method,
         verdict=verdict,
-        note=" ".join(part for part in (note, _range(found)) if part),
+        note=" ".join(part for part in (note, _range(computed)) if part),
     )
 
 
-def _range(found: Spread) -> str:
+def _range(computed: Spread) -> str:
     """The range that rounding leaves, of a single number."""
-    if found.value.ndim or math.isclose(found.low, found.high, rel_tol=1e-9):
+    if computed.value.ndim or math.isclose(computed.low, computed.high, rel_tol=1e-9):
         return ""
-    return f"The rounding of the printed inputs leaves {found.low:.5g} to {found.high:.5g}."
+    return f"The rounding of the printed inputs leaves {computed.low:.5g} to {computed.high:.5g}."
 
 
 def _text(values: Any) -> str:

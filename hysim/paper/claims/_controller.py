@@ -10,7 +10,7 @@ from hysim.paper.equations import EQUATION_1, EQUATION_4, pid_standard
 from hysim.paper.step_reading import StepReading, step_reading
 
 LOOP_GAIN = 0.5
-"""Of the loops that show what each term does, at zero frequency: (1) is stable there with any one of them."""
+"""Gain at zero frequency of the loops that show the effect of each term: (1) is stable with any one of them."""
 
 INTEGRAL_TIME = 2.0
 DERIVATIVE_TIME = 0.2
@@ -22,7 +22,7 @@ _GAINS = "the gains of the controller"
 
 
 def controller_claims() -> tuple[Claim, ...]:
-    """What section 2.7 says of the controller, decided on (1)."""
+    """Claims of section 2.7 about the controller, decided on (1)."""
     return (_standard_form(), *_terms(), *_open_loop(), *_unseen())
 
 

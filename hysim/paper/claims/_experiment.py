@@ -16,7 +16,7 @@ _PER_US = 1e6
 
 
 def experiment_claims(record: Record, information: Information) -> tuple[Claim, ...]:
-    """What section 2.4 says of the experiment, the amplifier and Table 2."""
+    """Claims of section 2.4 about the experiment, the amplifier and Table 2."""
     return (*_amplifier(), *_bandwidth(), *_program(), *_table2(record, information), *_unseen())
 
 
@@ -28,7 +28,7 @@ def _amplifier() -> tuple[Claim, ...]:
             "Section 2.4.1, equation (2)",
             "Rf/R2 that makes 50 V of 5 V.",
             printed=printed.RATIO,
-            found=exactly(resistor_ratio(OUTPUT, INPUT)),
+            computed=exactly(resistor_ratio(OUTPUT, INPUT)),
             method="equation (2) solved for Rf/R2",
         ),
         cross_checked(
@@ -36,7 +36,7 @@ def _amplifier() -> tuple[Claim, ...]:
             "Section 2.4.1, equation (2)",
             "With that ratio, 5 V become 50 V.",
             printed=printed.OUTPUT_V,
-            found=exactly(INPUT * voltage_gain(ratio)),
+            computed=exactly(INPUT * voltage_gain(ratio)),
             method="equation (2) with the printed ratio",
             unit="V",
         ),
@@ -45,7 +45,7 @@ def _amplifier() -> tuple[Claim, ...]:
             "Section 2.4.1",
             "Rf/R2 is the gain of the amplifier.",
             printed=printed.RATIO,
-            found=exactly(OUTPUT / INPUT),
+            computed=exactly(OUTPUT / INPUT),
             method="V_out / V_in of the same section",
             note="The gain of a non-inverting amplifier is Rf/R2 + 1, as equation (2) says.",
         ),
@@ -81,7 +81,9 @@ def _bandwidth() -> tuple[Claim, ...]:
             "Section 2.4.1, equation (3)",
             f"Full-power bandwidth, for the amplitude of the amplifier's {side}.",
             printed=printed.BANDWIDTH_KHZ,
-            found=spread(lambda x: full_power_bandwidth(x[0] * _PER_US, amplitude) / 1e3, [printed.SLEW_RATE_V_PER_US]),
+            computed=spread(
+                lambda x: full_power_bandwidth(x[0] * _PER_US, amplitude) / 1e3, [printed.SLEW_RATE_V_PER_US]
+            ),
             method=f"equation (3) at {amplitude:g} V with the printed slew rate, in V/us",
             unit="kHz",
             note="The value at the printed numbers would round to 15.92: the print cuts it off."
@@ -99,7 +101,7 @@ def _program() -> tuple[Claim, ...]:
             "Figure 6 and Table 2",
             "Frequency of the square wave, which is on for 5000 ms and off for 5000 ms.",
             printed=printed.FREQUENCY_HZ,
-            found=spread(lambda ms: 1000.0 / (ms[0] + ms[1]), [printed.ON_MS, printed.OFF_MS]),
+            computed=spread(lambda ms: 1000.0 / (ms[0] + ms[1]), [printed.ON_MS, printed.OFF_MS]),
             method="the reciprocal of the printed on and off times against Table 2",
             unit="Hz",
             note=f"Table 2's frequency belongs to a period of {1000.0 / float(printed.FREQUENCY_HZ):.0f} ms.",
@@ -145,7 +147,7 @@ def _table2(record: Record, information: Information) -> tuple[Claim, ...]:
             "Section 2.4 and Table 2",
             "The displacement is proportional to the voltage: that at 50 V from that at 18 V.",
             printed=upper,
-            found=spread(lambda x: x[0] * high / low, [lower]),
+            computed=spread(lambda x: x[0] * high / low, [lower]),
             method="Table 2's displacement at 18 V, times 50/18",
             unit="um",
             note="The zero of displacement is not that of voltage.",

@@ -21,21 +21,21 @@ VIBRATION_MEASURES = {
     "settling-time": "settling_time_reduction_percent",
 }
 MAX_SENSITIVITY = 2.0
-"""Of a loop that counts."""
+"""Largest maximum sensitivity of a loop that counts."""
 _WHERE = "Abstract and section 4"
 
 
 def headline_claims(control: Mapping[str, Sequence[Loop]]) -> tuple[Claim, ...]:
     """The headline claims, of the loops under "hysteresis" and "vibration"."""
     hysteresis, vibration = control.get("hysteresis", ()), control.get("vibration", ())
-    found = [
+    claims = [
         _hysteresis("bouc-wen", "bouc-wen+eq7", "hysteresis_reduction_percent", hysteresis),
         _hysteresis("eq1", "eq1", "lag_reduction_percent", hysteresis),
     ]
     for plant in ("eq4", "eq6"):
-        found += _vibration(plant, vibration)
-    found.append(_to_97(vibration))
-    return tuple(claim for claim in found if claim is not None)
+        claims += _vibration(plant, vibration)
+    claims.append(_to_97(vibration))
+    return tuple(claim for claim in claims if claim is not None)
 
 
 def _hysteresis(name: str, plant: str, key: str, loops: Sequence[Loop]) -> Claim | None:
@@ -127,7 +127,7 @@ def _sensitivity(loop: Loop) -> float:
 
 
 def _fragile(loops: Sequence[Loop], plant: str, key: str) -> str:
-    """What loops reach that do not count."""
+    """Reductions of the loops that do not count."""
     reached = {_sensitivity(loop): _number(loop.get(key)) for loop in loops if loop.get("plant") == plant}
     return " ".join(
         f"A loop with a maximum sensitivity of {sensitivity:.0f} reaches {figure:.1f} %."

@@ -23,7 +23,7 @@ _MEASURED_DIGITS = 3  # Table 1 is in 0.001 um; trailing zeros are not printed
 
 
 def hysteresis_claims(study: Study, eq7: Approximation) -> tuple[Claim, ...]:
-    """What section 2.3 says of (1) and of its estimate."""
+    """Claims of section 2.3 about (1) and its estimate."""
     return (*_poles(), *_fit(study), *_fpe(study), *_memory(study), similar("eq7-similar-to-eq1", "Figure 5", eq7))
 
 
@@ -49,18 +49,18 @@ def _poles() -> tuple[Claim, ...]:
         upper = [pole for pole in np.roots([1.0, *coefficients]) if pole.imag > 0.0]
         return np.array([[pole.real, pole.imag] for pole in sorted(upper, key=lambda pole: -pole.imag)])
 
-    found = spread(roots, printed.DEN_1[1:])
+    computed = spread(roots, printed.DEN_1[1:])
     return tuple(
         cross_checked(
             f"eq1-poles-{name}",
             "Section 2.3",
             f"The {name} pair of poles of (1), real and imaginary part.",
             printed=pair,
-            found=Spread(value=found.value[k], low=found.low[k], high=found.high[k]),
+            computed=Spread(value=computed.value[k], low=computed.low[k], high=computed.high[k]),
             method="roots of the printed denominator over the corners of its rounding",
             unit="rad/s",
-            note=f"The rounding of the coefficients leaves {found.low[k, 0]:.5f} to {found.high[k, 0]:.5f} and "
-            f"{found.low[k, 1]:.5f} to {found.high[k, 1]:.5f}.",
+            note=f"The rounding of the coefficients leaves {computed.low[k, 0]:.5f} to {computed.high[k, 0]:.5f} and "
+            f"{computed.low[k, 1]:.5f} to {computed.high[k, 1]:.5f}.",
         )
         for k, (name, pair) in enumerate(zip(("fast", "slow"), printed.POLES_1, strict=True))
     )
@@ -82,7 +82,7 @@ def _fit(study: Study) -> tuple[Claim, ...]:
             "Section 2.3",
             "Equation (1) fits Table 1.",
             printed=printed.FIT_1,
-            found=spread(of_printed, [*printed.NUM_1, *printed.DEN_1[1:], *measured]),
+            computed=spread(of_printed, [*printed.NUM_1, *printed.DEN_1[1:], *measured]),
             method="fit of (1) as printed: held voltage, displacement at the start of the hold, at rest before, "
             f"at the dwell that suits it best, {dwell:.2f} s",
             unit="%",
@@ -93,7 +93,7 @@ def _fit(study: Study) -> tuple[Claim, ...]:
             "Section 2.3",
             "A transfer function of four poles and one zero, identified on Table 1, fits it.",
             printed=printed.FIT_1,
-            found=spread(lambda y: fit_percent(y, identified.y), measured),
+            computed=spread(lambda y: fit_percent(y, identified.y), measured),
             method="the same structure identified anew under the same hold and sampling",
             unit="%",
         ),
@@ -114,7 +114,7 @@ def _fpe(study: Study) -> tuple[Claim, ...]:
             "Section 2.3",
             "Final prediction error of the identified transfer function.",
             printed=printed.FPE_1,
-            found=spread(lambda y: fpe(y - identified.y, d), measured),
+            computed=spread(lambda y: fpe(y - identified.y, d), measured),
             method=f"V (1 + d/N) / (1 - d/N) of the structure identified anew, d = {d}, N = {n}",
             unit="um^2",
         ),
@@ -123,7 +123,7 @@ def _fpe(study: Study) -> tuple[Claim, ...]:
             "Section 2.3",
             "The same by the formula's first order.",
             printed=printed.FPE_1,
-            found=spread(lambda y: float(np.mean((y - identified.y) ** 2)) * (1.0 + 2.0 * d / n), measured),
+            computed=spread(lambda y: float(np.mean((y - identified.y) ** 2)) * (1.0 + 2.0 * d / n), measured),
             method=f"V (1 + 2 d/N) of the structure identified anew, d = {d}, N = {n}",
             unit="um^2",
         ),
@@ -132,7 +132,7 @@ def _fpe(study: Study) -> tuple[Claim, ...]:
             "Section 2.3",
             "Fit and final prediction error belong to one model.",
             printed=printed.FPE_1,
-            found=spread(by_fit, [printed.FIT_1, *measured]),
+            computed=spread(by_fit, [printed.FIT_1, *measured]),
             method="V (1 + 2 d/N) with V from the printed fit and the variance of Table 1",
             unit="um^2",
         ),

@@ -6,7 +6,7 @@ from hysim.paper.claims.rounding import exactly
 
 
 def introduction() -> tuple[Claim, ...]:
-    """What can be said of the literature that the paper cites."""
+    """Claims about the literature that the paper cites."""
     return (
         unseen(
             "cited-vibration-33",
@@ -21,7 +21,7 @@ def introduction() -> tuple[Claim, ...]:
             "Section 1 and References",
             "The highest number that the text cites is the last one of the list.",
             printed=printed.LAST_CITED,
-            found=exactly(float(printed.LAST_LISTED)),
+            computed=exactly(float(printed.LAST_LISTED)),
             method="the highest number cited in the text against the last of the list",
             note="One entry of the list, after its number 12, has lost its number.",
         ),
@@ -30,7 +30,7 @@ def introduction() -> tuple[Claim, ...]:
             "Section 1 and References",
             "The BAT search algorithm has the number in the list by which the text cites it.",
             printed=printed.BAT_SEARCH_CITED,
-            found=exactly(float(printed.BAT_SEARCH_LISTED)),
+            computed=exactly(float(printed.BAT_SEARCH_LISTED)),
             method="the number cited in the text against the number in the list",
             note="From number 13 on the list is one behind the text.",
         ),

@@ -13,7 +13,7 @@ from hysim.paper.state_space import EQUATIONS_7_8, EQUATIONS_13_14, StateSpace
 
 
 def state_space_claims() -> tuple[Claim, ...]:
-    """What section 2.6 says of (7) to (16)."""
+    """Claims of section 2.6 about (7) to (16)."""
     return (
         *_structural("eq10", "(7), (8)", EQUATIONS_7_8, printed.A_7, printed.C_8, printed.CONTROLLABILITY_10, "eq12",
                      printed.OBSERVABILITY_12),
@@ -37,7 +37,7 @@ def _realisation() -> tuple[Claim, ...]:
             f"Section 2.6.2, equation {equation}",
             f"The entry that stands for {quantity}.",
             printed=entry,
-            found=_times(stands_for(coefficient), sign),
+            computed=_times(stands_for(coefficient), sign),
             method="the entry that the companion form of (6) would have",
         )
         for name, (equation, quantity, entry, coefficient, sign) in pairs.items()
@@ -67,24 +67,24 @@ def _structural(
     )
 
 
-def _matrix(id: str, what: str, model: str, matrix: Matrix, found: Spread) -> tuple[Claim, ...]:
+def _matrix(id: str, what: str, model: str, matrix: Matrix, computed: Spread) -> tuple[Claim, ...]:
     where = f"Section 2.6, equation ({id.removeprefix('eq')})"
-    determinant = found.value[0, 0] * found.value[1, 1] - found.value[0, 1] * found.value[1, 0]
-    rank = int(np.linalg.matrix_rank(found.value))
+    determinant = computed.value[0, 0] * computed.value[1, 1] - computed.value[0, 1] * computed.value[1, 0]
+    rank = int(np.linalg.matrix_rank(computed.value))
     return (
         cross_checked(
             f"{id}-{what}ility-matrix",
             where,
             f"The {what}ility matrix of {model}.",
             printed=_exact_units(matrix),
-            found=found,
+            computed=computed,
             method="computed from the printed state-space form over the corners of its rounding",
         ),
         decided(
             f"{id}-{what}le",
             where,
             f"The model {model} is {what}le: the matrix is not singular.",
-            holds=rank == int(printed.RANK) and _regular(found),
+            holds=rank == int(printed.RANK) and _regular(computed),
             method="rank of the matrix, and a determinant that no rounding brings to zero",
             printed=float(printed.RANK),
             recomputed=float(rank),
@@ -93,9 +93,9 @@ def _matrix(id: str, what: str, model: str, matrix: Matrix, found: Spread) -> tu
     )
 
 
-def _regular(found: Spread) -> bool:
+def _regular(computed: Spread) -> bool:
     """Whether the determinant keeps its sign for every choice of entries in their ranges."""
-    a, b, c, d = ([found.low[i, j], found.high[i, j]] for i in range(2) for j in range(2))
+    a, b, c, d = ([computed.low[i, j], computed.high[i, j]] for i in range(2) for j in range(2))
     values = [w * z - x * y for w in a for x in b for y in c for z in d]
     return bool(min(values) > 0.0 or max(values) < 0.0)
 

@@ -10,14 +10,14 @@ from hysim.paper.resolution import quantum
 from hysim.records import Record
 
 QUANTUM_TOLERANCE = 0.005
-"""How far the displacements of Table 1 lie from whole pixels [um]: more than their last digit's rounding."""
+"""Largest distance of Table 1's displacements from multiples of a pixel [um]: more than their last digit's rounding."""
 
 _PHOTOGRAPHS = "the photographs of the setup as data"
 _TIMES = "the times at which the staircase was read"
 
 
 def table1_claims(record: Record, loop: LoopMetrics) -> tuple[Claim, ...]:
-    """What the text says of Table 1, and what its figures add."""
+    """Claims of the text and the figures about Table 1."""
     return (*_staircase(record), *_displacements(record), *_loop(record, loop), *_unseen())
 
 
@@ -29,7 +29,7 @@ def _staircase(record: Record) -> tuple[Claim, ...]:
             "Table 1, part 1",
             "Part 1 holds the points of increasing voltage.",
             printed=printed.POINTS_LOADING,
-            found=exactly(float(rising.size)),
+            computed=exactly(float(rising.size)),
             method="count of the samples up to the first that does not rise",
         ),
         compared(
@@ -37,7 +37,7 @@ def _staircase(record: Record) -> tuple[Claim, ...]:
             "Table 1, part 2",
             "Part 2 holds the points of decreasing voltage.",
             printed=printed.POINTS_UNLOADING,
-            found=exactly(float(falling.size)),
+            computed=exactly(float(falling.size)),
             method="count of the samples from there on, all falling",
         ),
         compared(
@@ -45,7 +45,7 @@ def _staircase(record: Record) -> tuple[Claim, ...]:
             "Section 2.1",
             "The voltage rises from 0 V to 125 V, and falls back to 0 V.",
             printed=printed.RANGE_V,
-            found=exactly([record.u.min(), record.u.max()]),
+            computed=exactly([record.u.min(), record.u.max()]),
             method="smallest and largest voltage of Table 1",
             unit="V",
         ),

@@ -12,7 +12,7 @@ from hysim.paper.reidentification import Information, TimeUnit
 
 
 def vibration_claims(eq6: Approximation, units: Mapping[str, TimeUnit], information: Information) -> tuple[Claim, ...]:
-    """What section 2.5 says of (4) and (6); the units of time by their names."""
+    """Claims of section 2.5 about (4) and (6); the units of time by their names."""
     return (
         _repeats_table2("eq4-per-sample", "sample", units),
         _repeats_table2("eq4-per-second", "second", units),

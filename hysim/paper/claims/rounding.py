@@ -67,12 +67,12 @@ def half_unit(text: str) -> float:
 
 
 def stands_for(printed: Any) -> Spread:
-    """What printed numbers stand for: one, or nested sequences of one shape.
+    """The ranges of values that printed numbers stand for: one, or nested sequences of one shape.
 
     Examples
     --------
-    >>> found = stands_for("91.5")
-    >>> float(found.low), float(found.high)
+    >>> spread = stands_for("91.5")
+    >>> float(spread.low), float(spread.high)
     (91.45, 91.55)
     """
     value, half = _values(printed), _halves(printed)
@@ -114,12 +114,12 @@ def exactly(value: npt.ArrayLike) -> Spread:
 def _over_corners(
     function: Callable[[FloatArray], npt.ArrayLike], centre: FloatArray, halves: FloatArray, rounded: npt.NDArray[Any]
 ) -> tuple[FloatArray, FloatArray]:
-    found = []
+    corners = []
     for signs in product((-1.0, 1.0), repeat=rounded.size):
         corner = centre.copy()
         corner[rounded] += signs * halves[rounded]
-        found.append(np.asarray(function(corner), dtype=float))
-    return np.min(found, axis=0), np.max(found, axis=0)
+        corners.append(np.asarray(function(corner), dtype=float))
+    return np.min(corners, axis=0), np.max(corners, axis=0)
 
 
 def _one_at_a_time(
