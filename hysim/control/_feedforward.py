@@ -14,7 +14,7 @@ from hysim.models.actuator import Actuator, is_law
 from hysim.models.amplifier import Amplifier
 from hysim.models.creep import Creep
 from hysim.models.inverse_steps import inverse_step
-from hysim.models.model import model
+from hysim.models.model import family
 from hysim.models.protocols import CompiledController, needs_time
 from hysim.models.static import Line
 
@@ -27,7 +27,7 @@ class FeedforwardBlock(NamedTuple):
     state: FloatArray
 
 
-@model
+@family
 class InverseFeedforward(SampledController):
     """The command that takes a model of an actuator to a wanted displacement, sample by sample.
 

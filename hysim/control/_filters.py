@@ -17,10 +17,10 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim.control._sampled import Feedback
-from hysim.models.model import model
+from hysim.models.model import family
 
 
-@model
+@family
 class Notch:
     """Filter that cancels a resonance in the feedback's command.
 
@@ -69,7 +69,7 @@ class Notch:
         return biquad_response(self.coefficients(sample_time), frequency, sample_time)
 
 
-@model
+@family
 class DampingLoop:
     """Positive feedback of the displacement through a low-pass filter, which damps a resonance.
 

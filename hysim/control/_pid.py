@@ -17,14 +17,14 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, read_only
 from hysim.control._sampled import Feedback, SampledController, check_limits, check_sample_time
 from hysim.kernels import controllers as kernels
-from hysim.models.model import model
+from hysim.models.model import family
 from hysim.models.protocols import CompiledController
 
 State = tuple[float, float, float, float]
 """Last command before the limits, integral part, derivative part, and last c r - y."""
 
 
-@model
+@family
 class PID(SampledController):
     """Sampled PID controller with limits, anti-windup and a filtered derivative.
 

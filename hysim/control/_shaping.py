@@ -30,14 +30,14 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
-from hysim.models.model import model
+from hysim.models.model import family
 from hysim.models.modes import mode
 from hysim.models.sampled import sampled, vibration_stage
 
 _BOXES = 2  # moving averages in a row: their motion has a bounded acceleration, that of a mode in least time
 
 
-@model
+@family
 class Shaper:
     """Filter of the reference that excites no vibration of some modes.
 
@@ -144,7 +144,7 @@ class Shaper:
         return total
 
 
-@model
+@family
 class ModeInverse:
     """Inverse of a resonance, for a smooth reference that is known two samples ahead.
 

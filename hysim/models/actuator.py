@@ -19,7 +19,7 @@ from hysim.errors import SimulationError
 from hysim.models.amplifier import Amplifier
 from hysim.models.chain import Chain, ChainState, linear_chain
 from hysim.models.creep import Creep
-from hysim.models.model import model
+from hysim.models.model import family
 from hysim.models.protocols import Remembering, Responding, Sampled, Steppable, law_at, needs_time
 from hysim.models.sampled import Stage, Vibration
 from hysim.models.sensor import Sensor
@@ -33,7 +33,7 @@ def is_law(value: Any) -> bool:
     return steps and (not needs_time(value) or isinstance(value, Sampled))
 
 
-@model
+@family
 class Actuator:
     """A hysteretic actuator with its physics.
 

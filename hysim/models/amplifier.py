@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim.models.model import model
+from hysim.models.model import family
 
 
 class CompiledAmplifier(NamedTuple):
@@ -25,7 +25,7 @@ class CompiledAmplifier(NamedTuple):
     state: FloatArray
 
 
-@model
+@family
 class Amplifier:
     """From the command to the voltage at the actuator.
 

@@ -27,7 +27,7 @@ from hysim.models import _boucwen_conversions
 from hysim.models._asymmetric import SteppedLaw
 from hysim.models.holding import Holding
 from hysim.models.law import Packed, Tables
-from hysim.models.model import model
+from hysim.models.model import family
 from hysim.models.search_space import Freedom, Parameters
 from hysim.records import Record
 
@@ -35,7 +35,7 @@ _PINCHING = ("zeta_s", "q", "p", "psi", "delta_psi", "lambda_")
 _OWN = ("delta_a", "delta_nu", "delta_eta", *_PINCHING)
 
 
-@model
+@family
 class BoucWenBaberNoori(SteppedLaw):
     """Bouc-Wen law with degradation and pinching, after Baber and Noori (1985) and Foliente (1995).
 

@@ -11,10 +11,10 @@ from typing import ClassVar, Self
 
 from hysim.models import _boucwen_conversions as conversions
 from hysim.models._boucwen_law import BoucWenLaw
-from hysim.models.model import model
+from hysim.models.model import family
 
 
-@model
+@family
 class BoucWen(BoucWenLaw):
     """Symmetric Bouc-Wen law, ``y = offset + feedthrough u + gain z``.
 

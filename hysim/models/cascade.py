@@ -17,13 +17,13 @@ from hysim.kernels.composed import one_behind_the_other
 from hysim.models._cascade_search import CascadeStructure
 from hysim.models._composite import Composite, State, continued
 from hysim.models._parts import check_parts, compiled_law, compiled_pair, labels, response_of
-from hysim.models.model import model
+from hysim.models.model import family
 from hysim.models.protocols import CompiledLaw
 
 __all__ = ["Cascade", "CascadeStructure"]
 
 
-@model
+@family
 class Cascade(Composite):
     """Models one behind the other; ``first >> second`` is short for it.
 

@@ -23,11 +23,11 @@ import numpy as np
 from hysim._frozen import FloatArray
 from hysim.models._as_bouc_wen import AsBoucWen
 from hysim.models.law import Tables
-from hysim.models.model import model
+from hysim.models.model import family
 from hysim.models.parameters import Parameter
 
 
-@model
+@family
 class ColemanHodgdon(AsBoucWen):
     """Backlash-like Duhem law, ``y' = alpha |u'| (c u + offset - y) + B u'``.
 

@@ -16,13 +16,13 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
-from hysim.models.model import model
+from hysim.models.model import family
 from hysim.models.state_space import StateSpace
 
 _TIMES_PER_DECADE = 20  # at which the bank is fitted
 
 
-@model
+@family
 class Creep:
     """A bank of Kelvin-Voigt elements.
 

@@ -14,13 +14,13 @@ import numpy as np
 from hysim._frozen import FloatArray
 from hysim.models._as_bouc_wen import AsBoucWen
 from hysim.models.law import Tables
-from hysim.models.model import model
+from hysim.models.model import family
 from hysim.models.parameters import Parameter
 
 _STARTS = ((0.03, 0.5), (0.1, 0.5), (0.3, 0.7), (1.0, 1.5))  # coulomb / stiffness in spans of u, coulomb in spans of y
 
 
-@model
+@family
 class Dahl(AsBoucWen):
     """Dahl friction, ``F' = stiffness (u' - |u'| F / coulomb)`` and ``y = offset + F``.
 

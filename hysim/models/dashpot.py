@@ -15,14 +15,14 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
 from hysim.models.composable import Composable
-from hysim.models.model import model
+from hysim.models.model import family
 from hysim.models.protocols import Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.static import linear_space
 from hysim.records import Record
 
 
-@model
+@family
 class Dashpot(Identifiable, Composable):
     """Viscous damper, ``y = c u'``.
 

@@ -30,7 +30,7 @@ from hysim.models import _duhem_search, _inverse_search, duhem_structure
 from hysim.models.duhem_runs import branches, free_runs, outputs
 from hysim.models.duhem_structure import DuhemStructure
 from hysim.models.law import Law, Packed, State, Tables
-from hysim.models.model import model
+from hysim.models.model import family
 from hysim.models.protocols import CompiledLaw
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.terms import Polynomials, Term, equation, latex, polynomials, terms_of
@@ -44,7 +44,7 @@ def _none() -> FloatArray:
     return np.zeros((1, 1))
 
 
-@model
+@family
 class Duhem(Law):
     """Polynomial Duhem law, ``y = offset + feedthrough u + z`` with ``z' = u' p(u, z) + |u'| q(u, z)``.
 

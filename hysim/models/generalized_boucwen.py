@@ -19,7 +19,7 @@ from hysim._frozen import FloatArray
 from hysim.kernels import generalized as kernels
 from hysim.models._asymmetric import SteppedLaw
 from hysim.models.law import Packed, Tables
-from hysim.models.model import model
+from hysim.models.model import family
 from hysim.models.search_space import Freedom
 from hysim.records import Record
 
@@ -28,7 +28,7 @@ _ONE_SIDED = (("b6", "gamma"), ("b3", "b5"), ("b2", "b4"))
 """Where u keeps its sign, the terms of a pair are the same to a sign."""
 
 
-@model
+@family
 class GeneralizedBoucWen(SteppedLaw):
     """Bouc-Wen law with a shape for each sector of the loop, after Song and Der Kiureghian (2006).
 

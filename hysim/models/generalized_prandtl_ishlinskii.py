@@ -25,7 +25,7 @@ from hysim._frozen import FloatArray, checked, read_only
 from hysim.models._clamp_search import Axis, ClampStructure, half_span
 from hysim.models._play_sums import IDENTITY, ExtendedPlays, kernel_rows, positions_of
 from hysim.models.law import Packed, State, Tables
-from hysim.models.model import model
+from hysim.models.model import family
 from hysim.models.search_space import Parameters
 from hysim.records import Record
 
@@ -34,7 +34,7 @@ _SKEWS = (-3.0, 3.0)  # where the middle of the input is on the tanh
 _STARTS: tuple[tuple[float, ...], ...] = ((0.3, 1.0), (0.0, -1.0, 1.0), (0.2,))
 
 
-@model
+@family
 class GeneralizedPrandtlIshlinskii(ExtendedPlays):
     """Generalised Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i`` over plays behind envelopes.
 

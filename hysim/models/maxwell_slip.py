@@ -18,11 +18,11 @@ from hysim._frozen import read_only
 from hysim.models._by_structure import ByStructure
 from hysim.models._clamp_search import ClampStructure
 from hysim.models._clamps import ClampLaw
-from hysim.models.model import model
+from hysim.models.model import family
 from hysim.models.prandtl_ishlinskii import PrandtlIshlinskii
 
 
-@model
+@family
 class MaxwellSlip(ByStructure, ClampLaw):
     """Maxwell-slip law, ``F = offset + feedthrough u + sum k_i (u - z_i)``.
 

@@ -1,4 +1,4 @@
-"""What every model shares: the `model` decorator, the registry of families, and the protocols.
+"""What every model shares: the `family` decorator, the registry of families, and the protocols.
 
 A model is a specification. It is frozen and keyword-only, its numbers are finite floats, and it is
 compared by value. Evolving state is separate: it is passed in and handed back.
@@ -20,7 +20,7 @@ FAMILIES: dict[str, type] = {}
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True)
-def model(cls: type[T]) -> type[T]:
+def family(cls: type[T]) -> type[T]:
     """Make `cls` a frozen model, and enter it into the registry of families under its name."""
     specification = checked(cls)
     specification.__str__ = _in_words  # type: ignore[method-assign]
@@ -72,6 +72,3 @@ def every_family() -> dict[str, type]:
         if module.startswith("hysim.models."):
             importlib.import_module(module)
     return FAMILIES
-
-
-family = model

@@ -10,7 +10,7 @@ w is the natural frequency, zeta the damping ratio, g the static gain. In the st
 import numpy as np
 import numpy.typing as npt
 
-from hysim.models.model import model
+from hysim.models.model import family
 from hysim.models.state_space import StateSpace
 from hysim.models.transfer_function import TransferFunction
 
@@ -54,7 +54,7 @@ def mode(natural_frequency: float, damping_ratio: float, gain: float = 1.0, *, d
     )
 
 
-@model
+@family
 class Modes:
     """Several resonances side by side.
 

@@ -25,11 +25,11 @@ from hysim._frozen import FloatArray, read_only
 from hysim.models._dead_zone_search import DeadZoneStructure
 from hysim.models._play_sums import ExtendedPlays, check_dead_zones, dead_zone, kernel_rows
 from hysim.models.law import Packed, State, Tables
-from hysim.models.model import model
+from hysim.models.model import family
 from hysim.models.prandtl_ishlinskii import PrandtlIshlinskii, wrong_sum
 
 
-@model
+@family
 class ModifiedPrandtlIshlinskii(ExtendedPlays):
     """Modified Prandtl-Ishlinskii law, ``y = offset + sum c_j S_j(sum w_i z_i)``: plays, then dead zones.
 

@@ -33,7 +33,7 @@ from hysim.kernels.boucwen import prepare
 from hysim.kernels.charts import N_WORK
 from hysim.models.boucwen import BoucWen
 from hysim.models.equation_of_motion import METHODS
-from hysim.models.model import model
+from hysim.models.model import family
 from hysim.models.oscillator_structure import OscillatorStructure
 from hysim.models.polynomial_boucwen import PolynomialBoucWen
 from hysim.models.steady_state import ATTEMPTS, attracting_state
@@ -55,7 +55,7 @@ class OscillatorState(NamedTuple):
     memory_work: float = 0.0
 
 
-@model
+@family
 class BoucWenOscillator:
     """Mass on a linear and a Bouc-Wen spring, ``m y'' + c y' + k y + law(y) = u``.
 

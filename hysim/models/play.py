@@ -17,7 +17,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.models._clamps import ClampLaw
-from hysim.models.model import model
+from hysim.models.model import family
 from hysim.models.parameters import Parameter
 from hysim.models.search_space import Parameters
 from hysim.records import Record
@@ -47,7 +47,7 @@ class _Element(ClampLaw):
         return np.stack([element, np.ones_like(element), np.zeros_like(element)], axis=-1)
 
 
-@model
+@family
 class Play(_Element):
     """Play (backlash) of half width r, ``y = offset + gain z``.
 
@@ -81,7 +81,7 @@ class Play(_Element):
     z0: float = 0.0
 
 
-@model
+@family
 class Stop(_Element):
     """Stop (elastic-perfectly plastic element), ``y = offset + gain (u - z)``.
 

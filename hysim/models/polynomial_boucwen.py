@@ -9,10 +9,10 @@ Source: the polynomial input for asymmetric piezoelectric loops after Wang, Chen
 """
 
 from hysim.models._boucwen_law import BoucWenLaw
-from hysim.models.model import model
+from hysim.models.model import family
 
 
-@model
+@family
 class PolynomialBoucWen(BoucWenLaw):
     """Bouc-Wen law beside a polynomial of the input, ``y = offset + sum c_k u^k + gain z``.
 

@@ -29,12 +29,12 @@ from hysim.models._by_structure import ByStructure
 from hysim.models._clamp_search import ClampStructure
 from hysim.models._clamps import ClampLaw
 from hysim.models.law import State
-from hysim.models.model import model
+from hysim.models.model import family
 
 _CONSISTENT = 1e-9  # of the largest threshold: what rounding may add to the distance of two plays
 
 
-@model
+@family
 class PrandtlIshlinskii(ByStructure, ClampLaw):
     """Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i`` over plays of the thresholds r_i.
 

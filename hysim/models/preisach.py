@@ -38,7 +38,7 @@ from hysim.kernels.stepping import drive
 from hysim.models._preisach_search import SearchedRelays
 from hysim.models._relays import everett_of, weights_of
 from hysim.models.law import State
-from hysim.models.model import model
+from hysim.models.model import family
 from hysim.models.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.protocols import CompiledLaw
 from hysim.records import Record
@@ -49,7 +49,7 @@ Density = Callable[[FloatArray, FloatArray], npt.ArrayLike]
 _POINTS = 8  # of Gauss's rule on an interval
 
 
-@model
+@family
 class PreisachRelays(SearchedRelays):
     """Preisach law of single relays, ``y = offset + sum w_ij R_ij``.
 
@@ -86,7 +86,7 @@ class PreisachRelays(SearchedRelays):
     z0: tuple[float, ...] = ()
 
 
-@model
+@family
 class Preisach(SearchedRelays):
     """Preisach law of a density that is even between levels; its output is continuous.
 

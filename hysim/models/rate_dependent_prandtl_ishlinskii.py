@@ -37,7 +37,7 @@ from hysim.models._clamp_search import Axis, ClampStructure, half_span
 from hysim.models._play_sums import ExtendedPlays, kernel_rows, positions_of
 from hysim.models.composable import Composable
 from hysim.models.law import Packed, State, Tables
-from hysim.models.model import model
+from hysim.models.model import family
 from hysim.models.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.protocols import CompiledLaw
 from hysim.models.search_space import Parameters
@@ -75,7 +75,7 @@ class PlaysAtSampleTime(ExtendedPlays):
         return y
 
 
-@model
+@family
 class RateDependentPrandtlIshlinskii(ByStructure, Composable):
     """Rate-dependent Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i``, thresholds ``r_i + beta |u'|``.
 

@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, items, read_only
-from hysim.models.model import model
+from hysim.models.model import family
 
 
-@model
+@family
 class Sensor:
     """From the true displacement to the measured one.
 

@@ -13,11 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
-from hysim.models.model import model
+from hysim.models.model import family
 from hysim.models.transfer_function import TransferFunction
 
 
-@model
+@family
 class StateSpace:
     """A linear stage with one input and one output.
 

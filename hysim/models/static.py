@@ -16,14 +16,14 @@ from hysim.kernels import stepping
 from hysim.models._smoothing import equal_inputs, smoothing_spline
 from hysim.models.composable import Composable
 from hysim.models.law import Law
-from hysim.models.model import model
+from hysim.models.model import family
 from hysim.models.parameters import Parameter, space_of
 from hysim.models.protocols import DirectFit
 from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record
 
 
-@model
+@family
 class Line(Law):
     """Straight line ``y = offset + slope u``.
 
@@ -48,7 +48,7 @@ class Line(Law):
     memory = None  # type: ignore[assignment]  # a line remembers nothing
 
 
-@model
+@family
 class SingleValued(Composable):
     """A function of the input alone, linear between knots and constant outside.
 

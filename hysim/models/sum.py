@@ -17,13 +17,13 @@ from hysim.kernels.composed import side_by_side
 from hysim.models._composite import Composite, State, continued
 from hysim.models._parts import check_parts, compiled_law, compiled_pair, labels, response_of
 from hysim.models._sum_search import SumStructure
-from hysim.models.model import model
+from hysim.models.model import family
 from hysim.models.protocols import CompiledLaw
 
 __all__ = ["Sum", "SumStructure"]
 
 
-@model
+@family
 class Sum(Composite):
     """Models side by side, whose outputs are added; ``first + second`` is short for it.
 

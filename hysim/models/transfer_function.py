@@ -25,7 +25,7 @@ from hysim.models._linear_response import LinearPlants, LinearState, affine_colu
 from hysim.models._transfer_function_notes import notes
 from hysim.models._transfer_function_starts import Guess, guesses, likely_delays, sections
 from hysim.models.composable import Composable
-from hysim.models.model import model
+from hysim.models.model import family
 from hysim.models.protocols import Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
@@ -39,7 +39,7 @@ _MAJORITY = 3  # of them are enough to search no further
 _SCREENED = 64  # random points beside starts that differ
 
 
-@model
+@family
 class TransferFunction(Composable):
     """Continuous-time transfer function.
 

@@ -23,10 +23,10 @@ from hysim._frozen import FloatArray
 from hysim.kernels import zhu_wang as kernels
 from hysim.models._asymmetric import SteppedLaw
 from hysim.models.law import Packed, Tables
-from hysim.models.model import model
+from hysim.models.model import family
 
 
-@model
+@family
 class ZhuWangBoucWen(SteppedLaw):
     """Bouc-Wen law with the term ``delta u sgn(du)``, after Zhu and Wang (2012).
 
