@@ -58,7 +58,7 @@ MAPPED = {
     "kernels/duhem.py": "duhem_offset duhem duhem_memory certified_series",
     "kernels/elementary.py": "boucwen_closed_forms boucwen_far boucwen_invariants boucwen_reference oscillator",
     "kernels/generalized.py": "asymmetric",
-    "kernels/hidden.py": "discovery_refinement",
+    "kernels/hidden.py": "hidden_memory discovery_refinement",
     "kernels/lanes.py": "boucwen_invariants boucwen_closed_forms",
     "kernels/linear.py": "transfer_function actuator_stages composed",
     "kernels/loop.py": "close_loop actuator_chain",

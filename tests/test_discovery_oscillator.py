@@ -13,13 +13,12 @@ import hysim as hs
 from hysim.discovery import _oscillator_search
 from hysim.discovery._hidden_memory import HiddenMemory
 from hysim.discovery._marquardt import descended
-from hysim.discovery._memory_terms import RELAXATION, MemoryTerm, bouc_wen_terms, cases, law, memory_terms
+from hysim.discovery._memory_terms import MemoryTerm, bouc_wen_terms, cases, memory_terms
 from hysim.discovery._oscillator import oscillator
 from hysim.discovery._oscillator_models import diverges
 from hysim.discovery._oscillator_records import recorded
 from hysim.discovery._oscillator_result import FoundOscillator
 from hysim.identification import identify
-from hysim.kernels import hidden
 
 COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
 needs_compiled = pytest.mark.skipif(not COMPILED, reason="millions of steps, which only compiled code does in time")
@@ -252,25 +251,3 @@ def test_the_cases_of_a_term_are_its_name_read_literally(term: MemoryTerm, rate:
     literal = np.prod([words[word] for word in term.name.split()])
     case = cases(term, 3)[int(rate > 0.0), int(z > 0.0)]
     assert np.polyval(case[::-1], z) == pytest.approx(literal, abs=1e-14)  # rounding of z^3 to 8
-
-
-def test_the_memory_along_a_path_is_that_of_the_law_and_its_slopes_are_derivatives():
-    path = np.sin(np.linspace(0.0, 9.0, 4001))
-    terms = bouc_wen_terms(1.0)
-    units = np.array([cases(term, 1) for term in terms])
-
-    def run(coefficients: list[float], relaxation: float = 0.0) -> np.ndarray:
-        found = np.zeros((5, path.size))
-        polynomial = law(dict(zip(terms, coefficients, strict=True)), 1).polynomial
-        assert hidden.along(np.diff(path), 1e-3, polynomial, relaxation, units, found[0], found[1:])
-        return found
-
-    found = run([1.0, -0.6, -0.3])
-    exact = hs.BoucWen(A=1.0, beta=0.6, gamma=0.3).memory(path)
-    assert np.abs(found[0] - exact).max() < 1e-5  # second order: the square of increments of 2e-3
-    for k in range(3):
-        moved = [1.0, -0.6, -0.3]
-        moved[k] += 1e-6
-        assert np.abs((run(moved)[0] - found[0]) / 1e-6 - found[1 + k]).max() < 1e-4  # the difference's own error
-    assert np.abs((run([1.0, -0.6, -0.3], 1e-6)[0] - found[0]) / 1e-6 - found[4]).max() < 1e-4
-    assert RELAXATION.name == "z"
