@@ -142,6 +142,26 @@ def test_a_bell_that_narrows_to_nothing_is_left_out():
     assert coarse[-1] == pytest.approx(fine[-1], abs=1e-12)
 
 
+def test_a_large_power_that_grows_from_nothing_on_one_step_is_not_missed():
+    """The memory nearly doubles, its power 40 grows from 1e-20 of the slope by 1e11, and the first terms show none."""
+    c, z0 = 1e-8, 0.51
+    law = {"A": 1.0, "beta": 0.5 * (1.0 + c), "gamma": -0.5 * (1.0 - c), "n": 40.0, "z0": z0}
+    for beyond in (1e-2, 1e-6, 1e-8, 3e-9, 1e-9):  # the disc that keeps away from zero reaches as far beyond the step
+        length = 0.9 * z0 / (1.0 + beyond)
+        worn = hs.BoucWenBaberNoori(**law, delta_nu=1e-30)  # so little that the series are used and the law stays
+        assert worn.memory([0.0, length])[-1] == pytest.approx(hs.BoucWen(**law).memory([0.0, length])[-1], rel=1e-12)
+
+
+@pytest.mark.parametrize("n", [0.5, 1.0, 1.5, 2.0, 3.0])
+@pytest.mark.parametrize("gamma", [0.5, -0.5, 0.2])
+def test_from_zero_a_memory_bends_to_the_side_to_which_it_goes(n, gamma):
+    """Unloading (gamma = beta) or loading (gamma = -beta) alone is straight: not the side that counts here."""
+    u = np.array([0.0, 1.5, -1.0])
+    law = {"A": 1.0, "beta": 0.5, "gamma": gamma, "n": n}
+    worn = hs.BoucWenBaberNoori(**law, delta_nu=1e-30)
+    assert worn.memory(u) == pytest.approx(hs.BoucWen(**law).memory(u), abs=1e-12)
+
+
 # ---------------------------------------------------------------------------------- memories that wear off
 
 

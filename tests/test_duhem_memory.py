@@ -101,6 +101,20 @@ def test_a_dip_below_zero_and_back_is_not_stepped_over(depth):
     assert law.response(u[[0, -1]])[1] == pytest.approx(law.response(u)[-1], rel=1e-12)  # the series' promise
 
 
+def test_a_slope_that_begins_with_a_high_power_of_the_input_is_not_taken_for_none():
+    """dz/du = u^30 from zero on: no term that is computed is other than zero."""
+    law = hs.Duhem(p=[*[[0.0]] * 30, [1.0]], q=[[0.0]])
+    for end in (0.3, 1.0, 2.0, -1.0):
+        assert law.response([0.0, end])[-1] == pytest.approx(end**31 / 31.0, rel=1e-14)
+
+
+@pytest.mark.parametrize("unit", [1e-200, 1e-100, 1e-12, 1e100])
+def test_the_unit_of_the_memory_does_not_matter(unit):
+    u = np.array([0.0, 1.0, -2.0, 0.5])
+    z = hs.Duhem(p=[[unit]], q=[[0.0, -0.7]]).response(u)
+    assert z / unit == pytest.approx(hs.BoucWen(beta=0.7, gamma=0.0).memory(u), rel=1e-13)
+
+
 def test_a_law_at_rest_at_zero_where_its_slope_is_zero_finds_its_side():
     law = hs.Duhem.from_terms({"|u'| u": 2.0, "|u'| |z|": -1.0})  # from u = 0 on z grows as u^2, or falls as -u^2
     up, down = law.response([0.0, 1.0])[1], law.response([0.0, -1.0])[1]

@@ -142,6 +142,17 @@ def test_a_polynomial_that_turns_twice_between_two_samples_is_refused():
         law.inverse_response(law.response(u))
 
 
+def test_a_polynomial_that_turns_in_the_middle_alone_is_refused_and_one_that_flattens_is_not():
+    """c1 + 3 u^2 is steep at both ends, and Newton's method steps over the middle; the bound decides neither."""
+    u = np.array([-1.0, 1.0])
+    turns, flattens = (
+        hs.PolynomialBoucWen(gain=0.01, n=n, input_coefficients=(c1, 0.0, 1.0)) for n, c1 in ((1.5, -0.05), (1.0, 0.1))
+    )
+    with pytest.raises(hs.SimulationError, match="sample 1"):
+        turns.inverse_response(turns.response(u), u0=-1.0)
+    assert flattens.inverse_response(flattens.response(u), u0=-1.0) == pytest.approx(u, abs=1e-14)
+
+
 @pytest.mark.parametrize("n", [1.0, 1.5, 2.0, 6.0])
 def test_a_slope_that_is_not_positive_is_refused_with_its_place(n):
     """Rising is fine up to where the memory bends the output down; the place is between the samples."""

@@ -229,6 +229,19 @@ def test_a_compiled_loop_forgets_the_smallest_of_too_many_extremes():
     assert 0.0 < np.abs(y - law.response(u)).max() < 500 * 2.0 * densest * (4.0 * step) ** 2
 
 
+def test_the_extremes_that_are_forgotten_close_the_smallest_rectangle():
+    """Four extremes nearly repeat each other: the corner between them is the one that the output may lose."""
+    law = a_law(hs.Preisach)
+    falls = np.full(999, 5e-4)  # of the amplitude, from one extreme to the next
+    falls[400:403] = 1e-7
+    u = (0.95 - np.cumsum([0.0, *falls])) * np.resize([1.0, -1.0], 1000)
+    u = np.concatenate([u, u[::-1]])
+    compiled, y = law.compiled(u0=u[0]), np.empty(u.size)
+    assert drive(compiled.step, compiled.parameters, compiled.state, u, y) == -1
+    densest = max(WEIGHTS) / np.diff(LEVELS).min() ** 2
+    assert np.abs(y - law.response(u)).max() < 2.0 * densest * 2e-7**2 + ROUNDING
+
+
 @given(short_inputs(1.2), st.integers(0, 1000), st.booleans())
 def test_batch_is_the_path_to_the_bit(u, seed, own_inputs):
     rng = np.random.default_rng(seed)

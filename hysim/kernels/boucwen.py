@@ -29,7 +29,7 @@ from hysim.kernels.lanes import N_LANES, N_ROWS, fellows, linear_rows
 
 # The first places of a law's workspace: last u and z, for `step`; then w*, 1/w* and |a|/w* loading, and unloading.
 _LOADING, _UNLOADING = 2, 5
-_EXTREME = 690.0  # of |log(A/c)| and of |log w*|: beyond it, one of the two terms counts as vanished
+_EXTREME = 690.0  # of |log w*|, beyond which one of the two terms counts as vanished, and of |log(A/c)| for a power
 
 
 # ---------------------------------------------------------------------------------- scalar functions
@@ -105,8 +105,10 @@ def prepare(A: float, beta: float, gamma: float, n: float, last_n: float, work: 
 def prepare_side(A: float, c: float, n: float, side: int, work: FloatArray) -> None:
     """Fill w*, 1/w* and |A|/w*; they are 0 where one of the terms vanishes, or w* is not a number of this size."""
     balance = inverse = rate = 0.0
-    if A != 0.0 and c != 0.0 and abs(math.log(abs(A)) - math.log(abs(c))) < _EXTREME * min(n, 1.0):
-        balance = abs(A / c) ** (1.0 / n)
+    ratio = math.log(abs(A)) - math.log(abs(c)) if A != 0.0 and c != 0.0 else math.inf
+    if abs(ratio) < _EXTREME * n:
+        near = abs(ratio) < _EXTREME  # else the quotient is no number of this size, though its root is
+        balance = abs(A / c) ** (1.0 / n) if near else abs(A) ** (1.0 / n) / abs(c) ** (1.0 / n)
         inverse, rate = 1.0 / balance, abs(A) / balance
     work[side], work[side + 1], work[side + 2] = balance, inverse, rate
 
