@@ -30,6 +30,7 @@ from hysim.simulation import simulate
 _SHORT = 200  # samples; leaving one out at a time costs as many fits as there are samples
 _BLOCKS = 10
 _SAME = 1e-6  # of the output's range: largest effect of a change of rate on a rate-independent model
+_CRITERIA = {"fpe": metrics.fpe, "aic": metrics.aic, "bic": metrics.bic}
 _FAILURES = (ValueError, TypeError, ArithmeticError, SimulationError)
 
 
@@ -174,15 +175,11 @@ class _Protocol:
         y = simulate(model, record.t, record.u).y
         loop, residual, rmse = _loop(model, record, y), record.y - y, metrics.rmse(record.y, y)
         fitted: dict[str, Any] = {"n_parameters": 0, "cv_rmse": rmse, "cv_residual": residual}
-        fitted |= dict.fromkeys(("fpe", "aic", "bic"), math.nan)
+        fitted |= dict.fromkeys(_CRITERIA, math.nan)
         if isinstance(subject, _Result):
             d = int(subject.n_parameters)
             fitted = {"n_parameters": d, "cv_rmse": float(subject.cv_rmse), "cv_residual": np.empty(0)}
-            fitted |= {
-                "fpe": metrics.fpe(residual, d),
-                "aic": metrics.aic(residual, d),
-                "bic": metrics.bic(residual, d),
-            }
+            fitted |= {name: criterion(residual, d) for name, criterion in _CRITERIA.items()}
         if isinstance(subject, Identification):
             fitted |= {"cv_residual": subject.cv_residual, "warnings": tuple(subject.warnings)}
             fitted |= {"success": subject.success, "message": subject.message if identified_here else ""}
