@@ -41,7 +41,7 @@ def pyplot_keeps_no_figure():
 
 
 def once_for_all_processes(tmp_path_factory, name, compute):
-    """What `compute` returns for a folder of its own, in the first process that asks; the others read it from a file."""
+    """The result of `compute` for a folder of its own: the first process computes it, and the others read it."""
     folder = tmp_path_factory.getbasetemp()
     if "PYTEST_XDIST_WORKER" in os.environ:
         folder = folder.parent  # which all processes share
