@@ -129,6 +129,7 @@ def test_every_kind_goes_through_the_command_line(name, kinds, tmp_path, monkeyp
     if found.model is None:
         assert (code, [file.exists() for file in files]) == (1, [False, False])
         assert err == f"hysim: --out and --plot not written: {found.warnings[0]}\n"
+        assert (main([*command, "--out", "-"]), capsys.readouterr().out) == (1, "")
         assert found.warnings[0].startswith("There is no model of this law")
     else:
         assert (code, err) == (0, "")

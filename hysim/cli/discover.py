@@ -26,7 +26,9 @@ def run(options: argparse.Namespace) -> int:
         options.out: lambda: to_json(model, units=record.units),
         options.plot: lambda: outputs.loop_of_model(record, model),
     }
-    outputs.write(options, {} if model is None else files, discovery.to_json if options.json else discovery.summary)
+    if model is None:
+        files = {path: lambda: "" for path in files if path == records.STANDARD}
+    outputs.write(options, files, discovery.to_json if options.json else discovery.summary)
     unwritten = [name for name, path in (("--out", options.out), ("--plot", options.plot)) if path and model is None]
     if unwritten:
         print(f"hysim: {' and '.join(unwritten)} not written: {discovery.warnings[0]}", file=sys.stderr)

@@ -29,6 +29,7 @@ from hysim.simulation import simulate
 _SHORT = 200  # samples; leaving one out at a time costs as many fits as there are samples
 _BLOCKS = 10
 _SAME = 1e-6  # of the output's range: largest effect of a change of rate on a rate-independent model
+_CRITERIA = {"fpe": metrics.fpe, "aic": metrics.aic, "bic": metrics.bic}
 _FAILURES = (ValueError, TypeError, ArithmeticError, SimulationError)
 
 
@@ -161,38 +162,34 @@ class _Protocol:
         begin, seconds = time.perf_counter(), math.nan
         try:
             if _is_family(subject):
-                fitted = identify(subject, self.record, cross_validate=self.cross_validate, seed=self.seed)
+                subject = identify(subject, self.record, cross_validate=self.cross_validate, seed=self.seed)
                 seconds = time.perf_counter() - begin
-                return self._judged(name, fitted, seconds, fitted.success, fitted.message)
-            return self._judged(name, subject, seconds, True, "")
+            return self._judged(name, subject, seconds)
         except _FAILURES as error:
             return " ".join(str(error).split())
 
-    def _judged(self, name: str, subject: Any, seconds: float, success: bool, message: str) -> ComparisonRow:
+    def _judged(self, name: str, subject: Any, seconds: float) -> ComparisonRow:
         record, measured, model = self.record, self.measured, _model_of(subject)
+        identified_here = math.isfinite(seconds)
         y = simulate(model, record.t, record.u).y
-        loop = _loop(model, record, y)
-        residual = record.y - y
-        rmse = metrics.rmse(record.y, y)
-        n_parameters, cv_rmse, cv_residual = 0, rmse, residual
-        warnings: tuple[str, ...] = ()
-        fpe = aic = bic = math.nan
+        loop, residual, rmse = _loop(model, record, y), record.y - y, metrics.rmse(record.y, y)
+        fitted: dict[str, Any] = {"n_parameters": 0, "cv_rmse": rmse, "cv_residual": residual}
+        fitted |= dict.fromkeys(_CRITERIA, math.nan)
         if isinstance(subject, _Result):
-            n_parameters, cv_rmse, cv_residual = int(subject.n_parameters), float(subject.cv_rmse), np.empty(0)
-            fpe, aic, bic = (of(residual, n_parameters) for of in (metrics.fpe, metrics.aic, metrics.bic))
+            d = int(subject.n_parameters)
+            fitted = {"n_parameters": d, "cv_rmse": float(subject.cv_rmse), "cv_residual": np.empty(0)}
+            fitted |= {name: criterion(residual, d) for name, criterion in _CRITERIA.items()}
         if isinstance(subject, Identification):
-            cv_residual, warnings, success = subject.cv_residual, tuple(subject.warnings), subject.success
+            fitted |= {"cv_residual": subject.cv_residual, "warnings": tuple(subject.warnings)}
+            fitted |= {"success": subject.success, "message": subject.message if identified_here else ""}
         sense = -1.0 if {loop.orientation, measured.orientation} == {"clockwise", "counterclockwise"} else 1.0
         deviation = _rate_deviation(model, record, y)
-        test_fit, test_rmse = self._tested(subject, model, math.isfinite(seconds))
+        test_fit, test_rmse = self._tested(subject, model, identified_here)
         return ComparisonRow(
             name=name,
             model=model,
-            n_parameters=n_parameters,
             fit_percent=metrics.fit_percent(record.y, y),
             rmse=rmse,
-            cv_rmse=cv_rmse,
-            cv_residual=cv_residual,
             max_residual=float(np.abs(residual).max()),
             max_width=loop.max_width,
             max_width_at=loop.max_width_at,
@@ -200,19 +197,14 @@ class _Protocol:
             width_rmse=metrics.width_rmse(measured, loop),
             width_error_percent=_excess_percent(sense * loop.max_width, measured.max_width),
             area_error_percent=_excess_percent(sense * loop.area, measured.area),
-            fpe=fpe,
-            aic=aic,
-            bic=bic,
             is_rate_independent=deviation <= _SAME,
             rate_deviation=deviation,
             y=y,
             loop=loop,
             test_fit_percent=test_fit,
             test_rmse=test_rmse,
-            success=success,
-            message=message,
-            warnings=warnings,
             seconds=seconds,
+            **fitted,
         )
 
     def _tested(self, subject: Any, model: Any, identified_here: bool) -> tuple[float, float]:
