@@ -216,6 +216,11 @@ def test_the_same_settings_give_the_same_text():
     assert f"#define CONTROLLER_AHEAD {controller.ahead(H)}\n" in hs.to_c(controller, H).header
 
 
+def test_a_feedforward_alone_is_a_controller_of_one_part():
+    alone = CONTROLLERS["inverse"][1].feedforward
+    assert hs.to_c(alone, H) == hs.to_c(hs.TrackingController(feedforward=alone), H)
+
+
 PLAYS = hs.PrandtlIshlinskii(thresholds=(0.0, 2.0), weights=(0.01, 0.003))
 
 
@@ -231,12 +236,10 @@ PLAYS = hs.PrandtlIshlinskii(thresholds=(0.0, 2.0), weights=(0.01, 0.003))
     ],
 )
 def test_what_there_is_no_c_for_is_refused(controller, options, message):
-    if isinstance(controller, hs.InverseFeedforward):
-        controller = hs.TrackingController(feedforward=controller)
     with pytest.raises(ValueError, match=message):
         hs.to_c(controller, H, **options)
 
 
 def test_what_is_no_controller_is_refused():
-    with pytest.raises(TypeError, match="controller must be a PID or a TrackingController, got BoucWen"):
+    with pytest.raises(TypeError, match="or an InverseFeedforward, got BoucWen"):
         hs.to_c(hs.BoucWen(), H)

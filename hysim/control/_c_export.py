@@ -22,11 +22,14 @@ from hysim._frozen import FloatArray, frozen
 from hysim._release import __version__
 from hysim._words import printed, words
 from hysim.control import _c_fragments as pieces
+from hysim.control._feedforward import InverseFeedforward
 from hysim.control._pid import PID
 from hysim.control._tracking import TrackingController
 from hysim.kernels import boucwen_inverse, inverses
 from hysim.kernels import tracking as kernels
 from hysim.kernels.stepping import Step
+
+Exported = PID | TrackingController | InverseFeedforward
 
 _DIGITS = {"double": 17, "float": 9}
 _RANGES = {"double": (2.0**-1022, sys.float_info.max), "float": (2.0**-126, (2.0 - 2.0**-23) * 2.0**127)}
@@ -74,7 +77,7 @@ class CSource:
 
 
 def to_c(
-    controller: PID | TrackingController,
+    controller: Exported,
     sample_time: float,
     *,
     name: str = "controller",
@@ -86,8 +89,8 @@ def to_c(
 
     Parameters
     ----------
-    controller : PID or TrackingController
-        Any of its parts; a law to invert must be a Bouc-Wen law with n = 1, or a line.
+    controller : PID, TrackingController or InverseFeedforward
+        With any of its parts; a law to invert must be a Bouc-Wen law with n = 1, or a line.
     sample_time : float
         At which it will be called [s].
     name : str
@@ -117,8 +120,10 @@ def to_c(
     >>> "axis_real axis_step(axis_state *state, axis_real reference, axis_real measurement);" in code.header
     True
     """
-    if not isinstance(controller, PID | TrackingController):
-        raise TypeError(f"controller must be a PID or a TrackingController, got {type(controller).__name__}")
+    if not isinstance(controller, Exported):
+        raise TypeError(
+            f"controller must be a PID, a TrackingController or an InverseFeedforward, got {type(controller).__name__}"
+        )
     if precision not in _DIGITS:
         raise ValueError(f'precision must be "double" or "float", got {precision!r}')
     if not re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name):
@@ -148,10 +153,12 @@ def to_c(
     return CSource(name=name, header=header, source=source, sketch=sketch)
 
 
-def _composed(controller: PID | TrackingController) -> TrackingController:
-    """A PID alone as a controller of one part, which has the same bits."""
+def _composed(controller: Exported) -> TrackingController:
+    """A PID or a feed-forward alone as a controller of one part, which has the same bits."""
     if isinstance(controller, TrackingController):
         return controller
+    if isinstance(controller, InverseFeedforward):
+        return TrackingController(feedforward=controller)
     return TrackingController(feedback=replace(controller, limits=None), limits=controller.limits)
 
 

@@ -19,7 +19,7 @@ from numba import float64
 
 from hysim._frozen import FloatArray
 from hysim.kernels import clamps
-from hysim.kernels._compile import by_address, inlined, kernel, signed_closure
+from hysim.kernels._compile import borrowed, by_address, inlined, kernel, signed_closure
 from hysim.kernels.stepping import CONSTANTS, STEP, VECTOR, Step
 
 N_LIMITS = 2  # parameters before those of the inverse itself
@@ -77,6 +77,7 @@ def plays(parameters: FloatArray, state: FloatArray, y: float) -> float:
     `parameters` are the limits, and then those of `clamps.step` of the inverse and of the law; `state` is (u, y), the
     states of both, and room for one more.
     """
+    parameters, state = borrowed(parameters), borrowed(state)
     n, m = (parameters.size - N_LIMITS) // 2, (state.size - N_PLACE) // 3
     own, forward = parameters[N_LIMITS : N_LIMITS + n], parameters[N_LIMITS + n :]
     inverse, law, before = state[N_PLACE : N_PLACE + m], state[N_PLACE + m : N_PLACE + 2 * m], state[N_PLACE + 2 * m :]
@@ -248,6 +249,7 @@ def search(step: Step, parameters: FloatArray, state: FloatArray, y: float) -> f
     finite, and then closed in on. Where this fails, or the output has turned before, it is sought again: with a look
     ahead, which tells an end before the turn from one behind it, and before the turn.
     """
+    parameters, state = borrowed(parameters), borrowed(state)
     m = (state.size - N_SEARCH) // 2
     own, law, trial = parameters[N_LIMITS:], state[N_SEARCH : N_SEARCH + m], state[N_SEARCH + m :]
     here, reached, slope = state[0], state[1], state[2]

@@ -17,7 +17,7 @@ import math
 from numba import float64, types, void
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import inlined, inner, kernel, signed_kernel
+from hysim.kernels._compile import borrowed, inlined, inner, kernel, signed_kernel
 from hysim.kernels.inverses import N_LIMITS, N_PLACE, within_limits
 from hysim.kernels.stepping import CONSTANTS, STEP, VECTOR
 
@@ -162,7 +162,7 @@ def inverse_step(parameters: FloatArray, state: FloatArray, y: float) -> float:
 
     `parameters` are the limits and those of `step`; `state` is (u, y) and that of `step`.
     """
-    own, law = parameters[N_LIMITS:], state[N_PLACE:]
+    own, law = borrowed(parameters)[N_LIMITS:], borrowed(state)[N_PLACE:]
     rise = y - looked_at(own, law, law[0], 1.0)[0]
     direction = math.copysign(1.0, slope_of_all(own, law.size - 1)) * math.copysign(1.0, rise)
     u = solved(own, law, y, direction)

@@ -19,7 +19,7 @@ import math
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import inner, kernel
+from hysim.kernels._compile import borrowed, inner, kernel
 from hysim.kernels.inverses import N_LIMITS, N_PLACE, within_limits
 
 HEAD = 3
@@ -174,6 +174,7 @@ def inverse_step(parameters: FloatArray, state: FloatArray, wanted: float) -> fl
     `parameters` are the limits, 1.0 for a law that rises or -1.0 for one that falls with its input, and the
     parameters of `step` of the law with this sign, which rises; `state` is (u, y) and the state of `step`.
     """
+    parameters, state = borrowed(parameters), borrowed(state)
     sign, own, law = parameters[N_LIMITS], parameters[N_LIMITS + 1 :], state[N_PLACE:]
     room = (law.size - 2) // 2
     x, y = law[2 : 2 + room], law[2 + room :]

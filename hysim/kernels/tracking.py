@@ -25,7 +25,7 @@ from collections.abc import Callable
 from numba import float64
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import by_address, inlined, kernel, signed_closure
+from hysim.kernels._compile import borrowed, by_address, inlined, kernel, signed_closure
 from hysim.kernels.controllers import CONTROLLER, ControllerStep, pid
 from hysim.kernels.loop import advance, output
 from hysim.kernels.stepping import CONSTANTS, STEP, VECTOR, Step
@@ -103,6 +103,7 @@ def track(inverse: Step, parameters: FloatArray, state: FloatArray, reference: f
     its number of states that creep and of all states, its whole samples of dead time and of delay, and whether a part
     of a sample is left of the delay).
     """
+    parameters, state = borrowed(parameters), borrowed(state)
     lowest, highest, taps = parameters[0], parameters[1], int(parameters[2])
     feeds_forward, has_model, has_part = parameters[3] > 0.0, parameters[4] > 0.0, parameters[9] > 0.0
     p, s = N_HEAD, 1
