@@ -39,7 +39,7 @@ def test_down_is_ninety_degrees():
 @given(st.floats(-40.0, 40.0), st.floats(-40.0, 40.0))
 def test_a_motion_by_parts_of_a_pixel_is_that_of_every_wave_of_the_picture(down, right):
     waves = np.fft.fft2(np.fft.irfft2(SCENE.coefficients, s=SCENE.period)) / math.prod(SCENE.period)
-    seen = SCENE.moved(np.array([[down, right]]))
+    seen = SCENE.shifted(np.array([[down, right]]))
     f, g = (np.fft.fftfreq(n) for n in SCENE.period)
     for row, column in ((0, 0), (2, 7), (5, 8)):
         x = row + MARGIN // 2 - down, column + MARGIN // 2 - right
@@ -58,7 +58,7 @@ def test_a_moving_actuator_blurs_into_the_mean_of_its_pictures():
     exposed = [camera.light(0.5 + 0.2 * part) for part in (0.125, 0.375, 0.625, 0.875)]
     counts = np.floor(255.0 * np.mean(exposed, axis=0) + 0.5)
     assert (np.abs(frames[1] - counts) <= 1.0).all()  # at a half, rounding decides
-    assert abs(frames.seen[1] - 0.6) < 1e-12
+    assert abs(frames.exposed_y[1] - 0.6) < 1e-12
 
 
 def test_shot_noise_has_the_variance_of_its_mean():

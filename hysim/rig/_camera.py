@@ -228,7 +228,7 @@ class Camera:
     def _lit(self, shifts: FloatArray, t: float) -> FloatArray:
         """Light of the scene moved by shifts, shape (m, 2) [pixel]."""
         swing = math.sin(2.0 * math.pi * t / self.drift_period)
-        return (1.0 + self.gain_drift * swing) * self._scene.moved(shifts) + self.offset_drift * swing
+        return (1.0 + self.gain_drift * swing) * self._scene.shifted(shifts) + self.offset_drift * swing
 
 
 class Frames:
@@ -258,7 +258,7 @@ class Frames:
         return (self[k] for k in range(len(self)))
 
     @property
-    def seen(self) -> FloatArray:
+    def exposed_y(self) -> FloatArray:
         """Mean displacement of each exposure, shape (n_frames,) [um]: what a perfect measurement would find."""
         return np.array([self._exposed(k).mean() for k in range(len(self))])
 

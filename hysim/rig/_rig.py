@@ -123,9 +123,9 @@ class Experiment:
     at: FloatArray
 
     @property
-    def seen(self) -> FloatArray:
+    def exposed_y(self) -> FloatArray:
         """True displacement, its mean in each exposure, shape (n_frames,) [um]."""
-        return self.frames().seen
+        return self.frames().exposed_y
 
     @property
     def voltages(self) -> FloatArray:
@@ -211,15 +211,15 @@ class Experiment:
         if take not in ("mean", "last"):
             raise ValueError(f'take must be "mean" or "last", got {take!r}')
         frames_per_row = self.drive.frames_per_step if self.drive.dwell is not None else 1
-        y = self.seen if method == "truth" else self.measure(method).y
+        y = self.exposed_y if method == "truth" else self.measure(method).y
         rows = y.reshape(-1, frames_per_row)[:, 0 if take == "mean" else -1 :]
         if lost := np.flatnonzero(np.isnan(rows).all(axis=1)).tolist():
             raise ValueError(f"no frame of the rows {lost} could be measured: take more frames or more light")
-        found = np.nanmean(rows, axis=1)
+        means = np.nanmean(rows, axis=1)
         whole = method == "whole-pixel" and rows.shape[1] == 1
         return Record(
             u=self.voltages[frames_per_row - 1 :: frames_per_row],
-            y=found - found[0],
+            y=means - means[0],
             t=self.at[frames_per_row - 1 :: frames_per_row],
             units=UNITS,
             resolution=self.rig.camera.scale if whole else None,

@@ -65,17 +65,18 @@ class Scene:
                 transfer[(n // 2,) if axis == 0 else (slice(None), n // 2)] = 0.0
         return cls(coefficients=transfer * fft.rfft2(np.clip(light, 0.0, 1.0)), period=period, shape=shape)
 
-    def moved(self, shifts: FloatArray) -> FloatArray:
-        """Mean of the picture moved by each of some shifts, shape (m, 2), rows down and columns right [pixel]."""
-        whole = np.floor(shifts.mean(axis=0) + 0.5)
-        rest, times = np.unique(shifts - whole, axis=0, return_counts=True)
+    def shifted(self, shifts: FloatArray) -> FloatArray:
+        """Mean of the picture shifted by each of some shifts, shape (m, 2), rows down and columns right [pixel]."""
+        whole_pixels = np.floor(shifts.mean(axis=0) + 0.5)
+        rest, times = np.unique(shifts - whole_pixels, axis=0, return_counts=True)
         frequencies = fft.fftfreq(self.period[0]), fft.rfftfreq(self.period[1])
         down, right = (np.exp(-2j * np.pi * np.outer(part, f)) for part, f in zip(rest.T, frequencies, strict=True))
         transfer = (down * (times / times.sum())[:, np.newaxis]).T @ right
         picture = fft.irfft2(self.coefficients * transfer, s=self.period)
-        rows, columns = (np.arange(size) + MARGIN // 2 - int(far) for size, far in zip(self.shape, whole, strict=True))
-        seen = picture.take(rows, axis=0, mode="wrap").take(columns, axis=1, mode="wrap")
-        return np.asarray(seen)
+        rows, columns = (
+            np.arange(size) + MARGIN // 2 - int(far) for size, far in zip(self.shape, whole_pixels, strict=True)
+        )
+        return np.asarray(picture.take(rows, axis=0, mode="wrap").take(columns, axis=1, mode="wrap"))
 
 
 def _period(size: int) -> int:

@@ -71,13 +71,7 @@ class Sweep:
     @property
     def columns(self) -> dict[str, Column]:
         """Parameters, outputs that are numbers, seed, seconds and error, each shape (n,), by name."""
-        return {
-            **self.parameters,
-            **self.outputs,
-            "seed": self.seed,
-            "seconds": self.seconds,
-            "error": self.error,
-        }
+        return {**self.parameters, **self.outputs, "seed": self.seed, "seconds": self.seconds, "error": self.error}
 
     @property
     def error(self) -> Column:

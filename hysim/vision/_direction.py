@@ -22,30 +22,30 @@ _SHARP = 0.8  # curvature of the correlation's peak, of the median one
 
 def along(
     located: Sequence[Location],
-    seen: FloatArray,
+    visible: FloatArray,
     angle: float | None,
     scale: float,
     unit: str,
     *,
     whole: bool,
 ) -> Displacement:
-    """The displacements of located frames; `seen` projects on the directions in which there is structure."""
+    """The displacements of located frames; `visible` projects on the directions in which there is structure."""
     shift = np.array([place.shift[::-1] for place in located])
     covariance = np.array([place.covariance[::-1, ::-1] for place in located])
-    seen = seen[::-1, ::-1]
+    visible = visible[::-1, ::-1]
     if angle is None:
-        angle = _found(shift, covariance, seen)
+        angle = _best_direction(shift, covariance, visible)
         angle = 90.0 * round(angle / 90.0) if whole else angle
     unit_vector = _unit(angle)
     across = _unit(angle + 90.0)
-    towards = _towards(unit_vector, seen)
-    moved, variance = shift @ towards, np.einsum("i,nij,j->n", towards, covariance, towards)
-    beside = shift @ across if np.trace(seen) > 1.5 else np.full(len(shift), np.nan)
+    towards = _towards(unit_vector, visible)
+    displacement, variance = shift @ towards, np.einsum("i,nij,j->n", towards, covariance, towards)
+    beside = shift @ across if np.trace(visible) > 1.5 else np.full(len(shift), np.nan)
     if whole:
-        shift, moved, beside = np.rint(shift) + 0.0, np.rint(moved) + 0.0, np.rint(beside) + 0.0
+        shift, displacement, beside = np.rint(shift) + 0.0, np.rint(displacement) + 0.0, np.rint(beside) + 0.0
         variance = variance + 1.0 / 12.0
     return Displacement(
-        y=scale * moved,
+        y=scale * displacement,
         uncertainty=scale * np.sqrt(variance),
         shift=shift,
         across=scale * beside,
@@ -58,8 +58,8 @@ def along(
     )
 
 
-def given_angle(direction: float | str | None, *, whole: bool) -> float | None:
-    """The angle of a direction; None where it is to be found."""
+def angle_of(direction: float | str | None, *, whole: bool) -> float | None:
+    """The angle of a direction; None if it must be estimated."""
     if direction is None:
         return None
     if isinstance(direction, str) and direction in _AXES:
@@ -71,16 +71,16 @@ def given_angle(direction: float | str | None, *, whole: bool) -> float | None:
     return float(direction)
 
 
-def _found(shift: FloatArray, covariance: FloatArray, seen: FloatArray) -> float:
+def _best_direction(shift: FloatArray, covariance: FloatArray, visible: FloatArray) -> float:
     """Direction in which the shifts spread more than their noise does; to the right where there is none."""
-    if np.trace(seen) < 1.5:
-        vector = np.linalg.eigh(seen)[1][:, 1]
+    if np.trace(visible) < 1.5:
+        vector = np.linalg.eigh(visible)[1][:, 1]
     else:
-        found = np.isfinite(shift[:, 0])
-        if not found.any():
+        is_located = np.isfinite(shift[:, 0])
+        if not is_located.any():
             return 0.0
-        off, noise = shift[found] - shift[found].mean(axis=0), covariance[found].mean(axis=0)
-        values, vectors = np.linalg.eigh(off.T @ off / found.sum() - noise)
+        off, noise = shift[is_located] - shift[is_located].mean(axis=0), covariance[is_located].mean(axis=0)
+        values, vectors = np.linalg.eigh(off.T @ off / is_located.sum() - noise)
         if values[1] <= np.trace(noise):
             return 0.0
         vector = vectors[:, 1]
@@ -95,14 +95,14 @@ def _unit(angle: float) -> npt.NDArray[np.float64]:
     return np.array(axes.get(turned, (math.cos(math.radians(angle)), math.sin(math.radians(angle)))))
 
 
-def _towards(direction: FloatArray, seen: FloatArray) -> FloatArray:
+def _towards(direction: FloatArray, visible: FloatArray) -> FloatArray:
     """The vector whose product with a shift is the displacement along the direction."""
-    if np.trace(seen) > 1.5:
+    if np.trace(visible) > 1.5:
         return direction
-    shown = seen @ direction
+    shown = visible @ direction
     cosine = float(np.linalg.norm(shown))
     if cosine < _LEAST_COSINE:
-        normal = np.linalg.eigh(seen)[1][:, 1]
+        normal = np.linalg.eigh(visible)[1][:, 1]
         raise ValueError(
             f"the picture is a straight edge, which shows no motion along {direction[0]:.2g}, {direction[1]:.2g} "
             f"(right, down), only along {normal[0]:.2g}, {normal[1]:.2g}"
@@ -113,6 +113,6 @@ def _towards(direction: FloatArray, seen: FloatArray) -> FloatArray:
 def _statuses(located: Sequence[Location], direction: FloatArray) -> tuple[str, ...]:
     """Blurred is a frame whose correlation has a flatter peak along the motion than the median one's."""
     sharpness = np.array([direction @ place.sharpness[::-1, ::-1] @ direction for place in located])
-    found = np.isfinite(sharpness)
-    least = _SHARP * np.median(sharpness[found]) if found.any() else 0.0
+    is_located = np.isfinite(sharpness)
+    least = _SHARP * np.median(sharpness[is_located]) if is_located.any() else 0.0
     return tuple("ok" if value >= least else "blurred" if value < least else "lost" for value in sharpness)

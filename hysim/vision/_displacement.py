@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from hysim._parallel import Progress
-from hysim.vision._direction import along, given_angle
+from hysim.vision._direction import along, angle_of
 from hysim.vision._frames import Picture, grey_pictures, read_frames
 from hysim.vision._result import Displacement
 from hysim.vision._template import Reference, Region
@@ -94,7 +94,7 @@ def displacement(
         raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
     if isinstance(scale, (str, bool)) or not 0.0 < float(scale) < math.inf:
         raise ValueError(f"scale must be the length of a pixel, a positive number, got {scale}")
-    angle = given_angle(direction, whole=method == "whole-pixel")
+    angle = angle_of(direction, whole=method == "whole-pixel")
     source, total = _source(frames)
     first, pictures = _pictures(source, reference)
     start = Reference(first, _region(region, first.shape))
@@ -104,7 +104,7 @@ def displacement(
         places.append(place)
         if progress is not None:
             progress(len(places), total)
-    return along(places, start.seen, angle, float(scale), unit, whole=method == "whole-pixel")
+    return along(places, start.visible, angle, float(scale), unit, whole=method == "whole-pixel")
 
 
 def _source(frames: Any) -> tuple[Iterable[Any], int]:

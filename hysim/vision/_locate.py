@@ -26,7 +26,7 @@ _OVERLAP = 0.5  # of the region's length, the least
 
 @dataclass(frozen=True)
 class Location:
-    """Where the region's content is in a frame, in rows and columns [pixel]; nan where it is not found.
+    """Where the region's content is in a frame, in rows and columns [pixel]; nan where it is not location.
 
     `quality` is the correlation, `sharpness` the curvature of its peak over that of the reference with itself, and
     `overlap` the part of the region's length that both have.
@@ -39,7 +39,7 @@ class Location:
     overlap: float
 
     @property
-    def is_found(self) -> bool:
+    def is_located(self) -> bool:
         return bool(np.isfinite(self.shift[0]))
 
 
@@ -64,21 +64,21 @@ class _View:
 
 def locate(reference: Reference, frame: Picture, guess: FloatArray) -> Location:
     """The shift of the reference's region in the frame, looked for within half the region of the guess."""
-    shift, is_near = reference.seen @ guess, False
+    shift, is_near = reference.visible @ guess, False
     for _ in range(_ROUNDS):
         view = _view(reference, frame, shift)
         if view is None:
             return LOST
         if not is_near:
-            jump = reference.seen @ _jump(reference, view)
+            jump = reference.visible @ _jump(reference, view)
             is_near = float(np.abs(jump).max()) < _KNOWN
             if np.abs(jump).max() > _NEAR:
                 shift = shift + jump
                 continue
-        found, is_settled = _settle(reference, view, shift)
+        location, is_settled = _settle(reference, view, shift)
         if is_settled:
-            return found
-        shift = found.shift
+            return location
+        shift = location.shift
         if not view.distance(shift) < _ASTRAY:
             return LOST
     return LOST
@@ -87,13 +87,13 @@ def locate(reference: Reference, frame: Picture, guess: FloatArray) -> Location:
 def _settle(reference: Reference, view: _View, shift: FloatArray) -> tuple[Location, bool]:
     """Steps until one is small enough, which is True, or the windows should follow."""
     for _ in range(_STEPS):
-        found = _step(reference, view, shift)
-        if np.abs(found.shift - shift).max() < _SETTLED:
-            return found, True
-        shift = found.shift
+        location = _step(reference, view, shift)
+        if np.abs(location.shift - shift).max() < _SETTLED:
+            return location, True
+        shift = location.shift
         if not view.distance(shift) < _NEAR:
             break
-    return found, False
+    return location, False
 
 
 def _view(reference: Reference, frame: Picture, shift: FloatArray) -> _View | None:
@@ -101,8 +101,8 @@ def _view(reference: Reference, frame: Picture, shift: FloatArray) -> _View | No
     region = reference.region
     lengths, edges = (region.height, region.width), (region.top, region.left)
     offset = [
-        int(np.clip(round(s), -edge, whole - length - edge))
-        for s, edge, whole, length in zip(shift, edges, frame.shape, lengths, strict=True)
+        int(np.clip(round(s), -edge, size - length - edge))
+        for s, edge, size, length in zip(shift, edges, frame.shape, lengths, strict=True)
     ]
     rest = shift - offset
     cuts = cut(rest[0], region.height), cut(rest[1], region.width)

@@ -70,11 +70,11 @@ class Displacement:
         """Frames by status, the range of the displacement and its median standard error, in words."""
         counts = ", ".join(f"{n} {status}" for status in STATUSES if (n := self.status.count(status)))
         lines = [f"{len(self)} frames: {counts}", f"direction {self.direction:.2f} degrees from the right, downwards"]
-        found = np.isfinite(self.y)
-        if found.any():
-            error = float(np.median(self.uncertainty[found]))
+        is_located = np.isfinite(self.y)
+        if is_located.any():
+            error = float(np.median(self.uncertainty[is_located]))
             lines += [
-                f"displacement from {self.y[found].min():.6g} to {self.y[found].max():.6g} {self.units['y']}",
+                f"displacement from {self.y[is_located].min():.6g} to {self.y[is_located].max():.6g} {self.units['y']}",
                 f"standard error {error:.2g} {self.units['y']}, {error / self.scale:.2g} pixel",
             ]
         return "\n".join(lines)
@@ -135,16 +135,16 @@ class Displacement:
         at = None if frame_times is None else self._per_frame(frame_times, "frame_times")
         voltages = self._voltages(u, at, u_times)
         times = at if t is None else self._per_frame(t, "t")
-        found = np.isfinite(self.y)
-        if on_lost == "error" and not found.all():
+        is_located = np.isfinite(self.y)
+        if on_lost == "error" and not is_located.all():
             raise ValueError(
-                f"frame {int(np.argmin(found))} is lost, and {int((~found).sum())} of {len(self)} are: "
+                f"frame {int(np.argmin(is_located))} is lost, and {int((~is_located).sum())} of {len(self)} are: "
                 'on_lost="drop" leaves them out'
             )
         return Record(
-            u=voltages[found],
-            y=self.y[found],
-            t=None if times is None else times[found],
+            u=voltages[is_located],
+            y=self.y[is_located],
+            t=None if times is None else times[is_located],
             units={"u": "V", "t": "s", **(units or {}), **self.units},
             resolution=self.resolution,
             name=name,

@@ -107,7 +107,7 @@ class Reference:
         self.region = region
         self.grid = Grid(region.height, region.width)
         self.template = lru_cache(maxsize=_TEMPLATES)(self._template)
-        self.seen = self._seen()
+        self.visible = self._visible()
 
     def windows(self, cuts: tuple[int, int], shift: FloatArray) -> tuple[Picture, Picture]:
         """The window along a column and along a row, moved by a shift."""
@@ -121,7 +121,7 @@ class Reference:
         light = [W * r, W, W * _centred(down[:, 0])[:, None], W * _centred(right)]
         h = _without([W * slope for slope in self._smooth], light)
         flanks = [r * np.gradient(down, axis=0) * right, r * down * np.gradient(right)]
-        steepness = self.seen @ _products(h, [W * slope for slope in self._slopes]) @ self.seen
+        steepness = self.visible @ _products(h, [W * slope for slope in self._slopes]) @ self.visible
         inverse = np.asarray(np.linalg.pinv(steepness), dtype=np.float64)
         noise = [W * one for one in h]
         spectrum, weights = self.grid.spectrum(W * r), self.grid.weights
@@ -136,7 +136,7 @@ class Reference:
             spread=inverse @ _products(noise, noise) @ inverse.T,
         )
 
-    def _seen(self) -> FloatArray:
+    def _visible(self) -> FloatArray:
         """Projector on the directions in which the region has more structure than noise."""
         down, right = self.windows((0, 0), np.zeros(2))
         W = down * right
