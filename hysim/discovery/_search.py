@@ -109,7 +109,6 @@ class Outcome:
     search: Search
     start: Start
     slopes: Slopes
-    form: str
     path: list[tuple[float, Terms]]
     is_short: bool = False
 
@@ -186,7 +185,7 @@ def searched(
         search.explore(library.structure(starts[0].regression.terms))
     chosen = _on_all_samples(free_run, search, library, options.seed, restarts=0 if is_short else _RESTARTS)
     start = _start_at(rows, library, chosen)
-    return Outcome(library, chosen, search, start, rows, form, _path(start, library, optimizer), is_short)
+    return Outcome(library, chosen, search, start, rows, _path(start, library, optimizer), is_short)
 
 
 def _least_rmse(search: Search) -> float:

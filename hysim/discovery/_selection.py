@@ -66,14 +66,8 @@ class Prediction(NamedTuple):
     unknowns: FloatArray
 
 
-def thinned(record: Record, most: int) -> Record:
-    """Every m-th sample of a record, its last one and its reversals, about `most` together."""
-    samples = thinning(record, most)
-    return Record(u=record.u[samples], y=record.y[samples])
-
-
 def thinning(record: Record, most: int) -> npt.NDArray[np.intp]:
-    """The samples that `thinned` keeps; a record that has more reversals than `most` is cut short."""
+    """Every m-th sample of a record, its last one and its reversals, about `most` together, and 2 `most` at most."""
     stride = -(-len(record) // most)
     kept = np.arange(len(record)) % stride == 0
     kept[-1] = True

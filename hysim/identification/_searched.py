@@ -91,7 +91,7 @@ class Search:
 
     def residual(self, theta: FloatArray) -> FloatArray:
         """Measured minus model."""
-        return np.asarray(self.problem.y - self.descent.outputs(theta[np.newaxis])[0])
+        return np.asarray(self.problem.y - self.problem.model(theta[np.newaxis])[0])
 
     def described(
         self, likely: list[LocalOptimum], intervals: str, least_squares: FloatArray
@@ -245,7 +245,9 @@ def _phrases(
     inputs = [part.record.u for part in problem.parts]
     if all((np.diff(u) >= 0.0).all() or (np.diff(u) <= 0.0).all() for u in inputs):
         phrases.append("the input never turns back: nothing shows what unloading does")
-    phrases += [f"the interval of {name} ends at the box" for name, curve in curves.items() if any(curve.at_box)]
+    phrases += [
+        f"the interval of {name} ends at its search bound" for name, curve in curves.items() if any(curve.at_box)
+    ]
     if rivals:
         phrases.append(f"{len(rivals)} other {'optimum' if len(rivals) == 1 else 'optima'} within the noise")
     return phrases
