@@ -255,7 +255,6 @@ def _searched(
     best: float = math.inf,
     seen: Sequence[Samples] | None = None,
 ) -> list[Outcome]:
-    """What each library has for the records; one that cannot come near the BIC `best` has nothing."""
     n = sum(map(len, records))
     outcomes: list[Outcome] = []
     for library in libraries:

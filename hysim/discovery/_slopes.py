@@ -149,7 +149,6 @@ def _smoothed_where_long(u: FloatArray, y: FloatArray) -> FloatArray:
 
 
 def _polynomial(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Chebyshev coefficients of the smoothing polynomial on -1 <= x <= 1."""
     highest = min(MAX_DEGREE, x.size - 2)
     basis, triangle = np.linalg.qr(chebyshev.chebvander(x, highest))
     weights = basis.T @ y
