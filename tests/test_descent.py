@@ -80,3 +80,12 @@ def test_whether_a_constraint_is_kept_does_not_depend_on_the_unit(descent, size)
     value = named(descent, theta, places)
     assert descent.keeps(theta, Constraint(places, value * (1.0 + 1e-9))).all()
     assert not descent.keeps(theta, Constraint(places, value * (1.0 + 1e-7))).any()
+
+
+def test_sets_descend_together_as_each_does_alone(descent):
+    theta = drawn(descent, 5)
+    together = descent.run(theta)
+    for k in range(SETS):
+        alone = descent.run(theta[k : k + 1])
+        assert together.theta[k] == pytest.approx(alone.theta[0], rel=1e-9)  # sums of a batch are rounded otherwise
+        assert bool(together.at_rest[k]) == bool(alone.at_rest[0])

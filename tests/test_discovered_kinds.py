@@ -208,3 +208,35 @@ def test_initial_states_are_counted_as_parameters_where_they_are_free(kinds):
     rest = replace(found, initial="rest").summary()
     assert f"{free.n_parameters} parameters\n" in rest
     assert "initial state (rest): z0 = " in rest
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--route", "memory", "--mass", "2"], "--mass is not used by --route memory: leave it out"),
+        (["--mass", "2", "--library", "duhem"], "--library is not used by an oscillator: leave it out"),
+        (["--route", "oscillator", "--cross-validate", "3"], "--cross-validate is not used by an oscillator"),
+        (["--route", "oscillator", "--symmetry", "even"], "--symmetry even is not used by an oscillator"),
+        (["--library", "u',|u'| z", "--degree", "2"], "--degree is not used with a library of names: leave it out"),
+    ],
+)
+def test_the_command_line_refuses_what_a_verb_does_not_use(options, message, tmp_path, capsys):
+    np.savetxt(tmp_path / "r.csv", np.stack([U, U], axis=1), delimiter=",", header="u,y", comments="")
+    assert main(["discover", str(tmp_path / "r.csv"), *options]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_known_mass_means_an_oscillator(tmp_path, capsys, kinds, monkeypatch):
+    found, record = kinds["n held"]
+    arguments = []
+
+    def verb(record, **options):
+        arguments.append(options)
+        return found
+
+    monkeypatch.setattr("hysim.discovery.discover_oscillator", verb)
+    columns = np.stack([record.u, record.y, record.t], axis=1)
+    np.savetxt(tmp_path / "r.csv", columns, delimiter=",", header="u,y,t", comments="")
+    assert main(["discover", str(tmp_path / "r.csv"), "--mass", "2", "--degree", "2"]) == 0
+    assert {name: arguments[0][name] for name in ("mass", "degree", "seed")} == {"mass": 2.0, "degree": 2, "seed": 0}
+    assert capsys.readouterr().out == found.summary() + "\n"

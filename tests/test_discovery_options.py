@@ -174,7 +174,11 @@ def test_a_lag_under_one_triangle_cannot_be_told_from_hysteresis():
         (zigzag(0, 1, 0), np.ones(59), "the output is constant"),
         (zigzag(0, 1, 0), 3.0 + 1e-12 * (np.arange(59) == 5), "every law that was tried diverges"),
         (np.tile([0.0, 1.0], 20), np.tile([0.0, 1.0], 20), "at least 4 samples each"),
-        (zigzag(0, 1, 0, per_branch=5), zigzag(0, 1, 0, per_branch=5), "9 samples cannot tell 10 terms"),
+        (
+            zigzag(0, 1, 0, per_branch=5),
+            zigzag(0, 1, 0, per_branch=5),
+            "10 terms and y0 cannot be estimated from 9 samples",
+        ),
     ],
 )
 def test_records_without_the_information_are_refused(u, y, message):

@@ -11,11 +11,11 @@ from scipy.optimize import least_squares
 
 import hysim as hs
 from hysim.discovery import _laws
+from hysim.discovery._discover import left_out_rmse
 from hysim.discovery._refinement import _SCHEDULE, FreeRun, bic_of
 from hysim.discovery._search import Library, Options, searched
 from hysim.discovery._selection import Search, pruned
 from hysim.discovery._structures import AnyExponent, Terms
-from hysim.discovery._validation import left_out_rmse
 from hysim.identification.marquardt import SumOfSquares, descend, differences
 from hysim.models.terms import Term, bouc_wen_terms
 

@@ -82,3 +82,8 @@ def test_a_criterion_of_nothing_is_refused(criterion):
         criterion(E, -1)
     with pytest.raises(ValueError, match="residual must be finite, got inf at index 0"):
         criterion([math.inf], 0)
+
+
+def test_residuals_below_a_floor_are_no_evidence():
+    assert metrics.bic(np.zeros(4), 1, floor=0.5) == pytest.approx(4 * math.log(0.25) + math.log(4), rel=ROUNDING)
+    assert metrics.bic(E, 2, floor=0.1) == pytest.approx(4 * math.log(1.25 / 4 + 0.01) + 2 * math.log(4), rel=ROUNDING)

@@ -100,14 +100,14 @@ def test_a_profile_ends_at_the_bound_of_its_parameter_and_says_so():
         assert fit.intervals["slope"][side] == pytest.approx(bounds[side], abs=1e-3)
         assert fit.intervals["slope"][1 - side] == pytest.approx(free.intervals["slope"][1 - side], rel=1e-3)
         assert fit.profiles["slope"].at_box == (side == 0, side == 1)
-        assert "the interval of slope ends at the box" in fit.message
+        assert "the interval of slope ends at its search bound" in fit.message
 
 
 def test_a_linear_parameter_at_its_bound_is_named():
     fit = hs.identify(hs.Line, line_record(), bounds={"slope": (0.0, 1.5)}, intervals="profile")
     assert fit.estimates["slope"] == 1.5
     assert fit.intervals["slope"][1] == 1.5
-    assert "slope is at a side of its box" in fit.message
+    assert "slope reached its search bound" in fit.message
 
 
 def test_an_exponent_at_the_side_of_its_box_is_taken_as_known():
@@ -115,7 +115,7 @@ def test_an_exponent_at_the_side_of_its_box_is_taken_as_known():
     given = hs.identify(LAW, noisy(), fixed={"n": fit.estimates["n"]})
     assert fit.estimates["n"] == pytest.approx(2.0)
     assert np.isnan([fit.stderr["n"], *fit.intervals["n"]]).all()
-    assert "n is at a side of its box" in fit.message
+    assert "n reached its search bound" in fit.message
     factor = np.sqrt((INPUT.size - given.n_parameters) / (INPUT.size - fit.n_parameters))
     assert fit.stderr["beta"] == pytest.approx(factor * given.stderr["beta"], rel=1e-3)  # of two descents
 
@@ -126,7 +126,7 @@ def test_a_redundant_pair_has_no_numbers_but_words(kind):
     for name in ("A", "gain"):
         assert np.isnan([fit.stderr[name], *fit.intervals[name]]).all()
         assert name not in fit.profiles
-    assert "the data cannot tell A and gain apart, only their product" in fit.message
+    assert "the data determine only the product of A and gain" in fit.message
     assert any({"A", "gain"} <= set(group) for group in fit.redundant)
     assert np.isfinite([fit.stderr["beta"], *fit.intervals["beta"]]).all()
     assert fit.condition > 1e7

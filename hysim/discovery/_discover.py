@@ -8,7 +8,7 @@ verdict on the records (`_judgement`).
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -21,12 +21,11 @@ from hysim._frozen import FloatArray
 from hysim._parallel import Progress
 from hysim.discovery import _laws, _pysindy
 from hysim.discovery._judgement import HYSTERESIS, NO_STRUCTURE, Competitors, Judgement, competitors, doubts, judge
-from hysim.discovery._refinement import Candidate, FreeRun, Samples
+from hysim.discovery._refinement import DIVERGED, Candidate, FreeRun, Samples
 from hysim.discovery._result import Discovery
 from hysim.discovery._search import Library, Options, Outcome, or_any_exponent, searched
 from hysim.discovery._slopes import FORMS, signs_of
 from hysim.discovery._structures import AnyExponent
-from hysim.discovery._validation import left_out_rmse
 from hysim.identification.folds import folds
 from hysim.identification.swapped import swapped_columns
 from hysim.models.terms import duhem_terms, memory_terms, named_terms, symmetric
@@ -256,12 +255,13 @@ def _searched(
     best: float = math.inf,
     seen: Sequence[Samples] | None = None,
 ) -> list[Outcome]:
-    """What each library has for the records; one that cannot come near the BIC `best` has nothing."""
     n = sum(map(len, records))
     outcomes: list[Outcome] = []
     for library in libraries:
         if n <= len(library.terms):
-            raise ValueError(f"{n} samples cannot tell {len(library.terms)} terms and y0: lower the degree")
+            raise ValueError(
+                f"{len(library.terms)} terms and y0 cannot be estimated from {n} samples: lower the degree"
+            )
         outcome = searched(records, library, options, best=best, seen=seen)
         outcomes += [] if outcome is None else [outcome]
     return outcomes
@@ -280,11 +280,8 @@ def _discovery(
     path = [(threshold, outcome.search.refine(each)) for threshold, each in outcome.path]
     path_scores = [_scores(each, outcome.search.free_run.records) for _, each in path]
     return Discovery(
+        **law._asdict(),
         model=law.models[0],
-        models=law.models,
-        coefficients=law.coefficients,
-        stderr=law.stderr,
-        equation=law.equation,
         verdict=NO_STRUCTURE if outcome.unstable and judgement.verdict != HYSTERESIS else judgement.verdict,
         route="output" if structure.feedthrough or structure.offset else "memory",
         scores={
@@ -295,9 +292,7 @@ def _discovery(
             "condition": outcome.start.regression.condition,
         },
         n_parameters=candidate.n_parameters,
-        parameters=law.parameters,
         initial="rest" if structure.rest else "free",
-        initial_states=law.initial_states,
         judgement=judgement,
         cv_rmse=math.nan,
         left_out=tuple(term.named(letter) for term in outcome.start.regression.dependent),
@@ -353,3 +348,27 @@ def _scores(candidate: Candidate[Any] | None, records: Sequence[Record]) -> dict
         "rmse": metrics.rmse(y, y - residual),
         "bic": metrics.bic(residual, candidate.n_parameters),
     }
+
+
+def left_out_rmse(
+    records: Sequence[Record],
+    search: Callable[[tuple[Samples, ...]], Candidate[Any]],
+    count: str | int,
+    progress: Progress,
+) -> float:
+    """Rmse on samples that were left out of the search [unit of y]; inf where a law diverges.
+
+    Each fold repeats the `search` for structure and numbers in the outputs seen, (n_samples,) for each record.
+    """
+    free_run, edges = FreeRun(tuple(records)), np.cumsum([len(record) for record in records])
+    left_out = folds(count, free_run.n_samples)
+    errors = np.empty(free_run.n_samples)
+    for done, samples in enumerate(left_out, 1):
+        seen = np.ones(free_run.n_samples, dtype=bool)
+        seen[samples] = False
+        law = search(tuple(np.split(seen, edges[:-1])))
+        errors[samples] = free_run.residuals(law.structure, law.unknowns[np.newaxis])[0, samples]
+        progress(done, len(left_out))
+    if np.abs(errors).max() >= DIVERGED:
+        return float("inf")
+    return float(np.sqrt(np.mean(errors**2))) * free_run.stroke

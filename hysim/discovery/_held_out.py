@@ -138,7 +138,6 @@ def law_held_out(trial: Trial, records: Sequence[Record], refit: Refit) -> Trial
 
 
 def _with(trial: Trial, name: str, model: Model, records: Sequence[Record], left_out: Sequence[Samples]) -> Trial:
-    """The trial with the errors of one more model."""
     y = np.concatenate([record.y for record in records])
     residual, fitted = np.full(y.size, math.nan), []
     for samples in left_out:
@@ -225,7 +224,6 @@ def _folds_of(record: Record) -> tuple[str, list[Samples]]:
 
 
 def _covers(seen: FloatArray, other: FloatArray) -> bool:
-    """Whether the inputs seen have about the range of the others."""
     beyond = _INSIDE * float(np.ptp(np.append(seen, other)))
     return bool(other.min() >= seen.min() - beyond and other.max() <= seen.max() + beyond)
 
@@ -280,7 +278,6 @@ def at_one_rate(record: Record) -> list[Samples]:
 
 
 def _crossings(record: Record, edges: FloatArray) -> list[list[float]]:
-    """Rates of the passes of one record through each band."""
     bands: list[list[float]] = [[] for _ in itertools.pairwise(edges)]
     for branch in record.branches(TOLERANCE):
         sign = 1.0 if branch.u[-1] > branch.u[0] else -1.0

@@ -1,16 +1,13 @@
-"""A memory that nobody measured, from the equation of motion along a measured displacement.
+"""A memory that is not measured, from the equation of motion along a measured displacement.
 
     m y'' + c y' + k y + z = u,    z' = sum of coefficients times terms in (y', z)
 
-For given coefficients z follows from y by integration, so that neither y'' nor z' is ever taken of noise, and no kink
-of |y'| or |z| is smoothed. Both sides of the equation of motion are filtered alike (`hysim.models.equation_of_motion`),
-which keeps it an identity; its error is about one of the displacement. It is linear in m, c and k, which are projected
-out, and its slopes along the coefficients come with z: a Gauss-Newton step is a regression on terms. Since z = A y is
-no error of the equation where k is free, only the memory's curvature tells A from k; the descent begins from several
-shares of the stiffness.
-
-Reversals that noise makes add to the length of y's path, so the numbers are biased by a percent or so: they begin a
-refinement by simulation.
+For given coefficients z follows from y by integration, so that neither y'' nor z' is taken of noise. Both sides of
+the equation of motion are filtered alike (`hysim.models.equation_of_motion`). It is linear in m, c and k, which are
+projected out, and the slopes of z along the coefficients come with z: a Gauss-Newton step is a regression on terms. z
+= A y is no error of the equation where k is free, so that only the curvature of the memory distinguishes A from k;
+the descent begins from several shares of the stiffness. Reversals that noise makes add to the length of the path of
+y, which biases the numbers by a percent or so: a refinement by simulation begins with them.
 """
 
 import itertools
@@ -85,7 +82,6 @@ def cases(term: Term, degree: int) -> FloatArray:
 
 
 def _signs(term: Term) -> FloatArray:
-    """Factors of |z|^power, shape (2, 2), by direction and side of z = 0."""
     direction = np.array([1.0, 1.0] if term.rectified else [-1.0, 1.0])
     side = np.array([1.0, 1.0] if term.is_even_in_memory else [-1.0, 1.0])
     return np.asarray(direction[:, np.newaxis] * side)
@@ -109,7 +105,7 @@ class HiddenMemory:
         self._size = float(np.linalg.norm(force))
 
     def fit(self, terms: Sequence[Term]) -> Regressed | None:
-        """The law of these terms, the first of which is u', from the best of several starts; None if all escape."""
+        """The law of these terms, the first of which is u', from the best of several starts; None if all diverge."""
         spring = self.linear.stiffness
         shares = [1.0 - self.known["stiffness"] / spring] if "stiffness" in self.known else SHARES
         starts = [np.array([max(share, 0.01) * spring, *np.zeros(len(terms) - 1)]) for share in shares]
@@ -157,7 +153,6 @@ class HiddenMemory:
         return self._regressed(terms, reached.x[0])
 
     def _regressed(self, terms: Sequence[Term], x: FloatArray) -> Regressed | None:
-        """The law with these coefficients and the plant that goes best with it."""
         rows = self._memory(terms, x)
         if rows is None:
             return None
@@ -168,7 +163,7 @@ class HiddenMemory:
         return Regressed(coefficients, self.known | dict(zip(self._free, plant, strict=True)), error)
 
     def _memory(self, terms: Sequence[Term], x: FloatArray) -> FloatArray | None:
-        """Filtered memory and its slopes along the coefficients, (1 + n_terms, n_rows); None if it escapes."""
+        """Filtered memory and its slopes along the coefficients, (1 + n_terms, n_rows); None if it diverges."""
         polynomial, _, _, relaxation = memory_arrays(dict(zip(terms, x.tolist(), strict=True)), _DEGREE)
         polynomials = [term for term in terms if not term.relaxing]
         units = np.array([cases(term, _DEGREE) for term in polynomials])

@@ -225,7 +225,6 @@ def _response(law: Law, record: Record) -> FloatArray | None:
 
 
 def _width(law: Law, record: Record) -> float:
-    """Relative width of the last complete cycle; nan where there is none."""
     y = _response(law, record)
     if y is None or not complete_cycles(record.u, TOLERANCE):
         return math.nan
@@ -259,13 +258,11 @@ def signed_area(loop: metrics.LoopMetrics) -> float:
 
 
 def _even(record: Record) -> Record:
-    """The record at even times, as many as it has."""
     steps = np.diff(np.asarray(record.t, dtype=float))
     return record if np.ptp(steps) <= 1e-6 * steps.mean() else record.resample(float(steps.mean()))
 
 
 def _thinned(records: Sequence[Record]) -> list[Record]:
-    """Every m-th sample of each record, where all together have many and the branches stay well sampled."""
     branches = np.concatenate([[len(branch) for branch in record.branches(TOLERANCE)] for record in records])
     total = sum(len(record) for record in records)
     stride = max(1, min(total // _THINNED, int(np.median(branches)) // _PER_BRANCH if branches.size else 1))

@@ -132,7 +132,6 @@ def _structure(records: Sequence[Record], structure: OscillatorStructure | None)
 
 
 def _known_plant(plant: Mapping[str, float | None]) -> dict[str, float]:
-    """The parts of the plant that are known."""
     known = {}
     for name, value in plant.items():
         if value is None:
@@ -165,7 +164,6 @@ def _period(u: FloatArray) -> int | None:
 
 
 def _is_steady(y: FloatArray, period: int) -> bool:
-    """Whether what changes between the first and the last period is no transient, which would be larger at first."""
     first, last = y[:period], y[y.size // period * period - period : y.size // period * period]
     early, late = (float(np.std(part)) for part in np.array_split(first - last, 4)[::3])
     return early <= max(_TRANSIENT * late, 1e-6 * float(np.std(y)))

@@ -29,7 +29,7 @@ from hysim.models.steady_state import ATTEMPTS, attracting_state
 from hysim.models.terms import Term
 from hysim.records import Record
 
-_DIFFERENCES = (3e-4, 3e-5, 3e-6)  # of a parameter, for its slope: the first with which nothing escapes
+_DIFFERENCES = (3e-4, 3e-5, 3e-6)  # of a parameter, for its slope: the first with which nothing diverges
 _STEADY = 1e-9  # relative change of the state from period to period
 
 
@@ -70,7 +70,6 @@ class Response:
 
     @cached_property
     def _inputs(self) -> list[tuple[FloatArray, float]]:
-        """Forces at the ends of the steps, and the time of a step."""
         return [(self.structure.fine_input(r.u), r.sample_time / self.structure.oversampling) for r in self.records]
 
     def outputs(self, oscillators: Sequence[Oscillator]) -> FloatArray:
@@ -128,7 +127,7 @@ class Response:
     def slopes(self, oscillator: Oscillator, terms: Sequence[Term]) -> FloatArray:
         """Derivatives of the output by the plant's free parameters and the coefficients of `terms`, (n_samples, n).
 
-        Zero where the motion would escape, or never be steady, with any of the differences.
+        Zero where the motion would diverge, or never be steady, with any of the differences.
         """
         slopes = np.zeros((self.measured.size, len(self.free) + len(terms)))
         missing = np.arange(slopes.shape[1])
@@ -143,7 +142,7 @@ class Response:
     def _differences(
         self, oscillator: Oscillator, terms: Sequence[Term], places: npt.NDArray[np.intp], difference: float
     ) -> FloatArray:
-        """Central differences by the parameters at some places; not finite where one escapes."""
+        """Central differences by the parameters at some places; not finite where one diverges."""
         plant, coefficients = oscillator
         spring = plant["stiffness"] + next(iter(coefficients.values()), 0.0)
         size = spring * float(np.sqrt(np.mean(self.measured**2)))
@@ -212,7 +211,6 @@ class Response:
 
     @cached_property
     def _blocks(self) -> list[slice]:
-        """The periods of periodic records, or blocks of others."""
         edges = [0]
         for record in self.records:
             period = self.structure.period

@@ -1,9 +1,9 @@
 """The search behind `hysim.discover_oscillator`: candidates for the law of the memory, and the choice of one.
 
 1. A rival without memory, a mass on a linear spring, is identified. About it all terms of the library are tried: if
-   none is worth its parameter (BIC), there is no structure.
-2. Along the measured motion, with z from the equation of motion and m, c and k projected out, the laws of Bouc and Wen
-   with n = 1, 2 and 3 and a linear relaxation are regressed (`_hidden_memory`): the nearest one begins.
+   none lowers the BIC, there is no structure.
+2. Along the measured motion the laws of Bouc and Wen with n = 1, 2 and 3 and a linear relaxation are regressed
+   (`_hidden_memory`); the search begins with the nearest one.
 3. It is refined by simulation error (`hysim.identify`).
 4. About the refined law the whole library is regressed, the law's own terms like all others: PySINDy's STLSQ and plain
    elimination from dense to sparse, one structure by BIC, inclusion by bagging (`_oscillator_response`). Terms that are
@@ -138,7 +138,6 @@ class Search(NamedTuple):
         return _chosen(candidates, elastic, nearest)
 
     def _made(self, structure: OscillatorStructure) -> "Search":
-        """The same search under another assumption of how the records were made."""
         return self._replace(response=replace(self.response, structure=structure))
 
     def _again(self, candidates: "Sequence[tuple[Search, _Tried]]") -> "list[tuple[Search, _Tried]]":
@@ -359,18 +358,15 @@ def _tried(fitted: _Fitted, regression: TermRegression) -> _Tried:
 
 
 def _is_polynomial(terms: Sequence[Term]) -> bool:
-    """Whether no power in a law is a free number."""
     return all(term.is_polynomial or term.relaxing for term in terms)
 
 
 def _motion(plant: Mapping[str, float]) -> str:
-    """The equation of motion as text."""
     text = f"{plant['mass']:.6g} y'' + {plant['damping']:.6g} y' + {plant['stiffness']:.6g} y + z = u"
     return text.replace("+ -", "- ")
 
 
 def _message(kind: str, warnings: Sequence[str]) -> str:
-    """How the search ended."""
     if kind == NO_STRUCTURE:
         return "no term of the library is worth its parameter beside a linear spring"
     if kind == RATE_DEPENDENT:
@@ -379,7 +375,6 @@ def _message(kind: str, warnings: Sequence[str]) -> str:
 
 
 def _warnings(tried: _Tried, inclusion: Mapping[str, float]) -> tuple[str, ...]:
-    """Reasons to doubt the law, the gravest first."""
     parts = []
     if verdict(tried.fitted.terms) != NO_STRUCTURE and tried.beyond:
         parts.append(f"The records ask for more terms: {', '.join(term.named('z') for term in sorted(tried.beyond))}.")

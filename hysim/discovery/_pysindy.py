@@ -76,15 +76,7 @@ def inclusion(features: FloatArray, slope: FloatArray, threshold: float, *, n_mo
 
 
 def check(optimizer: str) -> None:
-    """Refuse an optimizer that no path can be made with.
-
-    Raises
-    ------
-    ImportError
-        If PySINDy needs an extra for it that is not installed.
-    ValueError
-        If it is none of `OPTIMIZERS`.
-    """
+    """Refuse an optimizer that no path can be made with: an ImportError says that its extra is not installed."""
     if optimizer in OPTIMIZERS:
         return
     extra = _EXTRAS.get(optimizer)
@@ -135,7 +127,6 @@ def _quiet() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _seeded(seed: int) -> Iterator[None]:
-    """NumPy's global generator with this seed, and afterwards as it was."""
     before = np.random.get_state()  # noqa: NPY002  PySINDy takes no generator
     np.random.seed(seed)  # noqa: NPY002
     try:

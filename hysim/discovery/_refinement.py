@@ -231,7 +231,6 @@ class FreeRun:
         )
 
     def _with_starts(self, structure: Structure, unknowns: FloatArray) -> FloatArray:
-        """The unknowns, their y0 those at rest where the structure is."""
         if not structure.rest:
             return unknowns
         numbers = unknowns[np.newaxis, : structure.size]

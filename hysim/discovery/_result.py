@@ -86,14 +86,12 @@ class _Discovered(ABC):
 
     @property
     def _counted(self) -> str:
-        """How many of the parameters are initial states."""
         if self.initial != "free" or not self.initial_states:
             return ""
         n = sum(map(len, self.initial_states))
         return f", {n} of them {'an initial state' if n == 1 else 'initial states'}"
 
     def _initial_state(self, form: str) -> str:
-        """The initial states in words, those of several records one after the other."""
         states = self.initial_states
         if all(state == states[0] for state in states):
             states = states[:1]

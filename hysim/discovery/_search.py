@@ -57,19 +57,11 @@ _RIDGES = (1e-9, 1e-4, 1e-2)
 
 @dataclass(frozen=True)
 class Library:
-    """What laws are looked for.
+    """The terms of laws, and what else these may have.
 
-    Parameters
-    ----------
-    terms : tuple of Term
-    letter : {"y", "z"}
-        What the memory is called: the output itself, or what the output hides.
-    feedthrough : {"no", "may", "must"}
-        Whether the output has one beside the memory.
-    offset : bool
-        Whether the memory may be zero at another output than zero.
-    rests : tuple of bool
-        Whether a memory that begins at a value of its own is tried, False, or one that begins at zero, True, or both.
+    `letter` is "y" where the memory is the output, else "z". `feedthrough` is "no", "may" or "must", `offset` whether
+    the memory may be zero at another output than zero. `rests` holds False where a memory that begins at a value of its
+    own is tried, and True where one that begins at zero is.
     """
 
     terms: tuple[Term, ...]
@@ -109,7 +101,6 @@ class Outcome:
     search: Search
     start: Start
     slopes: Slopes
-    form: str
     path: list[tuple[float, Terms]]
     is_short: bool = False
 
@@ -186,7 +177,7 @@ def searched(
         search.explore(library.structure(starts[0].regression.terms))
     chosen = _on_all_samples(free_run, search, library, options.seed, restarts=0 if is_short else _RESTARTS)
     start = _start_at(rows, library, chosen)
-    return Outcome(library, chosen, search, start, rows, form, _path(start, library, optimizer), is_short)
+    return Outcome(library, chosen, search, start, rows, _path(start, library, optimizer), is_short)
 
 
 def _least_rmse(search: Search) -> float:
@@ -197,7 +188,6 @@ def _least_rmse(search: Search) -> float:
 
 
 def _thinned(free_run: FreeRun) -> FreeRun:
-    """The problem on about SEARCHED samples of the records."""
     samples = [thinning(record, SEARCHED // len(free_run.records)) for record in free_run.records]
     records = tuple(Record(u=r.u[kept], y=r.y[kept]) for r, kept in zip(free_run.records, samples, strict=True))
     seen = free_run.seen and tuple(mask[kept] for mask, kept in zip(free_run.seen, samples, strict=True))
@@ -211,7 +201,6 @@ def _path(start: Start, library: Library, optimizer: str) -> list[tuple[float, T
 
 
 def _start_at(rows: Slopes, library: Library, candidate: Candidate[Terms]) -> Start:
-    """The regression at the shifts of a refined candidate."""
     feedthrough, offset = shifts(candidate.structure, candidate.unknowns[np.newaxis, : candidate.structure.size])
     place = float(feedthrough[0]), float(offset[0])
     return Start(rows.regression(library.terms, *place), *place)
@@ -260,7 +249,6 @@ def _on_all_samples(free_run: FreeRun, search: Search, library: Library, seed: i
 
 
 def _restarted(free_run: FreeRun, chosen: Candidate[Terms], seed: int, restarts: int) -> Candidate[Terms]:
-    """The best of a candidate and of descending again from random starts around it."""
     random = np.random.default_rng(seed)
     spread = _SPREAD * free_run.units(chosen.structure)
     best = chosen

@@ -66,14 +66,8 @@ class Prediction(NamedTuple):
     unknowns: FloatArray
 
 
-def thinned(record: Record, most: int) -> Record:
-    """Every m-th sample of a record, its last one and its reversals, about `most` together."""
-    samples = thinning(record, most)
-    return Record(u=record.u[samples], y=record.y[samples])
-
-
 def thinning(record: Record, most: int) -> npt.NDArray[np.intp]:
-    """The samples that `thinned` keeps; a record that has more reversals than `most` is cut short."""
+    """Every m-th sample of a record, its last one and its reversals, about `most` together, and 2 `most` at most."""
     stride = -(-len(record) // most)
     kept = np.arange(len(record)) % stride == 0
     kept[-1] = True
@@ -144,7 +138,6 @@ class Search:
         return [c for c in candidates if c.bic < best.bic + HOPELESS or gap(c, best) < ALIKE]
 
     def _hopeless(self, structure: Terms) -> float:
-        """The cost above which a structure is not followed."""
         sound, n = self.sound, self.free_run.n_samples
         if not sound:
             return math.inf
@@ -216,7 +209,6 @@ class Search:
 
 
 def _placed(candidate: Candidate[Terms], largest: Terms) -> FloatArray:
-    """The unknowns of a candidate among those of `largest`, zero where it has none."""
     own, size = candidate.structure, candidate.structure.size
     values = dict(zip(_names(own), candidate.unknowns[:size].tolist(), strict=True))
     return np.concatenate([[values.get(name, 0.0) for name in _names(largest)], candidate.unknowns[size:]])
@@ -233,7 +225,6 @@ def _shift_columns(largest: Terms, u0: FloatArray) -> FloatArray:
 
 
 def _of(largest: Terms, kept: npt.NDArray[np.bool_], rest: bool) -> Terms:
-    """The structure inside `largest` of the numbers kept."""
     names = [name for name, is_kept in zip(_names(largest), kept.tolist(), strict=False) if is_kept]
     terms = tuple(name for name in names if isinstance(name, Term))
     return Terms(terms, "feedthrough" in names, "offset" in names, rest)

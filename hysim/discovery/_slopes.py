@@ -149,7 +149,6 @@ def _smoothed_where_long(u: FloatArray, y: FloatArray) -> FloatArray:
 
 
 def _polynomial(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Chebyshev coefficients of the smoothing polynomial on -1 <= x <= 1."""
     highest = min(MAX_DEGREE, x.size - 2)
     basis, triangle = np.linalg.qr(chebyshev.chebvander(x, highest))
     weights = basis.T @ y
@@ -233,7 +232,8 @@ class Slopes:
         raw, slope = self.equations(_features(terms), feedthrough, offset)
         sizes, slope_size = np.sqrt(np.mean(raw**2, axis=0)), float(np.sqrt(np.mean(slope**2))) or 1.0
         scaled = raw / np.where(sizes > 0.0, sizes, 1.0)
-        kept = sorted(_independent(scaled, sorted(range(len(terms)), key=lambda k: (terms[k].degree, k))))
+        by_degree = sorted(range(len(terms)), key=lambda k: (terms[k].degree, k))
+        kept = sorted(independent(scaled, np.empty((len(slope), 0)), by_degree, DEPENDENT))
         return Regression(
             terms=tuple(terms[k] for k in kept),
             dependent=tuple(term for k, term in enumerate(terms) if k not in kept),
@@ -277,16 +277,18 @@ def feature(term: Term, u: FloatArray, z: FloatArray, direction: FloatArray | fl
     return column if term.rectified else direction * column
 
 
-def _independent(columns: FloatArray, order: list[int]) -> list[int]:
-    """The columns that, taken in `order`, are not linear combinations of those before them."""
-    basis = np.empty((len(columns), 0))
+def independent(columns: FloatArray, basis: FloatArray, order: Sequence[int], least: float) -> list[int]:
+    """The columns that, taken in `order`, are no combinations of an orthonormal `basis` and of those before them.
+
+    Columns (n, n_columns) of which a share below `least` remains count as combinations.
+    """
     kept = []
     for k in order:
-        rest = columns[:, k] / np.sqrt(len(columns))
+        rest = columns[:, k]
         for _ in range(2):  # twice is enough for orthogonality to rounding
             rest = rest - basis @ (basis.T @ rest)
         size = float(np.linalg.norm(rest))
-        if size > DEPENDENT:
+        if size > least * float(np.linalg.norm(columns[:, k])):
             kept.append(k)
             basis = np.column_stack([basis, rest / size])
     return kept

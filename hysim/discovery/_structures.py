@@ -79,18 +79,15 @@ class AnyExponent:
         return 4 + self.feedthrough + self.offset
 
     def units(self, record: Record, stroke: float) -> FloatArray:
-        """See `Terms`."""
         span = float(np.ptp(record.u))
         return np.concatenate([[stroke / span, 1.0 / span, 1.0 / span, 1.0], _shift_units(self, record, stroke)])
 
     def bounds(self, signs: Mapping[Term, int]) -> Bounds:
-        """See `Terms`."""
         lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
         lower[3], upper[3] = self.LOWEST, self.HIGHEST
         return lower, upper
 
     def run(self, u: FloatArray, numbers: FloatArray, y0: FloatArray, bound: float) -> FloatArray:
-        """See `Terms`."""
         feedthrough, offset = shifts(self, numbers)
         A, dissipative, conservative, n = numbers[:, :4].T
         laws = {"A": A, "beta": -dissipative, "gamma": -conservative, "n": n}

@@ -41,17 +41,9 @@ def best_subsets(
     *,
     width: int = WIDTH,
 ) -> Iterator[Subsets]:
-    """The best subsets of each size, from all columns down to those that are not removable.
+    """The `width` best subsets of each size, from all columns down to those that are not `removable` (n,).
 
-    Parameters
-    ----------
-    jacobian : array, shape (n_samples, n)
-    residual : array, shape (n_samples,)
-        At `x`.
-    x : array, shape (n,)
-    removable : array of bool, shape (n,)
-    width : int
-        Number of subsets of one size that are followed.
+    `jacobian` (n_samples, n) and `residual` (n_samples,) are those at `x` (n,).
     """
     sizes = np.linalg.norm(jacobian, axis=0)
     sizes[sizes == 0.0] = 1.0

@@ -13,6 +13,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.discovery._pysindy import sparse_path
+from hysim.discovery._slopes import independent
 from hysim.metrics.criteria import information
 from hysim.models.terms import Term
 
@@ -125,27 +126,19 @@ def term_regression(
     """
     sizes = np.linalg.norm(plant, axis=0)
     plant, sizes = plant[:, sizes > 0.0], sizes[sizes > 0.0]  # where the motion diverges a slope is unknown, and zero
-    basis = list(np.linalg.qr(plant / sizes)[0].T) if plant.size else []
-    n_plant, independent = len(basis), []
-    for k, slope in enumerate(slopes.T):
-        rest = slope.copy()
-        for _ in range(2):  # the second time takes away what rounding left
-            rest -= np.array(basis).T @ (np.array(basis) @ rest) if basis else 0.0
-        if np.linalg.norm(rest) > DEPENDENT * np.linalg.norm(slope):
-            basis.append(rest / np.linalg.norm(rest))
-            independent.append(k)
-    Q = np.array(basis[:n_plant]).reshape(n_plant, target.size)
-    features, goal = slopes[:, independent], target
-    features, goal = features - Q.T @ (Q @ features), goal - Q.T @ (Q @ goal)
+    basis = np.linalg.qr(plant / sizes)[0]
+    n_plant, kept = basis.shape[1], independent(slopes, basis, range(len(terms)), DEPENDENT)
+    features = slopes[:, kept] - basis @ (basis.T @ slopes[:, kept])
+    goal = target - basis @ (basis.T @ target)
     size = np.linalg.norm(features, axis=0)
     scaled = features / size
     residual = goal - scaled @ np.linalg.lstsq(scaled, goal, rcond=None)[0]
-    freedom = max(goal.size - n_plant - len(independent), 1)
+    freedom = max(goal.size - n_plant - len(kept), 1)
     sigma = max(float(np.sqrt(residual @ residual / freedom)), floor)
     units = sigma * np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled))) / size
     return TermRegression(
-        terms=tuple(terms[k] for k in independent),
-        dependent=tuple(term for k, term in enumerate(terms) if k not in independent),
+        terms=tuple(terms[k] for k in kept),
+        dependent=tuple(term for k, term in enumerate(terms) if k not in kept),
         features=features * units / sigma,
         target=goal / sigma,
         units=units,

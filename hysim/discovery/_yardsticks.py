@@ -4,16 +4,15 @@
     relaxations   y = c_0 u + sum_i g(log tau_i) x_i + trend,       tau_i x_i' + x_i = u
     plays         y = f(u) + sum_i (c_i p_i + d_i p_i^2 + e_i p_i^3) + trend,   p_i the play of the threshold r_i
 
-A curve has no memory, relaxations are linear creep over all times that a record shows, and plays know no time. Every
+A curve has no memory, relaxations are linear creep over all times of a record, and plays do not depend on time. Every
 Preisach operator is a sum of functions of plays (M. Brokate and J. Sprekels, Hysteresis and Phase Transitions, 1996,
-section 2.4), so that plays describe what a library of terms cannot. The trend is a slow drift, a polynomial of time in
-each record. All models are linear in their numbers, f is a cubic spline and g is linear between three places. The
-numbers come from a ridge regression whose weight minimises the generalised cross-validation
+section 2.4). The trend is a polynomial of time in each record, f is a cubic spline and g is linear between three
+places. The numbers come from a ridge regression whose weight minimises the generalised cross-validation
 
     GCV = (residual sum of squares / n) / (1 - degrees of freedom / n)^2.
 
-What a play was before a record began is not known: it lies within its threshold of the first input, and the difference
-between both ends is a column for that record alone.
+The state of a play before a record is unknown within its threshold of the first input: the difference between both
+ends is a column for that record alone.
 """
 
 from collections.abc import Sequence
@@ -49,16 +48,10 @@ _SLOW = 1e-3  # the same of trends: they cannot be estimated from the few sample
 
 @dataclass(frozen=True)
 class Yardstick:
-    """A model that is linear in its numbers.
+    """A model that is linear in its numbers, which multiply `columns` (n_samples, n_columns), and a constant.
 
-    Parameters
-    ----------
-    columns : array, shape (n_samples, n_columns)
-        What the numbers multiply, a constant excepted.
-    held : array, shape (n_columns,)
-        How strongly each number is held near zero whatever the ridge, in squared sizes of its column.
-    u : array, shape (n_samples,), optional
-        Input of the smoothing spline that is fitted first; the columns have what it leaves.
+    Each number is held near zero, whatever the ridge, as strongly as `held` (n_columns,) says in squared sizes of its
+    column. Where `u` (n_samples,) is given, a smoothing spline of it is fitted first.
     """
 
     columns: FloatArray
@@ -163,7 +156,6 @@ def _ridge(design: FloatArray, target: FloatArray, n: int) -> FloatArray:
 
 
 def _spline(records: Sequence[Record]) -> FloatArray:
-    """A cubic spline of the input with even knots, (n_samples, n_splines)."""
     u = _inputs(records)
     n = min(_SPLINES, max(int(np.count_nonzero(_steps(u))) // 2, _CUBIC + 1))
     inner = np.linspace(u.min(), u.max(), n - _CUBIC + 1)
@@ -172,19 +164,16 @@ def _spline(records: Sequence[Record]) -> FloatArray:
 
 
 def _steps(u: FloatArray) -> npt.NDArray[np.bool_]:
-    """Whether each sorted input differs from the one before it, (n_samples - 1,)."""
     return np.asarray(np.diff(np.sort(u)) > _EQUAL * float(np.ptp(u)))
 
 
 def _positions(u: FloatArray, side: float) -> FloatArray:
-    """Positions of the plays, which begin as far from the input as they can on one side."""
     thresholds = np.arange(1.0, _PLAYS + 1.0) / (_PLAYS + 1.0)
     starts = tuple((u[0] + side * thresholds).tolist())
     return PrandtlIshlinskii(thresholds=tuple(thresholds.tolist()), weights=starts, z0=starts).memory(u)
 
 
 def _relaxed(record: Record, tau: float) -> FloatArray:
-    """The input after a lag that is at rest at the first sample."""
     lag = TransferFunction(num=(1.0,), den=(tau, 1.0), hold="foh")
     return lag.response(record.u - record.u[0], record.sample_time)
 
@@ -198,7 +187,6 @@ def _trends(records: Sequence[Record]) -> FloatArray:
 
 
 def _apart(parts: Sequence[FloatArray]) -> FloatArray:
-    """Columns of one record each, zero at the samples of the others."""
     rows = [np.zeros((len(part), sum(each.shape[1] for each in parts))) for part in parts]
     begin = 0
     for row, part in zip(rows, parts, strict=True):

@@ -67,10 +67,6 @@ class Descent:
         reached = descend(sets, theta, tolerance=tolerance, steps=steps)
         return Reached(reached.x, reached.loss, reached.evaluated[2][:, 0], reached.at_rest)
 
-    def outputs(self, theta: FloatArray) -> FloatArray:
-        """The model's outputs at `theta`, (n_sets, n_samples)."""
-        return self.problem.model(theta)
-
     def box(self) -> tuple[FloatArray, FloatArray]:
         """Lower and upper bounds of theta."""
         space, linear = self.problem.space, self.problem.linear_box()

@@ -58,7 +58,7 @@ def whiteness(residual: FloatArray, n_parameters: int) -> float:
 def loop_widths(descent: Descent, theta: FloatArray) -> FloatArray:
     """Largest width of the loop of the first record for each theta, (n_sets,); empty where it has no loop."""
     record = descent.problem.parts[0].record
-    outputs = descent.outputs(theta)[:, : len(record)]
+    outputs = descent.problem.model(theta)[:, : len(record)]
     finite = outputs[np.isfinite(outputs).all(axis=1)]
     try:
         return LoopRows(record.u).max_width(finite)

@@ -22,13 +22,7 @@ from hysim.records import Record
 
 
 def refuse(family: Direct, freedom: Freedom, noise: str, intervals: str) -> None:
-    """Refuse what a fit in one step cannot do.
-
-    Raises
-    ------
-    ValueError
-        If parameters are fixed, freed or bounded, the noise is not normal, or intervals are asked for.
-    """
+    """Refuse, by a ValueError, parameters by name, other noise than normal, and intervals."""
     name = family.__name__ if isinstance(family, type) else type(family).__name__
     if freedom.fixed or freedom.free or freedom.bounds:
         raise ValueError(f"{name} has no parameters by name: leave out fixed=, free= and bounds=")
@@ -81,7 +75,6 @@ def _left_out_errors(family: Direct, u: FloatArray, y: FloatArray, folds: Sequen
 
 
 def _no_width(record: Record) -> Width | None:
-    """The width of a curve's loop, which is zero; None where the record has no loop."""
     try:
         LoopRows(record.u)
     except ValueError:  # there is no complete cycle

@@ -127,7 +127,6 @@ def _searched(
     seed: int,
     progress: Progress | None,
 ) -> Identification:
-    """The result of the search for a family's parameters."""
     n_samples, n_names = problem.y.size, len(problem.space.names)
     if not n_names:
         raise ValueError("every parameter is fixed: nothing is left to identify")

@@ -24,7 +24,7 @@ from hysim.models.search_space import Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
 _CHUNK = 200_000  # samples that are evaluated at once, to bound the memory
-_LARGEST = 1e150  # beyond it squares overflow: such a set counts as one that has escaped
+_LARGEST = 1e150  # beyond it squares overflow: such a set counts as one that has diverged
 _RANK = 1e-11  # singular values of the normalised columns below this are taken as zero
 _DIFFERENCE = 1e-6  # step of a central difference in units of the box: truncation and rounding both ~1e-10
 
@@ -117,7 +117,7 @@ class Problem:
         for k, part in enumerate(self.parts):
             samples = slice(self.cuts[k], self.cuts[k + 1])
             parameters = self.parameters(x, k)
-            lost = [~np.isfinite(parameters[name]) for name in self.own.state if part.periodic]
+            missing = [~np.isfinite(parameters[name]) for name in self.own.state if part.periodic]
             parameters |= {name: np.nan_to_num(parameters[name]) for name in self.own.state if part.periodic}
             with np.errstate(over="ignore", invalid="ignore"):
                 regressors = self.family.regressors(parameters, part.record)
@@ -129,8 +129,8 @@ class Problem:
                         steady = part.periodic and name in self.own.state
                         value = parameters[name][:, np.newaxis] if steady else self.own.held[name]
                         fixed_part[:, samples] += value * regressors[..., place]
-            for escaped in lost:  # there is no steady cycle
-                fixed_part[escaped, samples] = np.inf
+            for diverged in missing:  # there is no steady cycle
+                fixed_part[diverged, samples] = np.inf
             places = [place for place, name in enumerate(self.own.columns) if name in self.own.linear]
             for place, column in zip(places, part.linear.tolist(), strict=True):
                 if column >= 0:
@@ -214,14 +214,7 @@ class Problem:
 def problem(
     family: Identifiable, records: Sequence[Record], freedom: Freedom, initial: str | Sequence[str] | None
 ) -> Problem:
-    """Put the records of one family together.
-
-    Raises
-    ------
-    ValueError
-        If `initial` is unknown or not one for each record, the family has no steady cycle, or as the family's
-        `search_space`.
-    """
+    """Put the records of one family together; a ValueError says what of `initial` or `freedom` does not fit."""
     kinds = _kinds(initial, len(records))
     shared = None if kinds[0] is None else "free" if "free" in kinds else "rest"
     widest = max(records, key=lambda record: (float(np.ptp(record.u)), len(record)))  # it scales the box
@@ -246,7 +239,6 @@ def _kinds(initial: str | Sequence[str] | None, n: int) -> list[str | None]:
 def _together(
     family: Identifiable, own: SearchSpace, records: Sequence[Record], kinds: Sequence[str | None]
 ) -> Problem:
-    """Records that share all but their states."""
     states = [name for name in own.state if name not in own.held]
     if foreign := [name for name in states if name not in (*own.coordinates, *own.linear)]:
         raise ValueError(f'{foreign[0]} is not free record by record: use initial="rest" or "periodic"')

@@ -51,7 +51,7 @@ def _left_out_errors(
     descent = Descent(problem, noise, problem.y[np.newaxis], np.repeat(weights, len(starts), axis=0))
     reached = descent.run(np.tile(starts, (len(left_out), 1)), tolerance=_TOLERANCE)
     best = np.arange(len(left_out)) * len(starts) + reached.loss.reshape(len(left_out), -1).argmin(axis=1)
-    errors = (problem.y - descent.outputs(reached.theta[best]))[weights == 0.0]
+    errors = (problem.y - problem.model(reached.theta[best]))[weights == 0.0]
     return np.where(np.isfinite(errors), errors, np.inf)  # nan is for samples that no fold has
 
 

@@ -58,7 +58,7 @@ class Identification:
     condition : float
         Condition number of the Jacobian whose columns have length one.
     redundant : tuple of tuples of str
-        Groups of parameters that the data cannot tell apart.
+        Groups of parameters that the data do not determine separately.
     free_names : tuple of str
     n_parameters : int
         The parameters that were identified, and their number d.
@@ -201,7 +201,7 @@ class Identification:
         if self.noise != "gaussian":
             words.append(f"{self.noise} noise of sigma {self.sigma:.4g}")
         if not np.isnan(self.whiteness):
-            words.append(f"white with probability {self.whiteness:.2g}")
+            words.append(f"p = {self.whiteness:.2g} if white")
         return ", ".join(words)
 
     def to_json(self) -> str:

@@ -83,7 +83,6 @@ def polish(problem: Problem, starts: FloatArray) -> list[Optimum]:
 
 
 def _descended(problem: Problem, starts: FloatArray, *, exact: bool) -> Reached:
-    """Where the points `starts` (n, n_x) descend to, on the way or at the end."""
     noise, everything = Gaussian(floor=PERFECT * problem.scale), np.ones((1, problem.y.size))
     descent = Descent(problem, noise, problem.y[np.newaxis], everything, projected=not problem.space.bounds)
     gain, steps = (_TOLERANCE, N_POLISHING) if exact else (_GAIN, N_STEPS)
@@ -91,7 +90,6 @@ def _descended(problem: Problem, starts: FloatArray, *, exact: bool) -> Reached:
 
 
 def _starts(problem: Problem, screened: int, seed: int, most: int, n_given: int = 0) -> FloatArray:
-    """The family's first `n_given` starts, and the best of the others and of points drawn from the box."""
     candidates = np.concatenate([problem.space.starts, _uniform(problem.space, screened, seed)])
     return _apart(problem.space, candidates, problem.costs(candidates), _APART, most, n_given)
 

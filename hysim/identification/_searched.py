@@ -91,7 +91,7 @@ class Search:
 
     def residual(self, theta: FloatArray) -> FloatArray:
         """Measured minus model."""
-        return np.asarray(self.problem.y - self.descent.outputs(theta[np.newaxis])[0])
+        return np.asarray(self.problem.y - self.problem.model(theta[np.newaxis])[0])
 
     def described(
         self, likely: list[LocalOptimum], intervals: str, least_squares: FloatArray
@@ -185,7 +185,6 @@ class Search:
         return [*notes, *family.notes(record, family.assemble(self.problem.estimates(best.theta)))]
 
     def _draws(self, best: LocalOptimum, residual: FloatArray) -> FloatArray:
-        """Theta as it could have come out, (n_draws, n_theta)."""
         if residual.size <= len(self.problem.space.names):
             return np.empty((0, best.theta.size))
         return bootstrap(self.problem, self.noise, best.theta, residual, best.sigma, draws=N_BOOTSTRAP, seed=self.seed)
@@ -211,14 +210,12 @@ class Search:
         return {name: (estimates[name] - each, estimates[name] + each) for name, each in reach.items()}
 
     def _quantile(self) -> float:
-        """Quantile of Student's distribution for the remaining degrees of freedom."""
         from scipy.stats import t
 
         freedom = self.problem.y.size - len(self.problem.space.names)
         return float(t.ppf(TAILS[1], freedom)) if freedom > 0 else float("nan")
 
     def _width(self, theta: FloatArray, known: Uncertainty, draws: FloatArray) -> Width | None:
-        """The loop's largest width with its band; None where the first record has no loop."""
         value = loop_widths(self.descent, theta[np.newaxis])
         if not value.size:
             return None
@@ -238,12 +235,13 @@ def _phrases(
     rivals: Sequence[Candidate],
     curves: Mapping[str, Profile],
 ) -> list[str]:
-    """How the search ended, and which parameters the data do not determine."""
     phrases = ["converged" if converged else "the search did not converge", *known.reasons]
     inputs = [part.record.u for part in problem.parts]
     if all((np.diff(u) >= 0.0).all() or (np.diff(u) <= 0.0).all() for u in inputs):
         phrases.append("the input never turns back: nothing shows what unloading does")
-    phrases += [f"the interval of {name} ends at the box" for name, curve in curves.items() if any(curve.at_box)]
+    phrases += [
+        f"the interval of {name} ends at its search bound" for name, curve in curves.items() if any(curve.at_box)
+    ]
     if rivals:
         phrases.append(f"{len(rivals)} other {'optimum' if len(rivals) == 1 else 'optima'} within the noise")
     return phrases

@@ -1,4 +1,4 @@
-"""Standard errors by the linearised model, and what the data cannot tell.
+"""Standard errors by the linearised model, and the parameters that the data do not determine.
 
 With J = dm/dtheta at the optimum, theta the searched coordinates and the linear parameters, W the curvature of the
 loss in the model's output (1/sigma^2 for normal noise), and G = d(the user's parameters)/d(theta),
@@ -49,7 +49,7 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
     at_side = (x - space.lower < _AT_SIDE * width) | (space.upper - x < _AT_SIDE * width)
     at_bound = np.logical_or(*(linear == bound for bound in problem.linear_box()))
     ended = zip((*space.coordinates, *space.linear), np.concatenate([at_side, at_bound]), strict=True)
-    reasons = [f"{name} is at a side of its box" for name, side in ended if side]
+    reasons = [f"{name} reached its search bound: widen it with bounds=" for name, side in ended if side]
     reach = np.linalg.norm(slopes[:, : x.size], axis=0) * width
     has_effect = reach > _SINGULAR * reach.max(initial=0.0)
     known = np.concatenate([at_side & has_effect, np.zeros(linear.size, dtype=bool)])
@@ -111,8 +111,8 @@ def _named(names: tuple[str, ...], direction: FloatArray, size: FloatArray) -> t
 
 def _in_words(names: tuple[str, ...], groups: tuple[tuple[str, ...], ...]) -> str:
     if len(names) == 1:
-        return f"the data cannot tell {names[0]}"
+        return f"the data do not determine {names[0]}"
     for group in groups:
         if set(group) <= set(names):
-            return f"the data cannot tell {' and '.join(group)} apart, only their product: fix one of them"
-    return f"the data cannot tell {', '.join(names)} apart"
+            return f"the data determine only the product of {' and '.join(group)}: fix one of them"
+    return f"the data do not determine {', '.join(names)} separately"

@@ -150,7 +150,6 @@ def bounded_steps(
 
 
 def _regressed(jacobian: FloatArray, goal: FloatArray, damping: FloatArray, n_damped: int | None) -> FloatArray:
-    """Least-squares steps (n_sets, n_x), damped in the first `n_damped` elements."""
     norms = np.linalg.norm(jacobian, axis=1)
     norms[norms == 0.0] = 1.0
     strength = np.full(norms.shape, _LEAST_DAMPING)
@@ -176,7 +175,6 @@ class SumOfSquares:
     sizes: Callable[[FloatArray], FloatArray] | None = None
 
     def evaluate(self, x: FloatArray, sets: Sets) -> tuple[FloatArray, tuple[FloatArray, ...]]:
-        """See `Problem`."""
         residual = self.residuals(x)
         with np.errstate(over="ignore", invalid="ignore"):
             squares = np.sum(residual**2, axis=1)
