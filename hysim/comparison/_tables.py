@@ -7,12 +7,9 @@ import math
 import re
 import textwrap
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from hysim._words import LETTERS, words
-
-if TYPE_CHECKING:
-    from hysim.comparison._result import Comparison
 
 Value = str | int | float | bool
 _WIDE = 110  # letters in a line of text
@@ -28,7 +25,7 @@ class Column(NamedTuple):
     short: bool = True
 
 
-def columns(comparison: "Comparison", *, timings: bool) -> list[Column]:
+def columns(comparison: Any, *, timings: bool) -> list[Column]:
     """The columns that this comparison can fill."""
     units = comparison.record.units
     u, y = (f" [{units[name]}]" if name in units else "" for name in ("u", "y"))
@@ -67,7 +64,7 @@ def columns(comparison: "Comparison", *, timings: bool) -> list[Column]:
     ]
 
 
-def rows(comparison: "Comparison") -> list[dict[str, Any]]:
+def rows(comparison: Any) -> list[dict[str, Any]]:
     """The values of each model by name; the best model compares with itself as 1."""
     contrasts = {each.name: vars(each) for each in comparison.contrasts}
     quantum, values = comparison.record.resolution, []
@@ -81,7 +78,7 @@ def rows(comparison: "Comparison") -> list[dict[str, Any]]:
     return values
 
 
-def to_text(comparison: "Comparison", *, timings: bool) -> str:
+def to_text(comparison: Any, *, timings: bool) -> str:
     """The short table for a terminal, the models that could not be compared, and the verdict."""
     lines = _aligned(_short(comparison, timings))
     notes = [f"not compared: {name}: {reason}" for name, reason in comparison.failed.items()] + [comparison.verdict]
@@ -94,7 +91,7 @@ def to_text(comparison: "Comparison", *, timings: bool) -> str:
     )
 
 
-def to_words(comparison: "Comparison") -> str:
+def to_words(comparison: Any) -> str:
     """The rows that predict best, and the verdict."""
     best = [row.name for row in comparison.ranked()]
     unknown = [row.name for row in comparison.rows if math.isnan(row.cv_rmse)]
@@ -118,7 +115,7 @@ def to_words(comparison: "Comparison") -> str:
     return words([f"{head}{len(comparison.record)} samples", *(f"  {line}" for line in _aligned(table)), *notes])
 
 
-def to_html(comparison: "Comparison") -> str:
+def to_html(comparison: Any) -> str:
     """The short table for a notebook, and the verdict."""
     header, *body = ([html.escape(cell) for cell in cells] for cells in _short(comparison, timings=False))
     head = "".join(f"<th>{cell}</th>" for cell in header)
@@ -129,7 +126,7 @@ def to_html(comparison: "Comparison") -> str:
     return f"<table><thead><tr>{head}</tr></thead><tbody>{lines}</tbody></table>{verdict}{warnings}"
 
 
-def to_markdown(comparison: "Comparison", *, timings: bool) -> str:
+def to_markdown(comparison: Any, *, timings: bool) -> str:
     """The short table in Markdown, with a row for each model that could not be compared."""
     header, *body = _short(comparison, timings)
     body += [[name, reason, *[""] * (len(header) - 2)] for name, reason in comparison.failed.items()]
@@ -137,7 +134,7 @@ def to_markdown(comparison: "Comparison", *, timings: bool) -> str:
     return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |" for cells in lines)
 
 
-def to_latex(comparison: "Comparison", *, timings: bool) -> str:
+def to_latex(comparison: Any, *, timings: bool) -> str:
     """The short table as a plain tabular, which needs no package."""
     (header, *body), failed = _short(comparison, timings), comparison.failed.items()
     spans = rf"\multicolumn{{{len(header) - 1}}}{{l}}"
@@ -147,7 +144,7 @@ def to_latex(comparison: "Comparison", *, timings: bool) -> str:
     return "\n".join([*head, r"\hline", *(rf"{line} \\" for line in lines), r"\hline", r"\end{tabular}"])
 
 
-def to_csv(comparison: "Comparison", *, timings: bool) -> str:
+def to_csv(comparison: Any, *, timings: bool) -> str:
     """Every column with all digits; an unknown number is an empty cell."""
     buffer = io.StringIO()
     table = to_columns(comparison, timings=timings)
@@ -157,14 +154,14 @@ def to_csv(comparison: "Comparison", *, timings: bool) -> str:
     return buffer.getvalue()
 
 
-def to_columns(comparison: "Comparison", *, timings: bool) -> dict[str, list[Value | None]]:
+def to_columns(comparison: Any, *, timings: bool) -> dict[str, list[Value | None]]:
     """Heading to values; a model that could not be compared has its name and message only."""
     failed = [{"name": name, "success": False, "message": reason} for name, reason in comparison.failed.items()]
     every = [*rows(comparison), *failed]
     return {column.heading: [row.get(column.name) for row in every] for column in columns(comparison, timings=timings)}
 
 
-def to_frame(comparison: "Comparison", *, timings: bool) -> Any:
+def to_frame(comparison: Any, *, timings: bool) -> Any:
     """The columns as a DataFrame."""
     try:
         import pandas
@@ -185,7 +182,7 @@ def _aligned(table: Sequence[Sequence[str]]) -> list[str]:
     ]
 
 
-def _short(comparison: "Comparison", timings: bool) -> list[list[str]]:
+def _short(comparison: Any, timings: bool) -> list[list[str]]:
     """Headings and printed cells of the short columns, one row a model."""
     chosen = [column for column in columns(comparison, timings=timings) if column.short]
     body = [[_printed(row[column.name], column.digits) for column in chosen] for row in rows(comparison)]

@@ -193,9 +193,9 @@ def to_opensees_degrading(law: Any) -> Scalars:
 
 def to_opensees_pinching(law: Any) -> Scalars:
     """The member with Ao = A."""
-    for name in ("delta_a", "delta_nu", "delta_eta"):
-        if getattr(law, name) != 0.0:
-            raise ValueError(f"the material does not degrade, got {name} = {getattr(law, name):g}: see to_opensees")
+    for name, rate in {"delta_a": law.delta_a, "delta_nu": law.delta_nu, "delta_eta": law.delta_eta}.items():
+        if rate != 0.0:
+            raise ValueError(f"the material does not degrade, got {name} = {rate:g}: see to_opensees")
     return {
         **_of_opensees_energy(law),
         "q": law.q,

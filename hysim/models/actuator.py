@@ -178,7 +178,7 @@ class Actuator:
         signals, end = chain.driven(inputs, begin)
         if signals.lost >= 0:
             raise SimulationError(f"the actuator leaves the finite numbers at sample {signals.lost}")
-        if getattr(self.vibration, "sample", "start") == "end":
+        if isinstance(self.vibration, TransferFunction) and self.vibration.sample == "end":
             return np.append(signals.y, chain.displacement(end))[1:], end
         return chain.after_the_command(signals, begin), end
 

@@ -7,6 +7,7 @@ num and den.
 """
 
 import math
+from collections.abc import Sized
 from typing import Any
 
 import numpy as np
@@ -89,7 +90,7 @@ def linear_plant(system: Any) -> Any:
     ValueError
         If it has several inputs or outputs, or is discrete.
     """
-    by_matrices = all(hasattr(system, name) for name in "ABCD")
+    by_matrices = all(hasattr(system, name) for name in "ABCD")  # systems of SciPy and python-control share no class
     own = isinstance(system, StateSpace | TransferFunction)
     if own or not (by_matrices or all(hasattr(system, name) for name in ("num", "den"))):
         return system
@@ -105,8 +106,8 @@ def linear_plant(system: Any) -> Any:
 
 def _polynomial(coefficients: Any) -> tuple[float, ...]:
     """Coefficients as such, or as the one entry of a matrix of them."""
-    while len(coefficients) == 1 and hasattr(coefficients[0], "__len__"):
+    while len(coefficients) == 1 and isinstance(coefficients[0], Sized):
         coefficients = coefficients[0]
-    if hasattr(coefficients[0], "__len__"):
+    if isinstance(coefficients[0], Sized):
         raise ValueError("vibration must have one input and one output, got a matrix of transfer functions")
     return tuple(float(value) for value in np.trim_zeros(np.asarray(coefficients), "f")) or (0.0,)

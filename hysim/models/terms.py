@@ -209,7 +209,8 @@ def polynomials(terms: Sequence[Term], coefficients: FloatArray) -> Polynomials:
     parts = []
     for absolute in (False, True):
         chosen = [(k, term) for k, term in enumerate(terms) if term.absolute == absolute]
-        rows, columns = (1 + max((getattr(term, power) for _, term in chosen), default=0) for power in ("i", "j"))
+        rows = 1 + max((term.i for _, term in chosen), default=0)
+        columns = 1 + max((term.j for _, term in chosen), default=0)
         pair = np.zeros((2, len(coefficients), rows, columns))
         for k, term in chosen:
             pair[int(term.rectified), :, term.i, term.j] = coefficients[:, k]
