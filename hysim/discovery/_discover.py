@@ -20,7 +20,7 @@ from hysim._blas import one_blas_thread
 from hysim._frozen import FloatArray
 from hysim._parallel import Progress
 from hysim.discovery import _laws, _pysindy
-from hysim.discovery._judgement import HYSTERESIS, NO_STRUCTURE, Competitors, Judgement, competitors, doubts, judge
+from hysim.discovery._judgement import HYSTERESIS, LAG, NO_STRUCTURE, Competitors, Judgement, competitors, doubts, judge
 from hysim.discovery._refinement import DIVERGED, Candidate, FreeRun, Samples
 from hysim.discovery._result import Discovery
 from hysim.discovery._search import Library, Options, Outcome, or_any_exponent, searched
@@ -187,7 +187,7 @@ def discover(
     if cross_validate is not None:
         error = left_out_rmse(records, again, cross_validate, lambda done, n: report(_STAGES + done, _STAGES + n))
     warnings = [*result.warnings, swapped_columns(records)]
-    if route == "auto" and _may_be_an_oscillators(records, outcomes[0].candidate):
+    if route == "auto" and result.verdict != LAG and _may_be_an_oscillators(records, outcomes[0].candidate):
         warnings.append(_OSCILLATOR)
     return replace(result, warnings=tuple(filter(None, warnings)), cv_rmse=error)
 

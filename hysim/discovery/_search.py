@@ -294,7 +294,7 @@ def or_any_exponent(
 ) -> Candidate[Terms] | Candidate[AnyExponent]:
     """The chosen law, or the Bouc-Wen law of any exponent where that explains the records of `free_run` better.
 
-    `hidden` is the outcome of the library of z, from which the scan takes its slopes and shifts.
+    `of_memory` is the outcome of the library of z, from which the scan takes its slopes and shifts.
     """
     thin, best = of_memory.search.free_run, chosen.searched
     if chosen.candidate.cost < free_run.n_samples * ALIKE**2:
