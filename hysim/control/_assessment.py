@@ -34,10 +34,8 @@ class OpenLoop:
         Times [s], and the reference [unit of y].
     u, y : array
         Voltage reference / secant gain [unit of u], and the true displacement just before each [unit of y].
-    secant_gain : float
-        Stroke over span of the last cycle, which is the steady one without creep [unit of y / unit of u].
-    samples_per_cycle : int
-        Of the reference.
+    secant_gain, samples_per_cycle
+        Stroke over span of the last cycle [unit of y / unit of u], and length of a cycle of the reference.
     """
 
     t: FloatArray

@@ -94,7 +94,7 @@ def to_c(
     sample_time : float
         At which it will be called [s].
     name : str
-        Of the files, and in front of each name that they give.
+        Of the files, and the prefix of every name in them.
     u0, y0 : float
         Command and displacement at which it starts, at rest [unit of u], [unit of y].
     precision : "double" or "float"

@@ -123,23 +123,16 @@ class PID(SampledController):
     def advance(
         self, reference: npt.ArrayLike, measurement: npt.ArrayLike, sample_time: float, state: State | None = None
     ) -> tuple[FloatArray, State]:
-        """Voltages for the samples of a reference and of a measurement.
+        """Voltages within the limits, the same bits as in a loop, and the state after the last sample.
 
         Parameters
         ----------
         reference, measurement : array, shape (n,)
             [unit of y]
         sample_time : float
-            Time between two samples [s].
+            [s]
         state : State, optional
             To continue from; by default `start` at no voltage and at the first measurement.
-
-        Returns
-        -------
-        u : array, shape (n,)
-            Voltages within the limits, the same bits as in a loop.
-        state : State
-            After the last sample.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""What `close_loop` asks of a controller and of a law; all of it but `compiled` is optional."""
+"""Abilities of controllers and laws that `close_loop` uses; all but `compiled` are optional."""
 
 from typing import Protocol, runtime_checkable
 

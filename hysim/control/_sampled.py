@@ -112,7 +112,7 @@ def check_kind(name: str, part: Any, kind: type) -> None:
 
 
 def check_limits(limits: tuple[float, ...] | None) -> None:
-    """Raise a ValueError if limits are given and are no interval."""
+    """Raise a ValueError if limits are no interval."""
     if limits is not None and not (len(limits) == 2 and limits[0] <= limits[1]):
         raise ValueError(f"limits must be (lowest, highest), got {limits}")
 

@@ -52,10 +52,8 @@ class TrackingController(SampledController):
         Inverse of creep, law and amplifier, behind it; without one the reference reaches the feedback only.
     feedback : PID, optional
         On the shaped reference, or on the model's measurement; without limits of its own.
-    notch : Notch, optional
-        Filter of the feedback's command.
-    damping : DampingLoop, optional
-        Beside the feedback.
+    notch, damping : Notch and DampingLoop, optional
+        Filter of the feedback's command, and a loop beside it.
     model : Actuator, optional
         The feed-forward's plant with its vibration and the sensor's delay: the feedback then compares with the
         measurement that this model would give, and corrects only the difference.

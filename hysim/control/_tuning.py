@@ -17,10 +17,9 @@ class Trial:
     ----------
     controller : PID or TrackingController
         With the limits.
-    max_sensitivity : float
-        Largest ``|1 / (1 + L)|`` of all plants, at either slope of the law; infinite if a loop is unstable.
-    voltage_noise : float
-        Largest rms of the voltage that the sensor's noise causes in these linear loops [unit of u].
+    max_sensitivity, voltage_noise : float
+        Largest ``|1 / (1 + L)|`` of all plants, at either slope of the law, and largest rms of the voltage that the
+        sensor's noise causes in these linear loops [unit of u]; infinite if a loop is unstable.
     objective : float
         Of the simulated loop, in units of the reference's span; infinite if a loop is unstable.
     """

@@ -8,8 +8,8 @@ a scalar equation, found by Newton's method inside a bracket that closes on it. 
 output itself, not of its increment: nothing drifts, and the law's response to these inputs is the given
 output to rounding.
 
-The slope must have one sign, `rising` = 1 or -1, all along the way, and at its beginning in the other
-direction too, or the output would not tell which way the input went. On one side of z = 0 the memory's slope
+The slope must have one sign, `rising` = 1 or -1, along the whole branch, and at its beginning in the other
+direction too, or the output would not determine the direction of the input. On one side of z = 0 the memory's slope
 changes monotonically; with a linear P the ends of the stretch and the crossing of z = 0 therefore decide.
 With a polynomial a bound on P'' decides where it can, and a few points in between where it cannot.
 
@@ -31,8 +31,8 @@ MAX_STEPS = 400
 _EPSILON = 2.0**-52
 _SMALLEST = 2.0**-1022  # below it numbers lose their bits: an output that near to another is no other
 _ROUNDINGS = 16.0  # of the forward step, which may keep the residual from zero where the bracket has closed
-_FLAT = 1e-12  # of the slope ahead: what rounding makes of no slope at all on the way back
-_POINTS = 16  # looked at along a stretch that the bound on P'' leaves open
+_FLAT = 1e-12  # of the slope ahead: a slope of zero, rounded, where the input turns back
+_POINTS = 16  # evaluated along a branch that the bound on P'' does not decide
 
 
 # ---------------------------------------------------------------------------------- scalar functions
@@ -73,7 +73,7 @@ def slope(u: float, z: float, direction: float, parameters: FloatArray) -> float
 
 @inner
 def rounding(y: float, u: float, z: float, parameters: FloatArray) -> float:
-    """What one rounding of the terms of the output at (u, z) amounts to."""
+    """One rounding of the terms of the output at (u, z)."""
     coefficients = parameters[N_HEAD : N_HEAD + int(parameters[7])]
     terms = abs(parameters[5] * z) + abs(parameters[6]) + abs(u * derivative(u, coefficients))
     return float(_EPSILON * (abs(y) + terms) + _SMALLEST)
@@ -88,7 +88,7 @@ def forward(u: float, z: float, target: float, parameters: FloatArray, memory: F
 
 @inner
 def lowest_slope(u: float, z: float, end: float, z_end: float, direction: float, parameters: FloatArray) -> float:
-    """A lower bound of `slope` on the way from (u, z) to (end, z_end), the lowest slope itself if P is linear."""
+    """A lower bound of `slope` from (u, z) to (end, z_end), the lowest slope itself if P is linear."""
     coefficients = parameters[N_HEAD : N_HEAD + int(parameters[7])]
     rising = parameters[0]
     memory = min(
@@ -126,7 +126,7 @@ def solve(
 ) -> bool:
     """Move the law's state in `direction` from (u, z), `gap` short of `y`, to where the output is `y`.
 
-    Returns whether it was reached; the last place on the way goes into `state`.
+    Returns whether it was reached; the last place goes into `state`.
     """
     memory = state[N_OWN:]
     upward = parameters[0] * direction

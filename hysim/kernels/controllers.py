@@ -30,11 +30,11 @@ def pid(parameters: FloatArray, state: FloatArray, reference: float, measurement
 
     `parameters` is (kp, ki h, kd / (T_f + h), T_f / (T_f + h), b, c, lowest u, highest u, h / T_t).
     """
-    seen = parameters[5] * reference - measurement
-    derivative = parameters[3] * state[2] + parameters[2] * (seen - state[3])
+    weighted = parameters[5] * reference - measurement
+    derivative = parameters[3] * state[2] + parameters[2] * (weighted - state[3])
     command = parameters[0] * (parameters[4] * reference - measurement) + state[1] + derivative
     u = min(max(command, parameters[6]), parameters[7])
-    state[0], state[2], state[3] = command, derivative, seen
+    state[0], state[2], state[3] = command, derivative, weighted
     state[1] += parameters[1] * (reference - measurement)
     if u != command:
         state[1] += parameters[8] * (u - command)

@@ -26,18 +26,18 @@ N_LIMITS = 2  # parameters before those of the inverse itself
 N_PLACE = 2  # places of the state before those of the inverse itself
 N_SEARCH = 4  # places of the state of `searched` before the law's: input, output, slope, largest output so far
 
-_POINTS = 16  # of a branch at which the output is looked at
+_POINTS = 16  # of a branch at which the output is evaluated
 _DOUBLINGS = 1100  # more than there are between the smallest number and the largest
 _HALVINGS = 200
 _ATTEMPTS = 64  # branches that are tried, each ended where the output has turned on the last
 _RESOLVED = 1e-13
 """Of the largest output so far: shorter branches rise in steps of rounding, and are not searched for a turn."""
 _NEAR, _NEARER, _NEAREST = 1e-10, 0.125, 1e-13
-"""Of the largest output so far: how far back from its beginning a branch is looked at, and then nearer."""
+"""Of the largest output so far: distances behind its beginning at which the output is evaluated, the farthest first."""
 _ROUNDINGS = 64.0 * 2.0**-53
 _CLEAR = 256.0  # roundings by which an output has to rise to show it
 _AHEAD = 2.0**-26
-"""Of a branch: how far beyond its end the output is looked at; a turn is missed by the square of it, a rounding."""
+"""Of a branch: distance beyond its end at which the output is evaluated; a turn is missed by its square, a rounding."""
 _SMALLEST = 2.0**-1022
 _SEARCH = float64(STEP, CONSTANTS, VECTOR, float64)
 
@@ -98,7 +98,7 @@ def plays(parameters: FloatArray, state: FloatArray, y: float) -> float:
 
 @inlined
 def _tried(step: Step, parameters: FloatArray, state: FloatArray, trial: FloatArray, u: float) -> float:
-    """Output at `u`, the state left as it is."""
+    """Output at `u`; the state does not change."""
     trial[:] = state
     return step(parameters, trial, u)
 
@@ -128,7 +128,7 @@ def _bracket(
 ) -> tuple[float, float, float, float]:
     """Two lengths with their errors, of which the second reaches the output; where none does, its error is negative.
 
-    The output turns before `limit`. Where `ahead` is not zero, it is looked at by this part of a length beyond each
+    The output turns before `limit`. Where `ahead` is not zero, it is evaluated by this part of a length beyond each
     end: where it falls there, the end is behind the turn. A `noise` of infinity stands for an output that rises in
     steps of rounding.
     """
@@ -227,7 +227,7 @@ def _falls_back(
 ) -> bool:
     """Whether the output falls where the input turns back; `steepness` is the slope of the branch ahead.
 
-    It is looked at as near as rounding allows, and counts as falling where it is infinite even there.
+    It is evaluated as near as rounding allows, and counts as falling where it is infinite even there.
     """
     near, noise, known = _NEAR, 0.0, False
     while near > _NEAREST:

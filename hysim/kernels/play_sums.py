@@ -68,7 +68,7 @@ def through_dead_zones(x: float, parameters: FloatArray, first: int) -> float:
 
 
 @inner
-def moved(parameters: FloatArray, state: FloatArray, u: float, widening: float) -> float:
+def output_after(parameters: FloatArray, state: FloatArray, u: float, widening: float) -> float:
     """Output at the next input `u`, thresholds beyond zero being wider by `widening`; `state` moves along."""
     n_plays = state.size - 1
     below, above = envelope(u, parameters, LEFT), envelope(u, parameters, RIGHT)
@@ -92,7 +92,9 @@ def slope_of_all(parameters: FloatArray, n_plays: int) -> float:
 
 
 @inner
-def looked_at(parameters: FloatArray, state: FloatArray, u: float, direction: float) -> tuple[float, float, float]:
+def output_and_slope(
+    parameters: FloatArray, state: FloatArray, u: float, direction: float
+) -> tuple[float, float, float]:
     """Output, slope in a direction of the input, and size of the terms at the next input `u`, without dead zones."""
     n_plays = state.size - 1
     below, above = envelope(u, parameters, LEFT), envelope(u, parameters, RIGHT)
@@ -120,7 +122,7 @@ def looked_at(parameters: FloatArray, state: FloatArray, u: float, direction: fl
 @signed_kernel(STEP.signature)
 def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """Output at the next input `u`; `state` moves along."""
-    return float(moved(parameters, state, u, parameters[1] * abs(u - state[0])))
+    return float(output_after(parameters, state, u, parameters[1] * abs(u - state[0])))
 
 
 @inner
@@ -134,7 +136,7 @@ def solved(parameters: FloatArray, state: FloatArray, y: float, direction: float
     u = behind = state[0]
     beyond, ahead = direction * math.inf, _FIRST_STEP * (1.0 + abs(u))
     for _ in range(_MAX_STEPS):
-        total, slope, size = looked_at(parameters, state, u, direction)
+        total, slope, size = output_and_slope(parameters, state, u, direction)
         error = total - y
         if abs(error) <= _ROUNDINGS * (size + abs(y)):
             break
@@ -163,7 +165,7 @@ def inverse_step(parameters: FloatArray, state: FloatArray, y: float) -> float:
     `parameters` are the limits and those of `step`; `state` is (u, y) and that of `step`.
     """
     own, law = borrowed(parameters)[N_LIMITS:], borrowed(state)[N_PLACE:]
-    rise = y - looked_at(own, law, law[0], 1.0)[0]
+    rise = y - output_and_slope(own, law, law[0], 1.0)[0]
     direction = math.copysign(1.0, slope_of_all(own, law.size - 1)) * math.copysign(1.0, rise)
     u = solved(own, law, y, direction)
     end = within_limits(parameters, u, direction)
@@ -184,6 +186,6 @@ def positions(parameters: FloatArray, state: FloatArray, u: FloatArray, out: Flo
 
 @signed_kernel(void(CONSTANTS, VECTOR, CONSTANTS, CONSTANTS, VECTOR))
 def widened(parameters: FloatArray, state: FloatArray, u: FloatArray, widening: FloatArray, out: FloatArray) -> None:
-    """Outputs at the samples of `u` into `out`, thresholds beyond zero being wider by what is given."""
+    """Outputs at the samples of `u` into `out`, thresholds beyond zero being wider by `widening`."""
     for k in range(u.size):
-        out[k] = moved(parameters, state, u[k], widening[k])
+        out[k] = output_after(parameters, state, u[k], widening[k])

@@ -1,6 +1,6 @@
 """Relays under a staircase: the Preisach law along an input, and backwards.
 
-What the law remembers are the extremes x_0, x_1, ..., x_d of its input that later ones have not wiped out: minima at
+The law remembers the extremes x_0, x_1, ..., x_d of its input that later ones have not wiped out: minima at
 even places, maxima at odd ones, each between the two before it. x_0 is the lowest level, where all relays are
 down, and x_d is the input itself. With the Everett function E(a, b) = -E(b, a)
 
@@ -43,13 +43,13 @@ def interval(parameters: FloatArray, u: float) -> int:
 
 @inner
 def everett(parameters: FloatArray, a: float, b: float) -> float:
-    """E(a, b): half of what the output gains on the way from `b` to `a`, inputs between the levels."""
+    """E(a, b): half of the rise of the output from `b` to `a`, inputs between the levels."""
     n = int(parameters[2])
     i, j = interval(parameters, a), interval(parameters, b)
     low_a, high_a = parameters[HEAD + i], parameters[HEAD + i + 1]
     low_b, high_b = parameters[HEAD + j], parameters[HEAD + j + 1]
     p, q = (a - low_a) / (high_a - low_a), (b - low_b) / (high_b - low_b)
-    if parameters[0] == 0.0:  # the levels that the way has met, compared since a quotient may be rounded to 1
+    if parameters[0] == 0.0:  # the levels that the input has met, compared since a quotient may be rounded to 1
         p = 1.0 if (a >= high_a if a > b else a > low_a) else 0.0
         q = 1.0 if (b > low_b if a > b else b >= high_b) else 0.0
         if (a > b) != (i + p > j + q):
@@ -62,7 +62,7 @@ def everett(parameters: FloatArray, a: float, b: float) -> float:
 
 @inner
 def origin(of: FloatArray, d: int, end: float) -> int:
-    """Place of the extreme from which a way from place `d` to `end`, which differs, has come; -1 if from x_0 or below.
+    """Place of the extreme at which a branch from place `d` to another value `end` begins; -1 for x_0 or below.
 
     `of` holds the inputs x or the outputs y.
     """
@@ -74,7 +74,7 @@ def origin(of: FloatArray, d: int, end: float) -> int:
 
 
 @inner
-def moved(parameters: FloatArray, x: FloatArray, y: FloatArray, d: int, u: float) -> int:
+def place_after(parameters: FloatArray, x: FloatArray, y: FloatArray, d: int, u: float) -> int:
     """Place of the last extreme once the input is `u`."""
     end = min(max(u, parameters[HEAD]), parameters[HEAD + int(parameters[2]) - 1])
     if end == x[d]:
@@ -131,7 +131,7 @@ def path(parameters: FloatArray, x: FloatArray, y: FloatArray, d: int, u: FloatA
     `x` and `y` hold the extremes and outputs up to place `d`, and have room for one more each sample.
     """
     for k in range(u.size):
-        d = moved(parameters, x, y, d, u[k])
+        d = place_after(parameters, x, y, d, u[k])
         out[k] = y[d]
     return d
 
@@ -162,7 +162,7 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     d = int(state[1])
     if d + 1 == room:
         d = shortened(parameters, x, y, d)
-    d = moved(parameters, x, y, d, u)
+    d = place_after(parameters, x, y, d, u)
     state[0], state[1] = u, d
     return float(y[d])
 
@@ -193,7 +193,7 @@ def inverse_step(parameters: FloatArray, state: FloatArray, wanted: float) -> fl
     if end == u:
         x[place], y[place], d = u, rising_wanted, place
     elif not math.isnan(end):
-        d = moved(own, x, y, d, end)
+        d = place_after(own, x, y, d, end)
     law[1] = d
     if not math.isnan(end):
         law[0] = state[0] = end

@@ -100,8 +100,8 @@ def track(inverse: Step, parameters: FloatArray, state: FloatArray, reference: f
     """The command within the limits.
 
     The head is (lowest and highest command, number of taps, whether there is a feed-forward, whether there is a model,
-    its number of states that creep and of all states, its whole samples of dead time and of delay, and whether a part
-    of a sample is left of the delay).
+    its number of states that creep and of all states, its whole samples of dead time and of delay, and whether the
+    delay has a part of a sample too).
     """
     parameters, state = borrowed(parameters), borrowed(state)
     lowest, highest, taps = parameters[0], parameters[1], int(parameters[2])
