@@ -15,6 +15,7 @@ from hysim._frozen import FloatArray, checked
 from hysim.errors import SimulationError
 from hysim.identification import identify
 from hysim.metrics.criteria import information
+from hysim.models.protocols import Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.transfer_function import FREQUENCY, TransferFunction, TransferFunctionStructure
 from hysim.records import Record
@@ -89,7 +90,7 @@ def steady_width(plant: TransferFunction, cycle: Record, rate: float) -> float:
 
 
 @dataclass(frozen=True)
-class _Affine:
+class _Affine(Identifiable):
     """A transfer function with an offset, as `identify` takes it.
 
     The box reaches from the longest of the records to the finest sampling; the search begins at `start`, if given.
