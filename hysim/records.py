@@ -17,8 +17,8 @@ from hysim._drift import drift
 from hysim._excursions import full_amplitude, protocol
 from hysim._frozen import FloatArray, checked
 from hysim._prefixes import power_of_ten
-from hysim._quanta import output_quantum
-from hysim._words import extent, printed, quantity, words
+from hysim._printing import extent, printed, quantity, summary_text
+from hysim._resolution import output_quantum
 
 T = TypeVar("T", float, FloatArray)
 
@@ -89,7 +89,7 @@ class Record:
         turns = int(self.reversals().size)
         resolution = "" if self.resolution is None else f", resolution {quantity(self.resolution, y)}"
         time = "" if self.t is None else f"{extent(self.t, t)}, {self._step_in_words(t)}"
-        return words(
+        return summary_text(
             [f"Record {self.name}".rstrip() + f": {self.u.size} samples" + (", no time" if self.t is None else "")],
             {
                 "t": time,

@@ -7,7 +7,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen, read_only
-from hysim._words import extent, printed, words
+from hysim._printing import extent, printed, summary_text
 from hysim.models.protocols import needs_time
 from hysim.records import check_increasing, even_step
 
@@ -40,7 +40,7 @@ class Simulation:
 
     def __str__(self) -> str:
         known = {"t": self.t, "u": self.u, "y": self.y, "z": self.z, **self.signals}
-        return words(
+        return summary_text(
             [f"Simulation: {self.u.size} samples"],
             {name: extent(values, self.units.get(name, "")) for name, values in known.items() if values is not None},
         )

@@ -13,8 +13,8 @@ PACKAGE = Path(hysim.__file__).parent
 RANKS = {
     # tools of the language, which know nothing of hysteresis
     -4: ("_names", "_release"),
-    -3: ("_frozen", "_atomic", "_blas", "_words", "_versions", "errors"),
-    -2: ("_cycles", "_quanta", "_prefixes"),  # the turning points of an input, the quantum of a sensor, units
+    -3: ("_frozen", "_atomic", "_blas", "_printing", "_versions", "errors"),
+    -2: ("_cycles", "_resolution", "_prefixes"),  # the turning points of an input, the quantum of a sensor, units
     -1: ("_drift", "_excursions"),  # the drift between cycles, and cycles about a level of the input
     0: ("signals", "records", "metrics", "kernels", "_parallel"),
     1: ("datasets", "files", "models", "vision"),

@@ -9,7 +9,7 @@ import pytest
 
 import hysim as hs
 from hysim import _versions
-from hysim._words import LETTERS, LINES, words, wrapped
+from hysim._printing import LETTERS, LINES, summary_text, wrapped
 
 UNITS = {"t": "s", "u": "V", "y": "um"}
 U = hs.signals.triangle(0.0, 100.0, cycles=2, samples_per_cycle=40)
@@ -87,8 +87,8 @@ def test_a_notebook_has_the_comparison_as_a_table():
 
 
 def test_what_is_too_much_is_counted():
-    assert words([f"line {k}" for k in range(12)]).splitlines()[-1] == "  ... and 3 lines more"
-    assert len(words(["x" * 200])) == LETTERS
+    assert summary_text([f"line {k}" for k in range(12)]).splitlines()[-1] == "  ... and 3 lines more"
+    assert len(summary_text(["x" * 200])) == LETTERS
     many = wrapped([f"parameter {k} = 1" for k in range(100)], most=2).splitlines()
     assert len(many) == 2
     assert many[-1].endswith("more")
@@ -117,6 +117,6 @@ def test_a_library_that_is_not_there_is_said(monkeypatch, capsys):
 
 @pytest.mark.parametrize("name", ["identification", "record"])
 def test_what_is_long_is_cut_within_its_lines(name):
-    text = words(["Head"], {name: "word " * 100, "empty": ""})
+    text = summary_text(["Head"], {name: "word " * 100, "empty": ""})
     assert text.count("\n") == 2
     assert text.endswith("...")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hysim._words import LETTERS, extent, quantity
+from hysim._printing import LETTERS, extent, quantity
 from hysim.cli import outputs
 from hysim.cli.designs import CYCLES, Task
 from hysim.control import HysteresisAssessment, StepAssessment, Tuning

@@ -5,7 +5,7 @@ import textwrap
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from hysim._words import LETTERS, quantity
+from hysim._printing import LETTERS, quantity
 from hysim.cli import outputs, records
 from hysim.cli.options import JSON, Command
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hysim._frozen import FloatArray, frozen
-from hysim._words import bic_in_words, printed, words
+from hysim._printing import bic_in_words, printed, summary_text
 from hysim.comparison import _tables
 from hysim.comparison._verdict import Contrast, contrasts
 from hysim.identification.sentences import CONSTANT, SWAPPED
@@ -96,7 +96,7 @@ class ComparisonRow:
     def __str__(self) -> str:
         fit = "fit not defined" if math.isnan(self.fit_percent) else f"fit {self.fit_percent:.2f} %"
         excess = "" if math.isnan(self.width_error_percent) else f", {self.width_error_percent:+.1f} %"
-        return words(
+        return summary_text(
             [f"ComparisonRow {self.name}: {fit}, rmse {self.rmse:.4g}"],
             {
                 "left out": "" if math.isnan(self.cv_rmse) else f"rmse {self.cv_rmse:.4g}",

@@ -9,7 +9,7 @@ import textwrap
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from hysim._words import LETTERS, words
+from hysim._printing import LETTERS, summary_text
 
 Value = str | int | float | bool
 _WIDE = 110  # letters in a line of text
@@ -112,7 +112,7 @@ def to_words(comparison: Any) -> str:
     notes += textwrap.wrap(
         " ".join(filter(None, sentences)), LETTERS, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False
     )
-    return words([f"{head}{len(comparison.record)} samples", *(f"  {line}" for line in _aligned(table)), *notes])
+    return summary_text([f"{head}{len(comparison.record)} samples", *(f"  {line}" for line in _aligned(table)), *notes])
 
 
 def to_html(comparison: Any) -> str:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from hysim import signals
 from hysim._frozen import FloatArray, frozen, read_only
-from hysim._words import extent, printed, words
+from hysim._printing import extent, printed, summary_text
 from hysim.control._loop import ClosedLoop, RestingPlant, as_actuator, close_loop
 from hysim.control._open_loop import secant_gain, without_memory
 from hysim.control._protocols import Controller, preview
@@ -46,7 +46,7 @@ class OpenLoop:
     samples_per_cycle: int
 
     def __str__(self) -> str:
-        return words([f"OpenLoop: {self.t.size} samples, secant gain {self.secant_gain:.4g}", str(self.loop)])
+        return summary_text([f"OpenLoop: {self.t.size} samples, secant gain {self.secant_gain:.4g}", str(self.loop)])
 
     @property
     def cycle(self) -> FloatArray:
@@ -112,7 +112,7 @@ class HysteresisAssessment:
         is_lag = math.isnan(self.hysteresis_reduction_percent)
         what = "lag" if is_lag else "hysteresis"
         reduction = self.lag_reduction_percent if is_lag else self.hysteresis_reduction_percent
-        return words(
+        return summary_text(
             [f"HysteresisAssessment: {what} reduction {reduction:.2f} %, tracking rms {self.tracking_rms:.4g}"],
             {
                 "open width": f"{self.open_width:.4g}, without the memory {self.open_lag_width:.4g}",
@@ -143,7 +143,7 @@ class StepAssessment:
 
     def __str__(self) -> str:
         ends = f"from {self.closed.y[0]:.4g} to {self.closed.reference[-1]:.4g}"
-        return words([f"StepAssessment {ends}, voltage {extent(self.closed.u)}", f"  {self.reduction}"])
+        return summary_text([f"StepAssessment {ends}, voltage {extent(self.closed.u)}", f"  {self.reduction}"])
 
 
 @printed
@@ -173,7 +173,7 @@ class SquareWaveAssessment:
     closed: ClosedLoop
 
     def __str__(self) -> str:
-        return words(
+        return summary_text(
             [
                 f"SquareWaveAssessment: tracking rms {self.tracking_rms:.4g}, open loop {self.open_tracking_rms:.4g}",
                 f"  peak excess {self.peak_excess_percent:.2f} %, open loop {self.open_peak_excess_percent:.2f} %",

@@ -19,8 +19,8 @@ import numpy as np
 
 from hysim._atomic import write_text
 from hysim._frozen import FloatArray, frozen
+from hysim._printing import printed, summary_text
 from hysim._release import __version__
-from hysim._words import printed, words
 from hysim.control import _c_fragments as pieces
 from hysim.control._feedforward import InverseFeedforward
 from hysim.control._pid import PID
@@ -65,7 +65,7 @@ class CSource:
     def __str__(self) -> str:
         texts = {".h": self.header, ".c": self.source, ".ino": self.sketch}
         rows = {f"{self.name}{end}": f"{text.count(chr(10))} lines" for end, text in texts.items()}
-        return words([f"CSource {self.name}: C99 with math.h alone"], rows)
+        return summary_text([f"CSource {self.name}: C99 with math.h alone"], rows)
 
     def write(self, folder: str | Path) -> None:
         """Write name.h, name.c and the sketch, which Arduino wants under the folder's name; the folder is made."""

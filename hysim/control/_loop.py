@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen, read_only
 from hysim._parallel import Progress
-from hysim._words import extent, printed, quantity, words
+from hysim._printing import extent, printed, quantity, summary_text
 from hysim.control._protocols import Controller, Remembering, Responding, limits_of, preview
 from hysim.errors import SimulationError
 from hysim.models.actuator import Actuator, is_law
@@ -66,7 +66,7 @@ class ClosedLoop:
         t, u, y = (self.units.get(signal, unit) for signal, unit in (("t", "s"), ("u", ""), ("y", "")))
         rms = float(np.sqrt(np.mean((self.reference - self.y) ** 2)))
         conditions = self.conditions
-        return words(
+        return summary_text(
             [f"ClosedLoop: {self.t.size} samples to {quantity(self.t[-1], t)}, tracking rms {quantity(rms, y)}"],
             {
                 "reference": extent(self.reference, y),

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from hysim._frozen import frozen
-from hysim._words import printed, words
+from hysim._printing import printed, summary_text
 from hysim.models.model import in_brief
 
 
@@ -66,7 +66,7 @@ class Tuning:
 
     def __str__(self) -> str:
         bounds = "within" if self.success else "NOT within"
-        return words(
+        return summary_text(
             [
                 f"Tuning: {type(self.controller).__name__} {bounds} its bounds, objective {self.objective:.4g} of the "
                 "reference's span"

@@ -7,7 +7,7 @@ from dataclasses import field
 from typing import Any, Self
 
 from hysim._frozen import FloatArray, frozen
-from hysim._words import printed, words, wrapped
+from hysim._printing import printed, summary_text, wrapped
 from hysim.discovery._judgement import Judgement
 from hysim.identification import json_forms
 from hysim.models.terms import latex
@@ -50,7 +50,7 @@ class _Discovered(ABC):
     def __str__(self) -> str:
         scores = self.scores
         numbers = [f"{name} {value:.4g}{self._spread(name)}" for name, value in self._numbers.items()]
-        return words(
+        return summary_text(
             [
                 f"{type(self).__name__}: {self.verdict}, fit {scores['fit_percent']:.2f} %, rmse {scores['rmse']:.4g}, "
                 f"{self.n_parameters} parameters",

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
-from hysim._quanta import output_quantum
+from hysim._resolution import output_quantum
 from hysim.files._delimited import delimited
 from hysim.files._hdf5 import hdf5
 from hysim.files._layout import DECIMALS

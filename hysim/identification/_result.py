@@ -7,7 +7,7 @@ from typing import Any, Self
 import numpy as np
 
 from hysim._frozen import FloatArray, frozen
-from hysim._words import bic_in_words, printed, words, wrapped
+from hysim._printing import bic_in_words, printed, summary_text, wrapped
 from hysim.identification import json_forms
 from hysim.identification._profile import Profile
 
@@ -150,7 +150,7 @@ class Identification:
         free = [f"{name} {self.estimates[name]:.4g} +- {self.stderr[name]:.2g}" for name in self.free_names]
         held = [f"{name} {value:.4g}" for name, value in self.estimates.items() if name not in self.free_names]
         width = self.loop_width
-        return words(
+        return summary_text(
             [
                 f"Identification of {type(self.model).__name__}: {self._fit_in_words()}, rmse {self.rmse:.4g}, "
                 f"{self.n_parameters} parameters{state}",

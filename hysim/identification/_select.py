@@ -10,7 +10,7 @@ from typing import Any
 
 from hysim._frozen import frozen
 from hysim._parallel import Progress
-from hysim._words import aligned, printed, words
+from hysim._printing import aligned, printed, summary_text
 from hysim.identification._identify import identify
 from hysim.identification._result import Identification
 from hysim.records import Record
@@ -48,7 +48,9 @@ class Selection:
         return self.fits[self.name]
 
     def __str__(self) -> str:
-        return words([f"Selection: {self.name} is the best of {len(self.fits)} by {self.criterion}", self.to_text()])
+        return summary_text(
+            [f"Selection: {self.name} is the best of {len(self.fits)} by {self.criterion}", self.to_text()]
+        )
 
     def to_text(self) -> str:
         """The table for a terminal, the best first."""

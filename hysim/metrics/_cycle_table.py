@@ -31,7 +31,7 @@ import numpy.typing as npt
 from hysim._cycles import ROUNDING, TOLERANCE, too_few
 from hysim._excursions import Loops, protocol
 from hysim._frozen import FloatArray, frozen
-from hysim._words import LETTERS, extent, printed, quantity, words
+from hysim._printing import LETTERS, extent, printed, quantity, summary_text
 from hysim.metrics._loop import COUNTERCLOCKWISE, FORCE, LoopMetrics, measure, samples_of_a_loop
 
 
@@ -153,7 +153,7 @@ class CycleMetrics:
     def __str__(self) -> str:
         many = "1 cycle" if len(self) == 1 else f"{len(self)} cycles"
         known = self.equivalent_damping[~np.isnan(self.equivalent_damping)]
-        return words(
+        return summary_text(
             [f"CycleMetrics: {many} from u = {self.level:.6g}, energy {self.energy.sum():.4g} in all"],
             {
                 "amplitude": extent(self.amplitude),

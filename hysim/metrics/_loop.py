@@ -35,7 +35,7 @@ import numpy.typing as npt
 from hysim._cycles import ROUNDING, TOLERANCE, Cycle, settled
 from hysim._excursions import measured_cycles
 from hysim._frozen import FloatArray, frozen, read_only
-from hysim._words import extent, printed, words
+from hysim._printing import extent, printed, summary_text
 
 COUNTERCLOCKWISE = (
     "counterclockwise, as a piezo's displacement over its voltage: the integral of y du is negative, and "
@@ -103,7 +103,7 @@ class LoopMetrics:
     def __str__(self) -> str:
         loop = "no loop" if self.orientation == "none" else f"{self.orientation} loop"
         cycles = "the last cycle" if self.n_cycles == 1 else f"the mean of {self.n_cycles} cycles"
-        return words(
+        return summary_text(
             [f"LoopMetrics: {loop}, {cycles}, largest width {self.max_width:.4g}"],
             {
                 "largest width": f"{self.max_width:.4g} at u = {self.max_width_at:.6g}"

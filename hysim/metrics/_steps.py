@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from hysim._cycles import ROUNDING
 from hysim._frozen import FloatArray, frozen, read_only
-from hysim._words import printed, words
+from hysim._printing import printed, summary_text
 
 SETTLED = 0.02
 """Distance from the final value within which a response has settled, as a fraction of the step."""
@@ -71,7 +71,7 @@ class VibrationReduction:
     closed: StepMetrics
 
     def __str__(self) -> str:
-        return words(
+        return summary_text(
             [
                 f"VibrationReduction: overshoot {self.overshoot_reduction_percent:.2f} %, residual rms "
                 f"{self.residual_rms_reduction_percent:.2f} %, settling time "

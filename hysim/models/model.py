@@ -12,7 +12,7 @@ import numpy as np
 
 from hysim._frozen import checked, items
 from hysim._names import MODULE_OF
-from hysim._words import shown, value_in_words, words, wrapped
+from hysim._printing import shown, summary_text, value_in_words, wrapped
 
 T = TypeVar("T")
 
@@ -39,8 +39,8 @@ def _in_words(self: Any) -> str:
         elif value is not None:
             plain.append(f"{field} = {value_in_words(value)}")
     if inside:
-        return words([name, wrapped(plain)], inside)
-    return words([wrapped(plain, most=9, first=f"{name}: ") or name])
+        return summary_text([name, wrapped(plain)], inside)
+    return summary_text([wrapped(plain, most=9, first=f"{name}: ") or name])
 
 
 def in_brief(value: Any) -> str:

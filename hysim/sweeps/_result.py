@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen
-from hysim._words import printed, words
+from hysim._printing import printed, summary_text
 from hysim.sweeps._seeds import seeds
 from hysim.sweeps._space import Column
 from hysim.sweeps._store import opened
@@ -57,7 +57,7 @@ class Sweep:
     axes: Mapping[str, Column] | None = None
 
     def __str__(self) -> str:
-        return words([f"Sweep of {', '.join(self.parameters)}; {self.summary()}"])
+        return summary_text([f"Sweep of {', '.join(self.parameters)}; {self.summary()}"])
 
     def __len__(self) -> int:
         return self.task.size

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from hysim._frozen import FloatArray, frozen
-from hysim._words import printed, words
+from hysim._printing import printed, summary_text
 from hysim.sweeps._result import Sweep
 
 _RESAMPLES = 200
@@ -43,7 +43,7 @@ class SobolIndices:
 
     def __str__(self) -> str:
         size = f"{len(self.first_order)} outputs by {len(self.parameters)} parameters"
-        return words([f"SobolIndices: {size}", self.summary()])
+        return summary_text([f"SobolIndices: {size}", self.summary()])
 
     def summary(self) -> str:
         """The indices as a table."""

@@ -33,7 +33,7 @@ def bic_in_words(bic: float) -> str:
     return "BIC not defined" if bic == -math.inf else f"BIC {bic:.1f}"
 
 
-def words(lines: Iterable[str], rows: Mapping[str, str] | None = None) -> str:
+def summary_text(lines: Iterable[str], rows: Mapping[str, str] | None = None) -> str:
     """Lines, and rows of a name and a text, up to the largest number of lines."""
     width = max(map(len, rows or {}), default=0)
     named = [_cut(f"  {name:<{width}}  ", text) for name, text in (rows or {}).items() if text]
