@@ -217,7 +217,7 @@ def test_the_same_settings_give_the_same_text():
 
 
 def test_a_feedforward_alone_is_a_controller_of_one_part():
-    alone = CONTROLLERS["inverse"][1].feedforward
+    alone = CONTROLLERS["inverse"]()[1].feedforward
     assert hs.to_c(alone, H) == hs.to_c(hs.TrackingController(feedforward=alone), H)
 
 

@@ -342,24 +342,22 @@ class Law(Composable, ABC):
         """Initial memory with which a periodic record ends as it began, (n_sets,) by name; nan where it diverges.
 
         One pass through the record contracts the memory; the fixed point is found by the secant method.
+
+        Raises
+        ------
+        ValueError
+            If an affine parameter moves the memory: it is not known yet where the others are searched.
         """
-        from hysim.kernels.memories import drive_to_end  # compiled where it is needed
-
-        names = self.initial_names
-        around = np.append(record.u, record.u[0])
-        tables, inputs = tables_of(type(self).__name__, self.arguments, parameters, around)
-        constants, memory = (read_only(table, finite=False) for table in self.pack(self.completed(tables)))
-        place, step, y = slice(1, 1 + len(names)), compiled_step(self.step), np.empty(inputs.shape[1])
-
-        def passed(z: FloatArray) -> FloatArray:
-            begin, ends = memory.copy(), np.empty(memory.shape)
-            begin[:, place] = np.nan_to_num(z, posinf=0.0, neginf=0.0)
-            with np.errstate(all="ignore"):
-                drive_to_end(step, constants, read_only(begin), self.workspace, inputs[0], y, ends)
-            return np.where(np.isfinite(z), ends[:, place], np.nan)
-
-        before = np.zeros((len(memory), len(names)))
+        names, u = self.initial_names, np.append(record.u, record.u[0])
+        passed = self._one_pass(parameters, u)
+        affine = {name: 1.0 + self.scalars[name] for name in self.columns if name not in names}
+        before = np.zeros((max(map(np.size, parameters.values()), default=1), len(names)))
         z = passed(before)
+        if affine and not np.array_equal(z, self._one_pass({**parameters, **affine}, u)(before), equal_nan=True):
+            raise ValueError(
+                f"a {type(self).__name__} has no steady cycle that could be computed, since {' or '.join(affine)} moves "
+                'its memory: use initial="free"'
+            )
         drift_before = z - before
         for _ in range(_PASSES):
             with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
@@ -369,10 +367,28 @@ class Law(Composable, ABC):
                 secant = z - drift * (z - before) / (drift - drift_before)
             before, drift_before, z = z, drift, np.where(np.isfinite(secant), secant, z + drift)
         shape = np.broadcast_shapes(*map(np.shape, parameters.values()))
-        return {
-            name: column.reshape(shape)[()]
-            for name, column in zip(names, np.where(np.isfinite(z), z, np.nan).T, strict=True)
-        }
+        columns = np.where(np.isfinite(z), z, np.nan).T
+        return {name: column.reshape(shape)[()] for name, column in zip(names, columns, strict=True)}
+
+    def _one_pass(self, parameters: Parameters, u: FloatArray) -> Callable[[FloatArray], FloatArray]:
+        """A function from the memory before the input `u` to that after it, (n_sets, n_memory).
+
+        It is nan where the law diverges.
+        """
+        from hysim.kernels.memories import drive_to_end  # compiled where it is needed
+
+        tables, inputs = tables_of(type(self).__name__, self.arguments, parameters, u)
+        constants, memory = (read_only(table, finite=False) for table in self.pack(self.completed(tables)))
+        place, step, y = slice(1, 1 + len(self.initial_names)), compiled_step(self.step), np.empty(u.size)
+
+        def passed(z: FloatArray) -> FloatArray:
+            begin, ends = memory.copy(), np.empty(memory.shape)
+            begin[:, place] = np.nan_to_num(z, posinf=0.0, neginf=0.0)
+            with np.errstate(all="ignore"):
+                drive_to_end(step, constants, read_only(begin), self.workspace, inputs[0], y, ends)
+            return np.where(np.isfinite(z), ends[:, place], np.nan)
+
+        return passed
 
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
         """Remarks on the identified model, as phrases."""
