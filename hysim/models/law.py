@@ -350,13 +350,14 @@ class Law(Composable, ABC):
         """
         names, u = self.initial_names, np.append(record.u, record.u[0])
         passed = self._one_pass(parameters, u)
-        affine = {name: 1.0 + self.scalars[name] for name in self.columns if name not in names}
+        others = [name for name in self.columns if name not in names]
+        affine = {name: self.scalars[name] + k for k, name in enumerate(others, 1)}
         before = np.zeros((max(map(np.size, parameters.values()), default=1), len(names)))
         z = passed(before)
         if affine and not np.array_equal(z, self._one_pass({**parameters, **affine}, u)(before), equal_nan=True):
             raise ValueError(
-                f"a {type(self).__name__} has no steady cycle that could be computed, since {' or '.join(affine)} moves "
-                'its memory: use initial="free"'
+                f"a {type(self).__name__} has no steady cycle that could be computed, since {' or '.join(affine)} "
+                'moves its memory: use initial="free"'
             )
         drift_before = z - before
         for _ in range(_PASSES):
