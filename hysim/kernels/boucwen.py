@@ -204,25 +204,6 @@ def batch(parameters: FloatArray, output: FloatArray, u: FloatArray, out: FloatA
 
 
 @kernel
-def path(parameters: FloatArray, state: FloatArray, u: FloatArray, out: FloatArray) -> int:
-    """Outputs at the samples of `u` into `out`, as `step` has them: the first sample of no finite memory, or -1."""
-    A, beta, gamma, n = parameters[0], parameters[1], parameters[2], parameters[3]
-    if u.size == 0:
-        return -1
-    if n == 1.0:
-        lost = linear_path(A, beta, gamma, state[0], state[1], u, out)
-    elif n == 2.0:
-        lost = quadratic_path(A, beta, gamma, state[0], state[1], u, out)
-    else:
-        lost = power_path(A, beta, gamma, n, state[0], state[1], u, state, out)
-    if lost >= 0:
-        return lost
-    state[0], state[1] = u[-1], out[-1]
-    to_output(parameters, 4, u, out)
-    return -1
-
-
-@inlined
 def to_output(parameters: FloatArray, first: int, u: FloatArray, out: FloatArray) -> None:
     """Replace the memories z in `out` by offset + c1 u + c2 u^2 + ... + gain z.
 

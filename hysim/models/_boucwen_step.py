@@ -21,12 +21,24 @@ class BoucWenStep(Law):
     def prepare(cls, parameters: FloatArray, state: FloatArray) -> None:
         """The charts of the exponent."""
         A, beta, gamma, n = parameters[:4].tolist()
-        kernels.prepare(A, beta, gamma, n, 0.0, state)
+        if n not in (1.0, 2.0):
+            kernels.prepare(A, beta, gamma, n, 0.0, state)
 
     @classmethod
     def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:
         """As `Law.path`, the exponent looked at once for all samples."""
-        return int(kernels.path(law.parameters, law.state, u, y))
+        A, beta, gamma, n = map(float, law.parameters[:4])
+        last_u, z = map(float, law.state[:2])
+        if n == 1.0:
+            lost = kernels.linear_path(A, beta, gamma, last_u, z, u, y)
+        elif n == 2.0:
+            lost = kernels.quadratic_path(A, beta, gamma, last_u, z, u, y)
+        else:
+            lost = kernels.power_path(A, beta, gamma, n, last_u, z, u, law.state, y)
+        if lost < 0:
+            law.state[:2] = u[-1], y[-1]
+            kernels.to_output(law.parameters, 4, u, y)
+        return int(lost)
 
     @classmethod
     def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:

@@ -18,7 +18,6 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, items, read_only
 from hysim._parallel import in_pieces
 from hysim.errors import SimulationError
-from hysim.kernels.batches import drive_each
 from hysim.kernels.stepping import Step, drive
 from hysim.models._batch import Batch, Reduction, Sets
 from hysim.models._inverse_search import inverse_response, inverse_response_of, inverse_step
@@ -465,6 +464,8 @@ def _batch(
 
 def rows_by_step(step: Step, laws: Packed, workspace: int, u: FloatArray, y: FloatArray) -> None:
     """Outputs of many laws into `y`, sample by sample; see `Law.rows`."""
+    from hysim.kernels.batches import drive_each  # compiled where it is needed
+
     parameters, memory = (read_only(table, finite=False) for table in laws)
     with np.errstate(all="ignore"):
         drive_each(step, parameters, memory, workspace, u, y, 0, len(y))
