@@ -1,6 +1,7 @@
 """Imports point down only: to a lower rank, or inside one's own package."""
 
 import ast
+import graphlib
 from functools import cache
 from pathlib import Path
 
@@ -85,3 +86,36 @@ def test_nobody_walks_past_the_public_names_of_a_package():
             parts = name.split(".")
             if parts[0] == "hysim" and len(parts) > 3 and parts[2].startswith("_"):
                 assert parts[1] == own, (path, name)
+
+
+def imported_modules(path: Path) -> set[str]:
+    """Modules of hysim that a file imports anywhere, for types only too; a bare `import hysim` is the front door."""
+    names = {".".join(("hysim", *module.relative_to(PACKAGE).with_suffix("").parts)) for module in MODULES}
+    found = set()
+    for name in imported(path):
+        if name.split(".")[0] == "hysim":
+            longest = name if name in names or name == "hysim" else name.rpartition(".")[0]
+            found.add(f"{longest}.__init__" if f"{longest}.__init__" in names else longest)
+    return found
+
+
+def test_no_module_imports_itself_by_way_of_others():
+    """The front door, which loads names when they are first used, imports nothing that it names."""
+    graph = {
+        ".".join(("hysim", *path.relative_to(PACKAGE).with_suffix("").parts)): imported_modules(path)
+        for path in MODULES
+    }
+    assert graph["hysim.__init__"] <= {"hysim._names", "hysim._release"}
+    graphlib.TopologicalSorter(graph).prepare()  # raises a CycleError
+
+
+def test_abilities_are_asked_for_by_protocols_and_not_by_names():
+    """What is left looks at systems and dataclasses of others, which share no class."""
+    calls = [
+        str(path.relative_to(PACKAGE))
+        for path in MODULES
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("getattr", "hasattr")
+    ]
+    assert sorted(set(calls)) == ["_frozen.py", "models/state_space.py", "sweeps/_identity.py"]
+    assert len(calls) <= 20
