@@ -9,7 +9,7 @@ for a memory of order 2^k and an input of order 2^m, the step measures both in t
 
     A -> A 2^(m - k)    beta, gamma -> beta, gamma 2^(m + k (n - 1))    delta -> delta 2^(2 m - k)
 
-and an energy e goes over by 2^-(k + m). All other laws keep their units, and so their bits. The order of the memory is
+an energy e goes over by 2^-(k + m), and q, which multiplies (1 / (beta + gamma))^(1/n), by 2^((m - k) / n). All other laws keep their units, and so their bits. The order of the memory is
 that of the balance (A / c)^(1/n) with c the larger of beta and gamma, and the order of the input that of balance / A.
 Where A is zero or negligible, z0 or the forcing delta u gives both.
 """
@@ -47,9 +47,8 @@ class Units(NamedTuple):
         return np.concatenate([A, *decay, self.n], axis=1)
 
     def times(self, values: FloatArray, exponent: FloatArray) -> FloatArray:
-        """`values` times two to the `exponent`, which is an integer."""
-        with np.errstate(over="ignore", under="ignore"):
-            return np.ldexp(values, _integers(exponent))
+        """`values` times two to the `exponent`; exact where it is an integer."""
+        return _times(values, np.rint(exponent), exponent - np.rint(exponent))
 
     def _decay(self, values: FloatArray) -> FloatArray:
         """beta or gamma. k n is split into an integer and a small rest, so that it is not rounded."""
@@ -57,7 +56,7 @@ class Units(NamedTuple):
         product = self.memory * coarse
         whole = np.rint(product)
         rest = (product - whole) + self.memory * (self.n - coarse)
-        return self.times(values * np.exp2(rest), self.input - self.memory + whole)
+        return _times(values, self.input - self.memory + whole, rest)
 
 
 def units_with_ramp(tables: Tables) -> Units:
@@ -71,7 +70,8 @@ def units_with_ramp(tables: Tables) -> Units:
         power = 2.0 * n - 1.0  # delta u = c (delta u^2)^n
         ramped = ~started & ~free & ~(ramp + input_ <= force + _NEGLIGIBLE / n) & (np.abs(power) > 0.1)
         length = -(bend + (n - 1.0) * ramp) / power
-    return _units(n, np.where(ramped, ramp + 2.0 * length, memory), np.where(ramped, length, input_))
+        memory, input_ = np.where(ramped, ramp + 2.0 * length, memory), np.where(ramped, length, input_)
+    return _units(n, memory, input_)
 
 
 def units_with_wear(tables: Tables) -> Units:
@@ -114,6 +114,12 @@ def _units(n: FloatArray, memory: FloatArray, input_: FloatArray) -> Units:
 def _order(values: FloatArray) -> FloatArray:
     """Exponent of two of a number, the same bits in a batch and alone; minus infinity for zero."""
     return np.where(values == 0.0, -np.inf, np.frexp(values)[1])
+
+
+def _times(values: FloatArray, whole: FloatArray, rest: FloatArray) -> FloatArray:
+    """`values` times 2^(whole + rest), where neither factor overflows before the other."""
+    with np.errstate(over="ignore", under="ignore"):
+        return np.ldexp(values * np.exp2(rest), _integers(whole))
 
 
 def _integers(exponents: FloatArray) -> npt.NDArray[np.int32]:

@@ -126,7 +126,7 @@ class BoucWenBaberNoori(SteppedLaw):
         energy = units.memory + units.input
         exponents = {
             **{"delta_a": 2.0 * units.input, "delta_nu": energy, "delta_eta": energy, "p": energy},
-            **{"psi": -units.memory, "delta_psi": units.input},
+            **{"q": (units.input - units.memory) / units.n, "psi": -units.memory, "delta_psi": units.input},
         }
         own = [units.times(tables[name], exponents.get(name, np.zeros(()))) for name in _OWN]
         plain = cls.joined(tables, "A", "beta", "gamma", "n")
