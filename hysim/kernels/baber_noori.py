@@ -33,7 +33,6 @@ from hysim.kernels.baber_noori_series import (
     GAMMA,
     LARGEST,
     MEMORY,
-    N_OWN,
     N_ROWS,
     PINCH,
     POWER,
@@ -66,9 +65,9 @@ _RETREAT = 2.0**-10  # of a length at which a term overflows
 def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """Output at the next input `u`; `state`, shape (N_STATE,), has the last u, z and e in front, and moves along.
 
-    `parameters` are N_OWN of the law's own, (A, beta, gamma, n, scale of z, scale of u), and (A, beta, gamma, n, gain,
-    offset, c1, c2, ...). Those before the scales are of the law for z and u times their scales, powers of two; all
-    others, and the state, are in the user's units.
+    `parameters` are those of wear and pinching, (A, beta, gamma, n, scale of z, scale of u), and (A, beta, gamma, n,
+    gain, offset, c1, c2, ...). Those before the scales are of the law for z and u times their scales, powers of two;
+    those after them, and the state, are in the user's units.
     """
     common, plain = parameters[_COMMON:], state[_PLAIN:_SERIES]
     last, z, e = state[0], state[1], state[2]

@@ -9,9 +9,11 @@ for a memory of order 2^k and an input of order 2^m, the step measures both in t
 
     A -> A 2^(m - k)    beta, gamma -> beta, gamma 2^(m + k (n - 1))    delta -> delta 2^(2 m - k)
 
-an energy e goes over by 2^-(k + m), and q, which multiplies (1 / (beta + gamma))^(1/n), by 2^((m - k) / n). All other laws keep their units, and so their bits. The order of the memory is
-that of the balance (A / c)^(1/n) with c the larger of beta and gamma, and the order of the input that of balance / A.
-Where A is zero or negligible, z0 or the forcing delta u gives both.
+an energy e goes over by 2^-(k + m), and q, which multiplies (1 / (beta + gamma))^(1/n), by 2^((m - k) / n). All other
+laws keep their units, and so their bits.
+
+The order of the memory is that of the balance (A / c)^(1/n) with c the larger of beta and gamma, and the order of the
+input that of balance / A. Where A is zero or negligible, z0 or the forcing delta u gives both.
 """
 
 from typing import NamedTuple
