@@ -33,7 +33,6 @@ from hysim.kernels.baber_noori_series import (
     GAMMA,
     LARGEST,
     MEMORY,
-    N_OWN,
     N_ROWS,
     PINCH,
     POWER,
@@ -53,6 +52,9 @@ _READY = _EXPONENT + 1  # 0 before the first step
 N_STATE = _READY + 1
 
 MAX_STEPS = 5_000
+_SCALE = EXPONENT + 1  # place of the scales of z and u in the parameters
+_COMMON = _SCALE + 2
+_SMALLEST = 2.0**-1022
 _BEYOND, _BEYOND_POWER = 1e100, 1e200  # a memory, or its power n, that grows from there on has escaped
 _GROWTH = 4.0  # of the length tried, over the last one that served
 _VANISHED = 1e-3  # of eta: what is lost beside it did not escape
@@ -63,9 +65,11 @@ _RETREAT = 2.0**-10  # of a length at which a term overflows
 def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """Output at the next input `u`; `state`, shape (N_STATE,), has the last u, z and e in front, and moves along.
 
-    `parameters` are N_OWN of the law's own, and (A, beta, gamma, n, gain, offset, c1, c2, ...).
+    `parameters` are those of wear and pinching, (A, beta, gamma, n, scale of z, scale of u), and (A, beta, gamma, n,
+    gain, offset, c1, c2, ...). Those before the scales are of the law for z and u times their scales, powers of two;
+    those after them, and the state, are in the user's units.
     """
-    common, plain = parameters[N_OWN:], state[_PLAIN:_SERIES]
+    common, plain = parameters[_COMMON:], state[_PLAIN:_SERIES]
     last, z, e = state[0], state[1], state[2]
     if state[_READY] == 0.0:
         A, beta, gamma, n = common[0], common[1], common[2], common[3]
@@ -74,8 +78,9 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     if u != last and math.isfinite(z):  # an escape remains one
         direction = 1.0 if u > last else -1.0
         series = state[_SERIES:_EXPONENT].reshape((N_ROWS, N_TERMS + 1))
-        w, e = advance(direction * z, e, abs(u - last), parameters, series)
-        state[1], state[2] = direction * w, e
+        of_z, of_u = parameters[_SCALE], parameters[_SCALE + 1]
+        w, e = advance(direction * z * of_z, e * of_z * of_u, abs(u - last) * of_u, parameters, series)
+        state[1], state[2] = direction * w / of_z, e / of_u / of_z
     state[0] = u
     if parameters[0] == 0.0 and parameters[1] == 0.0 and parameters[2] == 0.0 and parameters[3] == 0.0:
         plain[0], plain[1] = last, z
@@ -183,7 +188,7 @@ def nearness(e: float, length: float, parameters: FloatArray, series: FloatArray
     if forcing == 0.0 or factor == 0.0:
         return (0.0 if forcing == 0.0 else math.inf), forcing * length, math.inf
     bent = (forcing / factor) ** (1.0 / n)
-    room = ROUNDING * min(forcing * length, bent) * (n + 1.0) * forcing / factor
+    room = max(_SMALLEST, ROUNDING * min(forcing * length, bent)) * (n + 1.0) * forcing / factor
     return float(0.5 * room ** (1.0 / (n + 1.0))), forcing * length, bent
 
 

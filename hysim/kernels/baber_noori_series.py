@@ -12,7 +12,7 @@ from hysim._frozen import FloatArray
 from hysim.kernels._compile import inner, kernel
 from hysim.kernels.remainder import FARTHEST, N_TERMS, ROUNDING, fraction
 
-N_OWN = 9  # delta_a, delta_nu, delta_eta, zeta_s, q, p, psi, delta_psi, lambda, before what `boucwen.step` takes
+N_OWN = 9  # delta_a, delta_nu, delta_eta, zeta_s, q, p, psi, delta_psi, lambda, before A, beta, gamma and n
 STRENGTH, BETA, GAMMA, EXPONENT = range(N_OWN, N_OWN + 4)
 
 # Rows of the series; `reach`, `place` and `zero` look at row 1.

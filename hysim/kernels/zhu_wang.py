@@ -36,10 +36,12 @@ from hysim.kernels.remainder import N_TERMS, ROUNDING, fraction, radius
 
 N_HEAD = 2
 N_STATE = N_HEAD + 2 * (N_TERMS + 1)
+_SCALE, _OUTPUT = 5, 7  # places in the parameters
 
 _RAMP = read_only([(-1.0) ** k / math.factorial(k + 2) for k in range(N_RAMP)])  # of (x - 1 + exp(-x)) / x^2
 _RAMP_REACH = 0.75  # the terms left out are below 1e-18 here
 _LARGEST_EXPONENT = 709.0
+_SMALLEST = 2.0**-1022
 _LARGEST = 1.7976931348623157e308
 _MAX_NEWTON = 1000  # more than the largest exponent: down a growing exponential, Newton's rule goes 1/|c| at a time
 _AHEAD = 16.0  # times the length that is sure before, of a step whose terms tell how much of it they serve
@@ -53,13 +55,15 @@ _MAX_SIDES = 8
 def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """Output at the next input `u`; `state`, shape (N_STATE,), is (last u, z, scratch), and moves along.
 
-    `parameters` is (A, beta, gamma, n, delta, gain, offset, c1, c2, ...).
+    `parameters` is (A, beta, gamma, n, delta, scale of z, scale of u, gain, offset, c1, c2, ...). The first five are
+    those of the law for z and u times their scales, powers of two; all others, and the state, are in the user's units.
     """
-    last, z = state[0], state[1]
+    last, z, of_z, of_u = state[0], state[1], parameters[_SCALE], parameters[_SCALE + 1]
     if u != last and math.isfinite(z):  # an escape remains one
-        z = advance(last, z, u - last, parameters, state[N_HEAD:])
+        z = advance(last * of_u, z * of_z, (u - last) * of_u, parameters, state[N_HEAD:]) / of_z
     state[0], state[1] = u, z
-    return float(parameters[6] + boucwen.polynomial(u, parameters, 7) + parameters[5] * z)
+    gain, offset = parameters[_OUTPUT], parameters[_OUTPUT + 1]
+    return float(offset + boucwen.polynomial(u, parameters, _OUTPUT + 2) + gain * z)
 
 
 @kernel
@@ -154,7 +158,7 @@ def power_side(
         if w == 0.0 or forcing < 0.0:
             landing = free_landing(w, forcing, d)
             if negligible < 0.0 and (w == 0.0 or landing <= left):
-                negligible = ROUNDING * scale(from_w, a, d, c, n, length)
+                negligible = max(_SMALLEST, ROUNDING * scale(from_w, a, d, c, n, length))
             if w == 0.0:
                 h, w = take_off(forcing, d, c, n, negligible, left)
                 if h >= left or w == 0.0:

@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim.kernels import baber_noori as kernels
-from hysim.models import _boucwen_conversions
+from hysim.models import _boucwen_conversions, _power_units
 from hysim.models._asymmetric import SteppedLaw
 from hysim.models.holding import Holding
 from hysim.models.law import Packed, Tables
@@ -121,8 +121,17 @@ class BoucWenBaberNoori(SteppedLaw):
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
-        """Parameters of wear and pinching, then (A, beta, gamma, n, gain, offset, c1, ...); memory (u, z, e)."""
-        return Packed(cls.joined(tables, *_OWN, "A", "beta", "gamma", "n"), cls.initial_memory(tables, further=1))
+        """Parameters as `hysim.kernels.baber_noori.step` takes them, and memory (u, z, e)."""
+        units = _power_units.units_with_wear(tables)
+        energy = units.memory + units.input
+        exponents = {
+            **{"delta_a": 2.0 * units.input, "delta_nu": energy, "delta_eta": energy, "p": energy},
+            **{"q": (units.input - units.memory) / units.n, "psi": -units.memory, "delta_psi": units.input},
+        }
+        own = [units.times(tables[name], exponents.get(name, np.zeros(()))) for name in _OWN]
+        plain = cls.joined(tables, "A", "beta", "gamma", "n")
+        parameters = np.concatenate([*own, units.shape(tables), units.scales, plain], axis=1)
+        return Packed(parameters, cls.initial_memory(tables, further=1))
 
     @classmethod
     def candidates(cls) -> dict[str, Holding]:

@@ -21,6 +21,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.kernels import zhu_wang as kernels
+from hysim.models import _power_units
 from hysim.models._asymmetric import SteppedLaw
 from hysim.models.law import Packed, Tables
 from hysim.models.model import family
@@ -78,8 +79,11 @@ class ZhuWangBoucWen(SteppedLaw):
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
-        """Parameters (A, beta, gamma, n, delta, gain, offset, c1, c2, ...) and memory (u, z)."""
-        return Packed(cls.joined(tables, "A", "beta", "gamma", "n", "delta"), cls.initial_memory(tables))
+        """Parameters as `hysim.kernels.zhu_wang.step` takes them, and memory (u, z)."""
+        units = _power_units.units_with_ramp(tables)
+        delta = units.times(tables["delta"], 2.0 * units.input - units.memory)
+        parameters = np.concatenate([units.shape(tables), delta, units.scales, cls.joined(tables)], axis=1)
+        return Packed(parameters, cls.initial_memory(tables))
 
     def _memory_slope(self, direction: FloatArray, z: FloatArray, u: FloatArray, *_: FloatArray) -> FloatArray:
         bend = np.abs(z) ** self.n * (self.gamma + self.beta * np.sign(z * direction))
