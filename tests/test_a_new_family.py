@@ -1,4 +1,4 @@
-"""A family that hysim does not have, `tests/my_laws.py`, takes part in every verb."""
+"""A family that hysim does not have, `tests/square_dahl.py`, takes part in every verb."""
 
 import inspect
 import itertools
@@ -8,7 +8,7 @@ import sys
 
 import numpy as np
 import pytest
-from my_laws import SquareDahl
+from square_dahl import SquareDahl
 
 import hysim as hs
 
@@ -104,7 +104,7 @@ def test_it_is_drawn():
 
 def test_the_command_line_takes_it_by_its_import_path(tmp_path):
     hs.save_record(RECORD, tmp_path / "record.csv")
-    command = [sys.executable, "-m", "hysim", "identify", "record.csv", "--model", "my_laws:SquareDahl", "--json"]
+    command = [sys.executable, "-m", "hysim", "identify", "record.csv", "--model", "square_dahl:SquareDahl", "--json"]
     path = os.pathsep.join([os.path.dirname(__file__), *filter(None, sys.path)])
     done = subprocess.run(command, cwd=tmp_path, env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -151,7 +151,7 @@ def test_a_narrow_loop_keeps_its_digits():
         ({}, 0.0, ValueError, "amplitude must be positive"),
         ({}, math.nan, ValueError, "amplitude must be positive"),
         ({"A": 0.0}, 1.0, ValueError, "A = 0"),
-        ({"beta": 0.5, "gamma": -1.5, "n": 2.0}, 5.0, hs.SimulationError, "escapes"),
+        ({"beta": 0.5, "gamma": -1.5, "n": 2.0}, 5.0, hs.SimulationError, "diverges"),
     ],
 )
 def test_what_has_no_steady_loop_is_refused(parameters, amplitude, error, message):

@@ -5,6 +5,7 @@ import pytest
 
 import hysim as hs
 from hysim import _parallel
+from hysim.models.protocols import Remembering
 
 U = np.concatenate([np.linspace(0.0, 1.0, 9), np.linspace(0.9, -0.8, 11), np.linspace(-0.7, 0.6, 12)])
 LAWS = [
@@ -30,7 +31,7 @@ def asked_for(law):
     """Everything that a law computes along a path."""
     y = law.response(U)
     values = {"response": y}
-    if hasattr(law, "memory"):
+    if isinstance(law, Remembering):
         values["memory"] = law.memory(U)
     if isinstance(law, (hs.BoucWen, hs.PolynomialBoucWen, hs.PrandtlIshlinskii)):
         values["inverse"] = law.inverse_response(y)

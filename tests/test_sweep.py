@@ -272,7 +272,7 @@ def test_a_wrong_sample_is_refused(arguments, words):
         (hs.BoucWen, {"measure": "rmse"}, ValueError, "y is needed"),
         (hs.BoucWen, {"measure": "width"}, ValueError, "one of rmse"),
         (hs.BoucWen, {"y": [1.0]}, ValueError, "equal lengths"),
-        (hs.Line, {"y": [1.0, 2.0]}, TypeError, "Line cannot compute many laws"),
+        (hs.SingleValued, {"y": [1.0, 2.0]}, TypeError, "SingleValued cannot compute many laws"),
     ],
 )
 def test_a_wrong_response_task_is_refused(law, arguments, error, words):

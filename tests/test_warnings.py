@@ -118,7 +118,7 @@ def test_parameters_without_a_standard_error_are_named_with_the_reason():
     (sentence,) = (each for each in fit.warnings if each.startswith("no standard error for"))
     assert "A" in sentence.split(":")[0]
     assert "gain" in sentence.split(":")[0]
-    assert "only their product" in sentence
+    assert "determine only the product of A and gain" in sentence
     assert not any("standard error" in each for each in hs.identify(hs.Line, record).warnings)
 
 

@@ -43,7 +43,7 @@ def names() -> list[str]:
     from hysim.models.candidates import candidates
 
     short = {family: name for name, family in _SHORT.items()}
-    families = dict.fromkeys(name.split()[0] for name in candidates())
+    families = dict.fromkeys(name.split()[0] for name in candidates() if name.split()[0] in hysim.__all__)
     return [short.get(name, _hyphenated(name)) for name in families]
 
 

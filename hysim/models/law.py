@@ -366,9 +366,7 @@ class Law(Composable, ABC):
                     break
                 secant = z - drift * (z - before) / (drift - drift_before)
             before, drift_before, z = z, drift, np.where(np.isfinite(secant), secant, z + drift)
-        shape = np.broadcast_shapes(*map(np.shape, parameters.values()))
-        columns = np.where(np.isfinite(z), z, np.nan).T
-        return {name: column.reshape(shape)[()] for name, column in zip(names, columns, strict=True)}
+        return dict(zip(names, np.where(np.isfinite(z), z, np.nan).T, strict=True))
 
     def _one_pass(self, parameters: Parameters, u: FloatArray) -> Callable[[FloatArray], FloatArray]:
         """A function from the memory before the input `u` to that after it, (n_sets, n_memory).
@@ -490,7 +488,8 @@ def arguments_of(scalars: Mapping[str, float]) -> dict[str, Any]:
     arguments: dict[str, Any] = {}
     for name, value in scalars.items():
         whole, bracket, _ = name.partition("[")
-        arguments[whole] = (*arguments.get(whole, ()), float(value)) if bracket else float(value)
+        number = float(np.asarray(value).item())
+        arguments[whole] = (*arguments.get(whole, ()), number) if bracket else number
     return arguments
 
 
