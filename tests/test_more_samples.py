@@ -25,6 +25,8 @@ N_CASES = 2 if numba.config.DISABLE_JIT else 8
 NOT_RATE_INDEPENDENT = {"TransferFunction", "Dashpot", "Actuator", "BoucWenOscillator"}
 """Between two samples the input of these is held, or goes on a line: with more samples it is another input."""
 INVERSES = {"BoucWenInverse"}  # under the laws that it inverts
+SEARCHED = {"CustomLaw", "Line", "MaxwellSlip", "Play", "PreisachRelays", "Stop"}
+"""Laws whose only inverse is the search on their step, as a sum's is; `test_inverse_of_every_law.py` has them."""
 
 
 def test_every_law_that_hysim_exports_is_among_the_families():
@@ -33,7 +35,7 @@ def test_every_law_that_hysim_exports_is_among_the_families():
     exported = {name for name, each in classes.items() if hasattr(each, "response")} - {"Law"}
     assert exported == {*experiment.DRAWS, *NOT_RATE_INDEPENDENT, *INVERSES}
     undone = {name for name in experiment.DRAWS if hasattr(getattr(hs, name), "inverse_response")}
-    assert undone == set(experiment.INVERTED)
+    assert undone - SEARCHED == set(experiment.INVERTED)
 
 
 @pytest.mark.parametrize("family", experiment.DRAWS)
