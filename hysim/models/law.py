@@ -10,6 +10,7 @@ identification, printing and files follow from these. `hysim.models.dahl` is a s
 from abc import ABC
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, Field, fields
+from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -138,10 +139,16 @@ class Law(Composable, ABC):
         """Every field by name."""
         return items(self)
 
-    @property
+    @cached_property
     def tables(self) -> dict[str, FloatArray]:
         """Every field as a table of one set."""
-        return {name: _table(name, value, np.ndim(value)) for name, value in self.arguments.items()}
+        return {name: _table_of_one(value) for name, value in self.arguments.items()}
+
+    @cached_property
+    def packed(self) -> tuple[FloatArray, FloatArray]:
+        """Parameters of the step and memory before the first sample, as `pack` has them of this law."""
+        parameters, memory = self.pack(self.tables)
+        return read_only(parameters[0], finite=False), read_only(memory[0], finite=False)
 
     @property
     def scalars(self) -> dict[str, float]:
@@ -431,14 +438,14 @@ class Law(Composable, ABC):
 
     def _begun(self, u: FloatArray, state: State | None) -> tuple[CompiledLaw, State]:
         """The law before the first sample of `u`, and the front of its state."""
-        parameters, memory = self.pack(self.tables)
-        start = self.start(float(u[0]) if u.size else 0.0, memory[0]) if state is None else state
-        if len(start) != memory.shape[1]:
-            raise ValueError(f"the state must hold {memory.shape[1]} numbers, got {len(start)}")
+        parameters, memory = self.packed
+        start = self.start(float(u[0]) if u.size else 0.0, memory) if state is None else state
+        if len(start) != memory.size:
+            raise ValueError(f"the state must hold {memory.size} numbers, got {len(start)}")
         moving = np.zeros(len(start) + self.workspace)
         moving[: len(start)] = start
-        self.prepare(parameters[0], moving)
-        return CompiledLaw(compiled_step(self.step), read_only(parameters[0], finite=False), moving), start
+        self.prepare(parameters, moving)
+        return CompiledLaw(compiled_step(self.step), parameters, moving), start
 
     def _follow(self, law: CompiledLaw, u: FloatArray, y: FloatArray) -> None:
         """Outputs at `u` into `y`, the state moving along."""
@@ -526,6 +533,11 @@ def tables_of(
         field, _, place = name.partition("[")
         tables[field] = np.where(np.arange(tables[field].shape[1]) == int(place[:-1]), column, tables[field])
     return tables, inputs
+
+
+def _table_of_one(value: Any) -> FloatArray:
+    """A number (1, 1), or a field with axes of its own behind one of length 1."""
+    return np.array([[value]]) if isinstance(value, float) else np.array([value], dtype=float)
 
 
 def _table(name: str, values: npt.ArrayLike, ndim: int) -> FloatArray:
