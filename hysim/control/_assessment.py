@@ -207,6 +207,10 @@ def assess_hysteresis(
     cycles : int
         Number of cycles, of which the last is measured.
 
+    Returns
+    -------
+    HysteresisAssessment
+
     Raises
     ------
     SimulationError
@@ -257,6 +261,10 @@ def open_loop(plant: Any, reference: npt.ArrayLike, sample_time: float, samples_
         Whole cycles, and the sample at which the last one ends [unit of y].
     sample_time, samples_per_cycle
         Of the reference [s].
+
+    Returns
+    -------
+    OpenLoop
 
     Raises
     ------
@@ -318,6 +326,10 @@ def assess_step(
         Whether the reference is known ahead, so that a controller with preview moves before the step; the open loop
         then steps in the reference's time. By default the controller is told when the open loop steps.
 
+    Returns
+    -------
+    StepAssessment
+
     Raises
     ------
     SimulationError, ValueError
@@ -365,6 +377,10 @@ def assess_square_wave(
         Of the wave, an even number of samples, and of the controller [s].
     periods : int
         Number of periods, enough for the open loop to become periodic.
+
+    Returns
+    -------
+    SquareWaveAssessment
 
     Raises
     ------

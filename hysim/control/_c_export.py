@@ -100,6 +100,10 @@ def to_c(
     precision : "double" or "float"
         Of every number in it.
 
+    Returns
+    -------
+    CSource
+
     Raises
     ------
     TypeError, ValueError

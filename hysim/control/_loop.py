@@ -120,6 +120,10 @@ def close_loop(
     progress : callable, optional
         Called as ``progress(done, total)`` with numbers of samples, in long runs.
 
+    Returns
+    -------
+    ClosedLoop
+
     Raises
     ------
     SimulationError

@@ -134,6 +134,13 @@ class PID(SampledController):
         state : State, optional
             To continue from; by default `start` at no voltage and at the first measurement.
 
+        Returns
+        -------
+        u : array, shape (n,)
+            Commands within the limits [V].
+        state : tuple
+            To continue from.
+
         Raises
         ------
         ValueError

@@ -88,6 +88,10 @@ def tune(
     u0 : float
         Voltage before the first sample.
 
+    Returns
+    -------
+    Tuning
+
     Raises
     ------
     TypeError, ValueError

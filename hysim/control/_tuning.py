@@ -37,11 +37,13 @@ class Tuning:
 
     Parameters
     ----------
-    controller, objective, max_sensitivity, voltage_noise
-        Of the best `Trial`. The noise also moves the memory of a law; `close_loop` has this in its conditions.
+    controller, objective, max_sensitivity
+        Of the best `Trial`.
     gain_margin, phase_margin : float
         Factor and angle [degrees] by which the loop may change before it is unstable: the smallest of all plants and
         slopes.
+    voltage_noise : float
+        Of the best `Trial`. The noise also moves the memory of a law; `close_loop` has this in its conditions.
     trade_off : tuple of Trial
         The trials within the bound on the noise that no other beats in both objective and sensitivity, the most
         robust first.

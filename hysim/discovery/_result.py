@@ -141,25 +141,19 @@ class Discovery(_Discovered):
     verdict : str
         ``"rate-independent hysteresis"``, ``"linear lag"``, ``"cannot be told from one rate"`` or
         ``"no structure found"``; see `discover`.
-    route : {"memory", "output"}
-        What the law takes the measured output for.
     scores : mapping
         ``"fit_percent"`` [%], ``"rmse"`` [unit of y], ``"bic"`` and ``"n_terms"`` of the law's free run;
         ``"threshold"``, the largest one whose structure still has all terms of the law, ``"n_structures"`` refined, and
         ``"condition"`` of the regression.
     n_parameters : int
         Fitted numbers: those of the law, and the initial state of each record where it is free.
-    judgement : Judgement
-        The errors and loops on which the verdict rests.
-    cv_rmse : float
-        Cross-validated rmse [unit of y], the whole search repeated for each fold; nan if it was not asked for.
     left_out : tuple of str
         Terms of the library that the records cannot tell from those of lower degree.
     regressed : mapping
         The coefficients before their refinement, from the regression of slopes; empty for a scanned exponent.
     inclusion : mapping
         Term of the library to the share of an ensemble of sparse regressions that keeps it.
-    thresholds, path_n_terms, path_fit_percent, path_bic : array, shape (n_thresholds,)
+    path_n_terms, path_fit_percent, path_bic : array, shape (n_thresholds,)
         The optimizer's path from dense to sparse, each structure refined on thinned records; a structure whose free run
         diverges has a fit of -inf and a BIC of inf.
     message : str
@@ -173,6 +167,14 @@ class Discovery(_Discovered):
         ``"free"``: the initial states were fitted. ``"rest"``: the memory is held at zero at the first sample.
     initial_states : tuple of mapping
         The state at the first sample of each record, in the letters of `equation`: ``"z0"`` or ``"y0"``.
+    route : {"memory", "output"}
+        What the law takes the measured output for.
+    judgement : Judgement
+        The errors and loops on which the verdict rests.
+    cv_rmse : float
+        Cross-validated rmse [unit of y], the whole search repeated for each fold; nan if it was not asked for.
+    thresholds : array, shape (n_thresholds,)
+        Of the optimizer's path.
     """
 
     route: str
@@ -231,10 +233,8 @@ class OscillatorDiscovery(_Discovered):
         Coefficients before the refinement, from the regression along the measured motion.
     inclusion : mapping
         Term to the share of fits to resampled data that keep it, for every term of the library that is not `left_out`.
-    path_terms : tuple of str
-        The structures that were compared, from dense to sparse, each as its terms joined by commas.
-    path_n_terms, path_bic, path_fit_percent : array, shape (n_structures,)
-        Their sizes, BIC, and the fit [%] of what is held out: for a Pareto figure.
+    path_n_terms, path_fit_percent, path_bic : array, shape (n_structures,)
+        Sizes of the compared structures, the fit [%] of what is held out, and the BIC: for a Pareto figure.
     message : str
         How the search ended.
     warnings : tuple of str
@@ -248,6 +248,8 @@ class OscillatorDiscovery(_Discovered):
         Displacement, velocity and memory at the first sample of each record: ``"y0"``, ``"y'0"`` and ``"z0"``.
     rival : TransferFunction
         The same mass on a linear spring, fitted to the records without a memory.
+    path_terms : tuple of str
+        The structures that were compared, from dense to sparse, each as its terms joined by commas.
     relative_width, dissipation : float
         Relative width and signed area [unit of y times unit of u] of the memory's steady loop over the range of the
         displacements, as in `Judgement`; nan where the memory is no Bouc-Wen law.

@@ -60,8 +60,9 @@ class Identification:
     redundant : tuple of tuples of str
         Groups of parameters that the data do not determine separately.
     free_names : tuple of str
+        The parameters that were identified.
     n_parameters : int
-        The parameters that were identified, and their number d.
+        Their number d.
     fit_percent, rmse : float
         100 (1 - ||residual|| / ||y - mean(y)||), and the residual's root mean square [unit of y].
     fpe, aic, bic : float
@@ -71,26 +72,29 @@ class Identification:
         Density of the noise, its most likely scale [unit of y], and the largest likelihood without constants.
     least_squares : Candidate or None
         The optimum of the sum of squares, where the noise is not Gaussian.
-    residual, response_stderr : array, shape (n,)
-        Measured minus model, one record after the other, and the standard error of the model's output [unit of y].
+    residual : array, shape (n,)
+        Measured minus model, one record after the other [unit of y].
     resolution : float or None
         Quantum of the sensor [unit of y].
+    response_stderr : array, shape (n,)
+        Standard error of the model's output [unit of y].
     loop_width : Width or None
         The largest width of the first record's loop with its band; None if the record has no complete cycle.
     whiteness : float
         Probability of residuals at least as correlated if they were white (Ljung and Box); nan if unknown.
     success : bool
+        Whether the search converged.
     message : str
-        Whether the search converged, how it ended, and which parameters the data do not determine.
+        How the search ended, and which parameters the data do not determine.
     rivals : tuple of Candidate
         Other optima whose likelihood ratio is inside the 95 % region of this one, best first.
     regions : mapping
         Name to the best candidate inside a region that the family names (for Bouc-Wen ``"admissible"``),
         where the optimum lies outside.
     cv_rmse : float
+        Cross-validated rmse [unit of y]; nan if it was not asked for.
     cv_residual : array, shape (n,)
-        Cross-validated rmse, and measured minus model at each sample by the fit that leaves it out [unit of y]; nan
-        where there is none.
+        Measured minus model at each sample by the fit that leaves it out [unit of y]; nan where there is none.
     seed : int
         Of the starts of the search.
     warnings : tuple of str

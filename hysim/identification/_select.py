@@ -88,9 +88,11 @@ def select(
     candidates : mapping or sequence
         Name to what `identify` takes: a class, a model as the start, or a structure. Those of a sequence are
         named by themselves, a class by its name.
+    record_or_records : Record or sequence of Record
+        As in `identify`, the same for all.
     criterion : {"bic", "aic", "fpe", "cv_rmse"}
         By which they are ranked; the last needs `cross_validate`.
-    record_or_records, initial, noise, cross_validate, seed, workers
+    initial, noise, cross_validate, seed, workers
         As in `identify`, the same for all.
     progress : callable, optional
         Called as ``progress(done, total)`` after each candidate.

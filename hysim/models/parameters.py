@@ -5,6 +5,7 @@ affine in it, and it is solved for; or it is neither, and held.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +15,8 @@ from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record
 
 
-class Parameter(NamedTuple):
+@dataclass(frozen=True)
+class Parameter:
     """How `hysim.identify` treats a field of a family.
 
     `lower` and `upper` are the box in units of `unit`: a quotient of the spans of input and output such as ``"y/u"``;
