@@ -1,5 +1,6 @@
 """Laws that are Bouc-Wen's with n = 1 and gamma = 0 under other names: everything is evaluated as that law."""
 
+import math
 from abc import abstractmethod
 
 import numpy as np
@@ -11,6 +12,7 @@ from hysim.models.boucwen import BoucWen
 from hysim.models.boucwen_inverse import BoucWenInverse, InverseState
 from hysim.models.law import Packed, State, Tables
 from hysim.models.limit_cycle import LimitCycle
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 
 
 class AsBoucWen(BoucWenStep):
@@ -50,3 +52,7 @@ class AsBoucWen(BoucWenStep):
     ) -> FloatArray:
         """Input that gives the output `y` from the input `u0`; see `hysim.BoucWen.inverse_response`."""
         return self.bouc_wen.inverse_response(y, u0, state)
+
+    def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
+        """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""
+        return self.bouc_wen.compiled_inverse(u0, limits)

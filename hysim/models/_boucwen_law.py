@@ -11,6 +11,8 @@ force) and counterclockwise for a negative one (a piezoelectric displacement).
 Sources: R. Bouc 1967; Y. K. Wen, J. Eng. Mech. Div. 102 (1976); the classes after Ikhouane and Rodellar 2007.
 """
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
@@ -21,6 +23,7 @@ from hysim.models._memory_law import MemoryLaw
 from hysim.models.boucwen_inverse import BoucWenInverse, InverseState
 from hysim.models.law import Packed, State, Tables
 from hysim.models.limit_cycle import LimitCycle
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.records import Record
 
 
@@ -189,6 +192,10 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
         [0.0, 30.0, 10.0]
         """
         return boucwen_inverse.inverse_response(self, y, u0, state)
+
+    def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
+        """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""
+        return boucwen_inverse.inverse(self, u0).compiled(u0=u0, limits=limits)
 
     def notes(self, record: Record, model: "BoucWenLaw") -> tuple[str, ...]:
         """What the identified law promises for other inputs."""

@@ -2,7 +2,7 @@
 
 The last stage that is not a transfer function carries the gain: what it is linear in stays linear, each of its columns
 passing through the linear stages behind it. A structure of a transfer function before or behind it has the gain one at
-rest, which the data could not tell from the other's (`hysim.models._unit_gain`); its initial state is linear behind
+rest, which the data could not tell from the other's (`hysim.plants._unit_gain`); its initial state is linear behind
 the carrier, and zero before it. A stage before the carrier that is not such a structure is taken as it is, and so is a
 transfer function that is given. Of transfer functions alone the first structure carries the gain.
 """
@@ -18,11 +18,16 @@ from hysim._frozen import FloatArray, checked
 from hysim.models._joint_space import declared, together
 from hysim.models._parts import checked_tuple, labels, own, response_of
 from hysim.models._sum_search import started, time_of
-from hysim.models._unit_gain import UnitGain
 from hysim.models.composable import Composable, composed
-from hysim.models.protocols import Identifiable, Responding, needs_time
+from hysim.models.protocols import (
+    Identifiable,
+    LinearStage,
+    LinearStructure,
+    Responding,
+    UnitGainStructure,
+    needs_time,
+)
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
-from hysim.models.transfer_function import TransferFunction, TransferFunctionStructure
 from hysim.records import Record
 
 
@@ -37,7 +42,7 @@ class CascadeStructure(Identifiable, Composable):
         for stage in stages:
             if not isinstance(stage, Identifiable | Responding):
                 raise TypeError(f"stages must hold models or structures, got {type(stage).__name__}")
-            if isinstance(stage, TransferFunction) and stage.initial_state:
+            if isinstance(stage, LinearStage) and stage.initial_state:
                 raise ValueError("a transfer function that is given must not hold an initial state")
         object.__setattr__(self, "stages", stages)
         if not isinstance(stages[self.carrier], Identifiable):
@@ -46,10 +51,10 @@ class CascadeStructure(Identifiable, Composable):
     @property
     def carrier(self) -> int:
         """Which stage carries the gain."""
-        linear = [isinstance(stage, TransferFunction | TransferFunctionStructure) for stage in self.stages]
+        linear = [isinstance(stage, LinearStage | LinearStructure) for stage in self.stages]
         if not all(linear):
             return len(linear) - 1 - linear[::-1].index(False)
-        return next((k for k, stage in enumerate(self.stages) if isinstance(stage, TransferFunctionStructure)), 0)
+        return next((k for k, stage in enumerate(self.stages) if isinstance(stage, LinearStructure)), 0)
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The stages' spaces side by side.
@@ -85,7 +90,7 @@ class CascadeStructure(Identifiable, Composable):
         for name in names[self.carrier + 1 :]:
             stage, its = stages[name], own(parameters, name)
             passed = _through(stage, its, columns.transpose(0, 2, 1), record).transpose(0, 2, 1)
-            added = stage.free_responses(its, record) if isinstance(stage, UnitGain) else passed[..., :0]
+            added = stage.free_responses(its, record) if isinstance(stage, UnitGainStructure) else passed[..., :0]
             n_sets = max(len(passed), len(added))
             blocks = (passed[..., :-1], added, passed[..., -1:])
             columns = np.concatenate([np.broadcast_to(block, (n_sets, *block.shape[1:])) for block in blocks], axis=-1)
@@ -111,7 +116,7 @@ class CascadeStructure(Identifiable, Composable):
     def _by_label(self) -> dict[str, Any]:
         """The stages, structures of transfer functions beside the carrier with the gain one."""
         return {
-            label: UnitGain(stage) if isinstance(stage, TransferFunctionStructure) and k != self.carrier else stage
+            label: stage.with_unit_gain() if isinstance(stage, LinearStructure) and k != self.carrier else stage
             for k, (label, stage) in enumerate(zip(labels(self.stages), self.stages, strict=True))
         }
 
@@ -119,19 +124,21 @@ class CascadeStructure(Identifiable, Composable):
     def _searched(self) -> dict[str, Any]:
         carrier = labels(self.stages)[self.carrier]
         return {
-            label: stage for label, stage in self._by_label.items() if label == carrier or isinstance(stage, UnitGain)
+            label: stage
+            for label, stage in self._by_label.items()
+            if label == carrier or isinstance(stage, UnitGainStructure)
         }
 
     def _record_at(self, label: str, record: Record) -> Record:
         """The record as a stage sees it: the carrier behind those before it, which have a gain of about one."""
         if label != labels(self.stages)[self.carrier]:
             return record
-        known = [stage for stage in self.stages[: self.carrier] if not isinstance(stage, TransferFunctionStructure)]
+        known = [stage for stage in self.stages[: self.carrier] if not isinstance(stage, LinearStructure)]
         u = reduce(lambda v, stage: response_of(stage, v, time_of(stage, record)), known, record.u)
         return Record(u=u, y=record.y, t=record.t)
 
 
-def _at_rest(stage: UnitGain, record: Record, freedom: Freedom) -> SearchSpace:
+def _at_rest(stage: UnitGainStructure, record: Record, freedom: Freedom) -> SearchSpace:
     """The space of a stage in front of the carrier, in whose initial state nothing is linear."""
     space = stage.search_space(record, replace(freedom, initial="rest"))
     if space.linear:
@@ -141,10 +148,10 @@ def _at_rest(stage: UnitGain, record: Record, freedom: Freedom) -> SearchSpace:
 
 def _through(stage: Any, parameters: Parameters, signals: FloatArray, record: Record) -> FloatArray:
     """Outputs (n_sets, n_signals, n_samples) of a stage for the inputs `signals`, of this shape or (1, ...)."""
-    if isinstance(stage, UnitGain):
-        return stage.filtered(parameters, signals, record.sample_time)
+    if isinstance(stage, UnitGainStructure):
+        return stage.filtered_sets(parameters, signals, record.sample_time)
     each = signals.reshape(-1, signals.shape[-1])
-    if isinstance(stage, TransferFunction):
+    if isinstance(stage, LinearStage):
         return stage.filtered(each, record.sample_time).reshape(signals.shape)
     return np.reshape([response_of(stage, u, time_of(stage, record)) for u in each], signals.shape)
 

@@ -1,7 +1,6 @@
 """The inverse of any law that is known by its step, found by a search on this step (`hysim.kernels.inverses`)."""
 
 import functools
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -12,12 +11,7 @@ from hysim._parallel import in_pieces
 from hysim.errors import SimulationError
 from hysim.kernels import inverses as kernels
 from hysim.kernels.stepping import drive
-from hysim.models.protocols import CompiledLaw
-
-Limits = tuple[float, float]
-"""Lowest and highest input."""
-
-UNLIMITED: Limits = (-math.inf, math.inf)
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 
 _REACH, _WIDER = 1e-6, 16.0  # how far at most the output is looked at to either side of the first input; the ratio
 _SHORTEST = 2.0**-46  # of the first input, or this number

@@ -15,7 +15,7 @@ from hysim.models._by_structure import ByStructure
 from hysim.models._clamps import Bank
 from hysim.models.law import State, Tables
 from hysim.models.prandtl_ishlinskii import PrandtlIshlinskii
-from hysim.models.protocols import CompiledLaw
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 
 _WIDTH = 3  # place of the width behind the limits and the offset
 IDENTITY = (0.0, 0.0, 0.0, 0.0, 1.0)
@@ -48,7 +48,7 @@ class ExtendedPlays(ByStructure, Bank):
         if state is None:
             first = self._first_input(float(wanted[0])) if u0 is None and wanted.size else u0
             state = self.advance([first or 0.0])[1]
-        u, inverse = np.empty(wanted.size), self.inverse_step(state)
+        u, inverse = np.empty(wanted.size), self.inverse_from(state)
         lost = in_pieces(lambda k: drive(inverse.step, inverse.parameters, inverse.state, wanted[k], u[k]), u.size)
         if lost >= 0:
             raise SimulationError(f"no input gives the output at sample {lost} (y = {wanted[lost]:g})")
@@ -56,13 +56,13 @@ class ExtendedPlays(ByStructure, Bank):
 
     def _first_input(self, y: float) -> float:
         """The first input that finds the plays at z0 and gives `y`, whatever its speed would be."""
-        inverse = self.inverse_step((0.0, *self.z0))
+        inverse = self.inverse_from((0.0, *self.z0))
         still = inverse.parameters.copy()
         still[_WIDTH] = 0.0
         u = inverse.step(read_only(still, finite=False), inverse.state, y)
         return u if math.isfinite(u) else 0.0
 
-    def inverse_step(self, state: State, limits: tuple[float, float] = (-math.inf, math.inf)) -> CompiledLaw:
+    def inverse_from(self, state: State, limits: Limits = UNLIMITED) -> CompiledLaw:
         """The inverse of the law in this state, as `hysim.kernels.inverses` has it."""
         law, _ = self._begun(np.array([state[0]]), state)
         y = kernels.step(law.parameters, law.state.copy(), state[0])

@@ -8,13 +8,13 @@ of any size and sign.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.models._linear_response import LinearPlants, affine_columns
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
-from hysim.models.transfer_function import TransferFunction, TransferFunctionStructure
 from hysim.records import Record
 
 _WIDEST = float(np.arcsinh(1e4))
@@ -25,7 +25,7 @@ _NEAR = 0.05  # of the box: how far random points are from starts that regressio
 class UnitGain:
     """A structure whose numerator ends with ``den[n]``."""
 
-    structure: TransferFunctionStructure
+    structure: Any  # of a transfer function, which makes this
 
     @property
     def shape(self) -> tuple[str, ...]:
@@ -45,7 +45,7 @@ class UnitGain:
                 raise ValueError(
                     f"{name!r} cannot be fixed or bounded: the numerator is searched with the gain one at rest"
                 )
-        own = self.structure.search_space(record, freedom)
+        own: SearchSpace = self.structure.search_space(record, freedom)
         numerator = self.structure.columns[: self.structure.zeros + 1]
         n_shape, n_own = self.structure.zeros, len(own.coordinates)
         lower, upper = (np.append(side, np.full(n_shape, end)) for side, end in
@@ -70,7 +70,7 @@ class UnitGain:
             drawn=_near(starts, lower, upper) if len(starts) else None,
         )
 
-    def filtered(self, parameters: Parameters, signals: FloatArray, sample_time: float) -> FloatArray:
+    def filtered_sets(self, parameters: Parameters, signals: FloatArray, sample_time: float) -> FloatArray:
         """Outputs (n_sets, n_signals, n_samples) for the inputs `signals` of this shape, or (1, ...)."""
         monic = self._monic(parameters)
         numerators = np.zeros((len(monic), monic.shape[1] + 1))
@@ -86,7 +86,7 @@ class UnitGain:
         hold, sample = self.structure.hold, self.structure.sample
         return affine_columns(monic, record.u, record.sample_time, zeros=0, hold=hold, sample=sample)[..., 1:-1]
 
-    def assemble(self, parameters: Mapping[str, float]) -> TransferFunction:
+    def assemble(self, parameters: Mapping[str, float]) -> Any:
         """The transfer function with these parameters."""
         return self.structure.assemble(parameters)
 

@@ -15,6 +15,7 @@ Sources: M. Al Janaideh, S. Rakheja and C.-Y. Su, IEEE/ASME Trans. Mechatronics 
 inverse, with the envelopes a_0 tanh(a_1 u + a_2) + a_3 and a_4 u + a_3; the sum of the two is ours.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -26,6 +27,7 @@ from hysim.models._clamp_search import Axis, ClampStructure, half_span
 from hysim.models._play_sums import IDENTITY, ExtendedPlays, kernel_rows, positions_of
 from hysim.models.law import Packed, State, Tables
 from hysim.models.model import family
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.search_space import Parameters
 from hysim.records import Record
 
@@ -173,6 +175,11 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
         """
         self.check_invertible()
         return self.input_of(y, u0, state)
+
+    def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
+        """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""
+        self.check_invertible()
+        return self.inverse_from(self.advance([u0])[1], limits)
 
     def check_invertible(self) -> None:
         """Raise a ValueError if the law is not invertible, or z0 holds positions that no input leads to."""

@@ -7,6 +7,7 @@ sample itself. A family declares its fields, its step, and where its search box 
 identification, printing and files follow from these. `hysim.models.dahl` is a short example.
 """
 
+import math
 from abc import ABC
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, Field, fields
@@ -25,7 +26,7 @@ from hysim.models._inverse_search import inverse_response, inverse_response_of, 
 from hysim.models.compiled_step import compiled_step
 from hysim.models.composable import Composable
 from hysim.models.parameters import Parameter, declared_space
-from hysim.models.protocols import CompiledLaw
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
@@ -329,6 +330,30 @@ class Law(Composable, ABC):
             return inverse_response_of(self, outputs, u0)
         forward, _ = self._begun(np.array([state[0]]), state)
         return inverse_response(inverse_step(forward, state[0]), outputs)
+
+    def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
+        """The inverse, stepped; a search on the law's own step unless the family has a closed form.
+
+        Parameters
+        ----------
+        u0 : float
+            Input at which the law rests [unit of u].
+        limits : (float, float)
+            Lowest and highest input to which the inverse's copy of the law moves [unit of u].
+        sample_time : float
+            Time between two samples, for a law that depends on the rate of its input [s].
+
+        Returns
+        -------
+        CompiledLaw
+            ``u = step(parameters, state, y)``, nan where no input has the output y.
+
+        Raises
+        ------
+        ValueError
+            If the output does not rise or fall through u0.
+        """
+        return inverse_step(self.compiled(u0), u0, limits=limits)
 
     # ------------------------------------------------------------------------------ identification
 

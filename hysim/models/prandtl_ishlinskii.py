@@ -18,6 +18,7 @@ Sources: K. Kuhnen, European J. Control 9 (2003), for the inverse; P. Krejci and
 Theory Appl. 148 (2001).
 """
 
+import math
 from dataclasses import replace
 from typing import ClassVar
 
@@ -25,11 +26,13 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
+from hysim.kernels import inverses
 from hysim.models._by_structure import ByStructure
 from hysim.models._clamp_search import ClampStructure
 from hysim.models._clamps import ClampLaw
 from hysim.models.law import State
 from hysim.models.model import family
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 
 _CONSISTENT = 1e-9  # of the largest threshold: what rounding may add to the distance of two plays
 
@@ -133,6 +136,16 @@ class PrandtlIshlinskii(ByStructure, ClampLaw):
         return (
             f"the law has no inverse: the sums of weights w_0 + ... + w_i must have one sign, but from "
             f"{self.weights[0]:g} for i = 0 they come to {sum(self.weights[: wrong + 1]):g} for i = {wrong}"
+        )
+
+    def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
+        """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""
+        y0 = float(self.response([u0])[0])
+        forward, inverse = self.compiled(u0), self.inverse().compiled(y0)
+        return CompiledLaw(
+            inverses.plays,
+            read_only(np.concatenate([limits, inverse.parameters, forward.parameters]), finite=False),
+            np.concatenate([[u0, y0], inverse.state, forward.state, inverse.state]),
         )
 
     def inverse(self) -> "PrandtlIshlinskii":

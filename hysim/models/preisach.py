@@ -40,13 +40,15 @@ from hysim.models._relays import everett_of, weights_of
 from hysim.models.law import State
 from hysim.models.model import family
 from hysim.models.prandtl_ishlinskii import PrandtlIshlinskii
-from hysim.models.protocols import CompiledLaw
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.records import Record
 
 Density = Callable[[FloatArray, FloatArray], npt.ArrayLike]
 """Weight of relays per area at arrays of upper and lower thresholds of one shape."""
 
 _POINTS = 8  # of Gauss's rule on an interval
+
+_ROOM = 1000  # extremes that the inverse keeps in a loop
 
 
 @family
@@ -346,7 +348,7 @@ class Preisach(SearchedRelays):
             raise ValueError("give u0 or state, not both: the state has its own input")
         wanted = read_only(y, "y", ndim=1)
         past = state[1:] if state is not None else self.z0 if u0 is None else (*self.z0, u0)
-        u, inverse = np.empty(wanted.size), self.inverse_step(past, room=wanted.size)
+        u, inverse = np.empty(wanted.size), self.inverse_from(past, room=wanted.size)
         lost = in_pieces(lambda k: drive(inverse.step, inverse.parameters, inverse.state, wanted[k], u[k]), u.size)
         if lost >= 0:
             bound = abs(float(self.everett[-1, 0]))
@@ -356,9 +358,11 @@ class Preisach(SearchedRelays):
             )
         return u
 
-    def inverse_step(
-        self, past: State, limits: tuple[float, float] = (-math.inf, math.inf), *, room: int = 0
-    ) -> CompiledLaw:
+    def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
+        """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""
+        return self.inverse_from((*self.z0, u0), limits, room=_ROOM)
+
+    def inverse_from(self, past: State, limits: Limits = UNLIMITED, *, room: int = 0) -> CompiledLaw:
         """The inverse after the inputs `past`, as `hysim.kernels.inverses` has it, with room for so many more extremes.
 
         Raises

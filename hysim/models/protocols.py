@@ -4,12 +4,18 @@ A verb asks for a role, never for a class: a user's own class that has the metho
 method and does not offer it sets it to None, which `isinstance` sees.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, NamedTuple, Protocol, TypeGuard, runtime_checkable
 
 from hysim._frozen import FloatArray
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
+
+Limits = tuple[float, float]
+"""Lowest and highest input."""
+
+UNLIMITED: Limits = (-math.inf, math.inf)
 
 
 class CompiledLaw(NamedTuple):
@@ -100,6 +106,15 @@ class Invertible(Protocol):
 
 
 @runtime_checkable
+class StepwiseInvertible(Protocol):
+    """A law whose inverse runs sample by sample."""
+
+    def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
+        """The inverse of the law at rest at `u0`; see `hysim.models.inverse_steps`."""
+        ...
+
+
+@runtime_checkable
 class OfFamily(Protocol):
     """A structure whose `law` is the family that it makes models of."""
 
@@ -149,6 +164,43 @@ class Identifiable(Protocol):
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
         """Remarks on the identified model, as phrases."""
         return ()
+
+
+@runtime_checkable
+class LinearStage(Protocol):
+    """A linear plant through which many inputs pass at once."""
+
+    initial_state: tuple[float, ...]
+
+    def filtered(self, signals: FloatArray, sample_time: float) -> FloatArray:
+        """Outputs from rest, of the shape of the inputs (n_signals, n_samples)."""
+        ...
+
+
+@runtime_checkable
+class UnitGainStructure(Protocol):
+    """A linear structure whose gain at rest is one, beside a stage that carries the gain."""
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """Declare the box for `record`."""
+        ...
+
+    def filtered_sets(self, parameters: Parameters, signals: FloatArray, sample_time: float) -> FloatArray:
+        """Outputs (n_sets, n_signals, n_samples) for inputs of this shape, or (1, n_signals, n_samples)."""
+        ...
+
+    def free_responses(self, parameters: Parameters, record: Record) -> FloatArray:
+        """Columns of the initial state, shape (n_sets, n_samples, n_states)."""
+        ...
+
+
+@runtime_checkable
+class LinearStructure(Identifiable, Protocol):
+    """A linear plant to be identified, whose gain another stage of a cascade may carry."""
+
+    def with_unit_gain(self) -> UnitGainStructure:
+        """The structure with the gain at rest one."""
+        ...
 
 
 class DirectFit(NamedTuple):

@@ -22,6 +22,7 @@ Sources: M. Al Janaideh and P. Krejci, IEEE/ASME Trans. Mechatronics 18 (2013), 
 M. Al Janaideh, P. Krejci and G. A. Monteiro, Applications of Mathematics (2023). The condition on samples is ours.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any, ClassVar
@@ -39,7 +40,7 @@ from hysim.models.composable import Composable
 from hysim.models.law import Packed, State, Tables
 from hysim.models.model import family
 from hysim.models.prandtl_ishlinskii import PrandtlIshlinskii
-from hysim.models.protocols import CompiledLaw
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.search_space import Parameters
 from hysim.records import Record
 
@@ -354,6 +355,12 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
             return self.inverse().response(y, sample_time, speed=speed)
         self.check_invertible(sample_time)
         return self.at(sample_time).input_of(y, u0, state)
+
+    def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
+        """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""
+        self.check_invertible(sample_time)
+        steps = self.at(sample_time)
+        return steps.inverse_from(steps.advance([u0])[1], limits)
 
     def check_invertible(self, sample_time: float) -> None:
         """Raise a ValueError if the law is not invertible at this sample time, or no input leads to z0."""

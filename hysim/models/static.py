@@ -5,6 +5,7 @@ SingleValued   y = f(u), linear between knots; fitted to a record, f is a cubic 
                (`hysim.models._smoothing`), whose loop has no width
 """
 
+import math
 from collections.abc import Mapping
 from typing import ClassVar, Self
 
@@ -12,13 +13,13 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim.kernels import stepping
+from hysim.kernels import inverses, stepping
 from hysim.models._smoothing import equal_inputs, smoothing_spline
 from hysim.models.composable import Composable
 from hysim.models.law import Law
 from hysim.models.model import family
 from hysim.models.parameters import Parameter, space_of
-from hysim.models.protocols import DirectFit
+from hysim.models.protocols import UNLIMITED, CompiledLaw, DirectFit, Limits
 from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record
 
@@ -46,6 +47,13 @@ class Line(Law):
     initial: ClassVar[tuple[str, ...]] = ()
     searched = (Parameter("offset", affine=True), Parameter("slope", affine=True))
     memory = None  # type: ignore[assignment]  # a line remembers nothing
+
+    def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
+        """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""
+        if not self.slope:
+            raise ValueError("the law has no inverse: its slope is zero")
+        parameters = read_only([*limits, self.offset, self.slope], finite=False)
+        return CompiledLaw(inverses.line, parameters, np.array([u0, self.offset + self.slope * u0]))
 
 
 @family

@@ -24,6 +24,7 @@ from hysim.errors import SimulationError
 from hysim.models._linear_response import LinearPlants, LinearState, affine_columns
 from hysim.models._transfer_function_notes import notes
 from hysim.models._transfer_function_starts import Guess, guesses, likely_delays, sections
+from hysim.models._unit_gain import UnitGain
 from hysim.models.composable import Composable
 from hysim.models.model import family
 from hysim.models.protocols import Identifiable
@@ -406,6 +407,10 @@ class TransferFunctionStructure(Identifiable, Composable):
         delay = parameters["delay"] if self.delay is None else self.delay
         options = {"hold": self.hold, "sample": self.sample}
         return affine_columns(monic, record.u, record.sample_time, delay, zeros=self.zeros, **options)
+
+    def with_unit_gain(self) -> UnitGain:
+        """The structure with the gain at rest one, beside a stage that carries the gain."""
+        return UnitGain(self)
 
     def assemble(self, parameters: Mapping[str, float]) -> TransferFunction:
         """The transfer function with these parameters."""
