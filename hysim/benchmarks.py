@@ -25,9 +25,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim.models.boucwen import BoucWen
-from hysim.models.oscillator import BoucWenOscillator
-from hysim.models.resampling import decimated, interpolated
+from hysim.laws.differential.boucwen import BoucWen
+from hysim.plants.oscillator import BoucWenOscillator
+from hysim.plants.resampling import decimated, interpolated
 from hysim.records import Record
 from hysim.signals import multisine
 

@@ -11,24 +11,25 @@ import hysim
 
 PACKAGE = Path(hysim.__file__).parent
 
-RANKS = {
-    # tools of the language, which know nothing of hysteresis
-    -4: ("_names", "_release"),
-    -3: ("_frozen", "_atomic", "_blas", "_printing", "_versions", "errors"),
-    -2: ("_cycles", "_resolution", "_prefixes"),  # the turning points of an input, the quantum of a sensor, units
-    -1: ("_drift", "_excursions"),  # the drift between cycles, and cycles about a level of the input
-    0: ("signals", "records", "metrics", "kernels", "_parallel"),
-    1: ("datasets", "files", "models", "vision"),
-    2: ("simulation", "benchmarks"),
-    3: ("identification",),
-    4: ("discovery", "control"),
-    5: ("comparison", "sweeps", "rig"),
-    6: ("plot",),
-    7: ("paper",),
-    8: ("cli",),
-    9: ("__main__",),
-}
-RANK = {name: rank for rank, names in RANKS.items() for name in names}
+RANKS = (
+    ("_names", "_release"),
+    ("_frozen", "_atomic", "_blas", "_printing", "_versions", "errors"),  # they know nothing of hysteresis
+    ("_cycles", "_resolution", "_prefixes"),  # the turning points of an input, the quantum of a sensor, units
+    ("_drift", "_excursions"),  # the drift between cycles, and cycles about a level of the input
+    ("signals", "records", "metrics", "kernels", "_parallel"),
+    ("datasets", "files", "models", "vision"),
+    ("laws",),
+    ("plants",),
+    ("simulation", "benchmarks"),
+    ("identification",),
+    ("discovery", "control"),
+    ("comparison", "sweeps", "rig"),
+    ("plot",),
+    ("paper",),
+    ("cli",),
+    ("__main__",),
+)
+RANK = {name: rank for rank, names in enumerate(RANKS) for name in names}
 ONLY_IMPORTED_IN = {"pysindy": ("discovery/_pysindy.py",), "matplotlib": ("plot/",), "control": ("control/", "paper/")}
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
@@ -46,7 +47,7 @@ def imported(path: Path) -> list[str]:
 
 
 def part(module: str) -> str:
-    """`records` for hysim.records.Record, `models` for hysim.models.boucwen."""
+    """`records` for hysim.records.Record, `models` for hysim.laws.differential.boucwen."""
     return module.split(".")[1]
 
 
@@ -81,11 +82,18 @@ def test_kernels_know_no_class():
 def test_nobody_walks_past_the_public_names_of_a_package():
     """Private modules are imported inside their own package only."""
     for path in MODULES:
-        own = path.relative_to(PACKAGE).parts[0]
+        own = ("hysim", *path.relative_to(PACKAGE).parts[:-1])
         for name in imported(path):
-            parts = name.split(".")
-            if parts[0] == "hysim" and len(parts) > 3 and parts[2].startswith("_"):
-                assert parts[1] == own, (path, name)
+            parts = tuple(name.split("."))[:-1]
+            private = next((k for k, part in enumerate(parts) if k > 1 and part.startswith("_")), None)
+            if parts[:1] == ("hysim",) and private:
+                assert parts[:private] == own[:private], (path, name)
+
+
+def test_a_room_is_not_crowded():
+    rooms = {path.parent for path in MODULES}
+    crowded = {str(room.relative_to(PACKAGE)): n for room in rooms if (n := len(list(room.glob("*.py")))) > 25}
+    assert not crowded, crowded
 
 
 def imported_modules(path: Path) -> set[str]:
@@ -117,5 +125,5 @@ def test_abilities_are_asked_for_by_protocols_and_not_by_names():
         for node in ast.walk(ast.parse(path.read_text()))
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("getattr", "hasattr")
     ]
-    assert sorted(set(calls)) == ["_frozen.py", "models/state_space.py", "sweeps/_identity.py"]
+    assert sorted(set(calls)) == ["_frozen.py", "plants/state_space.py", "sweeps/_identity.py"]
     assert len(calls) <= 20

@@ -13,8 +13,8 @@ from hysim.cli import main
 from hysim.discovery._discover import discover
 from hysim.discovery._oscillator_response import Oscillator, Response
 from hysim.discovery._oscillator_search import Search, _Fitted, _tried
-from hysim.models.equation_of_motion import linear_plant
-from hysim.models.terms import RELAXATION, Term, bouc_wen_terms, power_term
+from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_terms, power_term
+from hysim.plants.equation_of_motion import linear_plant
 
 STEP = 1.0 / 750.0
 PLANT = {"mass": 2.0, "damping": 10.0, "stiffness": 5e4}

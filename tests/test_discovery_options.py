@@ -11,7 +11,7 @@ import hysim as hs
 from hysim.discovery import _discover
 from hysim.discovery._refinement import FreeRun
 from hysim.discovery._search import Library, Options, searched
-from hysim.models.terms import memory_terms
+from hysim.laws.differential.terms import memory_terms
 
 RECORD = record_of(LAW.memory, multisine(200), noise=0.01)
 NAMES = list(TRUTH)

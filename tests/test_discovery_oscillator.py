@@ -15,7 +15,7 @@ from hysim.discovery._hidden_memory import HiddenMemory, cases
 from hysim.discovery._oscillator import recorded
 from hysim.discovery._oscillator_models import diverges
 from hysim.identification import identify
-from hysim.models.terms import RELAXATION, Term, bouc_wen_terms, memory_terms
+from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_terms, memory_terms
 
 COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
 needs_compiled = pytest.mark.skipif(not COMPILED, reason="millions of steps, which only compiled code does in time")

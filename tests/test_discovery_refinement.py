@@ -17,7 +17,7 @@ from hysim.discovery._search import Library, Options, searched
 from hysim.discovery._selection import Search, pruned
 from hysim.discovery._structures import AnyExponent, Terms
 from hysim.identification.marquardt import SumOfSquares, descend, differences
-from hysim.models.terms import Term, bouc_wen_terms
+from hysim.laws.differential.terms import Term, bouc_wen_terms
 
 OPEN = np.full(2, np.inf)
 

@@ -17,7 +17,7 @@ from hysim.discovery._selection import is_complete, preferred, thinning
 from hysim.discovery._slopes import branches, feature, signs_of, slopes, smoothed, weak_rows
 from hysim.discovery._structures import Terms
 from hysim.discovery._subsets import best_subsets
-from hysim.models.terms import Term, duhem_terms, memory_terms, named_terms, symmetric
+from hysim.laws.differential.terms import Term, duhem_terms, memory_terms, named_terms, symmetric
 
 
 def test_slopes_are_never_taken_across_a_reversal():

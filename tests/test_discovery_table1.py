@@ -6,7 +6,7 @@ import pytest
 import hysim as hs
 from hysim.discovery._refinement import FreeRun
 from hysim.discovery._structures import Terms
-from hysim.models.terms import Term
+from hysim.laws.differential.terms import Term
 
 
 @pytest.fixture(scope="module")

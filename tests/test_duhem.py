@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 
 import hysim as hs
 from hysim.errors import SimulationError
+from hysim.laws.differential.terms import Term
 from hysim.models.search_space import Freedom
-from hysim.models.terms import Term
 
 # Degree 2 in both variables, an inner loop, long and short moves, a rest.
 GENERAL = hs.Duhem(

@@ -10,9 +10,9 @@ from scipy.integrate import solve_ivp
 
 import hysim as hs
 from hysim.errors import SimulationError
-from hysim.models.duhem_runs import free_runs
+from hysim.laws.differential.duhem_runs import free_runs
+from hysim.laws.differential.terms import Term
 from hysim.models.search_space import Freedom
-from hysim.models.terms import Term
 
 polyval2d = np.polynomial.polynomial.polyval2d
 

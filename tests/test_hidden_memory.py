@@ -7,7 +7,7 @@ from scipy.linalg import expm
 import hysim as hs
 from hysim.discovery._hidden_memory import cases, memory_arrays
 from hysim.kernels import hidden
-from hysim.models.terms import RELAXATION, bouc_wen_terms
+from hysim.laws.differential.terms import RELAXATION, bouc_wen_terms
 
 PLANT = {"mass": 2.0, "damping": 0.4, "stiffness": 3.0}
 

@@ -5,9 +5,9 @@ import pytest
 from numba import njit
 
 import hysim as hs
-from hysim.models.actuator import is_law
 from hysim.models.inverse_steps import inverse_step
 from hysim.models.model import every_family
+from hysim.plants.actuator import is_law
 
 CLOSE = 1e-10  # of the range of the reference
 H = 1.0  # s

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 import hysim as hs
 from hysim.kernels import oscillator as kernels
-from hysim.models import oscillator as module
+from hysim.plants import oscillator as module
 
 COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
 LAWS = {

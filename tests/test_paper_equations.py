@@ -8,7 +8,6 @@ import pytest
 
 import hysim.paper
 from hysim.control import to_control
-from hysim.models.transfer_function import TransferFunction
 from hysim.paper import printed
 from hysim.paper.amplifier import UA741_SUPPLY_SPAN, full_power_bandwidth, resistor_ratio, voltage_gain
 from hysim.paper.approximations import approximations, matched_second_order, step_fit
@@ -27,6 +26,7 @@ from hysim.paper.equations import (
 )
 from hysim.paper.resolution import quantum
 from hysim.paper.state_space import EQUATIONS_7_8, EQUATIONS_13_14, array, companion
+from hysim.plants.transfer_function import TransferFunction
 
 MODELS = {"(1)": EQUATION_1, "(4)": EQUATION_4, "(6)": EQUATION_6, "(7)": EQUATION_7}
 

@@ -11,8 +11,8 @@ import pytest
 import hysim as hs
 from hysim.discovery._oscillator_response import Oscillator, Response
 from hysim.kernels import hidden
-from hysim.models import steady_state
-from hysim.models.terms import bouc_wen_terms
+from hysim.laws.differential.terms import bouc_wen_terms
+from hysim.plants import steady_state
 
 COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
 needs_compiled = pytest.mark.skipif(not COMPILED, reason="hundreds of periods, which only compiled code does in time")

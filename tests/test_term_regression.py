@@ -3,7 +3,7 @@
 import numpy as np
 
 from hysim.discovery._term_regression import TermRegression
-from hysim.models.terms import power_term
+from hysim.laws.differential.terms import power_term
 
 TERMS = tuple(power_term(False, power, even=False) for power in range(4))
 

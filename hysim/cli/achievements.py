@@ -13,9 +13,9 @@ from hysim.cli import outputs
 from hysim.cli.designs import CYCLES, Task
 from hysim.control import HysteresisAssessment, StepAssessment, Tuning
 from hysim.metrics import rmse
-from hysim.models.actuator import Actuator
 from hysim.models.model import in_brief
 from hysim.models.storage import to_document
+from hysim.plants.actuator import Actuator
 
 if TYPE_CHECKING:
     from hysim.plot import Figure

@@ -25,11 +25,11 @@ from hysim.control import (
     close_loop,
 )
 from hysim.files import load
-from hysim.models.actuator import Actuator
-from hysim.models.creep import Creep
-from hysim.models.modes import mode
 from hysim.models.protocols import needs_time
-from hysim.models.sensor import Sensor
+from hysim.plants.actuator import Actuator
+from hysim.plants.creep import Creep
+from hysim.plants.modes import mode
+from hysim.plants.sensor import Sensor
 from hysim.records import Record
 
 Pair = tuple[float, float]

@@ -18,7 +18,7 @@ from hysim.control._loop import ClosedLoop, RestingPlant, as_actuator, close_loo
 from hysim.control._open_loop import secant_gain, without_memory
 from hysim.control._protocols import Controller, preview
 from hysim.metrics import LoopMetrics, VibrationReduction, loop_metrics, reduction_percent, rmse, vibration_reduction
-from hysim.models.actuator import Actuator
+from hysim.plants.actuator import Actuator
 
 _FEWEST = 10  # samples of which a step is measured
 

@@ -10,13 +10,13 @@ from hysim._frozen import FloatArray, read_only
 from hysim.control._sampled import Feedback, SampledController, check_kind, with_inverse
 from hysim.kernels import tracking as kernels
 from hysim.kernels.stepping import Step
-from hysim.models.actuator import Actuator, is_law
-from hysim.models.amplifier import Amplifier
-from hysim.models.creep import Creep
+from hysim.laws.static import Line
 from hysim.models.inverse_steps import inverse_step
 from hysim.models.model import family
 from hysim.models.protocols import CompiledController, needs_time
-from hysim.models.static import Line
+from hysim.plants.actuator import Actuator, is_law
+from hysim.plants.amplifier import Amplifier
+from hysim.plants.creep import Creep
 
 
 class FeedforwardBlock(NamedTuple):

@@ -13,12 +13,12 @@ from hysim._parallel import Progress
 from hysim._printing import extent, printed, quantity, summary_text
 from hysim.control._protocols import Controller, Remembering, Responding, limits_of, preview
 from hysim.errors import SimulationError
-from hysim.models.actuator import Actuator, is_law
-from hysim.models.chain import Signals
 from hysim.models.model import in_brief
 from hysim.models.protocols import CompiledController
-from hysim.models.sampled import Vibration
-from hysim.models.state_space import linear_plant
+from hysim.plants.actuator import Actuator, is_law
+from hysim.plants.chain import Signals
+from hysim.plants.sampled import Vibration
+from hysim.plants.state_space import linear_plant
 from hysim.records import even_step
 
 

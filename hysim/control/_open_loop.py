@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.models.actuator import Actuator
-from hysim.models.static import Line
+from hysim.laws.static import Line
+from hysim.plants.actuator import Actuator
 
 _ITERATIONS = 60
 _CONVERGED = 1e-12  # of the gain

@@ -31,8 +31,8 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim.models.model import family
-from hysim.models.modes import mode
-from hysim.models.sampled import sampled, vibration_stage
+from hysim.plants.modes import mode
+from hysim.plants.sampled import sampled, vibration_stage
 
 _BOXES = 2  # moving averages in a row: their motion has a bounded acceleration, that of a mode in least time
 

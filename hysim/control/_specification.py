@@ -11,7 +11,7 @@ from hysim.control._margins import LinearLoop
 from hysim.control._open_loop import secant_gain, slopes
 from hysim.control._sampled import SampledController
 from hysim.control._tuning import Trial
-from hysim.models.actuator import Actuator
+from hysim.plants.actuator import Actuator
 
 
 class Judgement(NamedTuple):

@@ -8,10 +8,10 @@ import numpy as np
 from hysim.control._io_systems import actuator_system, controller_system, oscillator_system
 from hysim.control._loop import as_actuator, is_controller
 from hysim.control._pid import PID
-from hysim.models.actuator import Actuator
-from hysim.models.oscillator import BoucWenOscillator
-from hysim.models.sampled import sampled
-from hysim.models.transfer_function import TransferFunction
+from hysim.plants.actuator import Actuator
+from hysim.plants.oscillator import BoucWenOscillator
+from hysim.plants.sampled import sampled
+from hysim.plants.transfer_function import TransferFunction
 
 
 def to_control(plant: Any, sample_time: float | None = None) -> Any:
@@ -95,7 +95,7 @@ def _continuous(actuator: Actuator) -> Any:
 
 
 def _discrete(actuator: Actuator, sample_time: float) -> Any:
-    """The linear chain of `hysim.models.sampled`, its held values in a chain of further states."""
+    """The linear chain of `hysim.plants.sampled`, its held values in a chain of further states."""
     import control
 
     linear, delay = actuator.linear(sample_time)

@@ -30,9 +30,9 @@ from hysim.control._sampled import (
 from hysim.control._shaping import ModeInverse, Shaper
 from hysim.kernels import tracking as kernels
 from hysim.kernels.inverses import line
-from hysim.models.actuator import Actuator
 from hysim.models.model import family
 from hysim.models.protocols import CompiledController
+from hysim.plants.actuator import Actuator
 
 _THROUGH = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
 _NOTHING = FeedforwardBlock(line, np.empty(0), np.empty(0))

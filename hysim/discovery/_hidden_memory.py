@@ -3,7 +3,7 @@
     m y'' + c y' + k y + z = u,    z' = sum of coefficients times terms in (y', z)
 
 For given coefficients z follows from y by integration, so that neither y'' nor z' is taken of noise. Both sides of
-the equation of motion are filtered alike (`hysim.models.equation_of_motion`). It is linear in m, c and k, which are
+the equation of motion are filtered alike (`hysim.plants.equation_of_motion`). It is linear in m, c and k, which are
 projected out, and the slopes of z along the coefficients come with z: a Gauss-Newton step is a regression on terms. z
 = A y is no error of the equation where k is free, so that only the curvature of the memory distinguishes A from k;
 the descent begins from several shares of the stiffness. Reversals that noise makes add to the length of the path of
@@ -21,9 +21,9 @@ from hysim._frozen import FloatArray
 from hysim.discovery._term_regression import BLOCKS, FLOOR, TermRegression, term_regression
 from hysim.identification.marquardt import Schedule, SumOfSquares, descend
 from hysim.kernels import hidden as kernels
-from hysim.models.equation_of_motion import Filter, Linear, Motion, filtering
-from hysim.models.resampling import interpolated
-from hysim.models.terms import RELAXATION, Term, bouc_wen_terms
+from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_terms
+from hysim.plants.equation_of_motion import Filter, Linear, Motion, filtering
+from hysim.plants.resampling import interpolated
 
 POWERS = (1.0, 2.0, 3.0)
 SHARES = (0.2, 0.5, 0.8)  # of the stiffness of small motions, in A

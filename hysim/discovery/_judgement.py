@@ -43,7 +43,7 @@ from hysim.discovery._held_out import (
 )
 from hysim.discovery._rival import FLOOR, Rival, rival, steady_width
 from hysim.errors import SimulationError
-from hysim.models.transfer_function import TransferFunction
+from hysim.plants.transfer_function import TransferFunction
 from hysim.records import Record
 
 HYSTERESIS = "rate-independent hysteresis"

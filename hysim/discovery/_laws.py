@@ -16,9 +16,9 @@ import numpy as np
 from hysim._frozen import FloatArray
 from hysim.discovery._refinement import Candidate
 from hysim.discovery._structures import AnyExponent, Structure, Terms
-from hysim.models.boucwen import BoucWen
-from hysim.models.duhem import Duhem
-from hysim.models.terms import bouc_wen_exponent, bouc_wen_terms, equation
+from hysim.laws.differential.boucwen import BoucWen
+from hysim.laws.differential.duhem import Duhem
+from hysim.laws.differential.terms import bouc_wen_exponent, bouc_wen_terms, equation
 from hysim.records import Record
 
 _STEP = 1e-6

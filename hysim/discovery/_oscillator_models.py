@@ -18,11 +18,11 @@ from hysim import metrics
 from hysim._frozen import FloatArray
 from hysim.discovery._judgement import HYSTERESIS, LAG, NO_STRUCTURE, signed_area
 from hysim.errors import SimulationError
-from hysim.models.boucwen import BoucWen
-from hysim.models.oscillator import BoucWenOscillator
-from hysim.models.oscillator_structure import OscillatorStructure
-from hysim.models.terms import RELAXATION, Term, bouc_wen_exponent, bouc_wen_terms
-from hysim.models.transfer_function import TransferFunction
+from hysim.laws.differential.boucwen import BoucWen
+from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_exponent, bouc_wen_terms
+from hysim.plants.oscillator import BoucWenOscillator
+from hysim.plants.oscillator_structure import OscillatorStructure
+from hysim.plants.transfer_function import TransferFunction
 
 RATE_DEPENDENT = "rate-dependent hysteresis"
 

@@ -39,11 +39,11 @@ from hysim.discovery._oscillator_response import Oscillator, Response
 from hysim.discovery._result import OscillatorDiscovery
 from hysim.discovery._term_regression import TermRegression
 from hysim.identification import identify
+from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_exponent, bouc_wen_terms, law_text
 from hysim.metrics.criteria import information
-from hysim.models.equation_of_motion import Linear, linear_plant
-from hysim.models.oscillator_structure import OscillatorStructure
-from hysim.models.terms import RELAXATION, Term, bouc_wen_exponent, bouc_wen_terms, law_text
-from hysim.models.transfer_function import TransferFunction
+from hysim.plants.equation_of_motion import Linear, linear_plant
+from hysim.plants.oscillator_structure import OscillatorStructure
+from hysim.plants.transfer_function import TransferFunction
 
 N_DRAWS = 20
 

@@ -22,8 +22,8 @@ from hysim._frozen import FloatArray
 from hysim.discovery._slopes import Regression
 from hysim.discovery._structures import AnyExponent, Structure, Terms, output_at_rest
 from hysim.identification.marquardt import Schedule, SumOfSquares, descend, differences
+from hysim.laws.differential.terms import Term
 from hysim.metrics.criteria import information
-from hysim.models.terms import Term
 from hysim.records import Record
 
 BOUND = 30.0

@@ -17,7 +17,7 @@ from hysim.identification import identify
 from hysim.metrics.criteria import information
 from hysim.models.protocols import Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
-from hysim.models.transfer_function import FREQUENCY, TransferFunction, TransferFunctionStructure
+from hysim.plants.transfer_function import FREQUENCY, TransferFunction, TransferFunctionStructure
 from hysim.records import Record
 
 ORDERS = ((1, 0), (1, 1), (2, 0), (2, 1))  # poles, zeros

@@ -36,7 +36,7 @@ from hysim.discovery._selection import (
 )
 from hysim.discovery._slopes import FORMS, Feature, Slopes, slopes
 from hysim.discovery._structures import AnyExponent, Terms, shifts
-from hysim.models.terms import Term, symmetric
+from hysim.laws.differential.terms import Term, symmetric
 from hysim.records import Record
 
 LINE = Terms((Term(False, 0, 0),))

@@ -35,7 +35,7 @@ from hysim.discovery._refinement import Candidate, FreeRun, bic_of, cost_of
 from hysim.discovery._slopes import Regression
 from hysim.discovery._structures import Terms
 from hysim.discovery._subsets import Subsets, best_subsets
-from hysim.models.terms import Term, bouc_wen_exponent
+from hysim.laws.differential.terms import Term, bouc_wen_exponent
 from hysim.records import Record
 
 MET = 24

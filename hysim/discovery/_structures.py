@@ -15,9 +15,9 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.models.boucwen import BoucWen
-from hysim.models.duhem_runs import free_runs
-from hysim.models.terms import Term, coefficient_units
+from hysim.laws.differential.boucwen import BoucWen
+from hysim.laws.differential.duhem_runs import free_runs
+from hysim.laws.differential.terms import Term, coefficient_units
 from hysim.records import Record
 
 Bounds = tuple[FloatArray, FloatArray]

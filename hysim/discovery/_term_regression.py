@@ -14,8 +14,8 @@ import numpy as np
 from hysim._frozen import FloatArray
 from hysim.discovery._pysindy import sparse_path
 from hysim.discovery._slopes import independent
+from hysim.laws.differential.terms import Term
 from hysim.metrics.criteria import information
-from hysim.models.terms import Term
 
 FLOOR = 1e-5  # of the rms output: smaller residuals are no evidence of a term
 BLOCKS = 4  # that are held out in turn, where there are no periods

@@ -25,9 +25,9 @@ from scipy.interpolate import BSpline
 
 from hysim._cycles import TOLERANCE
 from hysim._frozen import FloatArray
-from hysim.models.prandtl_ishlinskii import PrandtlIshlinskii
-from hysim.models.static import SingleValued
-from hysim.models.transfer_function import TransferFunction
+from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
+from hysim.laws.static import SingleValued
+from hysim.plants.transfer_function import TransferFunction
 from hysim.records import Record
 
 _SPLINES = 24  # or half as many as there are different inputs

@@ -8,9 +8,9 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
 from hysim.models import _parts
-from hysim.models._by_structure import ByStructure
-from hysim.models._inverse_search import inverse_response_of
+from hysim.models.by_structure import ByStructure
 from hysim.models.composable import Composable
+from hysim.models.inverse_search import inverse_response_of
 from hysim.models.protocols import CompiledLaw, Continuable, needs_time
 
 State = tuple[Any, ...]

@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from hysim.models import _inverse_search
+from hysim.models import inverse_search
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, StepwiseInvertible
 
 
@@ -44,4 +44,4 @@ def inverse_step(law: Any, u0: float, limits: Limits = UNLIMITED, sample_time: f
     """
     if isinstance(law, StepwiseInvertible):
         return law.compiled_inverse(u0, limits, sample_time)
-    return _inverse_search.inverse_step(CompiledLaw(*law.compiled(u0)), u0, limits=limits)
+    return inverse_search.inverse_step(CompiledLaw(*law.compiled(u0)), u0, limits=limits)

@@ -4,7 +4,7 @@
 
 `state` is the last input and what the law remembers, and moves along; at the first sample the last input is that
 sample itself. A family declares its fields, its step, and where its search box lies; path, batch, loops, inverse,
-identification, printing and files follow from these. `hysim.models.dahl` is a short example.
+identification, printing and files follow from these. `hysim.laws.differential.dahl` is a short example.
 """
 
 import math
@@ -21,10 +21,10 @@ from hysim._frozen import FloatArray, items, read_only
 from hysim._parallel import in_pieces
 from hysim.errors import SimulationError
 from hysim.kernels.stepping import Step, drive
-from hysim.models._batch import Batch, Reduction, Sets
-from hysim.models._inverse_search import inverse_response, inverse_response_of, inverse_step
+from hysim.models.batch import Batch, Reduction, Sets
 from hysim.models.compiled_step import compiled_step
 from hysim.models.composable import Composable
+from hysim.models.inverse_search import inverse_response, inverse_response_of, inverse_step
 from hysim.models.parameters import Parameter, declared_space
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace

@@ -6,7 +6,7 @@
 The paper takes V of (3) at the amplifier's input; it is the output that slews.
 """
 
-from hysim.models.amplifier import Amplifier
+from hysim.plants.amplifier import Amplifier
 
 UA741_SUPPLY_SPAN = 44.0
 """Most that a uA741 may have between its supplies, 22 V each side [V]; the absolute maximum rating in the part's

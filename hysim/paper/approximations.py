@@ -13,7 +13,6 @@ import numpy as np
 
 from hysim._frozen import frozen
 from hysim.metrics import fit_percent
-from hysim.models.transfer_function import TransferFunction
 from hysim.paper.equations import (
     EQUATION_1,
     EQUATION_4,
@@ -25,6 +24,7 @@ from hysim.paper.equations import (
     settling_window,
     unit_step,
 )
+from hysim.plants.transfer_function import TransferFunction
 
 _INTERVALS = 4000
 

@@ -5,8 +5,8 @@ import numpy as np
 from hysim._frozen import frozen
 from hysim.datasets import table1
 from hysim.metrics import rmse
-from hysim.models.transfer_function import TransferFunction
 from hysim.paper.equations import EQUATION_1, in_time_unit
+from hysim.plants.transfer_function import TransferFunction
 
 _DWELLS = np.geomspace(0.1, 50.0, 400)
 

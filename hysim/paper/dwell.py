@@ -9,8 +9,8 @@ import numpy as np
 
 from hysim._frozen import FloatArray, frozen
 from hysim.metrics import loop_metrics
-from hysim.models.actuator import Actuator
-from hysim.models.transfer_function import TransferFunction
+from hysim.plants.actuator import Actuator
+from hysim.plants.transfer_function import TransferFunction
 
 DWELLS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 _SAMPLES_PER_SECOND = 10

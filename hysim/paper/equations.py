@@ -22,10 +22,10 @@ import numpy as np
 
 from hysim._frozen import FloatArray, frozen
 from hysim.control import to_control
-from hysim.models.transfer_function import TransferFunction
 from hysim.paper import printed
 from hysim.paper.printed import floats
 from hysim.paper.step_reading import step_reading
+from hysim.plants.transfer_function import TransferFunction
 
 EQUATION_1 = TransferFunction(num=floats(printed.NUM_1), den=floats(printed.DEN_1))
 EQUATION_4 = TransferFunction(num=floats(printed.NUM_4), den=floats(printed.DEN_4))

@@ -6,8 +6,6 @@ from typing import Any
 
 from hysim._frozen import frozen
 from hysim._parallel import awaited, second_process
-from hysim.models.actuator import Actuator
-from hysim.models.transfer_function import TransferFunction
 from hysim.paper.approximations import Approximation, approximations
 from hysim.paper.claims import Claim, claims
 from hysim.paper.dwell import DwellWidth, dwell_widths
@@ -16,6 +14,8 @@ from hysim.paper.loops import DYNAMICS_7, Loops, control_measures, loops
 from hysim.paper.reidentification import Reidentification, reidentify
 from hysim.paper.state_space import EQUATIONS_7_8, EQUATIONS_13_14
 from hysim.paper.study import Progress, Study, asymmetric_law, study
+from hysim.plants.actuator import Actuator
+from hysim.plants.transfer_function import TransferFunction
 
 
 @frozen

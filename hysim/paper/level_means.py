@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from hysim._frozen import FloatArray, frozen
-from hysim.models.static import SingleValued
+from hysim.laws.static import SingleValued
 from hysim.records import Record
 
 

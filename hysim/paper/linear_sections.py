@@ -3,11 +3,11 @@
 import math
 from collections.abc import Sequence
 
-from hysim.models.transfer_function import TransferFunction
 from hysim.paper import markup
 from hysim.paper.dwell import DwellWidth
 from hysim.paper.equations import EQUATION_4, EQUATION_6
 from hysim.paper.reidentification import Reidentification
+from hysim.plants.transfer_function import TransferFunction
 
 
 def identification_section(found: Reidentification, drawn: markup.Drawn) -> str:

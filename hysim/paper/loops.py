@@ -30,9 +30,9 @@ from hysim.control import (
     tune,
 )
 from hysim.metrics import VibrationReduction
-from hysim.models.actuator import Actuator
-from hysim.models.transfer_function import TransferFunction
 from hysim.paper.equations import EQUATION_1, EQUATION_4, EQUATION_6, EQUATION_7
+from hysim.plants.actuator import Actuator
+from hysim.plants.transfer_function import TransferFunction
 from hysim.signals import triangle
 
 Limits = tuple[float, float] | None

@@ -22,10 +22,10 @@ from hysim.control import to_control
 from hysim.datasets import SQUARE_WAVE_FREQUENCY, table1, table2
 from hysim.identification import Identification, identify
 from hysim.metrics import fit_percent
-from hysim.models.transfer_function import TransferFunction
 from hysim.paper import printed
 from hysim.paper.equations import EQUATION_1, EQUATION_4, in_time_unit
 from hysim.paper.resolution import quantum
+from hysim.plants.transfer_function import TransferFunction
 from hysim.records import Record
 
 SAMPLE_SECONDS = 1.0 / (4.0 * SQUARE_WAVE_FREQUENCY)

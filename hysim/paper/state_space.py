@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from hysim._frozen import FloatArray, checked
-from hysim.models.transfer_function import TransferFunction
 from hysim.paper import printed
 from hysim.paper.printed import Matrix, floats
+from hysim.plants.transfer_function import TransferFunction
 
 _ROUNDING = 1e-12  # leading coefficients of this size, relative to the largest, are what is left of zeros
 

@@ -9,13 +9,13 @@ from hysim.comparison import Comparison, ComparisonRow, compare
 from hysim.datasets import table1
 from hysim.discovery import Discovery, discover
 from hysim.identification import Identification, identify
-from hysim.models.boucwen import BoucWen
-from hysim.models.polynomial_boucwen import PolynomialBoucWen
-from hysim.models.static import Line
-from hysim.models.transfer_function import TransferFunction
+from hysim.laws.differential.boucwen import BoucWen
+from hysim.laws.differential.polynomial_boucwen import PolynomialBoucWen
+from hysim.laws.static import Line
 from hysim.paper.best_dwell import PrintedModel, printed_model
 from hysim.paper.level_means import level_means
 from hysim.paper.nested import of_discovered
+from hysim.plants.transfer_function import TransferFunction
 
 Progress = Callable[[int, int, str], None]
 

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from hysim._cycles import TOLERANCE, turns
 from hysim._frozen import FloatArray
 from hysim.identification import Identification
-from hysim.models.preisach import Preisach, PreisachRelays
+from hysim.laws.operators.preisach import Preisach, PreisachRelays
 from hysim.plot._style import DIVERGING, GUIDE, AxesArray, in_unit, label, one, several
 from hysim.records import Record
 from hysim.simulation import Simulation, simulate

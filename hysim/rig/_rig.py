@@ -8,10 +8,10 @@ import numpy as np
 
 from hysim._frozen import FloatArray, checked, frozen
 from hysim._parallel import Progress
-from hysim.models.actuator import Actuator
-from hysim.models.amplifier import Amplifier
-from hysim.models.modes import mode
-from hysim.models.polynomial_boucwen import PolynomialBoucWen
+from hysim.laws.differential.polynomial_boucwen import PolynomialBoucWen
+from hysim.plants.actuator import Actuator
+from hysim.plants.amplifier import Amplifier
+from hysim.plants.modes import mode
 from hysim.records import Record
 from hysim.rig._camera import Camera, Frames
 from hysim.rig._drive import Drive

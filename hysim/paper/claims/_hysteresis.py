@@ -4,7 +4,6 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.metrics import fit_percent, fpe, loop_metrics
-from hysim.models.transfer_function import TransferFunction
 from hysim.paper import printed
 from hysim.paper.approximations import Approximation
 from hysim.paper.claims._claim import Claim, compared, cross_checked, decided
@@ -12,6 +11,7 @@ from hysim.paper.claims.rounding import Number, Spread, half_unit, spread
 from hysim.paper.equations import EQUATION_1
 from hysim.paper.reidentification import printed_choices
 from hysim.paper.study import Study
+from hysim.plants.transfer_function import TransferFunction
 
 SIMILAR_PERCENT = float(printed.FIT_1)
 """Two responses are called similar where one fits the other as well as the paper asks of a model [%]."""

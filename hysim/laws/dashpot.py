@@ -1,0 +1,102 @@
+"""A viscous damper, the part of a force that depends on the velocity.
+
+    y = c u'
+
+Between the samples of an input that is linear there, u' is constant. At a sample the output is that of the stretch
+which ends there, y_k = c (u_k - u_(k-1)) / h: the left limit, which asks for no later input. Before its first
+sample the input rests.
+"""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, read_only
+from hysim.laws.static import linear_space
+from hysim.models.composable import Composable
+from hysim.models.model import family
+from hysim.models.protocols import Identifiable
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.records import Record
+
+
+@family
+class Dashpot(Identifiable, Composable):
+    """Viscous damper, ``y = c u'``.
+
+    Parameters
+    ----------
+    c : float
+        [unit of y s / unit of u].
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> hs.Dashpot(c=2.0).response([0.0, 1.0, 1.0, 0.5], sample_time=0.5).tolist()
+    [0.0, 4.0, 0.0, -2.0]
+    """
+
+    c: float = 1.0
+
+    dynamic: ClassVar[bool] = True
+
+    @classmethod
+    def candidates(cls) -> dict[str, Any]:
+        """What `hysim.compare` tries of this family: nothing, it is a part of sums."""
+        return {}
+
+    def response(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
+        """Output at the samples of `u`, by the difference to the sample before.
+
+        Parameters
+        ----------
+        u : array, shape (n,)
+            Input, at rest before its first sample.
+        sample_time : float
+            Time between two samples [s].
+
+        Returns
+        -------
+        array, shape (n,)
+
+        Raises
+        ------
+        ValueError
+            If `u` is not finite or has not one axis, or the sample time is not positive.
+        """
+        return self.advance(u, sample_time)[0]
+
+    def advance(
+        self, u: npt.ArrayLike, sample_time: float, state: float | None = None
+    ) -> tuple[FloatArray, float | None]:
+        """Output continued from `state`, the last input, and the state after it; the same bits as uncut."""
+        inputs = read_only(u, "u", ndim=1)
+        if not 0.0 < sample_time < np.inf:
+            raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
+        if not inputs.size:
+            return inputs, state
+        before = inputs[0] if state is None else state
+        return self.c * (np.diff(inputs, prepend=before) / sample_time), float(inputs[-1])
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """Nothing to search: the output is linear in c.
+
+        Raises
+        ------
+        ValueError
+            If the record has no even time, its input is constant, or a name does not fit.
+        """
+        if not record.sample_time or np.ptp(record.u) == 0.0:
+            raise ValueError("the input is constant: nothing can be identified from it")
+        return linear_space({"c": self.c}, freedom)
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """Columns u', 0, shape (1, n_samples, 2)."""
+        velocity = Dashpot(c=1.0).response(record.u, record.sample_time)
+        return np.stack([velocity, np.zeros_like(velocity)], axis=-1)[np.newaxis]
+
+    def assemble(self, parameters: Mapping[str, float]) -> Self:
+        """The damper with this parameter."""
+        return type(self)(**parameters)

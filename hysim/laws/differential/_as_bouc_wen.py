@@ -1,0 +1,58 @@
+"""Laws that are Bouc-Wen's with n = 1 and gamma = 0 under other names: everything is evaluated as that law."""
+
+import math
+from abc import abstractmethod
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray
+from hysim.laws.differential._boucwen_step import BoucWenStep
+from hysim.laws.differential.boucwen import BoucWen
+from hysim.laws.differential.boucwen_inverse import BoucWenInverse, InverseState
+from hysim.laws.differential.limit_cycle import LimitCycle
+from hysim.models.law import Packed, State, Tables
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
+
+
+class AsBoucWen(BoucWenStep):
+    """A law that says which Bouc-Wen law it is."""
+
+    @classmethod
+    @abstractmethod
+    def equivalent(cls, tables: Tables) -> dict[str, FloatArray]:
+        """Parameters of the Bouc-Wen law over sets, those that differ from its defaults."""
+
+    @classmethod
+    def pack(cls, tables: Tables) -> Packed:
+        """As the Bouc-Wen law is packed."""
+        parameters = cls.equivalent(tables)
+        plain = {name: np.full_like(parameters["A"], value) for name, value in BoucWen.defaults().items()}
+        return BoucWen.pack({**plain, **parameters})
+
+    @property
+    def bouc_wen(self) -> BoucWen:
+        """The same law as Bouc-Wen's."""
+        return BoucWen(**{name: float(table[0, 0]) for name, table in self.equivalent(self.tables).items()})
+
+    def tangent(self, direction: npt.ArrayLike, z: npt.ArrayLike) -> FloatArray:
+        """Slope dy/du at the memory `z` in a `direction` that is not zero; see `hysim.BoucWen.tangent`."""
+        return self.bouc_wen.tangent(direction, z)
+
+    def limit_cycle(self, amplitude: float) -> LimitCycle:
+        """Steady loop of the memory between the inputs -amplitude and amplitude; see `hysim.BoucWen.limit_cycle`."""
+        return self.bouc_wen.limit_cycle(amplitude)
+
+    def inverse(self) -> BoucWenInverse:
+        """The law's inverse as an object, where its slope keeps its sign; see `hysim.BoucWen.inverse`."""
+        return self.bouc_wen.inverse()
+
+    def inverse_response(
+        self, y: npt.ArrayLike, u0: float | None = None, state: State | InverseState | None = None
+    ) -> FloatArray:
+        """Input that gives the output `y` from the input `u0`; see `hysim.BoucWen.inverse_response`."""
+        return self.bouc_wen.inverse_response(y, u0, state)
+
+    def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
+        """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""
+        return self.bouc_wen.compiled_inverse(u0, limits)

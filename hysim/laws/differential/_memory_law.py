@@ -1,0 +1,137 @@
+"""Laws with one memory z beside a polynomial of the input.
+
+    dz/du = f(u, z, sign(du))
+    y = offset + c1 u + c2 u^2 + ... + gain z
+
+u is the input, z the memory, y the output; time has no part in it.
+"""
+
+from abc import abstractmethod
+from collections.abc import Callable
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray
+from hysim.laws.differential import _boucwen_search, boucwen_inverse
+from hysim.models.law import Law, Tables
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.records import Record
+
+
+class MemoryLaw(Law):
+    """A law with one memory z, and an output that is a polynomial of u plus gain z.
+
+    `polynomial` names the field of the coefficients c1, c2, ..., a tuple or a single number.
+    """
+
+    polynomial: ClassVar[str] = "input_coefficients"
+
+    A: float
+    beta: float
+    gamma: float
+    n: float
+    gain: float
+    offset: float
+    z0: float
+
+    @classmethod
+    def check(cls, tables: Tables) -> None:
+        """Refuse an exponent that is not positive, and a polynomial without coefficients."""
+        if not (tables["n"] > 0.0).all():
+            raise ValueError(f"n must be positive, got {tables['n'].min()}")
+        if not tables[cls.polynomial].size:
+            raise ValueError(f"{cls.polynomial} must hold at least one coefficient")
+
+    @classmethod
+    def order(cls, tables: Tables) -> npt.NDArray[np.intp] | None:
+        """The order of n: neighbours of equal n share their charts (`hysim.kernels.charts`)."""
+        n = tables["n"][:, 0]
+        return None if (np.diff(n) >= 0.0).all() else np.argsort(n, kind="stable")
+
+    @classmethod
+    def joined(cls, tables: Tables, *names: str) -> FloatArray:
+        """Columns of these fields, then gain, offset and the coefficients of the polynomial."""
+        return np.concatenate([tables[name] for name in (*names, "gain", "offset", cls.polynomial)], axis=1)
+
+    @property
+    def coefficient_names(self) -> tuple[str, ...]:
+        """One name for each coefficient of the polynomial, as in `scalars`."""
+        return tuple(name for name in self.scalars if name.partition("[")[0] == self.polynomial)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names in which the output is affine."""
+        return (*self.coefficient_names, "gain", "offset")
+
+    @property
+    def memory_only(self) -> dict[str, float]:
+        """Parameters for which the output is the memory itself."""
+        return {**dict.fromkeys(self.coefficient_names, 0.0), "gain": 1.0, "offset": 0.0}
+
+    def memory(self, u: npt.ArrayLike) -> FloatArray:
+        """Memory z at the samples of `u`, shape (n_samples,); parameters and errors as in `response`."""
+        return self.assemble(self.memory_only).response(u)
+
+    def tangent(
+        self, direction: npt.ArrayLike, z: npt.ArrayLike, u: npt.ArrayLike = 0.0, *others: npt.ArrayLike
+    ) -> FloatArray:
+        """Slope dy/du of the output at the memory `z`, for an input at `u` that moves in `direction`.
+
+        Parameters
+        ----------
+        direction : array
+            Velocity u' or its sign, not zero.
+        z, u : array
+            Memory and input, broadcast against the direction; only a polynomial's slope depends on u.
+        *others : array
+            Further elements of the law's state, in their order.
+
+        Returns
+        -------
+        array
+            [unit of y / unit of u].
+
+        Raises
+        ------
+        ValueError
+            If a direction is zero: the slopes ahead and behind differ.
+        """
+        velocity, memory = np.asarray(direction, dtype=float), np.asarray(z, dtype=float)
+        if not np.all(velocity):
+            raise ValueError("direction must not be zero: an input that stands still has two slopes")
+        inputs = np.asarray(u, dtype=float)
+        static = np.polynomial.polynomial.polyval(inputs, boucwen_inverse.derivative(self))
+        further = (np.asarray(other, dtype=float) for other in others)
+        return np.asarray(static + self.gain * self._memory_slope(np.sign(velocity), memory, inputs, *further))
+
+    @abstractmethod
+    def _memory_slope(self, direction: FloatArray, z: FloatArray, u: FloatArray, *others: FloatArray) -> FloatArray:
+        """Slope dz/du for an input at `u` that moves in `direction`, 1 or -1."""
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """The box that `hysim.identify` searches, in the coordinates of `hysim.laws.differential._boucwen_search`."""
+        return _boucwen_search.search_space(
+            self.scalars, self.columns, record, freedom, alike=self.alike(record, freedom)
+        )
+
+    def alike(self, record: Record, freedom: Freedom) -> tuple[tuple[str, ...], ...]:
+        """Groups of parameters of which one is held on this record."""
+        return ()
+
+    def _one_pass(self, parameters: Parameters, u: FloatArray) -> Callable[[FloatArray], FloatArray]:
+        """As `Law._one_pass`, by the faster rows that a family may have."""
+
+        def passed(z: FloatArray) -> FloatArray:
+            sets = {**parameters, **self.memory_only, "z0": np.nan_to_num(z[:, 0], posinf=0.0, neginf=0.0)}
+            end = self.outputs_of(sets, u).reduced("final", None, None)[:, np.newaxis]
+            return np.where(np.isfinite(z) & np.isfinite(end), end, np.nan)
+
+        return passed
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """Columns u, u^2, ..., z, 1, 0 of the output, shape (n_sets, n_samples, n_columns + 1)."""
+        z = self.outputs({**parameters, **self.memory_only}, record.u)
+        powers = [np.broadcast_to(record.u**k, z.shape) for k in range(1, len(self.coefficient_names) + 1)]
+        return np.stack([*powers, z, np.ones_like(z), np.zeros_like(z)], axis=-1)

@@ -1,0 +1,365 @@
+"""The symmetric Bouc-Wen law, and the parameters that other people give it.
+
+    dz/du = A - |z|^n (gamma + beta sign(z du))
+    y = offset + feedthrough u + gain z
+
+What follows from the equations is in `hysim.laws.differential._boucwen_law`, the conversions in
+`hysim.laws.differential._boucwen_conversions`.
+"""
+
+from typing import ClassVar, Self
+
+from hysim.laws.differential import _boucwen_conversions as conversions
+from hysim.laws.differential._boucwen_law import BoucWenLaw
+from hysim.models.model import family
+
+
+@family
+class BoucWen(BoucWenLaw):
+    """Symmetric Bouc-Wen law, ``y = offset + feedthrough u + gain z``.
+
+    Parameters
+    ----------
+    A : float
+        Slope dz/du at z = 0 [unit of z / unit of u].
+    beta, gamma : float
+        Shape of the branches: ``beta + gamma`` bends the loading ones (z du > 0), ``beta - gamma`` the
+        unloading ones. Any sign [unit of z^(1-n) / unit of u].
+    n : float
+        Sharpness of the knee, positive. Also called eta or nu.
+    feedthrough : float
+        Gain of the input past the memory [unit of y / unit of u].
+    gain : float
+        Gain of the memory [unit of y / unit of z].
+    offset : float
+        Output at u = 0, z = 0 [unit of y].
+    z0 : float
+        Memory at the first sample [unit of z].
+
+    Raises
+    ------
+    ValueError
+        If a parameter is not finite, or n is not positive.
+
+    Notes
+    -----
+    beta + gamma < 0 is legal (the field's benchmark has it): z then has no bound that is independent
+    of the input, and for n > 1 a long enough stretch of the input takes it to infinity.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> law = hs.BoucWen(beta=0.5, gamma=0.5)
+    >>> law.response([0.0, 1.0, -1.0, 1.0]).round(6).tolist()
+    [0.0, 0.632121, -0.745354, 0.714823]
+    """
+
+    polynomial: ClassVar[str] = "feedthrough"
+
+    A: float = 1.0
+    beta: float = 0.5
+    gamma: float = 0.5
+    n: float = 1.0
+    feedthrough: float = 0.0
+    gain: float = 1.0
+    offset: float = 0.0
+    z0: float = 0.0
+
+    @classmethod
+    def from_low_guo(cls, *, alpha: float, beta: float, gamma: float, d: float = 1.0, h0: float = 0.0) -> Self:
+        """The law of a piezoelectric stack by Low and Guo (1995), ``x = d u - h``.
+
+        Parameters
+        ----------
+        alpha, beta, gamma : float
+            ``h' = alpha d u' - beta |u'| h - gamma u' |h|``; alpha has no unit, the others [1 / unit of u].
+        d : float
+            Displacement per input without hysteresis [unit of x / unit of u].
+        h0 : float
+            Initial h [unit of x].
+
+        Returns
+        -------
+        BoucWen
+            Whose memory is h: A = alpha d, feedthrough = d, gain = -1, n = 1.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> law = hs.BoucWen.from_low_guo(alpha=0.35, beta=0.02, gamma=0.005)
+        >>> round(law.limit_cycle(30.0).peak, 12)
+        8.702046583872
+        """
+        return cls(**conversions.from_low_guo(alpha, beta, gamma, d, h0))
+
+    def to_low_guo(self) -> dict[str, float]:
+        """The arguments of `from_low_guo`; there is one set only.
+
+        Raises
+        ------
+        ValueError
+            If n is not 1, there is an offset, or feedthrough or gain is zero.
+        """
+        return conversions.to_low_guo(self)
+
+    @classmethod
+    def from_wen(
+        cls,
+        *,
+        alpha: float,
+        k: float,
+        A: float = 1.0,
+        beta: float,
+        gamma: float,
+        n: float,
+        D: float = 1.0,
+        z0: float = 0.0,
+    ) -> Self:
+        """The restoring force by Wen (1976), ``F = alpha k u + (1 - alpha) k D z``.
+
+        Parameters
+        ----------
+        alpha : float
+            Ratio of the stiffness after yielding to the one before it, for A = 1.
+        k : float
+            Stiffness [unit of F / unit of u].
+        A, beta, gamma, n : float
+            ``D z' = A u' - beta |u'| |z|^(n-1) z - gamma u' |z|^n``.
+        D : float
+            Yield displacement [unit of u], with a z that has no unit; 1 where z is a displacement.
+        z0 : float
+            Initial memory.
+
+        Returns
+        -------
+        BoucWen
+
+        Raises
+        ------
+        ValueError
+            If D is zero.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> force = hs.BoucWen.from_wen(alpha=0.1, k=20.0, beta=0.6, gamma=0.4, n=1.5, D=0.5)
+        >>> force.response([0.0, 10.0]).round(6).tolist()
+        [0.0, 29.0]
+        """
+        return cls(**conversions.from_wen(alpha, k, A, beta, gamma, n, D, z0))
+
+    def to_wen(self) -> dict[str, float]:
+        """The arguments of `from_wen`, of all sets with this response the one with A = D = 1.
+
+        Raises
+        ------
+        ValueError
+            If there is an offset, A = 0, or no stiffness at z = 0.
+        """
+        return conversions.to_wen(self)
+
+    @classmethod
+    def from_normalized(cls, *, k_x: float, k_w: float, rho: float, sigma: float, n: float, w0: float = 0.0) -> Self:
+        """The normalised law of Ikhouane and Rodellar (2007), ``F = k_x u + k_w w``.
+
+        Parameters
+        ----------
+        k_x, k_w : float
+            Weights of the input and of the memory.
+        rho, sigma, n : float
+            ``w' = rho (u' - sigma |u'| |w|^(n-1) w + (sigma - 1) u' |w|^n)``; w saturates at 1.
+        w0 : float
+            Initial memory.
+
+        Returns
+        -------
+        BoucWen
+            Whose memory is w: A = rho, beta = rho sigma, gamma = rho (1 - sigma).
+        """
+        return cls(**conversions.from_normalized(k_x, k_w, rho, sigma, n, w0))
+
+    def to_normalized(self) -> dict[str, float]:
+        """The arguments of `from_normalized`; there is one set only.
+
+        Raises
+        ------
+        ValueError
+            If beta + gamma <= 0 or A <= 0, for which nothing saturates at 1, or there is an offset.
+        """
+        return conversions.to_normalized(self)
+
+    @classmethod
+    def from_noel_schoukens(
+        cls, *, alpha: float, beta: float, gamma: float, delta: float, nu: float, z0: float = 0.0
+    ) -> Self:
+        """The force of the system-identification benchmark of Noel and Schoukens (2016), ``y = z``.
+
+        Parameters
+        ----------
+        alpha : float
+            Stiffness of the memory [unit of z / unit of u].
+        beta, gamma, delta, nu : float
+            ``z' = alpha u' - beta (gamma |u'| |z|^(nu-1) z + delta u' |z|^nu)``. Our beta is their beta
+            gamma, our gamma their beta delta. Mass, damping and stiffness belong to the oscillator.
+        z0 : float
+            Initial memory.
+
+        Returns
+        -------
+        BoucWen
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> law = hs.BoucWen.from_noel_schoukens(alpha=5e4, beta=1e3, gamma=0.8, delta=-1.1, nu=1.0)
+        >>> law.stability_class, round(law.limit_cycle(1e-3).peak, 9)
+        ('none', 77.756980989)
+        """
+        return cls(**conversions.from_noel_schoukens(alpha, beta, gamma, delta, nu, z0))
+
+    def to_noel_schoukens(self) -> dict[str, float]:
+        """The arguments of `from_noel_schoukens`, of all sets with this response the one with beta = 1.
+
+        Raises
+        ------
+        ValueError
+            If there is a feedthrough or an offset, or the gain is zero.
+        """
+        return conversions.to_noel_schoukens(self)
+
+    @classmethod
+    def from_opensees(
+        cls,
+        *,
+        alpha: float,
+        ko: float,
+        n: float,
+        gamma: float,
+        beta: float,
+        Ao: float = 1.0,
+        deltaA: float = 0.0,
+        deltaNu: float = 0.0,
+        deltaEta: float = 0.0,
+    ) -> Self:
+        """The material ``uniaxialMaterial BoucWen`` of OpenSees, ``alpha ko u + (1 - alpha) ko z``.
+
+        Parameters
+        ----------
+        alpha, ko : float
+            Ratio of the stiffness after yielding to the one before it, and that one.
+        n, gamma, beta, Ao : float
+            ``z' = u' (Ao - |z|^n (gamma + beta sign(u' z)))``.
+        deltaA, deltaNu, deltaEta : float
+            Rates of degradation: a law without it takes zeros only.
+
+        Returns
+        -------
+        BoucWen
+
+        Raises
+        ------
+        ValueError
+            If the material degrades.
+        """
+        degradation = {"deltaA": deltaA, "deltaNu": deltaNu, "deltaEta": deltaEta}
+        return cls(**conversions.from_opensees(alpha, ko, n, gamma, beta, Ao, degradation))
+
+    def to_opensees(self) -> dict[str, float]:
+        """The arguments of `from_opensees`, of all sets with this response the one with Ao = 1.
+
+        Raises
+        ------
+        ValueError
+            If there is an offset or an initial memory, A = 0, or no stiffness at z = 0.
+        """
+        return conversions.to_opensees(self)
+
+    @classmethod
+    def from_opensees_original(
+        cls,
+        *,
+        E: float,
+        fy: float,
+        alphaL: float,
+        alphaNL: float = 0.0,
+        eta: float = 1.0,
+        beta: float = 0.5,
+        gamma: float = 0.5,
+    ) -> Self:
+        """The material ``uniaxialMaterial BoucWenOriginal`` of OpenSees, ``alphaL E u + (1 - alphaL) fy z``.
+
+        Parameters
+        ----------
+        E, fy : float
+            Stiffness before yielding and yield force, positive.
+        alphaL : float
+            Ratio of the stiffness of the linear spring to E.
+        alphaNL : float
+            That of the spring with the power mu: a law without it takes zero only.
+        eta, beta, gamma : float
+            ``z' = u' (1 - |z|^eta (gamma + beta sign(z u'))) E / fy``; z has no unit.
+
+        Returns
+        -------
+        BoucWen
+
+        Raises
+        ------
+        ValueError
+            If E or fy is not positive, or alphaNL is not zero.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> bearing = hs.BoucWen.from_opensees_original(E=200.0, fy=4.0, alphaL=0.1)
+        >>> bearing.response([0.0, 10.0]).round(6).tolist()
+        [0.0, 203.6]
+        """
+        return cls(**conversions.from_opensees_original(E, fy, alphaL, alphaNL, eta, beta, gamma))
+
+    def to_opensees_original(self) -> dict[str, float]:
+        """The arguments of `from_opensees_original`, of all sets with this response the one with beta + gamma = 1.
+
+        Raises
+        ------
+        ValueError
+            If there is an offset or an initial memory, A = 0, no stiffness at z = 0, or nothing yields.
+        """
+        return conversions.to_opensees_original(self)
+
+    @classmethod
+    def from_suanpan(
+        cls, *, elastic_modulus: float, yield_stress: float, hardening: float, beta: float, n: float
+    ) -> Self:
+        """The material ``BoucWen`` of suanPan, whose gamma is 1 - beta.
+
+        Parameters
+        ----------
+        elastic_modulus, yield_stress : float
+            Positive; z is driven by the strain in units of yield_stress / elastic_modulus, and yields at 1.
+        hardening : float
+            Ratio of the stiffness after yielding to the one before it.
+        beta, n : float
+            ``z' = u' (1 - |z|^n (1 - beta + beta sign(z u'))) elastic_modulus / yield_stress``.
+
+        Returns
+        -------
+        BoucWen
+
+        Raises
+        ------
+        ValueError
+            If elastic_modulus or yield_stress is not positive.
+        """
+        shape = {"eta": n, "beta": beta, "gamma": 1.0 - beta}
+        return cls(**conversions.from_opensees_original(elastic_modulus, yield_stress, hardening, 0.0, **shape))
+
+    def to_suanpan(self) -> dict[str, float]:
+        """The arguments of `from_suanpan`; there is one set only.
+
+        Raises
+        ------
+        ValueError
+            As `to_opensees_original`.
+        """
+        return conversions.to_suanpan(self)

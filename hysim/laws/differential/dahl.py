@@ -1,0 +1,82 @@
+"""Dahl's friction law, which is the Bouc-Wen law with n = 1 and gamma = 0, under the names of its field.
+
+    F' = sigma (u' - |u'| F / F_c),    y = offset + F
+
+u is the displacement, F the friction force, sigma the stiffness at F = 0, F_c the Coulomb force to which F
+tends. (Dahl's exponent is 1.) Everything is evaluated by the exact Bouc-Wen kernels with A = sigma and
+beta = sigma / F_c.
+
+Source: P. R. Dahl, A solid friction model, Aerospace Corporation 1968.
+"""
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.laws.differential._as_bouc_wen import AsBoucWen
+from hysim.models.law import Tables
+from hysim.models.model import family
+from hysim.models.parameters import Parameter
+
+_STARTS = ((0.03, 0.5), (0.1, 0.5), (0.3, 0.7), (1.0, 1.5))  # coulomb / stiffness in spans of u, coulomb in spans of y
+
+
+@family
+class Dahl(AsBoucWen):
+    """Dahl friction, ``F' = stiffness (u' - |u'| F / coulomb)`` and ``y = offset + F``.
+
+    Parameters
+    ----------
+    stiffness : float
+        Slope dF/du at F = 0, positive [unit of y / unit of u].
+    coulomb : float
+        Force to which ``|F|`` tends, positive [unit of y].
+    offset : float
+        Output at F = 0 [unit of y].
+    z0 : float
+        Force F at the first sample [unit of y].
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite, or stiffness or coulomb is not positive.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> friction = hs.Dahl(stiffness=2.0, coulomb=0.5)
+    >>> friction.response([0.0, 1.0, 0.9]).round(6).tolist()
+    [0.0, 0.490842, 0.164181]
+    """
+
+    stiffness: float = 1.0
+    coulomb: float = 1.0
+    offset: float = 0.0
+    z0: float = 0.0
+
+    searched = (
+        Parameter("stiffness", 1e-4, 1e5, unit="y/u", log=True),
+        Parameter("coulomb", 1e-2, 1e2, unit="y", log=True),
+        Parameter("offset", affine=True),
+        Parameter("z0", affine=True),
+    )
+    starts = tuple({"stiffness": force / length, "coulomb": force} for length, force in _STARTS)
+    screened = 512
+
+    @classmethod
+    def check(cls, tables: Tables) -> None:
+        """Refuse a stiffness or a Coulomb force that is not positive."""
+        for name in ("stiffness", "coulomb"):
+            if not (tables[name] > 0.0).all():
+                raise ValueError(f"{name} must be positive, got {tables[name].min()}")
+
+    @classmethod
+    def equivalent(cls, tables: Tables) -> dict[str, FloatArray]:
+        """The law with A = stiffness and beta = stiffness / coulomb."""
+        A, gamma = tables["stiffness"], np.zeros_like(tables["stiffness"])
+        beta = tables["stiffness"] / tables["coulomb"]
+        return {"A": A, "beta": beta, "gamma": gamma, "offset": tables["offset"], "z0": tables["z0"]}
+
+    @property
+    def saturation(self) -> float:
+        """Limit of ``|F|`` on a long stroke, the Coulomb force."""
+        return self.coulomb

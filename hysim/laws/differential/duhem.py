@@ -1,0 +1,392 @@
+"""The polynomial Duhem law: one slope where the input rises, another where it falls.
+
+    y = offset + feedthrough u + z,    z' = u' p(u, z) + |u'| q(u, z)
+    p = sum (p_ij + p_abs_ij |z|) u^i z^j,    q = sum (q_ij + q_abs_ij |z|) u^i z^j
+    dz/du = p + q  where u rises,             dz/du = p - q  where u falls
+
+u is the input, z the memory, y the output. The law does not depend on time. It has hysteresis exactly if q is
+not zero. Without feedthrough and offset the memory is the output: the law is one of u and y. The memory is
+evaluated at the samples of an input that is linear between them by power series (`hysim.kernels.duhem`), to 1e-12
+of the range. Special cases:
+
+    Coleman-Hodgdon    p = b,                q = a (c u - y)
+    Dahl               p = r,                q = -(r / F) y
+    Bouc-Wen, n = 1    p = A - gamma |z|,    q = -beta z
+    Bouc-Wen, n = 2    p = A - gamma z^2,    q = -beta |z| z
+
+Sources: P. Duhem 1897; B. D. Coleman and M. L. Hodgdon, Int. J. Eng. Sci. 24 (1986).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import field
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, read_only
+from hysim.kernels import duhem as kernels
+from hysim.laws.differential import _duhem_search, duhem_structure
+from hysim.laws.differential.duhem_runs import branches, free_runs, outputs
+from hysim.laws.differential.duhem_structure import DuhemStructure
+from hysim.laws.differential.terms import Polynomials, Term, equation, latex, polynomials, terms_of
+from hysim.models import inverse_search
+from hysim.models.law import Law, Packed, State, Tables
+from hysim.models.model import family
+from hysim.models.protocols import CompiledLaw
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.records import Record
+
+_BOUND = 1e3
+_OUTPUT = ("feedthrough", "offset", "y0")
+
+
+def _none() -> FloatArray:
+    return np.zeros((1, 1))
+
+
+@family
+class Duhem(Law):
+    """Polynomial Duhem law, ``y = offset + feedthrough u + z`` with ``z' = u' p(u, z) + |u'| q(u, z)``.
+
+    Parameters
+    ----------
+    p, q : array, shape (rows, columns)
+        Element [i, j] multiplies ``u^i z^j`` [unit of y^(1-j) / unit of u^(i+1)]. The shapes may differ.
+    p_abs, q_abs : array, shape (rows, columns)
+        Element [i, j] multiplies ``|z| u^i z^j`` in p and in q [unit of y^(-j) / unit of u^(i+1)].
+    feedthrough : float
+        Slope of the output beside the memory [unit of y / unit of u].
+    offset : float
+        Output where u and the memory are zero [unit of y].
+    y0 : float
+        Output at the first sample [unit of y], whatever the input there.
+
+    Raises
+    ------
+    ValueError
+        If an array is empty, has not two axes, or a number is not finite.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> law = hs.Duhem.from_terms({"u'": 1.0, "|u'| y": -1.0})  # Dahl's
+    >>> law.equation
+    "y' = u' (1) + |u'| (-1 y)"
+    >>> law.response([0.0, 1.0, -1.0]).round(6).tolist()
+    [0.0, 0.632121, -0.779117]
+    >>> law = hs.Duhem.from_terms({"u'": 1.0, "u' |z|": -0.3, "|u'| z": -0.6}, feedthrough=40.0)  # Bouc-Wen's
+    >>> law.equation
+    "z' = u' (1 - 0.3 |z|) + |u'| (-0.6 z), y = 40 u + z"
+    """
+
+    p: FloatArray
+    q: FloatArray
+    p_abs: FloatArray = field(default_factory=_none)
+    q_abs: FloatArray = field(default_factory=_none)
+    feedthrough: float = 0.0
+    offset: float = 0.0
+    y0: float = 0.0
+
+    step = staticmethod(kernels.step)
+    initial: ClassVar[tuple[str, ...]] = ("y0",)
+
+    def __post_init__(self) -> None:
+        for name, part in self._parts._asdict().items():
+            shape = part.shape
+            if len(shape) != 2 or 0 in shape:
+                raise ValueError(f"{name} must have two axes and at least one element, got shape {shape}")
+
+    @classmethod
+    def from_terms(
+        cls, terms: Mapping[str, float], *, feedthrough: float = 0.0, offset: float = 0.0, y0: float = 0.0
+    ) -> Self:
+        """The law with these coefficients.
+
+        Parameters
+        ----------
+        terms : mapping
+            Names such as ``"u'"``, ``"u' u^2"``, ``"|u'| u y"``, ``"u' |z|"``, ``"|u'| |z| z"`` to coefficients;
+            the memory is called y or z.
+        feedthrough, offset : float
+            Slope of the output beside the memory, and what is added to both.
+        y0 : float
+            Output at the first sample.
+
+        Raises
+        ------
+        ValueError
+            If a name is not in the vocabulary, or two name the same term.
+        """
+        parsed = [Term.parse(name) for name in terms]
+        for term, name in zip(parsed, terms, strict=True):
+            if parsed.count(term) > 1:
+                raise ValueError(f"the term {name!r} is given twice, once with y and once with z")
+        parts = polynomials(parsed, np.array([list(terms.values())], dtype=float))
+        arrays = {name: part[0] for name, part in parts._asdict().items()}
+        return cls(**arrays, feedthrough=feedthrough, offset=offset, y0=y0)
+
+    @classmethod
+    def from_branches(
+        cls,
+        *,
+        ascending: npt.ArrayLike,
+        descending: npt.ArrayLike,
+        feedthrough: float = 0.0,
+        offset: float = 0.0,
+        y0: float = 0.0,
+    ) -> Self:
+        """The law by its two slopes, ``z' = f1(u, z) u'`` where u rises and ``z' = f2(u, z) u'`` where it falls.
+
+        Parameters
+        ----------
+        ascending, descending : array, shape (rows, columns)
+            Element [i, j] of f1 and of f2 multiplies ``u^i z^j`` [unit of y^(1-j) / unit of u^(i+1)]. The shapes may
+            differ.
+        feedthrough, offset, y0 : float
+            As in the constructor.
+
+        Returns
+        -------
+        Duhem
+            With p = (f1 + f2) / 2 and q = (f1 - f2) / 2.
+
+        Raises
+        ------
+        ValueError
+            If an array is empty, has not two axes, or a number is not finite.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> hs.Duhem.from_branches(ascending=[[1.0, -1.0]], descending=[[1.0, 1.0]]).equation
+        "y' = u' (1) + |u'| (-1 y)"
+        """
+        f1, f2 = (
+            read_only(slope, name, ndim=2) for name, slope in (("ascending", ascending), ("descending", descending))
+        )
+        half = np.zeros((2, max(len(f1), len(f2)), max(f1.shape[1], f2.shape[1])))
+        for k, slope in enumerate((f1, f2)):
+            half[k, : slope.shape[0], : slope.shape[1]] = 0.5 * slope
+        return cls(p=half[0] + half[1], q=half[0] - half[1], feedthrough=feedthrough, offset=offset, y0=y0)
+
+    @classmethod
+    def candidates(cls) -> dict[str, DuhemStructure]:
+        """What `hysim.compare` tries of this family: polynomials of the first and of the second degree."""
+        return {f"Duhem of degree {degree}": cls.structure(degree=degree) for degree in (1, 2)}
+
+    @classmethod
+    def structure(cls, *, degree: int | None = None, terms: Sequence[str] | None = None) -> DuhemStructure:
+        """What `hysim.identify` takes: the terms of a law between u and y, without their coefficients.
+
+        The search begins at a regression on the record, so that no start is needed.
+
+        Parameters
+        ----------
+        degree : int, optional
+            Every monomial of u and y up to this degree, with u' and with ``|u'|``: (degree + 1)(degree + 2) terms.
+        terms : sequence of str, optional
+            Or the names of the terms, as in `from_terms`, without ``|z|``.
+
+        Returns
+        -------
+        DuhemStructure
+
+        Raises
+        ------
+        ValueError, TypeError
+            If not one of the two is given, the degree is not a whole number of at least zero, or a name is not in the
+            vocabulary.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> law = hs.Duhem.from_terms({"u'": 0.345, "|u'| u": 3.1635, "|u'| y": -1.0})
+        >>> u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=60)
+        >>> structure = hs.Duhem.structure(terms=["u'", "|u'| u", "|u'| y"])
+        >>> fit = hs.identify(structure, hs.Record(u=u, y=law.response(u)))
+        >>> round(fit.estimates["|u'| u"], 6)
+        3.1635
+        """
+        if degree is not None and terms is None:
+            return duhem_structure.of_degree(degree, cls(p=_none(), q=_none()))
+        if terms is not None and degree is None:
+            return duhem_structure.of_terms(tuple(terms), cls(p=_none(), q=_none()))
+        raise ValueError("give degree or terms, one of the two")
+
+    @property
+    def terms(self) -> dict[str, float]:
+        """Coefficients that are not zero by term, all of ``u'`` before those of ``|u'|``, each by degree.
+
+        The memory is called y where it is the output: without feedthrough, offset and terms with ``|z|``; else z.
+        """
+        return {term.named(self._letter): value for term, value in self._coefficients.items()}
+
+    @property
+    def equation(self) -> str:
+        """The law as text, coefficients to 4 significant digits."""
+        return equation(self.terms, self._letter, feedthrough=self.feedthrough, offset=self.offset)
+
+    @property
+    def latex(self) -> str:
+        """The equation for LaTeX, without dollar signs."""
+        return latex(self.equation)
+
+    def tangent(self, direction: npt.ArrayLike, z: npt.ArrayLike, u: npt.ArrayLike = 0.0) -> FloatArray:
+        """Slope dy/du of the output at the memory `z`, for an input at `u` that moves in `direction`.
+
+        Parameters
+        ----------
+        direction : array
+            Velocity u' or its sign, not zero.
+        z, u : array
+            Memory and input, broadcast against the direction.
+
+        Returns
+        -------
+        array
+            [unit of y / unit of u].
+
+        Raises
+        ------
+        ValueError
+            If a direction is zero: the slope ahead and the one behind differ.
+        """
+        velocity = np.asarray(direction, dtype=float)
+        if not np.all(velocity):
+            raise ValueError("direction must not be zero: an input that stands still has two slopes")
+        inputs, memory = np.broadcast_arrays(np.asarray(u, dtype=float), np.asarray(z, dtype=float))
+        p, q, p_abs, q_abs = (np.polynomial.polynomial.polyval2d(inputs, memory, part) for part in self._parts)
+        size = np.abs(memory)
+        return np.asarray(self.feedthrough + (p + size * p_abs) + np.sign(velocity) * (q + size * q_abs))
+
+    def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
+        """Input that gives the output `y`, linear between the samples.
+
+        Parameters
+        ----------
+        y : array, shape (n_samples,)
+            Wanted output.
+        u0 : float, optional
+            Input at which the law rests, its output at y0, before it moves to the first sample; by default zero.
+        state : (float, float), optional
+            Input and memory to continue from, in place of u0 and y0.
+
+        Returns
+        -------
+        array, shape (n_samples,)
+            The law that comes from u0 through these inputs has the output y, to 1e-12 of its range; so has its
+            `response` if y begins at y0.
+
+        Raises
+        ------
+        SimulationError
+            If the output does not reach a sample, or does not rise (or fall) all the way there; it names the sample.
+        ValueError
+            If y is not finite or has not one axis, both u0 and state are given, or the slope is zero where the
+            record begins.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> law = hs.Duhem.from_terms({"u'": 1.0, "u' |z|": -0.3, "|u'| z": -0.6}, feedthrough=2.0)
+        >>> law.inverse_response(law.response([0.0, 1.0, 0.2])).round(9).tolist()
+        [0.0, 1.0, 0.2]
+        """
+        if state is not None and u0 is not None:
+            raise ValueError("give u0 or state, not both: the state has its own input")
+        outputs = read_only(y, "y", ndim=1)
+        start = state or self.start(float(u0 or 0.0), np.empty(0))
+        terms = abs(self.offset) + abs(self.feedthrough * start[0]) + abs(start[1])
+        forward = self._begun(np.array([start[0]]), start)[0]
+        return inverse_search.inverse_response(inverse_search.inverse_step(forward, start[0], terms=terms), outputs)
+
+    @property
+    def workspace(self) -> int:  # type: ignore[override]
+        """Places for the series of the law."""
+        return kernels.state_size(*branches(self._parts).shape[1:]) - 2
+
+    @classmethod
+    def defaults(cls) -> dict[str, Any]:
+        """Zero polynomials, and the other defaults."""
+        return {"p": _none(), "q": _none(), **super().defaults()}
+
+    @classmethod
+    def pack(cls, tables: Tables) -> Packed:
+        """Parameters (offset, feedthrough, shape and numbers of the slopes by direction) and memory (u, 0)."""
+        laws = branches(Polynomials(*(tables[name] for name in Polynomials._fields)))
+        shape = np.broadcast_to(np.array(laws.shape[1:], dtype=float), (len(laws), 3))
+        parts = (tables["offset"], tables["feedthrough"], shape, laws.reshape(len(laws), -1))
+        return Packed(np.concatenate(parts, axis=1), np.zeros((len(laws), 2)))
+
+    def start(self, u0: float, memory: FloatArray) -> State:
+        """The input, and the memory with which the output is y0."""
+        return u0, self.y0 - self.offset - self.feedthrough * u0
+
+    @classmethod
+    def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:
+        """As `Law.path`, without the checks of a single step."""
+        offset, feedthrough, *shape = law.parameters[:5]
+        slopes = law.parameters[5:].reshape([int(length) for length in shape])
+        lost = int(kernels.path(slopes, law.state[0], law.state[1], u, kernels.LARGEST, y))
+        if lost < 0:
+            law.state[:2] = u[-1], y[-1]
+            y[:] = offset + (feedthrough * u + y)
+        return lost
+
+    @classmethod
+    def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
+        """As `Law.rows`, the slopes of all laws side by side."""
+        laws = branches(Polynomials(*(tables[name] for name in Polynomials._fields)))
+        offset, feedthrough, y0 = (tables[name][:, 0] for name in ("offset", "feedthrough", "y0"))
+        y[:] = outputs(laws, feedthrough, y0 - offset, u, kernels.LARGEST, 1) + offset[:, np.newaxis]
+
+    def divergence(self, sample: int, u: float, y: float) -> str:
+        """The law's equation."""
+        return f"{super().divergence(sample, u, y)}: {self.equation}"
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """The box that `identify` searches; see `hysim.laws.differential._duhem_search`."""
+        return _duhem_search.search_space(self.scalars, record, freedom)
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """The output itself, shape (n_sets, n_samples, 1): it is affine in none of the parameters.
+
+        A law whose memory goes 1000 times as far as the record counts as one that escapes: following it costs
+        much and can only lose.
+        """
+        values = {**self.scalars, **parameters}
+        names = [name for name in values if name not in _OUTPUT]
+        columns = np.broadcast_arrays(*(np.atleast_1d(values[name]) for name in (*names, *_OUTPUT)))
+        *coefficients, feedthrough, offset, y0 = columns
+        sets = np.stack(coefficients, axis=1) if coefficients else np.empty((len(y0), 0))
+        bound = _BOUND * (float(np.abs(record.y).max()) or 1.0)
+        terms = [Term.parse(name) for name in names]
+        y = free_runs(terms, sets, feedthrough, y0 - offset, record.u[np.newaxis], bound)
+        return np.asarray(y + offset[:, np.newaxis])[..., np.newaxis]
+
+    def steady(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
+        """Not computed: raises a ValueError."""
+        raise ValueError('a Duhem law has no steady cycle that could be computed: use initial="free"')
+
+    def assemble(self, parameters: Mapping[str, float]) -> Self:
+        """The law with these parameters, one number for each name."""
+        terms = {name: value for name, value in parameters.items() if name not in _OUTPUT}
+        others = {name: parameters.get(name, self.scalars[name]) for name in _OUTPUT}
+        return self.from_terms(terms, **others)
+
+    @property
+    def _parts(self) -> Polynomials:
+        return Polynomials(self.p, self.q, self.p_abs, self.q_abs)
+
+    @property
+    def _coefficients(self) -> dict[Term, float]:
+        return terms_of(self._parts)
+
+    @property
+    def _letter(self) -> str:
+        return "z" if self.feedthrough or self.offset or self.p_abs.any() or self.q_abs.any() else "y"
+
+    @property
+    def scalars(self) -> dict[str, float]:
+        return {**self.terms, "feedthrough": self.feedthrough, "offset": self.offset, "y0": self.y0}

@@ -1,0 +1,102 @@
+"""Free runs of many polynomial Duhem laws at once.
+
+Each law runs on its own memory from its first output, y = feedthrough u + z, whatever a record says
+(`hysim.kernels.duhem`).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, read_only
+from hysim._parallel import in_chunks
+from hysim.kernels import duhem as kernels
+from hysim.laws.differential.terms import Polynomials, Term, polynomials
+
+_SAMPLES_PER_THREAD = 20_000
+
+
+def free_runs(
+    terms: Sequence[Term],
+    coefficients: FloatArray,
+    feedthrough: npt.ArrayLike,
+    y0: npt.ArrayLike,
+    u: FloatArray,
+    bound: float,
+    *,
+    workers: int | None = None,
+) -> FloatArray:
+    """Outputs of many laws of the same terms.
+
+    Parameters
+    ----------
+    terms : sequence of Term, length n_terms
+        The structure.
+    coefficients : array, shape (n_sets, n_terms)
+        One law a row.
+    feedthrough, y0 : float or array, shape (n_sets,)
+        Slope of the output beside the memory, and the output at the first sample.
+    u : array, shape (1, n_samples) or (n_sets, n_samples)
+        Inputs, read-only as a record has them.
+    bound : float
+        A law whose memory goes beyond it escapes.
+    workers : int, optional
+        Number of threads; by default one for each core. The result does not depend on it.
+
+    Returns
+    -------
+    array, shape (n_sets, n_samples)
+        A law that escapes is a row of inf.
+    """
+    laws = branches(polynomials(terms, np.atleast_2d(coefficients)))
+    return outputs(laws, np.asarray(feedthrough), np.asarray(y0), u, bound, workers)
+
+
+def outputs(
+    laws: FloatArray, feedthrough: FloatArray, y0: FloatArray, u: FloatArray, bound: float, workers: int | None
+) -> FloatArray:
+    """As `free_runs`, of the laws (1 or n_sets, 2 or 4, rows, columns) of `branches`; all lengths may be 1."""
+    n_sets = max(len(laws), feedthrough.size, y0.size, len(u))
+    laws = read_only(np.broadcast_to(laws, (n_sets, *laws.shape[1:])), finite=False)
+    direct = np.broadcast_to(feedthrough, n_sets)
+    z0 = read_only(y0 - direct * (u[:, 0] if u.size else 0.0), finite=False)
+    y = np.empty((n_sets, u.shape[1]))
+
+    def work(start: int, stop: int) -> None:
+        with np.errstate(all="ignore"):  # an escape overflows, and uncompiled kernels would warn of it
+            kernels.batch(laws, z0, u, bound, y, start, stop)
+
+    in_chunks(work, n_sets, workers=workers, minimum=1 + _SAMPLES_PER_THREAD // max(1, u.shape[1]))
+    if feedthrough.any():
+        y += direct[:, np.newaxis] * u
+    return y
+
+
+def branches(parts: Polynomials) -> FloatArray:
+    """The polynomials of dz/du as kernels take them, read-only.
+
+    They are p + q where u rises and p - q where it falls, shape (..., 2, rows, columns), or (..., 4, rows, columns)
+    with each for z >= 0 and for z <= 0, if any of the laws has a term with |z|.
+    """
+    two_sided = bool(parts.p_abs.any() or parts.q_abs.any())
+    barred = (parts.p_abs, parts.q_abs) if two_sided else ()
+    shapes = [(part.shape[-2], part.shape[-1]) for part in (parts.p, parts.q)]
+    shapes += [(part.shape[-2], part.shape[-1] + 1) for part in barred]
+    rows, columns = (max(lengths) for lengths in zip(*shapes, strict=True))
+    p, q = (_padded(part, rows, columns) for part in (parts.p, parts.q))
+    smooth = np.stack([p + q, p - q], axis=-3)
+    if two_sided:
+        p, q = (_padded(part, rows, columns, shift=1) for part in barred)
+        bent = np.stack([p + q, p - q], axis=-3)
+        sides = np.stack([smooth + bent, smooth - bent], axis=-3)
+        smooth = sides.reshape(*sides.shape[:-4], 4, rows, columns)
+    smooth.setflags(write=False)  # kernels are compiled anew for arrays that can be written
+    return smooth
+
+
+def _padded(part: FloatArray, rows: int, columns: int, *, shift: int = 0) -> FloatArray:
+    """`part` in an array of zeros of this size, `shift` powers of z higher."""
+    padded = np.zeros((*part.shape[:-2], rows, columns))
+    padded[..., : part.shape[-2], shift : shift + part.shape[-1]] = part
+    return padded

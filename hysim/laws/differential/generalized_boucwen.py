@@ -1,0 +1,106 @@
+"""The generalised Bouc-Wen law of Song and Der Kiureghian.
+
+    dz/du = A - |z|^n psi
+    psi = gamma + beta sgn(u' z) + b2 sgn(u' u) + b3 sgn(z u) + b4 sgn(u') + b5 sgn(z) + b6 sgn(u)
+    y = offset + c1 u + c2 u^2 + ... + gain z
+
+psi is one number in each of the six sectors that the signs of u', z and u make of a loop in the (u, z) plane,
+so each sector can be bent by itself. It is evaluated exactly for every n (`hysim.kernels.generalized`).
+
+Source: J. Song and A. Der Kiureghian, J. Eng. Mech. 132 (2006). Their beta_1 is our beta. Their psi has no
+constant gamma; with it the Bouc-Wen law is the special case b2 = ... = b6 = 0.
+"""
+
+from typing import ClassVar
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.kernels import generalized as kernels
+from hysim.laws.differential._asymmetric import SteppedLaw
+from hysim.models.law import Packed, Tables
+from hysim.models.model import family
+from hysim.models.search_space import Freedom
+from hysim.records import Record
+
+_SECTORS = ("b2", "b3", "b4", "b5", "b6")
+_ONE_SIDED = (("b6", "gamma"), ("b3", "b5"), ("b2", "b4"))
+"""Where u keeps its sign, the terms of a pair are the same to a sign."""
+
+
+@family
+class GeneralizedBoucWen(SteppedLaw):
+    """Bouc-Wen law with a shape for each sector of the loop, after Song and Der Kiureghian (2006).
+
+    ``dz/du = A - |z|^n psi`` with ``psi = gamma + beta sgn(u' z) + b2 sgn(u' u) + b3 sgn(z u) + b4 sgn(u') +
+    b5 sgn(z) + b6 sgn(u)``, and ``y = offset + sum c_k u^k + gain z``
+
+    Parameters
+    ----------
+    A, beta, gamma, n : float
+        As in `BoucWen`; beta is their beta_1, and theirs has no gamma.
+    b2, b3, b4, b5, b6 : float
+        Their beta_2 to beta_6 [unit of z^(1-n) / unit of u]. The loop is symmetric about its centre if b4, b5
+        and b6 are zero.
+    gain, offset, z0 : float
+        As in `BoucWen`.
+    input_coefficients : sequence of float
+        (c1, c2, ...) [unit of y / (unit of u)^k]; c1 is the feedthrough. Their number is the degree that
+        `identify` fits.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is not finite, n is not positive, or there is no coefficient.
+
+    Notes
+    -----
+    Exact for every n. On an input that keeps its sign only the sums gamma + b6, b3 + b5 and b2 + b4 can be told
+    (differences for a negative one): `identify` then holds b6, b3 and b2. No class of stability is known for the
+    general case.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> law = hs.GeneralizedBoucWen(beta=0.5, gamma=0.3, b4=0.1, b5=-0.2)
+    >>> law.response([0.0, 1.0, 0.0, 1.0]).round(6).tolist()
+    [0.0, 0.719164, -0.325835, 0.534028]
+    """
+
+    A: float = 1.0
+    beta: float = 0.5
+    gamma: float = 0.5
+    n: float = 1.0
+    b2: float = 0.0
+    b3: float = 0.0
+    b4: float = 0.0
+    b5: float = 0.0
+    b6: float = 0.0
+    gain: float = 1.0
+    offset: float = 0.0
+    z0: float = 0.0
+    input_coefficients: tuple[float, ...] = (0.0,)
+
+    step = staticmethod(kernels.step)
+    workspace: ClassVar[int] = kernels.N_STATE - 2
+
+    @classmethod
+    def pack(cls, tables: Tables) -> Packed:
+        """Parameters of four Bouc-Wen laws, for a falling and a rising u, each below and above zero; memory (u, z)."""
+        A, beta, gamma, n, b2, b3, b4, b5, b6 = (tables[name] for name in ("A", "beta", "gamma", "n", *_SECTORS))
+        laws = []
+        for direction in (-1.0, 1.0):
+            for side in (-1.0, 1.0):
+                both = direction * side
+                bend = gamma + both * b2 + direction * b4 + side * b6
+                laws += [A, beta + both * b3 + direction * b5, bend, n, cls.joined(tables)]
+        return Packed(np.concatenate(laws, axis=1), cls.initial_memory(tables))
+
+    def alike(self, record: Record, freedom: Freedom) -> tuple[tuple[str, ...], ...]:
+        """The pairs of which one is held where the input keeps its sign."""
+        return _ONE_SIDED if (record.u >= 0.0).all() or (record.u <= 0.0).all() else ()
+
+    def _memory_slope(self, direction: FloatArray, z: FloatArray, u: FloatArray, *_: FloatArray) -> FloatArray:
+        s, e, side = direction, np.sign(z), np.sign(u)
+        symmetric = self.gamma + self.beta * s * e + self.b2 * s * side + self.b3 * e * side
+        return np.asarray(self.A - np.abs(z) ** self.n * (symmetric + self.b4 * s + self.b5 * e + self.b6 * side))

@@ -1,0 +1,47 @@
+"""The Bouc-Wen law beside a polynomial of the input, for asymmetric loops.
+
+    dz/du = A - |z|^n (gamma + beta sign(z du))
+    y = offset + c1 u + c2 u^2 + ... + gain z
+
+What follows from the equations is in `hysim.laws.differential._boucwen_law`.
+
+Source: the polynomial input for asymmetric piezoelectric loops after Wang, Chen and Bai 2015.
+"""
+
+from hysim.laws.differential._boucwen_law import BoucWenLaw
+from hysim.models.model import family
+
+
+@family
+class PolynomialBoucWen(BoucWenLaw):
+    """Bouc-Wen law beside a polynomial of the input, ``y = offset + sum c_k u^k + gain z``.
+
+    Parameters
+    ----------
+    A, beta, gamma, n, gain, offset, z0 : float
+        As in `BoucWen`; z is driven by u itself.
+    input_coefficients : sequence of float
+        (c1, c2, ...) [unit of y / (unit of u)^k]; c1 is the feedthrough. Their number is the degree
+        that `identify` fits.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is not finite, n is not positive, or there is no coefficient.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> law = hs.PolynomialBoucWen(beta=0.5, gamma=0.5, gain=-1.0, input_coefficients=(2.0, 0.1))
+    >>> law.response([0.0, 1.0, 0.0]).round(6).tolist()
+    [0.0, 1.467879, 0.307799]
+    """
+
+    A: float = 1.0
+    beta: float = 0.5
+    gamma: float = 0.5
+    n: float = 1.0
+    gain: float = 1.0
+    offset: float = 0.0
+    z0: float = 0.0
+    input_coefficients: tuple[float, ...] = (0.0, 0.0)

@@ -1,0 +1,1 @@
+"""Laws that are sums of elementary operators: plays, stops and relays."""

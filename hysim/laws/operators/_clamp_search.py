@@ -1,0 +1,262 @@
+"""What is searched of a law of plays or stops.
+
+The output is affine in the weights, the feedthrough and the offset. A bank has its thresholds given: where a
+record says nothing else, they are spread evenly over half the span of the input, the way that a cycle can move.
+A threshold that the user frees is searched between the middles of the gaps to its neighbours, so that their
+order stays. The threshold of a single element is searched on all of that way.
+
+One-signed weights (the default) are those of the classical operator, of one density: all elements past the
+threshold zero turn the loop the way in which the record's own runs. Least squares without it fit noise by
+weights of alternating sign, and such a law may have no inverse.
+
+A law whose plays are pushed by more than the input (`Pushing`) adds what is searched of that.
+
+The memory of many plays is as many unknowns, which no record can tell. With ``initial="rest"``, the default of
+a bank, the plays stand at zero before the first sample. With ``"free"`` the memory is the one that a single
+former turning point leaves behind:
+
+    z_i = sign(turn) max(|turn| - r_i, 0)        the way from rest at zero to `turn`, then to the first sample
+
+It holds every record that begins at rest or at a turning point of its cycle, or in a cycle about zero;
+any other steady cycle is ``"periodic"``: the positions that the record itself leaves behind. A single element
+has its z0, searched where the first input allows it to be.
+"""
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from hysim._frozen import FloatArray, checked
+from hysim.laws.operators._clamps import check_elements, positions
+from hysim.models.composable import Composable
+from hysim.models.parameters import Coordinate, space_of
+from hysim.models.protocols import Identifiable
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.records import Record
+
+TURN = "turn"
+_LEVELS = 9  # of the former turning point, from which the search begins
+
+
+class Axis(NamedTuple):
+    """A coordinate beside thresholds and turning point: its box and starts, and the scale by which it is divided."""
+
+    lower: float
+    upper: float
+    starts: tuple[float, ...]
+    scale: float
+
+
+class Pushing(Protocol):
+    """How a law's plays are pushed, as far as its parameters are to be identified."""
+
+    def axes(self, record: Record) -> dict[str, Axis]:
+        """What is searched beside thresholds and turning point, by name."""
+        ...
+
+    def derived(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
+        """What the law has in place of the coordinates, by name, (n_sets,) each."""
+        ...
+
+    def positions(self, parameters: Parameters, thresholds: FloatArray, z0: FloatArray, record: Record) -> FloatArray:
+        """Positions (n_sets, n_samples, n_plays) for thresholds and initial positions (n_sets, n_plays)."""
+        ...
+
+    def arguments(self, parameters: Mapping[str, float]) -> dict[str, Any]:
+        """The constructor's arguments beside those of every bank."""
+        ...
+
+
+@checked
+class ByTheInput:
+    """Plays and stops that the input itself pushes."""
+
+    def axes(self, record: Record) -> dict[str, Axis]:
+        """Nothing."""
+        return {}
+
+    def derived(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
+        """Nothing."""
+        return {}
+
+    def positions(self, parameters: Parameters, thresholds: FloatArray, z0: FloatArray, record: Record) -> FloatArray:
+        """Positions (n_sets, n_samples, n_plays)."""
+        return positions(thresholds, z0, record.u)
+
+    def arguments(self, parameters: Mapping[str, float]) -> dict[str, Any]:
+        """Nothing."""
+        return {}
+
+
+@checked
+class ClampStructure(Identifiable, Composable):
+    """A bank of plays or stops to be identified; see `PrandtlIshlinskii.structure`."""
+
+    law: Any
+    thresholds: tuple[float, ...] = ()
+    plays: int = 10
+    one_signed: bool = True
+    pushing: Pushing = ByTheInput()
+
+    def __post_init__(self) -> None:
+        if isinstance(self.plays, bool) or not isinstance(self.plays, int):
+            raise TypeError(f"plays must be an int, got {self.plays!r}")
+        if self.plays < 1:
+            raise ValueError(f"plays must be at least 1, got {self.plays}")
+        check_elements(self.law, *[np.atleast_2d(self.thresholds)] * 3)
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """Thresholds and memory as coordinates where they are free; the rest is linear.
+
+        Raises
+        ------
+        ValueError
+            If the input is constant, `initial` is unknown, or a name or a bound does not fit.
+        """
+        half = half_span(record)
+        thresholds = self._thresholds(half)
+        names, columns = self._names("thresholds", thresholds.size), self._columns(thresholds.size)
+        first, axes = float(record.u[0]), self.pushing.axes(record)
+        defaults = {
+            **dict(zip(names, thresholds.tolist(), strict=True)),
+            **{name: axis.starts[0] for name, axis in axes.items()},
+            **dict.fromkeys(columns, 0.0),
+            TURN: first,
+        }
+        given = freedom.held(defaults, at_rest=(TURN,) if freedom.starts_at_rest("rest") else ())
+        held = {name: defaults[name] for name in names if name not in freedom.free} | given
+        limits = freedom.limits(defaults, held)
+        gaps = zip(names, _gaps(thresholds), strict=True)
+        box = [
+            *(Coordinate(name, *gap, half) for name, gap in gaps),
+            Coordinate(TURN, first - 2.0 * half, first + 2.0 * half, half),
+        ]
+        box += [Coordinate(name, axis.lower, axis.upper, axis.scale) for name, axis in axes.items()]
+        starts = {TURN: tuple(first + half * np.linspace(-2.0, 2.0, _LEVELS))} | {
+            name: axis.starts for name, axis in axes.items()
+        }
+        starts = {name: values for name, values in starts.items() if name not in held}
+        points = [dict(zip(starts, values, strict=True)) for values in itertools.product(*starts.values())]
+        signs = self._signs(record, dict(zip(self._names("weights", thresholds.size), thresholds, strict=True)))
+        bounds = {name: pair for name, pair in signs.items() if name in columns and name not in held}
+        space = space_of(
+            box,
+            columns,
+            defaults,
+            held,
+            limits,
+            points,
+            bounds=bounds | {name: pair for name, pair in limits.items() if name in columns},
+            state=(TURN,),
+            screened=0 if {each.name for each in box} - set(held) <= {TURN, *axes} else 256,
+        )
+        return replace(space, parameters=lambda x: self._with_derived(space.parameters(x), record))
+
+    def _with_derived(self, searched: dict[str, FloatArray], record: Record) -> dict[str, FloatArray]:
+        return searched | self.pushing.derived(searched, record)
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """One column for each element, the input where there is a feedthrough, 1 and 0."""
+        thresholds, z0 = self._elements(parameters)
+        z = self.pushing.positions(parameters, thresholds, z0, record)
+        elements: FloatArray = record.u[:, np.newaxis] - z if self.law.stops else z
+        ones = np.ones((*z.shape[:2], 1))
+        static = [record.u[:, np.newaxis] * ones] if _has_feedthrough(self.law) else []
+        return np.concatenate([elements, *static, ones, np.zeros_like(ones)], axis=-1)
+
+    def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
+        """The parameters with the positions of the steady cycle of which `record` is one period or more.
+
+        One run through the record wipes out what was before it.
+        """
+        thresholds, z0 = self._elements(parameters)
+        z = self.pushing.positions(parameters, thresholds, z0, record)[:, -1]
+        shape = np.broadcast_shapes(*map(np.shape, parameters.values()))
+        columns = (column.reshape(shape)[()] for column in z.T)
+        return {**parameters} | dict(zip(self._names("z0", z.shape[1]), columns, strict=True))
+
+    def assemble(self, parameters: Mapping[str, float]) -> Any:
+        """The law with these parameters, one number for each name."""
+        thresholds, z0 = self._elements(parameters)
+        law: Any = self.law
+        weights = [parameters[name] for name in self._names("weights", thresholds.shape[1])]
+        others = {name: parameters[name] for name in ("feedthrough", "offset") if name in parameters}
+        tuples = {law.thresholds_name: thresholds[0], law.weights_name: weights, "z0": z0[0]}
+        return law(**tuples, **others, **self.pushing.arguments(parameters))
+
+    def _thresholds(self, half: float) -> FloatArray:
+        """Those given, or in even steps: from zero for plays; for stops, which are nothing there, up to the end."""
+        if self.thresholds:
+            return np.array(self.thresholds)
+        steps = np.arange(self.plays) + float(self.law.stops)
+        return np.asarray(half * steps / (self.plays + float(self.law.stops)))
+
+    def _names(self, what: str, count: int) -> tuple[str, ...]:
+        own = {"thresholds": self.law.thresholds_name, "weights": self.law.weights_name}
+        return tuple(f"{own.get(what, what)}[{k}]" for k in range(count))
+
+    def _columns(self, count: int) -> tuple[str, ...]:
+        static = ("feedthrough",) if _has_feedthrough(self.law) else ()
+        return (*self._names("weights", count), *static, "offset")
+
+    def _elements(self, parameters: Parameters) -> tuple[FloatArray, FloatArray]:
+        """Thresholds and initial positions, shape (n_sets, n_plays) each."""
+        count = sum(name.startswith(f"{self.law.thresholds_name}[") for name in parameters)
+        n_sets = max((np.size(value) for value in parameters.values()), default=1)
+
+        def table(what: str) -> FloatArray:
+            columns = [np.broadcast_to(np.ravel(parameters[name]), n_sets) for name in self._names(what, count)]
+            return np.stack(columns, axis=1)
+
+        thresholds = table("thresholds")
+        return thresholds, table("z0") if "z0[0]" in parameters else _after(parameters.get(TURN, 0.0), thresholds)
+
+    def _signs(self, record: Record, thresholds: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+        """Bounds at zero of the weights that turn the loop."""
+        if not self.one_signed:
+            return {}
+        side = (0.0, np.inf) if self.law.stops == runs_clockwise(record) else (-np.inf, 0.0)
+        return {name: side for name, threshold in thresholds.items() if threshold > 0.0}
+
+
+def half_span(record: Record) -> float:
+    """Half the span of the input: the largest threshold of which a cycle can tell.
+
+    Raises
+    ------
+    ValueError
+        If the input is constant.
+    """
+    span = float(np.ptp(record.u))
+    if span == 0.0:
+        raise ValueError("the input is constant: nothing can be identified from it")
+    return 0.5 * span
+
+
+def _after(turn: Any, thresholds: FloatArray) -> FloatArray:
+    """Positions (n_sets, n_plays) after the way from rest at zero to `turn`, shape (n_sets,)."""
+    level = np.ravel(turn)[:, np.newaxis]
+    return np.asarray(np.sign(level) * np.maximum(np.abs(level) - thresholds, 0.0))
+
+
+def _gaps(thresholds: FloatArray) -> list[tuple[float, float]]:
+    """For each threshold the middles of the gaps to its neighbours; zero below the first."""
+    order = np.argsort(thresholds, kind="stable")
+    middles = 0.5 * (thresholds[order][1:] + thresholds[order][:-1])
+    last = 1.5 * float(thresholds.max(initial=0.0)) or 1.0
+    edges = np.concatenate([[0.0], middles, [last]])
+    gaps = np.empty((thresholds.size, 2))
+    gaps[order] = np.stack([edges[:-1], edges[1:]], axis=1)
+    return [(lower, upper) for lower, upper in gaps.tolist()]
+
+
+def runs_clockwise(record: Record) -> bool:
+    """Whether the path of the record, closed by its chord, encloses more area clockwise."""
+    return bool(np.dot(record.u, np.roll(record.y, -1)) < np.dot(np.roll(record.u, -1), record.y))
+
+
+def _has_feedthrough(law: type) -> bool:
+    return any(field.name == "feedthrough" for field in fields(law))

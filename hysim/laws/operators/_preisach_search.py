@@ -1,0 +1,231 @@
+"""What is searched of a law of relays.
+
+The output is affine in the weights and the offset. The levels are given: where the user says nothing else, they
+divide the span of the input evenly. One-signed weights (the default) turn the loop the way in which the record's own
+runs; those of the diagonal, which turn none, are free.
+
+With ``initial="rest"``, the default, all relays are down before the first sample. With ``"free"`` the memory is that
+of a single former turning point: all down, up to `turn`, then to the first sample. ``"periodic"`` is the memory that
+the record itself leaves behind.
+
+A record tells as many combinations of weights as their columns have rank: one loop between two inputs 2 N - 1 of the
+N (N + 1) / 2. As many weights are free, and the others are held at zero: free are those of a best fit that has no
+more weights than needed, then those that are nearest to the diagonal. Where the memory is free, a weight is held
+only if no memory tells it. The user frees others by name.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, checked, read_only
+from hysim.laws.operators._clamp_search import TURN, half_span, runs_clockwise
+from hysim.laws.operators._relays import RelayLaw, check_relays
+from hysim.models.by_structure import ByStructure
+from hysim.models.composable import Composable
+from hysim.models.parameters import Coordinate, space_of
+from hysim.models.protocols import Identifiable
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.records import Record
+
+_STARTS = 9  # former turning points from which the search begins
+_RANK = 1e-9  # of a column's length: what is left of one that others make up for
+
+
+@checked
+class PreisachStructure(Identifiable, Composable):
+    """A bank of relays to be identified; see `Preisach.structure`."""
+
+    law: type[RelayLaw]
+    levels: tuple[float, ...] = ()
+    intervals: int = 4
+    one_signed: bool = True
+
+    def __post_init__(self) -> None:
+        if isinstance(self.intervals, bool) or not isinstance(self.intervals, int):
+            raise TypeError(f"intervals must be an int, got {self.intervals!r}")
+        if self.intervals < 1:
+            raise ValueError(f"intervals must be at least 1, got {self.intervals}")
+        levels = np.array(self.levels)
+        check_relays(levels[np.newaxis], np.zeros((1, _n_weights(levels))))
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """The memory as a coordinate where it is free; the rest is linear.
+
+        Raises
+        ------
+        ValueError
+            If the input is constant, `initial` is unknown, or a name or a bound does not fit.
+        """
+        scale = half_span(record)
+        levels = self._levels(record)
+        places = {f"levels[{k}]": value for k, value in enumerate(levels.tolist())}
+        columns = (*(f"weights[{k}]" for k in range(_n_weights(levels))), "offset")
+        lowest, highest = float(levels[0]), float(levels[-1])
+        defaults = {**places, **dict.fromkeys(columns, 0.0), TURN: lowest}
+        if searched := [name for name in places if name in (*freedom.free, *freedom.fixed)]:
+            raise ValueError(f"{searched[0]!r} is not searched: give the levels to structure(levels=...)")
+        signs = self._signs(record, levels.size - 1)
+        resting = {TURN: lowest} if freedom.starts_at_rest("rest") and TURN not in freedom.free else {}
+        turns = freedom.fixed.get(TURN, lowest if resting else np.linspace(lowest, highest, _STARTS))
+        untold = self._untold(record, {**places, TURN: turns}, signs)
+        given = freedom.held(defaults)
+        held = {**places, **resting, **{name: 0.0 for name in untold if name not in freedom.free}, **given}
+        limits = freedom.limits(defaults, held)
+        turn = Coordinate(TURN, *limits.get(TURN, (lowest, highest)), scale)
+        points = [
+            {TURN: value} for value in np.linspace(turn.lower, turn.upper, 1 if TURN in held else _STARTS).tolist()
+        ]
+        bounds = {name: pair for name, pair in {**signs, **limits}.items() if name in columns and name not in held}
+        return space_of([turn], columns, defaults, held, limits, points, bounds=bounds, state=(TURN,), screened=0)
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """The output of each relay of weight 1, then 1 and 0."""
+        levels, z0 = _table("levels", parameters)[0], _memory(parameters)
+        relays = np.eye(_n_weights(levels))
+        sets = {"levels": levels, "weights": np.tile(relays, (len(z0), 1)), "z0": np.repeat(z0, len(relays), axis=0)}
+        outputs = self.law.responses(sets, record.u).reshape(len(z0), len(relays), -1).transpose(0, 2, 1)
+        ones = np.ones((*outputs.shape[:2], 1))
+        return np.concatenate([outputs, ones, np.zeros_like(ones)], axis=-1)
+
+    def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
+        """The parameters with the memory of the steady cycle of which `record` is one period or more.
+
+        One run through the record wipes out what was before it, unless that went beyond the record's inputs.
+        """
+        shape = np.broadcast_shapes(*map(np.shape, parameters.values()))
+        levels = _table("levels", parameters)[0]
+        extremes = self._law(levels, np.zeros(_n_weights(levels))).advance(record.u)[1][1:]
+        return {**parameters} | {f"z0[{k}]": np.full(shape, value)[()] for k, value in enumerate(extremes)}
+
+    def assemble(self, parameters: Mapping[str, float]) -> RelayLaw:
+        """The law with these parameters, one number for each name."""
+        levels, weights = (_table(name, parameters)[0] for name in ("levels", "weights"))
+        past = [value for value in _memory(parameters)[0].tolist() if value > levels[0]]
+        return self._law(levels, weights, offset=parameters["offset"], z0=tuple(past))
+
+    def notes(self, record: Record, law: RelayLaw) -> tuple[str, ...]:
+        """How many of the weights the record tells apart, where these are not all."""
+        places = {f"levels[{k}]": value for k, value in enumerate(law.levels)}
+        columns = self.regressors({**places, TURN: law.levels[0]}, record)[0, :, :-1]
+        untold = columns.shape[1] - int(np.linalg.matrix_rank(columns))
+        told = f"this record does not tell {untold} of the {len(law.weights)} weights from the others"
+        return (told,) if untold else ()
+
+    def _levels(self, record: Record) -> FloatArray:
+        """Those given, or even steps over the span of the input."""
+        if self.levels:
+            return np.array(self.levels)
+        return np.linspace(record.u.min(), record.u.max(), self.intervals + 1)
+
+    def _untold(
+        self, record: Record, parameters: Parameters, signs: Mapping[str, tuple[float, float]]
+    ) -> tuple[str, ...]:
+        """The weights of which others, within these signs, do the work on this record from every memory given."""
+        columns = np.concatenate([*self.regressors(parameters, record)])[:, :-1]
+        _, factor = np.linalg.qr(np.column_stack([columns, np.resize(record.y, len(columns))]))
+        relays, goal = np.split(factor, [columns.shape[1]], axis=1)
+        rows, lower = np.tril_indices(len(_table("levels", parameters)[0]) - 1)
+        nearest = np.lexsort((rows, rows - lower))
+        if np.linalg.matrix_rank(relays) == relays.shape[1]:
+            return ()
+        used = _support(relays, goal[:, 0], [signs.get(f"weights[{k}]", (-np.inf, np.inf)) for k in range(rows.size)])
+        kept = _independent(relays, [rows.size, *nearest[used[nearest]], *nearest[~used[nearest]]])
+        return tuple(f"weights[{k}]" for k in range(rows.size) if k not in kept)
+
+    def _law(self, levels: FloatArray, weights: FloatArray, **others: Any) -> RelayLaw:
+        law: Any = self.law
+        return law(levels=tuple(levels), weights=tuple(weights), **others)  # type: ignore[no-any-return]
+
+    def _signs(self, record: Record, n: int) -> dict[str, tuple[float, float]]:
+        """Bounds at zero of the weights off the diagonal."""
+        if not self.one_signed:
+            return {}
+        side = (-np.inf, 0.0) if runs_clockwise(record) else (0.0, np.inf)
+        rows, columns = np.tril_indices(n)
+        return {f"weights[{k}]": side for k in np.flatnonzero(rows > columns).tolist()}
+
+
+class SearchedRelays(ByStructure, RelayLaw):
+    """A law of relays that `hysim.identify` takes."""
+
+    def as_structure(self) -> PreisachStructure:
+        """The structure with the levels of this law."""
+        return PreisachStructure(law=type(self), levels=self.levels)
+
+    @classmethod
+    def structure(cls, *, intervals: int = 4, levels: npt.ArrayLike = (), one_signed: bool = True) -> PreisachStructure:
+        """What `hysim.identify` takes: where the levels are.
+
+        Parameters
+        ----------
+        intervals : int
+            Their number N, of equal length over the span of the input. There are N (N + 1) / 2 weights; one loop
+            between two inputs tells 2 N - 1 combinations of them.
+        levels : sequence of float, optional
+            The N + 1 levels themselves [unit of u].
+        one_signed : bool
+            Whether all weights off the diagonal have the sign of the record's loop (positive for a counterclockwise
+            one). Else they are free, and may be of alternating signs on noisy records.
+
+        Returns
+        -------
+        PreisachStructure
+
+        Raises
+        ------
+        ValueError, TypeError
+            If the number is not a positive int, or the levels are not finite or do not increase.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> fit = hs.identify(hs.Preisach.structure(intervals=3), hs.datasets.table1())
+        >>> fit.n_parameters
+        6
+        """
+        given = tuple(read_only(levels, "levels", ndim=1).tolist())
+        return PreisachStructure(law=cls, levels=given, intervals=intervals, one_signed=one_signed)
+
+
+def _n_weights(levels: FloatArray) -> int:
+    return levels.size * (levels.size - 1) // 2
+
+
+def _table(what: str, parameters: Parameters) -> FloatArray:
+    """The numbers of a tuple over the sets, shape (n_sets, length)."""
+    count = sum(name.startswith(f"{what}[") for name in parameters)
+    columns = np.broadcast_arrays(*(np.ravel(parameters[f"{what}[{k}]"]) for k in range(count)))
+    return np.stack(columns, axis=1)
+
+
+def _memory(parameters: Parameters) -> FloatArray:
+    """Inputs before the first sample, shape (n_sets, n_past)."""
+    return _table("z0", parameters) if "z0[0]" in parameters else np.reshape(parameters[TURN], (-1, 1))
+
+
+def _support(columns: FloatArray, goal: FloatArray, bounds: list[tuple[float, float]]) -> npt.NDArray[np.bool_]:
+    """Which of the bounded coefficients a best fit with few of them uses; the last column has no bounds."""
+    from scipy.optimize import nnls
+
+    sides = [(k, sign) for k, (low, high) in enumerate(bounds) for sign, end in ((1.0, high), (-1.0, low)) if end]
+    sides += [(len(bounds), 1.0), (len(bounds), -1.0)]
+    places, signs = np.array([k for k, _ in sides]), np.array([sign for _, sign in sides])
+    size = np.linalg.norm(columns, axis=0)[places]
+    found, _ = nnls(signs * columns[:, places] / np.where(size > 0.0, size, 1.0), goal)
+    return np.isin(np.arange(len(bounds)), places[found > 0.0])
+
+
+def _independent(columns: FloatArray, order: list[int]) -> set[int]:
+    """The columns that are no combination of those before them in the order."""
+    basis = np.empty((len(columns), 0))
+    kept: set[int] = set()
+    for k in order:
+        rest = columns[:, k] - basis @ (basis.T @ columns[:, k])
+        rest -= basis @ (basis.T @ rest)
+        size = float(np.linalg.norm(rest))
+        if size > _RANK * float(np.linalg.norm(columns[:, k])):
+            basis, kept = np.column_stack([basis, rest / size]), kept | {int(k)}
+    return kept

@@ -1,0 +1,278 @@
+"""The generalised Prandtl-Ishlinskii law: plays that the input pushes through envelope functions.
+
+    z_i(k) = max(gamma_left(u_k) - r_i, min(gamma_right(u_k) + r_i, z_i(k-1)))
+    y      = offset + sum_i w_i z_i
+    gamma(u) = a_0 tanh(a_1 u + a_2) + a_3 + a_4 u,    increasing
+
+u is the input, z_i the memory, y the output. An input that rises pushes the plays along the left envelope, one
+that falls along the right one; the tanh lets the loop saturate, and two different envelopes make the rising
+branch another curve than the falling one. With one envelope the law is the plain one behind gamma, with
+the inverse u = gamma^-1(H^-1[y]). With two, the output stands still in the gap between them after a reversal, so
+that many inputs give it: the inverse takes the nearest. Both are found by Newton's method on the output itself,
+which is monotone along each stretch.
+
+Sources: M. Al Janaideh, S. Rakheja and C.-Y. Su, IEEE/ASME Trans. Mechatronics 16 (2011), for the law and its
+inverse, with the envelopes a_0 tanh(a_1 u + a_2) + a_3 and a_4 u + a_3; the sum of the two is ours.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, checked, read_only
+from hysim.laws.operators._clamp_search import Axis, ClampStructure, half_span
+from hysim.laws.operators._play_sums import IDENTITY, ExtendedPlays, kernel_rows, positions_of
+from hysim.models.law import Packed, State, Tables
+from hysim.models.model import family
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
+from hysim.models.search_space import Parameters
+from hysim.records import Record
+
+_BENDS = (0.02, 3.0)  # of the envelope between the ends of the input: nearly straight, nearly a step
+_SKEWS = (-3.0, 3.0)  # where the middle of the input is on the tanh
+_STARTS: tuple[tuple[float, ...], ...] = ((0.3, 1.0), (0.0, -1.0, 1.0), (0.2,))
+
+
+@family
+class GeneralizedPrandtlIshlinskii(ExtendedPlays):
+    """Generalised Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i`` over plays behind envelopes.
+
+    Parameters
+    ----------
+    thresholds : sequence of float, length n_plays
+        r_i, not negative and increasing [unit of gamma].
+    weights : sequence of float, length n_plays
+        w_i, of any sign [unit of y / unit of gamma].
+    left : sequence of float, length 5
+        a_0 ... a_4 of the envelope along which a rising input pushes; by default gamma(u) = u.
+    right : sequence of float, length 5 or 0
+        Those of a falling one; empty for the same. The play of the threshold r is one where
+        gamma_left - gamma_right is at most 2 r; else it follows the left envelope.
+    offset : float
+        Output at z = 0 [unit of y].
+    z0 : float or sequence of float, length n_plays
+        Positions before the first sample, which pushes them [unit of gamma].
+
+    Raises
+    ------
+    ValueError
+        If lengths differ, a number is not finite, thresholds are negative or do not increase, or an envelope
+        does not increase.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> law = hs.GeneralizedPrandtlIshlinskii(
+    ...     thresholds=(0.0, 0.5), weights=(1.0, 1.0), left=(1.0, 2.0, 0.0, 0.0, 0.0)
+    ... )
+    >>> law.response([0.0, 1.0, 0.5, -1.0]).round(6).tolist()
+    [0.0, 1.428055, 1.225622, -1.428055]
+    >>> law.inverse_response(law.response([0.0, 1.0, 0.5, -1.0])).round(6).tolist()
+    [0.0, 1.0, 0.5, -1.0]
+    """
+
+    thresholds: tuple[float, ...] = ()
+    weights: tuple[float, ...] = ()
+    left: tuple[float, ...] = IDENTITY
+    right: tuple[float, ...] = ()
+    offset: float = 0.0
+    z0: tuple[float, ...] = (0.0,)
+
+    @classmethod
+    def check(cls, tables: Tables) -> None:
+        """Refuse elements that are no plays, and envelopes that do not increase."""
+        super().check(tables)
+        _envelopes(tables["left"], tables["right"])
+
+    @classmethod
+    def structure(
+        cls,
+        *,
+        plays: int = 10,
+        thresholds: npt.ArrayLike = (),
+        one_signed: bool = True,
+        envelopes: int = 1,
+        left: npt.ArrayLike = (),
+        right: npt.ArrayLike = (),
+    ) -> ClampStructure:
+        """What `hysim.identify` takes: where the plays are, and what is known of the envelopes.
+
+        The envelopes that are searched take the ends of the record's input to themselves, so that thresholds mean
+        there what they mean for `PrandtlIshlinskii`: ``bend`` is how far the tanh is gone through on half the way
+        (none for a straight envelope), ``skew`` where its middle is.
+
+        Parameters
+        ----------
+        plays, thresholds, one_signed
+            As of `PrandtlIshlinskii.structure`.
+        envelopes : {1, 2}
+            Whether one envelope is searched, or the right one has a ``lead`` in skew before the left one.
+        left, right : sequence of float, length 5, optional
+            Envelopes that are known, and not searched.
+
+        Returns
+        -------
+        ClampStructure
+
+        Raises
+        ------
+        ValueError, TypeError
+            As `PrandtlIshlinskii.structure`, if `envelopes` is not 1 or 2, or an envelope does not increase.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> fit = hs.identify(hs.GeneralizedPrandtlIshlinskii.structure(plays=4), hs.datasets.table1())
+        >>> fit.n_parameters
+        7
+        """
+        if envelopes not in (1, 2):
+            raise ValueError(f"envelopes must be 1 or 2, got {envelopes!r}")
+        known = tuple(tuple(read_only(side, "envelopes", ndim=1).tolist()) for side in (left, right))
+        if known[0]:
+            _envelopes(*(np.atleast_2d(side) for side in known))
+        return ClampStructure(
+            law=cls, thresholds=tuple(read_only(thresholds, "thresholds", ndim=1).tolist()), plays=plays,
+            one_signed=one_signed, pushing=Envelopes(left=known[0], right=known[1], count=envelopes),
+        )  # fmt: skip
+
+    def is_invertible(self) -> bool:
+        """Whether `inverse_response` gives an input for every output that the envelopes reach.
+
+        With one envelope where the plain law of the same plays is invertible, with two where the weights have one
+        sign.
+        """
+        return self._refusal() is None
+
+    def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
+        """Input that gives the output `y`, monotone between the samples; the nearest where there are several.
+
+        Parameters
+        ----------
+        y : array, shape (n_samples,)
+            Wanted output.
+        u0 : float, optional
+            Input at which the law rests before it moves to the first sample; by default the first sample
+            finds the plays at z0.
+        state : tuple of float, optional
+            Input and positions to continue from, in place of u0 and z0.
+
+        Returns
+        -------
+        array, shape (n_samples,)
+            Its `response` is y to rounding.
+
+        Raises
+        ------
+        SimulationError
+            If the envelopes end before an output is reached; it names the sample.
+        ValueError
+            If the law is not invertible, z0 holds positions that no input leads to, or y is not finite or has
+            not one axis.
+        """
+        self.check_invertible()
+        return self.input_of(y, u0, state)
+
+    def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
+        """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""
+        self.check_invertible()
+        return self.inverse_from(self.advance([u0])[1], limits)
+
+    def check_invertible(self) -> None:
+        """Raise a ValueError if the law is not invertible, or z0 holds positions that no input leads to."""
+        if (refusal := self._refusal()) is not None:
+            raise ValueError(refusal)
+        if self._has_one_envelope():
+            self.plays.inverse()  # refuses these positions
+
+    @classmethod
+    def pack(cls, tables: Tables) -> Packed:
+        """Rows with envelopes; see `hysim.kernels.play_sums`."""
+        left, right = _envelopes(tables["left"], tables["right"])
+        return Packed(kernel_rows(tables, left=left, right=right), cls.initial_memory(tables))
+
+    def as_structure(self) -> ClampStructure:
+        """The structure with the thresholds and envelopes of this law, or with free ones where it has none."""
+        left, right = (self.left, self.right) if self.thresholds else ((), ())
+        one_signed = self.plays.is_one_signed()
+        return self.structure(thresholds=self.thresholds, one_signed=one_signed, left=left, right=right)
+
+    def _has_one_envelope(self) -> bool:
+        return self.right in ((), self.left)
+
+    def _refusal(self) -> str | None:
+        if self._has_one_envelope():
+            return self.plays.refusal()
+        if any(self.weights) and min(self.weights) * max(self.weights) >= 0.0:
+            return None
+        return f"the law has no inverse: with two envelopes its weights must have one sign, got {self.weights}"
+
+
+@checked
+class Envelopes:
+    """What is searched of envelopes: nothing where the left one is known."""
+
+    left: tuple[float, ...] = ()
+    right: tuple[float, ...] = ()
+    count: int = 1
+
+    def axes(self, record: Record) -> dict[str, Axis]:
+        """Bend, skew, and with two envelopes the lead of the right one."""
+        if self.left:
+            return {}
+        bends, skews, leads = _STARTS
+        found = {"bend": Axis(*_BENDS, bends, 1.0), "skew": Axis(*_SKEWS, skews, 1.0)}
+        return found | ({"lead": Axis(0.0, _SKEWS[1], leads, 1.0)} if self.count == 2 else {})
+
+    def derived(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
+        """Coefficients ``left[0]`` ... ``left[4]``, and those of the right envelope where there are two."""
+        if self.left:
+            return {}
+        bend, skew = parameters["bend"], parameters["skew"]
+        sides = {"left": skew} | ({"right": skew + parameters["lead"]} if self.count == 2 else {})
+        return {
+            f"{side}[{k}]": column
+            for side, phase in sides.items()
+            for k, column in enumerate(_between_the_ends(np.asarray(bend), np.asarray(phase), record))
+        }
+
+    def positions(self, parameters: Parameters, thresholds: FloatArray, z0: FloatArray, record: Record) -> FloatArray:
+        """Positions (n_sets, n_samples, n_plays)."""
+        left, right = (self._coefficients(side, parameters, len(z0)) for side in ("left", "right"))
+        return positions_of(thresholds, z0, record.u, left=left, right=right if right.size else left)
+
+    def arguments(self, parameters: Mapping[str, float]) -> dict[str, Any]:
+        """The envelopes."""
+        return {side: self._coefficients(side, parameters, 1)[0] for side in ("left", "right")}
+
+    def _coefficients(self, side: str, parameters: Mapping[str, Any], n_sets: int) -> FloatArray:
+        """Coefficients (n_sets, 5), or (n_sets, 0) for a right envelope that is the left one."""
+        known = self.left if side == "left" else self.right
+        if known or f"{side}[0]" not in parameters:
+            return np.tile(known, (n_sets, 1))
+        columns = (np.broadcast_to(np.ravel(parameters[f"{side}[{k}]"]), n_sets) for k in range(5))
+        return np.stack(list(columns), axis=1)
+
+
+def _between_the_ends(bend: FloatArray, phase: FloatArray, record: Record) -> list[FloatArray]:
+    """Coefficients of the envelope of this shape that takes the lowest and the highest input to themselves."""
+    half, middle = half_span(record), 0.5 * float(record.u.max() + record.u.min())
+    low, high = np.tanh(phase - bend), np.tanh(phase + bend)
+    height = 2.0 * half / (high - low)
+    level = middle - 0.5 * height * (high + low)
+    return [height, bend / half, phase - bend * middle / half, level, np.zeros_like(height)]
+
+
+def _envelopes(left: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Both envelopes (n_sets, 5); refuse what does not increase."""
+    both = left, right if right.size else left
+    for name, side in zip(("left", "right"), both, strict=True):
+        if side.shape[1] != len(IDENTITY):
+            raise ValueError(f"{name} must hold 5 coefficients, got {side.shape[1]}")
+        bend, line = side[:, 0] * side[:, 1], side[:, 4]
+        if not ((bend >= 0.0) & (line >= 0.0) & (bend + line > 0.0)).all():
+            raise ValueError(f"the envelope {name} must increase: a_0 a_1 and a_4 not negative, one of them positive")
+    return both

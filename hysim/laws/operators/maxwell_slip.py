@@ -1,0 +1,165 @@
+"""The Maxwell-slip law: springs side by side, each of which slips at an elongation of its own.
+
+    F = offset + feedthrough u + sum_i k_i (u - z_i),    z_i = min(max(z_i, u - d_i), u + d_i)
+
+u is the displacement, z_i the block to which spring i is fixed, F the force, k_i a stiffness, d_i the
+elongation at which the block begins to slide. An element holds at most the force f_i = k_i d_i. It is a sum of stops,
+and so a Prandtl-Ishlinskii law. The loop of a positive stiffness runs clockwise: the law takes energy.
+
+Sources: M. Goldfarb and N. Celanovic, IEEE Control Systems 17 (1997); W. D. Iwan, J. Appl. Mech. 33 (1966).
+"""
+
+from typing import ClassVar, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import read_only
+from hysim.laws.operators._clamp_search import ClampStructure
+from hysim.laws.operators._clamps import ClampLaw
+from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
+from hysim.models.by_structure import ByStructure
+from hysim.models.model import family
+
+
+@family
+class MaxwellSlip(ByStructure, ClampLaw):
+    """Maxwell-slip law, ``F = offset + feedthrough u + sum k_i (u - z_i)``.
+
+    Parameters
+    ----------
+    stiffness : sequence of float, length n_elements
+        k_i, of any sign [unit of y / unit of u].
+    slips : sequence of float, length n_elements
+        Elongation d_i at which each element slips, not negative [unit of u].
+    feedthrough : float
+        Stiffness of a spring beside them that does not slip [unit of y / unit of u].
+    offset : float
+        Output at rest at u = 0 [unit of y].
+    z0 : float or sequence of float, length n_elements
+        Positions of the blocks before the first sample, which may pull them along [unit of u].
+
+    Raises
+    ------
+    ValueError
+        If lengths differ, a number is not finite, or an elongation is negative.
+
+    Notes
+    -----
+    A law without elements, the default, is a line; as a start of `hysim.identify` it leaves the elements to
+    the record, as ``MaxwellSlip.structure()`` does.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> law = hs.MaxwellSlip.from_limits(stiffness=(4.0, 2.0), limits=(1.0, 2.0))
+    >>> law.slips
+    (0.25, 1.0)
+    >>> law.response([0.0, 0.25, 2.0, 1.5, -2.0]).tolist()
+    [0.0, 1.5, 3.0, 0.0, -3.0]
+    """
+
+    thresholds_name: ClassVar[str] = "slips"
+    weights_name: ClassVar[str] = "stiffness"
+    stops: ClassVar[bool] = True
+    bank: ClassVar[bool] = True
+
+    stiffness: tuple[float, ...] = ()
+    slips: tuple[float, ...] = ()
+    feedthrough: float = 0.0
+    offset: float = 0.0
+    z0: tuple[float, ...] = (0.0,)
+
+    @classmethod
+    def from_limits(
+        cls, *, stiffness: npt.ArrayLike, limits: npt.ArrayLike, feedthrough: float = 0.0, offset: float = 0.0
+    ) -> Self:
+        """The law by the force at which each element slips.
+
+        Parameters
+        ----------
+        stiffness : sequence of float, length n_elements
+            k_i, not zero [unit of y / unit of u].
+        limits : sequence of float, length n_elements
+            f_i = k_i d_i, of the sign of k_i [unit of y].
+        feedthrough, offset : float
+            As in the constructor.
+
+        Returns
+        -------
+        MaxwellSlip
+            With blocks at zero before the first sample.
+
+        Raises
+        ------
+        ValueError
+            If lengths differ, a stiffness is zero, or a limit has the other sign.
+        """
+        k, f = (read_only(values, name, ndim=1) for values, name in ((stiffness, "stiffness"), (limits, "limits")))
+        if k.size != f.size:
+            raise ValueError(f"stiffness and limits must be equally long, got {k.size} and {f.size}")
+        if not k.all() or (f * k < 0.0).any():
+            raise ValueError(f"a stiffness must not be zero, and its limit has its sign, got {k} and {f}")
+        return cls(stiffness=tuple(k.tolist()), slips=tuple((f / k).tolist()), feedthrough=feedthrough, offset=offset)
+
+    @classmethod
+    def structure(cls, *, elements: int = 10, slips: npt.ArrayLike = (), one_signed: bool = True) -> ClampStructure:
+        """What `hysim.identify` takes: where the elements slip.
+
+        Parameters
+        ----------
+        elements : int
+            Their number, with elongations in even steps up to less than half the span of the input.
+        slips : sequence of float, optional
+            The elongations themselves [unit of u].
+        one_signed : bool
+            Whether every stiffness has the sign of the record's loop (positive for a clockwise one).
+
+        Returns
+        -------
+        ClampStructure
+
+        Raises
+        ------
+        ValueError, TypeError
+            If the number is not a positive int, or an elongation is not a finite number.
+        """
+        given = tuple(read_only(slips, "slips", ndim=1).tolist())
+        return ClampStructure(law=cls, thresholds=given, plays=elements, one_signed=one_signed)
+
+    @property
+    def limits(self) -> tuple[float, ...]:
+        """Largest force of each element, f_i = k_i d_i [unit of y]."""
+        return tuple(k * d for k, d in zip(self.stiffness, self.slips, strict=True))
+
+    @property
+    def saturation(self) -> float:
+        """What the elements together tend to on a long way upwards, the sum of their limits [unit of y]."""
+        return sum(self.limits)
+
+    def to_prandtl_ishlinskii(self) -> PrandtlIshlinskii:
+        """The same law as a sum of plays: weights -k_i beside their sum at the threshold zero.
+
+        Raises
+        ------
+        ValueError
+            If elements that slip at one elongation begin at different positions: no play stands at both.
+        """
+        slope, slips, weights = self.as_plays
+        thresholds, element = np.unique(np.concatenate([[0.0], slips]), return_inverse=True)
+        positions = np.zeros(thresholds.size)
+        z0 = self.elements[2][np.argsort(self.slips, kind="stable")]
+        positions[element[1:]] = z0
+        if not np.array_equal(positions[element[1:]], z0):
+            raise ValueError("elements of equal slips must have equal z0 to be one play")
+        return PrandtlIshlinskii(
+            thresholds=tuple(thresholds.tolist()),
+            weights=tuple(np.bincount(element, np.concatenate([[slope], weights])).tolist()),
+            offset=self.offset,
+            z0=tuple(positions.tolist()),
+        )
+
+    def as_structure(self) -> ClampStructure:
+        """The structure with the thresholds of this law, or with those by default where it has none."""
+        one_signed = all(k >= 0.0 for k in self.stiffness) or all(k <= 0.0 for k in self.stiffness)
+        return ClampStructure(law=type(self), thresholds=self.slips, one_signed=one_signed)

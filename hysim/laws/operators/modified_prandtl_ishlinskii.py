@@ -1,0 +1,193 @@
+"""The modified Prandtl-Ishlinskii law: plays, and behind them dead zones, for loops that are not odd.
+
+    x = sum_i w_i z_i,    z_i(k) = min(max(z_i(k-1), u_k - r_i), u_k + r_i)
+    y = offset + S(x),    S(x) = sum_j c_j S_(d_j)(x)
+    S_d(x) = max(x - d, 0) for d > 0,    min(x - d, 0) for d < 0,    x for d = 0
+
+u is the input, z_i the memory, y the output. S is a broken line through zero, of the slope c_0 about zero and
+c_0 + c_1 + ... + c_j beyond the j-th threshold on either side. Where these sums have one sign it has an inverse
+of its own kind, each side by the formulas of the plays,
+
+    c'_0 = 1 / c_0,    c'_j = -c_j / (s_j s_(j-1)),    d'_j = sum_(i<=j) c_i (d_j - d_i)
+
+and the law's is that of the plays behind it, u = H^-1[S^-1(y - offset)].
+
+Source: K. Kuhnen, Modeling, identification and compensation of complex hysteretic nonlinearities: a modified
+Prandtl-Ishlinskii approach, European J. Control 9 (2003).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, read_only
+from hysim.laws.operators._dead_zone_search import DeadZoneStructure
+from hysim.laws.operators._play_sums import ExtendedPlays, check_dead_zones, dead_zone, kernel_rows
+from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii, wrong_sum
+from hysim.models.law import Packed, State, Tables
+from hysim.models.model import family
+
+
+@family
+class ModifiedPrandtlIshlinskii(ExtendedPlays):
+    """Modified Prandtl-Ishlinskii law, ``y = offset + sum c_j S_j(sum w_i z_i)``: plays, then dead zones.
+
+    Parameters
+    ----------
+    thresholds : sequence of float, length n_plays
+        r_i, not negative and increasing [unit of u]. The play of threshold zero is the input itself.
+    weights : sequence of float, length n_plays
+        w_i, of any sign [unit of x / unit of u].
+    dead_zones : sequence of float, length n_zones
+        Thresholds d_j, increasing [unit of x]. That of threshold zero is x itself.
+    dead_zone_weights : sequence of float, length n_zones
+        c_j, of any sign [unit of y / unit of x].
+    offset : float
+        Output at rest at u = 0 [unit of y].
+    z0 : float or sequence of float, length n_plays
+        Positions before the first sample, which pushes them [unit of u].
+
+    Raises
+    ------
+    ValueError
+        If lengths differ, a number is not finite, thresholds are negative, or either thresholds do not increase.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> law = hs.ModifiedPrandtlIshlinskii(
+    ...     thresholds=(0.0, 0.5), weights=(1.0, 2.0), dead_zones=(0.0, 1.0), dead_zone_weights=(1.0, 0.5)
+    ... )
+    >>> law.response([0.0, 1.0, 0.5, -1.0]).tolist()
+    [0.0, 2.5, 1.75, -2.0]
+    >>> law.inverse_response([0.0, 2.5, 1.75, -2.0]).tolist()
+    [0.0, 1.0, 0.5, -1.0]
+    """
+
+    thresholds: tuple[float, ...] = ()
+    weights: tuple[float, ...] = ()
+    dead_zones: tuple[float, ...] = (0.0,)
+    dead_zone_weights: tuple[float, ...] = (1.0,)
+    offset: float = 0.0
+    z0: tuple[float, ...] = (0.0,)
+
+    @classmethod
+    def check(cls, tables: Tables) -> None:
+        """Refuse elements that are no plays or no dead zones."""
+        super().check(tables)
+        check_dead_zones(tables["dead_zones"], tables["dead_zone_weights"])
+
+    @classmethod
+    def structure(
+        cls,
+        *,
+        plays: int = 10,
+        thresholds: npt.ArrayLike = (),
+        one_signed: bool = True,
+        dead_zones: int | npt.ArrayLike = 5,
+    ) -> DeadZoneStructure:
+        """What `hysim.identify` takes: where the plays and the dead zones are.
+
+        Parameters
+        ----------
+        plays, thresholds, one_signed
+            As of `PrandtlIshlinskii.structure`.
+        dead_zones : int or sequence of float
+            Their number beside that of threshold zero, whose weight is held at one, with thresholds in even steps
+            inside the range that the plays alone would give; or the thresholds themselves [unit of x].
+
+        Returns
+        -------
+        DeadZoneStructure
+
+        Raises
+        ------
+        ValueError, TypeError
+            As `PrandtlIshlinskii.structure`, or if dead zones do not increase.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> fit = hs.identify(hs.ModifiedPrandtlIshlinskii.structure(plays=4, dead_zones=2), hs.datasets.table1())
+        >>> fit.n_parameters
+        7
+        """
+        counted = isinstance(dead_zones, int)
+        return DeadZoneStructure(
+            law=cls,
+            plays=PrandtlIshlinskii.structure(plays=plays, thresholds=thresholds, one_signed=one_signed),
+            count=dead_zones if isinstance(dead_zones, int) else 0,
+            dead_zones=() if counted else tuple(read_only(dead_zones, "dead_zones", ndim=1).tolist()),
+        )
+
+    def is_invertible(self) -> bool:
+        """Whether r_0 = 0, one dead zone has the threshold zero, and the sums of both weights have one sign each."""
+        return self.plays.is_invertible() and self._refusal() is None
+
+    def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
+        """Input that gives the output `y`, monotone between the samples: the inverse of S, then that of the plays.
+
+        Parameters
+        ----------
+        y : array, shape (n_samples,)
+            Wanted output.
+        u0 : float, optional
+            Input at which the law rests before it moves to the first sample; by default the first sample
+            finds the plays at z0.
+        state : tuple of float, optional
+            Input and positions to continue from, in place of u0 and z0.
+
+        Returns
+        -------
+        array, shape (n_samples,)
+            Its `response` is y to rounding.
+
+        Raises
+        ------
+        ValueError
+            If the law is not invertible (it says which weight is in the way), z0 holds positions that no input
+            leads to, or y is not finite or has not one axis.
+        """
+        if (refusal := self._refusal()) is not None:
+            raise ValueError(refusal)
+        wanted = read_only(y, "y", ndim=1) - self.offset
+        slope = self.dead_zone_weights[self.dead_zones.index(0.0)]
+        x = wanted / slope
+        for side in (1.0, -1.0):
+            inverse = self._side(side).inverse()
+            for threshold, weight in zip(inverse.thresholds[1:], inverse.weights[1:], strict=True):
+                x += weight * dead_zone(wanted, np.copysign(threshold, side * slope))
+        return self.plays.inverse_response(x, u0, state)
+
+    @classmethod
+    def pack(cls, tables: Tables) -> Packed:
+        """Rows with dead zones; see `hysim.kernels.play_sums`."""
+        behind = tables["dead_zones"], tables["dead_zone_weights"]
+        return Packed(kernel_rows(tables, behind=behind), cls.initial_memory(tables))
+
+    def as_structure(self) -> DeadZoneStructure:
+        """The structure with the thresholds of this law, or with those by default where it has none."""
+        plays = replace(PrandtlIshlinskii.structure(thresholds=self.thresholds), one_signed=self.plays.is_one_signed())
+        own = self.dead_zones if self.thresholds else ()
+        count = 0 if own else 5
+        return DeadZoneStructure(law=type(self), plays=plays, dead_zones=own, count=count, weights=self.weights)
+
+    def _side(self, side: float) -> PrandtlIshlinskii:
+        """Plays whose initial curve is the sum of the dead zones from zero upwards, or (side = -1) downwards."""
+        ranked = sorted(zip((side * d for d in self.dead_zones), self.dead_zone_weights, strict=True))
+        thresholds, weights = zip(*((d, c) for d, c in ranked if d >= 0.0), strict=True)
+        return PrandtlIshlinskii(thresholds=tuple(np.abs(thresholds).tolist()), weights=weights)
+
+    def _refusal(self) -> str | None:
+        if 0.0 not in self.dead_zones:
+            return "the law has no inverse: without a dead zone of threshold zero its output stands still about x = 0"
+        for side in (1.0, -1.0):
+            zones = self._side(side)
+            if (wrong := wrong_sum(zones.weights)) is not None:
+                return (
+                    f"the law has no inverse: from the dead zone 0 outwards the sums of weights must have one sign, "
+                    f"but with the weight {zones.weights[wrong]:g} of the dead zone "
+                    f"{side * zones.thresholds[wrong]:g} they come to {sum(zones.weights[: wrong + 1]):g}"
+                )
+        return None

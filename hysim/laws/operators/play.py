@@ -1,0 +1,120 @@
+"""The play and the stop, of which the other rate-independent operators are built.
+
+    z_k = min(max(z_(k-1), u_k - r), u_k + r)
+    y   = offset + gain z             Play: backlash of half width r; its loop runs counterclockwise
+    y   = offset + gain (u - z)       Stop: a spring that slips at the elongation r; clockwise
+
+u is the input, z the position that it pushes, r the threshold. Both are exact at the samples of an input that
+is monotone between them, and do not depend on time. The stop is an elastic-perfectly plastic element; z is
+then the place to which its spring is fixed.
+
+Sources: M. A. Krasnosel'skii and A. V. Pokrovskii, Systems with Hysteresis, 1989.
+"""
+
+from typing import ClassVar
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.laws.operators._clamps import ClampLaw
+from hysim.models.model import family
+from hysim.models.parameters import Parameter
+from hysim.models.search_space import Parameters
+from hysim.records import Record
+
+
+class _Element(ClampLaw):
+    """One play or stop."""
+
+    thresholds_name: ClassVar[str] = "threshold"
+    weights_name: ClassVar[str] = "gain"
+    bank: ClassVar[bool] = False
+    threshold: float
+    gain: float
+
+    searched = (
+        Parameter("threshold", 1e-3, 1.5, unit="h"),
+        Parameter("z0", -1.0, 1.0, unit="h", from_first=True),
+        Parameter("gain", affine=True),
+        Parameter("offset", affine=True),
+    )
+    starts = tuple({"threshold": share, "z0": 0.0} for share in (0.1, 0.3, 0.6))
+    screened = 256
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """Columns z (or u - z), 1 and 0 of the output, shape (n_sets, n_samples, 3)."""
+        element = self.outputs({**parameters, "gain": 1.0, "offset": 0.0}, record.u)
+        return np.stack([element, np.ones_like(element), np.zeros_like(element)], axis=-1)
+
+
+@family
+class Play(_Element):
+    """Play (backlash) of half width r, ``y = offset + gain z``.
+
+    Parameters
+    ----------
+    threshold : float
+        Half width r, not negative [unit of u].
+    gain : float
+        [unit of y / unit of u].
+    offset : float
+        Output at z = 0 [unit of y].
+    z0 : float
+        Position before the first sample, which pushes it [unit of u].
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite, or the threshold is negative.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> hs.Play(threshold=0.25, gain=2.0).response([0.0, 1.0, 0.75, 0.0]).tolist()
+    [0.0, 1.5, 1.5, 0.5]
+    """
+
+    stops: ClassVar[bool] = False
+    threshold: float = 1.0
+    gain: float = 1.0
+    offset: float = 0.0
+    z0: float = 0.0
+
+
+@family
+class Stop(_Element):
+    """Stop (elastic-perfectly plastic element), ``y = offset + gain (u - z)``.
+
+    Parameters
+    ----------
+    threshold : float
+        Elongation r at which it slips, not negative [unit of u].
+    gain : float
+        Stiffness [unit of y / unit of u].
+    offset : float
+        Output of the relaxed element [unit of y].
+    z0 : float
+        Where it is fixed before the first sample, which may pull it along [unit of u].
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite, or the threshold is negative.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> hs.Stop(threshold=0.25, gain=2.0).response([0.0, 1.0, 0.75, 0.0]).tolist()
+    [0.0, 0.5, 0.0, -0.5]
+    """
+
+    stops: ClassVar[bool] = True
+    threshold: float = 1.0
+    gain: float = 1.0
+    offset: float = 0.0
+    z0: float = 0.0
+
+    @property
+    def saturation(self) -> float:
+        """What y - offset tends to on a long way upwards: gain r; its negative on the way down."""
+        return self.gain * self.threshold

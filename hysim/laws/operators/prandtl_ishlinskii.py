@@ -1,0 +1,244 @@
+"""The Prandtl-Ishlinskii law: a weighted sum of plays, and its exact inverse.
+
+    z_i(k) = min(max(z_i(k-1), u_k - r_i), u_k + r_i),    0 <= r_0 < r_1 < ...
+    y      = offset + sum_i w_i z_i
+
+u is the input, z_i the memory, y the output. Positive weights give the counterclockwise loops of
+piezoelectric stacks, negative ones beside a large w_0 the clockwise ones of a force. The slope after a
+reversal grows through the sums s_i = w_0 + ... + w_i. Where r_0 = 0 and all s_i have one sign the output is
+monotone in the input, and the inverse is a law of the same kind (with s_-1 = 0, and the sum for i = 0 left out)
+
+    w'_0 = 1 / w_0,    w'_i = -w_i / (s_i s_(i-1))
+    r'_i = |sum_(j<=i) w_j (r_i - r_j)|
+    z'_i = sum_(j<=i) w_j z_i + sum_(j>i) w_j z_j
+
+An offset c moves the inverse's own input: u = sum w'_i (z'_i - c), where z'_i begins c further on.
+
+Sources: K. Kuhnen, European J. Control 9 (2003), for the inverse; P. Krejci and K. Kuhnen, IEE Proc. Control
+Theory Appl. 148 (2001).
+"""
+
+import math
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, read_only
+from hysim.kernels import inverses
+from hysim.laws.operators._clamp_search import ClampStructure
+from hysim.laws.operators._clamps import ClampLaw
+from hysim.models.by_structure import ByStructure
+from hysim.models.law import State
+from hysim.models.model import family
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
+
+_CONSISTENT = 1e-9  # of the largest threshold: what rounding may add to the distance of two plays
+
+
+@family
+class PrandtlIshlinskii(ByStructure, ClampLaw):
+    """Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i`` over plays of the thresholds r_i.
+
+    Parameters
+    ----------
+    thresholds : sequence of float, length n_plays
+        r_i, not negative and increasing [unit of u]. The play of threshold zero is the input itself.
+    weights : sequence of float, length n_plays
+        w_i, of any sign [unit of y / unit of u].
+    offset : float
+        Output at rest at u = 0 [unit of y].
+    z0 : float or sequence of float, length n_plays
+        Positions before the first sample, which pushes them [unit of u].
+
+    Raises
+    ------
+    ValueError
+        If lengths differ, a number is not finite, or the thresholds are negative or do not increase.
+
+    Notes
+    -----
+    A law without plays, the default, is a constant; as a start of `hysim.identify` it leaves the plays to
+    the record, as ``PrandtlIshlinskii.structure()`` does.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> law = hs.PrandtlIshlinskii(thresholds=(0.0, 0.5), weights=(1.0, 2.0))
+    >>> law.response([0.0, 1.0, 0.5, -1.0]).tolist()
+    [0.0, 2.0, 1.5, -2.0]
+    >>> law.inverse_response([0.0, 2.0, 1.5, -2.0]).tolist()
+    [0.0, 1.0, 0.5, -1.0]
+    """
+
+    thresholds_name: ClassVar[str] = "thresholds"
+    weights_name: ClassVar[str] = "weights"
+    stops: ClassVar[bool] = False
+    bank: ClassVar[bool] = True
+    ordered: ClassVar[bool] = True
+
+    thresholds: tuple[float, ...] = ()
+    weights: tuple[float, ...] = ()
+    offset: float = 0.0
+    z0: tuple[float, ...] = (0.0,)
+
+    @classmethod
+    def structure(cls, *, plays: int = 10, thresholds: npt.ArrayLike = (), one_signed: bool = True) -> ClampStructure:
+        """What `hysim.identify` takes: where the plays are.
+
+        Parameters
+        ----------
+        plays : int
+            Their number, with thresholds from zero in even steps over half the span of the input.
+        thresholds : sequence of float, optional
+            The thresholds themselves [unit of u].
+        one_signed : bool
+            Whether all weights past the threshold zero have the sign of the record's loop (positive for a
+            counterclockwise one). Else they are free, and may be of alternating signs on noisy records.
+
+        Returns
+        -------
+        ClampStructure
+
+        Raises
+        ------
+        ValueError, TypeError
+            If the number is not a positive int, or a threshold is not a finite number.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> fit = hs.identify(hs.PrandtlIshlinskii.structure(plays=4), hs.datasets.table1())
+        >>> fit.n_parameters, round(fit.fit_percent, 1)
+        (5, 93.5)
+        """
+        return ClampStructure(
+            law=cls, thresholds=tuple(read_only(thresholds, "thresholds", ndim=1).tolist()), plays=plays,
+            one_signed=one_signed,
+        )  # fmt: skip
+
+    def is_one_signed(self) -> bool:
+        """Whether all weights past the threshold zero have one sign."""
+        lagging = [weight for weight, threshold in zip(self.weights, self.thresholds, strict=True) if threshold > 0.0]
+        return all(weight >= 0.0 for weight in lagging) or all(weight <= 0.0 for weight in lagging)
+
+    def is_invertible(self) -> bool:
+        """Whether r_0 = 0 and the sums w_0 + ... + w_i have one sign: then there is an `inverse`."""
+        return self.refusal() is None
+
+    def refusal(self) -> str | None:
+        """Why there is no `inverse`; None where there is one."""
+        if not self.thresholds or self.thresholds[0] > 0.0:
+            return "the law has no inverse: without a play of threshold zero its output stands still at a reversal"
+        if (wrong := wrong_sum(self.weights)) is None:
+            return None
+        return (
+            f"the law has no inverse: the sums of weights w_0 + ... + w_i must have one sign, but from "
+            f"{self.weights[0]:g} for i = 0 they come to {sum(self.weights[: wrong + 1]):g} for i = {wrong}"
+        )
+
+    def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
+        """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""
+        y0 = float(self.response([u0])[0])
+        forward, inverse = self.compiled(u0), self.inverse().compiled(y0)
+        return CompiledLaw(
+            inverses.plays,
+            read_only(np.concatenate([limits, inverse.parameters, forward.parameters]), finite=False),
+            np.concatenate([[u0, y0], inverse.state, forward.state, inverse.state]),
+        )
+
+    def inverse(self) -> "PrandtlIshlinskii":
+        """The law that gives the input for a wanted output, exactly.
+
+        Returns
+        -------
+        PrandtlIshlinskii
+            Its first sample finds it as this law's first sample finds this one.
+
+        Raises
+        ------
+        ValueError
+            If the law is not invertible, or z0 holds positions that no input leads to.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> law = hs.PrandtlIshlinskii(thresholds=(0.0, 0.5), weights=(1.0, 1.0))
+        >>> law.inverse()
+        PrandtlIshlinskii(thresholds=(0.0, 0.5), weights=(1.0, -0.5), offset=0.0, z0=(0.0, 0.0))
+        """
+        if (refusal := self.refusal()) is not None:
+            raise ValueError(refusal)
+        r, w, z = self.elements
+        z = _consistent(r, z)
+        sums = np.cumsum(w)
+        weights = np.concatenate([1.0 / w[:1], -w[1:] / (sums[1:] * sums[:-1])])
+        thresholds = np.abs(np.concatenate([[0.0], np.cumsum(sums[:-1] * np.diff(r))]))
+        later = np.concatenate([np.cumsum((w * z)[::-1])[::-1][1:], [0.0]])
+        return PrandtlIshlinskii(
+            thresholds=tuple(thresholds.tolist()),
+            weights=tuple(weights.tolist()),
+            offset=0.0 - self.offset * float(weights.sum()),
+            z0=tuple((sums * z + later + self.offset).tolist()),
+        )
+
+    def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
+        """Input that gives the output `y`, monotone between the samples.
+
+        Parameters
+        ----------
+        y : array, shape (n_samples,)
+            Wanted output.
+        u0 : float, optional
+            Input at which the law rests before it moves to the first sample; by default the first sample
+            finds the plays at z0.
+        state : tuple of float, optional
+            Input and positions to continue from, in place of u0 and z0.
+
+        Returns
+        -------
+        array, shape (n_samples,)
+            Its `response` is y to rounding.
+
+        Raises
+        ------
+        ValueError
+            If y is not finite or has not one axis, or as `inverse`.
+        """
+        if state is not None and u0 is not None:
+            raise ValueError("give u0 or state, not both: the state has its own input")
+        start = self.advance([u0])[1] if state is None and u0 is not None else state
+        law = self if start is None else replace(self, z0=start[1:])
+        return law.inverse().response(y)
+
+    def as_structure(self) -> ClampStructure:
+        """The structure with the thresholds of this law, or with those by default where it has none."""
+        return ClampStructure(law=type(self), thresholds=self.thresholds, one_signed=self.is_one_signed())
+
+
+def wrong_sum(weights: npt.ArrayLike) -> int | None:
+    """The first i for which the sum of the weights up to i has not the sign of the first weight, or is zero."""
+    sums = np.cumsum(weights)
+    wrong = np.flatnonzero(~(sums * np.sign(sums[0]) > 0.0))
+    return int(wrong[0]) if wrong.size else None
+
+
+def _consistent(r: FloatArray, z: FloatArray) -> FloatArray:
+    """The positions with that of threshold zero, which the first sample sets anyway, within reach of the others.
+
+    Raises
+    ------
+    ValueError
+        If two others are further apart than their thresholds, where no input takes them.
+    """
+    slack = _CONSISTENT * r[-1]
+    apart = np.abs(z[1:, np.newaxis] - z[1:]) - np.abs(r[1:, np.newaxis] - r[1:])
+    if (apart > slack).any():
+        i, j = (int(k) + 1 for k in np.argwhere(apart > slack)[0])
+        raise ValueError(
+            f"the law has no inverse from this z0: no input leads to the positions {z[i]:g} and {z[j]:g} of the "
+            f"plays {i} and {j}, which differ by more than their thresholds {r[i]:g} and {r[j]:g}"
+        )
+    lowest, highest = (z - r)[1:].max(initial=-np.inf), (z + r)[1:].min(initial=np.inf)
+    return np.concatenate([[min(max(float(z[0]), lowest), highest)], z[1:]])

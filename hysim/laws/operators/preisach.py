@@ -1,0 +1,393 @@
+"""The Preisach law: relays of all thresholds, weighted by a density.
+
+    y = offset + sum over a > b of w(a, b) R_ab[u],    R_ab = 1 once u has reached a, -1 once it has reached b
+
+u is the input and y the output. Half of what the output changes by between the turning points a > b is the Everett
+function, the weight of the relays that switch on the way,
+
+    E(a, b) = integral of w over b < b' < a' < a,    y = y_0 + 2 (E(x_1, x_0) - E(x_1, x_2) + E(x_3, x_2) - ...)
+
+along the dominant extremes x_k of the input; a larger one wipes out smaller ones. Two laws hold the same table of
+weights over pairs of intervals between levels. `PreisachRelays` has one relay for each, at the upper end of the one
+and the lower end of the other: its output jumps. `Preisach` spreads the weight evenly over the pair of two intervals,
+and along the diagonal a = b that of one interval with itself. E is then bilinear between the levels, and the output
+piecewise linear in the input, with the slope of the diagonal's weight at once after a reversal. Where the
+input stops at levels only, the two laws agree.
+
+The inverse runs the same recursion on the outputs: as E is monotone, the dominant extremes of the output are those
+of the input. Each stretch ends on a piece on which y is linear, so that it is exact.
+
+Sources: F. Preisach, Z. Phys. 94 (1935); D. H. Everett, Trans. Faraday Soc. 51 (1955); I. D. Mayergoyz,
+Mathematical Models of Hysteresis, 1991, for first-order reversal curves and the interpolation of E.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import ClassVar, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._cycles import TOLERANCE
+from hysim._frozen import FloatArray, read_only
+from hysim._parallel import in_pieces
+from hysim.errors import SimulationError
+from hysim.kernels import preisach as kernels
+from hysim.kernels.stepping import drive
+from hysim.laws.operators._preisach_search import SearchedRelays
+from hysim.laws.operators._relays import everett_of, weights_of
+from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
+from hysim.models.law import State
+from hysim.models.model import family
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
+from hysim.records import Record
+
+Density = Callable[[FloatArray, FloatArray], npt.ArrayLike]
+"""Weight of relays per area at arrays of upper and lower thresholds of one shape."""
+
+_POINTS = 8  # of Gauss's rule on an interval
+
+_ROOM = 1000  # extremes that the inverse keeps in a loop
+
+
+@family
+class PreisachRelays(SearchedRelays):
+    """Preisach law of single relays, ``y = offset + sum w_ij R_ij``.
+
+    Parameters
+    ----------
+    levels : sequence of float, length N + 1
+        L_0 < L_1 < ... [unit of u].
+    weights : sequence of float, length N (N + 1) / 2
+        w_ij for j <= i, row by row [unit of y]: that of the relay which goes up where the input reaches L_(i+1), and
+        down where it reaches L_j.
+    offset : float
+        Mean of the outputs of all relays up and of all down [unit of y].
+    z0 : sequence of float
+        Inputs before the first sample, the oldest first; before them all relays are down [unit of u].
+
+    Raises
+    ------
+    ValueError
+        If lengths do not fit, a number is not finite, or the levels do not increase.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> law = hs.PreisachRelays(levels=(0.0, 1.0, 2.0), weights=(1.0, 0.5, 1.0))
+    >>> law.response([0.0, 1.5, 2.0, 1.5, 0.5, 0.0]).tolist()
+    [-2.5, -0.5, 2.5, 2.5, 0.5, -2.5]
+    """
+
+    spread: ClassVar[bool] = False
+
+    levels: tuple[float, ...] = ()
+    weights: tuple[float, ...] = ()
+    offset: float = 0.0
+    z0: tuple[float, ...] = ()
+
+
+@family
+class Preisach(SearchedRelays):
+    """Preisach law of a density that is even between levels; its output is continuous.
+
+    Parameters
+    ----------
+    levels : sequence of float, length N + 1
+        L_0 < L_1 < ... [unit of u]. Beyond them the law is saturated.
+    weights : sequence of float, length N (N + 1) / 2
+        w_ij for j <= i, row by row [unit of y]: that of all relays whose upper threshold is in the interval i and
+        whose lower one is in the interval j. Those of w_ii switch up and down at the same input.
+    offset : float
+        Mean of the outputs of all relays up and of all down [unit of y].
+    z0 : sequence of float
+        Inputs before the first sample, the oldest first; before them all relays are down [unit of u].
+
+    Raises
+    ------
+    ValueError
+        If lengths do not fit, a number is not finite, or the levels do not increase.
+
+    Notes
+    -----
+    A law without relays, the default, is a constant; as a start of `hysim.identify` it leaves the levels to the
+    record, as ``Preisach.structure()`` does.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> law = hs.Preisach(levels=(0.0, 1.0, 2.0), weights=(1.0, 0.5, 1.0))
+    >>> law.response([0.0, 1.5, 2.0, 1.5, 0.5, 0.0]).tolist()
+    [-2.5, 1.0, 2.5, 1.5, -1.0, -2.5]
+    >>> law.inverse_response([-2.5, 1.0, 2.5, 1.5]).tolist()
+    [0.0, 1.5, 2.0, 1.5]
+    """
+
+    spread: ClassVar[bool] = True
+
+    levels: tuple[float, ...] = ()
+    weights: tuple[float, ...] = ()
+    offset: float = 0.0
+    z0: tuple[float, ...] = ()
+
+    @classmethod
+    def from_everett(cls, levels: npt.ArrayLike, everett: npt.ArrayLike, *, offset: float = 0.0) -> Self:
+        """The law whose Everett function is known at the pairs of levels.
+
+        Parameters
+        ----------
+        levels : sequence of float, length n_levels
+            [unit of u]
+        everett : array, shape (n_levels, n_levels)
+            Element [m, n], m > n, is half of what the output loses from the turning point at level m down to
+            level n [unit of y]. The others are not read.
+        offset : float
+            [unit of y]
+
+        Returns
+        -------
+        Preisach
+
+        Raises
+        ------
+        ValueError
+            If the shape is not that of the levels, or as in the constructor.
+        """
+        grid, table = read_only(levels, "levels", ndim=1), read_only(everett, "everett", ndim=2, finite=False)
+        if table.shape != (grid.size, grid.size):
+            raise ValueError(f"everett must have the shape {(grid.size, grid.size)} of the levels, got {table.shape}")
+        return cls(levels=tuple(grid), weights=tuple(weights_of(table)), offset=offset)
+
+    @classmethod
+    def from_density(cls, levels: npt.ArrayLike, density: Density, *, offset: float = 0.0) -> Self:
+        """The law with the weights of a density w(a, b), integrated over each pair of intervals.
+
+        Parameters
+        ----------
+        levels : sequence of float, length n_levels
+            [unit of u]
+        density : callable
+            ``density(a, b)`` at arrays of upper and lower thresholds [unit of y / unit of u^2].
+        offset : float
+            [unit of y]
+
+        Returns
+        -------
+        Preisach
+
+        Raises
+        ------
+        ValueError
+            As in the constructor, or if the density is not finite.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> law = hs.Preisach.from_density((0.0, 1.0, 2.0), lambda a, b: 3.0 + 0.0 * a)
+        >>> [round(weight, 12) for weight in law.weights]
+        [1.5, 3.0, 1.5]
+        """
+        grid = read_only(levels, "levels", ndim=1)
+        rows, columns = np.tril_indices(max(grid.size - 1, 0))
+        nodes, share = np.polynomial.legendre.leggauss(_POINTS)
+        p, q = (1.0 + nodes) / 2.0, (1.0 + nodes[:, np.newaxis]) / 2.0
+        length = np.diff(grid)
+        diagonal = (rows == columns)[:, np.newaxis, np.newaxis]
+        reach = np.where(diagonal, p, 1.0)  # of b on the way up to a
+        a = grid[rows][:, np.newaxis, np.newaxis] + length[rows][:, np.newaxis, np.newaxis] * p
+        b = grid[columns][:, np.newaxis, np.newaxis] + length[columns][:, np.newaxis, np.newaxis] * reach * q
+        area = (length[rows] * length[columns] / 4.0)[:, np.newaxis, np.newaxis] * np.outer(share, share) * reach
+        weights = np.sum(area * np.asarray(density(np.broadcast_to(a, b.shape), b), dtype=float), axis=(1, 2))
+        return cls(levels=tuple(grid), weights=tuple(weights), offset=offset)
+
+    @classmethod
+    def from_plays(cls, levels: npt.ArrayLike, law: PrandtlIshlinskii) -> Self:
+        """The law that has a Prandtl-Ishlinskii law's Everett function at the pairs of levels.
+
+        A play of threshold r is a line of relays with a - b = 2 r. Where the input stops at the levels only, the two
+        laws agree once the plays have been pushed from the lowest level or below; elsewhere E is interpolated.
+
+        Parameters
+        ----------
+        levels : sequence of float, length n_levels
+            [unit of u]
+        law : PrandtlIshlinskii
+            Its z0 is not read.
+
+        Returns
+        -------
+        Preisach
+
+        Raises
+        ------
+        ValueError
+            As in the constructor.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> plays = hs.PrandtlIshlinskii(thresholds=(0.0, 0.5), weights=(1.0, 2.0))
+        >>> law = hs.Preisach.from_plays((-2.0, -1.0, 0.0, 1.0, 2.0), plays)
+        >>> law.response([-2.0, 2.0, -1.0, 0.0]).tolist(), plays.response([-2.0, 2.0, -1.0, 0.0]).tolist()
+        ([-5.0, 5.0, -2.0, -1.0], [-5.0, 5.0, -2.0, -1.0])
+        """
+        grid = read_only(levels, "levels", ndim=1)
+        thresholds, weights, _ = law.elements
+        falls = grid[:, np.newaxis, np.newaxis] - grid[:, np.newaxis] - 2.0 * thresholds
+        everett = 0.5 * np.maximum(falls, 0.0) @ weights
+        lowest = law.offset + float(weights @ (grid[0] + thresholds))
+        return cls.from_everett(grid, everett, offset=lowest + float(everett[-1, 0]))
+
+    @classmethod
+    def from_reversal_curves(cls, record: Record, *, tolerance: float = TOLERANCE) -> Self:
+        """The law whose Everett function is read from first-order reversal curves.
+
+        ::
+
+            E(a, b) = (y_a - y_ab) / 2
+
+        y_a is the output where the input turns at a on its way up from the lowest one, and y_ab where it is back at b.
+
+        Parameters
+        ----------
+        record : Record
+            Ways up from the lowest input to rising turning points, each followed by the way down to the lowest
+            input, such as `hysim.signals.reversal_curves` has. The turning points become the levels.
+        tolerance : float
+            Retreats of the input up to this fraction of its span are ignored: noise.
+
+        Returns
+        -------
+        Preisach
+
+        Raises
+        ------
+        ValueError
+            If the input does not turn, or a curve does not begin and end at the lowest input.
+
+        Notes
+        -----
+        Noise of the standard deviation s leaves some s in each weight, of either sign. ``hs.identify`` on the same
+        record and levels fits all samples at once with weights of one sign.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> law = hs.Preisach(levels=(0.0, 1.0, 2.0), weights=(1.0, 0.5, 1.0), offset=3.0)
+        >>> u = hs.signals.reversal_curves(0.0, 2.0, curves=2, samples_per_step=5)
+        >>> found = hs.Preisach.from_reversal_curves(hs.Record(u=u, y=law.response(u)))
+        >>> [round(weight, 12) for weight in found.weights], round(found.offset, 12)
+        ([1.0, 0.5, 1.0], 3.0)
+        """
+        low, slack = float(record.u.min()), tolerance * float(np.ptp(record.u))
+        falls = [branch for branch in record.branches(tolerance) if branch.u[-1] < branch.u[0]]
+        if not falls:
+            raise ValueError("the input never falls: a reversal curve is a way up and the way down after it")
+        for fall in falls:
+            if fall.u[-1] > low + slack:
+                raise ValueError(
+                    f"the way down from {fall.u[0]:g} must end at the lowest input {low:g}, it ends at {fall.u[-1]:g}"
+                )
+        falls.sort(key=lambda fall: float(fall.u[0]))
+        levels = np.array([low, *(float(fall.u[0]) for fall in falls)])
+        everett = np.zeros((levels.size, levels.size))
+        for m, fall in enumerate(falls, 1):
+            everett[m, :m] = 0.5 * (fall.y[0] - _at(levels[:m], fall))
+        lowest = float(np.mean([fall.y[-1] for fall in falls]))
+        return cls.from_everett(levels, everett, offset=lowest + float(everett[-1, 0]))
+
+    def slope_bounds(self) -> tuple[float, float]:
+        """Lowest and highest slope dy/du over every input between the levels.
+
+        Where the input rises in the interval i, the relays w_ij, w_i(j+1), ..., w_ii go up, where j is that of the last
+        minimum; where it falls in the interval j, w_jj, w_(j+1)j, ..., w_ij go down, where i is that of the last
+        maximum.
+        """
+        if not self.levels:
+            return 0.0, 0.0
+        everett, length = everett_of(np.array([self.weights]))[0], np.diff(self.levels)
+        below = np.tril_indices(length.size)
+        rising = np.diff(everett, axis=0)[:, :-1] / length[:, np.newaxis]
+        falling = (everett[1:, :-1] - everett[1:, 1:]) / length
+        slopes = 2.0 * np.concatenate([rising[below], falling[below]])
+        return float(slopes.min()), float(slopes.max())
+
+    def is_invertible(self) -> bool:
+        """Whether the slope has one sign for every input between the levels, and nowhere vanishes."""
+        low, high = self.slope_bounds()
+        return low * high > 0.0
+
+    def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
+        """Input that gives the output `y`, monotone between the samples.
+
+        Parameters
+        ----------
+        y : array, shape (n_samples,)
+            Wanted output.
+        u0 : float, optional
+            Input at which the law rests before it moves to the first sample; by default the first sample
+            finds the relays as z0 left them.
+        state : tuple of float, optional
+            Input and extremes to continue from, in place of u0 and z0.
+
+        Returns
+        -------
+        array, shape (n_samples,)
+            Its `response` is y to rounding.
+
+        Raises
+        ------
+        ValueError
+            If y is not finite or has not one axis, both u0 and state are given, or the slope vanishes or
+            changes its sign.
+        SimulationError
+            If a sample is beyond the saturation; the message names it.
+        """
+        if state is not None and u0 is not None:
+            raise ValueError("give u0 or state, not both: the state has its own input")
+        wanted = read_only(y, "y", ndim=1)
+        past = state[1:] if state is not None else self.z0 if u0 is None else (*self.z0, u0)
+        u, inverse = np.empty(wanted.size), self.inverse_from(past, room=wanted.size)
+        lost = in_pieces(lambda k: drive(inverse.step, inverse.parameters, inverse.state, wanted[k], u[k]), u.size)
+        if lost >= 0:
+            bound = abs(float(self.everett[-1, 0]))
+            raise SimulationError(
+                f"the law has no inverse at sample {lost} (y = {wanted[lost]:g}): it saturates at "
+                f"{self.offset - bound:g} and {self.offset + bound:g}"
+            )
+        return u
+
+    def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
+        """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""
+        return self.inverse_from((*self.z0, u0), limits, room=_ROOM)
+
+    def inverse_from(self, past: State, limits: Limits = UNLIMITED, *, room: int = 0) -> CompiledLaw:
+        """The inverse after the inputs `past`, as `hysim.kernels.inverses` has it, with room for so many more extremes.
+
+        Raises
+        ------
+        ValueError
+            If the slope vanishes or changes its sign.
+        """
+        slowest, fastest = self.slope_bounds()
+        if not slowest * fastest > 0.0:
+            raise ValueError(
+                f"the law has no inverse: its slope must have one sign, but it goes from {slowest:g} to {fastest:g}"
+            )
+        sign = math.copysign(1.0, fastest)
+        rising = replace(self, weights=tuple(sign * np.array(self.weights)), offset=sign * self.offset)
+        parameters, x, y, d = rising._staircase(past, 1 + room)
+        x[d + 1 :] = y[d + 1 :] = 0.0
+        u = past[-1] if past else float(x[d])
+        return CompiledLaw(
+            kernels.inverse_step,
+            read_only(np.concatenate([limits, [sign], parameters]), finite=False),
+            np.concatenate([[u, sign * y[d], u, d], x, y]),
+        )
+
+
+def _at(levels: FloatArray, branch: Record) -> FloatArray:
+    """Outputs of a branch where its input passes the levels."""
+    order = np.argsort(branch.u, kind="stable")
+    return np.interp(levels, branch.u[order], branch.y[order])

@@ -1,0 +1,432 @@
+"""The rate-dependent Prandtl-Ishlinskii law: plays whose thresholds grow with the speed of the input.
+
+    rho_i(k) = r_i + beta |u'_k| for r_i > 0,  0 for r_0 = 0        u'_k = (u_k - u_(k-1)) / sample_time
+    z_i(k)   = max(u_k - rho_i(k), min(u_k + rho_i(k), z_i(k-1)))
+    y        = offset + sum_i w_i z_i
+
+u is the input, z_i the memory, y the output. The input moves evenly from one sample to the next; at the first
+sample it stands still. Where the speed is known beforehand, the thresholds are functions of time, and the inverse is
+a law of the same kind at the same speed, with the weights and thresholds of the plain law's inverse and
+
+    beta' = |w_0| beta
+
+because the distances of the thresholds past the first do not change in time. Where the speed is that of the input
+which is sought, each sample is one equation for it. With b = beta / sample_time and the sums s_i = w_0 + ... + w_i it
+has one solution, and its error does not grow from sample to sample, where all
+
+    s_i - 2 b |s_i - s_0|    (times the sign of s_0)
+
+are positive: samples must be further apart than about 2 beta. Closer ones follow the analytic inverse only.
+
+Sources: M. Al Janaideh and P. Krejci, IEEE/ASME Trans. Mechatronics 18 (2013), for the law and the analytic inverse;
+M. Al Janaideh, P. Krejci and G. A. Monteiro, Applications of Mathematics (2023). The condition on samples is ours.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, checked, read_only
+from hysim.kernels import play_sums as kernels
+from hysim.laws.operators._clamp_search import Axis, ClampStructure, half_span
+from hysim.laws.operators._play_sums import ExtendedPlays, kernel_rows, positions_of
+from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
+from hysim.models.batch import Reduction
+from hysim.models.by_structure import ByStructure
+from hysim.models.composable import Composable
+from hysim.models.law import Packed, State, Tables
+from hysim.models.model import family
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
+from hysim.models.search_space import Parameters
+from hysim.records import Record
+
+_LARGEST = 1.0  # of the widening at the record's highest speed, in half spans
+_STARTS = (0.0, 0.1, 0.3)
+
+
+@checked
+class PlaysAtSampleTime(ExtendedPlays):
+    """The law at one sample time, thresholds ``r_i + width |u_k - u_(k-1)|``: a law by its step."""
+
+    thresholds: tuple[float, ...] = ()
+    weights: tuple[float, ...] = ()
+    width: float = 0.0
+    offset: float = 0.0
+    z0: tuple[float, ...] = (0.0,)
+
+    @classmethod
+    def pack(cls, tables: Tables) -> Packed:
+        """Rows with wider thresholds; see `hysim.kernels.play_sums`."""
+        return Packed(kernel_rows(tables, width=tables["width"]), cls.initial_memory(tables))
+
+    def as_structure(self) -> ClampStructure:
+        """The structure with the thresholds of this law."""
+        return ClampStructure(law=PrandtlIshlinskii, thresholds=self.thresholds)
+
+    def response_at(self, u: npt.ArrayLike, widening: FloatArray) -> FloatArray:
+        """Output at the samples of `u` of plays whose thresholds are wider by `widening`, shape (n_samples,)."""
+        inputs = read_only(u, "u", ndim=1)
+        y = np.empty(inputs.size)
+        parameters = read_only(self.pack(self.tables).parameters[0])
+        kernels.widened(parameters, np.array([0.0, *self.z0]), inputs, read_only(widening), y)
+        return y
+
+
+@family
+class RateDependentPrandtlIshlinskii(ByStructure, Composable):
+    """Rate-dependent Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i``, thresholds ``r_i + beta |u'|``.
+
+    Parameters
+    ----------
+    thresholds : sequence of float, length n_plays
+        r_i at rest, not negative and increasing [unit of u]. The play of threshold zero is the input itself at
+        every speed.
+    weights : sequence of float, length n_plays
+        w_i, of any sign [unit of y / unit of u].
+    beta : float
+        Growth of the thresholds with the speed of the input, not negative [s].
+    offset : float
+        Output at rest at u = 0 [unit of y].
+    z0 : float or sequence of float, length n_plays
+        Positions before the first sample, which pushes them [unit of u].
+
+    Raises
+    ------
+    ValueError
+        If lengths differ, a number is not finite, beta or a threshold is negative, or the thresholds do not increase.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> law = hs.RateDependentPrandtlIshlinskii(thresholds=(0.0, 0.25), weights=(1.0, 1.0), beta=0.25)
+    >>> law.response([0.0, 1.0, 0.0], sample_time=1.0).tolist()
+    [0.0, 1.5, 0.5]
+    >>> law.response([0.0, 1.0, 0.0], sample_time=2.0).tolist()
+    [0.0, 1.625, 0.375]
+    >>> law.inverse_response([0.0, 1.5, 0.5], sample_time=1.0).tolist()
+    [0.0, 1.0, 0.0]
+    """
+
+    thresholds: tuple[float, ...] = ()
+    weights: tuple[float, ...] = ()
+    beta: float = 0.0
+    offset: float = 0.0
+    z0: tuple[float, ...] = (0.0,)
+
+    dynamic: ClassVar[bool] = True
+    thresholds_name: ClassVar[str] = "thresholds"
+    weights_name: ClassVar[str] = "weights"
+    stops: ClassVar[bool] = False
+    ordered: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "z0", self.plays.z0)
+        _check_beta(np.array(self.beta))
+
+    @property
+    def plays(self) -> PrandtlIshlinskii:
+        """The sum of plays for an input that stands still, without the offset."""
+        return PrandtlIshlinskii(thresholds=self.thresholds, weights=self.weights, z0=self.z0)
+
+    @classmethod
+    def structure(cls, *, plays: int = 10, thresholds: npt.ArrayLike = (), one_signed: bool = True) -> ClampStructure:
+        """What `hysim.identify` takes: where the plays are; beta is searched.
+
+        Parameters
+        ----------
+        plays, thresholds, one_signed
+            As of `PrandtlIshlinskii.structure`.
+
+        Returns
+        -------
+        ClampStructure
+
+        Raises
+        ------
+        ValueError, TypeError
+            As `PrandtlIshlinskii.structure`.
+        """
+        given = tuple(read_only(thresholds, "thresholds", ndim=1).tolist())
+        return ClampStructure(law=cls, thresholds=given, plays=plays, one_signed=one_signed, pushing=Widening())
+
+    def at(self, sample_time: float) -> PlaysAtSampleTime:
+        """The law at one sample time [s], as loops step it.
+
+        Raises
+        ------
+        ValueError
+            If the sample time is not positive.
+        """
+        if not sample_time > 0.0:
+            raise ValueError(f"sample_time must be positive, got {sample_time}")
+        return PlaysAtSampleTime(
+            thresholds=self.thresholds,
+            weights=self.weights,
+            width=self.beta / sample_time,
+            offset=self.offset,
+            z0=self.z0,
+        )
+
+    def memory(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
+        """Positions of the plays at the samples of `u`, shape (n_samples, n_plays); see `response`."""
+        return self.at(sample_time).memory(u)
+
+    def response(self, u: npt.ArrayLike, sample_time: float, *, speed: npt.ArrayLike | None = None) -> FloatArray:
+        """Output y at the samples of an input that moves evenly between them.
+
+        Parameters
+        ----------
+        u : array, shape (n_samples,)
+            Input; the first sample finds the plays at z0, and pushes them.
+        sample_time : float
+            Time between two samples [s].
+        speed : array, shape (n_samples,), optional
+            ``|u'|`` by which the thresholds grow, in place of the input's own [unit of u / s].
+
+        Returns
+        -------
+        array, shape (n_samples,)
+
+        Raises
+        ------
+        ValueError
+            If u is not finite or has not one axis, the sample time is not positive, or the speed is negative or of
+            another length.
+        """
+        law = self.at(sample_time)
+        return law.response(u) if speed is None else law.response_at(u, self.beta * _as_speed(speed, u))
+
+    def signals(self, u: npt.ArrayLike, sample_time: float) -> dict[str, FloatArray]:
+        """Output ``"y"`` and positions ``"z"`` at the samples of `u`; see `response`."""
+        law = self.at(sample_time)
+        return {"y": law.response(u), "z": law.memory(u)}
+
+    def advance(self, u: npt.ArrayLike, sample_time: float, state: State | None = None) -> tuple[FloatArray, State]:
+        """Output continued from `state`, and the state after the last sample.
+
+        Parameters
+        ----------
+        u : array, shape (n_samples,)
+            Input, moving evenly between its samples and from the state's input to the first of them.
+        sample_time : float
+            Time between two samples [s].
+        state : tuple of float, optional
+            Input and positions at the last sample so far; by default ``(u[0], *z0)``.
+
+        Returns
+        -------
+        y : array, shape (n_samples,)
+            The same bits as from one uncut input.
+        state : tuple of float
+            To continue from.
+
+        Raises
+        ------
+        ValueError
+            As `response`, or if the state does not hold one position for each play.
+        """
+        return self.at(sample_time).advance(u, state)
+
+    def compiled(self, u0: float = 0.0, *, sample_time: float) -> CompiledLaw:
+        """The law as compiled loops take it; the state is that of a first sample at the input `u0`."""
+        return self.at(sample_time).compiled(u0)
+
+    @classmethod
+    def responses(
+        cls,
+        parameters: Parameters,
+        u: npt.ArrayLike,
+        sample_time: float,
+        *,
+        reduce: Reduction | None = None,
+        target: npt.ArrayLike | None = None,
+        workers: int | None = None,
+    ) -> FloatArray:
+        """Outputs of many laws at once, on all cores, or one number of each.
+
+        Parameters
+        ----------
+        parameters : mapping
+            As of `PrandtlIshlinskii.responses`, and ``beta``.
+        u : array, shape (n_samples,) or (n_sets, n_samples)
+            One input for all sets, or one for each.
+        sample_time : float
+            Time between two samples [s].
+        reduce, target, workers
+            As there.
+
+        Returns
+        -------
+        array, shape (n_sets, n_samples), or (n_sets,) with `reduce`
+            Each row the same bits as `response`.
+
+        Raises
+        ------
+        TypeError, ValueError
+            As there, or if the sample time is not positive.
+        """
+        if not sample_time > 0.0:
+            raise ValueError(f"sample_time must be positive, got {sample_time}")
+        known = [field.name for field in fields(cls)]
+        if wrong := [name for name in parameters if name not in known]:
+            raise TypeError(f"unknown parameter {wrong[0]!r}: {cls.__name__} has {', '.join(known)}")
+        beta = np.asarray(parameters.get("beta", cls.beta), dtype=float)
+        _check_beta(beta)
+        sets = {name: value for name, value in parameters.items() if name != "beta"} | {"width": beta / sample_time}
+        return PlaysAtSampleTime.responses(sets, u, reduce=reduce, target=target, workers=workers)
+
+    def is_invertible(self, sample_time: float | None = None) -> bool:
+        """Whether there is an `inverse`, for a known speed; with a sample time, an `inverse_response` without one."""
+        return self.plays.is_invertible() and (sample_time is None or self._refusal(sample_time) is None)
+
+    def inverse(self) -> "RateDependentPrandtlIshlinskii":
+        """The law that gives the input for a wanted output, exactly, at the same speed of the input.
+
+        Returns
+        -------
+        RateDependentPrandtlIshlinskii
+            To be used as ``inverse.response(y, sample_time, speed=...)``.
+
+        Raises
+        ------
+        ValueError
+            As `PrandtlIshlinskii.inverse`.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> law = hs.RateDependentPrandtlIshlinskii(thresholds=(0.0, 0.25), weights=(2.0, 2.0), beta=0.25)
+        >>> law.inverse().beta, law.inverse().thresholds, law.inverse().weights
+        (0.5, (0.0, 0.5), (0.5, -0.25))
+        """
+        inverse = self.plays.inverse()
+        rise = self.offset
+        return RateDependentPrandtlIshlinskii(
+            thresholds=inverse.thresholds,
+            weights=inverse.weights,
+            beta=abs(self.weights[0]) * self.beta,
+            offset=0.0 - rise * sum(inverse.weights),
+            z0=tuple(z + rise for z in inverse.z0),
+        )
+
+    def inverse_response(
+        self,
+        y: npt.ArrayLike,
+        sample_time: float,
+        u0: float | None = None,
+        state: State | None = None,
+        *,
+        speed: npt.ArrayLike | None = None,
+    ) -> FloatArray:
+        """Input that gives the output `y`.
+
+        Parameters
+        ----------
+        y : array, shape (n_samples,)
+            Wanted output.
+        sample_time : float
+            Time between two samples [s].
+        u0 : float, optional
+            Input at which the law rests before it moves to the first sample; by default the first sample
+            finds the plays at z0, at rest.
+        state : tuple of float, optional
+            Input and positions to continue from, in place of u0 and z0.
+        speed : array, shape (n_samples,), optional
+            ``|u'|`` of the input, where it is known beforehand, as from the reference: the analytic inverse.
+
+        Returns
+        -------
+        array, shape (n_samples,)
+            Its `response` (at that speed, where one is given) is y to rounding.
+
+        Raises
+        ------
+        ValueError
+            If the law is not invertible, the sample time is too short for it, z0 holds positions that no input leads
+            to, a speed is given beside u0 or state, or an array does not fit.
+        """
+        if speed is not None:
+            if u0 is not None or state is not None:
+                raise ValueError("a speed goes with the z0 of the law: replace that in place of u0 or state")
+            return self.inverse().response(y, sample_time, speed=speed)
+        self.check_invertible(sample_time)
+        return self.at(sample_time).input_of(y, u0, state)
+
+    def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
+        """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""
+        self.check_invertible(sample_time)
+        steps = self.at(sample_time)
+        return steps.inverse_from(steps.advance([u0])[1], limits)
+
+    def check_invertible(self, sample_time: float) -> None:
+        """Raise a ValueError if the law is not invertible at this sample time, or no input leads to z0."""
+        if (refusal := self._refusal(sample_time)) is not None:
+            raise ValueError(refusal)
+        self.plays.inverse()  # refuses such positions
+
+    def as_structure(self) -> ClampStructure:
+        """The structure with the thresholds and beta of this law."""
+        one_signed = self.plays.is_one_signed()
+        return ClampStructure(
+            law=type(self), thresholds=self.thresholds, one_signed=one_signed, pushing=Widening(beta=self.beta)
+        )
+
+    def _refusal(self, sample_time: float) -> str | None:
+        if (refusal := self.plays.refusal()) is not None:
+            return refusal
+        b, sums = self.beta / sample_time, np.cumsum(self.weights)
+        with np.errstate(divide="ignore"):
+            limits = np.abs(sums) / (2.0 * np.abs(sums - sums[0]))
+        i = int(np.argmin(limits))
+        if b < limits[i]:
+            return None
+        return (
+            f"the law has no stable inverse at the sample time {sample_time:g}: beta / sample_time is {b:g}, but the "
+            f"sums of weights s_i = w_0 + ... + w_i ask for less than |s_i| / (2 |s_i - s_0|), {limits[i]:g} for "
+            f"i = {i}; give the speed, or take longer samples"
+        )
+
+
+@checked
+class Widening:
+    """What is searched of thresholds that grow with the speed: beta, from a law's own or from none."""
+
+    beta: float | None = None
+
+    def axes(self, record: Record) -> dict[str, Axis]:
+        """Beta, up to half a span of the input at its highest speed."""
+        half = half_span(record)
+        scale = half / (float(np.abs(np.diff(record.u)).max()) / record.sample_time)
+        own = () if self.beta is None else (self.beta,)
+        return {"beta": Axis(0.0, _LARGEST * scale, (*own, *(scale * start for start in _STARTS)), scale)}
+
+    def derived(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
+        """Nothing."""
+        return {}
+
+    def positions(self, parameters: Parameters, thresholds: FloatArray, z0: FloatArray, record: Record) -> FloatArray:
+        """Positions (n_sets, n_samples, n_plays)."""
+        width = np.broadcast_to(np.ravel(parameters["beta"]), len(z0)) / record.sample_time
+        return positions_of(thresholds, z0, record.u, width=width)
+
+    def arguments(self, parameters: Mapping[str, float]) -> dict[str, Any]:
+        """Beta."""
+        return {"beta": parameters["beta"]}
+
+
+def _as_speed(speed: npt.ArrayLike, u: npt.ArrayLike) -> FloatArray:
+    given = read_only(speed, "speed", ndim=1)
+    if given.size != np.size(u):
+        raise ValueError(f"speed must have {np.size(u)} samples as the signal has, got {given.size}")
+    if (given < 0.0).any():
+        raise ValueError(f"speed must not be negative, got {given.min():g}")
+    return given
+
+
+def _check_beta(beta: FloatArray) -> None:
+    if (beta < 0.0).any():
+        raise ValueError(f"beta must not be negative, got {beta.min():g}")

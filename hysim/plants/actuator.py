@@ -1,0 +1,311 @@
+"""The actuator as a chain of stages:  u -> amplifier -> hysteresis -> creep -> vibration -> y -> sensor.
+
+The hysteresis is a law, the amplifier's limits are static, and what is behind the law is linear. A
+voltage that is held between samples moves the law at once to a level that is held too: the linear stages are
+discretised together, and the chain is exact. Behind an amplifier that slews or charges a capacitance the voltage is
+exact at the ends of sub-steps, between which the law's output is taken as linear: second order in the sub-step.
+A stage that is left out passes its input on.
+"""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, items, read_only
+from hysim.errors import SimulationError
+from hysim.models.model import family
+from hysim.models.protocols import Remembering, Responding, Sampled, Steppable, law_at, needs_time
+from hysim.plants.amplifier import Amplifier
+from hysim.plants.chain import Chain, ChainState, linear_chain
+from hysim.plants.creep import Creep
+from hysim.plants.sampled import Stage, Vibration
+from hysim.plants.sensor import Sensor
+from hysim.plants.state_space import linear_plant
+from hysim.plants.transfer_function import TransferFunction
+
+
+def is_law(value: Any) -> bool:
+    """Whether a value answers to an input and can be stepped in a loop, at a sample time if it needs one."""
+    steps = isinstance(value, Responding) and isinstance(value, Steppable)
+    return steps and (not needs_time(value) or isinstance(value, Sampled))
+
+
+@family
+class Actuator:
+    """A hysteretic actuator with its physics.
+
+    Parameters
+    ----------
+    amplifier : Amplifier, optional
+        From the command to the voltage.
+    hysteresis : law, optional
+        Law from voltage to displacement, such as `BoucWen`. One that depends on the voltage's speed, such as
+        `RateDependentPrandtlIshlinskii`, sees each step as a way that takes the whole sample before it.
+    creep : Creep, optional
+        Slow growth of the displacement.
+    vibration : TransferFunction, StateSpace or Modes, optional
+        Linear dynamics behind it; also a system of python-control, which is converted. With ``hold="zoh"`` and no
+        initial state. Where a response is taken, ``sample``, is the actuator's; without one it is the start.
+    sensor : Sensor, optional
+        From the true displacement to the measured one.
+
+    Raises
+    ------
+    TypeError
+        If a stage is not of its kind.
+    ValueError
+        If the vibration holds an initial state or is not held, has several inputs or outputs, or is discrete.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> mode = hs.TransferFunction(num=(1.0,), den=(1.0, 0.2, 1.0), sample="end")
+    >>> actuator = hs.Actuator(hysteresis=hs.BoucWen(), vibration=mode)
+    >>> actuator.response([0.0, 1.0, 1.0], sample_time=1.0).round(6).tolist()
+    [0.0, 0.272462, 0.795252]
+    """
+
+    amplifier: Amplifier | None = None
+    hysteresis: Any = None
+    creep: Creep | None = None
+    vibration: Vibration | None = None
+    sensor: Sensor | None = None
+
+    def __post_init__(self) -> None:
+        for name, kind in (("amplifier", Amplifier), ("creep", Creep), ("sensor", Sensor)):
+            if not isinstance(part := items(self)[name], kind | None):
+                raise TypeError(f"{name} must be of {kind.__name__}, got {type(part).__name__}")
+        if self.hysteresis is not None and not is_law(self.hysteresis):
+            raise TypeError(
+                f"hysteresis must be a law that a loop can step, such as BoucWen, got {type(self.hysteresis).__name__}"
+            )
+        object.__setattr__(self, "vibration", as_vibration(self.vibration))
+
+    @property
+    def dynamic(self) -> bool:
+        """Whether the displacement or its measurement depends on time."""
+        return self._moves or (self.sensor is not None and self.sensor.delay > 0.0)
+
+    @property
+    def dc_gain(self) -> float:
+        """Displacement at rest per unit of the command, with a law of the slope one."""
+        amplifier = 1.0 if self.amplifier is None else self.amplifier.gain
+        creep = 1.0 if self.creep is None else self.creep.dc_gain
+        return amplifier * creep * (1.0 if self.vibration is None else self.vibration.dc_gain)
+
+    def voltage(self, u: npt.ArrayLike) -> FloatArray:
+        """Voltage at the law that a command comes to when it is held, in the shape of `u`."""
+        return np.array(u, dtype=float) if self.amplifier is None else self.amplifier.voltage(u)
+
+    def level(self, u: npt.ArrayLike) -> FloatArray:
+        """Output of the law for commands of which each is held until nothing slews, shape (n,)."""
+        voltage = self.voltage(read_only(u, "u", ndim=1))
+        return voltage if self.hysteresis is None else np.array(law_at(self.hysteresis, math.inf).response(voltage))
+
+    def response(
+        self, u: npt.ArrayLike, sample_time: float | None = None, *, substeps: int | None = None
+    ) -> FloatArray:
+        """True displacement at the samples of a command that is held between them.
+
+        Exact, unless the amplifier slews or has a time constant: then second order in the sub-step.
+
+        Parameters
+        ----------
+        u : array, shape (n,)
+            Command. The first sample finds the law at its initial memory and everything at rest, creep included.
+        sample_time : float, optional
+            Time between two samples [s]; an actuator that is not `dynamic` needs none.
+        substeps : int, optional
+            Of a sample, behind an amplifier that takes time. By default a sub-step is a quarter of its time
+            constant, and there are 4 to 64 in a sample.
+
+        Returns
+        -------
+        array, shape (n,)
+
+        Raises
+        ------
+        SimulationError
+            If a stage leaves the finite numbers.
+        ValueError
+            If `u` is not finite or has not one axis, no time is given where one is needed, or the vibration cannot
+            rest at the first sample because it integrates.
+        """
+        inputs = read_only(u, "u", ndim=1)
+        if not self._moves or not inputs.size:
+            return self.level(inputs)
+        return self.advance(inputs, sample_time, substeps=substeps)[0]
+
+    def advance(
+        self,
+        u: npt.ArrayLike,
+        sample_time: float | None,
+        state: ChainState | None = None,
+        *,
+        substeps: int | None = None,
+    ) -> tuple[FloatArray, ChainState]:
+        """As `response`, continued from `state`, and the state after the last sample.
+
+        Parameters
+        ----------
+        u, sample_time
+            As in `response`; the time is the same for every part of a record.
+        state : ChainState, optional
+            By default rest at the first sample.
+        substeps : int, optional
+            As in `response`, the same for every part.
+
+        Returns
+        -------
+        y : array, shape (n,)
+            The same bits as from one uncut command.
+        state : ChainState
+            To continue from.
+
+        Raises
+        ------
+        SimulationError, ValueError
+            As `response`, or if there is neither a state nor a sample.
+        """
+        inputs = read_only(u, "u", ndim=1)
+        chain = self.chain(sample_time, substeps)
+        if state is None and not inputs.size:
+            raise ValueError("u must hold a sample to begin at rest with")
+        begin = chain.rest(float(inputs[0])) if state is None else state
+        signals, end = chain.driven(inputs, begin)
+        if signals.lost >= 0:
+            raise SimulationError(f"the actuator leaves the finite numbers at sample {signals.lost}")
+        if isinstance(self.vibration, TransferFunction) and self.vibration.sample == "end":
+            return np.append(signals.y, chain.displacement(end))[1:], end
+        return chain.after_the_command(signals, begin), end
+
+    def measured(
+        self, u: npt.ArrayLike, sample_time: float | None = None, *, substeps: int | None = None
+    ) -> FloatArray:
+        """What the sensor gives of `response`: late, noisy, in steps.
+
+        Parameters
+        ----------
+        u, sample_time, substeps
+            As in `response`.
+
+        Returns
+        -------
+        array, shape (n,)
+
+        Raises
+        ------
+        SimulationError, ValueError
+            As `response`.
+        """
+        if self.sensor is None:
+            return self.response(u, sample_time, substeps=substeps)
+        return self.sensor.measure(self._late(self.sensor.delay).response(u, sample_time, substeps=substeps))
+
+    def signals(
+        self, u: npt.ArrayLike, sample_time: float | None = None, *, substeps: int | None = None
+    ) -> dict[str, FloatArray]:
+        """What each stage gives at the samples of `u`, by the stage's name.
+
+        Parameters
+        ----------
+        u, sample_time, substeps
+            As in `response`.
+
+        Returns
+        -------
+        dict
+            ``"y"``, and of the stages that there are ``"amplifier"`` (voltage), ``"hysteresis"``, ``"creep"`` and
+            ``"measurement"``; ``"z"`` of a law with a memory. A stage is seen as a ``response`` that ends with it.
+
+        Raises
+        ------
+        SimulationError, ValueError
+            As `response`.
+        """
+        parts = {"y": self}
+        if self.creep is not None:
+            parts["creep"] = replace(self, vibration=None)
+        if self.hysteresis is not None:
+            parts["hysteresis"] = replace(self, creep=None, vibration=None)
+        if self.amplifier is not None:
+            parts["amplifier"] = replace(self, hysteresis=None, creep=None, vibration=None)
+        found = {name: part.response(u, sample_time, substeps=substeps) for name, part in parts.items()}
+        if self.sensor is not None:
+            found["measurement"] = self.measured(u, sample_time, substeps=substeps)
+        memory = self.memory(u, sample_time, substeps=substeps)
+        return found if memory is None else found | {"z": memory}
+
+    def memory(
+        self, u: npt.ArrayLike, sample_time: float | None = None, *, substeps: int | None = None
+    ) -> FloatArray | None:
+        """Memory of the law at the samples of `u`, shape (n,); None for a law without one.
+
+        The sample time is needed behind an amplifier that takes time.
+        """
+        if not isinstance(self.hysteresis, Remembering):
+            return None
+        inputs = read_only(u, "u", ndim=1)
+        if not self._drive_takes_time and not needs_time(self.hysteresis):
+            return np.asarray(self.hysteresis.memory(self.voltage(inputs)))
+        chain = self.chain(sample_time, substeps)
+        memory = law_at(self.hysteresis, chain.step).memory
+        if not self._drive_takes_time or not inputs.size:
+            return np.asarray(memory(self.voltage(inputs)))
+        begin = chain.rest(float(inputs[0]))
+        signals, _ = chain.driven(inputs, begin)
+        return np.asarray(memory(np.append(begin.voltages[1], signals.v))[: -1 : chain.substeps])
+
+    def chain(self, sample_time: float | None, substeps: int | None = None) -> Chain:
+        """The actuator as it is stepped at a sample time [s]."""
+        if sample_time is None:
+            raise ValueError("an actuator that moves in time needs sample_time")
+        return Chain(
+            amplifier=self.amplifier,
+            hysteresis=self.hysteresis,
+            creep=self.creep,
+            vibration=self.vibration,
+            sensor=self.sensor,
+            sample_time=sample_time,
+            substeps=substeps,
+        )
+
+    def linear(self, sample_time: float) -> tuple[Stage, float]:
+        """From command to measurement with a law of the slope one, no limits and no slewing; and its dead time [s].
+
+        The sample time gives the unit of the states.
+        """
+        delays = [stage.delay for stage in (self.vibration, self.sensor) if stage is not None]
+        return linear_chain(self.amplifier, self.creep, self.vibration, sample_time), sum(delays)
+
+    @property
+    def _moves(self) -> bool:
+        """Whether the true displacement depends on time."""
+        slow = self._drive_takes_time or needs_time(self.hysteresis)
+        return slow or self.creep is not None or self.vibration is not None
+
+    @property
+    def _drive_takes_time(self) -> bool:
+        return self.amplifier is not None and self.amplifier.dynamic
+
+    def _late(self, delay: float) -> "Actuator":
+        """The actuator whose true displacement is this one's of some time ago."""
+        if not delay:
+            return self
+        vibration = self.vibration or TransferFunction(num=(1.0,), den=(1.0,))
+        return replace(self, vibration=replace(vibration, delay=vibration.delay + delay))
+
+
+def as_vibration(value: Any) -> Vibration | None:
+    """A linear stage, one of another package converted."""
+    plant = linear_plant(value)
+    if plant is not None and not isinstance(plant, Vibration):
+        raise TypeError(f"vibration must be a TransferFunction, a StateSpace or Modes, got {type(value).__name__}")
+    if isinstance(plant, TransferFunction) and plant.hold != "zoh":
+        raise ValueError('the vibration\'s input is held: its hold must be "zoh"')
+    if isinstance(plant, TransferFunction) and plant.initial_state:
+        raise ValueError("an actuator begins at rest: its vibration must not hold an initial state")
+    return plant

@@ -1,0 +1,230 @@
+"""An actuator at one sample time, as `hysim.kernels.loop` steps it: constants, a state of rest, and runs.
+
+Every loop and every response goes through here. A response is a loop whose controller passes its reference on.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hysim._frozen import FloatArray, read_only
+from hysim._parallel import Progress
+from hysim.kernels import controllers
+from hysim.kernels import loop as kernels
+from hysim.laws.static import Line
+from hysim.models.protocols import CompiledController, CompiledLaw, law_at
+from hysim.plants.amplifier import Amplifier
+from hysim.plants.creep import Creep
+from hysim.plants.sampled import (
+    Stage,
+    Vibration,
+    creep_stage,
+    gain,
+    low_pass,
+    sampled,
+    seen_within,
+    vibration_stage,
+    whole_and_part,
+)
+from hysim.plants.sensor import Sensor
+
+_CHUNK = 1_000_000
+_PER_TIME_CONSTANT = 4  # sub-steps
+_FEWEST, _MOST = 4, 64  # sub-steps of a sample
+
+
+class ChainState(NamedTuple):
+    """Where an actuator is: the samples so far, and the states of its stages.
+
+    `past` holds the law's last outputs, the latest at its end, and `readings` the displacements that the sensor has
+    still to give, the oldest first, and at its end the one seen since the last sample.
+    """
+
+    samples: int
+    voltages: FloatArray
+    law: CompiledLaw
+    x: FloatArray
+    past: FloatArray
+    readings: FloatArray
+
+
+class Signals(NamedTuple):
+    """What a run gives: at every sample, and at every sub-step the voltage `v` at the law and its output `w`.
+
+    `lost` is the first sample that is not finite, or -1.
+    """
+
+    command: FloatArray
+    drive: FloatArray
+    v: FloatArray
+    w: FloatArray
+    y: FloatArray
+    measurement: FloatArray
+    lost: int
+
+
+class Chain:
+    """The stages of an actuator, sampled.
+
+    Parameters
+    ----------
+    amplifier, hysteresis, creep, vibration, sensor
+        As of `Actuator`.
+    sample_time : float
+        Of the controller, or of the samples of a held voltage [s].
+    substeps : int, optional
+        In a sample, for an amplifier that takes time; by default a quarter of its time constant each, 4 to 64.
+    """
+
+    def __init__(
+        self,
+        *,
+        amplifier: Amplifier | None,
+        hysteresis: Any,
+        creep: Creep | None,
+        vibration: Vibration | None,
+        sensor: Sensor | None,
+        sample_time: float,
+        substeps: int | None = None,
+    ) -> None:
+        if not 0.0 < sample_time < math.inf:
+            raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
+        self.amplifier, self.sensor = amplifier or Amplifier(), sensor or Sensor()
+        self.substeps = _substeps(self.amplifier, sample_time, substeps)
+        self.step = sample_time / self.substeps
+        self.hysteresis = Line(slope=1.0) if hysteresis is None else law_at(hysteresis, self.step)
+        self.delay = 0.0 if vibration is None else vibration.delay
+        self.linear = linear_stage(creep, vibration, self.step)
+        between = {"linear": self.amplifier.dynamic}
+        creeping = 0 if creep is None else len(creep.weights)
+        self.stage = sampled(self.linear, self.step, self.delay, creeping=creeping, **between)
+        self.samples_late, part = whole_and_part(self.sensor.delay / sample_time)
+        self.seen_in, seen = -1, self.stage.output
+        if part:
+            self.seen_in, at = whole_and_part((1.0 - part) * self.substeps)
+            seen = seen_within(self.linear, self.step, self.delay, at, **between)
+        self.outputs = read_only([self.stage.output, seen])
+        self._parameters = self._packed()
+
+    @property
+    def linear_block(self) -> FloatArray:
+        """The linear stage as one block of numbers; see `hysim.kernels.loop`."""
+        stage = self.stage
+        return np.concatenate([np.ravel(part) for part in (stage.decline, stage.A, stage.B, self.outputs)])
+
+    def rest(self, u0: float) -> ChainState:
+        """At rest at the command `u0`.
+
+        Raises
+        ------
+        ValueError
+            If u0 is not finite, or a plant that integrates is to rest at an output other than zero.
+        """
+        if not math.isfinite(u0):
+            raise ValueError(f"u0 must be finite, got {u0}")
+        voltages = self.amplifier.compiled(self.step, u0).state
+        level = float(np.asarray(self.hysteresis.response(voltages[1:]))[0])
+        x = np.zeros(2 * self.stage.rest.size)
+        if level != 0.0:
+            with np.errstate(invalid="ignore"):
+                x[: self.stage.rest.size] = self.stage.rest * level
+        if not np.isfinite(x).all():
+            raise ValueError(f"the vibration integrates: it cannot rest at the law's output {level:g}")
+        law = CompiledLaw(*self.hysteresis.compiled(float(voltages[1])))
+        state = ChainState(0, voltages, law, x, np.full(self.stage.lag + 3, level), np.empty(self.samples_late + 2))
+        state.readings[:] = self.displacement(state)
+        return state
+
+    def displacement(self, state: ChainState) -> float:
+        """The true displacement just before the next command."""
+        row, n = self.stage.output, self.stage.rest.size
+        return float(row[3:] @ state.x[:n] + row[1] * state.past[2] + row[2] * state.past[1])
+
+    def seen(self, state: ChainState) -> float:
+        """The displacement that the sensor gives just before the next command, without its noise and its quantum."""
+        if self.samples_late:
+            return float(state.readings[1])
+        return self.displacement(state) if self.seen_in < 0 else float(state.readings[-1])
+
+    def after_the_command(self, signals: Signals, state: ChainState) -> FloatArray:
+        """The displacement just after each new command; `state` is the one before the run."""
+        if self.amplifier.dynamic or whole_and_part(self.delay / self.step)[1] or not self.linear.D:
+            return signals.y
+        w = np.concatenate([state.past[1:], signals.w])
+        return signals.y + self.linear.D * np.diff(w)[1 : 1 + signals.y.size]
+
+    def run(
+        self,
+        controller: CompiledController,
+        state: ChainState,
+        reference: FloatArray,
+        progress: Progress | None = None,
+    ) -> tuple[Signals, ChainState]:
+        """Run a controller, whose state moves along, from a state of the chain; the state at the end with it."""
+        n = reference.size
+        law = state.law._replace(state=state.law.state.copy())
+        parts = (state.voltages, state.x, state.past, state.readings)
+        plant_state = np.concatenate(parts)
+        noise = self.sensor.noise_samples(state.samples + n)[state.samples :]
+        inputs = read_only(np.stack([reference, noise]), finite=False)
+        samples, path = np.empty((4, n)), np.empty((2, n * self.substeps))
+        lost = -1
+        for start in range(0, n, _CHUNK):
+            stop = min(start + _CHUNK, n)
+            with np.errstate(all="ignore"):  # an unstable loop may overflow before it is lost
+                lost = kernels.close(
+                    *controller, *law, self._parameters, plant_state, inputs, start, stop, samples, path
+                )
+            if lost >= 0:
+                break
+            if progress is not None:
+                progress(stop, n)
+        voltages, x, past, readings = np.split(plant_state, np.cumsum([part.size for part in parts])[:-1])
+        remaining = np.append(np.roll(readings[:-1], -n), readings[-1])
+        end = ChainState(state.samples + n, voltages, law, x, np.roll(past, -n * self.substeps), remaining)
+        (command, drive, y, measurement), (v, w) = samples, path
+        return Signals(command, drive, v, w, y, measurement, lost), end
+
+    def driven(self, u: FloatArray, state: ChainState) -> tuple[Signals, ChainState]:
+        """Run the commands `u` themselves."""
+        return self.run(CompiledController(controllers.through, read_only([]), np.zeros(1)), state, u)
+
+    def _packed(self) -> FloatArray:
+        """The stages apart from the law, as `hysim.kernels.loop` takes them."""
+        stage = self.stage
+        head = [
+            stage.decline.size, stage.rest.size, stage.lag, self.samples_late,
+            self.substeps, self.seen_in, self.sensor.quantum,
+        ]  # fmt: skip
+        amplifier = self.amplifier.compiled(self.step).parameters
+        return read_only(np.concatenate([amplifier, head, self.linear_block]), finite=False)
+
+    def just_after(self, before: float, fine: FloatArray) -> FloatArray:
+        """The voltages `fine` just after each new command; `before` is the voltage before the run."""
+        return np.append(before, fine)[: -1 : self.substeps] if self.amplifier.dynamic else fine
+
+
+def linear_stage(creep: Creep | None, vibration: Vibration | None, step: float) -> Stage:
+    """What is behind the law."""
+    first = gain(1.0) if creep is None else creep_stage(creep)
+    return first if vibration is None else first.then(vibration_stage(vibration, step))
+
+
+def linear_chain(amplifier: Amplifier | None, creep: Creep | None, vibration: Vibration | None, step: float) -> Stage:
+    """The whole chain with a law of the slope one, without limits and slewing."""
+    driver = gain(1.0 if amplifier is None else amplifier.gain)
+    if amplifier is not None and amplifier.time_constant:
+        driver = driver.then(low_pass(amplifier.time_constant))
+    return driver.then(linear_stage(creep, vibration, step))
+
+
+def _substeps(amplifier: Amplifier, sample_time: float, substeps: int | None) -> int:
+    if substeps is not None and (not isinstance(substeps, int) or substeps < 1):
+        raise ValueError(f"substeps must be an integer of at least 1, got {substeps}")
+    if not amplifier.dynamic:
+        return 1
+    if substeps is not None:
+        return substeps
+    wanted = _PER_TIME_CONSTANT * sample_time / amplifier.time_constant if amplifier.time_constant else 0.0
+    return min(max(_FEWEST, math.ceil(min(wanted, _MOST))), _MOST)

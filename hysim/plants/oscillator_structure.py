@@ -1,0 +1,276 @@
+"""An oscillator to be identified, and how its record was made.
+
+    fine input -> steps of the method -> y at the fine rate -> low-pass filters -> every r-th sample, the record
+
+The law is that of Bouc and Wen with gain 1: a gain of the memory could not be told from A, beta and gamma, nor a
+feedthrough from the stiffness. Stiffness and A are told apart by the memory's own curvature alone. The output is
+affine in no parameter: all are searched, from where `hysim.plants._oscillator_start` begins.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hysim._frozen import FloatArray, checked, items
+from hysim._parallel import in_chunks
+from hysim.errors import SimulationError
+from hysim.laws.differential import _boucwen_search
+from hysim.laws.differential.boucwen import BoucWen
+from hysim.models.protocols import Identifiable
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.plants._oscillator_start import start
+from hysim.plants.equation_of_motion import METHODS, Linear, Motion
+from hysim.plants.resampling import HALF_FILTER, decimated, interpolated
+from hysim.records import Record
+
+NAMES = ("mass", "damping", "stiffness", "A", "beta", "gamma", "n")
+_PLANT, _LAW = NAMES[:3], NAMES[3:]
+_SCALED = NAMES[:4]  # a base pushes with the mass: only the ratios of these can be told
+_REST_OF_LAW = {"z0": 0.0, "gain": 1.0, "offset": 0.0, "feedthrough": 0.0}
+_BOX = {"mass": (0.1, 10.0), "damping": (0.0, 2.0), "stiffness": (-10.0, 10.0), "A": (0.0, 10.0)}
+_STARTS = 2
+_REPEATS = 0.1  # share of the input's rms by which a period may differ from the mean one: measured inputs are noisy
+
+
+@checked
+class OscillatorStructure(Identifiable):
+    """An oscillator to be identified; see `BoucWenOscillator.structure`, whose class is `family`.
+
+    The box reaches from a tenth of the mass that the search begins with to ten times that mass, from no damping to
+    twice the critical one, and to ten times the stiffness of small motions for both springs; that of the law is the
+    one of `hysim.BoucWen`, with the displacement as its input and A not negative.
+    """
+
+    family: type
+    method: str = "split"
+    oversampling: int = 4
+    decimation: tuple[int, ...] = ()
+    initial: str = "rest"
+    period: int | None = None
+    hold: str = "foh"
+    excitation: str = "force"
+
+    def __post_init__(self) -> None:
+        options = {
+            "method": METHODS,
+            "initial": ("rest", "periodic"),
+            "hold": ("foh", "zoh", "band-limited"),
+            "excitation": ("force", "base"),
+        }
+        for name, allowed in options.items():
+            if items(self)[name] not in allowed:
+                raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {items(self)[name]!r}")
+        for number in (self.oversampling, *self.decimation, self.period or 1):
+            if isinstance(number, bool) or not isinstance(number, int):
+                raise TypeError(f"oversampling, decimation and period must be whole numbers, got {number!r}")
+            if number < 1:
+                raise ValueError(f"oversampling, decimation and period must be at least 1, got {number}")
+        if self.decimation and np.prod(self.decimation) != self.oversampling:
+            raise ValueError(
+                f"the stages of decimation must multiply to the oversampling {self.oversampling}, got {self.decimation}"
+            )
+        if (self.initial == "periodic") != (self.period is not None):
+            raise ValueError('initial="periodic" takes a period in samples, and nothing else does')
+        if self.hold == "band-limited" and self.period is None:
+            raise ValueError('hold="band-limited" needs initial="periodic": an input is interpolated by its spectrum')
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """The box around the plant of small motions, and where the equation of motion says to begin.
+
+        Raises
+        ------
+        ValueError
+            If the record has no even time, is too short, does not repeat itself, has a constant input, or is not
+            that of a mass on springs; if `initial` is given; or if a name or a bound does not fit.
+        """
+        if freedom.initial is not None:
+            raise ValueError("the structure says how the record begins: BoucWenOscillator.structure(initial=...)")
+        motion = self.motion(record)
+        redundant = (_SCALED,) if self.excitation == "base" else ()
+        held = freedom.held(dict.fromkeys(NAMES, 1.0), redundant=redundant)
+        limits = freedom.limits(dict.fromkeys(NAMES, 1.0), held)
+        linear, found = start(motion, _unit_laws(motion.y, held, limits), _STARTS)
+        found = found or [_without_memory(linear)]
+        factor = _factor(found[0], held) if redundant else 1.0
+        found, linear = [_scaled(each, factor) for each in found], Linear(*(factor * value for value in linear))
+        box = _Box(held, _limits(linear, held, limits), Record(u=motion.y, y=linear.stiffness * motion.y))
+        laws = box.laws(found[0])
+        return SearchSpace(
+            coordinates=(*box.plant, *laws.coordinates),
+            lower=np.concatenate([box.side(0), laws.lower]),
+            upper=np.concatenate([box.side(1), laws.upper]),
+            starts=np.array([box.encode(one) for one in found]),
+            names=tuple(name for name in NAMES if name not in held),
+            columns=(),
+            linear=(),
+            held=held,
+            parameters=lambda x: box.decode(np.atleast_2d(x), laws),
+            redundant=redundant,
+            screened=0,
+        )
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """The output itself, shape (n_sets, n_samples, 1), sets on threads; inf for a set that escapes."""
+        force, step = self.fine_input(record.u), record.sample_time / self.oversampling
+        sets = np.stack(np.broadcast_arrays(*(np.atleast_1d(parameters[name]) for name in NAMES)), axis=1)
+        outputs = np.full((len(sets), len(record), 1), np.inf)
+
+        def simulate(begin: int, end: int) -> None:
+            for k in range(begin, end):
+                plant = self.assemble(dict(zip(NAMES, sets[k].tolist(), strict=True)))
+                try:
+                    y = self._fine_output(replace(plant, substeps=1), force, step)
+                except SimulationError:
+                    continue
+                outputs[k, :, 0] = np.resize(self.sampled(y), len(record))
+
+        in_chunks(simulate, len(sets), minimum=1)
+        return outputs
+
+    def assemble(self, parameters: Mapping[str, float]) -> Any:
+        """The oscillator with these parameters, its steps as fine as those of the identification."""
+        return self.family(
+            mass=parameters["mass"],
+            damping=parameters["damping"],
+            stiffness=parameters["stiffness"],
+            law=BoucWen(**{name: parameters[name] for name in _LAW}),
+            excitation=self.excitation,
+            hold="foh" if self.hold == "band-limited" else self.hold,
+            method=self.method,
+            substeps=self.oversampling,
+        )
+
+    def motion(self, record: Record) -> Motion:
+        """Force and displacement that the start is found from: of a periodic record, the mean period."""
+        sample_time = record.sample_time
+        if np.ptp(record.u) == 0.0:
+            raise ValueError("the input is constant: nothing can be identified from it")
+        if len(record) <= 2 * HALF_FILTER:
+            raise ValueError(f"the record must have more than {2 * HALF_FILTER} samples, got {len(record)}")
+        u, y = self._mean_period(record.u), self._mean_period(record.y)
+        if np.ptp(y) == 0.0:
+            raise ValueError("the output is constant: nothing can be identified from it")
+        difference = float((record.u - np.resize(u, len(record))).std() / record.u.std())
+        if difference > _REPEATS:
+            raise ValueError(
+                f"u does not repeat itself every {self.period} samples: it differs from its mean period by "
+                f"{100.0 * difference:.0f} % of its rms"
+            )
+        return Motion(u if self.excitation == "force" else -u, y, sample_time, self.period is not None)
+
+    def _mean_period(self, signal: FloatArray) -> FloatArray:
+        if self.period is None:
+            return signal
+        if signal.size < self.period:
+            raise ValueError(f"the record holds {signal.size} samples, less than a period of {self.period}")
+        whole = signal.size // self.period * self.period
+        return np.asarray(signal[:whole].reshape(-1, self.period).mean(axis=0))
+
+    def fine_input(self, u: FloatArray) -> FloatArray:
+        """Inputs at the ends of the steps: of one period, or of the whole record."""
+        u, factor = self._mean_period(u), self.oversampling
+        if self.hold == "band-limited":
+            return interpolated(u, factor)
+        if self.hold == "zoh":
+            return np.repeat(u, factor) if self.period else np.repeat(u, factor)[: 1 - factor or None]
+        places = np.arange(u.size * factor if self.period else (u.size - 1) * factor + 1) / factor
+        return np.asarray(np.interp(places, np.arange(u.size + 1), np.append(u, u[0])))
+
+    def _fine_output(self, plant: Any, force: FloatArray, step: float) -> FloatArray:
+        run = plant.response if self.period is None else plant.periodic_response
+        return np.asarray(run(force, step))
+
+    def sampled(self, y: FloatArray) -> FloatArray:
+        """What the record keeps of an output at the ends of the steps."""
+        if self.decimation:
+            return decimated(y, self.decimation, periodic=self.period is not None)
+        return y[:: self.oversampling]
+
+
+class _Box(NamedTuple):
+    """Coordinates of the free parameters: the mass on a log scale, the law by its own chart, others plain."""
+
+    held: Mapping[str, float]
+    limits: Mapping[str, tuple[float, float]]
+    spring: Record  # displacement and force of a linear spring, which scale the law
+
+    @property
+    def plant(self) -> tuple[str, ...]:
+        """Free parameters of the plant."""
+        return tuple(name for name in _PLANT if name not in self.held)
+
+    def side(self, which: int) -> FloatArray:
+        """Lower (0) or upper (1) side of the plant's part."""
+        return self._plant({name: self.limits[name][which] for name in self.plant})
+
+    def _plant(self, values: Mapping[str, float]) -> FloatArray:
+        return np.array([math.log(values[name]) if name == "mass" else values[name] for name in self.plant])
+
+    def laws(self, values: Mapping[str, float]) -> SearchSpace:
+        """The law's part, with `values` as its start."""
+        fixed = {name: value for name, value in self.held.items() if name in _LAW}
+        bounds = {name: pair for name, pair in self.limits.items() if name in _LAW}
+        defaults = {name: values[name] for name in _LAW} | _REST_OF_LAW
+        return _boucwen_search.search_space(defaults, (), self.spring, Freedom(fixed | _REST_OF_LAW, (), bounds))
+
+    def encode(self, values: Mapping[str, float]) -> FloatArray:
+        """Coordinates (n_x,) inside the box."""
+        plant = np.clip(self._plant(values), self.side(0), self.side(1))
+        return np.concatenate([plant, self.laws(values).starts[0]])
+
+    def decode(self, x: FloatArray, laws: SearchSpace) -> dict[str, FloatArray]:
+        """All parameters, (n_sets,) each."""
+        n_plant = len(self.plant)
+        plant = {name: np.full(len(x), self.held[name]) for name in _PLANT if name in self.held}
+        plant |= {name: np.exp(x[:, k]) if name == "mass" else x[:, k] for k, name in enumerate(self.plant)}
+        law = laws.parameters(x[:, n_plant:])
+        return plant | {name: law[name] for name in _LAW}
+
+
+def _unit_laws(y: FloatArray, held: Mapping[str, float], limits: Mapping[str, tuple[float, float]]) -> SearchSpace:
+    """Laws with A = 1 along the displacement y, of which only n may be known."""
+    fixed = {"A": 1.0, **_REST_OF_LAW} | {name: value for name, value in held.items() if name == "n"}
+    bounds = {name: pair for name, pair in limits.items() if name == "n"}
+    return _boucwen_search.search_space(BoucWen().scalars, (), Record(u=y, y=y), Freedom(fixed, (), bounds))
+
+
+def _limits(
+    linear: Linear, held: Mapping[str, float], given: Mapping[str, tuple[float, float]]
+) -> dict[str, tuple[float, float]]:
+    """The user's bounds, those of the plant and of A completed by the default box."""
+    units = {
+        "mass": linear.mass,
+        "damping": 2.0 * np.sqrt(linear.mass * linear.stiffness),
+        "stiffness": linear.stiffness,
+        "A": linear.stiffness,
+    }
+    limits = dict(given)
+    for name in units.keys() - held.keys():
+        own = tuple(float(units[name] * side) for side in _BOX[name])
+        lower, upper = given.get(name, own)
+        limits[name] = (own[0] if np.isinf(lower) else lower, own[1] if np.isinf(upper) else upper)
+    if limits.get("mass", (1.0, 1.0))[0] <= 0.0:
+        limits["mass"] = (0.1 * min(linear.mass, limits["mass"][1]), limits["mass"][1])
+    return limits
+
+
+def _without_memory(linear: Linear) -> dict[str, float]:
+    """Half of the spring in a law that is hardly curved: where no law was found along the displacement."""
+    half = 0.5 * linear.stiffness
+    return {**linear._asdict(), "stiffness": half, "A": half, "beta": 0.0, "gamma": 0.0, "n": 1.0}
+
+
+def _factor(values: Mapping[str, float], held: Mapping[str, float]) -> float:
+    """What the plant of unit mass is multiplied by, so that one of its scaled parameters is what it is held at."""
+    known = [held[name] / values[name] for name in _SCALED if name in held and values[name] * held[name] > 0.0]
+    return float(known[0]) if known else 1.0
+
+
+def _scaled(values: Mapping[str, float], factor: float) -> dict[str, float]:
+    """The plant with all forces multiplied by `factor`."""
+    scaled = {name: value * factor if name in _SCALED else value for name, value in values.items()}
+    unit = factor ** (1.0 - values["n"])
+    return scaled | {"beta": values["beta"] * unit, "gamma": values["gamma"] * unit}

@@ -1,0 +1,482 @@
+"""Continuous-time transfer functions, simulated and identified from sampled data.
+
+    G(s) = exp(-delay s) (num_0 s^m + ... + num_m) / (den_0 s^n + ... + den_n),   m <= n
+
+The input between two samples is held (``hold="zoh"``) or linear (``hold="foh"``); under either the response
+is exact, by matrix exponentials. Where the input is held, the output of a sample may be taken at the start
+of the hold (``sample="start"``), before that sample's input has moved the states, or at its end. System
+identification tools take the start. A staircase that was read when each step had settled belongs to the end:
+taken as the start, each output must be explained by the step before, and is one sample too early for it.
+
+With den monic the output is affine in the numerator and in the initial state, which is the free response
+and its derivatives at the begin of the first hold, (y, y', ..., y^(n-1)): the state of the observability
+form. The delay, where it is not known, is searched beside the denominator.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, checked, read_only
+from hysim.errors import SimulationError
+from hysim.models.composable import Composable
+from hysim.models.model import family
+from hysim.models.protocols import Identifiable
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.plants._linear_response import LinearPlants, LinearState, affine_columns
+from hysim.plants._transfer_function_notes import notes
+from hysim.plants._transfer_function_starts import Guess, guesses, likely_delays, sections
+from hysim.plants._unit_gain import UnitGain
+from hysim.records import Record
+
+FREQUENCY = (0.1, np.pi)  # box of a section's frequency: rad over the whole record, rad per sample
+DAMPING = (1e-3, 30.0)  # box of its damping ratio; two real poles above 1
+LATEST = 0.25  # of the record: the largest delay that is searched
+_LONG = 1000  # samples from which the starts from the record are relied upon
+_AGREED = 0.02  # of the box: starts from different cutoffs this close to their median are one optimum
+_MAJORITY = 3  # of them are enough to search no further
+_SCREENED = 64  # random points beside starts that differ
+
+
+@family
+class TransferFunction(Composable):
+    """Continuous-time transfer function.
+
+    Parameters
+    ----------
+    num, den : sequence of float
+        Coefficients of descending powers of s [s^-1]. The numerator's degree is at most the denominator's.
+    delay : float
+        Dead time [s], not negative.
+    hold : {"zoh", "foh"}
+        Whether the input is held between samples, or linear.
+    sample : {"start", "end"}
+        Whether an output is taken at the start or the end of the time for which its input is held; with
+        ``hold="foh"`` it is taken at the sample.
+    initial_state : sequence of float
+        Free response and its derivatives at the begin of the first hold, (y, y', ...); empty for rest.
+
+    Raises
+    ------
+    ValueError
+        If the plant is not proper, den begins with zero, or an option is unknown.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> lag = hs.TransferFunction(num=(1.0,), den=(1.0, 1.0), sample="end")
+    >>> lag.response([1.0, 1.0], sample_time=1.0).round(6).tolist()
+    [0.632121, 0.864665]
+    """
+
+    num: tuple[float, ...]
+    den: tuple[float, ...]
+    delay: float = 0.0
+    hold: str = "zoh"
+    sample: str = "start"
+    initial_state: tuple[float, ...] = ()
+
+    dynamic: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        _check_options(self.hold, self.sample)
+        if not self.den or self.den[0] == 0.0:
+            raise ValueError(f"den must begin with a coefficient that is not zero, got {self.den}")
+        if not self.num:
+            raise ValueError("num must hold at least one coefficient")
+        if len(self.num) > len(self.den):
+            raise ValueError(f"the numerator's degree {len(self.num) - 1} is above the denominator's {self.order}")
+        if self.delay < 0.0:
+            raise ValueError(f"delay must not be negative, got {self.delay}")
+        if len(self.initial_state) not in (0, self.order):
+            raise ValueError(f"initial_state must be empty or hold {self.order} numbers, got {len(self.initial_state)}")
+
+    @property
+    def order(self) -> int:
+        """Number of poles."""
+        return len(self.den) - 1
+
+    @property
+    def poles(self) -> npt.NDArray[np.complex128]:
+        """Roots of the denominator [rad/s]."""
+        return np.roots(self.den).astype(np.complex128)
+
+    @property
+    def zeros(self) -> npt.NDArray[np.complex128]:
+        """Roots of the numerator [rad/s]."""
+        return np.roots(self.num).astype(np.complex128)
+
+    @property
+    def dc_gain(self) -> float:
+        """G(0) [unit of y / unit of u]; infinite with a pole at zero."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return float(np.divide(self.num[-1], self.den[-1]))
+
+    def response(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
+        """Output at the samples of `u`, exact under the hold.
+
+        Parameters
+        ----------
+        u : array, shape (n,)
+            Input, zero before its first sample.
+        sample_time : float
+            Time between two samples [s].
+
+        Returns
+        -------
+        array, shape (n,)
+
+        Raises
+        ------
+        SimulationError
+            If the output leaves the finite numbers, as an unstable plant's may; it names the sample.
+        ValueError
+            If `u` is not finite or has not one axis, or the sample time is not positive.
+        """
+        return self.advance(u, sample_time)[0]
+
+    def advance(
+        self, u: npt.ArrayLike, sample_time: float, state: LinearState | None = None
+    ) -> tuple[FloatArray, LinearState]:
+        """Output at the samples of `u`, continued from `state`, and the state after the last sample.
+
+        Parameters
+        ----------
+        u, sample_time
+            As in `response`; the time is the same for every part of a record.
+        state : LinearState, optional
+            What an earlier call returned; by default the initial state, with no input before.
+
+        Returns
+        -------
+        y : array, shape (n,)
+            The same bits as from one uncut input.
+        state : LinearState
+            To continue from.
+
+        Raises
+        ------
+        SimulationError, ValueError
+            As `response`.
+        """
+        inputs = read_only(u, "u", ndim=1)
+        if not 0.0 < sample_time < np.inf:
+            raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
+        with np.errstate(all="ignore"):
+            plant = self._plant(float(sample_time))
+            begin = state
+            if begin is None:
+                free = np.array(self.initial_state or [0.0] * self.order) * plant.rate[0] ** -np.arange(self.order)
+                begin = LinearState(np.stack([np.zeros(self.order), free]), np.empty((2, 0)))
+            if not inputs.size:
+                return inputs, begin
+            both = np.stack([inputs, np.zeros_like(inputs)])
+            forced, end = plant.continued(both, begin, hold=self.hold, sample=self.sample, free=True)
+            y = forced.sum(axis=0)
+        if not np.isfinite(y).all():
+            k = int(np.argmin(np.isfinite(y)))
+            raise SimulationError(f"the output leaves the finite numbers at sample {k}; the poles are {self.poles}")
+        return y, end
+
+    def filtered(self, signals: FloatArray, sample_time: float) -> FloatArray:
+        """Outputs from rest for several inputs at once, (n_signals, n_samples); what is not finite stays."""
+        plant = self._plant(sample_time)
+        return np.asarray(plant.filtered(signals[np.newaxis], hold=self.hold, sample=self.sample)[0])
+
+    @classmethod
+    def structure(
+        cls,
+        *,
+        poles: int,
+        zeros: int,
+        delay: float | str = 0.0,
+        hold: str = "zoh",
+        sample: str = "start",
+        initial: str = "rest",
+    ) -> "TransferFunctionStructure":
+        """What `hysim.identify` takes: numbers of poles and zeros, and how the record was sampled.
+
+        Parameters
+        ----------
+        poles, zeros : int
+            Their numbers, zeros <= poles.
+        delay : float or "free"
+            The dead time [s]. ``"free"`` has it identified, from 0 to a quarter of the record unless
+            ``bounds={"delay": (lower, upper)}`` says otherwise; it need not be a whole number of samples.
+        hold, sample : str
+            As in the constructor.
+        initial : {"rest", "free"}
+            Whether the initial state is zero, or identified.
+
+        Returns
+        -------
+        TransferFunctionStructure
+
+        Raises
+        ------
+        ValueError, TypeError
+            If the numbers do not fit, or an option is unknown.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> fit = hs.identify(hs.TransferFunction.structure(poles=4, zeros=1), hs.datasets.table1(dwell=1.0))
+        >>> fit.n_parameters, round(fit.fit_percent, 1)
+        (6, 91.5)
+        """
+        if isinstance(delay, str) and delay != "free":
+            raise ValueError(f'delay must be a number of seconds or "free", got {delay!r}')
+        return TransferFunctionStructure(
+            poles=poles,
+            zeros=zeros,
+            delay=None if isinstance(delay, str) else delay,
+            hold=hold,
+            sample=sample,
+            initial=initial,
+        )
+
+    @classmethod
+    def candidates(cls) -> dict[str, "TransferFunctionStructure"]:
+        """What `hysim.compare` tries of this family: two poles and one zero, one mode or a lag with a creep."""
+        return {cls.__name__: cls.structure(poles=2, zeros=1)}
+
+    @classmethod
+    def structures(
+        cls,
+        *,
+        poles: Iterable[int] = range(1, 6),
+        zeros: Iterable[int] | None = None,
+        delays: Iterable[float | str] = (0.0,),
+        hold: str = "zoh",
+        sample: str = "start",
+        initial: str = "rest",
+    ) -> dict[str, "TransferFunctionStructure"]:
+        """Candidates for `hysim.select`: every combination of the numbers and delays.
+
+        Parameters
+        ----------
+        poles : iterable of int
+            Numbers of poles.
+        zeros : iterable of int, optional
+            Numbers of zeros, of which those below the number of poles are taken; by default all of them.
+        delays : iterable of float or "free"
+            As in `structure` [s].
+        hold, sample, initial : str
+            As in `structure`.
+
+        Returns
+        -------
+        dict
+            Name to structure, ``"2 poles, 1 zero"`` and so on.
+
+        Raises
+        ------
+        ValueError, TypeError
+            As `structure`.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> list(hs.TransferFunction.structures(poles=(1, 2), delays=(0.0, "free")))[1:3]
+        ['1 pole, 0 zeros, free delay', '2 poles, 0 zeros']
+        """
+        numbers, late = None if zeros is None else set(zeros), tuple(delays)
+        found = [
+            cls.structure(poles=n, zeros=m, delay=delay, hold=hold, sample=sample, initial=initial)
+            for n in poles
+            for m in range(n)
+            if numbers is None or m in numbers
+            for delay in late
+        ]
+        return {str(structure): structure for structure in found}
+
+    def _plant(self, sample_time: float) -> LinearPlants:
+        with np.errstate(all="ignore"):
+            numerator = np.concatenate([np.zeros(self.order + 1 - len(self.num)), self.num]) / self.den[0]
+            monic = np.array(self.den[1:]) / self.den[0]
+        return LinearPlants.of(monic[np.newaxis], numerator[np.newaxis], np.array([self.delay]), sample_time)
+
+
+@checked
+class TransferFunctionStructure(Identifiable, Composable):
+    """The shape of a transfer function, to be identified; see `TransferFunction.structure`.
+
+    The search runs over second-order sections s^2 + 2 zeta omega s + omega^2 (and one of first order for an
+    odd number of poles) on log scales, which are stable by construction: omega from 0.1 rad over the whole
+    record to the Nyquist rate, zeta from 0.001 to 30, so that real poles may lie at both ends. Resonances
+    above the Nyquist rate are left out: samples cannot tell them from those below, and they fit noise.
+    A free delay, which is None here, is searched in samples from 0 to a quarter of the record.
+    """
+
+    poles: int
+    zeros: int
+    delay: float | None = 0.0
+    hold: str = "zoh"
+    sample: str = "start"
+    initial: str = "rest"
+
+    def __post_init__(self) -> None:
+        _check_options(self.hold, self.sample)
+        if self.initial not in ("rest", "free"):
+            raise ValueError(f'initial must be "rest" or "free", got {self.initial!r}')
+        if not all(isinstance(number, int) for number in (self.poles, self.zeros)):
+            raise TypeError(f"numbers of poles and zeros must be int, got {self!r}")
+        if not 0 <= self.zeros <= self.poles or self.poles < 1:
+            raise ValueError(f"there must be at least one pole, and no more zeros than poles, got {self!r}")
+        if self.delay is not None and self.delay < 0.0:
+            raise ValueError(f"delay must not be negative, got {self.delay}")
+
+    def __str__(self) -> str:
+        poles, zeros = (
+            f"{n} {what}{'' if n == 1 else 's'}" for n, what in ((self.poles, "pole"), (self.zeros, "zero"))
+        )
+        late = ", free delay" if self.delay is None else f", delay {self.delay:g} s" if self.delay else ""
+        return f"{poles}, {zeros}{late}"
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The names in which the output is affine: numerator, initial state."""
+        return (*(f"num[{k}]" for k in range(self.zeros + 1)), *(f"x0[{k}]" for k in range(self.poles)))
+
+    @property
+    def denominator(self) -> tuple[str, ...]:
+        """The denominator's names, which are searched; ``den[0]`` is one."""
+        return tuple(f"den[{k}]" for k in range(1, self.poles + 1))
+
+    @property
+    def free_delay(self) -> tuple[str, ...]:
+        """The delay's name where it is searched."""
+        return ("delay",) if self.delay is None else ()
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """The box of the sections, and of the delay where it is free.
+
+        Raises
+        ------
+        ValueError
+            If the record has no even time or no input, `initial` or a name is unknown, a coefficient of the
+            denominator is fixed or bounded, or a delay is negative.
+        """
+        sample_time = record.sample_time
+        if np.ptp(record.u) == 0.0 and record.u[0] == 0.0:
+            raise ValueError("the input is zero throughout: nothing can be identified from it")
+        names = (*self.denominator, *self.free_delay, *self.columns)
+        defaults = dict.fromkeys(names, 0.0)
+        for name in (*freedom.fixed, *freedom.bounds):
+            if name in self.denominator:
+                raise ValueError(f"{name!r} cannot be fixed or bounded: the denominator is searched by its sections")
+        at_rest = self.columns[self.zeros + 1 :] if freedom.starts_at_rest(self.initial) else ()
+        held = freedom.held(defaults, at_rest=at_rest)
+        limits = freedom.limits(defaults, held)
+        known_delay = held.get("delay", self.delay)
+        earliest, latest = limits.pop("delay", (0.0, LATEST * len(record) * sample_time))
+        if min(earliest, known_delay or 0.0) < 0.0 or not latest < np.inf:
+            raise ValueError(f"a delay must not be negative or infinite, got {known_delay or (earliest, latest)}")
+        pairs = self.poles // 2
+        low, high = np.log(FREQUENCY[0] / len(record)), np.log(FREQUENCY[1])
+        coordinates = [f"{what}[{k}]" for k in range(pairs) for what in ("log frequency", "log damping")]
+        box = [(low, high), (float(np.log(DAMPING[0])), float(np.log(DAMPING[1])))] * pairs
+        if self.poles % 2:
+            coordinates.append("log rate")
+            box.append((low, high))
+        if known_delay is None:
+            coordinates.append("delay")
+            box.append((earliest / sample_time, latest / sample_time))
+        lower, upper = np.array(box).T
+        starts, agreed = self._starts(record, lower, upper, known_delay, at_rest=bool(at_rest))
+        return SearchSpace(
+            coordinates=tuple(coordinates),
+            lower=lower,
+            upper=upper,
+            starts=starts,
+            screened=None if len(record) < _LONG else 0 if agreed else _SCREENED,
+            names=tuple(name for name in names if name not in held),
+            columns=self.columns,
+            linear=tuple(name for name in self.columns if name not in held),
+            held=held,
+            parameters=lambda x: self._searched(np.atleast_2d(x), sample_time, known_delay),
+            bounds=limits,
+            state=self.columns[self.zeros + 1 :],
+        )
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """Columns of the numerator and of the initial state, and zero, (n_sets, n_samples, n_columns + 1)."""
+        monic = np.stack([np.atleast_1d(parameters[name]) for name in self.denominator], axis=1)
+        delay = parameters["delay"] if self.delay is None else self.delay
+        options = {"hold": self.hold, "sample": self.sample}
+        return affine_columns(monic, record.u, record.sample_time, delay, zeros=self.zeros, **options)
+
+    def with_unit_gain(self) -> UnitGain:
+        """The structure with the gain at rest one, beside a stage that carries the gain."""
+        return UnitGain(self)
+
+    def assemble(self, parameters: Mapping[str, float]) -> TransferFunction:
+        """The transfer function with these parameters."""
+        initial_state = tuple(parameters[f"x0[{k}]"] for k in range(self.poles))
+        return TransferFunction(
+            num=tuple(parameters[f"num[{k}]"] for k in range(self.zeros + 1)),
+            den=(1.0, *(parameters[name] for name in self.denominator)),
+            delay=parameters["delay"] if self.delay is None else self.delay,
+            hold=self.hold,
+            sample=self.sample,
+            initial_state=initial_state if any(initial_state) else (),
+        )
+
+    def notes(self, record: Record, model: TransferFunction) -> tuple[str, ...]:
+        """Whether a curve without memory fits as well, and whether the record shows more than one rate."""
+        n_parameters = self.poles + self.zeros + 1 + len(self.free_delay)
+        return notes(record, model.response(record.u, record.sample_time), n_parameters)
+
+    def _starts(
+        self, record: Record, lower: FloatArray, upper: FloatArray, delay: float | None, *, at_rest: bool
+    ) -> tuple[FloatArray, bool]:
+        """What regressions find on a long record, and whether that is enough; a short one is covered by the search.
+
+        With one delay they have to agree; the best of several delays need not.
+        """
+        if len(record) < _LONG:
+            return np.empty((0, lower.size)), False
+        h = record.sample_time
+        delays = likely_delays(record, lower[-1] * h, upper[-1] * h) if delay is None else [delay]
+        options = {"hold": self.hold, "sample": self.sample}
+        found = guesses(record, self.poles, self.zeros, delays, at_rest=at_rest, **options)
+        starts = np.array([self._coordinates(each, h)[: lower.size] for each in found]).reshape(-1, lower.size)
+        starts = np.clip(starts, lower, upper)
+        if delay is None or len(starts) < _MAJORITY:
+            return starts, len(starts) >= _MAJORITY
+        apart = np.abs(starts - np.median(starts, axis=0))
+        return starts, bool(np.sum((apart < _AGREED * (upper - lower)).all(axis=1)) >= _MAJORITY)
+
+    def _coordinates(self, guess: Guess, sample_time: float) -> FloatArray:
+        return np.append(sections(guess.poles, sample_time), guess.delay / sample_time)
+
+    def _searched(self, x: FloatArray, sample_time: float, delay: float | None) -> dict[str, FloatArray]:
+        """The denominators, and the delay where it is not the structure's own."""
+        product = np.ones((len(x), 1))
+        for k in range(self.poles // 2):
+            frequency, damping = np.exp(x[:, 2 * k]), np.exp(x[:, 2 * k + 1])
+            product = _times(product, [np.ones(len(x)), 2.0 * damping * frequency, frequency**2])
+        if self.poles % 2:
+            product = _times(product, [np.ones(len(x)), np.exp(x[:, self.poles - 1])])
+        found = {name: product[:, k] / sample_time**k for k, name in enumerate(self.denominator, 1)}
+        late = x[:, -1] * sample_time if delay is None else np.full(len(x), delay)
+        return found | dict.fromkeys(self.free_delay, late)
+
+
+def _check_options(hold: str, sample: str) -> None:
+    if hold not in ("zoh", "foh"):
+        raise ValueError(f'hold must be "zoh" or "foh", got {hold!r}')
+    if sample not in ("start", "end"):
+        raise ValueError(f'sample must be "start" or "end", got {sample!r}')
+    if (hold, sample) == ("foh", "end"):
+        raise ValueError('sample="end" needs an input that is held, hold="zoh"')
+
+
+def _times(polynomials: FloatArray, factor: list[FloatArray]) -> FloatArray:
+    """Products of rows of polynomials with one factor for each row."""
+    product = np.zeros((len(polynomials), polynomials.shape[1] + len(factor) - 1))
+    for k, coefficient in enumerate(factor):
+        product[:, k : k + polynomials.shape[1]] += coefficient[:, np.newaxis] * polynomials
+    return product
