@@ -10,7 +10,7 @@ HERE = Path(__file__).parent
 RESULTS = HERE.parent / "experiments" / "results"
 sys.path.insert(0, str(HERE))
 
-from front_door import write_reference  # noqa: E402  from beside this file
+from front_door import families, write_reference  # noqa: E402  from beside this file
 
 project = "hysim"
 version = release = hysim.__version__
@@ -99,6 +99,7 @@ def table1_models() -> str:
 
 
 myst_substitutions = {
+    "families": families(),
     "table1_models": table1_models(),
     "recovery_figure": shown(
         {

@@ -5,12 +5,15 @@ A name that is added there appears here without an edit.
 
 import inspect
 from collections.abc import Iterable
-from itertools import groupby
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import hysim
+from hysim.models.candidates import is_identifiable
+from hysim.models.law import Law
+from hysim.models.model import every_family
+from hysim.models.protocols import Invertible, StepwiseInvertible
 
 
 def write_reference(folder: Path) -> None:
@@ -23,8 +26,8 @@ def write_reference(folder: Path) -> None:
         "``import hysim as hs`` loads nothing but the standard library; each name is loaded when it is first used.\n",
         ".. currentmodule:: hysim\n",
     ]
-    for home, members in groupby(names, key=lambda name: _home(names[name])):
-        parts += [_heading(home.capitalize(), "-"), _summary(members)]
+    for home in dict.fromkeys(map(_home, names.values())):
+        parts += [_heading(home.capitalize(), "-"), _summary(name for name in names if _home(names[name]) == home)]
     for name, module in modules.items():
         members = [member for member in _members(module) if getattr(module, member) not in names.values()]
         parts += [_heading(f"hysim.{name}", "-"), _first_line(module), _summary(f"{name}.{each}" for each in members)]
@@ -50,12 +53,34 @@ def _members(module: ModuleType) -> Iterable[str]:
             yield name
 
 
+def families() -> str:
+    """Every law of the registry, and what hysim can do with it, as a table."""
+    lines = ["| family | law | identified | inverse |", "|---|---|---|---|"]
+    for name, family in every_family().items():
+        if family.__module__.startswith("hysim.laws"):
+            summary = (
+                f"{inspect.getdoc(family)}".split("\n\n")[0].replace("\n", " ").replace("``", "`").replace("|", r"\|")
+            )
+            inverse = _inverse(family)
+            identified = "yes" if is_identifiable(family) else ""
+            lines.append(f"| [{name}](reference/hysim.{name}.rst) | {summary} | {identified} | {inverse} |")
+    return "\n".join(lines)
+
+
+def _inverse(family: type) -> str:
+    """How the inverse of a law is computed."""
+    if not isinstance(family, Invertible):
+        return ""
+    own = isinstance(family, StepwiseInvertible) and family.compiled_inverse is not Law.compiled_inverse
+    return "closed form" if own else "search on the step"
+
+
 def _heading(text: str, underline: str) -> str:
     return f"{text}\n{underline * len(text)}\n"
 
 
-def _first_line(module: ModuleType) -> str:
-    return f"{inspect.getdoc(module)}".split("\n\n")[0].replace("\n", " ") + "\n"
+def _first_line(value: Any) -> str:
+    return f"{inspect.getdoc(value)}".split("\n\n")[0].replace("\n", " ") + "\n"
 
 
 def _summary(names: Iterable[str]) -> str:

@@ -71,7 +71,9 @@ def test_every_result_says_what_matters_in_ten_lines():
         for word in wanted:
             assert word in text, (word, text)
         assert result._repr_mimebundle_() == {"text/plain": text}
-        if type(result).__module__.startswith(("hysim.laws", "hysim.plants")) or isinstance(result, hs.TrackingController):
+        if type(result).__module__.startswith(("hysim.laws", "hysim.plants")) or isinstance(
+            result, hs.TrackingController
+        ):
             assert (
                 eval(repr(result), {**vars(hs), **{name: getattr(hs, name) for name in hs.__all__}, "array": np.array})
                 == result
