@@ -6,8 +6,8 @@
 
 Each is discretised by s = w / tan(w h / 2) (z - 1) / (z + 1), which keeps its response at the frequency w.
 
-Sources: A. J. Fleming, S. S. Aphale and S. O. R. Moheimani, IEEE Trans. Nanotechnology 9 (2010), for the first
-damping loop in this equivalent form; J. L. Fanson and T. K. Caughey, AIAA Journal 28 (1990), for the second.
+Sources: A. J. Fleming, S. S. Aphale and S. O. R. Moheimani, IEEE Trans. Nanotechnology 9 (2010); J. L. Fanson and
+T. K. Caughey, AIAA Journal 28 (1990).
 """
 
 import math
@@ -27,7 +27,7 @@ class Notch:
     Parameters
     ----------
     natural_frequency, damping_ratio : float
-        Of the resonance, on whose poles the filter's zeros lie: positive [rad/s], and not negative.
+        Resonance, on whose poles the filter's zeros lie: positive [rad/s], and not negative.
     new_damping_ratio : float
         Damping ratio of the filter's poles, positive.
 
@@ -73,7 +73,7 @@ class Notch:
 class DampingLoop:
     """Positive feedback of the displacement through a low-pass filter, which damps a resonance.
 
-    It acts on the measurement minus the wanted displacement, so that it is silent where nothing vibrates.
+    It acts on the measurement minus the wanted displacement: without vibration its output is zero.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class DampingLoop:
     frequency : float
         Corner of the filter, positive [rad/s].
     damping_ratio : float, optional
-        Of a filter of second order (positive position feedback), positive; None for first order (integral resonant
+        Positive, for a filter of second order (positive position feedback); None for first order (integral resonant
         control).
 
     Raises
@@ -132,7 +132,7 @@ def biquad_response(
 
 
 def biquad(coefficients: FloatArray) -> Feedback:
-    """The filter with its two states."""
+    """Filter (b0 + b1 / z + b2 / z^2) / (1 + a1 / z + a2 / z^2) as a system with two states."""
     b0, b1, b2, a1, a2 = coefficients
     return Feedback(
         np.array([[-a1, 1.0], [-a2, 0.0]]), np.array([b1 - a1 * b0, b2 - a2 * b0]), np.array([1.0, 0.0]), float(b0)

@@ -2,12 +2,9 @@
 
     x[k+1] = f(x[k], u[k]),    y[k] = g(x[k])
 
-A discrete plant is one sample of hysim's own loop: x is the state that is carried from sample to sample, with the
-memory, and y the measurement just before the new command u[k], so that no command reaches the output of its own sample.
-A controller is its own step, whose command answers to the inputs at once. Both are functions of their arguments alone,
-which python-control may evaluate in any order.
-
-Every state is counted from rest: x = 0, from which python-control starts, is the system at rest at u = 0.
+A discrete plant is one sample of hysim's own loop: x is the state carried from sample to sample, and y the measurement
+just before the new command u[k], so that no command reaches the output of its own sample. A controller's command
+answers to the inputs at once. Both are functions of their arguments alone, and states are counted from rest at u = 0.
 """
 
 import math
@@ -36,7 +33,7 @@ Rule = Callable[[float, FloatArray, FloatArray, Any], FloatArray]
 
 
 def actuator_system(actuator: Actuator, sample_time: float) -> Any:
-    """The actuator with its limits and its sensor, the noise left out."""
+    """Actuator with its limits and its sensor, without noise."""
     if isinstance(actuator.hysteresis, BoucWenInverse):
         raise TypeError("the inverse of a law is part of a controller: give it as InverseFeedforward(law=...)")
     sensor = replace(actuator.sensor or Sensor(), noise=0.0)
@@ -63,7 +60,7 @@ def actuator_system(actuator: Actuator, sample_time: float) -> Any:
 
 
 def oscillator_system(plant: BoucWenOscillator, sample_time: float | None) -> Any:
-    """The oscillator as its differential equations, or from sample to sample, its input held between them."""
+    """Oscillator as its differential equations, or from sample to sample with its input held."""
     start: FloatArray = np.array([*(plant.initial_state or (0.0, 0.0)), plant.law.z0])
     step = sample_time or 0.0
     law, elastic_force, held = plant.law, plant.elastic_force, replace(plant, hold="zoh")
@@ -87,7 +84,7 @@ def oscillator_system(plant: BoucWenOscillator, sample_time: float | None) -> An
 
 
 def controller_system(controller: Any, sample_time: float) -> Any:
-    """The controller from reference and measurement to the command, within its limits."""
+    """Controller from reference and measurement to the command, within its limits."""
     compiled = CompiledController(*controller.compiled(sample_time, 0.0, 0.0))
     at_rest = compiled.state
     carried = np.isfinite(at_rest)  # other places are written before they are read
@@ -120,7 +117,6 @@ def _parts(state: ChainState) -> list[FloatArray]:
 
 
 def _with_parts(state: ChainState, values: FloatArray) -> ChainState:
-    """The state with the values of its parts, one behind the other."""
     ends = np.cumsum([part.size for part in _parts(state)])
     voltages, memory, x, past, readings = np.split(values, ends[:-1])
     return state._replace(voltages=voltages, law=state.law._replace(state=memory), x=x, past=past, readings=readings)
@@ -140,7 +136,7 @@ def _names(chain: Chain, state: ChainState) -> list[str]:
 
 
 def _memory_names(law: Any, state: FloatArray) -> list[str]:
-    """Names of a law's state; of a law with a memory z it begins the compiled state, and the rest is scratch."""
+    """Names of a law's state; a memory z begins the compiled state, and the rest is scratch."""
     size = len(law.advance(state[:1])[1]) if isinstance(law, Remembering) else state.size
     others = ["z"] if size == 2 else [f"z[{i}]" for i in range(size - 1)]
     return ["v", *others][:size]

@@ -34,18 +34,18 @@ class ClosedLoop:
     reference, error : array
         Reference, and reference minus measurement [unit of y].
     command, drive : array
-        Command of the controller before and after its limits, held from each sample on [unit of u].
+        Command before and after the controller's limits, held until the next sample [unit of u].
     u : array
         Voltage at the law just after each new command, within the amplifier's limits [unit of u].
     z : array, or None
-        Memory of the law at each sample, before the new command; None for a law without one.
+        Memory of the law just before each new command; None for a law without one.
     y, measurement : array
-        True displacement at each sample, before the new command, and its measurement [unit of y].
+        True displacement just before each new command, and its measurement [unit of y].
     conditions : mapping
         plant, controller, sample_time [s], substeps, delay (of vibration and sensor) [s], preview [s], limits (of the
-        controller), amplifier_limits, sensor_quantum, noise (rms), seed, u0, lowest_u, highest_u, limited_samples (at
-        which controller or amplifier are at a limit), voltage_noise_rms and voltage_noise_peak (of the difference to
-        the same loop without noise).
+        controller), amplifier_limits, sensor_quantum, noise (rms), seed, u0, lowest_u, highest_u, limited_samples (at a
+        limit of controller or amplifier), voltage_noise_rms and voltage_noise_peak (difference to the same loop without
+        noise).
     units : mapping
         Labels of the units of ``"t"``, ``"u"`` and ``"y"``.
     """
@@ -97,16 +97,15 @@ def close_loop(
     """Run a sampled controller around an actuator.
 
     At every sample the controller reads the sensor and sends a command, which is held until the next. The plant
-    between the samples is exact, unless its amplifier takes time: then it is second order in the sub-step. A
-    controller that needs a sample to compute is modelled by ``hs.Sensor(delay=sample_time)``.
+    between the samples is exact; behind an amplifier that takes time it is second order in the sub-step. Model a
+    controller that needs a sample to compute by ``hs.Sensor(delay=sample_time)``.
 
     Parameters
     ----------
     plant : Actuator, law or linear plant
         At rest at `u0` before the first sample, creep included.
     controller : PID, TrackingController, InverseFeedforward, or anything with their ``compiled``
-        At rest too. A controller with a method ``ahead`` gets the reference so many samples ahead of its time, and
-        after the end of the record its last value.
+        At rest too. With a method ``ahead`` it gets the reference so many samples ahead, and at the end its last value.
     t : array, shape (n,)
         Evenly spaced times [s]; their spacing is the controller's sample time.
     reference : array, shape (n,)
@@ -176,13 +175,7 @@ class RestingPlant:
     def run(
         self, controller: Controller, reference: FloatArray, progress: Progress | None = None, begin: float = 0.0
     ) -> Signals:
-        """Signals of the loop that a controller closes, from the time `begin` [s].
-
-        Raises
-        ------
-        SimulationError
-            If the loop diverges.
-        """
+        """Signals of the loop that a controller closes from the time `begin` [s]; a SimulationError if it diverges."""
         signals = self.attempt(controller, reference, progress)
         if signals.lost >= 0:
             time = begin + signals.lost * self.sample_time
@@ -208,12 +201,12 @@ class RestingPlant:
         return np.asarray(law.memory(np.append(self.state.voltages[1], signals.v))[: -1 : self.chain.substeps])
 
     def driven(self, u: FloatArray) -> FloatArray:
-        """Displacements just before each of the commands `u`, as a loop would measure them."""
+        """Displacements just before each of the commands `u`."""
         return self.chain.driven(u, self.state)[0].y
 
 
 def sample_time_of(t: FloatArray, reference: FloatArray) -> float:
-    """Spacing of the times [s] of a reference; a ValueError if they do not fit."""
+    """Spacing of the times of a reference [s]; a ValueError if they do not fit."""
     if t.size != reference.size:
         raise ValueError(f"reference and t must have equal lengths, got {reference.size} and {t.size}")
     return even_step(t)

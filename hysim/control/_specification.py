@@ -15,7 +15,7 @@ from hysim.models.actuator import Actuator
 
 
 class Judgement(NamedTuple):
-    """The largest figures of all plants and slopes; infinite if a loop is unstable."""
+    """Largest figures of all plants and slopes; infinite if a loop is unstable."""
 
     max_sensitivity: float
     voltage_noise: float
@@ -41,7 +41,6 @@ class Specification:
         self.plants = [_PlantLoops(plant, cycle, sample_time) for plant in plants]
 
     def judge(self, controller: SampledController) -> Judgement:
-        """The figures of a controller."""
         sensitivity = 0.0
         for loop, slope in self._loops():
             sensitivity = max(sensitivity, loop.max_sensitivity(controller, slope))
@@ -57,14 +56,12 @@ class Specification:
         return sum(max(0.0, part - 1.0) for part in parts)
 
     def words(self, trial: Trial) -> str:
-        """The figures and their bounds."""
         sensitivity = f"sensitivity {trial.max_sensitivity:.2f} of {self.max_sensitivity:g} allowed"
         if self.max_voltage_noise == math.inf:
             return sensitivity
         return f"{sensitivity}, voltage noise {trial.voltage_noise:.2g} of {self.max_voltage_noise:g}"
 
     def margins(self, controller: SampledController) -> tuple[float, float]:
-        """The smallest gain and phase margin."""
         gains, phases = np.array([loop.margins(controller, slope) for loop, slope in self._loops()]).T
         return float(gains.min()), float(phases.min())
 

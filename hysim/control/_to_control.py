@@ -21,20 +21,18 @@ def to_control(plant: Any, sample_time: float | None = None) -> Any:
     ----------
     plant : TransferFunction, StateSpace, Modes, Actuator, law, BoucWenOscillator, PID or TrackingController
         A plant without a law becomes a linear system, without the actuator's limits and slewing but with the sensor's
-        delay; a PID too, from its error to its command without limits, its derivative acting on the error, which
-        keeps the loop's poles. All others become nonlinear systems with their memory in the state: an actuator with
-        its limits and its sensor but without noise, a `TrackingController` from reference and measurement to the
-        command.
+        delay; a PID too, from its error to its command without limits, the derivative acting on the error (this keeps
+        the loop's poles). All others become nonlinear systems, memory in the state: an actuator with its limits
+        and its sensor but without noise, a `TrackingController` from reference and measurement to the command.
     sample_time : float, optional
-        Of the discrete form, which is that of `close_loop` [s]. By default the system stays continuous, which laws,
+        Sample time of the discrete form, that of `close_loop` [s]. By default the system stays continuous, which laws,
         actuators with a law and a `TrackingController` cannot.
 
     Returns
     -------
     control.TransferFunction, control.StateSpace or control.NonlinearIOSystem
-        The state zero is rest at u = 0 (of a controller also at the displacement zero), or the start of an
-        oscillator's own simulations. The output of a discrete plant is the measurement just before each new command,
-        which is held until the next.
+        The state zero is rest at u = 0 (of a controller also at the displacement zero), or the start of an oscillator's
+        own simulations. The output of a discrete plant is the measurement just before each new command.
 
     Raises
     ------

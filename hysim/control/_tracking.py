@@ -1,4 +1,4 @@
-"""Feed-forward and feedback composed, in one compiled step; its equations stand in `hysim.kernels.tracking`.
+"""Feed-forward and feedback composed, in one compiled step; `hysim.kernels.tracking` has its equations.
 
     reference -> shaper -> mode's inverse -> inverse of creep and law -> limits -> u
                    |                                  |                    |
@@ -55,8 +55,8 @@ class TrackingController(SampledController):
     notch, damping : Notch and DampingLoop, optional
         Filter of the feedback's command, and a loop beside it.
     model : Actuator, optional
-        The feed-forward's plant with its vibration and the sensor's delay: the feedback then compares with the
-        measurement that this model would give, and corrects only the difference.
+        The feed-forward's plant with vibration and sensor delay: the feedback then corrects only the difference between
+        the measurement and the model's.
     preview : bool
         Whether the reference is known ahead.
     limits : (float, float), optional
@@ -76,9 +76,8 @@ class TrackingController(SampledController):
     >>> law = hs.BoucWen(feedthrough=1.0, gain=0.5)
     >>> inverse = hs.TrackingController(feedforward=hs.InverseFeedforward(law=law), preview=True)
     >>> t = 0.01 * np.arange(200)
-    >>> reference = np.sin(t)
-    >>> run = hs.close_loop(law, inverse, t, reference)
-    >>> bool(np.abs(run.y - reference)[1:].max() < 1e-12)
+    >>> run = hs.close_loop(law, inverse, t, np.sin(t))
+    >>> bool(np.abs(run.y - np.sin(t))[1:].max() < 1e-12)
     True
     """
 
@@ -113,17 +112,14 @@ class TrackingController(SampledController):
                 raise ValueError("the model's law and amplifier must be those of the feedforward")
 
     def ahead(self, sample_time: float) -> int:
-        """By how many samples the reference must be known ahead, for the filters and the hold."""
+        """Samples by which the reference must be known ahead, for the filters and the hold."""
         if not self.preview:
             return 0
         shaped = self._shaped(sample_time)
         return self._hold + round(float(shaped @ np.arange(shaped.size)))
 
     def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
-        """Response of the feedback from the negative measurement to the command at frequencies [rad/s], limits apart.
-
-        The frequencies must not be zero where there is an integral; the result has their shape.
-        """
+        """Response from the negative measurement to the command at frequencies [rad/s], limits apart."""
         total = (self.feedback or PID()).frequency_response(frequency, sample_time)
         if self.notch is not None:
             total = total * self.notch.frequency_response(frequency, sample_time)
@@ -141,7 +137,7 @@ class TrackingController(SampledController):
         return total
 
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
-        """The controller as compiled loops take it, at rest at `u0` and `y0`."""
+        """Compiled step, parameters and state at rest at `u0` and `y0`."""
         check_sample_time(sample_time)
         lowest, highest = self.limits or (-math.inf, math.inf)
         taps = self._taps(sample_time)
@@ -163,14 +159,13 @@ class TrackingController(SampledController):
 
     @property
     def _hold(self) -> int:
-        """Samples from the drive to the displacement that it causes."""
         return 0 if self.feedforward is None else 1 if self.mode_inverse is None else 2
 
     def _shaped(self, sample_time: float) -> FloatArray:
         return np.ones(1) if self.shaper is None else self.shaper.impulses(sample_time)
 
     def _taps(self, sample_time: float) -> FloatArray:
-        """Weights of the reference, the newest first, for the drive and for the target."""
+        """Weights of the reference, the newest first, for the feed-forward and for the feedback."""
         shaped = self._shaped(sample_time)
         inverted = np.ones(1) if self.mode_inverse is None else self.mode_inverse.weights(sample_time)
         drive, target = np.convolve(shaped, inverted), np.concatenate([np.zeros(self._hold), shaped])
@@ -178,7 +173,7 @@ class TrackingController(SampledController):
         return np.stack([np.pad(weights, (0, size - weights.size)) for weights in (drive, target)])
 
     def _model_blocks(self, sample_time: float, u0: float) -> tuple[list[float], FloatArray, FloatArray]:
-        """The model for the kernel: the head's numbers, the matrices, the state at rest."""
+        """Numbers of the head, matrices, and state at rest of the model, as the kernel takes them."""
         chain = (self.model or Actuator()).chain(sample_time)
         rest = chain.rest(u0)
         stage, seen_in = chain.stage, chain.seen_in

@@ -62,18 +62,17 @@ def discover(
     """Discover the law of a memory in one or several records.
 
     The slope of the memory along the loading length, dL = ``|du|``, is regressed on a library of terms by PySINDy.
-    Structures are refined by their error in free run; of those that fit equally well the one of fewest numbers is
-    taken. Models without a law are fitted beside it, and all are judged on data that they were not fitted to.
+    Structures are refined by their error in free run; of those that fit equally well the one of fewest parameters is
+    taken. Models without a law are fitted beside it, and all are judged on held-out samples.
 
     Parameters
     ----------
     record_or_records : Record or sequence of Record
-        Input and output. The input is taken as exact, and must reverse. Several records share the law; each has its
-        own initial state. The law needs no time, but without it nothing distinguishes hysteresis from a lag.
+        Input, which is taken as exact and must reverse, and output. Several records share the law; each has its own
+        initial state. Without time hysteresis and lag cannot be distinguished.
     route : {"auto", "memory", "output"}
         What is measured: the memory itself, y = z; or an output, y = offset + feedthrough u + gain z. By default both
-        are tried, and a Duhem law, and the one of lowest BIC is taken. Where all of these explain little of records
-        with even times, a warning says so: they may be those of an oscillator, for which `discover_oscillator` is.
+        and a Duhem law are tried, and the one of lowest BIC is taken.
     library : {"bouc-wen", "duhem"} or sequence of str, optional
         ``"bouc-wen"``, for z: ``u'`` and ``|u'|`` times z^j, and times ``|z|`` z^(j-1), j up to `degree`.
         ``"duhem"``, for y: ``u'`` and ``|u'|`` times u^i y^j, i + j up to `degree`. Or the names of the terms:
@@ -87,26 +86,26 @@ def discover(
     optimizer : {"STLSQ", "SR3", "SSR", "FROLS"}
         PySINDy's optimizer that makes the path.
     derivative : {"auto", "smoothed", "weak"}
-        Slopes of smoothed branches, or the integral form, which needs none; by default the one whose regressions run
-        nearest to samples that they have not seen.
+        Slopes of smoothed branches, or the integral form, which needs none; by default the better one on held-out
+        samples.
     initial : {"auto", "free", "rest"}
-        Whether the memory at the first sample is fitted for each record, or zero. By default both are tried, and the
-        lower BIC decides; a Duhem law begins at rest only in records that begin at u = 0.
+        Whether the memory at the first sample is fitted for each record, or zero. By default the lower BIC decides; a
+        Duhem law begins at rest only in records that begin at u = 0.
     cross_validate : {None, "loo"} or int, optional
         ``"loo"`` leaves one output sample out at a time, an int that many blocks of samples; the input is kept. The
         whole search is repeated for each fold: minutes for ``"loo"`` on 50 samples. Fills `Discovery.cv_rmse`.
     seed : int
-        Of random restarts, and of the ensemble.
+        Seed of random restarts, and of the ensemble.
     progress : callable, optional
         Called as ``progress(done, total)``; each fold of the cross-validation is one step.
 
     Returns
     -------
     Discovery
-        Its verdict is about the records, and rests on the law and on models that need no library: a single-valued
-        curve, a linear plant, linear creep, and a superposition of functions of plays.
+        Its verdict rests on the law and on models that need no library: a single-valued curve, a linear plant, linear
+        creep, and a superposition of functions of plays.
 
-        - ``"rate-independent hysteresis"``: under several rates the law or the plays predict held-out samples better
+        - ``"rate-independent hysteresis"``: at several rates the law or the plays predict held-out samples better
           than all models that depend on time, and than the curve;
         - ``"linear lag"``: a linear dynamic model predicts them better;
         - ``"cannot be told from one rate"``: the records show a loop, but have one rate only, or no time;
@@ -118,14 +117,13 @@ def discover(
     ValueError
         If an option is unknown, an input or output is constant, the input never reverses, its branches are too short
         to have a slope, there are no more samples than terms, or every law diverges.
-    TypeError
-        If the first argument is not a record or a sequence of them.
-    ImportError
-        If `optimizer` is one of PySINDy's that needs an extra.
+    TypeError, ImportError
+        If the first argument is not a record or a sequence of them; if `optimizer` needs one of PySINDy's extras.
 
     Notes
     -----
-    Structures are compared by the BIC of their free runs; residuals below 1e-4 strokes are no evidence.
+    Structures are compared by the BIC of their free runs; residuals below 1e-4 strokes are no evidence. A warning says
+    where the records may be those of an oscillator, for which `discover_oscillator` is.
 
     Sources: S. L. Brunton, J. L. Proctor and J. N. Kutz, PNAS 113 (2016); PySINDy 2.1.
 
@@ -193,14 +191,13 @@ def discover(
 
 
 def _rests(initial: str, library: Library, records: Sequence[Record]) -> tuple[bool, ...]:
-    """Whether the memory may begin at a value of its own, at zero, or at either."""
+    """Values of `Terms.rest` to try."""
     if initial != "auto":
         return (initial == "rest",)
     return (False, True) if library.letter == "z" or all(record.u[0] == 0.0 for record in records) else (False,)
 
 
 def _may_be_an_oscillators(records: tuple[Record, ...], candidate: Candidate[Any]) -> bool:
-    """Whether the times are even and a law without dynamics explains little."""
     return _scores(candidate, records)["fit_percent"] <= _POOR and all(_is_even(record) for record in records)
 
 

@@ -1,15 +1,12 @@
-"""The errors of a law and its rivals on samples that were left out of the fit, and the rates of the input.
+"""Errors of a law and its competitors on samples that were left out of the fit, and the rates of the input.
 
-A record is left out at a time, if there are several and none goes beyond the range of the others; of one record a rate,
-if its cycles have several; else a cycle, if there are three; else a few blocks. The start of each record is always
-seen, since it determines the memory, or the state, at the first sample. Samples beyond the range of the others do not
-count, unless all are: no model is judged by extrapolation.
+Left out at a time is a record, if there are several and none goes beyond the range of the others; of one record a
+rate, if its cycles have several; else a cycle, if there are three; else a few blocks. The start of each record is
+never left out, since it determines the initial state, and samples beyond the range of the others do not count, unless
+all are. A slow trend of each record is taken out of every residual.
 
-The rivals are the linear plant, and the yardsticks that need no law. A slow trend of each record is taken out of every
-residual: a drift is neither a fault of the law nor hysteresis.
-
-A model explains the samples if its error is not above FACTOR times that on the fitted samples, where records or rates
-are left out, or else times the noise; or not above UNEXPLAINED times the error of a curve.
+A model explains the samples if its error is at most FACTOR times that on the fitted samples, where records or rates
+are left out, or else times the noise; or at most UNEXPLAINED times the error of a curve.
 """
 
 import itertools
@@ -51,7 +48,7 @@ Samples = npt.NDArray[np.intp]
 
 
 class Law(Protocol):
-    """What is judged: an output at the samples of an input, without time."""
+    """A model that is judged: an output at the samples of an input, without time."""
 
     def response(self, u: npt.ArrayLike, /) -> FloatArray:
         """Output at the samples of `u`."""
@@ -68,10 +65,10 @@ Model = Callable[[FloatArray], FloatArray]
 
 @dataclass(frozen=True)
 class Trial:
-    """Rmse of the law and its rivals by name, on held-out samples and on those seen, and what was left out at a time.
+    """Rmse of the law and its competitors by name, held out and fitted, and what was left out at a time [unit of y].
 
     `together` is the rmse of the plays fitted to all samples, `noise` that of white noise in the outputs, `stroke`
-    their range, and `parts` are rmse by name in parts of the held-out samples; all in the unit of y.
+    their range, and `parts` are rmse by name in parts of the held-out samples.
     """
 
     errors: Mapping[str, float]
@@ -85,8 +82,7 @@ class Trial:
     def explains(self, name: str) -> bool:
         """Whether a model predicts the held-out samples nearly as well as the fitted ones, or most of the memory.
 
-        Plays have too many numbers to predict another path of the input from few samples: their error may also be that
-        of one fit to all samples.
+        The error of the plays may also be that of one fit to all samples: they have many parameters.
         """
         usual = self.seen[name] if self.by in ("record", "rate") else self.noise
         error = min(self.errors[name], self.together) if name == PLAYS else self.errors[name]
@@ -103,7 +99,7 @@ class Trial:
 
 
 def competitors_held_out(records: Sequence[Record], linear: Rival | None) -> Trial:
-    """Fit the rivals of a law again without some of the samples, and predict these; the errors of the law are nan.
+    """Fit the competitors again without some of the samples, and predict these; the errors of the law are nan.
 
     Without a linear rival, for lack of time, there are no relaxations either, and both errors are nan.
     """
@@ -123,7 +119,7 @@ def competitors_held_out(records: Sequence[Record], linear: Rival | None) -> Tri
 
 
 def law_held_out(trial: Trial, records: Sequence[Record], refit: Refit) -> Trial:
-    """The trial of the rivals with a law beside them, fitted again without the same samples."""
+    """The trial with a law beside the competitors, fitted again without the same samples."""
     n_samples = sum(len(record) for record in records)
 
     def law(weights: FloatArray) -> FloatArray:
@@ -171,7 +167,7 @@ def _models(records: Sequence[Record], y: FloatArray, linear: Rival | None) -> d
 
 
 def about_trends(residual: FloatArray, records: Sequence[Record]) -> list[FloatArray]:
-    """The residual of each record about its own trend; nan where it is nan, and all of it where that is all trend."""
+    """Residual of each record about its own trend; nan where it is nan or has too few samples."""
     residuals = []
     for own, record in zip(_of_each(residual, records), records, strict=True):
         counts = ~np.isnan(own)
@@ -185,7 +181,6 @@ def about_trends(residual: FloatArray, records: Sequence[Record]) -> list[FloatA
 
 
 def _in_parts(held: Sequence[FloatArray], records: Sequence[Record]) -> list[FloatArray]:
-    """The residuals of consecutive samples, as many parts of each record as may be independent of each other."""
     pieces = [piece for residual in held for piece in np.array_split(residual, _PARTS)]
     return [piece[~np.isnan(piece)] for piece in pieces if np.count_nonzero(~np.isnan(piece)) > 1]
 
@@ -195,7 +190,7 @@ def _of_each(values: FloatArray, records: Sequence[Record]) -> list[FloatArray]:
 
 
 def _folds(records: Sequence[Record]) -> tuple[str, list[Samples]]:
-    """What is left out at a time, and its samples among those of all records; the start of a record never is."""
+    """What is left out at a time, and its samples among those of all records."""
     lengths = [len(record) for record in records]
     begins = np.cumsum([0, *lengths])[:-1]
     kept = np.ones(sum(lengths), dtype=bool)
@@ -215,7 +210,6 @@ def _folds(records: Sequence[Record]) -> tuple[str, list[Samples]]:
 
 
 def _folds_of(record: Record) -> tuple[str, list[Samples]]:
-    """The parts of a single record: its rates, its cycles or blocks."""
     parts = at_one_rate(record)
     if len(parts) > 1:
         return "rate", parts
@@ -233,12 +227,12 @@ def _is_inside(seen: FloatArray, other: FloatArray) -> npt.NDArray[np.bool_]:
 
 
 def _noise(records: Sequence[Record]) -> float:
-    """Rms of white noise as the third differences of the outputs show it, those of smooth outputs being small."""
+    """Rms of white noise, from the third differences of the outputs: those of smooth outputs are small."""
     return rms([np.diff(record.y, 3) for record in records]) / math.sqrt(20.0)
 
 
 def rms(parts: Sequence[FloatArray]) -> float:
-    """Root mean square of what is not nan."""
+    """Root mean square of the values that are not nan."""
     values = np.concatenate(parts) if parts else np.empty(0)
     counts = values[~np.isnan(values)]
     return float(np.sqrt(np.mean(counts**2))) if counts.size else math.nan
@@ -247,11 +241,10 @@ def rms(parts: Sequence[FloatArray]) -> float:
 def rate_spread(records: Sequence[Record]) -> float:
     """How much the input's rate differs between passes at the same input; 1 for one rate, nan without time.
 
-    The input's range, all records together, has nine equal bands between 5 and 95 % of it. A branch that crosses a
-    band has there the rate band over time of crossing, a stop at an edge being divided in its middle. In each band the
-    95th percentile of the rates is divided by the 5th, all records having the same weight. The median over the bands
-    that are crossed more than once is taken, or over those that two records cross. So a sine has one rate, and so has a
-    triangle of any amplitude; sines of two amplitudes, or of a decaying one, have several.
+    The input's range has nine equal bands between 5 and 95 % of it. A branch that crosses a band has there the rate
+    band over time of crossing. In each band the 95th percentile of the rates is divided by the 5th, all records having
+    the same weight; the median over the bands that two records cross, or else all, is taken. A sine has one rate, and
+    so has a triangle of any amplitude; sines of two amplitudes have several.
     """
     if any(record.t is None for record in records):
         return math.nan
@@ -264,7 +257,7 @@ def rate_spread(records: Sequence[Record]) -> float:
 
 
 def at_one_rate(record: Record) -> list[Samples]:
-    """The stretches of a record whose cycles have one rate, one after the other; the whole where that is one."""
+    """Samples of the consecutive parts of a record whose cycles have one rate."""
     everything = np.arange(len(record))
     if record.t is None:
         return [everything]

@@ -6,16 +6,16 @@ Models of three kinds are fitted to the same records and judged on samples that 
     lagging   a linear plant of one or two poles, or relaxations: memory that depends on time
     turning   the law, or a superposition of plays: memory that depends on the order of the extremes only
 
-The plays need no library, so that the verdict does not depend on whether the library has a good law for the records.
-Better means an rmse on held-out samples below BETTER times the other's.
+The plays need no library: the verdict does not depend on whether the library has a good law. Better means an rmse on
+held-out samples below BETTER times the other's.
 
 1. Neither a lagging nor a turning model is better than the still ones: "no structure found".
 2. One rate, or no time: "cannot be told from one rate".
 3. Several rates. Of the models that explain the held-out samples: "linear lag" if a lagging one is better than all
    others, "rate-independent hysteresis" if a turning one is. Else "no structure found": hysteresis followed by a lag,
    or noise.
-4. A law that diverges in free run, on the records or on steady cycles over their range, is no law: "no structure
-   found", unless the plays show at several rates that the records are hysteretic.
+4. If the law diverges in free run, on the records or on steady cycles over their range: "no structure found", unless
+   the plays show at several rates that the records are hysteretic.
 """
 
 import math
@@ -72,26 +72,26 @@ class Judgement:
         ``"rate-independent hysteresis"``, ``"linear lag"``, ``"cannot be told from one rate"`` or
         ``"no structure found"``.
     rival : TransferFunction or None
-        The linear plant fitted to the same records, with the initial state of the longest one; of degree 0 where a
-        line does as well. None where a record has no time.
+        Linear plant fitted to the same records, with the initial state of the longest one; of degree 0 where a line
+        does as well, None where a record has no time.
     rival_offset : float
-        What is added to its output [unit of y].
+        Offset of its output [unit of y].
     held_out : mapping
         Rmse on samples that were left out of the fit, about a slow trend of each record [unit of y]: ``"law"``;
         ``"rival"``, the linear plant; ``"relaxations"``, linear creep; ``"curve"``, a function of the input alone;
-        ``"plays"``, a superposition of functions of plays. Without time that of the linear ones is nan.
+        ``"plays"``, a superposition of functions of plays. Without time nan for the linear ones.
     held_out_by : str
         What was left out at a time: ``"record"``, ``"rate"``, ``"cycle"`` or ``"block"``.
     rates : array, shape (3,)
         Multiples of the rate of the longest record.
     widths : mapping
-        ``"law"`` and ``"rival"`` to the relative widths at these rates of the last complete cycle of the law's free
-        run along that record, and of the steady loop of the rival. nan where the record has no complete cycle.
+        ``"law"`` and ``"rival"`` to the relative widths of their loops at these rates, along that record's last and
+        first complete cycle; nan where it has none.
     dissipation : float
         Signed area of the law's steady loop over the range of the input [unit of y times unit of u], positive where
         it runs counterclockwise, as a piezoelectric actuator's does.
     one_sign : bool
-        Whether loops of a quarter, a half and three quarters of that range have areas of that sign too, or none.
+        Whether no smaller loop (a quarter, a half, three quarters of that range) has an area of the other sign.
     rate_spread : float
         How much the rate of the input differs between passes at the same input, from 1; nan without time.
     stable : bool
@@ -116,10 +116,7 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Competitors:
-    """The models that need no law, tried on records: they are the same whatever law is judged beside them.
-
-    `records` have even times, and long ones are thinned; `spread` is their `rate_spread`.
-    """
+    """Models that need no law, fitted to records with even times; `spread` is their `rate_spread`."""
 
     records: Sequence[Record]
     linear: Rival | None
@@ -150,10 +147,10 @@ def competitors(records: Sequence[Record]) -> Competitors:
 
 
 def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, others: Competitors | None = None) -> Judgement:
-    """Judge a law that was fitted to records beside its rivals.
+    """Judge a law that was fitted to records beside its competitors.
 
-    `laws` is the law once for each record: all is shared but the memory at the first sample. `refit(records, weights)`
-    returns such laws, fitted to the samples whose weights are not zero.
+    `laws` is the law for each record, with its own initial state. `refit(records, weights)` returns such laws, fitted
+    to the samples whose weights are not zero.
     """
     others = others or competitors(records)
     records, linear, spread = others.records, others.linear, others.spread
@@ -202,7 +199,7 @@ def _verdict(trial: Trial, linear: Rival | None, single_valued: bool, spread: fl
 
 
 def _still(trial: Trial, linear: Rival | None, single_valued: bool = False) -> float:
-    """The error of the best model without memory, which the law is if it is `single_valued`."""
+    """Error of the best model without memory; the law is one if it is `single_valued`."""
     straight = linear is not None and linear.is_line
     return _least(trial, [CURVE, *[RIVAL] * straight, *[LAW] * single_valued])
 
@@ -270,7 +267,7 @@ def _thinned(records: Sequence[Record]) -> list[Record]:
 
 
 def doubts(judgement: Judgement) -> tuple[str, ...]:
-    """Reasons to doubt a law, one sentence each, for `Discovery.warnings`."""
+    """Reasons to doubt a law, one sentence each."""
     errors = judgement.held_out
     law, plays, curve = errors[LAW], errors[PLAYS], errors[CURVE]
     linear = min((errors[name] for name in (RIVAL, RELAXATIONS) if not math.isnan(errors[name])), default=math.inf)

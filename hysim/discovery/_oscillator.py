@@ -1,10 +1,4 @@
-"""The verb `discover_oscillator`: a memory found from an oscillator's input and output alone.
-
-    m y'' + c y' + k y + z = u,    z' = sum of coefficients times terms in (y', z)
-
-The search is `hysim.discovery._oscillator_search`; here its arguments are checked, and records are looked at for how
-they were made.
-"""
+"""The verb `discover_oscillator`: its arguments; `hysim.discovery._oscillator_search` has the search."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -39,9 +33,8 @@ def discover_oscillator(
 ) -> OscillatorDiscovery:
     """Discover the law of the memory in a mass on a hysteretic spring, ``m y'' + c y' + k y + z = u``.
 
-    The plant and the law are found together, from force u and displacement y. Bouc-Wen laws, a linear relaxation and
-    laws of the terms that the records ask for are refined by the error of the simulated oscillator; the one of lowest
-    BIC is taken.
+    Plant and law are found together, from force u and displacement y. Bouc-Wen laws, a linear relaxation and laws of
+    other terms are refined by the error of the simulated oscillator; the one of lowest BIC is taken.
 
     Parameters
     ----------
@@ -49,8 +42,8 @@ def discover_oscillator(
         Force, displacement and time, evenly spaced; all of one plant. They must hold several swings, large enough for
         the memory to be curved: only its curvature distinguishes A from k.
     structure : OscillatorStructure, optional
-        How the records were made, from ``BoucWenOscillator.structure(...)``. By default a record whose input
-        repeats itself and whose periods are alike is taken as steady, any other record as beginning at rest.
+        How the records were made, from ``BoucWenOscillator.structure(...)``. By default a record is taken as steady if
+        its input repeats itself and its periods are alike, otherwise as beginning at rest.
     mass, damping, stiffness : float, optional
         Known parts of the plant [u per unit of y''; y'; y].
     degree : {1, 2, 3}
@@ -58,7 +51,7 @@ def discover_oscillator(
     symmetry : {None, "odd"}
         ``"odd"`` leaves out terms that do not change their sign with u and z.
     seed : int
-        Of the resampling behind `OscillatorDiscovery.inclusion`.
+        Seed of the resampling behind `OscillatorDiscovery.inclusion`.
     progress : callable, optional
         Called as ``progress(done, total)``.
 
@@ -109,7 +102,7 @@ def recorded(record: Record) -> OscillatorStructure:
 
 
 def _library(degree: int, symmetry: str | None) -> tuple[Term, ...]:
-    """The terms by their power of z, those that are combinations of earlier ones being left out."""
+    """The terms by their power of z, without combinations of earlier ones."""
     if degree not in (1, 2, 3):
         raise ValueError(f"degree must be 1, 2 or 3, got {degree!r}")
     if symmetry not in (None, "odd"):
@@ -147,7 +140,7 @@ def _known_plant(plant: Mapping[str, float | None]) -> dict[str, float]:
 
 
 def _period(u: FloatArray) -> int | None:
-    """The smallest shift, up to half of the record, by which an input repeats itself."""
+    """Smallest shift, up to half of the record, by which an input repeats itself."""
     n = u.size
     if np.ptp(u) == 0.0:
         return None

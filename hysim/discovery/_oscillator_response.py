@@ -2,9 +2,8 @@
 
     y = y0 + sum of (coefficient - its value) times dy/d(coefficient) + the same for m, c and k
 
-About a law that simulates the record well the residual is white, whatever the noise does to y' and z, and the slopes
-are free of noise. So this regression, unlike one of z' on noisy signals, has no bias, its standard errors are right and
-its BIC counts (`_term_regression`).
+About a law that simulates the record well the residual is white and the slopes are free of noise. Unlike one of z' on
+noisy signals, this regression has no bias, and its standard errors and BIC are right (`_term_regression`).
 """
 
 import itertools
@@ -55,7 +54,7 @@ class Response:
 
     @cached_property
     def widest(self) -> FloatArray:
-        """The displacements of the record in which they have the largest range."""
+        """Displacements of the record in which they have the largest range."""
         return max((record.y for record in self.records), key=lambda y: float(np.ptp(y)))
 
     @cached_property
@@ -65,7 +64,6 @@ class Response:
 
     @cached_property
     def free(self) -> tuple[str, ...]:
-        """The plant's free parameters."""
         return tuple(name for name in PLANT if name not in self.known)
 
     @cached_property
@@ -125,10 +123,7 @@ class Response:
         return None
 
     def slopes(self, oscillator: Oscillator, terms: Sequence[Term]) -> FloatArray:
-        """Derivatives of the output by the plant's free parameters and the coefficients of `terms`, (n_samples, n).
-
-        Zero where the motion would diverge, or never be steady, with any of the differences.
-        """
+        """Derivatives of the output by free parameters and coefficients of `terms`, (n_samples, n); zero if unknown."""
         slopes = np.zeros((self.measured.size, len(self.free) + len(terms)))
         missing = np.arange(slopes.shape[1])
         for difference in _DIFFERENCES:
@@ -164,7 +159,6 @@ class Response:
             return np.asarray((ahead - behind).T / (2.0 * by))
 
     def descended(self, oscillator: Oscillator) -> Oscillator:
-        """The optimum below an oscillator."""
         terms = tuple(oscillator.coefficients)
 
         def at(x: FloatArray) -> Oscillator:
@@ -186,7 +180,7 @@ class Response:
         return at(descend(problem, np.array([start]), relative=1e-7, steps=100, schedule=OSCILLATOR_SCHEDULE).x[0])
 
     def regression(self, oscillator: Oscillator, residual: FloatArray, library: Sequence[Term]) -> TermRegression:
-        """The regression about an oscillator with this residual on all terms of the library and its own."""
+        """Regression about an oscillator with this residual on all terms of the library and its own."""
         terms = (*library, *(term for term in oscillator.coefficients if term not in library))
         slopes = self.slopes(oscillator, terms)
         n_plant = len(self.free)
@@ -195,10 +189,7 @@ class Response:
         return term_regression(terms, slopes[:, :n_plant], slopes[:, n_plant:], target, self.floor, self._blocks)
 
     def held_out_rmse(self, oscillator: Oscillator, residual: FloatArray) -> float:
-        """Rmse on each block, predicted by an oscillator with this residual that the other blocks fit [unit of y].
-
-        The fits are linear, about the oscillator.
-        """
+        """Rmse on each block, predicted by a linear fit about the oscillator to the other blocks [unit of y]."""
         slopes, total = self.slopes(oscillator, tuple(oscillator.coefficients)), 0.0
         sizes = np.linalg.norm(slopes, axis=0)
         slopes = slopes / np.where(sizes > 0.0, sizes, 1.0)

@@ -1,17 +1,15 @@
 """The search behind `hysim.discover_oscillator`: candidates for the law of the memory, and the choice of one.
 
-1. A rival without memory, a mass on a linear spring, is identified. About it all terms of the library are tried: if
-   none lowers the BIC, there is no structure.
-2. Along the measured motion the laws of Bouc and Wen with n = 1, 2 and 3 and a linear relaxation are regressed
+1. A mass on a linear spring is identified. If none of the library's terms lowers its BIC, there is no structure.
+2. Along the measured motion Bouc-Wen laws with n = 1, 2 and 3 and a linear relaxation are regressed
    (`_hidden_memory`); the search begins with the nearest one.
 3. It is refined by simulation error (`hysim.identify`).
-4. About the refined law the whole library is regressed, the law's own terms like all others: PySINDy's STLSQ and plain
-   elimination from dense to sparse, one structure by BIC, inclusion by bagging (`_oscillator_response`). Terms that are
-   not chosen leave the law, which is refined again. If terms come in, the Bouc-Wen law is refined with n free and with
-   n at the nearest whole number, and where terms come in about the best of these too, the law of these terms. All this
-   is done for each way in which the records may have been made.
-5. Of all refined laws that do not diverge, the linear spring among them, the one of the lowest BIC is taken, each with
-   the same samples and the same floor; every number that has a standard error counts as a parameter.
+4. About the refined law the whole library is regressed: PySINDy's STLSQ and plain elimination from dense to sparse, one
+   structure by BIC, inclusion by bagging (`_oscillator_response`). Terms that are not chosen leave the law, which is
+   refined again. If terms come in, the Bouc-Wen law is refined with n free and with n at the nearest whole number, and
+   where terms come in about these too, the law of these terms. All this is done for each structure of the records.
+5. Of all refined laws that do not diverge, the linear spring among them, the one of the lowest BIC is taken; every
+   number that has a standard error counts as a parameter.
 """
 
 import contextlib
@@ -62,7 +60,7 @@ _DIVERGES = "A law of lower BIC diverges on cycles over the measured range, and 
 
 
 class _Fitted(NamedTuple):
-    """A refined oscillator, the standard errors by name, its residual (n_samples,), and what went wrong."""
+    """A refined oscillator, the standard errors by name, its residual (n_samples,), and warnings."""
 
     oscillator: Oscillator
     stderr: dict[str, float]
@@ -71,11 +69,9 @@ class _Fitted(NamedTuple):
 
     @property
     def terms(self) -> tuple[Term, ...]:
-        """The terms of the law."""
         return tuple(self.oscillator.coefficients)
 
     def bic(self, floor: float) -> float:
-        """Bayesian information criterion; each number that has a standard error counts as a parameter."""
         return information(float(np.mean(self.residual**2)), self.residual.size, len(self.stderr), floor=floor)
 
 
@@ -94,7 +90,7 @@ class _Tried(NamedTuple):
 
 
 class Search(NamedTuple):
-    """The response of oscillators on some records, which says how these were made, and the library of terms."""
+    """The response of oscillators on records of one structure, and the library of terms."""
 
     response: Response
     library: tuple[Term, ...]
@@ -102,7 +98,7 @@ class Search(NamedTuple):
     progress: Progress
 
     def result(self, others: Sequence[OscillatorStructure] = ()) -> OscillatorDiscovery:
-        """Steps 1 to 5; `others` are other ways in which the records may have been made."""
+        """Steps 1 to 5; `others` are other structures that the records may have."""
         motions = [self.response.structure.motion(record) for record in self.response.records]
         linear = linear_plant(motions[0])
         if linear is None:
@@ -141,7 +137,7 @@ class Search(NamedTuple):
         return self._replace(response=replace(self.response, structure=structure))
 
     def _again(self, candidates: "Sequence[tuple[Search, _Tried]]") -> "list[tuple[Search, _Tried]]":
-        """Candidates by this belief about how the records were made; none if it suits the best Bouc-Wen law less."""
+        """Candidates by this structure of the records; none if it suits the best Bouc-Wen law less."""
         laws = [each for _, each in candidates if bouc_wen_exponent(each.fitted.terms) is not None]
         if not laws:
             return []
@@ -156,7 +152,7 @@ class Search(NamedTuple):
         return tried.fitted.bic(self.response.floor)
 
     def _without_memory(self, linear: Linear) -> _Fitted:
-        """The rival without a memory. Where the stiffness is given, z = A y is the rest of the spring."""
+        """The linear spring. Where the stiffness is known, z = A y is the rest of the spring."""
         plant: dict[str, float] = {**linear._asdict(), **self.response.known}
         springs = {SPRING: linear.stiffness - plant["stiffness"]} if "stiffness" in self.response.known else {}
         refined = self._simulated(Oscillator(plant, springs))
@@ -242,13 +238,7 @@ class Search(NamedTuple):
         return _Fitted(Oscillator(plant, coefficients), stderr, fit.residual, tuple(warnings))
 
     def _simulated(self, oscillator: Oscillator) -> _Fitted:
-        """A law of any terms, refined by the simulation behind the regression.
-
-        Raises
-        ------
-        ValueError
-            If it diverges.
-        """
+        """A law of any terms, refined by the simulation behind the regression; a ValueError if it diverges."""
         refined = self.response.descended(oscillator)
         terms = tuple(refined.coefficients)
         residual = self.response.measured - self.response.outputs([refined])[0]
@@ -265,10 +255,7 @@ class Search(NamedTuple):
         return _Fitted(refined, dict(zip(names, errors.tolist(), strict=True)), residual)
 
     def _about(self, fitted: _Fitted) -> _Tried:
-        """The library about a law; where n is free, the terms that differ from the law's own by their power are none.
-
-        The law itself is among the structures: a path of elimination need not meet it.
-        """
+        """The library about a law; where n is free, without the terms that differ from the law's own by their power."""
         law = fitted.oscillator.coefficients
         same = {(t.rectified, t.is_even_in_memory) for t in law if not (t.is_polynomial or t.relaxing)}
         library = [t for t in self.library if not t.degree or (t.rectified, t.is_even_in_memory) not in same]

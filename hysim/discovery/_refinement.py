@@ -1,10 +1,9 @@
 """Refinement by simulation error: the numbers of a structure whose free run is nearest to the records.
 
-    minimise sum over the samples seen of (y_k - y(u; c, feedthrough, offset, y0)_k)^2
+    minimise sum over the visible samples of (y_k - y(u; c, feedthrough, offset, y0)_k)^2
 
-A derivative that fits says little about a law that must run on its own output, so every structure is judged by its
-free run alone. Records share all numbers but y0. A structure at rest has no y0: its memory begins at zero. Unknowns
-are measured in what they contribute, outputs in strokes. A free run that leaves BOUND strokes has diverged.
+Every structure is judged by its free run alone. Records share all numbers but y0; a structure at rest has none.
+Unknowns are measured in what they contribute, outputs in strokes. A free run beyond BOUND strokes has diverged.
 
     BIC = N ln(V + FLOOR^2) + d ln N,    V = mean squared residual in strokes,  d = n_parameters
 """
@@ -51,8 +50,8 @@ class Candidate(Generic[S]):
     """A refined structure.
 
     `unknowns` (size + n_records,) are its numbers and the y0 of each record, `residual` (n_samples,) is in strokes,
-    `jacobian` (n_samples, size + n_records) is its derivative. `settles` tells whether the law, when the input goes on
-    to and fro over its range, stays finite and comes to a steady loop.
+    `jacobian` (n_samples, size + n_records) is its derivative. `settles` is whether the law comes to a steady loop
+    under a cyclic input.
     """
 
     structure: S
@@ -68,17 +67,16 @@ class Candidate(Generic[S]):
 
     @property
     def n_parameters(self) -> int:
-        """The numbers of the structure, and y0 of each record unless it is at rest there."""
+        """Numbers of the structure, and y0 of each record unless it is at rest."""
         return self.structure.size if self.structure.rest else len(self.unknowns)
 
     @cached_property
     def bic(self) -> float:
-        """Bayesian information criterion, the lower the better."""
         return bic_of(self.cost, self.residual.size, self.n_parameters)
 
     @property
     def covariance(self) -> FloatArray:
-        """Covariance of the unknowns, zero for y0 at rest; nan throughout where the records do not tell one of them."""
+        """Covariance of the unknowns, zero for y0 at rest; nan where the records do not determine all of them."""
         covariance, free = np.zeros((self.unknowns.size,) * 2), slice(self.n_parameters)
         covariance[free, free] = _covariance(self.jacobian[:, free], self.cost)
         return covariance
@@ -104,7 +102,7 @@ def _covariance(jacobian: FloatArray, cost: float) -> FloatArray:
 
 
 def cost_of(bic: float, n_samples: int, n_parameters: int) -> float:
-    """The sum of squared residuals, in squared strokes, of which `bic_of` is `bic`; negative if there is none."""
+    """Sum of squared residuals, in squared strokes, with this BIC; negative if there is none."""
     return n_samples * (math.exp((bic - n_parameters * math.log(n_samples)) / n_samples) - FLOOR**2)
 
 
@@ -115,10 +113,10 @@ def bic_of(cost: float, n_samples: int, n_parameters: int) -> float:
 
 @dataclass(frozen=True)
 class FreeRun:
-    """The least-squares problem of some records.
+    """Least-squares problem of some records.
 
-    `seen`, shape (n_samples,) for each record, tells the samples whose outputs may be looked at; by default all. The
-    input is known at every sample. `signs` are those that coefficients must have.
+    `seen`, (n_samples,) for each record, marks the visible outputs; by default all. `signs` are those that coefficients
+    must have.
     """
 
     records: tuple[Record, ...]
@@ -127,7 +125,7 @@ class FreeRun:
 
     @cached_property
     def visible(self) -> tuple[Record, ...]:
-        """The records without the samples that are not seen."""
+        """Records of the visible samples."""
         if self.seen is None:
             return self.records
         return tuple(
@@ -136,43 +134,43 @@ class FreeRun:
 
     @cached_property
     def stroke(self) -> float:
-        """Range of the outputs seen, the unit of outputs and residuals."""
+        """Range of the visible outputs, the unit of outputs and residuals."""
         return float(max(record.y.max() for record in self.visible) - min(record.y.min() for record in self.visible))
 
     @cached_property
     def n_samples(self) -> int:
-        """Number of samples seen."""
+        """Number of visible samples."""
         return sum(map(len, self.visible))
 
     @cached_property
     def largest(self) -> Record:
-        """The record with the widest input, which sets the units."""
+        """Record with the widest input, which sets the units."""
         return max(self.visible, key=lambda record: float(np.ptp(record.u)))
 
     @property
     def measured_starts(self) -> FloatArray:
-        """The first output seen of each record."""
+        """First visible output of each record."""
         return np.array([record.y[0] for record in self.visible])
 
     @property
     def line(self) -> FloatArray:
-        """Unknowns of y' = b u': the slope that the largest record has on the whole, and the first outputs."""
+        """Unknowns of y' = b u': the mean slope of the largest record, and the first outputs."""
         u, y = self.largest.u, self.largest.y
         return np.append(np.polyfit(u, y, 1)[0], self.measured_starts)
 
     def units(self, structure: Structure) -> FloatArray:
-        """Units of the unknowns (size + n_records,): what moves the output by about a stroke."""
+        """Units of the unknowns (size + n_records,): changes that move the output by about a stroke."""
         starts = np.full(len(self.records), self.stroke)
         return np.concatenate([structure.units(self.largest, self.stroke), starts])
 
     def residuals(self, structure: Structure, unknowns: FloatArray) -> FloatArray:
-        """Residuals (n_sets, n_samples) in strokes at the samples seen."""
+        """Residuals (n_sets, n_samples) in strokes at the visible samples."""
         return np.concatenate([self._residual(structure, unknowns, k) for k in range(len(self.records))], axis=1)
 
     def refine(
         self, structure: S, starts: FloatArray, *, tolerance: float = RANKING, hopeless: float = math.inf
     ) -> Candidate[S] | None:
-        """The optimum that is reached from the best of `starts` (n_starts, size + n_records); None if all diverge.
+        """Optimum that is reached from the best of `starts` (n_starts, size + n_records); None if all diverge.
 
         A descent that will not come below the cost `hopeless` [squared strokes] is given up.
         """
@@ -216,7 +214,7 @@ class FreeRun:
     def regressed(
         self, regression: Regression, structure: Terms, feedthrough: float = 0.0, offset: float = 0.0
     ) -> FloatArray:
-        """Starts (n_ridges, size + n_records) from ridge regressions: the stiffer, the tamer the free run."""
+        """Starts (n_ridges, size + n_records) from ridge regressions of increasing weight."""
         shift = [feedthrough] * structure.feedthrough + [offset] * structure.offset
         ends = [*shift, *self.measured_starts]
         return np.array([[*regression.ridge(structure.terms, weight), *ends] for weight in _RIDGES])

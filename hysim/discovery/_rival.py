@@ -1,4 +1,4 @@
-"""The linear rival of a law: what a plant without hysteresis, but with dynamics, makes of the same records.
+"""The linear rival of a law: a plant without hysteresis, but with dynamics, fitted to the same records.
 
     y = offset + G(s) u + free response,    G of the orders in ORDERS, or a line
 
@@ -29,7 +29,7 @@ _PER_PARAMETER = 3  # samples
 
 @checked
 class Seen(Record):
-    """A record of which samples are left out by `shares` (n,) of 0: they multiply its output and its regressors."""
+    """A record whose samples are left out by `shares` (n,) of 0, which multiply its output and its regressors."""
 
     shares: FloatArray
 
@@ -38,8 +38,7 @@ class Seen(Record):
 class Rival:
     """A linear plant with an offset, fitted to records.
 
-    `plants` are one for each record, alike but for the initial state; `bic` takes residuals below FLOOR strokes as
-    that.
+    `plants` differ in the initial state alone; `bic` takes residuals of at least FLOOR strokes.
     """
 
     plants: tuple[TransferFunction, ...]
@@ -48,7 +47,6 @@ class Rival:
 
     @property
     def is_line(self) -> bool:
-        """Whether the plant has no dynamics."""
         return self.plants[0].order == 0
 
     def outputs(self, records: Sequence[Record]) -> list[FloatArray]:
@@ -76,8 +74,8 @@ def rival(records: Sequence[Record]) -> Rival:
 def steady_width(plant: TransferFunction, cycle: Record, rate: float) -> float:
     """Relative width of the plant's steady loop where the cycle runs at `rate` times its rate; nan where it has none.
 
-    From period to period the free response falls by the factors lambda = exp(p T) of the poles p, so that weights
-    which are the coefficients of prod (x - lambda) take it out of as many periods as there are poles, and one more.
+    From period to period the free response falls by the factors lambda = exp(p T) of the poles p; the coefficients of
+    prod (x - lambda) take it out of as many periods as there are poles, and one more.
     """
     step, u = cycle.sample_time / rate, cycle.u[:-1]
     taken = np.atleast_1d(np.poly(np.exp(plant.poles * step * u.size))).real[::-1]
@@ -101,7 +99,6 @@ class _Affine(Identifiable):
     start: TransferFunction | None = None
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The structure's own box, widened, and the offset among the linear parameters."""
         finest = min(self.records, key=lambda each: each.sample_time)
         longest = max(len(each) * each.sample_time for each in self.records)
         own = self.structure.search_space(finest, freedom)
@@ -119,12 +116,10 @@ class _Affine(Identifiable):
         )
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """The structure's columns and a one, times the shares of a record that is seen in part."""
         columns = np.insert(self.structure.regressors(parameters, record), -1, 1.0, axis=-1)
         return columns * record.shares[:, np.newaxis] if isinstance(record, Seen) else columns
 
     def assemble(self, parameters: Mapping[str, float]) -> TransferFunction:
-        """The transfer function, without the offset."""
         return self.structure.assemble(parameters)
 
     def _scanned(self, own: SearchSpace) -> FloatArray:

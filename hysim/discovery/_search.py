@@ -1,15 +1,15 @@
 """One library on some records: from slopes to refined structures.
 
-**Shifts.** The slope of z = y - feedthrough u - offset is linear in the coefficients of its law, not in the two shifts.
-These are scanned, and the coefficients solved for at each (variable projection). The left side loses what the term u'
-gains by a feedthrough, so that misfits are comparable. The free runs begin at the best few places.
+**Shifts.** The slope of z = y - feedthrough u - offset is linear in the coefficients of its law, not in the two
+shifts. These are scanned, and the coefficients solved for at each (variable projection). The left side loses what the
+term u' gains by a feedthrough, so that misfits are comparable. The free runs begin at the best few places.
 
 **Any exponent.** A Bouc-Wen law whose exponent is no whole number has terms that are in no finite library,
 
     z' = A u' - beta |u'| |z|^(n-1) z - gamma u' |z|^n.
 
-Its exponent is scanned: at each one the slope is regressed on the three terms, and from the best of these the free run
-is refined, n with the other numbers. The law is taken where its BIC is lower by more than INDISTINCT.
+Its exponent is scanned; from the best regressions on the three terms the free run is refined, n with the other numbers.
+The law is taken where its BIC is lower by more than INDISTINCT.
 """
 
 import math
@@ -57,11 +57,10 @@ _RIDGES = (1e-9, 1e-4, 1e-2)
 
 @dataclass(frozen=True)
 class Library:
-    """The terms of laws, and what else these may have.
+    """Terms of laws, and their other numbers.
 
     `letter` is "y" where the memory is the output, else "z". `feedthrough` is "no", "may" or "must", `offset` whether
-    the memory may be zero at another output than zero. `rests` holds False where a memory that begins at a value of its
-    own is tried, and True where one that begins at zero is.
+    the memory may be zero at another output than zero, `rests` the values of `Terms.rest` to try.
     """
 
     terms: tuple[Term, ...]
@@ -77,7 +76,7 @@ class Library:
 
 @dataclass(frozen=True)
 class Options:
-    """How laws are looked for: the signs that coefficients must have, and the arguments of `discover`.
+    """Signs that coefficients must have, and the arguments of `discover`.
 
     `enough` is the rmse that a law must come near for the search to go beyond the optimizer's path [unit of y].
     """
@@ -91,10 +90,7 @@ class Options:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The law that one library has for the records, and how it was found.
-
-    A search `is_short` if only the optimizer's path was looked at.
-    """
+    """Law of one library for the records, and its search; `is_short` if only the optimizer's path was searched."""
 
     library: Library
     candidate: Candidate[Terms]
@@ -106,7 +102,7 @@ class Outcome:
 
     @property
     def searched(self) -> Candidate[Terms]:
-        """The law as it is refined on the samples of the search, from the numbers that it has on all samples."""
+        """The law as it is refined on the samples of the search, from its numbers on all samples."""
         free_run = self.search.free_run
         if free_run.n_samples == self.candidate.residual.size:
             return self.candidate
@@ -120,7 +116,7 @@ class Outcome:
 
     @property
     def threshold(self) -> float:
-        """The largest one whose structure still has all terms of the law; nan if none has."""
+        """Largest one whose structure still has all terms of the law; nan if none has."""
         terms = set(self.candidate.structure.terms)
         return max((t for t, structure in self.path if terms <= set(structure.terms)), default=math.nan)
 
@@ -147,8 +143,8 @@ def searched(
 ) -> Outcome | None:
     """The best law of a library; None if none can come near the BIC `best`.
 
-    Only the outputs `seen`, (n_samples,) for each record, are looked at. If no law on the optimizer's path, on which
-    are the largest ones, comes near an rmse that is enough, the search ends there: a smaller law does not fit better.
+    Only the outputs `seen`, (n_samples,) for each record, are used. If no law on the optimizer's path, which has the
+    largest ones, comes near an rmse that is enough, the search ends there: a smaller law does not fit better.
     """
     free_run = FreeRun(tuple(records), None if seen is None else tuple(seen), options.signs)
     thin = _thinned(free_run)
@@ -181,7 +177,7 @@ def searched(
 
 
 def _least_rmse(search: Search) -> float:
-    """The smallest rmse of the laws about a slow trend of each record [unit of y], as the judgement takes it."""
+    """Smallest rmse of the laws about a slow trend of each record [unit of y], as the judgement takes it."""
     free_run = search.free_run
     errors = (rms(about_trends(candidate.residual, free_run.visible)) for candidate in search.candidates)
     return min(errors, default=math.inf) * free_run.stroke
@@ -207,10 +203,7 @@ def _start_at(rows: Slopes, library: Library, candidate: Candidate[Terms]) -> St
 
 
 def _better_form(records: Sequence[Record], library: Library, optimizer: str) -> str:
-    """The form whose regressions, as they are, run free nearest to samples that they have not seen.
-
-    Every third sample is held out; the input's path is kept.
-    """
+    """The form whose regressions run free nearest to held-out samples, every third one."""
     free_run, errors = FreeRun(tuple(records)), {}
     unseen = np.concatenate([np.arange(len(record)) % _HELD_OUT == 1 for record in records])
     for form in FORMS:
@@ -261,7 +254,7 @@ def _restarted(free_run: FreeRun, chosen: Candidate[Terms], seed: int, restarts:
 
 
 def shifted(slopes: Slopes, terms: tuple[Term, ...], *, feedthrough: bool, offset: bool) -> tuple[Start, ...]:
-    """The regressions to begin at: that of the output itself, and those at the best places of the scan."""
+    """Regressions to begin at: that of the output itself, and those at the best places of the scan."""
     trial = symmetric(terms, "odd") or terms  # about the origin of z a law is odd, or nearly
     places = sorted(
         (slopes.misfit(trial, slope, level), slope, level)
@@ -274,7 +267,6 @@ def shifted(slopes: Slopes, terms: tuple[Term, ...], *, feedthrough: bool, offse
 
 
 def _slopes_tried(slopes: Slopes) -> list[float]:
-    """The chord of y over u, on the whole, sets the scale, and the sign."""
     chord = max((_chord(rows.u, rows.y) for rows in slopes.rows), key=abs)
     return [0.0, *(chord * _FEEDTHROUGHS).tolist()]
 

@@ -4,9 +4,8 @@
 
 With C = (J^T J)^-1 and the optimum of all columns, leaving out column j costs x_j^2 / C_jj, moves the others by
 -C_j x_j / C_jj, and turns C into C - C_j C_j^T / C_jj. The subsets of each size follow from those of one more column;
-of each size the `width` cheapest are followed. Where there are no more subsets of any size, all are tried: so it is up
-to 12 columns with WIDTH. A chain of sweeps adds small positive costs, so that nothing cancels where the residual is
-rounding.
+of each size the `width` cheapest are followed, which with WIDTH are all up to 12 columns. A chain of sweeps adds small
+positive costs, so that nothing cancels where the residual is rounding.
 
 Source: G. M. Furnival and R. W. Wilson, Regressions by leaps and bounds, Technometrics 16 (1974) 499.
 """

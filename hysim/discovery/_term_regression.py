@@ -1,8 +1,8 @@
 """The regression of an oscillator's output on the terms of its memory, the plant projected out.
 
 Columns are scaled so that the coefficients of all terms together have standard errors of one: a threshold is then a
-number of standard errors, without unit. Where terms are nearly collinear a small coefficient is no sign of a small
-loss, so that STLSQ's thresholds are accompanied by plain elimination.
+number of standard errors. Where terms are nearly collinear a small coefficient is no sign of a small loss, so that
+STLSQ's thresholds are accompanied by plain elimination.
 """
 
 from collections.abc import Sequence
@@ -27,10 +27,9 @@ DEPENDENT = 1e-5  # share of a slope that those before it do not explain, below 
 class TermRegression:
     """target = plant @ ... + features @ coefficients + noise of one, all about an oscillator.
 
-    `features` (n_samples, n_terms) and `target` are without what the plant explains, and scaled by `units`, the
-    standard errors of the coefficients of all terms together. `dependent` are the terms left out since their slopes
-    are combinations of the plant's and of those of lower degree. `n_others` counts fitted numbers that are neither the
-    plant's nor coefficients, such as an exponent.
+    `features` (n_samples, n_terms) and `target` have the plant's part projected out, and are scaled by `units`, the
+    standard errors of the coefficients of all terms together. `dependent` are the terms left out as combinations of the
+    plant's slopes and those of lower degree. `n_others` counts other fitted numbers, such as an exponent.
     """
 
     terms: tuple[Term, ...]
@@ -46,7 +45,7 @@ class TermRegression:
 
     @cached_property
     def triangle(self) -> FloatArray:
-        """The R of [features, target]."""
+        """R of [features, target]."""
         return np.asarray(np.linalg.qr(np.column_stack([self.features, self.target]), mode="r"))
 
     def thresholded(self) -> list[tuple[Term, ...]]:
@@ -55,7 +54,7 @@ class TermRegression:
         return [tuple(t for t, value in zip(self.terms, values, strict=True) if value != 0.0) for _, values in path]
 
     def eliminated(self) -> list[tuple[Term, ...]]:
-        """Structures from dense to sparse, each without the term that the last one loses least by."""
+        """Structures from dense to sparse, each without the term whose removal costs least."""
         R, kept, path = self.triangle, list(range(len(self.terms))), []
         sizes = np.linalg.norm(R[:, :-1], axis=0)
         columns = R[:, :-1] / np.where(sizes > 0.0, sizes, 1.0)
@@ -67,7 +66,7 @@ class TermRegression:
         return path
 
     def best(self, structures: Sequence[tuple[Term, ...]]) -> tuple[Term, ...]:
-        """The structure of the lowest BIC, that without terms among them."""
+        """Structure of the lowest BIC, that without terms among them."""
         return min([*structures, ()], key=self.bic)
 
     def inclusion(self, rng: np.random.Generator, n_draws: int) -> dict[Term, float]:
@@ -87,22 +86,21 @@ class TermRegression:
         return float(np.linalg.cond(R / np.linalg.norm(R, axis=0))) if R.shape[1] else 1.0
 
     def places(self, terms: Sequence[Term]) -> list[int]:
-        """Columns of some terms."""
         return [self.terms.index(term) for term in terms]
 
     def squares(self, terms: Sequence[Term]) -> float:
-        """Sum of squares that a structure leaves, in units of the noise."""
+        """Sum of squared residuals of a structure, in units of the noise."""
         kept, goal = self.triangle[:, self.places(terms)], self.triangle[:, -1]
         rest = goal - kept @ np.linalg.lstsq(kept, goal, rcond=None)[0]
         return float(rest @ rest)
 
     def bic(self, terms: Sequence[Term]) -> float:
-        """Bayesian information criterion of a structure, [squared unit of y]."""
+        """BIC of a structure [squared unit of y]."""
         n, n_parameters = self.target.size, self.n_plant + self.n_others + len(terms)
         return information(self.squares(terms) / n * self.sigma**2, n, n_parameters, floor=self.floor)
 
     def held_out_rmse(self, terms: Sequence[Term]) -> float:
-        """Root mean square error on each block of a structure that the other blocks have fitted [unit of y]."""
+        """Rmse on each block of a structure that the other blocks have fitted [unit of y]."""
         X, y = self.features[:, self.places(terms)], self.target
         normal, right, total = X.T @ X, X.T @ y, 0.0
         for block in self.blocks:
@@ -120,9 +118,9 @@ def term_regression(
     floor: float,
     blocks: list[slice],
 ) -> TermRegression:
-    """The regression of `target` (n_samples,) on slopes (n_samples, n_terms), the plant's (n_samples, n) aside.
+    """Regression of `target` (n_samples,) on slopes (n_samples, n_terms), the plant's (n_samples, n) projected out.
 
-    `floor` is the noise below which nothing counts as evidence, `blocks` are what is held out in turn.
+    `floor` is the noise below which nothing counts as evidence, `blocks` are held out in turn.
     """
     sizes = np.linalg.norm(plant, axis=0)
     plant, sizes = plant[:, sizes > 0.0], sizes[sizes > 0.0]  # where the motion diverges a slope is unknown, and zero

@@ -4,10 +4,10 @@
     relaxations   y = c_0 u + sum_i g(log tau_i) x_i + trend,       tau_i x_i' + x_i = u
     plays         y = f(u) + sum_i (c_i p_i + d_i p_i^2 + e_i p_i^3) + trend,   p_i the play of the threshold r_i
 
-A curve has no memory, relaxations are linear creep over all times of a record, and plays do not depend on time. Every
-Preisach operator is a sum of functions of plays (M. Brokate and J. Sprekels, Hysteresis and Phase Transitions, 1996,
-section 2.4). The trend is a polynomial of time in each record, f is a cubic spline and g is linear between three
-places. The numbers come from a ridge regression whose weight minimises the generalised cross-validation
+Relaxations are linear creep over all times of a record. Every Preisach operator is a sum of functions of plays
+(M. Brokate and J. Sprekels, Hysteresis and Phase Transitions, 1996, section 2.4). The trend is a polynomial of time in
+each record, f is a cubic spline and g is linear between three places. The numbers come from a ridge regression whose
+weight minimises the generalised cross-validation
 
     GCV = (residual sum of squares / n) / (1 - degrees of freedom / n)^2.
 
@@ -50,8 +50,8 @@ _SLOW = 1e-3  # the same of trends: they cannot be estimated from the few sample
 class Yardstick:
     """A model that is linear in its numbers, which multiply `columns` (n_samples, n_columns), and a constant.
 
-    Each number is held near zero, whatever the ridge, as strongly as `held` (n_columns,) says in squared sizes of its
-    column. Where `u` (n_samples,) is given, a smoothing spline of it is fitted first.
+    Each number has a ridge of its own, `held` (n_columns,) in squared sizes of its column. Where `u` (n_samples,) is
+    given, a smoothing spline of it is fitted first.
     """
 
     columns: FloatArray
@@ -141,7 +141,7 @@ def _yardstick(
 
 
 def _ridge(design: FloatArray, target: FloatArray, n: int) -> FloatArray:
-    """The numbers of least squares with the ridge of least GCV, one number of the n samples being their mean."""
+    """Least squares with the ridge of least GCV, one number of the n samples being their mean."""
     basis, singular, right = np.linalg.svd(design, full_matrices=False)
     along = basis.T @ target
     beyond = max(float(target @ target - along @ along), 0.0)

@@ -1,7 +1,6 @@
-"""A family that is fitted in one step (`hysim.models.search_space.Direct`): the fit, and the result that describes it.
+"""A family that is fitted in one step (`hysim.models.protocols.Direct`): the fit, and its result.
 
-It has no parameters with names, and so no standard errors; its number of parameters is that of its degrees of freedom,
-rounded. A sample that is left out is predicted by a fit that repeats every choice without it.
+Its number of parameters is that of its degrees of freedom, rounded; it has none by name, and no standard errors.
 """
 
 from collections.abc import Sequence
@@ -22,7 +21,7 @@ from hysim.records import Record
 
 
 def refuse(family: Direct, freedom: Freedom, noise: str, intervals: str) -> None:
-    """Refuse, by a ValueError, parameters by name, other noise than normal, and intervals."""
+    """A ValueError for parameters by name, other noise than normal, and intervals."""
     name = family.__name__ if isinstance(family, type) else type(family).__name__
     if freedom.fixed or freedom.free or freedom.bounds:
         raise ValueError(f"{name} has no parameters by name: leave out fixed=, free= and bounds=")
@@ -35,7 +34,7 @@ def refuse(family: Direct, freedom: Freedom, noise: str, intervals: str) -> None
 def identified(
     family: Direct, records: Sequence[Record], folds: Sequence[npt.NDArray[np.intp]], seed: int
 ) -> Identification:
-    """The fit to all records together, described as a search is."""
+    """The fit to all records together."""
     u = np.concatenate([record.u for record in records])
     y = np.concatenate([record.y for record in records])
     fit = family.fitted(u, y)

@@ -63,14 +63,12 @@ def identify(
         Normal noise; normal noise before a sensor that rounds to multiples of `Record.resolution`; or Student's t with
         4 degrees of freedom, for records with outliers.
     intervals : {"linear", "profile", "bootstrap"}
-        How `Identification.intervals`, at 95 %, are computed: from the standard errors, by the profile of the
-        likelihood, or from 500 records drawn anew.
+        Intervals at 95 %: from the standard errors, by the profile of the likelihood, or from 500 records drawn anew.
     cross_validate : {None, "loo", "cycles", "records"} or int, optional
-        ``"loo"`` leaves one output sample out at a time, an int one of that many blocks of samples, ``"cycles"`` a
-        cycle of the input but the first, ``"records"`` a record; the input is kept. Fills `Identification.cv_rmse`
-        and `Identification.cv_residual`.
+        What is left out at a time: an output sample, a cycle of the input (not the first), a record, or one of that
+        many blocks of samples; the input is kept. Fills `Identification.cv_rmse` and `Identification.cv_residual`.
     seed : int
-        Of the starts of the search, and of random draws. The optimum does not depend on it.
+        Seed of the starts and of random draws. The optimum does not depend on it.
     workers : int, optional
         Number of threads; by default one for each core.
     progress : callable, optional
@@ -165,7 +163,7 @@ def _freedom(fixed: Mapping[str, float], free: Sequence[str], bounds: Mapping[st
 
 
 def _family(model_or_class: Any) -> Identifiable:
-    """The object that declares the search: a class stands for the model with its defaults."""
+    """The object that declares the search; a class stands for the model with its defaults."""
     family: Any = model_or_class
     if not isinstance(family, Identifiable):
         raise TypeError(f"identify takes a model, a model class or a structure, got {model_or_class!r}")

@@ -24,7 +24,7 @@ class Candidate:
 
 @frozen
 class Width:
-    """The largest width of a loop, and the interval at 95 % that the parameters' uncertainty leaves [unit of y]."""
+    """Largest width of a loop, and its interval at 95 % [unit of y]."""
 
     value: float
     lower: float
@@ -39,39 +39,35 @@ class Identification:
     Parameters
     ----------
     model : model
-        The identified model; of several records as the first begins.
+        The identified model, from the state at the first sample of the first record.
     models : tuple of model
-        One for each record: they differ in the state at the first sample.
+        One for each record.
     estimates : mapping
-        Every parameter by name, the held ones included.
+        Every parameter by name, the fixed ones included.
     stderr : mapping
-        Standard error of each free parameter by the linearised model; nan where the data do not determine it, with
-        the reason in `message`.
+        Standard error of each free parameter by the linearised model; nan where the data do not determine it.
     intervals : mapping
         Name to (lower, upper) at 95 %; nan where the data do not determine it.
     interval_method : {"linear", "profile", "bootstrap"}
-        How they were found.
     profiles : mapping
         Name to the profile of the likelihood, where it was computed.
     covariance : array, shape (n_parameters, n_parameters)
-        Of the free parameters, in the order of `free_names`.
+        Covariance of the free parameters, in the order of `free_names`.
     condition : float
         Condition number of the Jacobian whose columns have length one.
     redundant : tuple of tuples of str
         Groups of parameters that the data do not determine separately.
-    free_names : tuple of str
-        The parameters that were identified.
-    n_parameters : int
-        Their number d.
+    free_names, n_parameters
+        The parameters that were identified, and their number d.
     fit_percent, rmse : float
         100 (1 - ||residual|| / ||y - mean(y)||), and the residual's root mean square [unit of y].
     fpe, aic, bic : float
         V (1 + d/N) / (1 - d/N), N ln V + 2 d, N ln V + d ln N, with V the mean squared residual.
     noise : {"gaussian", "quantised", "robust"}
     sigma, log_likelihood : float
-        Density of the noise, its most likely scale [unit of y], and the largest likelihood without constants.
+        Most likely scale of the noise [unit of y], and the largest likelihood without constants.
     least_squares : Candidate or None
-        The optimum of the sum of squares, where the noise is not Gaussian.
+        Optimum of the sum of squares, where the noise is not Gaussian.
     residual : array, shape (n,)
         Measured minus model, one record after the other [unit of y].
     resolution : float or None
@@ -79,7 +75,7 @@ class Identification:
     response_stderr : array, shape (n,)
         Standard error of the model's output [unit of y].
     loop_width : Width or None
-        The largest width of the first record's loop with its band; None if the record has no complete cycle.
+        Largest width of the first record's loop; None without a complete cycle.
     whiteness : float
         Probability of residuals at least as correlated if they were white (Ljung and Box); nan if unknown.
     success : bool
@@ -89,14 +85,11 @@ class Identification:
     rivals : tuple of Candidate
         Other optima whose likelihood ratio is inside the 95 % region of this one, best first.
     regions : mapping
-        Name to the best candidate inside a region that the family names (for Bouc-Wen ``"admissible"``),
-        where the optimum lies outside.
-    cv_rmse : float
-        Cross-validated rmse [unit of y]; nan if it was not asked for.
-    cv_residual : array, shape (n,)
-        Measured minus model at each sample by the fit that leaves it out [unit of y]; nan where there is none.
+        Region that the family names (for Bouc-Wen ``"admissible"``) to its best candidate, if the optimum is outside.
+    cv_rmse, cv_residual : float, and array, shape (n,)
+        Cross-validated rmse, and measured minus model at each sample by the fit without it [unit of y]; nan if unknown.
     seed : int
-        Of the starts of the search.
+        Seed of the search.
     warnings : tuple of str
         Sentences on a search that did not converge, a constant output, unknown standard errors, correlated residuals,
         or input and output that may be swapped.
@@ -146,7 +139,7 @@ class Identification:
 
     @property
     def residual_quanta(self) -> FloatArray | None:
-        """The residual in quanta of the sensor, shape (n,); None where no resolution is known."""
+        """Residual in quanta of the sensor, shape (n,); None without a resolution."""
         return None if self.resolution is None else self.residual / self.resolution
 
     def __str__(self) -> str:
@@ -171,7 +164,7 @@ class Identification:
         )
 
     def summary(self) -> str:
-        """The result in a few lines."""
+        """Report of several lines."""
         family = type(self.model).__name__
         lines = [
             f"{family}: {self._fit_in_words()}, rmse {self.rmse:.4g}, FPE {self.fpe:.4g}, "

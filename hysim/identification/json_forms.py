@@ -17,25 +17,13 @@ _INFINITE = ("inf", "-inf")
 
 
 def to_text(name: str, result: Any) -> str:
-    """A result as JSON under its name, with the version of hysim; `from_text` returns it, every number to the bit.
-
-    Raises
-    ------
-    TypeError
-        If one of its models is not of hysim's families.
-    """
+    """A result as JSON under its name, with the version of hysim; a TypeError if a model is not of hysim's families."""
     document = {"hysim": __version__, name: to_plain(result)}
     return json.dumps(document, indent=2, allow_nan=False) + "\n"
 
 
 def from_text(name: str, text: str, kinds: Sequence[type]) -> Any:
-    """The result of the first of `kinds` that `to_text` wrote; its parts are of the others.
-
-    Raises
-    ------
-    ValueError
-        If the text does not hold one.
-    """
+    """The result of the first of `kinds` that `to_text` wrote, its parts of the others; else a ValueError."""
     try:
         result = from_plain(json.loads(text)[name], kinds)
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
@@ -82,6 +70,5 @@ def from_plain(value: Any, kinds: Sequence[type]) -> Any:
 
 
 def _field(value: Any, hint: Any, kinds: Sequence[type]) -> Any:
-    """One field: null is None where the field may be None, else nan."""
     optional = typing.get_origin(hint) in (types.UnionType, typing.Union) and type(None) in typing.get_args(hint)
     return None if value is None and optional else from_plain(value, kinds)
