@@ -231,10 +231,16 @@ def test_an_oscillators_records_are_pointed_to_their_own_verb():
     assert "discover_oscillator" not in " ".join(hs.discover(uneven, library=NAMES).warnings)
 
 
-@pytest.mark.parametrize("given", [CYCLES, [], [CYCLES], None, {"u": CYCLES, "y": CYCLES}])
+@pytest.mark.parametrize("given", [CYCLES, [CYCLES], None, {"u": CYCLES, "y": CYCLES}])
 def test_only_records_are_taken(given):
     with pytest.raises(TypeError, match="discover takes"):
         hs.discover(given)
+
+
+@pytest.mark.parametrize("verb", [hs.discover, hs.discover_oscillator])
+def test_at_least_one_record_is_needed(verb):
+    with pytest.raises(ValueError, match="no record was given"):
+        verb([])
 
 
 @pytest.mark.parametrize("optimizer", ["ConstrainedSR3", "MIOSR", "SBR"])

@@ -11,6 +11,7 @@ T. K. Caughey, AIAA Journal 28 (1990).
 """
 
 import math
+from abc import ABC, abstractmethod
 
 import numpy as np
 import numpy.typing as npt
@@ -20,8 +21,29 @@ from hysim.control._sampled import Feedback
 from hysim.models.model import family
 
 
+class _Filter(ABC):
+    """(b0 + b1 / z + b2 / z^2) / (1 + a1 / z + a2 / z^2)."""
+
+    @abstractmethod
+    def coefficients(self, sample_time: float) -> FloatArray:
+        """Coefficients (b0, b1, b2, a1, a2) of the discrete form."""
+
+    def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
+        """Response of the discrete form at frequencies [rad/s], in their shape."""
+        back = np.exp(-1j * np.asarray(frequency, dtype=float) * sample_time)
+        b0, b1, b2, a1, a2 = self.coefficients(sample_time)
+        return np.asarray((b0 + (b1 + b2 * back) * back) / (1.0 + (a1 + a2 * back) * back))
+
+    def linear(self, sample_time: float) -> Feedback:
+        """The filter as a system with two states."""
+        b0, b1, b2, a1, a2 = self.coefficients(sample_time)
+        return Feedback(
+            np.array([[-a1, 1.0], [-a2, 0.0]]), np.array([b1 - a1 * b0, b2 - a2 * b0]), np.array([1.0, 0.0]), float(b0)
+        )
+
+
 @family
-class Notch:
+class Notch(_Filter):
     """Filter that cancels a resonance in the feedback's command.
 
     Parameters
@@ -57,20 +79,15 @@ class Notch:
             raise ValueError(f"new_damping_ratio must be positive, got {self.new_damping_ratio}")
 
     def coefficients(self, sample_time: float) -> FloatArray:
-        """Coefficients (b0, b1, b2, a1, a2) of the discrete form."""
         w = self.natural_frequency
         numerator, denominator = (
             (w**2, 2.0 * ratio * w, 1.0) for ratio in (self.damping_ratio, self.new_damping_ratio)
         )
         return _discrete(numerator, denominator, w, sample_time)
 
-    def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
-        """Response of the discrete form at frequencies [rad/s], in their shape."""
-        return biquad_response(self.coefficients(sample_time), frequency, sample_time)
-
 
 @family
-class DampingLoop:
+class DampingLoop(_Filter):
     """Positive feedback of the displacement through a low-pass filter, which damps a resonance.
 
     It acts on the measurement minus the wanted displacement: without vibration its output is zero.
@@ -110,33 +127,11 @@ class DampingLoop:
             raise ValueError(f"damping_ratio must be positive, got {self.damping_ratio}")
 
     def coefficients(self, sample_time: float) -> FloatArray:
-        """Coefficients (b0, b1, b2, a1, a2) of the discrete form."""
         w = self.frequency
         if self.damping_ratio is None:
             return _discrete((self.gain * w, 0.0, 0.0), (w, 1.0, 0.0), w, sample_time)
         numerator, denominator = (self.gain * w**2, 0.0, 0.0), (w**2, 2.0 * self.damping_ratio * w, 1.0)
         return _discrete(numerator, denominator, w, sample_time)
-
-    def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
-        """Response of the discrete form at frequencies [rad/s], in their shape."""
-        return biquad_response(self.coefficients(sample_time), frequency, sample_time)
-
-
-def biquad_response(
-    coefficients: FloatArray, frequency: npt.ArrayLike, sample_time: float
-) -> npt.NDArray[np.complex128]:
-    """(b0 + b1 / z + b2 / z^2) / (1 + a1 / z + a2 / z^2) on the unit circle."""
-    back = np.exp(-1j * np.asarray(frequency, dtype=float) * sample_time)
-    b0, b1, b2, a1, a2 = coefficients
-    return np.asarray((b0 + (b1 + b2 * back) * back) / (1.0 + (a1 + a2 * back) * back))
-
-
-def biquad(coefficients: FloatArray) -> Feedback:
-    """Filter (b0 + b1 / z + b2 / z^2) / (1 + a1 / z + a2 / z^2) as a system with two states."""
-    b0, b1, b2, a1, a2 = coefficients
-    return Feedback(
-        np.array([[-a1, 1.0], [-a2, 0.0]]), np.array([b1 - a1 * b0, b2 - a2 * b0]), np.array([1.0, 0.0]), float(b0)
-    )
 
 
 def _discrete(

@@ -16,7 +16,6 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.control._feedforward import InverseFeedforward
-from hysim.control._protocols import Remembering
 from hysim.control._tracking import TrackingController
 from hysim.errors import SimulationError
 from hysim.kernels import boucwen_inverse
@@ -25,7 +24,7 @@ from hysim.models.actuator import Actuator
 from hysim.models.boucwen_inverse import BoucWenInverse
 from hysim.models.chain import Chain, ChainState
 from hysim.models.oscillator import BoucWenOscillator, OscillatorState
-from hysim.models.protocols import CompiledController
+from hysim.models.protocols import CompiledController, Continuable, Remembering
 from hysim.models.sensor import Sensor
 
 Rule = Callable[[float, FloatArray, FloatArray, Any], FloatArray]
@@ -137,7 +136,8 @@ def _names(chain: Chain, state: ChainState) -> list[str]:
 
 def _memory_names(law: Any, state: FloatArray) -> list[str]:
     """Names of a law's state; a memory z begins the compiled state, and the rest is scratch."""
-    size = len(law.advance(state[:1])[1]) if isinstance(law, Remembering) else state.size
+    remembers = isinstance(law, Remembering) and isinstance(law, Continuable)
+    size = len(law.advance(state[:1])[1]) if remembers else state.size
     others = ["z"] if size == 2 else [f"z[{i}]" for i in range(size - 1)]
     return ["v", *others][:size]
 

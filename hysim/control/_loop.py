@@ -11,12 +11,12 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, frozen, read_only
 from hysim._parallel import Progress
 from hysim._printing import extent, printed, quantity, summary_text
-from hysim.control._protocols import Controller, Remembering, Responding, limits_of, preview
+from hysim.control._protocols import Controller, limits_of, preview
 from hysim.errors import SimulationError
 from hysim.models.actuator import Actuator, is_law
 from hysim.models.chain import Signals
 from hysim.models.model import in_brief
-from hysim.models.protocols import CompiledController
+from hysim.models.protocols import CompiledController, Remembering, Responding
 from hysim.models.sampled import Vibration
 from hysim.models.state_space import linear_plant
 from hysim.records import even_step
@@ -198,7 +198,7 @@ class RestingPlant:
         law = self.chain.hysteresis
         if not isinstance(law, Remembering):
             return None
-        return np.asarray(law.memory(np.append(self.state.voltages[1], signals.v))[: -1 : self.chain.substeps])
+        return law.memory(np.append(self.state.voltages[1], signals.v))[: -1 : self.chain.substeps]
 
     def driven(self, u: FloatArray) -> FloatArray:
         """Displacements just before each of the commands `u`."""

@@ -92,7 +92,7 @@ class LinearLoop:
 
     def max_sensitivity(self, controller: SampledController, slope: float = 1.0) -> float:
         """Largest ``|1 / (1 + L)|`` with a law of this slope, within 0.1 %; infinite if the loop is unstable."""
-        poles = np.linalg.eigvals(self._loop(controller, slope).M)
+        poles = self._poles(controller, slope)
         if not np.abs(poles).max() < 1.0:
             return math.inf
         own = _around(_light(poles), _LOOPS_POLES) / self.sample_time
@@ -103,7 +103,7 @@ class LinearLoop:
 
     def is_stable(self, controller: SampledController, slope: float = 1.0) -> bool:
         """Whether all poles of the loop with a law of this slope lie inside the unit circle."""
-        return bool(np.abs(np.linalg.eigvals(self._loop(controller, slope).M)).max() < 1.0)
+        return bool(np.abs(self._poles(controller, slope)).max() < 1.0)
 
     def margins(self, controller: SampledController, slope: float = 1.0) -> tuple[float, float]:
         """Gain and phase margin [degrees] with a law of this slope, by python-control, and at z = -1."""
@@ -116,13 +116,16 @@ class LinearLoop:
 
     def noise_gain(self, controller: SampledController, slope: float = 1.0) -> float:
         """Rms of the command for white noise of rms one in the measurement; infinite if the loop is unstable."""
-        loop = self._loop(controller, slope)
-        if not np.abs(np.linalg.eigvals(loop.M)).max() < 1.0:
+        if not self.is_stable(controller, slope):
             return math.inf
+        loop = self._loop(controller, slope)
         power, states = loop.M, np.outer(loop.G, loop.G)
         while np.abs(power).max() > _FORGOTTEN:
             states, power = states + power @ states @ power.T, power @ power
         return math.sqrt(loop.through**2 + max(0.0, float(loop.K @ states @ loop.K)))
+
+    def _poles(self, controller: SampledController, slope: float) -> npt.NDArray[np.complex128]:
+        return np.asarray(np.linalg.eigvals(self._loop(controller, slope).M))
 
     def _default(self) -> FloatArray:
         highest = math.pi / self.sample_time

@@ -11,13 +11,14 @@ take, so that the displacement follows it without delay.
 """
 
 import math
+from dataclasses import fields
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
 from hysim.control._feedforward import FeedforwardBlock, InverseFeedforward
-from hysim.control._filters import DampingLoop, Notch, biquad
+from hysim.control._filters import DampingLoop, Notch
 from hysim.control._pid import PID
 from hysim.control._sampled import (
     Feedback,
@@ -92,13 +93,9 @@ class TrackingController(SampledController):
     limits: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
-        check_kind("shaper", self.shaper, Shaper)
-        check_kind("mode_inverse", self.mode_inverse, ModeInverse)
-        check_kind("feedforward", self.feedforward, InverseFeedforward)
-        check_kind("feedback", self.feedback, PID)
-        check_kind("notch", self.notch, Notch)
-        check_kind("damping", self.damping, DampingLoop)
-        check_kind("model", self.model, Actuator)
+        kinds = (Shaper, ModeInverse, InverseFeedforward, PID, Notch, DampingLoop, Actuator)
+        for field, kind in zip(fields(self), kinds, strict=False):
+            check_kind(field.name, vars(self)[field.name], kind)
         check_limits(self.limits)
         if self.feedback is not None and self.feedback.limits is not None:
             raise ValueError(
@@ -131,9 +128,9 @@ class TrackingController(SampledController):
         """Linear system from the measurement to the command, limits apart."""
         total = (self.feedback or PID()).linear(sample_time)
         if self.notch is not None:
-            total = total.then(biquad(self.notch.coefficients(sample_time)))
+            total = total.then(self.notch.linear(sample_time))
         if self.damping is not None:
-            total = total.beside(biquad(self.damping.coefficients(sample_time)))
+            total = total.beside(self.damping.linear(sample_time))
         return total
 
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:

@@ -29,7 +29,7 @@ from hysim.discovery._structures import AnyExponent
 from hysim.identification.folds import folds
 from hysim.identification.swapped import swapped_columns
 from hysim.models.terms import duhem_terms, memory_terms, named_terms, symmetric
-from hysim.records import Record
+from hysim.records import Record, several
 
 _POOR = 80.0  # fit of a law without dynamics [%] below which the records may be an oscillator's
 _SHORT = (
@@ -206,16 +206,12 @@ def _is_even(record: Record) -> bool:
 
 
 def _checked(record_or_records: Record | Sequence[Record]) -> tuple[Record, ...]:
-    records = (record_or_records,) if isinstance(record_or_records, Record) else record_or_records
-    if not isinstance(records, (list, tuple)) or not records:
-        raise TypeError(f"discover takes a Record or several, got {type(records).__name__}: hs.Record(u=u, y=y)")
+    records = several(record_or_records, "discover")
     for record in records:
-        if not isinstance(record, Record):
-            raise TypeError(f"discover takes records, got {type(record).__name__}: hs.Record(u=u, y=y)")
         for name, values in (("input", record.u), ("output", record.y)):
             if np.ptp(values) == 0.0:
                 raise ValueError(f"the {name} is constant: give a record on which it moves")
-    return tuple(records)
+    return records
 
 
 def _libraries(

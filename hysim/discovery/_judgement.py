@@ -158,7 +158,7 @@ def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, others: 
     longest = max(range(len(records)), key=lambda k: len(records[k]))
     loops = _loops(laws[longest], records[longest].u)
     areas = np.array([math.nan if loop is None else signed_area(loop) for loop in loops])
-    stable = all(_response(law, record) is not None for law, record in zip(laws, records, strict=True))
+    stable = all(_response(law, record.u) is not None for law, record in zip(laws, records, strict=True))
     stable = stable and loops[-1] is not None
     single_valued = all(loop is not None and loop.relative_width < LEAST for loop in loops)
     verdict = _verdict(trial, linear, single_valued, spread)
@@ -214,15 +214,15 @@ def _least(trial: Trial, names: Sequence[str]) -> float:
     return min((error for error in errors if not math.isnan(error)), default=math.inf)
 
 
-def _response(law: Law, record: Record) -> FloatArray | None:
+def _response(law: Law, u: FloatArray) -> FloatArray | None:
     try:
-        return law.response(record.u)
+        return law.response(u)
     except SimulationError:
         return None
 
 
 def _width(law: Law, record: Record) -> float:
-    y = _response(law, record)
+    y = _response(law, record.u)
     if y is None or not complete_cycles(record.u, TOLERANCE):
         return math.nan
     return metrics.loop_metrics(record.u, y).relative_width
@@ -241,11 +241,8 @@ def _loops(law: Law, u: FloatArray) -> list[metrics.LoopMetrics | None]:
     loops: list[metrics.LoopMetrics | None] = []
     for share in _AMPLITUDES:
         cycles = signals.triangle(middle - share * reach, middle + share * reach, cycles=_CYCLES, samples_per_cycle=64)
-        path = np.append(u[0], cycles)
-        try:
-            loops.append(metrics.loop_metrics(cycles, law.response(path)[1:]))
-        except SimulationError:
-            loops.append(None)
+        y = _response(law, np.append(u[0], cycles))
+        loops.append(None if y is None else metrics.loop_metrics(cycles, y[1:]))
     return loops
 
 

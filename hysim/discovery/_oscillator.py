@@ -13,7 +13,7 @@ from hysim.discovery._result import OscillatorDiscovery
 from hysim.models.oscillator import BoucWenOscillator
 from hysim.models.oscillator_structure import OscillatorStructure
 from hysim.models.terms import RELAXATION, Term, memory_terms, symmetric
-from hysim.records import Record
+from hysim.records import Record, several
 
 _REPEATS = 1e-3  # of the input's rms: how nearly a period must repeat itself to be seen
 _TRANSIENT = 1.5  # rms of what changes from period to period, early in the period over late
@@ -80,16 +80,12 @@ def discover_oscillator(
     >>> {term: round(value) for term, value in dis.coefficients.items()}
     {"u'": 50000, "|u'| z": -800, "u' |z|": 300}
     """
-    records = (record_or_records,) if isinstance(record_or_records, Record) else record_or_records
-    if not isinstance(records, Sequence) or not records or not all(isinstance(each, Record) for each in records):
-        raise TypeError(
-            f"discover_oscillator takes a Record or several, got {type(records).__name__}: hs.Record(u=u, y=y, t=t)"
-        )
+    records = several(record_or_records, "discover_oscillator")
     library = _library(degree, symmetry)
     known = _known_plant({"mass": mass, "damping": damping, "stiffness": stiffness})
     chosen = _structure(records, structure)
     others = () if structure is not None or chosen.period is None else (replace(chosen, hold="foh"),)
-    search = Search(Response(chosen, tuple(records), known), library, seed, progress or (lambda done, total: None))
+    search = Search(Response(chosen, records, known), library, seed, progress or (lambda done, total: None))
     return search.result(others)
 
 

@@ -235,14 +235,6 @@ class FreeRun:
         starts = [output_at_rest(structure, numbers, float(record.u[0])) for record in self.records]
         return np.concatenate([unknowns[: structure.size], *starts])
 
-    def _run(self, structure: Structure, unknowns: FloatArray, k: int) -> FloatArray:
-        record, visible = self.records[k], self.visible[k]
-        bound = BOUND * self.stroke + float(np.abs(visible.y).max())
-        numbers, y0 = unknowns[:, : structure.size], unknowns[:, structure.size + k]
-        if structure.rest:
-            y0 = output_at_rest(structure, numbers, float(record.u[0]))
-        return structure.run(record.u, numbers, y0, bound)
-
     def _settles(self, structure: Structure, unknowns: FloatArray) -> bool:
         k = max(range(len(self.records)), key=lambda k: float(np.ptp(self.records[k].u)))
         for share in _AMPLITUDES:
@@ -257,9 +249,14 @@ class FreeRun:
         return True
 
     def _residual(self, structure: Structure, unknowns: FloatArray, k: int) -> FloatArray:
-        y = self._run(structure, unknowns, k)
+        record, visible = self.records[k], self.visible[k]
+        bound = BOUND * self.stroke + float(np.abs(visible.y).max())
+        numbers, y0 = unknowns[:, : structure.size], unknowns[:, structure.size + k]
+        if structure.rest:
+            y0 = output_at_rest(structure, numbers, float(record.u[0]))
+        y = structure.run(record.u, numbers, y0, bound)
         if self.seen is not None:
             y = y[:, self.seen[k]]
-        residual = (self.visible[k].y - y) / self.stroke
+        residual = (visible.y - y) / self.stroke
         residual[~np.isfinite(residual)] = DIVERGED
         return residual

@@ -4,19 +4,22 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import field
-from typing import Any, Self
+from typing import Any
 
 from hysim._frozen import FloatArray, frozen
 from hysim._printing import printed, summary_text, wrapped
 from hysim.discovery._judgement import Judgement
-from hysim.identification import json_forms
+from hysim.identification.json_forms import Stored
 from hysim.models.terms import latex
 from hysim.models.transfer_function import TransferFunction
 
 
 @frozen
-class _Discovered(ABC):
+class _Discovered(Stored, ABC):
     """The fields and the text that both results have."""
+
+    json_name = "discovery"
+    json_parts = (Judgement,)
 
     model: Any | None
     models: tuple[Any, ...]
@@ -102,22 +105,6 @@ class _Discovered(ABC):
     def _spread(self, name: str) -> str:
         value = self.stderr.get(name, math.nan)
         return "" if math.isnan(value) else f" +- {value:.2g}"
-
-    def to_json(self) -> str:
-        """The whole result as JSON, with the version of hysim; `from_json` returns it, every number to the bit."""
-        return json_forms.to_text("discovery", self)
-
-    @classmethod
-    def from_json(cls, text: str) -> Self:
-        """A result that `to_json` wrote.
-
-        Raises
-        ------
-        ValueError
-            If the text does not hold one.
-        """
-        result: Self = json_forms.from_text("discovery", text, (cls, Judgement))
-        return result
 
 
 @printed

@@ -34,7 +34,7 @@ from hysim.discovery._selection import (
     thinning,
     turning,
 )
-from hysim.discovery._slopes import FORMS, Feature, Slopes, slopes
+from hysim.discovery._slopes import FORMS, Feature, Slopes, ridge, slopes
 from hysim.discovery._structures import AnyExponent, Terms, shifts
 from hysim.models.terms import Term, symmetric
 from hysim.records import Record
@@ -338,7 +338,4 @@ def _features(n: float) -> Feature:
 def _ridge(columns: FloatArray, target: FloatArray, weight: float) -> list[float]:
     sizes = np.sqrt(np.mean(columns**2, axis=0))
     sizes[sizes == 0.0] = 1.0
-    scaled = columns / sizes
-    normal = scaled.T @ scaled / len(target) + weight * np.eye(3)
-    solution = np.linalg.solve(normal, scaled.T @ target / len(target)) / sizes
-    return [float(value) for value in solution]
+    return [float(value) for value in ridge(columns / sizes, target, weight) / sizes]

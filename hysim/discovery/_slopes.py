@@ -26,6 +26,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.polynomial import chebyshev
 
 from hysim._frozen import FloatArray
+from hysim.discovery._pysindy import compressed
 from hysim.models.terms import Term
 from hysim.records import Record
 
@@ -201,10 +202,7 @@ class Regression:
     def ridge(self, terms: Sequence[Term], weight: float) -> FloatArray:
         """Coefficients (n_terms,) of a law with these terms alone, by ridge regression."""
         kept = [self.terms.index(term) for term in terms]
-        columns = self.features[:, kept]
-        normal = columns.T @ columns / len(columns) + weight * np.eye(len(kept))
-        scaled = np.linalg.solve(normal, columns.T @ self.slope / len(columns))
-        return np.asarray(scaled * self.slope_size / self.sizes[kept])
+        return np.asarray(ridge(self.features[:, kept], self.slope, weight) * self.slope_size / self.sizes[kept])
 
 
 @dataclass(frozen=True)
@@ -223,8 +221,7 @@ class Slopes:
     def misfit(self, terms: Sequence[Term], feedthrough: float, offset: float) -> float:
         """Rms of the residual slope with all terms together."""
         columns, slope = self.equations(_features(terms), feedthrough, offset)
-        triangle = np.asarray(np.linalg.qr(np.column_stack([columns, slope]), mode="r"))
-        return abs(float(triangle[-1, -1])) / math.sqrt(len(slope))
+        return abs(float(compressed(columns, slope)[1][-1])) / math.sqrt(len(slope))
 
     def regression(self, terms: Sequence[Term], feedthrough: float = 0.0, offset: float = 0.0) -> Regression:
         """Regression on the independent ones of the terms, for z = y - feedthrough u - offset."""
@@ -268,6 +265,12 @@ def feature(term: Term, u: FloatArray, z: FloatArray, direction: FloatArray | fl
     if term.absolute:
         column = column * np.abs(z)
     return column if term.rectified else direction * column
+
+
+def ridge(columns: FloatArray, target: FloatArray, weight: float) -> FloatArray:
+    """Ridge regression on columns of about unit rms."""
+    normal = columns.T @ columns / len(columns) + weight * np.eye(columns.shape[1])
+    return np.asarray(np.linalg.solve(normal, columns.T @ target / len(columns)))
 
 
 def independent(columns: FloatArray, basis: FloatArray, order: Sequence[int], least: float) -> list[int]:

@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import legendre
 from scipy.interpolate import BSpline
+from scipy.linalg import block_diag
 
 from hysim._cycles import TOLERANCE
 from hysim._frozen import FloatArray
@@ -101,7 +102,7 @@ def plays(records: Sequence[Record]) -> Yardstick:
         positions.append(0.5 * (high + low))
         before.append(high - low)
     powers = [np.concatenate(positions) ** power for power in _POWERS]
-    return _yardstick([_spline(records), *powers], _trends(records), _apart(before), u)
+    return _yardstick([_spline(records), *powers], _trends(records), block_diag(*before), u)
 
 
 def means(u: FloatArray, y: FloatArray, weights: FloatArray) -> FloatArray:
@@ -183,13 +184,4 @@ def _inputs(records: Sequence[Record]) -> FloatArray:
 
 
 def _trends(records: Sequence[Record]) -> FloatArray:
-    return _apart([trend(record) for record in records])
-
-
-def _apart(parts: Sequence[FloatArray]) -> FloatArray:
-    rows = [np.zeros((len(part), sum(each.shape[1] for each in parts))) for part in parts]
-    begin = 0
-    for row, part in zip(rows, parts, strict=True):
-        row[:, begin : begin + part.shape[1]] = part
-        begin += part.shape[1]
-    return np.concatenate(rows)
+    return np.asarray(block_diag(*(trend(record) for record in records)))

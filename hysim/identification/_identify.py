@@ -21,7 +21,7 @@ from hysim.identification.folds import left_out
 from hysim.identification.swapped import swapped_columns, swapped_for
 from hysim.models.protocols import Direct, Identifiable, needs_time
 from hysim.models.search_space import Freedom
-from hysim.records import Record
+from hysim.records import Record, several
 
 
 def identify(
@@ -95,7 +95,7 @@ def identify(
     >>> round(fit.estimates["beta"], 6), round(fit.estimates["gain"], 6)
     (0.7, 2.0)
     """
-    records, options = _records(record_or_records), _freedom(fixed or {}, free, bounds or {})
+    records, options = several(record_or_records, "identify"), _freedom(fixed or {}, free, bounds or {})
     if intervals not in ("linear", "profile", "bootstrap"):
         raise ValueError(f'intervals must be "linear", "profile" or "bootstrap", got {intervals!r}')
     if noise not in ("gaussian", "quantised", "robust"):
@@ -140,16 +140,6 @@ def _searched(
     result, likely = search.described(search.likely(squares), intervals, squares[0].x)
     errors = left_out_errors(problem, density, np.array([optimum.theta for optimum in likely]), folds)
     return replace(result, regions=search.regions(likely[0]), cv_residual=errors, cv_rmse=rms_of_known(errors))
-
-
-def _records(given: Record | Sequence[Record]) -> tuple[Record, ...]:
-    records = (given,) if isinstance(given, Record) else given
-    if not isinstance(records, Sequence) or not all(isinstance(record, Record) for record in records):
-        what = type(given).__name__
-        raise TypeError(f"identify takes a Record or several of them, got {what}: hs.Record(u=u, y=y)")
-    if not records:
-        raise ValueError("there is no record to identify from")
-    return tuple(records)
 
 
 def _freedom(fixed: Mapping[str, float], free: Sequence[str], bounds: Mapping[str, tuple[float, float]]) -> Freedom:

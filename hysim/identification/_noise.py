@@ -10,7 +10,7 @@ and non-negative curvature in m: a descent is a sequence of weighted regressions
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,27 +29,6 @@ class Terms(NamedTuple):
     curvature: FloatArray
 
 
-class Noise(Protocol):
-    """One of the densities."""
-
-    @property
-    def name(self) -> str:
-        """Its name, as `identify` takes it."""
-        ...
-
-    def scale(self, residual: FloatArray, weights: FloatArray) -> FloatArray:
-        """The most likely sigma, (n_sets, 1)."""
-        ...
-
-    def terms(self, residual: FloatArray, sigma: FloatArray) -> Terms:
-        """The loss of each sample, with slope and curvature."""
-        ...
-
-    def draw(self, y: FloatArray, sigma: float, rng: np.random.Generator) -> FloatArray:
-        """Outputs as they could have been measured, of the shape of the model's outputs `y`."""
-        ...
-
-
 @dataclass(frozen=True)
 class Gaussian:
     """Normal noise; `floor` is the smallest sigma [unit of y]."""
@@ -58,8 +37,7 @@ class Gaussian:
     name: str = "gaussian"
 
     def scale(self, residual: FloatArray, weights: FloatArray) -> FloatArray:
-        mean_square = np.sum(weights * residual**2, axis=1, keepdims=True) / weights.sum(axis=1, keepdims=True)
-        return np.asarray(np.maximum(np.sqrt(mean_square), self.floor))
+        return np.asarray(np.maximum(_rms(residual, weights), self.floor))
 
     def terms(self, residual: FloatArray, sigma: FloatArray) -> Terms:
         normal = residual / sigma
@@ -114,9 +92,8 @@ class Quantised:
 
     def scale(self, residual: FloatArray, weights: FloatArray) -> FloatArray:
         """Bisection on ln sigma: ln p is concave in 1 / sigma, so that its slope changes sign once."""
-        widest = np.sqrt(np.sum(weights * residual**2, axis=1, keepdims=True) / weights.sum(axis=1, keepdims=True))
         low = np.full((len(residual), 1), np.log(max(self.floor, _FINEST * self.quantum)))
-        high = np.maximum(np.log(widest + self.quantum), low)
+        high = np.maximum(np.log(_rms(residual, weights) + self.quantum), low)
         for _ in range(26):
             middle = 0.5 * (low + high)
             falls = np.sum(weights * self._scale_slope(residual, np.exp(middle)), axis=1, keepdims=True) < 0.0
@@ -148,3 +125,12 @@ class Quantised:
         shares = [np.minimum(np.exp(np.minimum(-0.5 * end**2 - _LOG_ROOT_2PI - log_p, 700.0)), most)
                   for end in (near, far)]  # fmt: skip
         return near, far, log_p, *shares
+
+
+Noise = Gaussian | Robust | Quantised
+
+
+def _rms(residual: FloatArray, weights: FloatArray) -> FloatArray:
+    """Weighted root mean squares, (n_sets, 1)."""
+    total = weights.sum(axis=1, keepdims=True)
+    return np.asarray(np.sqrt(np.sum(weights * residual**2, axis=1, keepdims=True) / total))

@@ -2,14 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import field
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
 from hysim._frozen import FloatArray, frozen
 from hysim._printing import bic_in_words, printed, summary_text, wrapped
-from hysim.identification import json_forms
 from hysim.identification._profile import Profile
+from hysim.identification.json_forms import Stored
 
 
 @frozen
@@ -33,7 +33,7 @@ class Width:
 
 @printed
 @frozen
-class Identification:
+class Identification(Stored):
     """Parameters of a model, identified on one or several records.
 
     Parameters
@@ -94,6 +94,9 @@ class Identification:
         Sentences on a search that did not converge, a constant output, unknown standard errors, correlated residuals,
         or input and output that may be swapped.
     """
+
+    json_name = "identification"
+    json_parts = (Candidate, Width, Profile)
 
     model: Any
     models: tuple[Any, ...]
@@ -200,25 +203,3 @@ class Identification:
         if not np.isnan(self.whiteness):
             words.append(f"p = {self.whiteness:.2g} if white")
         return ", ".join(words)
-
-    def to_json(self) -> str:
-        """The whole result as JSON, with the version of hysim; `from_json` returns it, every number to the bit.
-
-        Raises
-        ------
-        TypeError
-            If the model is not of one of hysim's families.
-        """
-        return json_forms.to_text("identification", self)
-
-    @classmethod
-    def from_json(cls, text: str) -> Self:
-        """A result that `to_json` wrote.
-
-        Raises
-        ------
-        ValueError
-            If the text does not hold one.
-        """
-        result: Self = json_forms.from_text("identification", text, (cls, Candidate, Width, Profile))
-        return result

@@ -6,7 +6,7 @@ import types
 import typing
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
-from typing import Any
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -16,21 +16,27 @@ from hysim.models import storage
 _INFINITE = ("inf", "-inf")
 
 
-def to_text(name: str, result: Any) -> str:
-    """A result as JSON under its name, with the version of hysim; a TypeError if a model is not of hysim's families."""
-    document = {"hysim": __version__, name: to_plain(result)}
-    return json.dumps(document, indent=2, allow_nan=False) + "\n"
+class Stored:
+    """A result that is stored as JSON under `json_name`; its parts are results of the classes `json_parts`."""
 
+    json_name: ClassVar[str]
+    json_parts: ClassVar[tuple[type, ...]] = ()
 
-def from_text(name: str, text: str, kinds: Sequence[type]) -> Any:
-    """The result of the first of `kinds` that `to_text` wrote, its parts of the others; else a ValueError."""
-    try:
-        result = from_plain(json.loads(text)[name], kinds)
-    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
-        raise ValueError(f"this is no {name} of hysim: {type(error).__name__}: {error}") from None
-    if not isinstance(result, kinds[0]):
-        raise ValueError(f"this is no {name} of hysim, but {type(result).__name__}")
-    return result
+    def to_json(self) -> str:
+        """The whole result as JSON, with the version of hysim; a TypeError if a model is not of hysim's families."""
+        document = {"hysim": __version__, self.json_name: to_plain(self)}
+        return json.dumps(document, indent=2, allow_nan=False) + "\n"
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """The result that `to_json` wrote, every number to the bit; a ValueError if the text does not hold one."""
+        try:
+            result = from_plain(json.loads(text)[cls.json_name], (cls, *cls.json_parts))
+        except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+            raise ValueError(f"this is no {cls.json_name} of hysim: {type(error).__name__}: {error}") from None
+        if not isinstance(result, cls):
+            raise ValueError(f"this is no {cls.json_name} of hysim, but {type(result).__name__}")
+        return result
 
 
 def to_plain(value: Any) -> Any:
