@@ -53,11 +53,9 @@ class OpenLoop:
 
     @property
     def loop(self) -> LoopMetrics:
-        """Measures of the open loop."""
         return self.loop_of(self.y)
 
     def last(self, signal: FloatArray) -> FloatArray:
-        """Last cycle of a signal, both ends included."""
         return signal[-self.samples_per_cycle - 1 :]
 
     def loop_of(self, y: FloatArray) -> LoopMetrics:
@@ -424,7 +422,6 @@ def _samples_in(what: str, duration: float, sample_time: float) -> int:
 
 
 def _least_damped(actuator: Actuator) -> complex:
-    """Pole of the least damped mode; nan, and an infinite frequency, without one."""
     poles = np.empty(0) if actuator.vibration is None else actuator.vibration.poles
     modes = poles[poles.imag > 0.0]
     return complex(modes[np.argmin(-modes.real / np.abs(modes))]) if modes.size else complex(math.nan, math.inf)

@@ -91,7 +91,6 @@ class InverseFeedforward(SampledController):
         return Feedback(np.zeros((0, 0)), np.zeros(0), np.zeros(0), 0.0)
 
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
-        """Compiled step, parameters and state at rest at the command `u0`."""
         inverse, parameters, state = self.block(sample_time, u0)
         step = with_inverse(kernels.invert, inverse)
         return CompiledController(step, read_only(parameters, finite=False), np.append(u0, state))

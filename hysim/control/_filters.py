@@ -137,7 +137,6 @@ class DampingLoop(_Filter):
 def _discrete(
     numerator: tuple[float, ...], denominator: tuple[float, ...], frequency: float, sample_time: float
 ) -> FloatArray:
-    """Coefficients of a filter of first or second order from ascending powers of s."""
     if not frequency * sample_time < math.pi:
         raise ValueError(
             f"a filter's frequency must be below pi / sample_time, {math.pi / sample_time:g} rad/s, got {frequency:g}"

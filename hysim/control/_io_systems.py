@@ -32,7 +32,6 @@ Rule = Callable[[float, FloatArray, FloatArray, Any], FloatArray]
 
 
 def actuator_system(actuator: Actuator, sample_time: float) -> Any:
-    """Actuator with its limits and its sensor, without noise."""
     if isinstance(actuator.hysteresis, BoucWenInverse):
         raise TypeError("the inverse of a law is part of a controller: give it as InverseFeedforward(law=...)")
     sensor = replace(actuator.sensor or Sensor(), noise=0.0)
@@ -83,7 +82,6 @@ def oscillator_system(plant: BoucWenOscillator, sample_time: float | None) -> An
 
 
 def controller_system(controller: Any, sample_time: float) -> Any:
-    """Controller from reference and measurement to the command, within its limits."""
     compiled = CompiledController(*controller.compiled(sample_time, 0.0, 0.0))
     at_rest = compiled.state
     carried = np.isfinite(at_rest)  # other places are written before they are read

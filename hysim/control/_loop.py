@@ -190,7 +190,6 @@ class RestingPlant:
         return self.chain.run(compiled, self.state, ahead, progress)[0]
 
     def voltages(self, signals: Signals) -> FloatArray:
-        """Voltage at the law just after each new command."""
         return self.chain.just_after(float(self.state.voltages[1]), signals.v)
 
     def memory(self, signals: Signals) -> FloatArray | None:
@@ -201,12 +200,10 @@ class RestingPlant:
         return law.memory(np.append(self.state.voltages[1], signals.v))[: -1 : self.chain.substeps]
 
     def driven(self, u: FloatArray) -> FloatArray:
-        """Displacements just before each of the commands `u`."""
         return self.chain.driven(u, self.state)[0].y
 
 
 def sample_time_of(t: FloatArray, reference: FloatArray) -> float:
-    """Spacing of the times of a reference [s]; a ValueError if they do not fit."""
     if t.size != reference.size:
         raise ValueError(f"reference and t must have equal lengths, got {reference.size} and {t.size}")
     return even_step(t)
@@ -263,7 +260,6 @@ def _conditions(
 def _voltage_noise(
     actuator: Actuator, controller: Controller, plant: RestingPlant, reference: FloatArray, u: FloatArray
 ) -> dict[str, float]:
-    """Difference of the voltage to that of the loop without the sensor's noise; nan where that one diverges."""
     if actuator.sensor is None or not actuator.sensor.noise:
         return {"voltage_noise_rms": 0.0, "voltage_noise_peak": 0.0}
     quiet = replace(actuator, sensor=replace(actuator.sensor, noise=0.0))

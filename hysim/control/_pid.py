@@ -188,7 +188,6 @@ class PID(SampledController):
         )
 
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
-        """Compiled step, parameters and state at rest at `u0` and `y0`."""
         check_sample_time(sample_time)
         lowest, highest = self.limits or (-math.inf, math.inf)
         lag = self.derivative_filter + sample_time

@@ -18,19 +18,13 @@ class Controller(Protocol):
 class Previewing(Protocol):
     """A controller that gets the reference ahead of its time."""
 
-    def ahead(self, sample_time: float) -> int:
-        """Number of samples; 0 for none."""
-        ...
+    def ahead(self, sample_time: float) -> int: ...
 
 
 @runtime_checkable
 class Limited(Protocol):
-    """A controller whose commands are limited."""
-
     @property
-    def limits(self) -> tuple[float, ...] | None:
-        """Lowest and highest command; None for no limits."""
-        ...
+    def limits(self) -> tuple[float, ...] | None: ...
 
 
 def limits_of(controller: object) -> tuple[float, ...] | None:

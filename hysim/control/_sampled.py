@@ -25,7 +25,6 @@ class Feedback(NamedTuple):
     D: float
 
     def then(self, other: "Feedback") -> "Feedback":
-        """This system, and another behind it."""
         return Feedback(
             np.block([[self.A, np.zeros((self.B.size, other.B.size))], [np.outer(other.B, self.C), other.A]]),
             np.concatenate([self.B, other.B * self.D]),
@@ -34,7 +33,6 @@ class Feedback(NamedTuple):
         )
 
     def beside(self, other: "Feedback") -> "Feedback":
-        """The sum of both."""
         n, m = self.B.size, other.B.size
         return Feedback(
             np.block([[self.A, np.zeros((n, m))], [np.zeros((m, n)), other.A]]),
@@ -106,18 +104,15 @@ class SampledController(ABC):
 
 
 def check_kind(name: str, part: Any, kind: type) -> None:
-    """Raise a TypeError if a part is neither None nor of its kind."""
     if part is not None and not isinstance(part, kind):
         raise TypeError(f"{name} must be of {kind.__name__}, got {type(part).__name__}")
 
 
 def check_limits(limits: tuple[float, ...] | None) -> None:
-    """Raise a ValueError if limits are no interval."""
     if limits is not None and not (len(limits) == 2 and limits[0] <= limits[1]):
         raise ValueError(f"limits must be (lowest, highest), got {limits}")
 
 
 def check_sample_time(sample_time: float) -> None:
-    """Raise a ValueError if a sample time is not positive and finite."""
     if not 0.0 < sample_time < math.inf:
         raise ValueError(f"sample_time must be positive and finite, got {sample_time}")

@@ -15,8 +15,6 @@ from hysim.models.actuator import Actuator
 
 
 class Judgement(NamedTuple):
-    """Largest figures of all plants and slopes; infinite if a loop is unstable."""
-
     max_sensitivity: float
     voltage_noise: float
 

@@ -105,7 +105,6 @@ class FreeGains:
 
 
 def as_template(template: Tuned | None, sign: float) -> StandardForm | FreeGains:
-    """Space of points that a template stands for."""
     if template is None:
         return StandardForm(sign)
     if not isinstance(template, PID | TrackingController):

@@ -116,7 +116,6 @@ class TrackingController(SampledController):
         return self._hold + round(float(shaped @ np.arange(shaped.size)))
 
     def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
-        """Response from the negative measurement to the command at frequencies [rad/s], limits apart."""
         total = (self.feedback or PID()).frequency_response(frequency, sample_time)
         if self.notch is not None:
             total = total * self.notch.frequency_response(frequency, sample_time)
@@ -125,7 +124,6 @@ class TrackingController(SampledController):
         return np.asarray(total)
 
     def linear(self, sample_time: float) -> Feedback:
-        """Linear system from the measurement to the command, limits apart."""
         total = (self.feedback or PID()).linear(sample_time)
         if self.notch is not None:
             total = total.then(self.notch.linear(sample_time))
@@ -134,7 +132,6 @@ class TrackingController(SampledController):
         return total
 
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
-        """Compiled step, parameters and state at rest at `u0` and `y0`."""
         check_sample_time(sample_time)
         lowest, highest = self.limits or (-math.inf, math.inf)
         taps = self._taps(sample_time)

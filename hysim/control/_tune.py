@@ -143,7 +143,6 @@ class _SimulatedLoop:
             raise ValueError(f"the reference stays at the resting displacement {self.plant.y0:g}: nothing to follow")
 
     def value(self, controller: Tuned) -> float:
-        """Largest objective within any of the limits; infinite if a loop diverges."""
         largest = -math.inf
         for limits in self.limits:
             signals = self.plant.attempt(replace(controller, limits=limits), self.reference)
@@ -153,14 +152,11 @@ class _SimulatedLoop:
         return largest
 
     def limited(self, controller: Tuned) -> int:
-        """Number of samples at which the controller's limits hold the voltage."""
         signals = self.plant.attempt(controller, self.reference)
         return int(np.count_nonzero(signals.drive != signals.command))
 
 
 class _Search:
-    """Cost of a controller as a function of its point."""
-
     def __init__(self, loop: _SimulatedLoop, specification: Specification, controller: Tuned | None) -> None:
         self.loop, self.specification = loop, specification
         self.template = as_template(controller, math.copysign(1.0, specification.plants[0].gain))
@@ -192,7 +188,6 @@ class _Search:
         return self.specification.excess(self.specification.judge(self.template.controller(x)))
 
     def cost(self, x: FloatArray) -> float:
-        """Objective, and a barrier beyond the bounds."""
         controller = replace(self.template.controller(x), limits=self.loop.limits[0])
         judgement = self.specification.judge(controller)
         value = self.loop.value(controller) if judgement.max_sensitivity < math.inf else math.inf

@@ -191,7 +191,6 @@ def discover(
 
 
 def _rests(initial: str, library: Library, records: Sequence[Record]) -> tuple[bool, ...]:
-    """Values of `Terms.rest` to try."""
     if initial != "auto":
         return (initial == "rest",)
     return (False, True) if library.letter == "z" or all(record.u[0] == 0.0 for record in records) else (False,)
@@ -217,7 +216,6 @@ def _checked(record_or_records: Record | Sequence[Record]) -> tuple[Record, ...]
 def _libraries(
     route: str, library: str | Sequence[str] | None, degree: int | None, symmetry: str | None
 ) -> tuple[Library, ...]:
-    """The libraries that a route looks into, the cheaper first."""
     if degree is not None and not isinstance(library, str | None):
         raise ValueError("degree is not used with a library of names: leave it out")
     degree = 2 if degree is None else degree

@@ -50,9 +50,7 @@ Samples = npt.NDArray[np.intp]
 class Law(Protocol):
     """A model that is judged: an output at the samples of an input, without time."""
 
-    def response(self, u: npt.ArrayLike, /) -> FloatArray:
-        """Output at the samples of `u`."""
-        ...
+    def response(self, u: npt.ArrayLike, /) -> FloatArray: ...
 
 
 Refit = Callable[[Sequence[Record], Sequence[FloatArray]], Sequence[Law]]
@@ -123,7 +121,6 @@ def law_held_out(trial: Trial, records: Sequence[Record], refit: Refit) -> Trial
     n_samples = sum(len(record) for record in records)
 
     def law(weights: FloatArray) -> FloatArray:
-        """The free runs; inf where they cannot be fitted or diverge."""
         try:
             laws = refit(records, _of_each(weights, records))
             return np.concatenate([law.response(record.u) for law, record in zip(laws, records, strict=True)])
@@ -190,7 +187,6 @@ def _of_each(values: FloatArray, records: Sequence[Record]) -> list[FloatArray]:
 
 
 def _folds(records: Sequence[Record]) -> tuple[str, list[Samples]]:
-    """What is left out at a time, and its samples among those of all records."""
     lengths = [len(record) for record in records]
     begins = np.cumsum([0, *lengths])[:-1]
     kept = np.ones(sum(lengths), dtype=bool)
@@ -232,7 +228,6 @@ def _noise(records: Sequence[Record]) -> float:
 
 
 def rms(parts: Sequence[FloatArray]) -> float:
-    """Root mean square of the values that are not nan."""
     values = np.concatenate(parts) if parts else np.empty(0)
     counts = values[~np.isnan(values)]
     return float(np.sqrt(np.mean(counts**2))) if counts.size else math.nan

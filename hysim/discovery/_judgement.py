@@ -27,20 +27,8 @@ import numpy as np
 from hysim import metrics, signals
 from hysim._cycles import TOLERANCE, complete_cycles
 from hysim._frozen import FloatArray, frozen
-from hysim.discovery._held_out import (
-    CURVE,
-    LAW,
-    PLAYS,
-    RELAXATIONS,
-    RIVAL,
-    SEVERAL,
-    Law,
-    Refit,
-    Trial,
-    competitors_held_out,
-    law_held_out,
-    rate_spread,
-)
+from hysim.discovery import _held_out as held_out
+from hysim.discovery._held_out import CURVE, LAW, PLAYS, RELAXATIONS, RIVAL, SEVERAL, Law, Refit, Trial
 from hysim.discovery._rival import FLOOR, Rival, rival, steady_width
 from hysim.errors import SimulationError
 from hysim.models.transfer_function import TransferFunction
@@ -138,12 +126,11 @@ class Competitors:
 
 
 def competitors(records: Sequence[Record]) -> Competitors:
-    """Fit the models that need no law."""
     timed = all(record.t is not None for record in records)
-    spread = rate_spread(records)
+    spread = held_out.rate_spread(records)
     records = _thinned([_even(record) for record in records] if timed else records)
     linear = rival(records) if timed else None
-    return Competitors(records, linear, competitors_held_out(records, linear), spread)
+    return Competitors(records, linear, held_out.competitors_held_out(records, linear), spread)
 
 
 def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, others: Competitors | None = None) -> Judgement:
@@ -154,7 +141,7 @@ def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, others: 
     """
     others = others or competitors(records)
     records, linear, spread = others.records, others.linear, others.spread
-    trial = law_held_out(others.trial, records, refit)
+    trial = held_out.law_held_out(others.trial, records, refit)
     longest = max(range(len(records)), key=lambda k: len(records[k]))
     loops = _loops(laws[longest], records[longest].u)
     areas = np.array([math.nan if loop is None else signed_area(loop) for loop in loops])
@@ -236,7 +223,6 @@ def _rival_widths(linear: Rival | None, k: int, record: Record) -> tuple[float, 
 
 
 def _loops(law: Law, u: FloatArray) -> list[metrics.LoopMetrics | None]:
-    """Steady loops of a quarter of the input's range to all of it, around its middle; None where the law diverges."""
     middle, reach = 0.5 * (u.max() + u.min()), 0.5 * float(np.ptp(u))
     loops: list[metrics.LoopMetrics | None] = []
     for share in _AMPLITUDES:

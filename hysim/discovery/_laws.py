@@ -60,7 +60,6 @@ def law_from(candidate: Candidate[Any], records: Sequence[Record], letter: str) 
 
 
 def coefficients(structure: Terms, unknowns: FloatArray, letter: str) -> dict[str, float]:
-    """Coefficients of a structure with these numbers, by name."""
     return _coefficients(_numbers(structure, letter)(unknowns[: structure.size]))
 
 

@@ -32,15 +32,12 @@ _SAMPLES = 65  # of a branch
 
 
 class State(NamedTuple):
-    """Displacement, velocity and memory at the first sample."""
-
     y: float
     velocity: float
     z: float
 
 
 def verdict(terms: Iterable[Term]) -> str:
-    """Kind of the law that has these terms."""
     present = set(terms)
     if RELAXATION in present:
         return LAG if present <= {SPRING, RELAXATION} else RATE_DEPENDENT

@@ -33,8 +33,6 @@ _STEADY = 1e-9  # relative change of the state from period to period
 
 
 class Oscillator(NamedTuple):
-    """A plant and the coefficients of its memory."""
-
     plant: dict[str, float]
     coefficients: dict[Term, float]
 
@@ -49,7 +47,6 @@ class Response:
 
     @cached_property
     def measured(self) -> FloatArray:
-        """Outputs of all records, one after the other, (n_samples,)."""
         return np.concatenate([record.y for record in self.records])
 
     @cached_property
@@ -71,7 +68,6 @@ class Response:
         return [(self.structure.fine_input(r.u), r.sample_time / self.structure.oversampling) for r in self.records]
 
     def outputs(self, oscillators: Sequence[Oscillator]) -> FloatArray:
-        """Simulated outputs, (n_oscillators, n_samples); inf where one diverges or never is steady."""
         outputs = np.full((len(oscillators), self.measured.size), np.inf)
         begins = np.cumsum([0, *map(len, self.records)])
 
@@ -93,7 +89,6 @@ class Response:
         return tuple(State(*([missing] * 3 if run is None else run[1].tolist())) for run in runs)
 
     def _run(self, oscillator: Oscillator, force: FloatArray, h: float) -> tuple[FloatArray, FloatArray] | None:
-        """Displacement at the ends of the steps, and the last state, in a steady motion that of the first sample."""
         degree = max((int(term.degree) for term in oscillator.coefficients if term.is_polynomial), default=0)
         polynomial, extra, power, relaxation = memory_arrays(oscillator.coefficients, degree)
         plant = np.array([*(oscillator.plant[name] for name in PLANT), relaxation, power])

@@ -24,15 +24,7 @@ from hysim._frozen import FloatArray
 from hysim._parallel import Progress
 from hysim.discovery._hidden_memory import PLANT, HiddenMemory, Regressed
 from hysim.discovery._judgement import NO_STRUCTURE
-from hysim.discovery._oscillator_models import (
-    RATE_DEPENDENT,
-    SPRING,
-    State,
-    diverges,
-    model,
-    steady_loop,
-    verdict,
-)
+from hysim.discovery._oscillator_models import RATE_DEPENDENT, SPRING, State, diverges, model, steady_loop, verdict
 from hysim.discovery._oscillator_response import Oscillator, Response
 from hysim.discovery._result import OscillatorDiscovery
 from hysim.discovery._term_regression import TermRegression
@@ -85,7 +77,6 @@ class _Tried(NamedTuple):
 
     @property
     def beyond(self) -> set[Term]:
-        """Terms that are chosen and not in the law."""
         return set(self.chosen) - set(self.fitted.terms)
 
 
@@ -162,7 +153,6 @@ class Search(NamedTuple):
         return refined._replace(oscillator=Oscillator(plant, {}), stderr=stderr)
 
     def _refined(self, nearest: Regressed) -> _Fitted:
-        """Step 3."""
         if RELAXATION in nearest.coefficients:
             return self._simulated(Oscillator(nearest.plant, nearest.coefficients))
         return self._bouc_wen(tuple(nearest.coefficients))
@@ -276,9 +266,8 @@ class Search(NamedTuple):
         fitted, regression, structures = tried.fitted, tried.regression, tried.structures
         plant, law = fitted.oscillator
         measured, response = self.response.measured, self.response
-        coefficients = {term.named("z"): value for term, value in law.items()}
-        shares = regression.inclusion(np.random.default_rng(self.seed), N_DRAWS)
-        inclusion = {term.named("z"): share for term, share in shares.items()}
+        coefficients = _by_name(law)
+        inclusion = _by_name(regression.inclusion(np.random.default_rng(self.seed), N_DRAWS))
         states = response.initial_states(fitted.oscillator)
         models = [model(plant, law, response.structure, state) for state in states]
         nothing = (_NO_MODEL,) if models[0] is None else ()
@@ -311,7 +300,7 @@ class Search(NamedTuple):
             initial="rest" if response.structure.period is None else "periodic",
             initial_states=tuple(dict(zip(("y0", "y'0", "z0"), state, strict=True)) for state in states),
             rival=TransferFunction(num=(1.0,), den=tuple(elastic.oscillator.plant[name] for name in PLANT), hold="foh"),
-            regressed={term.named("z"): value for term, value in regressed.items()},
+            regressed=_by_name(regressed),
             inclusion=inclusion,
             left_out=tuple(term.named("z") for term in regression.dependent),
             path_n_terms=np.array([len(terms) for terms in structures], dtype=float),
@@ -342,6 +331,10 @@ def _tried(fitted: _Fitted, regression: TermRegression) -> _Tried:
     paths = {*regression.thresholded(), *regression.eliminated(), *([law] if law else [])}
     structures = sorted(paths, key=lambda terms: (-len(terms), regression.bic(terms), terms))
     return _Tried(fitted, regression, structures, regression.best(structures))
+
+
+def _by_name(values: Mapping[Term, float]) -> dict[str, float]:
+    return {term.named("z"): value for term, value in values.items()}
 
 
 def _is_polynomial(terms: Sequence[Term]) -> bool:

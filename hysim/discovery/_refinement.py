@@ -9,7 +9,7 @@ Unknowns are measured in what they contribute, outputs in strokes. A free run be
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Generic, TypeVar
@@ -62,7 +62,6 @@ class Candidate(Generic[S]):
 
     @cached_property
     def cost(self) -> float:
-        """Sum of squared residuals, in squared strokes."""
         return float(self.residual @ self.residual)
 
     @property
@@ -107,7 +106,6 @@ def cost_of(bic: float, n_samples: int, n_parameters: int) -> float:
 
 
 def bic_of(cost: float, n_samples: int, n_parameters: int) -> float:
-    """BIC of a sum of squared residuals in squared strokes."""
     return information(cost / n_samples, n_samples, n_parameters, floor=FLOOR)
 
 
@@ -125,7 +123,6 @@ class FreeRun:
 
     @cached_property
     def visible(self) -> tuple[Record, ...]:
-        """Records of the visible samples."""
         if self.seen is None:
             return self.records
         return tuple(
@@ -139,7 +136,6 @@ class FreeRun:
 
     @cached_property
     def n_samples(self) -> int:
-        """Number of visible samples."""
         return sum(map(len, self.visible))
 
     @cached_property
@@ -181,9 +177,7 @@ class FreeRun:
         if costs.min() >= DIVERGED**2:
             return None
         is_ranked = tolerance >= RANKING  # else polished
-
-        def residuals(x: FloatArray) -> FloatArray:
-            return self.residuals(structure, x * units)
+        residuals = self._scaled(structure)
 
         def slopes(x: FloatArray, residual: FloatArray) -> FloatArray:
             return differences(residuals, x, residual, central=not is_ranked)
@@ -200,14 +194,14 @@ class FreeRun:
         unknowns = self._with_starts(structure, x * units)
         return Candidate(structure, unknowns, slopes(x, residual) / units, residual, self._settles(structure, unknowns))
 
+    def _scaled(self, structure: Structure) -> Callable[[FloatArray], FloatArray]:
+        """The residuals as a function of the unknowns in their units."""
+        units = self.units(structure)
+        return lambda x: self.residuals(structure, x * units)
+
     def linearised(self, structure: Structure, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Residual (n_samples,) at some unknowns (size + n_records,), and its Jacobian in their units."""
-        units = self.units(structure)
-
-        def residuals(x: FloatArray) -> FloatArray:
-            return self.residuals(structure, x * units)
-
-        x = unknowns / units
+        residuals, x = self._scaled(structure), unknowns / self.units(structure)
         residual = residuals(x[np.newaxis])[0]
         return residual, differences(residuals, x, residual, central=True)
 

@@ -50,7 +50,6 @@ class Rival:
         return self.plants[0].order == 0
 
     def outputs(self, records: Sequence[Record]) -> list[FloatArray]:
-        """Free runs, one for each record."""
         pairs = zip(self.plants, records, strict=True)
         return [self.offset + plant.response(record.u, record.sample_time) for plant, record in pairs]
 
@@ -63,7 +62,6 @@ class Rival:
 
 
 def rival(records: Sequence[Record]) -> Rival:
-    """The line or the plant of lowest BIC, of those that the records have samples for; their times are even."""
     everything = [np.ones(len(record)) for record in records]
     most = sum(len(record) for record in records) // _PER_PARAMETER
     orders = [(poles, zeros) for poles, zeros in ORDERS if poles * (1 + len(records)) + zeros + 2 <= most]
@@ -134,7 +132,6 @@ class _Affine(Identifiable):
 
 
 def _coordinates(plant: TransferFunction, sample_time: float) -> FloatArray:
-    """Where a plant of one or two poles lies in the box (1, n_x): the logarithms of rate, or frequency and damping."""
     sizes = np.array(plant.den[1:]) * sample_time ** np.arange(1, len(plant.den))
     frequency = np.sqrt(sizes[-1])
     place = sizes if sizes.size == 1 else [frequency, sizes[0] / (2.0 * frequency)]

@@ -70,7 +70,6 @@ class Library:
     rests: tuple[bool, ...] = (False,)
 
     def structure(self, terms: Sequence[Term]) -> Terms:
-        """The largest structure of these terms."""
         return Terms(tuple(terms), self.feedthrough != "no", self.offset, all(self.rests))
 
 
@@ -110,7 +109,6 @@ class Outcome:
 
     @property
     def unstable(self) -> bool:
-        """Whether no structure but the line stays finite in free run."""
         lines = (LINE, LINE._replace(rest=True))
         return all(candidate is None for structure, candidate in self.search.tried.items() if structure not in lines)
 
@@ -203,7 +201,6 @@ def _start_at(rows: Slopes, library: Library, candidate: Candidate[Terms]) -> St
 
 
 def _better_form(records: Sequence[Record], library: Library, optimizer: str) -> str:
-    """The form whose regressions run free nearest to held-out samples, every third one."""
     free_run, errors = FreeRun(tuple(records)), {}
     unseen = np.concatenate([np.arange(len(record)) % _HELD_OUT == 1 for record in records])
     for form in FORMS:
@@ -305,7 +302,6 @@ def or_any_exponent(
 
 
 def _structures(library: Library) -> list[AnyExponent]:
-    """With all shifts first, with as few as the route allows last."""
     feedthroughs = {"no": (False,), "may": (True, False), "must": (True,)}[library.feedthrough]
     offsets = (True, False) if library.offset else (False,)
     return [

@@ -48,8 +48,6 @@ _TWINS = 6
 
 
 class Start(NamedTuple):
-    """A regression of z = y - feedthrough u - offset."""
-
     regression: Regression
     feedthrough: float = 0.0
     offset: float = 0.0
@@ -72,13 +70,11 @@ def thinning(record: Record, most: int) -> npt.NDArray[np.intp]:
 
 
 def turning(u: FloatArray) -> npt.NDArray[np.bool_]:
-    """Where an input turns, rests or leaves a rest, (n,): a path through these samples keeps its extremes."""
     direction = np.sign(np.diff(u))
     return np.concatenate([[False], direction[1:] != direction[:-1], [False]])
 
 
 def is_complete(terms: Iterable[Term]) -> bool:
-    """Whether all divisors of each term are there."""
     present = set(terms)
     return all(term.divisors() <= present for term in present)
 
@@ -116,7 +112,6 @@ class Search:
 
     @property
     def candidates(self) -> list[Candidate[Terms]]:
-        """Refined structures, lowest BIC first."""
         return sorted((c for c in self.tried.values() if c is not None), key=lambda c: (c.bic, c.structure))
 
     @property
@@ -191,7 +186,6 @@ class Search:
                 yield Prediction(bic, _of(largest, kept, rest), np.concatenate([numbers, starts]))
 
     def _worth_refining(self, subsets: Subsets, largest: Terms) -> list[int]:
-        """The cheapest MET subsets that have a term, and the required signs."""
         n_terms = len(largest.terms)
         wanted = np.array([self.free_run.signs.get(term, 0) for term in largest.terms])
         allowed = (subsets.x[:, :n_terms] * wanted >= 0.0).all(axis=1) & subsets.kept[:, :n_terms].any(axis=1)
@@ -221,7 +215,6 @@ def _of(largest: Terms, kept: npt.NDArray[np.bool_], rest: bool) -> Terms:
 
 
 def preferred(candidates: Sequence[Candidate[Terms]], letter: str) -> Candidate[Terms]:
-    """Step 4, for structures whose memory is called `letter`."""
     lowest = min(candidate.bic for candidate in candidates)
     best = min(candidates, key=lambda candidate: candidate.bic)
     rivals = [c for c in candidates if c.bic <= lowest + INDISTINCT or _is_as_good(c, best)]
@@ -229,7 +222,6 @@ def preferred(candidates: Sequence[Candidate[Terms]], letter: str) -> Candidate[
 
 
 def pruned(free_run: FreeRun, candidate: Candidate[Terms], held: frozenset[str], tolerance: float) -> Candidate[Terms]:
-    """Step 5."""
     structure = candidate.structure
     for k in np.argsort(candidate.significance).tolist():
         smaller = structure.without(k)

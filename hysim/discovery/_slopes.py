@@ -112,13 +112,11 @@ def weak_rows(u: FloatArray, y: FloatArray) -> Rows | None:
 
 
 def branches(u: FloatArray, y: FloatArray) -> list[Branch]:
-    """Branches of a record that have enough samples, smoothed."""
     u, y = without_rests(u, y)
     return [smoothed(u[piece], y[piece]) for piece in pieces(u) if u[piece].size >= MIN_SAMPLES]
 
 
 def smoothed(u: FloatArray, y: FloatArray) -> Branch:
-    """Branch through the samples of one monotone part."""
     length = np.abs(u - u[0])
     x = 2.0 * length / length[-1] - 1.0
     series = _polynomial(x, y)
@@ -165,7 +163,6 @@ FORMS = {"smoothed": smoothed_rows, "weak": weak_rows}
 
 
 def signs_of(terms: Sequence[Term], signs: Mapping[str, int] | None) -> dict[Term, int]:
-    """Signs that coefficients must have, by term."""
     wanted = {Term.parse(name): sign for name, sign in (signs or {}).items()}
     for term, sign in wanted.items():
         if term not in terms:
@@ -192,11 +189,9 @@ class Regression:
 
     @property
     def condition(self) -> float:
-        """Condition number of the scaled features."""
         return float(np.linalg.cond(self.features))
 
     def kept(self, coefficients: FloatArray) -> tuple[Term, ...]:
-        """Terms whose coefficients (n_terms,) are not zero."""
         return tuple(term for term, value in zip(self.terms, coefficients, strict=True) if value != 0.0)
 
     def ridge(self, terms: Sequence[Term], weight: float) -> FloatArray:
@@ -260,7 +255,6 @@ def _features(terms: Sequence[Term]) -> Feature:
 
 
 def feature(term: Term, u: FloatArray, z: FloatArray, direction: FloatArray | float) -> FloatArray:
-    """Column of a term in dz/dL."""
     column = u**term.i * z**term.j
     if term.absolute:
         column = column * np.abs(z)

@@ -36,7 +36,6 @@ class Terms(NamedTuple):
         return len(self.terms) + self.feedthrough + self.offset
 
     def without(self, k: int) -> Self:
-        """The structure without its number `k`."""
         if k < len(self.terms):
             return self._replace(terms=self.terms[:k] + self.terms[k + 1 :])
         if self.feedthrough and k == len(self.terms):
@@ -49,7 +48,6 @@ class Terms(NamedTuple):
         return np.concatenate([of_terms, _shift_units(self, record, stroke)])
 
     def bounds(self, signs: Mapping[Term, int]) -> Bounds:
-        """Lower and upper bounds of the numbers, (size,) each."""
         wanted = np.array([signs.get(term, 0) for term in self.terms] + [0] * (self.feedthrough + self.offset))
         return np.where(wanted > 0, 0.0, -np.inf), np.where(wanted < 0, 0.0, np.inf)
 
@@ -105,7 +103,6 @@ def output_at_rest(structure: Structure, numbers: FloatArray, u0: float) -> Floa
 
 
 def shifts(structure: Structure, numbers: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Feedthrough and offset, (n_sets,) each, of numbers (n_sets, size)."""
     zero, first = np.zeros(len(numbers)), structure.size - structure.feedthrough - structure.offset
     feedthrough = numbers[:, first] if structure.feedthrough else zero
     return feedthrough, numbers[:, first + structure.feedthrough] if structure.offset else zero

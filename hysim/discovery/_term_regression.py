@@ -45,11 +45,9 @@ class TermRegression:
 
     @cached_property
     def triangle(self) -> FloatArray:
-        """R of [features, target]."""
         return np.asarray(np.linalg.qr(np.column_stack([self.features, self.target]), mode="r"))
 
     def thresholded(self) -> list[tuple[Term, ...]]:
-        """Structures on the path of PySINDy's STLSQ, from dense to sparse."""
         path = sparse_path(self.features, self.target) if self.terms else []
         return [tuple(t for t, value in zip(self.terms, values, strict=True) if value != 0.0) for _, values in path]
 
@@ -66,7 +64,6 @@ class TermRegression:
         return path
 
     def best(self, structures: Sequence[tuple[Term, ...]]) -> tuple[Term, ...]:
-        """Structure of the lowest BIC, that without terms among them."""
         return min([*structures, ()], key=self.bic)
 
     def inclusion(self, rng: np.random.Generator, n_draws: int) -> dict[Term, float]:
@@ -81,7 +78,6 @@ class TermRegression:
 
     @cached_property
     def condition(self) -> float:
-        """Condition number of the features, each of unit size."""
         R = self.triangle[:, :-1]
         return float(np.linalg.cond(R / np.linalg.norm(R, axis=0))) if R.shape[1] else 1.0
 
@@ -95,7 +91,6 @@ class TermRegression:
         return float(rest @ rest)
 
     def bic(self, terms: Sequence[Term]) -> float:
-        """BIC of a structure [squared unit of y]."""
         n, n_parameters = self.target.size, self.n_plant + self.n_others + len(terms)
         return information(self.squares(terms) / n * self.sigma**2, n, n_parameters, floor=self.floor)
 

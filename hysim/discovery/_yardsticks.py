@@ -76,7 +76,6 @@ class Yardstick:
 
 
 def curve(records: Sequence[Record]) -> Yardstick:
-    """A function of the input alone."""
     return _yardstick([_spline(records)], _trends(records), u=_inputs(records))
 
 
@@ -92,7 +91,6 @@ def relaxations(records: Sequence[Record]) -> Yardstick:
 
 
 def plays(records: Sequence[Record]) -> Yardstick:
-    """A curve and functions of plays."""
     u = _inputs(records)
     middle, reach = 0.5 * (u.max() + u.min()), 0.5 * float(np.ptp(u))
     positions, before = [], []

@@ -72,7 +72,6 @@ class Descent:
         return np.concatenate([space.lower, linear[0]]), np.concatenate([space.upper, linear[1]])
 
     def slopes(self, theta: FloatArray, outputs: FloatArray, columns: FloatArray) -> FloatArray:
-        """dm/dtheta, (n_sets, n_samples, n_theta), by one-sided differences in x."""
         n_sets, n_x = len(theta), self.problem.n_x
         if not n_x:
             return columns
@@ -124,8 +123,6 @@ class Descent:
 
 @dataclass(frozen=True)
 class _Sets:
-    """The sets of one descent, as `marquardt.descend` takes them."""
-
     descent: Descent
     targets: FloatArray
     weights: FloatArray

@@ -14,8 +14,6 @@ _MOST_LAGS = 20
 
 
 class FitMeasures(TypedDict):
-    """The fields of `Identification` that follow from the residual alone."""
-
     fit_percent: float
     rmse: float
     fpe: float
@@ -56,7 +54,6 @@ def whiteness(residual: FloatArray, n_parameters: int) -> float:
 
 
 def loop_widths(descent: Descent, theta: FloatArray) -> FloatArray:
-    """Largest loop width of the first record for each theta, (n_sets,); empty where it has no loop."""
     record = descent.problem.parts[0].record
     outputs = descent.problem.model(theta)[:, : len(record)]
     finite = outputs[np.isfinite(outputs).all(axis=1)]

@@ -21,7 +21,6 @@ from hysim.records import Record
 
 
 def refuse(family: Direct, freedom: Freedom, noise: str, intervals: str) -> None:
-    """A ValueError for parameters by name, other noise than normal, and intervals."""
     name = family.__name__ if isinstance(family, type) else type(family).__name__
     if freedom.fixed or freedom.free or freedom.bounds:
         raise ValueError(f"{name} has no parameters by name: leave out fixed=, free= and bounds=")
@@ -34,7 +33,6 @@ def refuse(family: Direct, freedom: Freedom, noise: str, intervals: str) -> None
 def identified(
     family: Direct, records: Sequence[Record], folds: Sequence[npt.NDArray[np.intp]], seed: int
 ) -> Identification:
-    """The fit to all records together."""
     u = np.concatenate([record.u for record in records])
     y = np.concatenate([record.y for record in records])
     fit = family.fitted(u, y)
@@ -64,7 +62,6 @@ def identified(
 
 
 def _left_out_errors(family: Direct, u: FloatArray, y: FloatArray, folds: Sequence[npt.NDArray[np.intp]]) -> FloatArray:
-    """Error of each sample, (n,), in the fit without its fold; nan where no fold has it."""
     errors = np.full(y.size, np.nan)
     for fold in folds:
         kept = np.ones(y.size, dtype=bool)

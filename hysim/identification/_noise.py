@@ -131,6 +131,5 @@ Noise = Gaussian | Robust | Quantised
 
 
 def _rms(residual: FloatArray, weights: FloatArray) -> FloatArray:
-    """Weighted root mean squares, (n_sets, 1)."""
     total = weights.sum(axis=1, keepdims=True)
     return np.asarray(np.sqrt(np.sum(weights * residual**2, axis=1, keepdims=True) / total))

@@ -57,7 +57,6 @@ class Problem:
 
     @cached_property
     def y(self) -> FloatArray:
-        """All measured outputs, one record after the other."""
         return np.concatenate([part.record.y for part in self.parts])
 
     @cached_property
@@ -76,7 +75,6 @@ class Problem:
         return np.concatenate([x, np.concatenate(linear)], axis=1)
 
     def costs(self, x: FloatArray) -> FloatArray:
-        """Sums of squares (n_sets,), the sets evaluated in chunks."""
         return np.concatenate([np.sum(self._solve(x[part])[1] ** 2, axis=1) for part in self._chunks(len(x))])
 
     def _chunks(self, n_sets: int) -> list[slice]:
@@ -100,7 +98,6 @@ class Problem:
         return linear, residual
 
     def model(self, theta: FloatArray) -> FloatArray:
-        """Outputs (n_sets, n_samples), the sets evaluated in chunks."""
         outputs = np.empty((len(theta), self.y.size))
         for sets in self._chunks(len(theta)):
             columns, fixed_part = self.split(theta[sets, : self.n_x])
@@ -204,7 +201,6 @@ class Problem:
         return np.array(solutions).reshape(len(columns), lower.size)
 
     def linear_box(self) -> tuple[FloatArray, FloatArray]:
-        """Lower and upper bounds of the free linear parameters."""
         limits = [self.space.bounds.get(name, (-np.inf, np.inf)) for name in self.space.linear]
         lower, upper = np.array(limits).reshape(-1, 2).T
         return lower, upper
@@ -281,7 +277,6 @@ def _called(name: str, k: int | None) -> str:
 
 
 def _place(order: Sequence[tuple[Any, int | None]], k: int, key: Any) -> int:
-    """Where something shared, or of the record `k`, stands in the order; -1 where the record has none."""
     return next((place for place, (other, owner) in enumerate(order) if other == key and owner in (None, k)), -1)
 
 

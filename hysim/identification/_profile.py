@@ -47,7 +47,6 @@ class Profile:
 
 
 def threshold(n_samples: int, n_parameters: int, level: float) -> float:
-    """Deviance at the end of an interval."""
     from scipy.stats import t
 
     freedom = n_samples - n_parameters
@@ -145,7 +144,6 @@ def profiles(
 
 
 def _next(ends: _Ends, active: npt.NDArray[np.intp], side: FloatArray, step: FloatArray, root: float) -> FloatArray:
-    """Next value of each end: on the secant between inside and outside, or farther out."""
     inside, outside = ends.inside[active], ends.outside[active]
     r_in, r_out = ends.r_inside[active], ends.r_outside[active]
     share = np.where(np.isfinite(r_out), (root - r_in) / np.where(np.isfinite(r_out), r_out - r_in, 1.0), 0.5)

@@ -31,7 +31,6 @@ def left_out_errors(
 
 
 def rms_of_known(errors: FloatArray) -> float:
-    """Root mean square of the errors that are not nan; nan where all are."""
     known = errors[~np.isnan(errors)]
     if not np.isfinite(known).all():
         return float("inf")

@@ -72,7 +72,6 @@ def brief_cost(problem: Problem) -> float:
 
 
 def polish(problem: Problem, starts: FloatArray) -> list[Optimum]:
-    """Local optima that are reached from `starts` (n, n_x)."""
     reached = _descended(problem, starts, exact=True)
     x = reached.theta[:, : starts.shape[1]]
     costs = problem.costs(x)
@@ -94,7 +93,6 @@ def _starts(problem: Problem, screened: int, seed: int, most: int, n_given: int 
 
 
 def _uniform(space: SearchSpace, n: int, seed: int) -> FloatArray:
-    """Scrambled Sobol sequence of `n` points in the box, or in its part from which they are drawn."""
     from scipy.stats import qmc
 
     sequence = qmc.Sobol(space.lower.size, rng=np.random.default_rng(seed))

@@ -38,8 +38,6 @@ class LocalOptimum(NamedTuple):
 
 @dataclass(frozen=True)
 class Search:
-    """One problem with its noise."""
-
     problem: Problem
     noise: Noise
     seed: int
@@ -49,7 +47,6 @@ class Search:
         return Descent(self.problem, self.noise, self.problem.y[np.newaxis], np.ones((1, self.problem.y.size)))
 
     def likely(self, squares: Sequence[Optimum]) -> list[LocalOptimum]:
-        """Distinct optima, best first."""
         theta = self.problem.completed(np.array([optimum.x for optimum in squares]))
         steps = 0 if isinstance(self.noise, Gaussian) else 200
         reached = self.descent.run(theta, tolerance=1e-9, steps=steps)

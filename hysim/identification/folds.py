@@ -32,7 +32,6 @@ def left_out(cross_validate: str | int | None, records: Sequence[Record]) -> lis
 
 
 def _cycles(records: Sequence[Record], cuts: Sequence[int]) -> list[npt.NDArray[np.intp]]:
-    """Samples between every second turning point of each input, except the first, which determine its state."""
     cycles = []
     for record, begin in zip(records, cuts, strict=False):
         turns = record.reversals(TOLERANCE)[1::2]

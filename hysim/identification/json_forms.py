@@ -40,7 +40,6 @@ class Stored:
 
 
 def to_plain(value: Any) -> Any:
-    """The JSON form of a value."""
     if storage.is_model(value):
         return storage.to_document(value)
     if is_dataclass(value) and not isinstance(value, type):

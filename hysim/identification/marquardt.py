@@ -51,15 +51,13 @@ class Problem(Protocol):
         """
         ...
 
-    def linearised(self, x: FloatArray, sets: Sets, evaluated: tuple[FloatArray, ...]) -> tuple[FloatArray, FloatArray]:
-        """J (n, n_rows, n_x) and goal (n, n_rows)."""
-        ...
+    def linearised(
+        self, x: FloatArray, sets: Sets, evaluated: tuple[FloatArray, ...]
+    ) -> tuple[FloatArray, FloatArray]: ...
 
     def stepped(
         self, x: FloatArray, sets: Sets, jacobian: FloatArray, goal: FloatArray, damping: FloatArray
-    ) -> FloatArray:
-        """Next points (n, n_x), for dampings (n,)."""
-        ...
+    ) -> FloatArray: ...
 
 
 class Reached(NamedTuple):
@@ -178,7 +176,6 @@ class SumOfSquares:
         return np.where(np.isfinite(squares), squares, np.inf), (residual,)
 
     def linearised(self, x: FloatArray, sets: Sets, evaluated: tuple[FloatArray, ...]) -> tuple[FloatArray, FloatArray]:
-        """J^T J and minus the gradient, of which `stepped` makes the normal equations."""
         residual = evaluated[0][0]
         jacobian = self.slopes(x[0], residual)
         return (jacobian.T @ jacobian)[np.newaxis], -(jacobian.T @ residual)[np.newaxis]

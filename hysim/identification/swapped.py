@@ -48,7 +48,6 @@ def _moves(signal: FloatArray) -> bool:
 
 
 def _is_generated(signal: FloatArray) -> bool:
-    """Whether a signal is a triangle or staircase of equal steps, or one sine, with hardly any noise."""
     steps = np.diff(signal)
     if signal.size < _FEWEST or not np.any(steps):
         return False
