@@ -61,7 +61,7 @@ def oscillator_system(plant: BoucWenOscillator, sample_time: float | None) -> An
     """Oscillator as its differential equations, or from sample to sample with its input held."""
     start: FloatArray = np.array([*(plant.initial_state or (0.0, 0.0)), plant.law.z0])
     step = sample_time or 0.0
-    law, elastic_force, held = plant.law, plant.elastic_force, replace(plant, hold="zoh")
+    law, elastic_force, sampled_plant = plant.law, plant.elastic_force, replace(plant, hold="zoh")
     weight = 1.0 if plant.excitation == "force" else -plant.mass
 
     def slope(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:
@@ -71,7 +71,7 @@ def oscillator_system(plant: BoucWenOscillator, sample_time: float | None) -> An
         return np.array([velocity, force / plant.mass, law.A * velocity - abs(z) ** law.n * against])
 
     def update(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:
-        _, end = held.advance(u, step, OscillatorState(float(u[0]), *(x + start).tolist()))
+        _, end = sampled_plant.advance(u, step, OscillatorState(float(u[0]), *(x + start).tolist()))
         return np.array([end.y, end.velocity, end.z]) - start
 
     def output(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:

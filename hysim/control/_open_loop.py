@@ -45,7 +45,9 @@ def secant_gain(
         now = gain, next_gain
         gain, before = next_gain if before is None else _secant(before, now), now
     if change > _ACCEPTED:
-        raise ValueError(f"no voltage drives the plant along the reference: its secant gain wanders about {gain:g}")
+        raise ValueError(
+            f"no voltage drives the plant along the reference: its secant gain does not converge at {gain:g}"
+        )
     return next_gain
 
 
@@ -110,5 +112,5 @@ def _secant(before: tuple[float, float], now: tuple[float, float]) -> float:
 
 def _usable(gain: float) -> float:
     if not (math.isfinite(gain) and gain != 0.0):
-        raise ValueError(f"the plant's gain is {gain}: there is no voltage that would drive it along the reference")
+        raise ValueError(f"the plant's gain is {gain}: no voltage drives it along the reference")
     return gain

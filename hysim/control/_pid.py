@@ -179,11 +179,11 @@ class PID(SampledController):
     def linear(self, sample_time: float) -> Feedback:
         """Linear system from the measurement to the command; the states are I, D and the last measurement."""
         lag, integrates = self.derivative_filter + sample_time, 1.0 if self.ki else 0.0
-        rate, kept = self.kd / lag, self.derivative_filter / lag
+        rate, decay = self.kd / lag, self.derivative_filter / lag
         return Feedback(
-            np.array([[integrates, 0.0, 0.0], [0.0, kept, rate], [0.0, 0.0, 0.0]]),
+            np.array([[integrates, 0.0, 0.0], [0.0, decay, rate], [0.0, 0.0, 0.0]]),
             np.array([-self.ki * sample_time, -rate, 1.0]),
-            np.array([integrates, kept, rate]),
+            np.array([integrates, decay, rate]),
             -(self.kp + rate),
         )
 

@@ -98,18 +98,18 @@ def _discrete(actuator: Actuator, sample_time: float) -> Any:
 
     linear, delay = actuator.linear(sample_time)
     stage = sampled(linear, sample_time, delay)
-    n, held = linear.g.size, stage.lag + 1
-    A = np.zeros((n + held, n + held))
+    n, n_inputs = linear.g.size, stage.lag + 1
+    A = np.zeros((n + n_inputs, n + n_inputs))
     A[:n, :n] = stage.A
     A[:n, -1] = stage.B[1]  # the last of the chain is v_(k-1-lag)
-    A[n + 1 :, n:-1] = np.eye(held - 1)
-    B = np.zeros((n + held, 1))
+    A[n + 1 :, n:-1] = np.eye(n_inputs - 1)
+    B = np.zeros((n + n_inputs, 1))
     B[n] = 1.0
     if stage.lag:
         A[:n, -2] = stage.B[0]
     else:
         B[:n, 0] = stage.B[0]
-    C = np.concatenate([linear.C, np.zeros(held - 1), [linear.D]])
+    C = np.concatenate([linear.C, np.zeros(n_inputs - 1), [linear.D]])
     return control.ss(A, B, C[np.newaxis], 0.0, sample_time)
 
 

@@ -32,10 +32,7 @@ from hysim.models.terms import duhem_terms, memory_terms, named_terms, symmetric
 from hysim.records import Record, several
 
 _POOR = 80.0  # fit of a law without dynamics [%] below which the records may be an oscillator's
-_SHORT = (
-    "only the optimizer's path was searched, since no law on it comes near the model without a law that explains the "
-    "records best"
-)
+_SHORT = "only the optimizer's path was searched, since no law on it is nearly as good as the best model without a law"
 _OSCILLATOR = (
     "The laws that were tried explain little of these records. If u is the force on a mass with a hysteretic spring "
     "and y its displacement, use hs.discover_oscillator."
@@ -167,15 +164,15 @@ def discover(
     report(1, _STAGES + n_folds)
     any_exponent = library is None and symmetry is None and not signs
 
-    def chosen(first: list[Outcome], seen: tuple[Samples, ...] | None) -> tuple[Outcome, Candidate[Any]]:
-        more = _searched(records, of_output, options, first[0].searched.bic, seen)
+    def chosen(first: list[Outcome], masks: tuple[Samples, ...] | None) -> tuple[Outcome, Candidate[Any]]:
+        more = _searched(records, of_output, options, first[0].searched.bic, masks)
         outcome = min([*first, *more], key=lambda each: each.candidate.bic)
         if not any_exponent or outcome.is_short:
             return outcome, outcome.candidate
-        return outcome, or_any_exponent(FreeRun(records, seen), first[0], outcome)
+        return outcome, or_any_exponent(FreeRun(records, masks), first[0], outcome)
 
-    def again(seen: tuple[Samples, ...]) -> Candidate[Any]:
-        return chosen(_searched(records, (of_memory,), options, seen=seen), seen)[1]
+    def again(masks: tuple[Samples, ...]) -> Candidate[Any]:
+        return chosen(_searched(records, (of_memory,), options, masks=masks), masks)[1]
 
     outcome, candidate = chosen(outcomes, None)
     report(_STAGES - 1, _STAGES + n_folds)
@@ -244,7 +241,7 @@ def _searched(
     libraries: Sequence[Library],
     options: Options,
     best: float = math.inf,
-    seen: Sequence[Samples] | None = None,
+    masks: Sequence[Samples] | None = None,
 ) -> list[Outcome]:
     n = sum(map(len, records))
     outcomes: list[Outcome] = []
@@ -253,7 +250,7 @@ def _searched(
             raise ValueError(
                 f"{len(library.terms)} terms and y0 cannot be estimated from {n} samples: lower the degree"
             )
-        outcome = searched(records, library, options, best=best, seen=seen)
+        outcome = searched(records, library, options, best=best, masks=masks)
         outcomes += [] if outcome is None else [outcome]
     return outcomes
 
@@ -299,7 +296,7 @@ def _discovery(
 
 
 def _message(outcome: Outcome, rest: bool) -> str:
-    parts = [f"{outcome.library.letter} at the first sample is held at zero, its rest"] * rest
+    parts = [f"{outcome.library.letter} is held at zero at the first sample"] * rest
     parts += [_SHORT] * outcome.is_short
     return "; ".join(parts)
 
@@ -347,17 +344,14 @@ def left_out_rmse(
     count: str | int,
     progress: Progress,
 ) -> float:
-    """Rmse on samples that were left out of the search [unit of y]; inf where a law diverges.
-
-    Each fold repeats the `search` for structure and numbers in the outputs seen, (n_samples,) for each record.
-    """
+    """Rmse on samples left out of the search, repeated for each fold [unit of y]; inf where a law diverges."""
     free_run, edges = FreeRun(tuple(records)), np.cumsum([len(record) for record in records])
     left_out = folds(count, free_run.n_samples)
     errors = np.empty(free_run.n_samples)
     for done, samples in enumerate(left_out, 1):
-        seen = np.ones(free_run.n_samples, dtype=bool)
-        seen[samples] = False
-        law = search(tuple(np.split(seen, edges[:-1])))
+        mask = np.ones(free_run.n_samples, dtype=bool)
+        mask[samples] = False
+        law = search(tuple(np.split(mask, edges[:-1])))
         errors[samples] = free_run.residuals(law.structure, law.unknowns[np.newaxis])[0, samples]
         progress(done, len(left_out))
     if np.abs(errors).max() >= DIVERGED:

@@ -34,7 +34,7 @@ FACTOR = 2.0
 UNEXPLAINED = 0.2
 
 _FOLDS = 5
-_START = 0.1  # of each record is always seen
+_START = 0.1  # share of each record that is never left out
 _PARTS = 8  # of each record, for the t test
 _DOUBT = 0.05  # probability of the t test below which a difference counts
 _INSIDE = 0.05  # spans of the input by which left-out samples may reach beyond the others
@@ -70,7 +70,7 @@ class Trial:
     """
 
     errors: Mapping[str, float]
-    seen: Mapping[str, float]
+    fitted: Mapping[str, float]
     together: float
     by: str
     noise: float
@@ -82,7 +82,7 @@ class Trial:
 
         The error of the plays may also be that of one fit to all samples: they have many parameters.
         """
-        usual = self.seen[name] if self.by in ("record", "rate") else self.noise
+        usual = self.fitted[name] if self.by in ("record", "rate") else self.noise
         error = min(self.errors[name], self.together) if name == PLAYS else self.errors[name]
         return error <= max(FACTOR * usual, UNEXPLAINED * self.errors[CURVE]) + FLOOR * self.stroke
 
@@ -108,12 +108,12 @@ def competitors_held_out(records: Sequence[Record], linear: Rival | None) -> Tri
     models = _models(records, y, linear)
     for name, model in models.items():
         trial = _with(trial, name, model, records, left_out)
-    errors, seen, parts = dict(trial.errors), dict(trial.seen), dict(trial.parts)
+    errors, fitted, parts = dict(trial.errors), dict(trial.fitted), dict(trial.parts)
     if errors[_MEANS] < errors[CURVE]:
-        errors[CURVE], seen[CURVE], parts[CURVE] = errors[_MEANS], seen[_MEANS], parts[_MEANS]
+        errors[CURVE], fitted[CURVE], parts[CURVE] = errors[_MEANS], fitted[_MEANS], parts[_MEANS]
     del errors[_MEANS]
     together = about_trends(y - models[PLAYS](np.ones(y.size)), records)
-    return replace(trial, errors=errors, seen=seen, parts=parts, together=rms(together), stroke=float(np.ptp(y)))
+    return replace(trial, errors=errors, fitted=fitted, parts=parts, together=rms(together), stroke=float(np.ptp(y)))
 
 
 def law_held_out(trial: Trial, records: Sequence[Record], refit: Refit) -> Trial:
@@ -139,12 +139,12 @@ def _with(trial: Trial, name: str, model: Model, records: Sequence[Record], left
         remaining = y - model(weights)
         residual[samples] = remaining[samples]
         fitted.extend(about_trends(np.where(weights > 0.0, remaining, math.nan), records))
-    held = about_trends(residual, records)
-    parts = np.array([rms([part]) for part in _in_parts(held, records)])
+    detrended = about_trends(residual, records)
+    parts = np.array([rms([part]) for part in _in_parts(detrended, records)])
     return replace(
         trial,
-        errors={**trial.errors, name: rms(held)},
-        seen={**trial.seen, name: rms(fitted)},
+        errors={**trial.errors, name: rms(detrended)},
+        fitted={**trial.fitted, name: rms(fitted)},
         parts={**trial.parts, name: parts},
     )
 
@@ -177,8 +177,8 @@ def about_trends(residual: FloatArray, records: Sequence[Record]) -> list[FloatA
     return residuals
 
 
-def _in_parts(held: Sequence[FloatArray], records: Sequence[Record]) -> list[FloatArray]:
-    pieces = [piece for residual in held for piece in np.array_split(residual, _PARTS)]
+def _in_parts(detrended: Sequence[FloatArray], records: Sequence[Record]) -> list[FloatArray]:
+    pieces = [piece for residual in detrended for piece in np.array_split(residual, _PARTS)]
     return [piece[~np.isnan(piece)] for piece in pieces if np.count_nonzero(~np.isnan(piece)) > 1]
 
 
@@ -189,9 +189,9 @@ def _of_each(values: FloatArray, records: Sequence[Record]) -> list[FloatArray]:
 def _folds(records: Sequence[Record]) -> tuple[str, list[Samples]]:
     lengths = [len(record) for record in records]
     begins = np.cumsum([0, *lengths])[:-1]
-    kept = np.ones(sum(lengths), dtype=bool)
+    counted = np.ones(sum(lengths), dtype=bool)
     for begin, length in zip(begins, lengths, strict=True):
-        kept[begin : begin + math.ceil(_START * length)] = False
+        counted[begin : begin + math.ceil(_START * length)] = False
     by, parts = "record", [begin + np.arange(length) for begin, length in zip(begins, lengths, strict=True)]
     u = np.concatenate([record.u for record in records])
     if len(records) == 1:
@@ -199,7 +199,7 @@ def _folds(records: Sequence[Record]) -> tuple[str, list[Samples]]:
     elif not all(_covers(np.delete(u, samples), u[samples]) for samples in parts):
         by, parts = "block", blocks(min(2 * _FOLDS * len(records), u.size), u.size)
     groups = [np.unique(np.concatenate(parts[k::_FOLDS])) for k in range(min(_FOLDS, len(parts)))]
-    left_out = [group[kept[group]] for group in groups if kept[group].any()]
+    left_out = [group[counted[group]] for group in groups if counted[group].any()]
     left_out = [samples for samples in left_out if _covers(np.delete(u, samples), u[samples])] or left_out
     inside = [samples[_is_inside(np.delete(u, samples), u[samples])] for samples in left_out]
     return by, [samples for samples in inside if samples.size] or left_out
@@ -213,13 +213,13 @@ def _folds_of(record: Record) -> tuple[str, list[Samples]]:
     return ("cycle", cycles) if len(cycles) > 2 else ("block", blocks(min(2 * _FOLDS, len(record)), len(record)))
 
 
-def _covers(seen: FloatArray, other: FloatArray) -> bool:
-    beyond = _INSIDE * float(np.ptp(np.append(seen, other)))
-    return bool(other.min() >= seen.min() - beyond and other.max() <= seen.max() + beyond)
+def _covers(training: FloatArray, other: FloatArray) -> bool:
+    beyond = _INSIDE * float(np.ptp(np.append(training, other)))
+    return bool(other.min() >= training.min() - beyond and other.max() <= training.max() + beyond)
 
 
-def _is_inside(seen: FloatArray, other: FloatArray) -> npt.NDArray[np.bool_]:
-    return np.asarray((other >= seen.min()) & (other <= seen.max()))
+def _is_inside(training: FloatArray, other: FloatArray) -> npt.NDArray[np.bool_]:
+    return np.asarray((other >= training.min()) & (other <= training.max()))
 
 
 def _noise(records: Sequence[Record]) -> float:

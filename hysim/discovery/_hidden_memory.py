@@ -48,7 +48,7 @@ class _Along(NamedTuple):
     filtered: Filter
     steps: FloatArray
     h: float
-    kept: slice
+    samples: slice
 
 
 class MemoryArrays(NamedTuple):
@@ -172,7 +172,7 @@ class HiddenMemory:
             memory = np.zeros((2 + len(polynomials), each.steps.size + 1))
             if not kernels.along(each.steps, each.h, polynomial, relaxation, units, memory[0], memory[1:]):
                 return None
-            signals.append(memory[[0, *place]][:, each.kept])
+            signals.append(memory[[0, *place]][:, each.samples])
         rows = self._stacked(signals, 0)
         return rows if np.isfinite(rows).all() else None
 

@@ -288,7 +288,7 @@ def _no_structure(judgement: Judgement, turning: float, linear: float, curve: fl
             "behind a curve. Identify the law and the dynamics together, for instance as hs.Actuator."
         )
     return (
-        f"Models that know time and models that do not predict held-out samples about equally well (rmse {linear:.3g} "
-        f"and {turning:.3g}): noise hides what the rates could tell. Record more cycles, or rates further "
+        f"Models that depend on time and models that do not predict held-out samples about equally well (rmse "
+        f"{linear:.3g} and {turning:.3g}): noise hides the effect of the rate. Record more cycles, or rates further "
         "apart, with less noise."
     )

@@ -15,7 +15,7 @@ from hysim.models.oscillator_structure import OscillatorStructure
 from hysim.models.terms import RELAXATION, Term, memory_terms, symmetric
 from hysim.records import Record, several
 
-_REPEATS = 1e-3  # of the input's rms: how nearly a period must repeat itself to be seen
+_REPEATS = 1e-3  # of the input's rms: largest difference of two periods that count as alike
 _TRANSIENT = 1.5  # rms of what changes from period to period, early in the period over late
 
 
@@ -111,7 +111,7 @@ def _structure(records: Sequence[Record], structure: OscillatorStructure | None)
     if structure is None:
         made = {recorded(record) for record in records}
         if len(made) > 1:
-            raise ValueError("the records were not all made alike: say how by structure=, or give one at a time")
+            raise ValueError("the records were made in different ways: give structure=, or one record at a time")
         return made.pop()
     if not isinstance(structure, OscillatorStructure):
         raise TypeError(f"structure comes from BoucWenOscillator.structure(...), got {type(structure).__name__}")

@@ -73,8 +73,8 @@ class Response:
 
         def work(start: int, stop: int) -> None:
             for k in range(start, stop):
-                for record, begin, given in zip(self.records, begins, self._inputs, strict=False):
-                    run = self._run(oscillators[k], *given)
+                for record, begin, force_and_step in zip(self.records, begins, self._inputs, strict=False):
+                    run = self._run(oscillators[k], *force_and_step)
                     if run is not None:
                         y = np.resize(self.structure.sampled(run[0]), len(record))
                         outputs[k, begin : begin + len(record)] = y
@@ -84,7 +84,9 @@ class Response:
 
     def initial_states(self, oscillator: Oscillator) -> tuple[State, ...]:
         """State at the first sample of each record: rest, or that of the steady motion under a periodic input."""
-        runs = [self._run(oscillator, *given) if self.structure.period else None for given in self._inputs]
+        runs = [
+            self._run(oscillator, *force_and_step) if self.structure.period else None for force_and_step in self._inputs
+        ]
         missing = np.nan if self.structure.period else 0.0
         return tuple(State(*([missing] * 3 if run is None else run[1].tolist())) for run in runs)
 
@@ -189,9 +191,9 @@ class Response:
         sizes = np.linalg.norm(slopes, axis=0)
         slopes = slopes / np.where(sizes > 0.0, sizes, 1.0)
         for block in self._blocks:
-            seen = np.ones(residual.size, dtype=bool)
-            seen[block] = False
-            change = np.linalg.lstsq(slopes[seen], residual[seen], rcond=None)[0]
+            fitted = np.ones(residual.size, dtype=bool)
+            fitted[block] = False
+            change = np.linalg.lstsq(slopes[fitted], residual[fitted], rcond=None)[0]
             total += float(np.sum((residual[block] - slopes[block] @ change) ** 2))
         return float(np.sqrt(total / residual.size))
 

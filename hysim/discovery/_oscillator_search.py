@@ -177,12 +177,12 @@ class Search(NamedTuple):
     def _pruned(self, tried: _Tried) -> list[_Tried]:
         """A Bouc-Wen law, and the same without those of its terms that are not chosen."""
         law = tried.fitted.terms
-        kept = tuple(term for term in law if term == SPRING or term in tried.chosen)
-        n = bouc_wen_exponent(kept)
-        if bouc_wen_exponent(law) is None or len(kept) == len(law) or n is None or n != int(n):
+        smaller = tuple(term for term in law if term == SPRING or term in tried.chosen)
+        n = bouc_wen_exponent(smaller)
+        if bouc_wen_exponent(law) is None or len(smaller) == len(law) or n is None or n != int(n):
             return [tried]
         with contextlib.suppress(ValueError):  # the law with all terms stays
-            return [tried, self._about(self._bouc_wen(kept))]
+            return [tried, self._about(self._bouc_wen(smaller))]
         return [tried]
 
     def _extended(self, tried: _Tried) -> _Tried | None:
@@ -348,7 +348,7 @@ def _motion(plant: Mapping[str, float]) -> str:
 
 def _message(kind: str, warnings: Sequence[str]) -> str:
     if kind == NO_STRUCTURE:
-        return "no term of the library is worth its parameter beside a linear spring"
+        return "no term of the library lowers the BIC of a linear spring"
     if kind == RATE_DEPENDENT:
         return "the memory depends on the rate"
     return "" if warnings else "every term is needed, and no other"
@@ -357,11 +357,11 @@ def _message(kind: str, warnings: Sequence[str]) -> str:
 def _warnings(tried: _Tried, inclusion: Mapping[str, float]) -> tuple[str, ...]:
     parts = []
     if verdict(tried.fitted.terms) != NO_STRUCTURE and tried.beyond:
-        parts.append(f"The records ask for more terms: {', '.join(term.named('z') for term in sorted(tried.beyond))}.")
+        parts.append(f"More terms would lower the BIC: {', '.join(term.named('z') for term in sorted(tried.beyond))}.")
     names = [term.named("z") for term in tried.fitted.terms]
     doubtful = [name for name in names if inclusion.get(name, 0.0) < _SURE]
     if doubtful:
         parts.append(f"Some terms are not in every fit to resampled data: {', '.join(doubtful)}.")
     if tried.fitted.terms and tried.regression.condition > _LARGEST_CONDITION:
-        parts.append(f"The terms are hard to tell apart on these records (condition {tried.regression.condition:.0e}).")
+        parts.append(f"The terms are nearly collinear on these records (condition {tried.regression.condition:.0e}).")
     return tuple(parts)

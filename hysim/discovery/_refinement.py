@@ -113,20 +113,20 @@ def bic_of(cost: float, n_samples: int, n_parameters: int) -> float:
 class FreeRun:
     """Least-squares problem of some records.
 
-    `seen`, (n_samples,) for each record, marks the visible outputs; by default all. `signs` are those that coefficients
+    `masks`, (n_samples,) for each record, mark the visible outputs; by default all. `signs` are those that coefficients
     must have.
     """
 
     records: tuple[Record, ...]
-    seen: tuple[Samples, ...] | None = None
+    masks: tuple[Samples, ...] | None = None
     signs: Mapping[Term, int] = field(default_factory=dict)
 
     @cached_property
     def visible(self) -> tuple[Record, ...]:
-        if self.seen is None:
+        if self.masks is None:
             return self.records
         return tuple(
-            Record(u=record.u[kept], y=record.y[kept]) for record, kept in zip(self.records, self.seen, strict=True)
+            Record(u=record.u[mask], y=record.y[mask]) for record, mask in zip(self.records, self.masks, strict=True)
         )
 
     @cached_property
@@ -249,8 +249,8 @@ class FreeRun:
         if structure.rest:
             y0 = output_at_rest(structure, numbers, float(record.u[0]))
         y = structure.run(record.u, numbers, y0, bound)
-        if self.seen is not None:
-            y = y[:, self.seen[k]]
+        if self.masks is not None:
+            y = y[:, self.masks[k]]
         residual = (visible.y - y) / self.stroke
         residual[~np.isfinite(residual)] = DIVERGED
         return residual

@@ -138,8 +138,8 @@ class Discovery(_Discovered):
     inclusion : mapping
         Term of the library to the share of an ensemble of sparse regressions that keeps it.
     path_n_terms, path_fit_percent, path_bic : array, shape (n_thresholds,)
-        The optimizer's path from dense to sparse, each structure refined on thinned records; -inf and inf where its free
-        run diverges.
+        The optimizer's path from dense to sparse, each structure refined on thinned records; a fit of -inf and a BIC of
+        inf where its free run diverges.
     message : str
         How the search ended.
     warnings : tuple of str

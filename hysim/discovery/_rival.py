@@ -28,7 +28,7 @@ _PER_PARAMETER = 3  # samples
 
 
 @checked
-class Seen(Record):
+class WeightedRecord(Record):
     """A record whose samples are left out by `shares` (n,) of 0, which multiply its output and its regressors."""
 
     shares: FloatArray
@@ -115,7 +115,7 @@ class _Affine(Identifiable):
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         columns = np.insert(self.structure.regressors(parameters, record), -1, 1.0, axis=-1)
-        return columns * record.shares[:, np.newaxis] if isinstance(record, Seen) else columns
+        return columns * record.shares[:, np.newaxis] if isinstance(record, WeightedRecord) else columns
 
     def assemble(self, parameters: Mapping[str, float]) -> TransferFunction:
         return self.structure.assemble(parameters)
@@ -146,11 +146,11 @@ def _identified(
     start: TransferFunction | None = None,
 ) -> Rival:
     structure = TransferFunction.structure(poles=poles, zeros=zeros, hold="foh", initial="free")
-    seen = [
-        Seen(u=record.u, y=record.y * shares, t=record.t, shares=shares)
+    weighted = [
+        WeightedRecord(u=record.u, y=record.y * shares, t=record.t, shares=shares)
         for record, shares in zip(records, weights, strict=True)
     ]
-    fit = identify(_Affine(structure, records, start), seen)
+    fit = identify(_Affine(structure, records, start), weighted)
     return Rival(fit.models, fit.estimates["offset"], _information(records, fit.residual, fit.n_parameters))
 
 

@@ -22,18 +22,7 @@ from hysim._frozen import FloatArray
 from hysim.discovery import _pysindy
 from hysim.discovery._held_out import about_trends, rms
 from hysim.discovery._refinement import POLISH, Candidate, FreeRun, Samples, bic_of
-from hysim.discovery._selection import (
-    ALIKE,
-    INDISTINCT,
-    SEARCHED,
-    Search,
-    Start,
-    gap,
-    preferred,
-    pruned,
-    thinning,
-    turning,
-)
+from hysim.discovery._selection import ALIKE, INDISTINCT, Search, Start, gap, preferred, pruned, thinned, turning
 from hysim.discovery._slopes import FORMS, Feature, Slopes, ridge, slopes
 from hysim.discovery._structures import AnyExponent, Terms, shifts
 from hysim.models.terms import Term, symmetric
@@ -137,22 +126,22 @@ def searched(
     options: Options,
     *,
     best: float = math.inf,
-    seen: Sequence[Samples] | None = None,
+    masks: Sequence[Samples] | None = None,
 ) -> Outcome | None:
     """The best law of a library; None if none can come near the BIC `best`.
 
-    Only the outputs `seen`, (n_samples,) for each record, are used. If no law on the optimizer's path, which has the
-    largest ones, comes near an rmse that is enough, the search ends there: a smaller law does not fit better.
+    Only the outputs in the `masks`, (n_samples,) for each record, are used. If no law on the optimizer's path, which
+    has the largest ones, comes near an rmse that is enough, the search ends there.
     """
-    free_run = FreeRun(tuple(records), None if seen is None else tuple(seen), options.signs)
-    thin = _thinned(free_run)
+    free_run = FreeRun(tuple(records), None if masks is None else tuple(masks), options.signs)
+    thin = thinned(free_run)
     optimizer, form = options.optimizer, options.derivative
     if form == "auto":
         form = _better_form(thin.visible, library, optimizer)
     rows = slopes(free_run.visible, form)
     starts = shifted(rows, library.terms, feedthrough=library.feedthrough != "no", offset=library.offset)
-    held = frozenset({"feedthrough"} if library.feedthrough == "must" else ())
-    search = Search(thin, starts, held, library.rests)
+    required = frozenset({"feedthrough"} if library.feedthrough == "must" else ())
+    search = Search(thin, starts, required, library.rests)
     for start in starts:
         search.refine(library.structure(start.regression.terms))
     if not search.could_win(1, best):
@@ -181,17 +170,10 @@ def _least_rmse(search: Search) -> float:
     return min(errors, default=math.inf) * free_run.stroke
 
 
-def _thinned(free_run: FreeRun) -> FreeRun:
-    samples = [thinning(record, SEARCHED // len(free_run.records)) for record in free_run.records]
-    records = tuple(Record(u=r.u[kept], y=r.y[kept]) for r, kept in zip(free_run.records, samples, strict=True))
-    seen = free_run.seen and tuple(mask[kept] for mask, kept in zip(free_run.seen, samples, strict=True))
-    return FreeRun(records, seen, free_run.signs)
-
-
 def _path(start: Start, library: Library, optimizer: str) -> list[tuple[float, Terms]]:
     regression = start.regression
     path = _pysindy.sparse_path(regression.features, regression.slope, optimizer)
-    return [(threshold, library.structure(regression.kept(coefficients))) for threshold, coefficients in path]
+    return [(threshold, library.structure(regression.included(coefficients))) for threshold, coefficients in path]
 
 
 def _start_at(rows: Slopes, library: Library, candidate: Candidate[Terms]) -> Start:
@@ -202,15 +184,15 @@ def _start_at(rows: Slopes, library: Library, candidate: Candidate[Terms]) -> St
 
 def _better_form(records: Sequence[Record], library: Library, optimizer: str) -> str:
     free_run, errors = FreeRun(tuple(records)), {}
-    unseen = np.concatenate([np.arange(len(record)) % _HELD_OUT == 1 for record in records])
+    held_out = np.concatenate([np.arange(len(record)) % _HELD_OUT == 1 for record in records])
     for form in FORMS:
         try:
-            rows = slopes([_seen(record) for record in records], form)
+            rows = slopes([_training(record) for record in records], form)
         except ValueError:
             continue
         starts = shifted(rows, library.terms, feedthrough=library.feedthrough != "no", offset=library.offset)
         runs = [
-            free_run.residuals(structure, free_run.regressed(start.regression, structure, *start[1:]))[:, unseen]
+            free_run.residuals(structure, free_run.regressed(start.regression, structure, *start[1:]))[:, held_out]
             for start in starts[:2]  # the output itself, and the best place of the scan
             for _, structure in _path(start, library, optimizer)
         ]
@@ -218,9 +200,9 @@ def _better_form(records: Sequence[Record], library: Library, optimizer: str) ->
     return min(errors, key=lambda form: errors[form], default="smoothed")
 
 
-def _seen(record: Record) -> Record:
-    kept = (np.arange(len(record)) % _HELD_OUT != 1) | turning(record.u)
-    return Record(u=record.u[kept], y=record.y[kept])
+def _training(record: Record) -> Record:
+    included = (np.arange(len(record)) % _HELD_OUT != 1) | turning(record.u)
+    return Record(u=record.u[included], y=record.y[included])
 
 
 def _on_all_samples(free_run: FreeRun, search: Search, library: Library, seed: int, restarts: int) -> Candidate[Terms]:
@@ -235,7 +217,7 @@ def _on_all_samples(free_run: FreeRun, search: Search, library: Library, seed: i
     restarted = _restarted(search.free_run, search.tried[chosen.structure] or chosen, seed, restarts)
     starts = np.stack([chosen.unknowns, restarted.unknowns])
     polished = free_run.refine(chosen.structure, starts, tolerance=POLISH) or chosen
-    return pruned(free_run, polished, search.held, POLISH)
+    return pruned(free_run, polished, search.required, POLISH)
 
 
 def _restarted(free_run: FreeRun, chosen: Candidate[Terms], seed: int, restarts: int) -> Candidate[Terms]:

@@ -64,9 +64,19 @@ class Prediction(NamedTuple):
 def thinning(record: Record, most: int) -> npt.NDArray[np.intp]:
     """Every m-th sample of a record, its last one and its reversals, about `most` together, and 2 `most` at most."""
     stride = -(-len(record) // most)
-    kept = np.arange(len(record)) % stride == 0
-    kept[-1] = True
-    return np.flatnonzero(kept | turning(record.u))[: 2 * most]
+    included = np.arange(len(record)) % stride == 0
+    included[-1] = True
+    return np.flatnonzero(included | turning(record.u))[: 2 * most]
+
+
+def thinned(free_run: FreeRun) -> FreeRun:
+    """The same problem on about SEARCHED samples."""
+    samples = [thinning(record, SEARCHED // len(free_run.records)) for record in free_run.records]
+    records = tuple(
+        Record(u=r.u[included], y=r.y[included]) for r, included in zip(free_run.records, samples, strict=True)
+    )
+    masks = free_run.masks and tuple(mask[included] for mask, included in zip(free_run.masks, samples, strict=True))
+    return FreeRun(records, masks, free_run.signs)
 
 
 def turning(u: FloatArray) -> npt.NDArray[np.bool_]:
@@ -88,12 +98,12 @@ def is_plain(structure: Terms, letter: str) -> bool:
 class Search:
     """Structures tried on some records, with their refinements: None where every free run diverged.
 
-    `held` are numbers that no structure may lose, such as "feedthrough"; `rests` the values of `Terms.rest` to try.
+    `required` are numbers that no structure may lose, such as "feedthrough"; `rests` the values of `Terms.rest` to try.
     """
 
     free_run: FreeRun
     starts: tuple[Start, ...]
-    held: frozenset[str] = frozenset()
+    required: frozenset[str] = frozenset()
     rests: tuple[bool, ...] = (False,)
     tried: dict[Terms, Candidate[Terms] | None] = field(default_factory=dict)
 
@@ -105,8 +115,8 @@ class Search:
                 for start in self.starts
                 if set(structure.terms) <= set(start.regression.terms)
             ]
-            given = np.array(unknowns).reshape(-1, structure.size + len(self.free_run.records))
-            starts, hopeless = np.concatenate([given, *regressed]), self._hopeless(structure) if race else math.inf
+            own = np.array(unknowns).reshape(-1, structure.size + len(self.free_run.records))
+            starts, hopeless = np.concatenate([own, *regressed]), self._hopeless(structure) if race else math.inf
             self.tried[structure] = self.free_run.refine(structure, starts, hopeless=hopeless)
         return self.tried[structure]
 
@@ -175,20 +185,20 @@ class Search:
             residual = residual - jacobian[:, size:] @ x[size:]
             jacobian, x = jacobian[:, :size], x[:size]
         removable = np.arange(x.size) < size
-        if "feedthrough" in self.held:
+        if "feedthrough" in self.required:
             removable[len(largest.terms)] = False
         for subsets in best_subsets(jacobian, residual, x, removable):
             for k in self._worth_refining(subsets, largest):
-                kept, unknowns = subsets.kept[k], subsets.x[k]
-                bic = bic_of(float(subsets.cost[k]), free_run.n_samples, int(kept.sum()))
+                included, unknowns = subsets.included[k], subsets.x[k]
+                bic = bic_of(float(subsets.cost[k]), free_run.n_samples, int(included.sum()))
                 starts = (np.zeros(u0.size) if rest else unknowns[size:]) + shift @ unknowns[:size]
-                numbers = unknowns[:size][kept[:size]]
-                yield Prediction(bic, _of(largest, kept, rest), np.concatenate([numbers, starts]))
+                numbers = unknowns[:size][included[:size]]
+                yield Prediction(bic, _of(largest, included, rest), np.concatenate([numbers, starts]))
 
     def _worth_refining(self, subsets: Subsets, largest: Terms) -> list[int]:
         n_terms = len(largest.terms)
         wanted = np.array([self.free_run.signs.get(term, 0) for term in largest.terms])
-        allowed = (subsets.x[:, :n_terms] * wanted >= 0.0).all(axis=1) & subsets.kept[:, :n_terms].any(axis=1)
+        allowed = (subsets.x[:, :n_terms] * wanted >= 0.0).all(axis=1) & subsets.included[:, :n_terms].any(axis=1)
         return [int(k) for k in np.flatnonzero(allowed)[:MET]]
 
 
@@ -208,8 +218,8 @@ def _shift_columns(largest: Terms, u0: FloatArray) -> FloatArray:
     return np.stack([columns.get(name, np.zeros(u0.size)) for name in _names(largest)], axis=1)
 
 
-def _of(largest: Terms, kept: npt.NDArray[np.bool_], rest: bool) -> Terms:
-    names = [name for name, is_kept in zip(_names(largest), kept.tolist(), strict=False) if is_kept]
+def _of(largest: Terms, included: npt.NDArray[np.bool_], rest: bool) -> Terms:
+    names = [name for name, is_kept in zip(_names(largest), included.tolist(), strict=False) if is_kept]
     terms = tuple(name for name in names if isinstance(name, Term))
     return Terms(terms, "feedthrough" in names, "offset" in names, rest)
 
@@ -221,11 +231,13 @@ def preferred(candidates: Sequence[Candidate[Terms]], letter: str) -> Candidate[
     return min(rivals, key=lambda c: (c.n_parameters, not is_plain(c.structure, letter), c.bic))
 
 
-def pruned(free_run: FreeRun, candidate: Candidate[Terms], held: frozenset[str], tolerance: float) -> Candidate[Terms]:
+def pruned(
+    free_run: FreeRun, candidate: Candidate[Terms], required: frozenset[str], tolerance: float
+) -> Candidate[Terms]:
     structure = candidate.structure
     for k in np.argsort(candidate.significance).tolist():
         smaller = structure.without(k)
-        needed = not smaller.terms or ("feedthrough" in held and not smaller.feedthrough)
+        needed = not smaller.terms or ("feedthrough" in required and not smaller.feedthrough)
         if candidate.significance[k] >= SIGNIFICANT:
             break
         if needed:
@@ -234,7 +246,7 @@ def pruned(free_run: FreeRun, candidate: Candidate[Terms], held: frozenset[str],
         worst = cost_of(candidate.bic + INDISTINCT, free_run.n_samples, candidate.n_parameters - 1)
         refined = free_run.refine(smaller, start[np.newaxis], tolerance=tolerance, hopeless=worst)
         if refined is not None and refined.bic <= candidate.bic + INDISTINCT and refined.settles >= candidate.settles:
-            return pruned(free_run, refined, held, tolerance)
+            return pruned(free_run, refined, required, tolerance)
     return candidate
 
 

@@ -191,13 +191,15 @@ class Regression:
     def condition(self) -> float:
         return float(np.linalg.cond(self.features))
 
-    def kept(self, coefficients: FloatArray) -> tuple[Term, ...]:
+    def included(self, coefficients: FloatArray) -> tuple[Term, ...]:
         return tuple(term for term, value in zip(self.terms, coefficients, strict=True) if value != 0.0)
 
     def ridge(self, terms: Sequence[Term], weight: float) -> FloatArray:
         """Coefficients (n_terms,) of a law with these terms alone, by ridge regression."""
-        kept = [self.terms.index(term) for term in terms]
-        return np.asarray(ridge(self.features[:, kept], self.slope, weight) * self.slope_size / self.sizes[kept])
+        included = [self.terms.index(term) for term in terms]
+        return np.asarray(
+            ridge(self.features[:, included], self.slope, weight) * self.slope_size / self.sizes[included]
+        )
 
 
 @dataclass(frozen=True)
@@ -224,13 +226,13 @@ class Slopes:
         sizes, slope_size = np.sqrt(np.mean(raw**2, axis=0)), float(np.sqrt(np.mean(slope**2))) or 1.0
         scaled = raw / np.where(sizes > 0.0, sizes, 1.0)
         by_degree = sorted(range(len(terms)), key=lambda k: (terms[k].degree, k))
-        kept = sorted(independent(scaled, np.empty((len(slope), 0)), by_degree, DEPENDENT))
+        included = sorted(independent(scaled, np.empty((len(slope), 0)), by_degree, DEPENDENT))
         return Regression(
-            terms=tuple(terms[k] for k in kept),
-            dependent=tuple(term for k, term in enumerate(terms) if k not in kept),
-            features=scaled[:, kept],
+            terms=tuple(terms[k] for k in included),
+            dependent=tuple(term for k, term in enumerate(terms) if k not in included),
+            features=scaled[:, included],
             slope=slope / slope_size,
-            sizes=sizes[kept],
+            sizes=sizes[included],
             slope_size=slope_size,
         )
 
@@ -242,7 +244,7 @@ def slopes(records: Sequence[Record], form: str) -> Slopes:
     if len(directions) < 2:
         raise ValueError(
             f"a memory law needs a rising and a falling branch of at least {MIN_SAMPLES} samples each: with one of "
-            "them alone u' and |u'| are the same thing. Give a record whose input reverses, sampled more finely"
+            "them alone u' and |u'| are equal. Give a record whose input reverses, sampled more finely"
         )
     return Slopes(parts)
 
@@ -272,13 +274,13 @@ def independent(columns: FloatArray, basis: FloatArray, order: Sequence[int], le
 
     Columns (n, n_columns) of which a share below `least` remains count as combinations.
     """
-    kept = []
+    included = []
     for k in order:
         rest = columns[:, k]
         for _ in range(2):  # twice is enough for orthogonality to rounding
             rest = rest - basis @ (basis.T @ rest)
         size = float(np.linalg.norm(rest))
         if size > least * float(np.linalg.norm(columns[:, k])):
-            kept.append(k)
+            included.append(k)
             basis = np.column_stack([basis, rest / size])
-    return kept
+    return included

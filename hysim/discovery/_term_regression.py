@@ -53,14 +53,14 @@ class TermRegression:
 
     def eliminated(self) -> list[tuple[Term, ...]]:
         """Structures from dense to sparse, each without the term whose removal costs least."""
-        R, kept, path = self.triangle, list(range(len(self.terms))), []
+        R, included, path = self.triangle, list(range(len(self.terms))), []
         sizes = np.linalg.norm(R[:, :-1], axis=0)
         columns = R[:, :-1] / np.where(sizes > 0.0, sizes, 1.0)
-        normal, right = columns.T @ columns + _RIDGE * np.eye(len(kept)), columns.T @ R[:, -1]
-        while kept:
-            path.append(tuple(self.terms[k] for k in kept))
-            inverse = np.linalg.inv(normal[np.ix_(kept, kept)])
-            kept.pop(int(np.argmin((inverse @ right[kept]) ** 2 / np.diag(inverse))))
+        normal, right = columns.T @ columns + _RIDGE * np.eye(len(included)), columns.T @ R[:, -1]
+        while included:
+            path.append(tuple(self.terms[k] for k in included))
+            inverse = np.linalg.inv(normal[np.ix_(included, included)])
+            included.pop(int(np.argmin((inverse @ right[included]) ** 2 / np.diag(inverse))))
         return path
 
     def best(self, structures: Sequence[tuple[Term, ...]]) -> tuple[Term, ...]:
@@ -86,8 +86,8 @@ class TermRegression:
 
     def squares(self, terms: Sequence[Term]) -> float:
         """Sum of squared residuals of a structure, in units of the noise."""
-        kept, goal = self.triangle[:, self.places(terms)], self.triangle[:, -1]
-        rest = goal - kept @ np.linalg.lstsq(kept, goal, rcond=None)[0]
+        included, goal = self.triangle[:, self.places(terms)], self.triangle[:, -1]
+        rest = goal - included @ np.linalg.lstsq(included, goal, rcond=None)[0]
         return float(rest @ rest)
 
     def bic(self, terms: Sequence[Term]) -> float:
@@ -120,18 +120,18 @@ def term_regression(
     sizes = np.linalg.norm(plant, axis=0)
     plant, sizes = plant[:, sizes > 0.0], sizes[sizes > 0.0]  # where the motion diverges a slope is unknown, and zero
     basis = np.linalg.qr(plant / sizes)[0]
-    n_plant, kept = basis.shape[1], independent(slopes, basis, range(len(terms)), DEPENDENT)
-    features = slopes[:, kept] - basis @ (basis.T @ slopes[:, kept])
+    n_plant, included = basis.shape[1], independent(slopes, basis, range(len(terms)), DEPENDENT)
+    features = slopes[:, included] - basis @ (basis.T @ slopes[:, included])
     goal = target - basis @ (basis.T @ target)
     size = np.linalg.norm(features, axis=0)
     scaled = features / size
     residual = goal - scaled @ np.linalg.lstsq(scaled, goal, rcond=None)[0]
-    freedom = max(goal.size - n_plant - len(kept), 1)
+    freedom = max(goal.size - n_plant - len(included), 1)
     sigma = max(float(np.sqrt(residual @ residual / freedom)), floor)
     units = sigma * np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled))) / size
     return TermRegression(
-        terms=tuple(terms[k] for k in kept),
-        dependent=tuple(term for k, term in enumerate(terms) if k not in kept),
+        terms=tuple(terms[k] for k in included),
+        dependent=tuple(term for k, term in enumerate(terms) if k not in included),
         features=features * units / sigma,
         target=goal / sigma,
         units=units,

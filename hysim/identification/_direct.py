@@ -64,9 +64,9 @@ def identified(
 def _left_out_errors(family: Direct, u: FloatArray, y: FloatArray, folds: Sequence[npt.NDArray[np.intp]]) -> FloatArray:
     errors = np.full(y.size, np.nan)
     for fold in folds:
-        kept = np.ones(y.size, dtype=bool)
-        kept[fold] = False
-        errors[fold] = y[fold] - family.fitted(u[kept], y[kept]).model.response(u[fold])
+        training = np.ones(y.size, dtype=bool)
+        training[fold] = False
+        errors[fold] = y[fold] - family.fitted(u[training], y[training]).model.response(u[fold])
     return errors
 
 

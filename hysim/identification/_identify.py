@@ -109,8 +109,8 @@ def identify(
             doubt = swapped_columns(records)
         else:
             family = _family(model_or_class)
-            whole = problem(family, records, options, initial)
-            fit = _searched(whole, noise, intervals, left_out(cross_validate, records), seed, progress)
+            least_squares = problem(family, records, options, initial)
+            fit = _searched(least_squares, noise, intervals, left_out(cross_validate, records), seed, progress)
             doubt = swapped_columns(records)
             if not doubt and not needs_time(fit.model):
                 doubt = swapped_for(family, records, options, initial, 1.0 - fit.fit_percent / 100.0)
@@ -127,7 +127,7 @@ def _searched(
 ) -> Identification:
     n_samples, n_names = problem.y.size, len(problem.space.names)
     if not n_names:
-        raise ValueError("every parameter is fixed: nothing is left to identify")
+        raise ValueError("every parameter is fixed: leave at least one free")
     if n_samples < n_names:
         raise ValueError(f"{n_names} parameters cannot be estimated from {n_samples} samples; fix some of them")
     density = _density(noise, problem)

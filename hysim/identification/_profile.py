@@ -189,12 +189,12 @@ def _gathered(
 def _outline(values: FloatArray, deviance: FloatArray) -> npt.NDArray[np.intp]:
     """Points of the profile in order of their values, without those that a point farther out lies below."""
     centre = values[np.argmin(deviance)]
-    kept: list[int] = []
+    outline: list[int] = []
     for sign in (-1.0, 1.0):
         lowest = np.inf
         for k in np.lexsort((deviance, -sign * values)).tolist():
             if sign * (values[k] - centre) >= 0.0 and deviance[k] < lowest:
                 lowest = deviance[k]
-                kept.append(k)
-    chosen = np.unique(kept)
+                outline.append(k)
+    chosen = np.unique(outline)
     return chosen[np.argsort(values[chosen], kind="stable")]

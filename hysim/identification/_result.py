@@ -148,14 +148,14 @@ class Identification(Stored):
     def __str__(self) -> str:
         state = "" if self.success else ", NOT converged"
         free = [f"{name} {self.estimates[name]:.4g} +- {self.stderr[name]:.2g}" for name in self.free_names]
-        held = [f"{name} {value:.4g}" for name, value in self.estimates.items() if name not in self.free_names]
+        fixed = [f"{name} {value:.4g}" for name, value in self.estimates.items() if name not in self.free_names]
         width = self.loop_width
         return summary_text(
             [
                 f"Identification of {type(self.model).__name__}: {self._fit_in_words()}, rmse {self.rmse:.4g}, "
                 f"{self.n_parameters} parameters{state}",
                 wrapped(free, most=4),
-                wrapped(held, most=1, first="  held: "),
+                wrapped(fixed, most=1, first="  held: "),
             ],
             {
                 "residual": f"{self._residual_in_words()}, {self.residual.size} samples",
@@ -174,8 +174,8 @@ class Identification(Stored):
             f"{bic_in_words(self.bic)}, {self.n_parameters} parameters from {self.residual.size} samples"
         ]
         lines += [self._line(name) for name in self.free_names]
-        held = [f"{name} = {value:g}" for name, value in self.estimates.items() if name not in self.free_names]
-        lines += [f"  held: {', '.join(held)}"] if held else []
+        fixed = [f"{name} = {value:g}" for name, value in self.estimates.items() if name not in self.free_names]
+        lines += [f"  held: {', '.join(fixed)}"] if fixed else []
         lines += [f"  residual: {self._residual_in_words()}"]
         if self.loop_width is not None:
             width = self.loop_width

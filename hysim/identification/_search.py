@@ -117,8 +117,8 @@ def _apart(
 
 
 def _distinct(optima: list[Optimum]) -> list[Optimum]:
-    kept: list[Optimum] = []
+    distinct: list[Optimum] = []
     for optimum in sorted(optima, key=lambda candidate: candidate.cost):
-        if not kept or optimum.cost > kept[-1].cost * (1.0 + 1e-6):
-            kept.append(optimum)
-    return kept
+        if not distinct or optimum.cost > distinct[-1].cost * (1.0 + 1e-6):
+            distinct.append(optimum)
+    return distinct

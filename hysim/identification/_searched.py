@@ -172,7 +172,7 @@ class Search:
         family, record = self.problem.family, self.problem.parts[0].record
         notes = []
         if len(draws) and isinstance(self.noise, Quantised) and best.sigma < _FAINT * self.noise.quantum:
-            notes.append("noise this far below the quantum hardly changes a record drawn anew: ask for profiles")
+            notes.append('with noise this far below the quantum bootstrap intervals are too short: use "profile"')
         return [*notes, *family.notes(record, family.assemble(self.problem.estimates(best.theta)))]
 
     def _draws(self, best: LocalOptimum, residual: FloatArray) -> FloatArray:
@@ -229,7 +229,7 @@ def _phrases(
     phrases = ["converged" if converged else "the search did not converge", *known.reasons]
     inputs = [part.record.u for part in problem.parts]
     if all((np.diff(u) >= 0.0).all() or (np.diff(u) <= 0.0).all() for u in inputs):
-        phrases.append("the input never turns back: nothing shows what unloading does")
+        phrases.append("the input never turns back: the parameters of unloading are not determined")
     phrases += [
         f"the interval of {name} ends at its search bound" for name, curve in curves.items() if any(curve.at_box)
     ]

@@ -106,8 +106,8 @@ def descend(
         is_better = losses[best] < before
         won, place = moving[is_better], best[is_better]
         x[won], loss[won], is_stale[won] = trial[place], losses[place], True
-        for kept, there in zip(evaluated, evaluated_there, strict=True):
-            kept[won] = there[place]
+        for values, trial_values in zip(evaluated, evaluated_there, strict=True):
+            values[won] = trial_values[place]
         lowered = np.clip(dampings[best] * schedule.success, schedule.least, schedule.most)
         damping[moving] = np.where(is_better, lowered, damping[moving] * schedule.failure)
         rests = (gained <= tolerance + relative * before) | (before - (1 + remaining) * gained > hopeless)
@@ -129,18 +129,18 @@ def bounded_steps(
 
     A step beyond a bound ends there, and the others make the best of it. The first `n_damped` numbers are damped.
     """
-    held, steps = np.zeros(lower.shape, dtype=bool), np.zeros(lower.shape)
+    at_bound, steps = np.zeros(lower.shape, dtype=bool), np.zeros(lower.shape)
     for _ in range(_PASSES):
-        short = goal - (jacobian @ np.where(held, steps, 0.0)[..., np.newaxis])[..., 0]
-        others = _regressed(np.where(held[:, np.newaxis], 0.0, jacobian), short, damping, n_damped)
-        steps = np.where(held, steps, others)
-        beyond = ((steps < lower) | (steps > upper)) & ~held
+        short = goal - (jacobian @ np.where(at_bound, steps, 0.0)[..., np.newaxis])[..., 0]
+        others = _regressed(np.where(at_bound[:, np.newaxis], 0.0, jacobian), short, damping, n_damped)
+        steps = np.where(at_bound, steps, others)
+        beyond = ((steps < lower) | (steps > upper)) & ~at_bound
         if is_free is not None:
             beyond &= ~is_free
         if not beyond.any():
             break
         steps = np.clip(steps, lower, upper)
-        held |= beyond
+        at_bound |= beyond
     return steps
 
 
