@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from hysim._frozen import check_positive
 from hysim.control._loop import RestingPlant, as_actuator
 from hysim.control._protocols import Controller
 
@@ -72,8 +73,7 @@ def bandwidth(
     >>> round(hs.control.bandwidth(lag, hs.PID(kp=9.0, ki=9.0), **sine), 1)  # 9 / s in open loop
     9.0
     """
-    if not (amplitude > 0.0 and lowest > 0.0):
-        raise ValueError(f"amplitude and lowest must be positive, got {amplitude} and {lowest}")
+    check_positive(amplitude=amplitude, lowest=lowest)
     actuator = as_actuator(plant)
     if actuator.sensor is not None:
         actuator = replace(actuator, sensor=replace(actuator.sensor, noise=0.0))

@@ -16,7 +16,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, check_not_negative, check_positive
 from hysim.control._sampled import Feedback
 from hysim.models.model import family
 
@@ -71,12 +71,8 @@ class Notch(_Filter):
     new_damping_ratio: float = 1.0
 
     def __post_init__(self) -> None:
-        if not self.natural_frequency > 0.0:
-            raise ValueError(f"natural_frequency must be positive, got {self.natural_frequency}")
-        if self.damping_ratio < 0.0:
-            raise ValueError(f"damping_ratio must not be negative, got {self.damping_ratio}")
-        if not self.new_damping_ratio > 0.0:
-            raise ValueError(f"new_damping_ratio must be positive, got {self.new_damping_ratio}")
+        check_positive(natural_frequency=self.natural_frequency, new_damping_ratio=self.new_damping_ratio)
+        check_not_negative(damping_ratio=self.damping_ratio)
 
     def coefficients(self, sample_time: float) -> FloatArray:
         w = self.natural_frequency
@@ -121,10 +117,7 @@ class DampingLoop(_Filter):
     damping_ratio: float | None = None
 
     def __post_init__(self) -> None:
-        if not self.frequency > 0.0:
-            raise ValueError(f"frequency must be positive, got {self.frequency}")
-        if self.damping_ratio is not None and not self.damping_ratio > 0.0:
-            raise ValueError(f"damping_ratio must be positive, got {self.damping_ratio}")
+        check_positive(frequency=self.frequency, damping_ratio=self.damping_ratio)
 
     def coefficients(self, sample_time: float) -> FloatArray:
         w = self.frequency

@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
+from hysim._frozen import FloatArray, check_not_negative, read_only
 from hysim.control._sampled import Feedback, SampledController, check_limits, check_sample_time
 from hysim.kernels import controllers as kernels
 from hysim.models.model import family
@@ -66,10 +66,7 @@ class PID(SampledController):
     derivative_weight: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.derivative_filter < 0.0:
-            raise ValueError(f"derivative_filter is a time and must not be negative, got {self.derivative_filter}")
-        if self.tracking_time is not None and self.tracking_time < 0.0:
-            raise ValueError(f"tracking_time must not be negative, got {self.tracking_time}")
+        check_not_negative(derivative_filter=self.derivative_filter, tracking_time=self.tracking_time)
         check_limits(self.limits)
 
     @classmethod

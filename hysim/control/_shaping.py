@@ -27,7 +27,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, check_not_negative, check_positive
 from hysim.models.model import family
 from hysim.models.modes import mode
 from hysim.models.sampled import sampled, vibration_stage
@@ -71,14 +71,12 @@ class Shaper:
                 f"natural_frequencies and damping_ratios must be equally long, got {len(self.natural_frequencies)} "
                 f"and {len(self.damping_ratios)}"
             )
-        if min(self.natural_frequencies, default=1.0) <= 0.0:
-            raise ValueError(f"natural_frequencies must be positive, got {min(self.natural_frequencies)}")
+        check_positive(natural_frequencies=min(self.natural_frequencies, default=None))
         if not all(0.0 <= ratio < 1.0 for ratio in self.damping_ratios):
             raise ValueError(f"damping_ratios must be from 0 to below 1, got {self.damping_ratios}")
         if not isinstance(self.repeats, int) or self.repeats < 1:
             raise ValueError(f"repeats must be an integer of at least 1, got {self.repeats}")
-        if self.smoothing < 0.0:
-            raise ValueError(f"smoothing must not be negative, got {self.smoothing}")
+        check_not_negative(smoothing=self.smoothing)
 
     @classmethod
     def zv(cls, natural_frequencies: npt.ArrayLike, damping_ratios: npt.ArrayLike) -> Self:

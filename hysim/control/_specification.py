@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, check_positive
 from hysim.control._margins import LinearLoop
 from hysim.control._open_loop import secant_gain, slopes
 from hysim.control._sampled import SampledController
@@ -32,8 +32,7 @@ class Specification:
     ) -> None:
         if not max_sensitivity > 1.0:
             raise ValueError(f"max_sensitivity must be above one, got {max_sensitivity}")
-        if max_voltage_noise is not None and not max_voltage_noise > 0.0:
-            raise ValueError(f"max_voltage_noise must be positive, got {max_voltage_noise}")
+        check_positive(max_voltage_noise=max_voltage_noise)
         self.max_sensitivity = max_sensitivity
         self.max_voltage_noise = math.inf if max_voltage_noise is None else max_voltage_noise
         self.plants = [_PlantLoops(plant, cycle, sample_time) for plant in plants]

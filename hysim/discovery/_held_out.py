@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -61,35 +61,47 @@ Model = Callable[[FloatArray], FloatArray]
 """Outputs (n_samples,) at all samples, fitted again where the weights (n_samples,) are not zero."""
 
 
+class Scores(NamedTuple):
+    """Rmse of a model on held-out samples, on the fitted ones, and in parts of the held-out ones [unit of y]."""
+
+    error: float = math.nan
+    fitted: float = math.nan
+    parts: FloatArray = np.empty(0)
+
+
 @dataclass(frozen=True)
 class Trial:
-    """Rmse of the law and its competitors by name, held out and fitted, and what was left out at a time [unit of y].
+    """Scores of the law and its competitors by name, and what was left out at a time.
 
     `together` is the rmse of the plays fitted to all samples, `noise` that of white noise in the outputs, `stroke`
-    their range, and `parts` are rmse by name in parts of the held-out samples.
+    their range [unit of y].
     """
 
-    errors: Mapping[str, float]
-    fitted: Mapping[str, float]
+    scores: Mapping[str, Scores]
     together: float
     by: str
     noise: float
     stroke: float
-    parts: Mapping[str, FloatArray]
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """Rmse on held-out samples by name."""
+        return {name: scores.error for name, scores in self.scores.items()}
 
     def explains(self, name: str) -> bool:
         """Whether a model predicts the held-out samples nearly as well as the fitted ones, or most of the memory.
 
         The error of the plays may also be that of one fit to all samples: they have many parameters.
         """
-        usual = self.fitted[name] if self.by in ("record", "rate") else self.noise
-        error = min(self.errors[name], self.together) if name == PLAYS else self.errors[name]
-        return error <= max(FACTOR * usual, UNEXPLAINED * self.errors[CURVE]) + FLOOR * self.stroke
+        own, curve = self.scores[name], self.scores[CURVE]
+        usual = own.fitted if self.by in ("record", "rate") else self.noise
+        error = min(own.error, self.together) if name == PLAYS else own.error
+        return error <= max(FACTOR * usual, UNEXPLAINED * curve.error) + FLOOR * self.stroke
 
     def consistent(self, name: str, other: str) -> bool:
         """Whether a model is better than another in most parts: a t test of the logarithms of their rmse."""
         floor = FLOOR * self.stroke
-        gains = np.log((self.parts[other] + floor) / (self.parts[name] + floor))
+        gains = np.log((self.scores[other].parts + floor) / (self.scores[name].parts + floor))
         if gains.size < 2:
             return True
         student = float(special.stdtrit(gains.size - 1, 1.0 - _DOUBT))
@@ -103,17 +115,14 @@ def competitors_held_out(records: Sequence[Record], linear: Rival | None) -> Tri
     """
     y = np.concatenate([record.y for record in records])
     by, left_out = _folds(records)
-    unknown = dict.fromkeys((LAW, RIVAL, RELAXATIONS, PLAYS, CURVE), math.nan)
-    trial = Trial(unknown, unknown, math.nan, by, _noise(records), 0.0, {})
     models = _models(records, y, linear)
-    for name, model in models.items():
-        trial = _with(trial, name, model, records, left_out)
-    errors, fitted, parts = dict(trial.errors), dict(trial.fitted), dict(trial.parts)
-    if errors[_MEANS] < errors[CURVE]:
-        errors[CURVE], fitted[CURVE], parts[CURVE] = errors[_MEANS], fitted[_MEANS], parts[_MEANS]
-    del errors[_MEANS]
+    scores = {name: _scores(model, records, left_out) for name, model in models.items()}
+    means = scores.pop(_MEANS)
+    if means.error < scores[CURVE].error:
+        scores[CURVE] = means
     together = about_trends(y - models[PLAYS](np.ones(y.size)), records)
-    return replace(trial, errors=errors, fitted=fitted, parts=parts, together=rms(together), stroke=float(np.ptp(y)))
+    ordered = dict.fromkeys((LAW, RIVAL, RELAXATIONS, PLAYS, CURVE), Scores()) | scores
+    return Trial(ordered, rms(together), by, _noise(records), float(np.ptp(y)))
 
 
 def law_held_out(trial: Trial, records: Sequence[Record], refit: Refit) -> Trial:
@@ -127,10 +136,10 @@ def law_held_out(trial: Trial, records: Sequence[Record], refit: Refit) -> Trial
         except (SimulationError, ValueError):
             return np.full(n_samples, math.inf)
 
-    return _with(trial, LAW, law, records, _folds(records)[1])
+    return replace(trial, scores={**trial.scores, LAW: _scores(law, records, _folds(records)[1])})
 
 
-def _with(trial: Trial, name: str, model: Model, records: Sequence[Record], left_out: Sequence[Samples]) -> Trial:
+def _scores(model: Model, records: Sequence[Record], left_out: Sequence[Samples]) -> Scores:
     y = np.concatenate([record.y for record in records])
     residual, fitted = np.full(y.size, math.nan), []
     for samples in left_out:
@@ -141,12 +150,7 @@ def _with(trial: Trial, name: str, model: Model, records: Sequence[Record], left
         fitted.extend(about_trends(np.where(weights > 0.0, remaining, math.nan), records))
     detrended = about_trends(residual, records)
     parts = np.array([rms([part]) for part in _in_parts(detrended, records)])
-    return replace(
-        trial,
-        errors={**trial.errors, name: rms(detrended)},
-        fitted={**trial.fitted, name: rms(fitted)},
-        parts={**trial.parts, name: parts},
-    )
+    return Scores(rms(detrended), rms(fitted), parts)
 
 
 def _models(records: Sequence[Record], y: FloatArray, linear: Rival | None) -> dict[str, Model]:

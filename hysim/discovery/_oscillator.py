@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, check_positive
 from hysim._parallel import Progress
 from hysim.discovery._oscillator_response import Response
 from hysim.discovery._oscillator_search import Search
@@ -130,8 +130,7 @@ def _known_plant(plant: Mapping[str, float | None]) -> dict[str, float]:
         if not np.isfinite(value):
             raise ValueError(f"{name} must be finite, got {value}")
         known[name] = float(value)
-    if known.get("mass", 1.0) <= 0.0:
-        raise ValueError(f"mass must be positive, got {known['mass']}")
+    check_positive(mass=known.get("mass"))
     return known
 
 

@@ -138,9 +138,8 @@ def profiles(
     at_box = np.isnan(ends.end) & np.isfinite(ends.outside) & ~np.isfinite(ends.r_outside)
     open_ended = np.where(np.isnan(ends.outside), side * np.inf, ends.inside)
     end = np.where(np.isnan(ends.end), open_ended, ends.end)
-    return _gathered(problem.space.names, place, side, end, at_box, points, limit), None if better is None else better[
-        1
-    ]
+    curves = _gathered(problem.space.names, place, side, end, at_box, points, limit)
+    return curves, None if better is None else better[1]
 
 
 def _next(ends: _Ends, active: npt.NDArray[np.intp], side: FloatArray, step: FloatArray, root: float) -> FloatArray:
