@@ -73,8 +73,8 @@ class Scores(NamedTuple):
 class Trial:
     """Scores of the law and its competitors by name, and what was left out at a time.
 
-    `together` is the rmse of the plays fitted to all samples, `noise` that of white noise in the outputs, `stroke`
-    their range [unit of y].
+    `together` is the rmse of plays fitted to all samples, `noise` that of white noise, `stroke` the range of the
+    outputs.
     """
 
     scores: Mapping[str, Scores]
@@ -109,10 +109,7 @@ class Trial:
 
 
 def competitors_held_out(records: Sequence[Record], linear: Rival | None) -> Trial:
-    """Fit the competitors again without some of the samples, and predict these; the errors of the law are nan.
-
-    Without a linear rival, for lack of time, there are no relaxations either, and both errors are nan.
-    """
+    """Fit the competitors again without some of the samples, and predict these; unknown errors are nan."""
     y = np.concatenate([record.y for record in records])
     by, left_out = _folds(records)
     models = _models(records, y, linear)
@@ -240,10 +237,9 @@ def rms(parts: Sequence[FloatArray]) -> float:
 def rate_spread(records: Sequence[Record]) -> float:
     """How much the input's rate differs between passes at the same input; 1 for one rate, nan without time.
 
-    The input's range has nine equal bands between 5 and 95 % of it. A branch that crosses a band has there the rate
-    band over time of crossing. In each band the 95th percentile of the rates is divided by the 5th, all records having
-    the same weight; the median over the bands that two records cross, or else all, is taken. A sine has one rate, and
-    so has a triangle of any amplitude; sines of two amplitudes have several.
+    The input's range has nine equal bands between 5 and 95 % of it. A branch that crosses one has there the rate band
+    over time of crossing. In each band the 95th percentile of the rates is divided by the 5th, all records having the
+    same weight; the median over the bands that two records cross, or else all, is taken.
     """
     if any(record.t is None for record in records):
         return math.nan

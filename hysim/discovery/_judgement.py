@@ -134,10 +134,9 @@ def competitors(records: Sequence[Record]) -> Competitors:
 
 
 def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, others: Competitors | None = None) -> Judgement:
-    """Judge a law that was fitted to records beside its competitors.
+    """Judge a law that was fitted to records beside its competitors; `laws` has one for each record.
 
-    `laws` is the law for each record, with its own initial state. `refit(records, weights)` returns such laws, fitted
-    to the samples whose weights are not zero.
+    `refit(records, weights)` returns such laws, fitted to the samples whose weights are not zero.
     """
     others = others or competitors(records)
     records, linear, spread = others.records, others.linear, others.spread

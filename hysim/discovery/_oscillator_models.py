@@ -73,10 +73,7 @@ def diverges(oscillator: Model | None, y: FloatArray) -> bool:
 
 
 def steady_loop(oscillator: Model | None, y: FloatArray) -> tuple[float, float]:
-    """Relative width and signed area of the memory's steady loop over the range of the displacements `y`.
-
-    Both are nan where the memory is no Bouc-Wen law; a `SimulationError` says that it diverges.
-    """
+    """Relative width and signed area of the memory's loop over the range of `y`; nan if it is no Bouc-Wen law."""
     law = oscillator.law if isinstance(oscillator, BoucWenOscillator) else None
     if not isinstance(law, BoucWen):
         return np.nan, np.nan

@@ -111,10 +111,9 @@ def bic_of(cost: float, n_samples: int, n_parameters: int) -> float:
 
 @dataclass(frozen=True)
 class FreeRun:
-    """Least-squares problem of some records.
+    """Least-squares problem of some records; `signs` are those that coefficients must have.
 
-    `masks`, (n_samples,) for each record, mark the visible outputs; by default all. `signs` are those that coefficients
-    must have.
+    `masks`, (n_samples,) for each record, mark the visible outputs; by default all.
     """
 
     records: tuple[Record, ...]

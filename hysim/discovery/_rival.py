@@ -36,10 +36,7 @@ class WeightedRecord(Record):
 
 @dataclass(frozen=True)
 class Rival:
-    """A linear plant with an offset, fitted to records.
-
-    `plants` differ in the initial state alone; `bic` takes residuals of at least FLOOR strokes.
-    """
+    """A linear plant with an offset, fitted to records; `plants` differ in the initial state alone."""
 
     plants: tuple[TransferFunction, ...]
     offset: float
@@ -72,8 +69,7 @@ def rival(records: Sequence[Record]) -> Rival:
 def steady_width(plant: TransferFunction, cycle: Record, rate: float) -> float:
     """Relative width of the plant's steady loop where the cycle runs at `rate` times its rate; nan where it has none.
 
-    From period to period the free response falls by the factors lambda = exp(p T) of the poles p; the coefficients of
-    prod (x - lambda) take it out of as many periods as there are poles, and one more.
+    The coefficients of prod (x - exp(p T)), p the poles, take the free response out of as many periods and one more.
     """
     step, u = cycle.sample_time / rate, cycle.u[:-1]
     taken = np.atleast_1d(np.poly(np.exp(plant.poles * step * u.size))).real[::-1]
@@ -87,10 +83,7 @@ def steady_width(plant: TransferFunction, cycle: Record, rate: float) -> float:
 
 @dataclass(frozen=True)
 class _Affine(Identifiable):
-    """A transfer function with an offset, as `identify` takes it.
-
-    The box reaches from the longest of the records to the finest sampling; the search begins at `start`, if given.
-    """
+    """A transfer function with an offset, as `identify` takes it; the search begins at `start`, if given."""
 
     structure: TransferFunctionStructure
     records: Sequence[Record]

@@ -46,10 +46,9 @@ _RIDGES = (1e-9, 1e-4, 1e-2)
 
 @dataclass(frozen=True)
 class Library:
-    """Terms of laws, and their other numbers.
+    """Terms of laws; whether these have an offset, and a `feedthrough`: "no", "may" or "must".
 
-    `letter` is "y" where the memory is the output, else "z". `feedthrough` is "no", "may" or "must", `offset` whether
-    the memory may be zero at another output than zero, `rests` the values of `Terms.rest` to try.
+    `letter` is "y" where the memory is the output, else "z"; `rests` are the values of `Terms.rest` to try.
     """
 
     terms: tuple[Term, ...]
@@ -64,10 +63,7 @@ class Library:
 
 @dataclass(frozen=True)
 class Options:
-    """Signs that coefficients must have, and the arguments of `discover`.
-
-    `enough` is the rmse that a law must come near for the search to go beyond the optimizer's path [unit of y].
-    """
+    """Signs of coefficients, and arguments of `discover`; `enough` is the rmse that makes a full search worth while."""
 
     signs: Mapping[Term, int] = field(default_factory=dict)
     optimizer: str = "STLSQ"
@@ -130,8 +126,8 @@ def searched(
 ) -> Outcome | None:
     """The best law of a library; None if none can come near the BIC `best`.
 
-    Only the outputs in the `masks`, (n_samples,) for each record, are used. If no law on the optimizer's path, which
-    has the largest ones, comes near an rmse that is enough, the search ends there.
+    Only outputs in the `masks`, (n_samples,) for each record, are used. The search is short if no law on the
+    optimizer's path, which has the largest ones, comes near an rmse that is enough.
     """
     free_run = FreeRun(tuple(records), None if masks is None else tuple(masks), options.signs)
     thin = thinned(free_run)
@@ -263,10 +259,7 @@ def _levels(slopes: Slopes, feedthrough: float) -> list[float]:
 def or_any_exponent(
     free_run: FreeRun, of_memory: Outcome, chosen: Outcome
 ) -> Candidate[Terms] | Candidate[AnyExponent]:
-    """The chosen law, or the Bouc-Wen law of any exponent where that explains the records of `free_run` better.
-
-    `of_memory` is the outcome of the library of z, from which the scan takes its slopes and shifts.
-    """
+    """The chosen law, or the Bouc-Wen law of any exponent where its BIC is lower; `of_memory` is the outcome for z."""
     thin, best = of_memory.search.free_run, chosen.searched
     if chosen.candidate.cost < free_run.n_samples * ALIKE**2:
         return chosen.candidate

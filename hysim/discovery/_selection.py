@@ -98,7 +98,7 @@ def is_plain(structure: Terms, letter: str) -> bool:
 class Search:
     """Structures tried on some records, with their refinements: None where every free run diverged.
 
-    `required` are numbers that no structure may lose, such as "feedthrough"; `rests` the values of `Terms.rest` to try.
+    `required` are numbers that no structure may lose; `rests` the values of `Terms.rest` to try.
     """
 
     free_run: FreeRun

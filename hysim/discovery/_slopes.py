@@ -174,10 +174,9 @@ def signs_of(terms: Sequence[Term], signs: Mapping[str, int] | None) -> dict[Ter
 
 @dataclass(frozen=True)
 class Regression:
-    """slope = features @ coefficients, in scaled units.
+    """slope = features @ coefficients, scaled by the rms values `sizes` (n_terms,) and `slope_size`.
 
-    `sizes` (n_terms,) and `slope_size` are the rms values of the columns and the slope. `dependent` are the terms left
-    out since their columns are combinations of those of lower degree on these records.
+    `dependent` are terms left out since their columns are combinations of those of lower degree.
     """
 
     terms: tuple[Term, ...]
@@ -270,10 +269,7 @@ def ridge(columns: FloatArray, target: FloatArray, weight: float) -> FloatArray:
 
 
 def independent(columns: FloatArray, basis: FloatArray, order: Sequence[int], least: float) -> list[int]:
-    """Columns that, taken in `order`, are no combinations of an orthonormal `basis` and of those before them.
-
-    Columns (n, n_columns) of which a share below `least` remains count as combinations.
-    """
+    """Columns, in `order`, of which a share of `least` is no combination of an orthonormal `basis` and those before."""
     included = []
     for k in order:
         rest = columns[:, k]

@@ -27,9 +27,8 @@ DEPENDENT = 1e-5  # share of a slope that those before it do not explain, below 
 class TermRegression:
     """target = plant @ ... + features @ coefficients + noise of one, all about an oscillator.
 
-    `features` (n_samples, n_terms) and `target` have the plant's part projected out, and are scaled by `units`, the
-    standard errors of the coefficients of all terms together. `dependent` are the terms left out as combinations of the
-    plant's slopes and those of lower degree. `n_others` counts other fitted numbers, such as an exponent.
+    `features` (n_samples, n_terms) and `target` have the plant projected out; `units` are the standard errors that
+    scale them. `dependent` are terms left out as combinations of others; `n_others` counts other fitted numbers.
     """
 
     terms: tuple[Term, ...]
@@ -113,10 +112,7 @@ def term_regression(
     floor: float,
     blocks: list[slice],
 ) -> TermRegression:
-    """Regression of `target` (n_samples,) on slopes (n_samples, n_terms), the plant's (n_samples, n) projected out.
-
-    `floor` is the noise below which nothing counts as evidence, `blocks` are held out in turn.
-    """
+    """Regression of `target` (n_samples,) on slopes (n_samples, n_terms), the plant's (n_samples, n) projected out."""
     sizes = np.linalg.norm(plant, axis=0)
     plant, sizes = plant[:, sizes > 0.0], sizes[sizes > 0.0]  # where the motion diverges a slope is unknown, and zero
     basis = np.linalg.qr(plant / sizes)[0]

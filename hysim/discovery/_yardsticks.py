@@ -51,8 +51,8 @@ _SLOW = 1e-3  # ridge of trends: the first samples of a left-out record cannot d
 class Yardstick:
     """A model that is linear in its numbers, which multiply `columns` (n_samples, n_columns), and a constant.
 
-    Each number has a ridge of its own, `ridges` (n_columns,) in squared sizes of its column. Where `u` (n_samples,) is
-    given, a smoothing spline of it is fitted first.
+    Each has a ridge of its own, `ridges` (n_columns,) in squared sizes. A smoothing spline of `u`, if any, is fitted
+    first.
     """
 
     columns: FloatArray
@@ -104,10 +104,10 @@ def plays(records: Sequence[Record]) -> Yardstick:
 
 
 def means(u: FloatArray, y: FloatArray, weights: FloatArray) -> FloatArray:
-    """Outputs at all inputs of straight lines through mean outputs of neighbouring inputs that have a weight.
+    """Straight lines through mean outputs of neighbouring inputs that have a weight, at all inputs.
 
-    Where inputs repeat themselves, this curve has steps and kinks that no smooth one has. A mean is that of several
-    samples: those of single ones would know the path of an input that another record repeats.
+    Where inputs repeat themselves, this curve has steps and kinks that no smooth one has. Single samples would know the
+    path of an input that another record repeats: a mean is that of several.
     """
     fitted = weights > 0.0
     order = np.argsort(u[fitted], kind="stable")

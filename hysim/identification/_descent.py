@@ -44,10 +44,7 @@ class Reached(NamedTuple):
 
 @dataclass(frozen=True)
 class Descent:
-    """Outputs `targets` to be met with `weights`, each (n_sets, n_samples), or (1, n_samples) for all sets.
-
-    `projected` solves for b anew after each step, which helps from a poor start; it is for sums of squares.
-    """
+    """Outputs `targets` to be met with `weights`, (n_sets or 1, n_samples); `projected` solves for b at each step."""
 
     problem: Problem
     noise: Noise

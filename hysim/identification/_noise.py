@@ -77,8 +77,8 @@ class Robust:
 class Quantised:
     """Normal noise before a sensor that rounds to multiples of `quantum`; sigma is at least `floor` [unit of y].
 
-    The most likely sigma is too small where there are few samples for each parameter. The mean squared residual s^2 on
-    N - d degrees of freedom, less the variance of rounding (Sheppard), is not: sigma^2 = s^2 - quantum^2 / 12.
+    The most likely sigma is too small for few samples. The mean squared residual s^2 on N - d degrees of freedom, less
+    the variance of rounding (Sheppard), is not: sigma^2 = s^2 - quantum^2 / 12.
     """
 
     quantum: float

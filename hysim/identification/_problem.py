@@ -86,10 +86,7 @@ class Problem:
         return self.regression(columns, self.y - fixed_part)
 
     def regression(self, columns: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Linear parameters (n_sets, n_linear) and residuals (n_sets, n_samples), inf for a set that diverges.
-
-        Rows of `columns` and `target` that are not finite become zero in place.
-        """
+        """Linear parameters (n_sets, n_linear) and residuals (n_sets, n_samples), inf for a set that diverges."""
         broken = ~((np.abs(columns) < _LARGEST).all(axis=(1, 2)) & (np.abs(target) < _LARGEST).all(axis=1))
         columns[broken], target[broken] = 0.0, 0.0
         linear = self._regress(columns, target)

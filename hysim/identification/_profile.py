@@ -55,11 +55,7 @@ def threshold(n_samples: int, n_parameters: int, level: float) -> float:
 
 
 class _Ends:
-    """Both ends of the intervals of some parameters around some optima.
-
-    For each end: the outermost value inside, the innermost one outside (nan if unknown), the roots of the deviance
-    there, and theta inside with its slope along the profile.
-    """
+    """Outermost values inside and innermost ones outside (nan if unknown) of each interval, with sqrt(D) there."""
 
     def __init__(self, values: FloatArray, root: FloatArray, theta: FloatArray, slope: FloatArray) -> None:
         self.inside, self.r_inside = values.copy(), root.copy()
@@ -91,8 +87,8 @@ def profiles(
 ) -> tuple[dict[str, Profile], FloatArray | None]:
     """Profiles of all parameters with a standard error, and a better optimum (n_theta,) if one was met.
 
-    `optima` (n_optima, n_theta) and `losses` are those within the `limit` of the deviance, best first. `covariance`
-    (n_names, n_names) is that of the parameters, `spread` (n_theta, n_names) that of theta with them.
+    `optima` (n_optima, n_theta) lie within the `limit` of the deviance, best first. `covariance` (n_names, n_names) is
+    that of the parameters, `spread` (n_theta, n_names) that of theta with them.
     """
     problem = descent.problem
     variance = np.diag(covariance)

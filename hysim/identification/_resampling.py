@@ -53,11 +53,7 @@ def _left_out_errors(
 def bootstrap(
     problem: Problem, noise: Noise, theta: FloatArray, residual: FloatArray, sigma: float, *, draws: int, seed: int
 ) -> FloatArray:
-    """Theta (draws, n_theta) of records that are drawn anew.
-
-    With normal noise the residuals are drawn, enlarged by sqrt(N / (N - d)); otherwise noise is drawn from its density,
-    and a quantised record is rounded again.
-    """
+    """Theta (draws, n_theta) of records drawn anew: residuals enlarged by sqrt(N / (N - d)), or other noise."""
     rng = np.random.default_rng(seed)
     y_model = np.broadcast_to(problem.y - residual, (draws, residual.size))
     freedom = residual.size - len(problem.space.names)

@@ -27,10 +27,10 @@ _ONE_SIDED = 1e-7  # those of a one-sided one near 1e-7, at half the cost
 
 @dataclass(frozen=True)
 class Schedule:
-    """How the damping begins and changes.
+    """Damping: each trial has the set's times one of `factors`; a set ends beyond `most`.
 
-    Each trial has the set's damping times one of `factors`. After a step that lowers the loss the damping is that of
-    the best trial times `success`, otherwise the last one times `failure`; a set ends beyond `most`.
+    After a step that lowers the loss it is that of the best trial times `success`, otherwise the last one times
+    `failure`.
     """
 
     factors: tuple[float, ...] = (1.0,)
