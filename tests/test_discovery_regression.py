@@ -169,7 +169,9 @@ def test_the_best_subsets_are_those_of_all_least_squares(width):
     removable = np.array([True, True, False, True, True, True])
     target = residual - jacobian @ x
     levels = list(best_subsets(jacobian, residual, x, removable, width=width))
-    assert [level.included.sum(axis=1).tolist() for level in levels] == [[6 - k] * len(levels[k].cost) for k in range(6)]
+    assert [level.included.sum(axis=1).tolist() for level in levels] == [
+        [6 - k] * len(levels[k].cost) for k in range(6)
+    ]
     for level in levels:
         size = int(level.included[0].sum())
         brute = {}
