@@ -34,6 +34,20 @@ def checked(cls: type[T]) -> type[T]:
     return _freeze(cls, finite=True)
 
 
+def check_positive(**numbers: float | None) -> None:
+    """A ValueError for the first number by name that is not positive; None is no number."""
+    for name, value in numbers.items():
+        if value is not None and not value > 0.0:
+            raise ValueError(f"{name} must be positive, got {value}")
+
+
+def check_not_negative(**numbers: float | None) -> None:
+    """A ValueError for the first number by name that is negative; None is no number."""
+    for name, value in numbers.items():
+        if value is not None and not value >= 0.0:
+            raise ValueError(f"{name} must not be negative, got {value}")
+
+
 def read_only(
     values: npt.ArrayLike, name: str = "values", *, ndim: int | None = None, finite: bool = True
 ) -> FloatArray:

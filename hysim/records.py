@@ -4,7 +4,7 @@ The sample axis is axis 0. A record never changes; a slice of it keeps its units
 """
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import field
 from itertools import pairwise
 from typing import Any, Self, TypeVar
@@ -411,6 +411,16 @@ class Record:
         if isinstance(place, (float, np.floating)) and 0.0 < place < 1.0:
             return round(place * len(self))
         raise TypeError(f"a place must be a sample's number or a fraction between 0 and 1, got {place!r}")
+
+
+def several(records: Any, verb: str) -> tuple[Record, ...]:
+    """One record or a sequence of them as a tuple; other arguments are errors that name the `verb`."""
+    records = (records,) if isinstance(records, Record) else records
+    if not isinstance(records, Sequence) or not all(isinstance(record, Record) for record in records):
+        raise TypeError(f"{verb} takes a Record or several of them, got {type(records).__name__}: hs.Record(u=u, y=y)")
+    if not records:
+        raise ValueError(f"{verb} takes a Record or several of them: no record was given")
+    return tuple(records)
 
 
 def check_increasing(t: FloatArray) -> None:

@@ -300,7 +300,7 @@ def test_the_open_loop_is_read_when_the_closed_one_is(assess, sample):
         (
             lambda: assess_hysteresis(hs.Line(slope=0.0), hs.PID(), **TRIANGLE),
             ValueError,
-            "gain is 0.0: there is no voltage",
+            "gain is 0.0: no voltage drives it",
         ),
         (
             lambda: assess_step(hs.TransferFunction(num=(1.0,), den=(1.0, 0.0)), hs.PID(), step=1.0, duration=9.0,

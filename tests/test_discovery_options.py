@@ -48,7 +48,7 @@ def test_the_search_does_not_look_at_samples_that_are_left_out():
     library = Library(memory_terms(1), "z", rests=(False, True))
     found, spoilt = (
         searched(
-            (hs.Record(u=RECORD.u, y=np.where(seen, RECORD.y, unseen)),), library, Options(), seen=(seen,)
+            (hs.Record(u=RECORD.u, y=np.where(seen, RECORD.y, unseen)),), library, Options(), masks=(seen,)
         ).candidate
         for unseen in (RECORD.y, 1e3)
     )
@@ -57,22 +57,22 @@ def test_the_search_does_not_look_at_samples_that_are_left_out():
 
 
 def test_cross_validation_repeats_the_whole_search(monkeypatch):
-    laws, masks = [], []
+    laws, every = [], []
 
-    def kept(records, library, options, *, best, seen=None):
-        outcome = searched(records, library, options, best=best, seen=seen)
+    def searched_and_noted(records, library, options, *, best, masks=None):
+        outcome = searched(records, library, options, best=best, masks=masks)
         laws.append(outcome.candidate)
-        masks.append(seen)
+        every.append(masks)
         return outcome
 
-    monkeypatch.setattr(_discover, "searched", kept)
+    monkeypatch.setattr(_discover, "searched", searched_and_noted)
     record, done = record_of(LAW.memory, multisine(120), noise=0.01), []
     found = hs.discover(
         record, library=NAMES, route="memory", cross_validate=3, progress=lambda *step: done.append(step)
     )
     folds = np.array_split(np.arange(len(record)), 3)
-    assert masks[0] is None
-    assert [np.flatnonzero(~seen).tolist() for (seen,) in masks[1:]] == [f.tolist() for f in folds]
+    assert every[0] is None
+    assert [np.flatnonzero(~seen).tolist() for (seen,) in every[1:]] == [f.tolist() for f in folds]
     free_run = FreeRun((record,))
     errors = [
         free_run.residuals(law.structure, law.unknowns[np.newaxis])[0, fold]
@@ -231,10 +231,16 @@ def test_an_oscillators_records_are_pointed_to_their_own_verb():
     assert "discover_oscillator" not in " ".join(hs.discover(uneven, library=NAMES).warnings)
 
 
-@pytest.mark.parametrize("given", [CYCLES, [], [CYCLES], None, {"u": CYCLES, "y": CYCLES}])
+@pytest.mark.parametrize("given", [CYCLES, [CYCLES], None, {"u": CYCLES, "y": CYCLES}])
 def test_only_records_are_taken(given):
     with pytest.raises(TypeError, match="discover takes"):
         hs.discover(given)
+
+
+@pytest.mark.parametrize("verb", [hs.discover, hs.discover_oscillator])
+def test_at_least_one_record_is_needed(verb):
+    with pytest.raises(ValueError, match="no record was given"):
+        verb([])
 
 
 @pytest.mark.parametrize("optimizer", ["ConstrainedSR3", "MIOSR", "SBR"])

@@ -89,7 +89,7 @@ def test_libraries_have_their_sizes_and_one_order():
 def test_every_threshold_on_the_path_changes_the_structure():
     problem = slopes([record_of(duhem(COLEMAN_HODGDON), CYCLES)], "smoothed").regression(duhem_terms(2))
     path = _pysindy.sparse_path(problem.features, problem.slope)
-    structures = [problem.kept(coefficients) for _, coefficients in path]
+    structures = [problem.included(coefficients) for _, coefficients in path]
     assert len(set(structures)) == len(structures)
     for threshold, coefficients in path:
         assert (np.abs(coefficients[coefficients != 0.0]) >= threshold).all()
@@ -100,7 +100,7 @@ def test_every_threshold_on_the_path_changes_the_structure():
 def test_other_optimizers_have_paths_too(optimizer):
     problem = slopes([record_of(duhem(DAHL), CYCLES)], "smoothed").regression(duhem_terms(1))
     path = _pysindy.sparse_path(problem.features, problem.slope, optimizer)
-    structures = [problem.kept(coefficients) for _, coefficients in path]
+    structures = [problem.included(coefficients) for _, coefficients in path]
     assert len(set(structures)) == len(structures)
     assert tuple(Term.parse(name) for name in DAHL) in structures
 
@@ -169,16 +169,18 @@ def test_the_best_subsets_are_those_of_all_least_squares(width):
     removable = np.array([True, True, False, True, True, True])
     target = residual - jacobian @ x
     levels = list(best_subsets(jacobian, residual, x, removable, width=width))
-    assert [level.kept.sum(axis=1).tolist() for level in levels] == [[6 - k] * len(levels[k].cost) for k in range(6)]
+    assert [level.included.sum(axis=1).tolist() for level in levels] == [
+        [6 - k] * len(levels[k].cost) for k in range(6)
+    ]
     for level in levels:
-        size = int(level.kept[0].sum())
+        size = int(level.included[0].sum())
         brute = {}
         for chosen in itertools.combinations([0, 1, 3, 4, 5], size - 1):
             kept = sorted([*chosen, 2])
             solved = np.linalg.lstsq(jacobian[:, kept], -target, rcond=None)[0]
             brute[tuple(kept)] = float(np.sum((target + jacobian[:, kept] @ solved) ** 2)), solved
         assert level.cost[0] == pytest.approx(min(cost for cost, _ in brute.values()), rel=1e-9)
-        for kept, cost, numbers in zip(level.kept, level.cost, level.x, strict=True):
+        for kept, cost, numbers in zip(level.included, level.cost, level.x, strict=True):
             expected, solved = brute[tuple(np.flatnonzero(kept).tolist())]
             assert cost == pytest.approx(expected, rel=1e-9)  # rounding, and a ridge of 1e-12
             assert numbers[kept] == pytest.approx(solved, rel=1e-6)  # the ridge, times the condition squared

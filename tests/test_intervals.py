@@ -139,7 +139,7 @@ def test_a_bootstrap_of_data_that_rounding_alone_disturbs_is_not_trusted():
         hs.identify(LAW, rounded, fixed={"n": 1.0, "z0": 0.0}, noise="quantised", intervals=kind)
         for kind in ("bootstrap", "profile")
     )
-    assert "ask for profiles" in drawn.message
+    assert 'use "profile"' in drawn.message
     assert "ask for profiles" not in profile.message
     for name in profile.free_names:
         lower, upper = profile.intervals[name]

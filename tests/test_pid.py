@@ -167,7 +167,7 @@ def test_a_pid_comes_back_from_its_file(pid, tmp_path):
         (lambda: hs.PID(kd="much"), TypeError, "kd must be a number, got 'much'"),
         (lambda: hs.PID(1.0), TypeError, "positional"),
         (lambda: hs.PID(kP=1.0), TypeError, "kP"),
-        (lambda: hs.PID(derivative_filter=-0.1), ValueError, "derivative_filter .* must not be negative, got -0.1"),
+        (lambda: hs.PID(derivative_filter=-0.1), ValueError, "derivative_filter must not be negative, got -0.1"),
         (lambda: hs.PID(tracking_time=-1.0), ValueError, "tracking_time must not be negative, got -1.0"),
         (lambda: hs.PID(tracking_time=math.nan), ValueError, "tracking_time must be finite, got nan"),
         (lambda: hs.PID(limits=(1.0, 0.0)), ValueError, r"\(lowest, highest\), got \(1.0, 0.0\)"),

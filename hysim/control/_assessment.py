@@ -1,8 +1,6 @@
-"""Figures of a closed loop beside those of the same plant in open loop, alike for every plant and controller.
+"""Figures of a closed loop beside those of the same plant in open loop, driven with reference / secant gain.
 
-The open loop drives the plant with reference / secant gain. Hysteresis loops are measured against the reference, over
-the last of several cycles; steps by the three figures of `hysim.metrics.vibration_reduction`, always together; square
-waves over their last period.
+Hysteresis loops and square waves are measured over their last cycle, steps by `hysim.metrics.vibration_reduction`.
 """
 
 import math
@@ -31,11 +29,11 @@ class OpenLoop:
     Parameters
     ----------
     t, reference : array
-        Times [s], and the reference [unit of y].
+        Times [s] and reference [unit of y].
     u, y : array
-        Voltage reference / secant gain [unit of u], and the true displacement just before each [unit of y].
+        Voltage reference / secant gain [unit of u], and true displacement just before it [unit of y].
     secant_gain, samples_per_cycle
-        Stroke over span of the last cycle [unit of y / unit of u], and length of a cycle of the reference.
+        Stroke over span of the last cycle [unit of y / unit of u], and length of a cycle.
     """
 
     t: FloatArray
@@ -50,49 +48,45 @@ class OpenLoop:
 
     @property
     def cycle(self) -> FloatArray:
-        """The reference's last cycle, both of its ends included."""
+        """Last cycle of the reference, both ends included."""
         return self.last(self.reference)
 
     @property
     def loop(self) -> LoopMetrics:
-        """The open loop's measures."""
         return self.loop_of(self.y)
 
     def last(self, signal: FloatArray) -> FloatArray:
-        """The last cycle of a signal, both of its ends included."""
         return signal[-self.samples_per_cycle - 1 :]
 
     def loop_of(self, y: FloatArray) -> LoopMetrics:
-        """Measures of a displacement against the reference, in the last cycle."""
+        """Measures of a displacement against the reference in the last cycle."""
         return loop_metrics(self.cycle, self.last(y))
 
     def reduction_percent(self, y: FloatArray) -> float:
-        """100 (1 - W closed / W open), W the largest width over the stroke [%]."""
+        """100 (1 - W closed / W open) [%], W the largest width over the stroke."""
         return reduction_percent(self.loop.relative_width, self.loop_of(y).relative_width)
 
 
 @printed
 @frozen
 class HysteresisAssessment:
-    """Figures of a triangle, followed in open and in closed loop.
+    """Figures of a triangle in open and in closed loop, over the last cycle.
 
     Parameters
     ----------
-    hysteresis_reduction_percent : float
-        100 (1 - W closed / W open), W the largest width over the stroke of the true displacement against the
-        reference, in the last cycle [%]; nan for a plant without a law.
-    lag_reduction_percent : float
-        The same of a plant without a law, whose loop is lag; nan with one.
+    hysteresis_reduction_percent, lag_reduction_percent : float
+        100 (1 - W closed / W open) [%], W the largest width over the stroke of the true displacement against the
+        reference. The first is nan for a plant without a law, whose loop is lag; the second is nan with one.
     open_width, closed_width : float
         Largest widths [unit of y].
     open_lag_width, lag_width : float
-        Those of the same loops with the law replaced by a line of its secant gain [unit of y].
+        The same with the law replaced by a line of its secant gain [unit of y].
     tracking_rms, closure_gap : float
-        Rms error of the closed loop over the last cycle, and displacement at its end minus at its start [unit of y].
+        Rms error, and displacement at the end minus at the start [unit of y].
     secant_gain : float
-        Of the open loop [unit of y / unit of u].
+        Secant gain of the open loop [unit of y / unit of u].
     open_u, open_y, closed
-        The open loop, shape (n,), and the closed one.
+        Signals of the open loop, shape (n,), and the closed loop.
     """
 
     hysteresis_reduction_percent: float
@@ -127,14 +121,14 @@ class HysteresisAssessment:
 @printed
 @frozen
 class StepAssessment:
-    """Figures of a step, in open and in closed loop.
+    """Figures of a step in open and in closed loop.
 
     Parameters
     ----------
     reduction : VibrationReduction
         The three figures, and the measures of both responses.
     open_y, closed
-        The open loop, shape (n,), whose voltage steps to its final value, and the closed one.
+        Displacement in open loop, shape (n,), where the voltage steps to its final value; and the closed loop.
     """
 
     reduction: VibrationReduction
@@ -156,12 +150,11 @@ class SquareWaveAssessment:
     open_tracking_rms, tracking_rms : float
         Rms errors over the last period [unit of y].
     open_peak_excess_percent, peak_excess_percent : float
-        How far the displacement leaves the reference's range, in the last period [% of the wave's height].
+        Largest displacement beyond the reference's range in the last period [% of the wave's height].
     reduction : VibrationReduction, or None
-        The step's figures over the last half period, if this is at least the open loop's t98 and five of its
-        periods long.
+        The step's figures over the last half period, if it lasts the open loop's t98 and five of its periods.
     open_y, closed
-        The open loop, shape (n,), and the closed one.
+        Displacement in open loop, shape (n,), and the closed loop.
     """
 
     open_tracking_rms: float
@@ -201,11 +194,11 @@ def assess_hysteresis(
     controller : PID, or anything with its ``compiled``
         Closes the loop.
     low, high : float
-        The triangle's extremes, which the plant must be able to reach [unit of y].
+        Extremes of the triangle, which the plant must be able to reach [unit of y].
     period, sample_time : float
-        Of the triangle, an even number of samples, and of the controller [s].
+        Period of the triangle, an even number of samples, and sample time of the controller [s].
     cycles : int
-        Number of cycles, of which the last is measured.
+        Number of cycles; the last one is measured.
 
     Returns
     -------
@@ -213,10 +206,8 @@ def assess_hysteresis(
 
     Raises
     ------
-    SimulationError
-        If a loop diverges.
-    ValueError
-        If a period is not a whole number of samples, or the plant has no gain.
+    SimulationError, ValueError
+        If a loop diverges; if a period is not a whole number of samples, or the plant has no gain.
 
     Examples
     --------
@@ -260,7 +251,7 @@ def open_loop(plant: Any, reference: npt.ArrayLike, sample_time: float, samples_
     reference : array, shape (n,)
         Whole cycles, and the sample at which the last one ends [unit of y].
     sample_time, samples_per_cycle
-        Of the reference [s].
+        Sample time [s] and length of a cycle.
 
     Returns
     -------
@@ -313,18 +304,18 @@ def assess_step(
     Parameters
     ----------
     plant, controller
-        As of `assess_hysteresis`; the plant rests at `u0`.
+        As in `assess_hysteresis`; the plant rests at `u0`.
     step : float
-        From the resting displacement [unit of y].
+        Height from the resting displacement [unit of y].
     duration, sample_time : float
-        Of the record, long enough for the open loop to come to rest, and of the controller [s].
+        Duration, long enough for the open loop to come to rest, and sample time of the controller [s].
     u0 : float
         Voltage before the first sample.
     hold : float
-        Time before the step for a controller with a wrong model to come to rest [s].
+        Time before the step, for a controller with a wrong model to come to rest [s].
     known_ahead : bool
-        Whether the reference is known ahead, so that a controller with preview moves before the step; the open loop
-        then steps in the reference's time. By default the controller is told when the open loop steps.
+        Whether the reference is known ahead, so that a controller with preview moves before the step. By default the
+        controller learns of the step when the open loop steps.
 
     Returns
     -------
@@ -370,11 +361,11 @@ def assess_square_wave(
     Parameters
     ----------
     plant, controller
-        As of `assess_hysteresis`.
+        As in `assess_hysteresis`.
     low, high : float
-        The wave's levels, the first half of each period at the low one [unit of y].
+        Levels of the wave; each period begins at the low one [unit of y].
     period, sample_time : float
-        Of the wave, an even number of samples, and of the controller [s].
+        Period of the wave, an even number of samples, and sample time of the controller [s].
     periods : int
         Number of periods, enough for the open loop to become periodic.
 
@@ -390,8 +381,7 @@ def assess_square_wave(
     Examples
     --------
     >>> import hysim as hs
-    >>> lag = hs.TransferFunction(num=(1.0,), den=(1.0, 1.0))
-    >>> pid = hs.PID(kp=9.0, ki=9.0)
+    >>> lag, pid = hs.TransferFunction(num=(1.0,), den=(1.0, 1.0)), hs.PID(kp=9.0, ki=9.0)
     >>> wave = dict(low=0.0, high=1.0, period=4.0, sample_time=0.01, periods=5)
     >>> result = hs.control.assess_square_wave(lag, pid, **wave)
     >>> result.tracking_rms < 0.5 * result.open_tracking_rms
@@ -425,7 +415,6 @@ def assess_square_wave(
 
 
 def _samples_in(what: str, duration: float, sample_time: float) -> int:
-    """Number of samples in a duration."""
     samples = round(duration / sample_time)
     if samples < 1 or abs(samples - duration / sample_time) > 1e-6 * samples:
         raise ValueError(f"{what} must be a whole number of samples, got {duration / sample_time:g}")
@@ -433,7 +422,6 @@ def _samples_in(what: str, duration: float, sample_time: float) -> int:
 
 
 def _least_damped(actuator: Actuator) -> complex:
-    """The pole of the least damped mode; nan, and an infinite frequency, without one."""
     poles = np.empty(0) if actuator.vibration is None else actuator.vibration.poles
     modes = poles[poles.imag > 0.0]
     return complex(modes[np.argmin(-modes.real / np.abs(modes))]) if modes.size else complex(math.nan, math.inf)

@@ -1,12 +1,11 @@
-"""The bandwidth of a loop, found by running it.
+"""Bandwidth of a loop, found by running it: law, limits and sampling included.
 
-A sine r = y0 + a sin(w t) about a resting displacement y0 is followed by the whole loop: law, limits, sampling and all.
-After its transient the true displacement is fitted by least squares as
+After its transient the response to a sine r = y0 + a sin(w t) is fitted by least squares as
 
     y = c + a Re(G) sin(w t) + a Im(G) cos(w t)
 
-G is the loop's describing function, its frequency response where the loop is linear. The bandwidth is the frequency at
-which |G| first leaves 1 / sqrt(2) to sqrt(2), 3 dB either way: frequencies are tried upwards, then halved between.
+G is the loop's describing function. The bandwidth is the lowest frequency at which |G| leaves 1 / sqrt(2) to sqrt(2)
+(3 dB): frequencies are tried upwards, then bisected.
 """
 
 import math
@@ -15,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from hysim._frozen import check_positive
 from hysim.control._loop import RestingPlant, as_actuator
 from hysim.control._protocols import Controller
 
@@ -44,28 +44,26 @@ def bandwidth(
     controller : PID, TrackingController, or anything with their ``compiled``
         Closes the loop.
     sample_time : float
-        Of the controller [s].
+        Sample time of the controller [s].
     amplitude : float
-        Of the sine about the resting displacement [unit of y].
+        Amplitude of the sine about the resting displacement [unit of y].
     lowest : float
         First frequency tried [rad/s].
     transient : float
-        Time after which the response is taken to be periodic [s].
+        Time after which the response is periodic [s].
     u0 : float
         Voltage before the first sample.
 
     Returns
     -------
     float
-        [rad/s]; zero if the loop does not follow at the lowest frequency, infinite if it follows up to the highest,
-        2.5 samples a period.
+        [rad/s]; zero if the loop does not follow at the lowest frequency, infinite if it follows up to 2.5 samples a
+        period.
 
     Raises
     ------
-    SimulationError
-        If the loop diverges.
-    ValueError
-        If the amplitude or the lowest frequency is not positive.
+    SimulationError, ValueError
+        If the loop diverges; if the amplitude or the lowest frequency is not positive.
 
     Examples
     --------
@@ -75,8 +73,7 @@ def bandwidth(
     >>> round(hs.control.bandwidth(lag, hs.PID(kp=9.0, ki=9.0), **sine), 1)  # 9 / s in open loop
     9.0
     """
-    if not (amplitude > 0.0 and lowest > 0.0):
-        raise ValueError(f"amplitude and lowest must be positive, got {amplitude} and {lowest}")
+    check_positive(amplitude=amplitude, lowest=lowest)
     actuator = as_actuator(plant)
     if actuator.sensor is not None:
         actuator = replace(actuator, sensor=replace(actuator.sensor, noise=0.0))
@@ -103,7 +100,6 @@ def bandwidth(
 def _describing(
     resting: RestingPlant, controller: Controller, frequency: float, amplitude: float, transient: float
 ) -> complex:
-    """G at a frequency."""
     h = resting.sample_time
     before = math.ceil(transient / h)
     fitted = max(_FEWEST, math.ceil(2.0 * math.pi * _PERIODS / (frequency * h)))

@@ -29,17 +29,16 @@ class FeedforwardBlock(NamedTuple):
 
 @family
 class InverseFeedforward(SampledController):
-    """The command that takes a model of an actuator to a wanted displacement, sample by sample.
+    """Command that takes a model of an actuator to a wanted displacement, one sample later.
 
-    It closes a loop by itself, or as a part of a `TrackingController`. The displacement is reached one sample later.
+    It closes a loop by itself, or as a part of a `TrackingController`.
 
     Parameters
     ----------
     law : law, optional
-        The hysteresis to invert, any law with an inverse, sums and cascades among them; by default none, a line of
-        slope one.
+        Any law with an inverse, sums and cascades among them; by default a line of slope one.
     creep : Creep, optional
-        The creep to invert: at the end of each sample it and the law together are where they are wanted.
+        Creep to invert: creep and law together meet the wanted displacement at the end of each sample.
     amplifier : Amplifier, optional
         Its gain and offset are inverted, its limits are kept.
 
@@ -80,7 +79,7 @@ class InverseFeedforward(SampledController):
 
     @classmethod
     def of(cls, plant: Actuator) -> Self:
-        """The inverse of an actuator's amplifier, law and creep; it raises as the constructor does."""
+        """Inverse of an actuator's amplifier, law and creep; it raises as the constructor does."""
         return cls(law=plant.hysteresis, creep=plant.creep, amplifier=plant.amplifier)
 
     def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
@@ -92,7 +91,6 @@ class InverseFeedforward(SampledController):
         return Feedback(np.zeros((0, 0)), np.zeros(0), np.zeros(0), 0.0)
 
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
-        """The controller as compiled loops take it, at rest at the command `u0`."""
         inverse, parameters, state = self.block(sample_time, u0)
         step = with_inverse(kernels.invert, inverse)
         return CompiledController(step, read_only(parameters, finite=False), np.append(u0, state))
@@ -100,7 +98,7 @@ class InverseFeedforward(SampledController):
     def block(
         self, sample_time: float, u0: float, commands: tuple[float, float] = (-math.inf, math.inf)
     ) -> FeedforwardBlock:
-        """The compiled inverse, at rest at the command `u0`, for commands within these limits."""
+        """Compiled inverse at rest at the command `u0`, for commands within these limits."""
         amplifier, law = self.amplifier or Amplifier(), Line(slope=1.0) if self.law is None else self.law
         lowest, highest = sorted(amplifier.voltage(commands).tolist())
         inverse = inverse_step(law, float(amplifier.voltage(u0)), (lowest, highest), sample_time)

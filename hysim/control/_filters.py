@@ -6,28 +6,50 @@
 
 Each is discretised by s = w / tan(w h / 2) (z - 1) / (z + 1), which keeps its response at the frequency w.
 
-Sources: A. J. Fleming, S. S. Aphale and S. O. R. Moheimani, IEEE Trans. Nanotechnology 9 (2010), for the first
-damping loop in this equivalent form; J. L. Fanson and T. K. Caughey, AIAA Journal 28 (1990), for the second.
+Sources: A. J. Fleming, S. S. Aphale and S. O. R. Moheimani, IEEE Trans. Nanotechnology 9 (2010); J. L. Fanson and
+T. K. Caughey, AIAA Journal 28 (1990).
 """
 
 import math
+from abc import ABC, abstractmethod
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, check_not_negative, check_positive
 from hysim.control._sampled import Feedback
 from hysim.models.model import family
 
 
+class _Filter(ABC):
+    """(b0 + b1 / z + b2 / z^2) / (1 + a1 / z + a2 / z^2)."""
+
+    @abstractmethod
+    def coefficients(self, sample_time: float) -> FloatArray:
+        """Coefficients (b0, b1, b2, a1, a2) of the discrete form."""
+
+    def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
+        """Response of the discrete form at frequencies [rad/s], in their shape."""
+        back = np.exp(-1j * np.asarray(frequency, dtype=float) * sample_time)
+        b0, b1, b2, a1, a2 = self.coefficients(sample_time)
+        return np.asarray((b0 + (b1 + b2 * back) * back) / (1.0 + (a1 + a2 * back) * back))
+
+    def linear(self, sample_time: float) -> Feedback:
+        """The filter as a system with two states."""
+        b0, b1, b2, a1, a2 = self.coefficients(sample_time)
+        return Feedback(
+            np.array([[-a1, 1.0], [-a2, 0.0]]), np.array([b1 - a1 * b0, b2 - a2 * b0]), np.array([1.0, 0.0]), float(b0)
+        )
+
+
 @family
-class Notch:
+class Notch(_Filter):
     """Filter that cancels a resonance in the feedback's command.
 
     Parameters
     ----------
     natural_frequency, damping_ratio : float
-        Of the resonance, on whose poles the filter's zeros lie: positive [rad/s], and not negative.
+        Resonance, on whose poles the filter's zeros lie: positive [rad/s], and not negative.
     new_damping_ratio : float
         Damping ratio of the filter's poles, positive.
 
@@ -49,31 +71,22 @@ class Notch:
     new_damping_ratio: float = 1.0
 
     def __post_init__(self) -> None:
-        if not self.natural_frequency > 0.0:
-            raise ValueError(f"natural_frequency must be positive, got {self.natural_frequency}")
-        if self.damping_ratio < 0.0:
-            raise ValueError(f"damping_ratio must not be negative, got {self.damping_ratio}")
-        if not self.new_damping_ratio > 0.0:
-            raise ValueError(f"new_damping_ratio must be positive, got {self.new_damping_ratio}")
+        check_positive(natural_frequency=self.natural_frequency, new_damping_ratio=self.new_damping_ratio)
+        check_not_negative(damping_ratio=self.damping_ratio)
 
     def coefficients(self, sample_time: float) -> FloatArray:
-        """Coefficients (b0, b1, b2, a1, a2) of the discrete form."""
         w = self.natural_frequency
         numerator, denominator = (
             (w**2, 2.0 * ratio * w, 1.0) for ratio in (self.damping_ratio, self.new_damping_ratio)
         )
         return _discrete(numerator, denominator, w, sample_time)
 
-    def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
-        """Response of the discrete form at frequencies [rad/s], in their shape."""
-        return biquad_response(self.coefficients(sample_time), frequency, sample_time)
-
 
 @family
-class DampingLoop:
+class DampingLoop(_Filter):
     """Positive feedback of the displacement through a low-pass filter, which damps a resonance.
 
-    It acts on the measurement minus the wanted displacement, so that it is silent where nothing vibrates.
+    It acts on the measurement minus the wanted displacement: without vibration its output is zero.
 
     Parameters
     ----------
@@ -82,7 +95,7 @@ class DampingLoop:
     frequency : float
         Corner of the filter, positive [rad/s].
     damping_ratio : float, optional
-        Of a filter of second order (positive position feedback), positive; None for first order (integral resonant
+        Positive, for a filter of second order (positive position feedback); None for first order (integral resonant
         control).
 
     Raises
@@ -104,45 +117,19 @@ class DampingLoop:
     damping_ratio: float | None = None
 
     def __post_init__(self) -> None:
-        if not self.frequency > 0.0:
-            raise ValueError(f"frequency must be positive, got {self.frequency}")
-        if self.damping_ratio is not None and not self.damping_ratio > 0.0:
-            raise ValueError(f"damping_ratio must be positive, got {self.damping_ratio}")
+        check_positive(frequency=self.frequency, damping_ratio=self.damping_ratio)
 
     def coefficients(self, sample_time: float) -> FloatArray:
-        """Coefficients (b0, b1, b2, a1, a2) of the discrete form."""
         w = self.frequency
         if self.damping_ratio is None:
             return _discrete((self.gain * w, 0.0, 0.0), (w, 1.0, 0.0), w, sample_time)
         numerator, denominator = (self.gain * w**2, 0.0, 0.0), (w**2, 2.0 * self.damping_ratio * w, 1.0)
         return _discrete(numerator, denominator, w, sample_time)
 
-    def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
-        """Response of the discrete form at frequencies [rad/s], in their shape."""
-        return biquad_response(self.coefficients(sample_time), frequency, sample_time)
-
-
-def biquad_response(
-    coefficients: FloatArray, frequency: npt.ArrayLike, sample_time: float
-) -> npt.NDArray[np.complex128]:
-    """(b0 + b1 / z + b2 / z^2) / (1 + a1 / z + a2 / z^2) on the unit circle."""
-    back = np.exp(-1j * np.asarray(frequency, dtype=float) * sample_time)
-    b0, b1, b2, a1, a2 = coefficients
-    return np.asarray((b0 + (b1 + b2 * back) * back) / (1.0 + (a1 + a2 * back) * back))
-
-
-def biquad(coefficients: FloatArray) -> Feedback:
-    """The filter with its two states."""
-    b0, b1, b2, a1, a2 = coefficients
-    return Feedback(
-        np.array([[-a1, 1.0], [-a2, 0.0]]), np.array([b1 - a1 * b0, b2 - a2 * b0]), np.array([1.0, 0.0]), float(b0)
-    )
-
 
 def _discrete(
     numerator: tuple[float, ...], denominator: tuple[float, ...], frequency: float, sample_time: float
 ) -> FloatArray:
-    """Coefficients of a filter of first or second order from ascending powers of s."""
     if not frequency * sample_time < math.pi:
         raise ValueError(
             f"a filter's frequency must be below pi / sample_time, {math.pi / sample_time:g} rad/s, got {frequency:g}"

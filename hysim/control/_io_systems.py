@@ -2,12 +2,9 @@
 
     x[k+1] = f(x[k], u[k]),    y[k] = g(x[k])
 
-A discrete plant is one sample of hysim's own loop: x is the state that is carried from sample to sample, with the
-memory, and y the measurement just before the new command u[k], so that no command reaches the output of its own sample.
-A controller is its own step, whose command answers to the inputs at once. Both are functions of their arguments alone,
-which python-control may evaluate in any order.
-
-Every state is counted from rest: x = 0, from which python-control starts, is the system at rest at u = 0.
+A discrete plant is one sample of hysim's own loop: x is the state carried from sample to sample, and y the measurement
+just before the new command u[k], so that no command reaches the output of its own sample. A controller's command
+answers to the inputs at once. Both are functions of their arguments alone, and states are counted from rest at u = 0.
 """
 
 import math
@@ -19,24 +16,22 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.control._feedforward import InverseFeedforward
-from hysim.control._protocols import Remembering
 from hysim.control._tracking import TrackingController
 from hysim.errors import SimulationError
 from hysim.kernels import boucwen_inverse
 from hysim.kernels.charts import N_WORK
-from hysim.laws.differential.boucwen_inverse import BoucWenInverse
-from hysim.models.protocols import CompiledController
-from hysim.plants.actuator import Actuator
-from hysim.plants.chain import Chain, ChainState
-from hysim.plants.oscillator import BoucWenOscillator, OscillatorState
-from hysim.plants.sensor import Sensor
+from hysim.models.actuator import Actuator
+from hysim.models.boucwen_inverse import BoucWenInverse
+from hysim.models.chain import Chain, ChainState
+from hysim.models.oscillator import BoucWenOscillator, OscillatorState
+from hysim.models.protocols import CompiledController, Continuable, Remembering
+from hysim.models.sensor import Sensor
 
 Rule = Callable[[float, FloatArray, FloatArray, Any], FloatArray]
 """A function of python-control: time, state, input and parameters to the state's change or to the output."""
 
 
 def actuator_system(actuator: Actuator, sample_time: float) -> Any:
-    """The actuator with its limits and its sensor, the noise left out."""
     if isinstance(actuator.hysteresis, BoucWenInverse):
         raise TypeError("the inverse of a law is part of a controller: give it as InverseFeedforward(law=...)")
     sensor = replace(actuator.sensor or Sensor(), noise=0.0)
@@ -63,10 +58,10 @@ def actuator_system(actuator: Actuator, sample_time: float) -> Any:
 
 
 def oscillator_system(plant: BoucWenOscillator, sample_time: float | None) -> Any:
-    """The oscillator as its differential equations, or from sample to sample, its input held between them."""
+    """Oscillator as its differential equations, or from sample to sample with its input held."""
     start: FloatArray = np.array([*(plant.initial_state or (0.0, 0.0)), plant.law.z0])
     step = sample_time or 0.0
-    law, elastic_force, held = plant.law, plant.elastic_force, replace(plant, hold="zoh")
+    law, elastic_force, sampled_plant = plant.law, plant.elastic_force, replace(plant, hold="zoh")
     weight = 1.0 if plant.excitation == "force" else -plant.mass
 
     def slope(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:
@@ -76,7 +71,7 @@ def oscillator_system(plant: BoucWenOscillator, sample_time: float | None) -> An
         return np.array([velocity, force / plant.mass, law.A * velocity - abs(z) ** law.n * against])
 
     def update(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:
-        _, end = held.advance(u, step, OscillatorState(float(u[0]), *(x + start).tolist()))
+        _, end = sampled_plant.advance(u, step, OscillatorState(float(u[0]), *(x + start).tolist()))
         return np.array([end.y, end.velocity, end.z]) - start
 
     def output(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:
@@ -87,7 +82,6 @@ def oscillator_system(plant: BoucWenOscillator, sample_time: float | None) -> An
 
 
 def controller_system(controller: Any, sample_time: float) -> Any:
-    """The controller from reference and measurement to the command, within its limits."""
     compiled = CompiledController(*controller.compiled(sample_time, 0.0, 0.0))
     at_rest = compiled.state
     carried = np.isfinite(at_rest)  # other places are written before they are read
@@ -120,7 +114,6 @@ def _parts(state: ChainState) -> list[FloatArray]:
 
 
 def _with_parts(state: ChainState, values: FloatArray) -> ChainState:
-    """The state with the values of its parts, one behind the other."""
     ends = np.cumsum([part.size for part in _parts(state)])
     voltages, memory, x, past, readings = np.split(values, ends[:-1])
     return state._replace(voltages=voltages, law=state.law._replace(state=memory), x=x, past=past, readings=readings)
@@ -140,8 +133,9 @@ def _names(chain: Chain, state: ChainState) -> list[str]:
 
 
 def _memory_names(law: Any, state: FloatArray) -> list[str]:
-    """Names of a law's state; of a law with a memory z it begins the compiled state, and the rest is scratch."""
-    size = len(law.advance(state[:1])[1]) if isinstance(law, Remembering) else state.size
+    """Names of a law's state; a memory z begins the compiled state, and the rest is scratch."""
+    remembers = isinstance(law, Remembering) and isinstance(law, Continuable)
+    size = len(law.advance(state[:1])[1]) if remembers else state.size
     others = ["z"] if size == 2 else [f"z[{i}]" for i in range(size - 1)]
     return ["v", *others][:size]
 

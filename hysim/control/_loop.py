@@ -11,14 +11,12 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, frozen, read_only
 from hysim._parallel import Progress
 from hysim._printing import extent, printed, quantity, summary_text
-from hysim.control._protocols import Controller, Remembering, Responding, limits_of, preview
+from hysim.control._protocols import Controller, limits_of, preview
 from hysim.errors import SimulationError
 from hysim.models.model import in_brief
-from hysim.models.protocols import CompiledController
-from hysim.plants.actuator import Actuator, is_law
-from hysim.plants.chain import Signals
-from hysim.plants.sampled import Vibration
-from hysim.plants.state_space import linear_plant
+from hysim.models.protocols import CompiledController, Remembering, Responding
+from hysim.models.sampled import Vibration
+from hysim.models.state_space import linear_plant
 from hysim.records import even_step
 
 
@@ -34,18 +32,18 @@ class ClosedLoop:
     reference, error : array
         Reference, and reference minus measurement [unit of y].
     command, drive : array
-        Command of the controller before and after its limits, held from each sample on [unit of u].
+        Command before and after the controller's limits, held until the next sample [unit of u].
     u : array
         Voltage at the law just after each new command, within the amplifier's limits [unit of u].
     z : array, or None
-        Memory of the law at each sample, before the new command; None for a law without one.
+        Memory of the law just before each new command; None for a law without one.
     y, measurement : array
-        True displacement at each sample, before the new command, and its measurement [unit of y].
+        True displacement just before each new command, and its measurement [unit of y].
     conditions : mapping
         plant, controller, sample_time [s], substeps, delay (of vibration and sensor) [s], preview [s], limits (of the
-        controller), amplifier_limits, sensor_quantum, noise (rms), seed, u0, lowest_u, highest_u, limited_samples (at
-        which controller or amplifier are at a limit), voltage_noise_rms and voltage_noise_peak (of the difference to
-        the same loop without noise).
+        controller), amplifier_limits, sensor_quantum, noise (rms), seed, u0, lowest_u, highest_u, limited_samples (at a
+        limit of controller or amplifier), voltage_noise_rms and voltage_noise_peak (difference to the same loop without
+        noise).
     units : mapping
         Labels of the units of ``"t"``, ``"u"`` and ``"y"``.
     """
@@ -97,16 +95,15 @@ def close_loop(
     """Run a sampled controller around an actuator.
 
     At every sample the controller reads the sensor and sends a command, which is held until the next. The plant
-    between the samples is exact, unless its amplifier takes time: then it is second order in the sub-step. A
-    controller that needs a sample to compute is modelled by ``hs.Sensor(delay=sample_time)``.
+    between the samples is exact; behind an amplifier that takes time it is second order in the sub-step. Model a
+    controller that needs a sample to compute by ``hs.Sensor(delay=sample_time)``.
 
     Parameters
     ----------
     plant : Actuator, law or linear plant
         At rest at `u0` before the first sample, creep included.
     controller : PID, TrackingController, InverseFeedforward, or anything with their ``compiled``
-        At rest too. A controller with a method ``ahead`` gets the reference so many samples ahead of its time, and
-        after the end of the record its last value.
+        At rest too. With a method ``ahead`` it gets the reference so many samples ahead, and at the end its last value.
     t : array, shape (n,)
         Evenly spaced times [s]; their spacing is the controller's sample time.
     reference : array, shape (n,)
@@ -176,13 +173,7 @@ class RestingPlant:
     def run(
         self, controller: Controller, reference: FloatArray, progress: Progress | None = None, begin: float = 0.0
     ) -> Signals:
-        """Signals of the loop that a controller closes, from the time `begin` [s].
-
-        Raises
-        ------
-        SimulationError
-            If the loop diverges.
-        """
+        """Signals of the loop that a controller closes from the time `begin` [s]; a SimulationError if it diverges."""
         signals = self.attempt(controller, reference, progress)
         if signals.lost >= 0:
             time = begin + signals.lost * self.sample_time
@@ -197,7 +188,6 @@ class RestingPlant:
         return self.chain.run(compiled, self.state, ahead, progress)[0]
 
     def voltages(self, signals: Signals) -> FloatArray:
-        """Voltage at the law just after each new command."""
         return self.chain.just_after(float(self.state.voltages[1]), signals.v)
 
     def memory(self, signals: Signals) -> FloatArray | None:
@@ -205,15 +195,13 @@ class RestingPlant:
         law = self.chain.hysteresis
         if not isinstance(law, Remembering):
             return None
-        return np.asarray(law.memory(np.append(self.state.voltages[1], signals.v))[: -1 : self.chain.substeps])
+        return law.memory(np.append(self.state.voltages[1], signals.v))[: -1 : self.chain.substeps]
 
     def driven(self, u: FloatArray) -> FloatArray:
-        """Displacements just before each of the commands `u`, as a loop would measure them."""
         return self.chain.driven(u, self.state)[0].y
 
 
 def sample_time_of(t: FloatArray, reference: FloatArray) -> float:
-    """Spacing of the times [s] of a reference; a ValueError if they do not fit."""
     if t.size != reference.size:
         raise ValueError(f"reference and t must have equal lengths, got {reference.size} and {t.size}")
     return even_step(t)
@@ -270,7 +258,6 @@ def _conditions(
 def _voltage_noise(
     actuator: Actuator, controller: Controller, plant: RestingPlant, reference: FloatArray, u: FloatArray
 ) -> dict[str, float]:
-    """Difference of the voltage to that of the loop without the sensor's noise; nan where that one diverges."""
     if actuator.sensor is None or not actuator.sensor.noise:
         return {"voltage_noise_rms": 0.0, "voltage_noise_peak": 0.0}
     quiet = replace(actuator, sensor=replace(actuator.sensor, noise=0.0))

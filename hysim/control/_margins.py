@@ -1,15 +1,14 @@
 """Distance of a sampled linear loop from instability, and voltage noise that its sensor causes.
 
-L is the loop's frequency response: the plant behind the hold, times the controller. Its distance from -1 is one over
-the maximum sensitivity max |1 / (1 + L)|. This holds for stable loops only: the poles of
+L is the loop's frequency response, the plant behind the hold times the controller. Its distance from -1 is one over
+the maximum sensitivity max |1 / (1 + L)|, for stable loops only: the poles of
 
     x' = A x + B v,        v = C_c q + D_c (y + noise),    y = C x
     q' = A_c q + B_c (y + noise)
 
-must lie inside the unit circle (x' and q' the states of plant and controller one sample later). Near a lightly damped
-pole exp(-d + i a) of the plant, L changes over the half width d of its resonance, and near one of the loop 1 / (1 + L)
-does. So both are evaluated around the angles a, in units of d, and the largest peaks once more between the neighbours.
-White noise of unit rms gives the command the variance
+must lie inside the unit circle (x' and q' the states one sample later). Near a lightly damped pole exp(-d + i a) L
+changes over its half width d, so that both are evaluated around the angles a in units of d, and the largest peaks once
+more between the neighbours. White noise of unit rms gives the command the variance
 
     D_c^2 + K X K^T,       X = G G^T + M G G^T M^T + M^2 G G^T M^2^T + ...
 
@@ -50,7 +49,7 @@ _FORGOTTEN = 1e-9
 
 
 class _Loop(NamedTuple):
-    """The loop's states one sample later, and the command: M x + G noise, K x + through noise."""
+    """States one sample later, and command: M x + G noise, K x + through noise."""
 
     M: FloatArray
     G: FloatArray
@@ -66,7 +65,7 @@ class LinearLoop:
     plant : Actuator, law or linear plant
         Its linear part counts.
     sample_time : float
-        Of the controller [s].
+        Sample time of the controller [s].
     frequencies : array, optional
         Where L is evaluated, increasing [rad/s]; by default 300, log-spaced up to pi / sample time, and more around
         each resonance of the plant.
@@ -93,7 +92,7 @@ class LinearLoop:
 
     def max_sensitivity(self, controller: SampledController, slope: float = 1.0) -> float:
         """Largest ``|1 / (1 + L)|`` with a law of this slope, within 0.1 %; infinite if the loop is unstable."""
-        poles = np.linalg.eigvals(self._loop(controller, slope).M)
+        poles = self._poles(controller, slope)
         if not np.abs(poles).max() < 1.0:
             return math.inf
         own = _around(_light(poles), _LOOPS_POLES) / self.sample_time
@@ -104,7 +103,7 @@ class LinearLoop:
 
     def is_stable(self, controller: SampledController, slope: float = 1.0) -> bool:
         """Whether all poles of the loop with a law of this slope lie inside the unit circle."""
-        return bool(np.abs(np.linalg.eigvals(self._loop(controller, slope).M)).max() < 1.0)
+        return bool(np.abs(self._poles(controller, slope)).max() < 1.0)
 
     def margins(self, controller: SampledController, slope: float = 1.0) -> tuple[float, float]:
         """Gain and phase margin [degrees] with a law of this slope, by python-control, and at z = -1."""
@@ -117,13 +116,16 @@ class LinearLoop:
 
     def noise_gain(self, controller: SampledController, slope: float = 1.0) -> float:
         """Rms of the command for white noise of rms one in the measurement; infinite if the loop is unstable."""
-        loop = self._loop(controller, slope)
-        if not np.abs(np.linalg.eigvals(loop.M)).max() < 1.0:
+        if not self.is_stable(controller, slope):
             return math.inf
+        loop = self._loop(controller, slope)
         power, states = loop.M, np.outer(loop.G, loop.G)
         while np.abs(power).max() > _FORGOTTEN:
             states, power = states + power @ states @ power.T, power @ power
         return math.sqrt(loop.through**2 + max(0.0, float(loop.K @ states @ loop.K)))
+
+    def _poles(self, controller: SampledController, slope: float) -> npt.NDArray[np.complex128]:
+        return np.asarray(np.linalg.eigvals(self._loop(controller, slope).M))
 
     def _default(self) -> FloatArray:
         highest = math.pi / self.sample_time
@@ -144,7 +146,7 @@ class LinearLoop:
     def _highest(
         self, frequencies: FloatArray, values: FloatArray, controller: SampledController, slope: float
     ) -> float:
-        """The largest value, refined between the neighbours of all peaks that are nearly as high."""
+        """Largest value, refined between the neighbours of all peaks that are nearly as high."""
         before, after = np.append(0.0, values[:-1]), np.append(values[1:], 0.0)
         highest = float(values.max())
         peaks = np.flatnonzero((values > before) & (values >= after) & (values >= _HIGH * highest))
@@ -173,13 +175,12 @@ def _sensitivity(loop: npt.NDArray[np.complex128]) -> FloatArray:
 
 
 def _light(poles: npt.NDArray[Any]) -> npt.NDArray[np.complex128]:
-    """The lightly damped poles of the upper half plane as half width + i angle."""
+    """Lightly damped poles of the upper half plane as half width + i angle."""
     logs = np.log(poles[poles.imag > 0.0].astype(complex))
     places = np.abs(logs.real) + 1j * logs.imag
     return np.asarray(places[places.real < _LIGHT * places.imag])
 
 
 def _around(resonances: npt.NDArray[np.complex128], places: FloatArray) -> FloatArray:
-    """Angles around those of some resonances, above zero and up to pi."""
     angles = (resonances.imag[:, np.newaxis] + resonances.real[:, np.newaxis] * places).ravel()
     return np.asarray(angles[(angles > 0.0) & (angles <= math.pi)])

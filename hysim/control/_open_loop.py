@@ -1,8 +1,8 @@
 """The open loop that a closed one is compared with: the voltage reference / secant gain.
 
-The secant gain of a steady cycle is its stroke over its voltage's span. It depends on the span itself, so that it
-is a fixed point: the gain g at which the cycle driven by ``cycle / g`` has the gain f(g) = g. It is found by the
-secant rule in the logarithms, which keeps the sign, and by g <- f where f is no contraction.
+The secant gain of a steady cycle is its stroke over its voltage's span, which depends on the span: the gain g at which
+the cycle driven by ``cycle / g`` has the gain f(g) = g. It is found by the secant rule in the logarithms, and by
+g <- f where f is no contraction.
 """
 
 import math
@@ -27,14 +27,9 @@ def secant_gain(
 ) -> float:
     """Stroke over span of the steady cycle that the voltage ``cycle / secant gain`` drives.
 
-    `cycle` is one period of a reference that starts where it ends. Without a sample time the cycle is
-    quasi-static: the law's, times the vibration's DC gain. With a number of periods the last of them stands for the
-    steady cycle, which creep approaches too slowly.
-
-    Raises
-    ------
-    ValueError
-        If the plant has no gain to divide by, or there is no such voltage.
+    `cycle` is one period of a reference. Without a sample time it is quasi-static: the law's, times the vibration's DC
+    gain. With a number of periods the last of them stands for the steady cycle, which creep approaches slowly. A
+    ValueError if the plant has no gain, or there is no such voltage.
     """
     span = float(np.ptp(cycle))
     if actuator.hysteresis is None and sample_time is None:
@@ -50,7 +45,9 @@ def secant_gain(
         now = gain, next_gain
         gain, before = next_gain if before is None else _secant(before, now), now
     if change > _ACCEPTED:
-        raise ValueError(f"no voltage drives the plant along the reference: its secant gain wanders about {gain:g}")
+        raise ValueError(
+            f"no voltage drives the plant along the reference: its secant gain does not converge at {gain:g}"
+        )
     return next_gain
 
 
@@ -70,7 +67,7 @@ def steady_cycle(
 
 
 def without_memory(actuator: Actuator, u: FloatArray) -> Actuator:
-    """The actuator with its law replaced by a line of its secant gain over the steady cycle of `u`."""
+    """Actuator with its law replaced by a line of its secant gain over the steady cycle of `u`."""
     if actuator.hysteresis is None:
         return actuator
     voltage, level = actuator.voltage(u), _steady_level(actuator, u)
@@ -81,7 +78,7 @@ def without_memory(actuator: Actuator, u: FloatArray) -> Actuator:
 
 
 def slopes(actuator: Actuator, u: FloatArray) -> tuple[float, float]:
-    """The least and the largest slope of the law along the steady cycle of `u`; one without a law."""
+    """Least and largest slope of the law along the steady cycle of `u`; one without a law."""
     if actuator.hysteresis is None:
         return 1.0, 1.0
     voltage, level = actuator.voltage(u), _steady_level(actuator, u)
@@ -97,12 +94,10 @@ def _driven(actuator: Actuator, u: FloatArray, sample_time: float | None) -> Flo
 
 
 def _steady_level(actuator: Actuator, u: FloatArray) -> FloatArray:
-    """The law's output over a period of the command `u`, once it repeats and where nothing takes time."""
     return steady_cycle(Actuator(hysteresis=actuator.hysteresis), actuator.voltage(u), None)
 
 
 def _first_slope(actuator: Actuator) -> float:
-    """Secant slope of the law from 0 to 1; one without a law."""
     low, high = replace(actuator, amplifier=None).level(np.array([0.0, 1.0]))
     return float(high - low)
 
@@ -117,5 +112,5 @@ def _secant(before: tuple[float, float], now: tuple[float, float]) -> float:
 
 def _usable(gain: float) -> float:
     if not (math.isfinite(gain) and gain != 0.0):
-        raise ValueError(f"the plant's gain is {gain}: there is no voltage that would drive it along the reference")
+        raise ValueError(f"the plant's gain is {gain}: no voltage drives it along the reference")
     return gain

@@ -1,11 +1,9 @@
-"""PID with two degrees of freedom, as it runs on a sampled controller.
-
-In continuous time, with the error e = r - y:
+"""PID with two degrees of freedom; in continuous time, with the error e = r - y,
 
     u = kp (b r - y) + ki integral e dt + kd d/dt (c r - y) / (1 + T_f s),    within the limits
 
 The paper's standard form (17), u = Kp (e + 1/Ti integral e dt + Td de/dt), is kp = Kp, ki = Kp / Ti,
-kd = Kp Td, with b = c = 1 and T_f = 0. How it is sampled is written in `hysim.kernels.controllers`.
+kd = Kp Td, with b = c = 1 and T_f = 0. `hysim.kernels.controllers` has the sampled form.
 """
 
 import math
@@ -14,7 +12,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
+from hysim._frozen import FloatArray, check_not_negative, read_only
 from hysim.control._sampled import Feedback, SampledController, check_limits, check_sample_time
 from hysim.kernels import controllers as kernels
 from hysim.models.model import family
@@ -32,7 +30,7 @@ class PID(SampledController):
     ----------
     kp, ki, kd : float
         Gains: proportional [unit of u / unit of y], integral [unit of u / (unit of y s)] and derivative
-        [unit of u s / unit of y].
+        [unit of u s / unit of y], of the sign of the plant's gain.
     derivative_filter : float
         Time constant T_f of the derivative's first-order filter [s]; 0 for none.
     limits : (float, float), optional
@@ -43,18 +41,13 @@ class PID(SampledController):
     setpoint_weight : float
         b, the weight of the reference in the proportional action.
     derivative_weight : float
-        c, the weight of the reference in the derivative: 0 differentiates the measurement alone, so that a step of
-        the reference gives no kick; 1 differentiates the error.
+        c, the weight of the reference in the derivative: 0 avoids a kick at a step of the reference, 1 differentiates
+        the error.
 
     Raises
     ------
     ValueError
         If a number is not finite, a time is negative, or the limits are not an interval.
-
-    Notes
-    -----
-    The gains have the sign of the plant's gain. `advance` and loops start without a bump: as if the controller had
-    always held the resting voltage at the resting displacement.
 
     Examples
     --------
@@ -73,10 +66,7 @@ class PID(SampledController):
     derivative_weight: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.derivative_filter < 0.0:
-            raise ValueError(f"derivative_filter is a time and must not be negative, got {self.derivative_filter}")
-        if self.tracking_time is not None and self.tracking_time < 0.0:
-            raise ValueError(f"tracking_time must not be negative, got {self.tracking_time}")
+        check_not_negative(derivative_filter=self.derivative_filter, tracking_time=self.tracking_time)
         check_limits(self.limits)
 
     @classmethod
@@ -92,16 +82,25 @@ class PID(SampledController):
         setpoint_weight: float = 1.0,
         derivative_weight: float = 0.0,
     ) -> Self:
-        """The PID in its standard form, u = Kp (e + 1/Ti integral e dt + Td de/dt).
+        """PID in its standard form, u = Kp (e + 1/Ti integral e dt + Td de/dt).
 
         Parameters
         ----------
         Kp : float
             Gain [unit of u / unit of y].
         Ti, Td : float
-            Integral time, infinite for none, and derivative time [s].
+            Integral time, positive and infinite for none, and derivative time [s].
         derivative_filter, limits, tracking_time, setpoint_weight, derivative_weight
-            As in the constructor, which lists what raises a ValueError; here Ti must be positive too.
+            As in the constructor.
+
+        Returns
+        -------
+        PID
+
+        Raises
+        ------
+        ValueError
+            If Ti is not positive, or as the constructor.
         """
         if not Ti > 0.0:
             raise ValueError(f"Ti must be positive, got {Ti}: an infinite one leaves the integral out")
@@ -117,7 +116,7 @@ class PID(SampledController):
         )
 
     def start(self, u: float = 0.0, y: float = 0.0) -> State:
-        """The state at rest at the voltage `u` and the displacement `y`."""
+        """State at rest at the voltage `u` and the displacement `y`."""
         return u, u - self.kp * (self.setpoint_weight - 1.0) * y, 0.0, (self.derivative_weight - 1.0) * y
 
     def advance(
@@ -137,7 +136,7 @@ class PID(SampledController):
         Returns
         -------
         u : array, shape (n,)
-            Commands within the limits [V].
+            Commands within the limits [unit of u].
         state : tuple
             To continue from.
 
@@ -167,10 +166,7 @@ class PID(SampledController):
         return u, (last, integral, derivative, weighted)
 
     def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
-        """Response from the negative measurement to the command at frequencies [rad/s], limits apart.
-
-        The frequencies must not be zero where there is an integral; the result has their shape.
-        """
+        """Response from the negative measurement to the command at frequencies [rad/s], not zero with an integral."""
         z = np.exp(1j * np.asarray(frequency, dtype=float) * sample_time)
         lag = self.derivative_filter + sample_time
         derivative = self.kd / lag * (z - 1.0) / (z - self.derivative_filter / lag)
@@ -180,16 +176,15 @@ class PID(SampledController):
     def linear(self, sample_time: float) -> Feedback:
         """Linear system from the measurement to the command; the states are I, D and the last measurement."""
         lag, integrates = self.derivative_filter + sample_time, 1.0 if self.ki else 0.0
-        rate, kept = self.kd / lag, self.derivative_filter / lag
+        rate, decay = self.kd / lag, self.derivative_filter / lag
         return Feedback(
-            np.array([[integrates, 0.0, 0.0], [0.0, kept, rate], [0.0, 0.0, 0.0]]),
+            np.array([[integrates, 0.0, 0.0], [0.0, decay, rate], [0.0, 0.0, 0.0]]),
             np.array([-self.ki * sample_time, -rate, 1.0]),
-            np.array([integrates, kept, rate]),
+            np.array([integrates, decay, rate]),
             -(self.kp + rate),
         )
 
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
-        """The controller as compiled loops take it, at rest at `u0` and `y0`."""
         check_sample_time(sample_time)
         lowest, highest = self.limits or (-math.inf, math.inf)
         lag = self.derivative_filter + sample_time
@@ -200,7 +195,6 @@ class PID(SampledController):
         return CompiledController(kernels.pid, read_only(parameters, finite=False), np.array(self.start(u0, y0)))
 
     def _tracking(self, sample_time: float) -> float:
-        """h / T_t, at most one."""
         if self.ki == 0.0:
             return 0.0
         usual = math.sqrt(abs(self.kd / self.ki)) if self.kd else abs(self.kp / self.ki)

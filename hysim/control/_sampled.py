@@ -25,7 +25,6 @@ class Feedback(NamedTuple):
     D: float
 
     def then(self, other: "Feedback") -> "Feedback":
-        """This system, and another behind it."""
         return Feedback(
             np.block([[self.A, np.zeros((self.B.size, other.B.size))], [np.outer(other.B, self.C), other.A]]),
             np.concatenate([self.B, other.B * self.D]),
@@ -34,7 +33,6 @@ class Feedback(NamedTuple):
         )
 
     def beside(self, other: "Feedback") -> "Feedback":
-        """The sum of both."""
         n, m = self.B.size, other.B.size
         return Feedback(
             np.block([[self.A, np.zeros((n, m))], [np.zeros((m, n)), other.A]]),
@@ -49,13 +47,13 @@ class SampledController(ABC):
 
     @abstractmethod
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
-        """The controller as compiled loops take it, at rest at the command `u0` and the displacement `y0`."""
+        """Compiled step, parameters and state at rest at the command `u0` and the displacement `y0`."""
 
     @abstractmethod
     def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
-        """Response from the negative measurement to the command at frequencies [rad/s], limits apart.
+        """Response from the negative measurement to the command at frequencies [rad/s], in their shape, limits apart.
 
-        The frequencies must not be zero where there is an integral; the result has their shape.
+        The frequencies must not be zero where there is an integral.
         """
 
     @abstractmethod
@@ -63,11 +61,11 @@ class SampledController(ABC):
         """Linear system from the measurement to the command, limits apart."""
 
     def ahead(self, sample_time: float) -> int:
-        """By how many samples the reference must be known ahead of its time; 0 for a controller without preview."""
+        """Samples by which the reference must be known ahead of its time."""
         return 0
 
     def initial(self, sample_time: float, u: float = 0.0, y: float = 0.0) -> CompiledController:
-        """The state to `step` from, at rest at a command [unit of u] and a displacement [unit of y].
+        """State to `step` from, at rest at a command [unit of u] and a displacement [unit of y].
 
         Raises
         ------
@@ -77,14 +75,14 @@ class SampledController(ABC):
         return self.compiled(sample_time, u, y)
 
     def step(self, state: CompiledController, reference: float, measurement: float) -> tuple[float, CompiledController]:
-        """The command for one sample, and the state after it; `state` itself does not change.
+        """Command for one sample, and the state after it; `state` itself does not change.
 
         Parameters
         ----------
         state : CompiledController
             From `initial`, or from the step before.
         reference, measurement : float
-            The reference, `ahead` of its time where the controller has preview, and the measurement [unit of y].
+            Reference, `ahead` of its time where the controller has preview, and measurement [unit of y].
 
         Returns
         -------
@@ -106,18 +104,15 @@ class SampledController(ABC):
 
 
 def check_kind(name: str, part: Any, kind: type) -> None:
-    """Raise a TypeError if a part is neither None nor of its kind."""
     if part is not None and not isinstance(part, kind):
         raise TypeError(f"{name} must be of {kind.__name__}, got {type(part).__name__}")
 
 
 def check_limits(limits: tuple[float, ...] | None) -> None:
-    """Raise a ValueError if limits are no interval."""
     if limits is not None and not (len(limits) == 2 and limits[0] <= limits[1]):
         raise ValueError(f"limits must be (lowest, highest), got {limits}")
 
 
 def check_sample_time(sample_time: float) -> None:
-    """Raise a ValueError if a sample time is not positive and finite."""
     if not 0.0 < sample_time < math.inf:
         raise ValueError(f"sample_time must be positive and finite, got {sample_time}")

@@ -1,25 +1,23 @@
 """Filters of the reference: shaping, and the inverse of a mode.
 
-Shaping. Impulses A_i at the samples t_i leave no vibration of a mode with the poles p = -zeta w +- j w_d if
+**Shaping.** Impulses A_i at the samples t_i leave no vibration of a mode with the poles p = -zeta w +- j w_d if
 
     sum A_i exp(-p t_i) = 0,    sum A_i = 1
 
-Half a period pi / w_d is seldom a whole number of samples. Three impulses, at 0 and at the two samples around it,
-satisfy both equations exactly (zero vibration, ZV); applied twice, the derivative by the frequency vanishes too (ZVD),
-three times the second one (ZVDD); several modes take one shaper behind the other. For one mode whose frequency lies
-in a band, zeros at Chebyshev's points of the band make the largest residual in it smallest (extra-insensitive, EI).
-Two moving averages in a row make a step of the reference a motion of constant acceleration and deceleration.
+Half a period pi / w_d is seldom a whole number of samples: impulses at 0 and at the two samples around it satisfy
+both equations exactly (zero vibration, ZV). Applied twice, the derivative by the frequency vanishes too (ZVD), three
+times the second one (ZVDD). Zeros at Chebyshev's points of a band make the largest residual in it smallest
+(extra-insensitive, EI). Two moving averages in a row turn a step into constant acceleration and deceleration.
 
-The mode's inverse. Under the hold a mode is A(z) y = B(z) w with B(z) = b_1 z + b_2 and a zero -b_2 / b_1 close to
--1, so that its inverse rings. With the reference known two samples ahead
+**Inverse.** A mode under the hold is A(z) y = B(z) w, B(z) = b_1 z + b_2, whose zero -b_2 / b_1 close to -1 makes its
+inverse ring. With the reference known two samples ahead
 
     w = A(z) B(1/z) / B(1)^2 r        gives       y = B(z) B(1/z) / B(1)^2 r
 
-which has no phase and no vibration: y is the reference through the weights b_1 b_2, b_1^2 + b_2^2, b_1 b_2.
+without phase and vibration: y is the reference through the weights b_1 b_2, b_1^2 + b_2^2, b_1 b_2.
 
-Sources: N. C. Singer and W. P. Seering, J. Dyn. Sys. Meas. Control 112 (1990), for shaping; W. E. Singhose,
-W. P. Seering and N. C. Singer, J. Mech. Design 116 (1994), for residuals bounded over a band; M. Tomizuka, J. Dyn. Sys.
-Meas. Control 109 (1987), for the inverse without phase.
+Sources: N. C. Singer and W. P. Seering, J. Dyn. Sys. Meas. Control 112 (1990); W. E. Singhose, W. P. Seering and
+N. C. Singer, J. Mech. Design 116 (1994), EI; M. Tomizuka, J. Dyn. Sys. Meas. Control 109 (1987), the inverse.
 """
 
 import math
@@ -29,7 +27,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, check_not_negative, check_positive
 from hysim.models.model import family
 from hysim.plants.modes import mode
 from hysim.plants.sampled import sampled, vibration_stage
@@ -44,9 +42,9 @@ class Shaper:
     Parameters
     ----------
     natural_frequencies, damping_ratios : sequence of float
-        Of the modes, positive [rad/s] and from 0 to below 1; none for smoothing alone.
+        Modes, positive [rad/s] and from 0 to below 1; none for smoothing alone.
     repeats : int
-        How often each mode's shaper is applied: the more, the less exactly its frequency need be known.
+        How often each mode's shaper is applied: more repeats tolerate a larger error of its frequency.
     smoothing : float
         Duration of the moving averages together [s]; 0 for none.
 
@@ -73,18 +71,16 @@ class Shaper:
                 f"natural_frequencies and damping_ratios must be equally long, got {len(self.natural_frequencies)} "
                 f"and {len(self.damping_ratios)}"
             )
-        if min(self.natural_frequencies, default=1.0) <= 0.0:
-            raise ValueError(f"natural_frequencies must be positive, got {min(self.natural_frequencies)}")
+        check_positive(natural_frequencies=min(self.natural_frequencies, default=None))
         if not all(0.0 <= ratio < 1.0 for ratio in self.damping_ratios):
             raise ValueError(f"damping_ratios must be from 0 to below 1, got {self.damping_ratios}")
         if not isinstance(self.repeats, int) or self.repeats < 1:
             raise ValueError(f"repeats must be an integer of at least 1, got {self.repeats}")
-        if self.smoothing < 0.0:
-            raise ValueError(f"smoothing must not be negative, got {self.smoothing}")
+        check_not_negative(smoothing=self.smoothing)
 
     @classmethod
     def zv(cls, natural_frequencies: npt.ArrayLike, damping_ratios: npt.ArrayLike) -> Self:
-        """Zero vibration of one mode, or of several: numbers or sequences [rad/s], [1], as in the constructor."""
+        """Zero vibration of one mode or several: numbers or sequences [rad/s] and [1], as in the constructor."""
         return cls(
             natural_frequencies=tuple(np.atleast_1d(natural_frequencies)),
             damping_ratios=tuple(np.atleast_1d(damping_ratios)),
@@ -92,12 +88,12 @@ class Shaper:
 
     @classmethod
     def zvd(cls, natural_frequencies: npt.ArrayLike, damping_ratios: npt.ArrayLike) -> Self:
-        """As `zv`, and zero derivative of the vibration by the frequency."""
+        """As `zv`, with zero derivative of the vibration by the frequency."""
         return replace(cls.zv(natural_frequencies, damping_ratios), repeats=2)
 
     @classmethod
     def zvdd(cls, natural_frequencies: npt.ArrayLike, damping_ratios: npt.ArrayLike) -> Self:
-        """As `zvd`, and zero second derivative."""
+        """As `zvd`, with zero second derivative."""
         return replace(cls.zv(natural_frequencies, damping_ratios), repeats=3)
 
     @classmethod
@@ -109,14 +105,18 @@ class Shaper:
         natural_frequency, damping_ratio : float
             [rad/s], [1]
         tolerance : float
-            Half width of the band, relative to the frequency.
+            Half width of the band, relative to the frequency, from 0 to below 1.
         zeros : int
-            Number of frequencies in the band at which nothing vibrates; each takes half a period.
+            Number of frequencies in the band without vibration, at least 1; each takes half a period.
+
+        Returns
+        -------
+        Shaper
 
         Raises
         ------
         ValueError
-            If the tolerance is not from 0 to below 1, there is no zero, or as the constructor.
+            If a number is outside its range.
 
         Examples
         --------
@@ -148,7 +148,7 @@ class Shaper:
 class ModeInverse:
     """Inverse of a resonance, for a smooth reference that is known two samples ahead.
 
-    Its output grows with the reference's acceleration: a step of one makes some 1 / (natural_frequency sample_time)^2.
+    A step of one in the reference makes an output of about 1 / (natural_frequency sample_time)^2.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ class ModeInverse:
         mode(self.natural_frequency, self.damping_ratio)
 
     def weights(self, sample_time: float) -> FloatArray:
-        """Weights of the reference in two samples, in one, now, and one ago."""
+        """Weights of the reference two samples ahead, one ahead, now, and one ago."""
         stage = sampled(vibration_stage(mode(self.natural_frequency, self.damping_ratio), sample_time), sample_time)
         C, A = stage.output[3:], stage.A
         a1, a2 = -np.trace(A), np.linalg.det(A)
@@ -182,7 +182,6 @@ class ModeInverse:
 
 
 def _zero_vibration(frequency: float, ratio: float, sample_time: float) -> FloatArray:
-    """Impulses at 0 and around half a period."""
     damped = frequency * math.sqrt(1.0 - ratio**2)
     samples = math.floor(math.pi / (damped * sample_time) + 1e-9)
     if samples < 1:

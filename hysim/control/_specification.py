@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, check_positive
 from hysim.control._margins import LinearLoop
 from hysim.control._open_loop import secant_gain, slopes
 from hysim.control._sampled import SampledController
@@ -15,8 +15,6 @@ from hysim.plants.actuator import Actuator
 
 
 class Judgement(NamedTuple):
-    """The largest figures of all plants and slopes; infinite if a loop is unstable."""
-
     max_sensitivity: float
     voltage_noise: float
 
@@ -34,14 +32,12 @@ class Specification:
     ) -> None:
         if not max_sensitivity > 1.0:
             raise ValueError(f"max_sensitivity must be above one, got {max_sensitivity}")
-        if max_voltage_noise is not None and not max_voltage_noise > 0.0:
-            raise ValueError(f"max_voltage_noise must be positive, got {max_voltage_noise}")
+        check_positive(max_voltage_noise=max_voltage_noise)
         self.max_sensitivity = max_sensitivity
         self.max_voltage_noise = math.inf if max_voltage_noise is None else max_voltage_noise
         self.plants = [_PlantLoops(plant, cycle, sample_time) for plant in plants]
 
     def judge(self, controller: SampledController) -> Judgement:
-        """The figures of a controller."""
         sensitivity = 0.0
         for loop, slope in self._loops():
             sensitivity = max(sensitivity, loop.max_sensitivity(controller, slope))
@@ -57,14 +53,12 @@ class Specification:
         return sum(max(0.0, part - 1.0) for part in parts)
 
     def words(self, trial: Trial) -> str:
-        """The figures and their bounds."""
         sensitivity = f"sensitivity {trial.max_sensitivity:.2f} of {self.max_sensitivity:g} allowed"
         if self.max_voltage_noise == math.inf:
             return sensitivity
         return f"{sensitivity}, voltage noise {trial.voltage_noise:.2g} of {self.max_voltage_noise:g}"
 
     def margins(self, controller: SampledController) -> tuple[float, float]:
-        """The smallest gain and phase margin."""
         gains, phases = np.array([loop.margins(controller, slope) for loop, slope in self._loops()]).T
         return float(gains.min()), float(phases.min())
 

@@ -27,28 +27,25 @@ _STEP = 0.2  # of the first simplex along the logarithm of a gain
 
 
 class StandardForm:
-    """PIDs as points (log |Kp|, log Ti, log Td, setpoint weight).
+    """PIDs as points (log |Kp|, log Ti, log Td, setpoint weight); the gains have the sign of the plant's gain.
 
-    The derivative's filter is a tenth of Td, and of sqrt(Ti Td), one over the frequency of its zeros, where that is
-    shorter. The gains have the sign of the plant's gain.
+    The derivative's filter is a tenth of Td, and of sqrt(Ti Td), one over the frequency of its zeros, if shorter.
     """
 
     def __init__(self, sign: float) -> None:
         self.sign = sign
 
     def controller(self, x: FloatArray) -> PID:
-        """The controller at a point."""
         Kp, Ti, Td = _gains(x[:3])
         weight = float(np.clip(x[3], 0.0, _LARGEST_WEIGHT))
         shorter = _FILTER * min(Td, math.sqrt(Ti * Td))
         return PID.standard(math.copysign(Kp, self.sign), Ti, Td, derivative_filter=shorter, setpoint_weight=weight)
 
     def feedback(self, gains: Gains) -> PID:
-        """The part of the controller that is proportional to the gains."""
+        """Part of the controller that is proportional to the gains."""
         return self.controller(self.point(gains))
 
     def point(self, gains: Gains) -> FloatArray:
-        """The point of the controller with these gains."""
         kp, ki, kd = gains
         return np.append(np.log([kp, kp / ki, kd / kp]), 1.0)
 
@@ -57,11 +54,10 @@ class StandardForm:
         yield from _shapes(crossover, resonances)
 
     def own(self) -> list[FloatArray]:
-        """Points that need no rule."""
         return []
 
     def simplex(self, x: FloatArray) -> FloatArray | None:
-        """The corners from which a search around a point begins; None for the search's own."""
+        """Corners from which a search around a point begins; None for the search's own."""
         return None
 
 
@@ -79,7 +75,6 @@ class FreeGains:
             raise ValueError("the controller has nothing to tune: the gains that are not zero are the free ones")
 
     def controller(self, x: FloatArray) -> Tuned:
-        """The controller at a point."""
         gains = np.zeros(4)
         gains[self.free] = self.sign * _gains(x)
         kp, ki, kd, damping = gains.tolist()
@@ -90,32 +85,26 @@ class FreeGains:
         return replace(self.template, feedback=self.template.feedback and pid, damping=damped)
 
     def feedback(self, gains: Gains) -> Tuned:
-        """The part of the controller that is proportional to the gains."""
         controller = self.controller(self.point(gains))
         return controller if isinstance(controller, PID) else replace(controller, damping=None)
 
     def point(self, gains: Gains) -> FloatArray:
-        """The point of the controller with these gains."""
         return np.asarray(np.log(np.abs(np.array([*gains, self.gains[3]])[self.free])))
 
     def shapes(self, crossover: float, resonances: FloatArray) -> Iterator[Gains]:
-        """As `StandardForm.shapes`, the gains that are not free zero."""
         free = self.free[:3]
         shapes = _shapes(crossover, resonances) if free.any() else ()
         yield from dict.fromkeys(tuple(np.where(free, gains, 0.0).tolist()) for gains in shapes)
 
     def own(self) -> list[FloatArray]:
-        """The template's own gains, and smaller ones."""
         own = np.log(np.abs(self.gains[self.free]))
         return [own + math.log(scale) for scale in _SCALES]
 
     def simplex(self, x: FloatArray) -> FloatArray | None:
-        """A simplex of equal steps."""
         return np.vstack([x, x + _STEP * np.eye(x.size)])
 
 
 def as_template(template: Tuned | None, sign: float) -> StandardForm | FreeGains:
-    """The space of points that a template stands for; the gains get the sign of the plant's gain."""
     if template is None:
         return StandardForm(sign)
     if not isinstance(template, PID | TrackingController):

@@ -21,20 +21,18 @@ def to_control(plant: Any, sample_time: float | None = None) -> Any:
     ----------
     plant : TransferFunction, StateSpace, Modes, Actuator, law, BoucWenOscillator, PID or TrackingController
         A plant without a law becomes a linear system, without the actuator's limits and slewing but with the sensor's
-        delay; a PID too, from its error to its command without limits, its derivative acting on the error, which
-        keeps the loop's poles. All others become nonlinear systems with their memory in the state: an actuator with
-        its limits and its sensor but without noise, a `TrackingController` from reference and measurement to the
-        command.
+        delay; a PID too, from its error to its command without limits, the derivative acting on the error (this keeps
+        the loop's poles). All others become nonlinear systems, memory in the state: an actuator with its limits
+        and its sensor but without noise, a `TrackingController` from reference and measurement to the command.
     sample_time : float, optional
-        Of the discrete form, which is that of `close_loop` [s]. By default the system stays continuous, which laws,
+        Sample time of the discrete form, that of `close_loop` [s]. By default the system stays continuous, which laws,
         actuators with a law and a `TrackingController` cannot.
 
     Returns
     -------
     control.TransferFunction, control.StateSpace or control.NonlinearIOSystem
-        The state zero is rest at u = 0 (of a controller also at the displacement zero), or the start of an
-        oscillator's own simulations. The output of a discrete plant is the measurement just before each new command,
-        which is held until the next.
+        The state zero is rest at u = 0 (of a controller also at the displacement zero), or the start of an oscillator's
+        own simulations. The output of a discrete plant is the measurement just before each new command.
 
     Raises
     ------
@@ -100,18 +98,18 @@ def _discrete(actuator: Actuator, sample_time: float) -> Any:
 
     linear, delay = actuator.linear(sample_time)
     stage = sampled(linear, sample_time, delay)
-    n, held = linear.g.size, stage.lag + 1
-    A = np.zeros((n + held, n + held))
+    n, n_inputs = linear.g.size, stage.lag + 1
+    A = np.zeros((n + n_inputs, n + n_inputs))
     A[:n, :n] = stage.A
     A[:n, -1] = stage.B[1]  # the last of the chain is v_(k-1-lag)
-    A[n + 1 :, n:-1] = np.eye(held - 1)
-    B = np.zeros((n + held, 1))
+    A[n + 1 :, n:-1] = np.eye(n_inputs - 1)
+    B = np.zeros((n + n_inputs, 1))
     B[n] = 1.0
     if stage.lag:
         A[:n, -2] = stage.B[0]
     else:
         B[:n, 0] = stage.B[0]
-    C = np.concatenate([linear.C, np.zeros(held - 1), [linear.D]])
+    C = np.concatenate([linear.C, np.zeros(n_inputs - 1), [linear.D]])
     return control.ss(A, B, C[np.newaxis], 0.0, sample_time)
 
 

@@ -1,4 +1,4 @@
-"""Feed-forward and feedback composed, in one compiled step; its equations stand in `hysim.kernels.tracking`.
+"""Feed-forward and feedback composed, in one compiled step; `hysim.kernels.tracking` has its equations.
 
     reference -> shaper -> mode's inverse -> inverse of creep and law -> limits -> u
                    |                                  |                    |
@@ -11,13 +11,14 @@ take, so that the displacement follows it without delay.
 """
 
 import math
+from dataclasses import fields
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
 from hysim.control._feedforward import FeedforwardBlock, InverseFeedforward
-from hysim.control._filters import DampingLoop, Notch, biquad
+from hysim.control._filters import DampingLoop, Notch
 from hysim.control._pid import PID
 from hysim.control._sampled import (
     Feedback,
@@ -55,8 +56,8 @@ class TrackingController(SampledController):
     notch, damping : Notch and DampingLoop, optional
         Filter of the feedback's command, and a loop beside it.
     model : Actuator, optional
-        The feed-forward's plant with its vibration and the sensor's delay: the feedback then compares with the
-        measurement that this model would give, and corrects only the difference.
+        The feed-forward's plant with vibration and sensor delay: the feedback then corrects only the difference between
+        the measurement and the model's.
     preview : bool
         Whether the reference is known ahead.
     limits : (float, float), optional
@@ -76,9 +77,8 @@ class TrackingController(SampledController):
     >>> law = hs.BoucWen(feedthrough=1.0, gain=0.5)
     >>> inverse = hs.TrackingController(feedforward=hs.InverseFeedforward(law=law), preview=True)
     >>> t = 0.01 * np.arange(200)
-    >>> reference = np.sin(t)
-    >>> run = hs.close_loop(law, inverse, t, reference)
-    >>> bool(np.abs(run.y - reference)[1:].max() < 1e-12)
+    >>> run = hs.close_loop(law, inverse, t, np.sin(t))
+    >>> bool(np.abs(run.y - np.sin(t))[1:].max() < 1e-12)
     True
     """
 
@@ -93,13 +93,9 @@ class TrackingController(SampledController):
     limits: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
-        check_kind("shaper", self.shaper, Shaper)
-        check_kind("mode_inverse", self.mode_inverse, ModeInverse)
-        check_kind("feedforward", self.feedforward, InverseFeedforward)
-        check_kind("feedback", self.feedback, PID)
-        check_kind("notch", self.notch, Notch)
-        check_kind("damping", self.damping, DampingLoop)
-        check_kind("model", self.model, Actuator)
+        kinds = (Shaper, ModeInverse, InverseFeedforward, PID, Notch, DampingLoop, Actuator)
+        for field, kind in zip(fields(self), kinds, strict=False):
+            check_kind(field.name, vars(self)[field.name], kind)
         check_limits(self.limits)
         if self.feedback is not None and self.feedback.limits is not None:
             raise ValueError(
@@ -113,17 +109,13 @@ class TrackingController(SampledController):
                 raise ValueError("the model's law and amplifier must be those of the feedforward")
 
     def ahead(self, sample_time: float) -> int:
-        """By how many samples the reference must be known ahead, for the filters and the hold."""
+        """Samples by which the reference must be known ahead, for the filters and the hold."""
         if not self.preview:
             return 0
         shaped = self._shaped(sample_time)
         return self._hold + round(float(shaped @ np.arange(shaped.size)))
 
     def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
-        """Response of the feedback from the negative measurement to the command at frequencies [rad/s], limits apart.
-
-        The frequencies must not be zero where there is an integral; the result has their shape.
-        """
         total = (self.feedback or PID()).frequency_response(frequency, sample_time)
         if self.notch is not None:
             total = total * self.notch.frequency_response(frequency, sample_time)
@@ -132,16 +124,14 @@ class TrackingController(SampledController):
         return np.asarray(total)
 
     def linear(self, sample_time: float) -> Feedback:
-        """Linear system from the measurement to the command, limits apart."""
         total = (self.feedback or PID()).linear(sample_time)
         if self.notch is not None:
-            total = total.then(biquad(self.notch.coefficients(sample_time)))
+            total = total.then(self.notch.linear(sample_time))
         if self.damping is not None:
-            total = total.beside(biquad(self.damping.coefficients(sample_time)))
+            total = total.beside(self.damping.linear(sample_time))
         return total
 
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
-        """The controller as compiled loops take it, at rest at `u0` and `y0`."""
         check_sample_time(sample_time)
         lowest, highest = self.limits or (-math.inf, math.inf)
         taps = self._taps(sample_time)
@@ -163,14 +153,13 @@ class TrackingController(SampledController):
 
     @property
     def _hold(self) -> int:
-        """Samples from the drive to the displacement that it causes."""
         return 0 if self.feedforward is None else 1 if self.mode_inverse is None else 2
 
     def _shaped(self, sample_time: float) -> FloatArray:
         return np.ones(1) if self.shaper is None else self.shaper.impulses(sample_time)
 
     def _taps(self, sample_time: float) -> FloatArray:
-        """Weights of the reference, the newest first, for the drive and for the target."""
+        """Weights of the reference, the newest first, for the feed-forward and for the feedback."""
         shaped = self._shaped(sample_time)
         inverted = np.ones(1) if self.mode_inverse is None else self.mode_inverse.weights(sample_time)
         drive, target = np.convolve(shaped, inverted), np.concatenate([np.zeros(self._hold), shaped])
@@ -178,7 +167,7 @@ class TrackingController(SampledController):
         return np.stack([np.pad(weights, (0, size - weights.size)) for weights in (drive, target)])
 
     def _model_blocks(self, sample_time: float, u0: float) -> tuple[list[float], FloatArray, FloatArray]:
-        """The model for the kernel: the head's numbers, the matrices, the state at rest."""
+        """Numbers of the head, matrices, and state at rest of the model, as the kernel takes them."""
         chain = (self.model or Actuator()).chain(sample_time)
         rest = chain.rest(u0)
         stage, seen_in = chain.stage, chain.seen_in

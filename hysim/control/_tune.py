@@ -1,17 +1,16 @@
 """The verb `tune`: gains by simulation of the loop itself, limits, sampling, noise and memory included.
 
 A linear rule gives the starts: for each crossover frequency and each shape (Ti and Td in units of it, or zeros on a
-resonance of the plant) the gain makes |L| = 1 there, L the sampled loop with the law at its secant gain. Those that
-are stable on every plant, at the least and at the largest slope of its law, are simulated, and the search of
-J. A. Nelder and R. Mead (1965) descends from the best of them over the logarithms of the gains. A barrier keeps the
-largest of all maximum sensitivities max |1 / (1 + L)|, and the voltage noise, within their bounds. The objective is a
-number of the simulated error e, in units of the reference's span, the largest one where several limits are given:
+resonance) the gain makes |L| = 1 there, L the sampled loop with the law at its secant gain. Those that are stable on
+every plant, at the least and at the largest slope of its law, are simulated; the search of J. A. Nelder and R. Mead
+(1965) descends from the best of them over the logarithms of the gains. A barrier keeps the maximum sensitivity
+max |1 / (1 + L)| and the voltage noise within their bounds. The objective is a number of the simulated true error e,
+in units of the reference's span, the largest one where several limits are given:
 
-    "itae"   integral of t |e| / duration^2     a step: what lasts counts most
+    "itae"   integral of t |e| / duration^2     a step: late errors count most
     "rms"    rms of e                           a periodic reference
 
-e is that of the true displacement. The noise of the plant's sensor is in the simulation, the same in each, so that the
-search is deterministic: noise moves the memory of a law, which no linear figure shows.
+The sensor's noise is in the simulation, always the same: it moves the memory of a law, which no linear figure shows.
 """
 
 import math
@@ -69,9 +68,9 @@ def tune(
     reference : array, shape (n,)
         [unit of y]
     controller : PID or TrackingController, optional
-        A template: the gains of its PID and of its damping loop that are not zero are tuned, everything else stays.
-        ``hs.PID(ki=1.0)`` asks for an integral alone. By default a PID in standard form, with its setpoint weight and
-        a derivative filter of a tenth of Td.
+        A template: the gains of its PID and damping loop that are not zero are tuned, everything else stays;
+        ``hs.PID(ki=1.0)`` asks for an integral alone. By default a PID in standard form, with its setpoint weight and a
+        derivative filter of a tenth of Td.
     objective : {"itae", "rms"}
         Measure of the error to minimise: for a step, for a periodic reference.
     limits : (float, float), optional
@@ -82,9 +81,9 @@ def tune(
     max_voltage_noise : float, optional
         Bound on the rms of the voltage that the sensor's noise causes in the linear loop, positive [unit of u].
     variations : sequence of plants
-        Other plants, such as one whose resonance is elsewhere, on which the bounds must hold too.
+        Other plants on which the bounds must hold too.
     transient : float
-        Time at the beginning that does not count [s], until a periodic reference is steady.
+        Time at the beginning that does not count [s].
     u0 : float
         Voltage before the first sample.
 
@@ -118,7 +117,7 @@ def tune(
 
 
 class _SimulatedLoop:
-    """The error of the loop that a controller closes around the plant, within each of the limits, as one number."""
+    """Error of the loop that a controller closes around the plant, as one number."""
 
     def __init__(
         self,
@@ -144,7 +143,6 @@ class _SimulatedLoop:
             raise ValueError(f"the reference stays at the resting displacement {self.plant.y0:g}: nothing to follow")
 
     def value(self, controller: Tuned) -> float:
-        """The largest objective within any of the limits; infinite if a loop diverges."""
         largest = -math.inf
         for limits in self.limits:
             signals = self.plant.attempt(replace(controller, limits=limits), self.reference)
@@ -154,21 +152,18 @@ class _SimulatedLoop:
         return largest
 
     def limited(self, controller: Tuned) -> int:
-        """At how many samples the controller's limits hold the voltage."""
         signals = self.plant.attempt(controller, self.reference)
         return int(np.count_nonzero(signals.drive != signals.command))
 
 
 class _Search:
-    """The cost of a controller as a function of its point."""
-
     def __init__(self, loop: _SimulatedLoop, specification: Specification, controller: Tuned | None) -> None:
         self.loop, self.specification = loop, specification
         self.template = as_template(controller, math.copysign(1.0, specification.plants[0].gain))
         self.trials: list[Trial] = []
 
     def starts(self) -> list[FloatArray]:
-        """The stable points of the linear rule, without those far beyond the bounds where there are others."""
+        """Stable points of the linear rule, without those far beyond the bounds where there are others."""
         rule = [*self.template.own(), *self.rule()]
         stable = [(excess, x) for x in rule if (excess := self.excess(x)) < math.inf]
         if not stable:
@@ -190,11 +185,9 @@ class _Search:
         return points
 
     def excess(self, x: FloatArray) -> float:
-        """By how much the controller at a point exceeds the bounds."""
         return self.specification.excess(self.specification.judge(self.template.controller(x)))
 
     def cost(self, x: FloatArray) -> float:
-        """The objective, and a barrier beyond the bounds."""
         controller = replace(self.template.controller(x), limits=self.loop.limits[0])
         judgement = self.specification.judge(controller)
         value = self.loop.value(controller) if judgement.max_sensitivity < math.inf else math.inf
@@ -202,12 +195,11 @@ class _Search:
         return value * (1.0 + _BARRIER * self.specification.excess(judgement))
 
     def descend(self, start: FloatArray) -> None:
-        """Search from a start; every controller tried is among the trials."""
         options = {**_SEARCHED, "initial_simplex": self.template.simplex(start)}
         minimize(self.cost, start, method="Nelder-Mead", options=options)
 
     def result(self) -> Tuning:
-        """The best controller within the bounds, or the nearest to them if there is none, with its margins."""
+        """Best controller within the bounds, or the nearest to them, with its margins."""
         bounds = self.specification
         beyond = [bounds.excess(trial) for trial in self.trials]
         least = min(beyond)
@@ -235,7 +227,6 @@ class _Search:
 
 
 def _each(limits: Any, controller: Any) -> tuple[Limits, ...]:
-    """The limits of each simulation, from one pair or from several."""
     if limits is None:
         return (limits_of(controller),)
     if all(np.ndim(limit) == 0 and limit is not None for limit in limits):

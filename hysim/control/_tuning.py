@@ -18,10 +18,10 @@ class Trial:
     controller : PID or TrackingController
         With the limits.
     max_sensitivity, voltage_noise : float
-        Largest ``|1 / (1 + L)|`` of all plants, at either slope of the law, and largest rms of the voltage that the
-        sensor's noise causes in these linear loops [unit of u]; infinite if a loop is unstable.
+        Largest ``|1 / (1 + L)|`` of all plants, at either slope of the law, and largest rms of the voltage noise in the
+        linear loops [unit of u]; infinite if a loop is unstable.
     objective : float
-        Of the simulated loop, in units of the reference's span; infinite if a loop is unstable.
+        Objective of the simulated loop, in units of the reference's span; infinite if a loop is unstable.
     """
 
     controller: Any
@@ -37,22 +37,18 @@ class Tuning:
 
     Parameters
     ----------
-    controller, objective, max_sensitivity
-        Of the best `Trial`.
+    controller, objective, max_sensitivity, voltage_noise
+        As in the best `Trial`. The noise also moves the memory of a law, which `close_loop` has in its conditions.
     gain_margin, phase_margin : float
-        Factor and angle [degrees] by which the loop may change before it is unstable: the smallest of all plants and
-        slopes.
-    voltage_noise : float
-        Of the best `Trial`. The noise also moves the memory of a law; `close_loop` has this in its conditions.
+        Factor and angle [degrees] by which the loop may change before it is unstable: the smallest of all plants.
     trade_off : tuple of Trial
-        The trials within the bound on the noise that no other beats in both objective and sensitivity, the most
-        robust first.
+        Trials within the bound on the noise that no other beats in both objective and sensitivity, most robust first.
     trials : tuple of Trial
         Every controller that was simulated.
     success : bool
         Whether a controller within the bounds was found.
     message : str
-        Extent of the search, distance to the bounds, and at how many samples the voltage was limited.
+        Extent of the search, distance to the bounds, and number of samples with limited voltage.
     """
 
     controller: Any
@@ -84,7 +80,6 @@ class Tuning:
 
 
 def front(trials: Iterable[Trial]) -> tuple[Trial, ...]:
-    """Those that no other beats in both objective and maximum sensitivity, the most robust first."""
     best: list[Trial] = []
     for trial in sorted(trials, key=lambda trial: (trial.max_sensitivity, trial.objective)):
         if trial.objective < (best[-1].objective if best else math.inf):

@@ -28,14 +28,11 @@ from hysim.discovery._slopes import FORMS, signs_of
 from hysim.discovery._structures import AnyExponent
 from hysim.identification.folds import folds
 from hysim.identification.swapped import swapped_columns
-from hysim.laws.differential.terms import duhem_terms, memory_terms, named_terms, symmetric
-from hysim.records import Record
+from hysim.models.terms import duhem_terms, memory_terms, named_terms, symmetric
+from hysim.records import Record, several
 
 _POOR = 80.0  # fit of a law without dynamics [%] below which the records may be an oscillator's
-_SHORT = (
-    "only the optimizer's path was searched, since no law on it comes near the model without a law that explains the "
-    "records best"
-)
+_SHORT = "only the optimizer's path was searched, since no law on it is nearly as good as the best model without a law"
 _OSCILLATOR = (
     "The laws that were tried explain little of these records. If u is the force on a mass with a hysteretic spring "
     "and y its displacement, use hs.discover_oscillator."
@@ -62,18 +59,17 @@ def discover(
     """Discover the law of a memory in one or several records.
 
     The slope of the memory along the loading length, dL = ``|du|``, is regressed on a library of terms by PySINDy.
-    Structures are refined by their error in free run; of those that fit equally well the one of fewest numbers is
-    taken. Models without a law are fitted beside it, and all are judged on data that they were not fitted to.
+    Structures are refined by their error in free run; of those that fit equally well the one of fewest parameters is
+    taken. Models without a law are fitted beside it, and all are judged on held-out samples.
 
     Parameters
     ----------
     record_or_records : Record or sequence of Record
-        Input and output. The input is taken as exact, and must reverse. Several records share the law; each has its
-        own initial state. The law needs no time, but without it nothing distinguishes hysteresis from a lag.
+        Input, which is taken as exact and must reverse, and output. Several records share the law; each has its own
+        initial state. Without time hysteresis and lag cannot be distinguished.
     route : {"auto", "memory", "output"}
         What is measured: the memory itself, y = z; or an output, y = offset + feedthrough u + gain z. By default both
-        are tried, and a Duhem law, and the one of lowest BIC is taken. Where all of these explain little of records
-        with even times, a warning says so: they may be those of an oscillator, for which `discover_oscillator` is.
+        and a Duhem law are tried, and the one of lowest BIC is taken.
     library : {"bouc-wen", "duhem"} or sequence of str, optional
         ``"bouc-wen"``, for z: ``u'`` and ``|u'|`` times z^j, and times ``|z|`` z^(j-1), j up to `degree`.
         ``"duhem"``, for y: ``u'`` and ``|u'|`` times u^i y^j, i + j up to `degree`. Or the names of the terms:
@@ -87,26 +83,26 @@ def discover(
     optimizer : {"STLSQ", "SR3", "SSR", "FROLS"}
         PySINDy's optimizer that makes the path.
     derivative : {"auto", "smoothed", "weak"}
-        Slopes of smoothed branches, or the integral form, which needs none; by default the one whose regressions run
-        nearest to samples that they have not seen.
+        Slopes of smoothed branches, or the integral form, which needs none; by default the better one on held-out
+        samples.
     initial : {"auto", "free", "rest"}
-        Whether the memory at the first sample is fitted for each record, or zero. By default both are tried, and the
-        lower BIC decides; a Duhem law begins at rest only in records that begin at u = 0.
+        Whether the memory at the first sample is fitted for each record, or zero. By default the lower BIC decides; a
+        Duhem law begins at rest only in records that begin at u = 0.
     cross_validate : {None, "loo"} or int, optional
         ``"loo"`` leaves one output sample out at a time, an int that many blocks of samples; the input is kept. The
         whole search is repeated for each fold: minutes for ``"loo"`` on 50 samples. Fills `Discovery.cv_rmse`.
     seed : int
-        Of random restarts, and of the ensemble.
+        Seed of random restarts, and of the ensemble.
     progress : callable, optional
         Called as ``progress(done, total)``; each fold of the cross-validation is one step.
 
     Returns
     -------
     Discovery
-        Its verdict is about the records, and rests on the law and on models that need no library: a single-valued
-        curve, a linear plant, linear creep, and a superposition of functions of plays.
+        Its verdict rests on the law and on models that need no library: a single-valued curve, a linear plant, linear
+        creep, and a superposition of functions of plays.
 
-        - ``"rate-independent hysteresis"``: under several rates the law or the plays predict held-out samples better
+        - ``"rate-independent hysteresis"``: at several rates the law or the plays predict held-out samples better
           than all models that depend on time, and than the curve;
         - ``"linear lag"``: a linear dynamic model predicts them better;
         - ``"cannot be told from one rate"``: the records show a loop, but have one rate only, or no time;
@@ -118,14 +114,13 @@ def discover(
     ValueError
         If an option is unknown, an input or output is constant, the input never reverses, its branches are too short
         to have a slope, there are no more samples than terms, or every law diverges.
-    TypeError
-        If the first argument is not a record or a sequence of them.
-    ImportError
-        If `optimizer` is one of PySINDy's that needs an extra.
+    TypeError, ImportError
+        If the first argument is not a record or a sequence of them; if `optimizer` needs one of PySINDy's extras.
 
     Notes
     -----
-    Structures are compared by the BIC of their free runs; residuals below 1e-4 strokes are no evidence.
+    Structures are compared by the BIC of their free runs; residuals below 1e-4 strokes are no evidence. A warning says
+    where the records may be those of an oscillator, for which `discover_oscillator` is.
 
     Sources: S. L. Brunton, J. L. Proctor and J. N. Kutz, PNAS 113 (2016); PySINDy 2.1.
 
@@ -169,15 +164,15 @@ def discover(
     report(1, _STAGES + n_folds)
     any_exponent = library is None and symmetry is None and not signs
 
-    def chosen(first: list[Outcome], seen: tuple[Samples, ...] | None) -> tuple[Outcome, Candidate[Any]]:
-        more = _searched(records, of_output, options, first[0].searched.bic, seen)
+    def chosen(first: list[Outcome], masks: tuple[Samples, ...] | None) -> tuple[Outcome, Candidate[Any]]:
+        more = _searched(records, of_output, options, first[0].searched.bic, masks)
         outcome = min([*first, *more], key=lambda each: each.candidate.bic)
         if not any_exponent or outcome.is_short:
             return outcome, outcome.candidate
-        return outcome, or_any_exponent(FreeRun(records, seen), first[0], outcome)
+        return outcome, or_any_exponent(FreeRun(records, masks), first[0], outcome)
 
-    def again(seen: tuple[Samples, ...]) -> Candidate[Any]:
-        return chosen(_searched(records, (of_memory,), options, seen=seen), seen)[1]
+    def again(masks: tuple[Samples, ...]) -> Candidate[Any]:
+        return chosen(_searched(records, (of_memory,), options, masks=masks), masks)[1]
 
     outcome, candidate = chosen(outcomes, None)
     report(_STAGES - 1, _STAGES + n_folds)
@@ -193,14 +188,12 @@ def discover(
 
 
 def _rests(initial: str, library: Library, records: Sequence[Record]) -> tuple[bool, ...]:
-    """Whether the memory may begin at a value of its own, at zero, or at either."""
     if initial != "auto":
         return (initial == "rest",)
     return (False, True) if library.letter == "z" or all(record.u[0] == 0.0 for record in records) else (False,)
 
 
 def _may_be_an_oscillators(records: tuple[Record, ...], candidate: Candidate[Any]) -> bool:
-    """Whether the times are even and a law without dynamics explains little."""
     return _scores(candidate, records)["fit_percent"] <= _POOR and all(_is_even(record) for record in records)
 
 
@@ -209,22 +202,17 @@ def _is_even(record: Record) -> bool:
 
 
 def _checked(record_or_records: Record | Sequence[Record]) -> tuple[Record, ...]:
-    records = (record_or_records,) if isinstance(record_or_records, Record) else record_or_records
-    if not isinstance(records, (list, tuple)) or not records:
-        raise TypeError(f"discover takes a Record or several, got {type(records).__name__}: hs.Record(u=u, y=y)")
+    records = several(record_or_records, "discover")
     for record in records:
-        if not isinstance(record, Record):
-            raise TypeError(f"discover takes records, got {type(record).__name__}: hs.Record(u=u, y=y)")
         for name, values in (("input", record.u), ("output", record.y)):
             if np.ptp(values) == 0.0:
                 raise ValueError(f"the {name} is constant: give a record on which it moves")
-    return tuple(records)
+    return records
 
 
 def _libraries(
     route: str, library: str | Sequence[str] | None, degree: int | None, symmetry: str | None
 ) -> tuple[Library, ...]:
-    """The libraries that a route looks into, the cheaper first."""
     if degree is not None and not isinstance(library, str | None):
         raise ValueError("degree is not used with a library of names: leave it out")
     degree = 2 if degree is None else degree
@@ -253,7 +241,7 @@ def _searched(
     libraries: Sequence[Library],
     options: Options,
     best: float = math.inf,
-    seen: Sequence[Samples] | None = None,
+    masks: Sequence[Samples] | None = None,
 ) -> list[Outcome]:
     n = sum(map(len, records))
     outcomes: list[Outcome] = []
@@ -262,7 +250,7 @@ def _searched(
             raise ValueError(
                 f"{len(library.terms)} terms and y0 cannot be estimated from {n} samples: lower the degree"
             )
-        outcome = searched(records, library, options, best=best, seen=seen)
+        outcome = searched(records, library, options, best=best, masks=masks)
         outcomes += [] if outcome is None else [outcome]
     return outcomes
 
@@ -308,7 +296,7 @@ def _discovery(
 
 
 def _message(outcome: Outcome, rest: bool) -> str:
-    parts = [f"{outcome.library.letter} at the first sample is held at zero, its rest"] * rest
+    parts = [f"{outcome.library.letter} is held at zero at the first sample"] * rest
     parts += [_SHORT] * outcome.is_short
     return "; ".join(parts)
 
@@ -356,17 +344,14 @@ def left_out_rmse(
     count: str | int,
     progress: Progress,
 ) -> float:
-    """Rmse on samples that were left out of the search [unit of y]; inf where a law diverges.
-
-    Each fold repeats the `search` for structure and numbers in the outputs seen, (n_samples,) for each record.
-    """
+    """Rmse on samples left out of the search, repeated for each fold [unit of y]; inf where a law diverges."""
     free_run, edges = FreeRun(tuple(records)), np.cumsum([len(record) for record in records])
     left_out = folds(count, free_run.n_samples)
     errors = np.empty(free_run.n_samples)
     for done, samples in enumerate(left_out, 1):
-        seen = np.ones(free_run.n_samples, dtype=bool)
-        seen[samples] = False
-        law = search(tuple(np.split(seen, edges[:-1])))
+        mask = np.ones(free_run.n_samples, dtype=bool)
+        mask[samples] = False
+        law = search(tuple(np.split(mask, edges[:-1])))
         errors[samples] = free_run.residuals(law.structure, law.unknowns[np.newaxis])[0, samples]
         progress(done, len(left_out))
     if np.abs(errors).max() >= DIVERGED:

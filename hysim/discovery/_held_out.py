@@ -1,15 +1,12 @@
-"""The errors of a law and its rivals on samples that were left out of the fit, and the rates of the input.
+"""Errors of a law and its competitors on samples that were left out of the fit, and the rates of the input.
 
-A record is left out at a time, if there are several and none goes beyond the range of the others; of one record a rate,
-if its cycles have several; else a cycle, if there are three; else a few blocks. The start of each record is always
-seen, since it determines the memory, or the state, at the first sample. Samples beyond the range of the others do not
-count, unless all are: no model is judged by extrapolation.
+Left out at a time is a record, if there are several and none goes beyond the range of the others; of one record a
+rate, if its cycles have several; else a cycle, if there are three; else a few blocks. The start of each record is
+never left out, since it determines the initial state, and samples beyond the range of the others do not count, unless
+all are. A slow trend of each record is taken out of every residual.
 
-The rivals are the linear plant, and the yardsticks that need no law. A slow trend of each record is taken out of every
-residual: a drift is neither a fault of the law nor hysteresis.
-
-A model explains the samples if its error is not above FACTOR times that on the fitted samples, where records or rates
-are left out, or else times the noise; or not above UNEXPLAINED times the error of a curve.
+A model explains the samples if its error is at most FACTOR times that on the fitted samples, where records or rates
+are left out, or else times the noise; or at most UNEXPLAINED times the error of a curve.
 """
 
 import itertools
@@ -17,7 +14,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -37,7 +34,7 @@ FACTOR = 2.0
 UNEXPLAINED = 0.2
 
 _FOLDS = 5
-_START = 0.1  # of each record is always seen
+_START = 0.1  # share of each record that is never left out
 _PARTS = 8  # of each record, for the t test
 _DOUBT = 0.05  # probability of the t test below which a difference counts
 _INSIDE = 0.05  # spans of the input by which left-out samples may reach beyond the others
@@ -51,11 +48,9 @@ Samples = npt.NDArray[np.intp]
 
 
 class Law(Protocol):
-    """What is judged: an output at the samples of an input, without time."""
+    """A model that is judged: an output at the samples of an input, without time."""
 
-    def response(self, u: npt.ArrayLike, /) -> FloatArray:
-        """Output at the samples of `u`."""
-        ...
+    def response(self, u: npt.ArrayLike, /) -> FloatArray: ...
 
 
 Refit = Callable[[Sequence[Record], Sequence[FloatArray]], Sequence[Law]]
@@ -66,36 +61,47 @@ Model = Callable[[FloatArray], FloatArray]
 """Outputs (n_samples,) at all samples, fitted again where the weights (n_samples,) are not zero."""
 
 
+class Scores(NamedTuple):
+    """Rmse of a model on held-out samples, on the fitted ones, and in parts of the held-out ones [unit of y]."""
+
+    error: float = math.nan
+    fitted: float = math.nan
+    parts: FloatArray = np.empty(0)
+
+
 @dataclass(frozen=True)
 class Trial:
-    """Rmse of the law and its rivals by name, on held-out samples and on those seen, and what was left out at a time.
+    """Scores of the law and its competitors by name, and what was left out at a time.
 
-    `together` is the rmse of the plays fitted to all samples, `noise` that of white noise in the outputs, `stroke`
-    their range, and `parts` are rmse by name in parts of the held-out samples; all in the unit of y.
+    `together` is the rmse of plays fitted to all samples, `noise` that of white noise, `stroke` the range of the
+    outputs.
     """
 
-    errors: Mapping[str, float]
-    seen: Mapping[str, float]
+    scores: Mapping[str, Scores]
     together: float
     by: str
     noise: float
     stroke: float
-    parts: Mapping[str, FloatArray]
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """Rmse on held-out samples by name."""
+        return {name: scores.error for name, scores in self.scores.items()}
 
     def explains(self, name: str) -> bool:
         """Whether a model predicts the held-out samples nearly as well as the fitted ones, or most of the memory.
 
-        Plays have too many numbers to predict another path of the input from few samples: their error may also be that
-        of one fit to all samples.
+        The error of the plays may also be that of one fit to all samples: they have many parameters.
         """
-        usual = self.seen[name] if self.by in ("record", "rate") else self.noise
-        error = min(self.errors[name], self.together) if name == PLAYS else self.errors[name]
-        return error <= max(FACTOR * usual, UNEXPLAINED * self.errors[CURVE]) + FLOOR * self.stroke
+        own, curve = self.scores[name], self.scores[CURVE]
+        usual = own.fitted if self.by in ("record", "rate") else self.noise
+        error = min(own.error, self.together) if name == PLAYS else own.error
+        return error <= max(FACTOR * usual, UNEXPLAINED * curve.error) + FLOOR * self.stroke
 
     def consistent(self, name: str, other: str) -> bool:
         """Whether a model is better than another in most parts: a t test of the logarithms of their rmse."""
         floor = FLOOR * self.stroke
-        gains = np.log((self.parts[other] + floor) / (self.parts[name] + floor))
+        gains = np.log((self.scores[other].parts + floor) / (self.scores[name].parts + floor))
         if gains.size < 2:
             return True
         student = float(special.stdtrit(gains.size - 1, 1.0 - _DOUBT))
@@ -103,41 +109,34 @@ class Trial:
 
 
 def competitors_held_out(records: Sequence[Record], linear: Rival | None) -> Trial:
-    """Fit the rivals of a law again without some of the samples, and predict these; the errors of the law are nan.
-
-    Without a linear rival, for lack of time, there are no relaxations either, and both errors are nan.
-    """
+    """Fit the competitors again without some of the samples, and predict these; unknown errors are nan."""
     y = np.concatenate([record.y for record in records])
     by, left_out = _folds(records)
-    unknown = dict.fromkeys((LAW, RIVAL, RELAXATIONS, PLAYS, CURVE), math.nan)
-    trial = Trial(unknown, unknown, math.nan, by, _noise(records), 0.0, {})
     models = _models(records, y, linear)
-    for name, model in models.items():
-        trial = _with(trial, name, model, records, left_out)
-    errors, seen, parts = dict(trial.errors), dict(trial.seen), dict(trial.parts)
-    if errors[_MEANS] < errors[CURVE]:
-        errors[CURVE], seen[CURVE], parts[CURVE] = errors[_MEANS], seen[_MEANS], parts[_MEANS]
-    del errors[_MEANS]
+    scores = {name: _scores(model, records, left_out) for name, model in models.items()}
+    means = scores.pop(_MEANS)
+    if means.error < scores[CURVE].error:
+        scores[CURVE] = means
     together = about_trends(y - models[PLAYS](np.ones(y.size)), records)
-    return replace(trial, errors=errors, seen=seen, parts=parts, together=rms(together), stroke=float(np.ptp(y)))
+    ordered = dict.fromkeys((LAW, RIVAL, RELAXATIONS, PLAYS, CURVE), Scores()) | scores
+    return Trial(ordered, rms(together), by, _noise(records), float(np.ptp(y)))
 
 
 def law_held_out(trial: Trial, records: Sequence[Record], refit: Refit) -> Trial:
-    """The trial of the rivals with a law beside them, fitted again without the same samples."""
+    """The trial with a law beside the competitors, fitted again without the same samples."""
     n_samples = sum(len(record) for record in records)
 
     def law(weights: FloatArray) -> FloatArray:
-        """The free runs; inf where they cannot be fitted or diverge."""
         try:
             laws = refit(records, _of_each(weights, records))
             return np.concatenate([law.response(record.u) for law, record in zip(laws, records, strict=True)])
         except (SimulationError, ValueError):
             return np.full(n_samples, math.inf)
 
-    return _with(trial, LAW, law, records, _folds(records)[1])
+    return replace(trial, scores={**trial.scores, LAW: _scores(law, records, _folds(records)[1])})
 
 
-def _with(trial: Trial, name: str, model: Model, records: Sequence[Record], left_out: Sequence[Samples]) -> Trial:
+def _scores(model: Model, records: Sequence[Record], left_out: Sequence[Samples]) -> Scores:
     y = np.concatenate([record.y for record in records])
     residual, fitted = np.full(y.size, math.nan), []
     for samples in left_out:
@@ -146,14 +145,9 @@ def _with(trial: Trial, name: str, model: Model, records: Sequence[Record], left
         remaining = y - model(weights)
         residual[samples] = remaining[samples]
         fitted.extend(about_trends(np.where(weights > 0.0, remaining, math.nan), records))
-    held = about_trends(residual, records)
-    parts = np.array([rms([part]) for part in _in_parts(held, records)])
-    return replace(
-        trial,
-        errors={**trial.errors, name: rms(held)},
-        seen={**trial.seen, name: rms(fitted)},
-        parts={**trial.parts, name: parts},
-    )
+    detrended = about_trends(residual, records)
+    parts = np.array([rms([part]) for part in _in_parts(detrended, records)])
+    return Scores(rms(detrended), rms(fitted), parts)
 
 
 def _models(records: Sequence[Record], y: FloatArray, linear: Rival | None) -> dict[str, Model]:
@@ -171,7 +165,7 @@ def _models(records: Sequence[Record], y: FloatArray, linear: Rival | None) -> d
 
 
 def about_trends(residual: FloatArray, records: Sequence[Record]) -> list[FloatArray]:
-    """The residual of each record about its own trend; nan where it is nan, and all of it where that is all trend."""
+    """Residual of each record about its own trend; nan where it is nan or has too few samples."""
     residuals = []
     for own, record in zip(_of_each(residual, records), records, strict=True):
         counts = ~np.isnan(own)
@@ -184,9 +178,8 @@ def about_trends(residual: FloatArray, records: Sequence[Record]) -> list[FloatA
     return residuals
 
 
-def _in_parts(held: Sequence[FloatArray], records: Sequence[Record]) -> list[FloatArray]:
-    """The residuals of consecutive samples, as many parts of each record as may be independent of each other."""
-    pieces = [piece for residual in held for piece in np.array_split(residual, _PARTS)]
+def _in_parts(detrended: Sequence[FloatArray], records: Sequence[Record]) -> list[FloatArray]:
+    pieces = [piece for residual in detrended for piece in np.array_split(residual, _PARTS)]
     return [piece[~np.isnan(piece)] for piece in pieces if np.count_nonzero(~np.isnan(piece)) > 1]
 
 
@@ -195,12 +188,11 @@ def _of_each(values: FloatArray, records: Sequence[Record]) -> list[FloatArray]:
 
 
 def _folds(records: Sequence[Record]) -> tuple[str, list[Samples]]:
-    """What is left out at a time, and its samples among those of all records; the start of a record never is."""
     lengths = [len(record) for record in records]
     begins = np.cumsum([0, *lengths])[:-1]
-    kept = np.ones(sum(lengths), dtype=bool)
+    counted = np.ones(sum(lengths), dtype=bool)
     for begin, length in zip(begins, lengths, strict=True):
-        kept[begin : begin + math.ceil(_START * length)] = False
+        counted[begin : begin + math.ceil(_START * length)] = False
     by, parts = "record", [begin + np.arange(length) for begin, length in zip(begins, lengths, strict=True)]
     u = np.concatenate([record.u for record in records])
     if len(records) == 1:
@@ -208,14 +200,13 @@ def _folds(records: Sequence[Record]) -> tuple[str, list[Samples]]:
     elif not all(_covers(np.delete(u, samples), u[samples]) for samples in parts):
         by, parts = "block", blocks(min(2 * _FOLDS * len(records), u.size), u.size)
     groups = [np.unique(np.concatenate(parts[k::_FOLDS])) for k in range(min(_FOLDS, len(parts)))]
-    left_out = [group[kept[group]] for group in groups if kept[group].any()]
+    left_out = [group[counted[group]] for group in groups if counted[group].any()]
     left_out = [samples for samples in left_out if _covers(np.delete(u, samples), u[samples])] or left_out
     inside = [samples[_is_inside(np.delete(u, samples), u[samples])] for samples in left_out]
     return by, [samples for samples in inside if samples.size] or left_out
 
 
 def _folds_of(record: Record) -> tuple[str, list[Samples]]:
-    """The parts of a single record: its rates, its cycles or blocks."""
     parts = at_one_rate(record)
     if len(parts) > 1:
         return "rate", parts
@@ -223,22 +214,21 @@ def _folds_of(record: Record) -> tuple[str, list[Samples]]:
     return ("cycle", cycles) if len(cycles) > 2 else ("block", blocks(min(2 * _FOLDS, len(record)), len(record)))
 
 
-def _covers(seen: FloatArray, other: FloatArray) -> bool:
-    beyond = _INSIDE * float(np.ptp(np.append(seen, other)))
-    return bool(other.min() >= seen.min() - beyond and other.max() <= seen.max() + beyond)
+def _covers(training: FloatArray, other: FloatArray) -> bool:
+    beyond = _INSIDE * float(np.ptp(np.append(training, other)))
+    return bool(other.min() >= training.min() - beyond and other.max() <= training.max() + beyond)
 
 
-def _is_inside(seen: FloatArray, other: FloatArray) -> npt.NDArray[np.bool_]:
-    return np.asarray((other >= seen.min()) & (other <= seen.max()))
+def _is_inside(training: FloatArray, other: FloatArray) -> npt.NDArray[np.bool_]:
+    return np.asarray((other >= training.min()) & (other <= training.max()))
 
 
 def _noise(records: Sequence[Record]) -> float:
-    """Rms of white noise as the third differences of the outputs show it, those of smooth outputs being small."""
+    """Rms of white noise, from the third differences of the outputs: those of smooth outputs are small."""
     return rms([np.diff(record.y, 3) for record in records]) / math.sqrt(20.0)
 
 
 def rms(parts: Sequence[FloatArray]) -> float:
-    """Root mean square of what is not nan."""
     values = np.concatenate(parts) if parts else np.empty(0)
     counts = values[~np.isnan(values)]
     return float(np.sqrt(np.mean(counts**2))) if counts.size else math.nan
@@ -247,11 +237,9 @@ def rms(parts: Sequence[FloatArray]) -> float:
 def rate_spread(records: Sequence[Record]) -> float:
     """How much the input's rate differs between passes at the same input; 1 for one rate, nan without time.
 
-    The input's range, all records together, has nine equal bands between 5 and 95 % of it. A branch that crosses a
-    band has there the rate band over time of crossing, a stop at an edge being divided in its middle. In each band the
-    95th percentile of the rates is divided by the 5th, all records having the same weight. The median over the bands
-    that are crossed more than once is taken, or over those that two records cross. So a sine has one rate, and so has a
-    triangle of any amplitude; sines of two amplitudes, or of a decaying one, have several.
+    The input's range has nine equal bands between 5 and 95 % of it. A branch that crosses one has there the rate band
+    over time of crossing. In each band the 95th percentile of the rates is divided by the 5th, all records having the
+    same weight; the median over the bands that two records cross, or else all, is taken.
     """
     if any(record.t is None for record in records):
         return math.nan
@@ -264,7 +252,7 @@ def rate_spread(records: Sequence[Record]) -> float:
 
 
 def at_one_rate(record: Record) -> list[Samples]:
-    """The stretches of a record whose cycles have one rate, one after the other; the whole where that is one."""
+    """Samples of the consecutive parts of a record whose cycles have one rate."""
     everything = np.arange(len(record))
     if record.t is None:
         return [everything]

@@ -2,12 +2,10 @@
 
     m y'' + c y' + k y + z = u,    z' = sum of coefficients times terms in (y', z)
 
-For given coefficients z follows from y by integration, so that neither y'' nor z' is taken of noise. Both sides of
-the equation of motion are filtered alike (`hysim.plants.equation_of_motion`). It is linear in m, c and k, which are
-projected out, and the slopes of z along the coefficients come with z: a Gauss-Newton step is a regression on terms. z
-= A y is no error of the equation where k is free, so that only the curvature of the memory distinguishes A from k;
-the descent begins from several shares of the stiffness. Reversals that noise makes add to the length of the path of
-y, which biases the numbers by a percent or so: a refinement by simulation begins with them.
+For given coefficients z follows from y by integration, so that no noise is differentiated. Both sides of the equation
+of motion are filtered alike (`hysim.models.equation_of_motion`); m, c and k are projected out, and a Gauss-Newton step
+is a regression on the slopes of z. Only the curvature of the memory distinguishes A from k: the descent begins from
+several shares of the stiffness. Noise lengthens the path of y, a bias of about a percent; a simulation refines it.
 """
 
 import itertools
@@ -36,7 +34,7 @@ _DEGREE = 3
 
 
 class Regressed(NamedTuple):
-    """A law, the plant that goes with it, and the share of the filtered force that they leave unexplained."""
+    """A law, the plant that goes with it, and the unexplained share of the filtered force."""
 
     coefficients: dict[Term, float]
     plant: dict[str, float]
@@ -44,12 +42,12 @@ class Regressed(NamedTuple):
 
 
 class _Along(NamedTuple):
-    """One motion: its filter, its increments, their time, and how much of the memory along them is kept."""
+    """One motion: its filter, its increments, their time, and the samples of the memory along them."""
 
     filtered: Filter
     steps: FloatArray
     h: float
-    kept: slice
+    samples: slice
 
 
 class MemoryArrays(NamedTuple):
@@ -62,7 +60,7 @@ class MemoryArrays(NamedTuple):
 
 
 def memory_arrays(coefficients: Mapping[Term, float], degree: int) -> MemoryArrays:
-    """The law with these coefficients, whose powers that are not whole must be one."""
+    """The law with these coefficients; terms whose powers are not whole must share one power."""
     polynomial, extra, power = np.zeros((2, 2, degree + 1)), np.zeros((2, 2)), 1.0
     for term, value in coefficients.items():
         if term.is_polynomial:
@@ -105,19 +103,19 @@ class HiddenMemory:
         self._size = float(np.linalg.norm(force))
 
     def fit(self, terms: Sequence[Term]) -> Regressed | None:
-        """The law of these terms, the first of which is u', from the best of several starts; None if all diverge."""
+        """Law of these terms, the first of which is u', from the best of several starts; None if all diverge."""
         spring = self.linear.stiffness
         shares = [1.0 - self.known["stiffness"] / spring] if "stiffness" in self.known else SHARES
         starts = [np.array([max(share, 0.01) * spring, *np.zeros(len(terms) - 1)]) for share in shares]
         return _best(self._descended(terms, start) for start in starts)
 
     def nearest(self) -> Regressed | None:
-        """The Bouc-Wen law with a whole n, or the linear relaxation, of the smallest error; None if all diverge."""
+        """Bouc-Wen law with a whole n, or linear relaxation, of the smallest error; None if all diverge."""
         laws = [bouc_wen_terms(n) for n in POWERS] + [(bouc_wen_terms(1.0)[0], RELAXATION)]
         return _best(map(self.fit, laws))
 
     def regression(self, library: Sequence[Term]) -> TermRegression:
-        """The regression of what a linear spring leaves on all terms, whose slopes are those about z = A y."""
+        """Regression on all terms, about z = A y, of the force that a linear spring does not explain."""
         spring = bouc_wen_terms(1.0)[0]
         terms = (spring, *(term for term in library if term != spring))
         share = 1.0 - self.known.get("stiffness", 0.5 * self.linear.stiffness) / self.linear.stiffness
@@ -173,7 +171,7 @@ class HiddenMemory:
             memory = np.zeros((2 + len(polynomials), each.steps.size + 1))
             if not kernels.along(each.steps, each.h, polynomial, relaxation, units, memory[0], memory[1:]):
                 return None
-            signals.append(memory[[0, *place]][:, each.kept])
+            signals.append(memory[[0, *place]][:, each.samples])
         rows = self._stacked(signals, 0)
         return rows if np.isfinite(rows).all() else None
 

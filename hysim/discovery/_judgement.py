@@ -6,16 +6,16 @@ Models of three kinds are fitted to the same records and judged on samples that 
     lagging   a linear plant of one or two poles, or relaxations: memory that depends on time
     turning   the law, or a superposition of plays: memory that depends on the order of the extremes only
 
-The plays need no library, so that the verdict does not depend on whether the library has a good law for the records.
-Better means an rmse on held-out samples below BETTER times the other's.
+The plays need no library: the verdict does not depend on whether the library has a good law. Better means an rmse on
+held-out samples below BETTER times the other's.
 
 1. Neither a lagging nor a turning model is better than the still ones: "no structure found".
 2. One rate, or no time: "cannot be told from one rate".
 3. Several rates. Of the models that explain the held-out samples: "linear lag" if a lagging one is better than all
    others, "rate-independent hysteresis" if a turning one is. Else "no structure found": hysteresis followed by a lag,
    or noise.
-4. A law that diverges in free run, on the records or on steady cycles over their range, is no law: "no structure
-   found", unless the plays show at several rates that the records are hysteretic.
+4. If the law diverges in free run, on the records or on steady cycles over their range: "no structure found", unless
+   the plays show at several rates that the records are hysteretic.
 """
 
 import math
@@ -27,20 +27,8 @@ import numpy as np
 from hysim import metrics, signals
 from hysim._cycles import TOLERANCE, complete_cycles
 from hysim._frozen import FloatArray, frozen
-from hysim.discovery._held_out import (
-    CURVE,
-    LAW,
-    PLAYS,
-    RELAXATIONS,
-    RIVAL,
-    SEVERAL,
-    Law,
-    Refit,
-    Trial,
-    competitors_held_out,
-    law_held_out,
-    rate_spread,
-)
+from hysim.discovery import _held_out as held_out
+from hysim.discovery._held_out import CURVE, LAW, PLAYS, RELAXATIONS, RIVAL, SEVERAL, Law, Refit, Trial
 from hysim.discovery._rival import FLOOR, Rival, rival, steady_width
 from hysim.errors import SimulationError
 from hysim.plants.transfer_function import TransferFunction
@@ -72,26 +60,26 @@ class Judgement:
         ``"rate-independent hysteresis"``, ``"linear lag"``, ``"cannot be told from one rate"`` or
         ``"no structure found"``.
     rival : TransferFunction or None
-        The linear plant fitted to the same records, with the initial state of the longest one; of degree 0 where a
-        line does as well. None where a record has no time.
+        Linear plant fitted to the same records, with the initial state of the longest one; of degree 0 where a line
+        does as well, None where a record has no time.
     rival_offset : float
-        What is added to its output [unit of y].
+        Offset of its output [unit of y].
     held_out : mapping
         Rmse on samples that were left out of the fit, about a slow trend of each record [unit of y]: ``"law"``;
         ``"rival"``, the linear plant; ``"relaxations"``, linear creep; ``"curve"``, a function of the input alone;
-        ``"plays"``, a superposition of functions of plays. Without time that of the linear ones is nan.
+        ``"plays"``, a superposition of functions of plays. Without time nan for the linear ones.
     held_out_by : str
         What was left out at a time: ``"record"``, ``"rate"``, ``"cycle"`` or ``"block"``.
     rates : array, shape (3,)
         Multiples of the rate of the longest record.
     widths : mapping
-        ``"law"`` and ``"rival"`` to the relative widths at these rates of the last complete cycle of the law's free
-        run along that record, and of the steady loop of the rival. nan where the record has no complete cycle.
+        ``"law"`` and ``"rival"`` to the relative widths of their loops at these rates, along that record's last and
+        first complete cycle; nan where it has none.
     dissipation : float
         Signed area of the law's steady loop over the range of the input [unit of y times unit of u], positive where
         it runs counterclockwise, as a piezoelectric actuator's does.
     one_sign : bool
-        Whether loops of a quarter, a half and three quarters of that range have areas of that sign too, or none.
+        Whether no smaller loop (a quarter, a half, three quarters of that range) has an area of the other sign.
     rate_spread : float
         How much the rate of the input differs between passes at the same input, from 1; nan without time.
     stable : bool
@@ -116,10 +104,7 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Competitors:
-    """The models that need no law, tried on records: they are the same whatever law is judged beside them.
-
-    `records` have even times, and long ones are thinned; `spread` is their `rate_spread`.
-    """
+    """Models that need no law, fitted to records with even times; `spread` is their `rate_spread`."""
 
     records: Sequence[Record]
     linear: Rival | None
@@ -141,27 +126,25 @@ class Competitors:
 
 
 def competitors(records: Sequence[Record]) -> Competitors:
-    """Fit the models that need no law."""
     timed = all(record.t is not None for record in records)
-    spread = rate_spread(records)
+    spread = held_out.rate_spread(records)
     records = _thinned([_even(record) for record in records] if timed else records)
     linear = rival(records) if timed else None
-    return Competitors(records, linear, competitors_held_out(records, linear), spread)
+    return Competitors(records, linear, held_out.competitors_held_out(records, linear), spread)
 
 
 def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, others: Competitors | None = None) -> Judgement:
-    """Judge a law that was fitted to records beside its rivals.
+    """Judge a law that was fitted to records beside its competitors; `laws` has one for each record.
 
-    `laws` is the law once for each record: all is shared but the memory at the first sample. `refit(records, weights)`
-    returns such laws, fitted to the samples whose weights are not zero.
+    `refit(records, weights)` returns such laws, fitted to the samples whose weights are not zero.
     """
     others = others or competitors(records)
     records, linear, spread = others.records, others.linear, others.spread
-    trial = law_held_out(others.trial, records, refit)
+    trial = held_out.law_held_out(others.trial, records, refit)
     longest = max(range(len(records)), key=lambda k: len(records[k]))
     loops = _loops(laws[longest], records[longest].u)
     areas = np.array([math.nan if loop is None else signed_area(loop) for loop in loops])
-    stable = all(_response(law, record) is not None for law, record in zip(laws, records, strict=True))
+    stable = all(_response(law, record.u) is not None for law, record in zip(laws, records, strict=True))
     stable = stable and loops[-1] is not None
     single_valued = all(loop is not None and loop.relative_width < LEAST for loop in loops)
     verdict = _verdict(trial, linear, single_valued, spread)
@@ -202,7 +185,7 @@ def _verdict(trial: Trial, linear: Rival | None, single_valued: bool, spread: fl
 
 
 def _still(trial: Trial, linear: Rival | None, single_valued: bool = False) -> float:
-    """The error of the best model without memory, which the law is if it is `single_valued`."""
+    """Error of the best model without memory; the law is one if it is `single_valued`."""
     straight = linear is not None and linear.is_line
     return _least(trial, [CURVE, *[RIVAL] * straight, *[LAW] * single_valued])
 
@@ -217,15 +200,15 @@ def _least(trial: Trial, names: Sequence[str]) -> float:
     return min((error for error in errors if not math.isnan(error)), default=math.inf)
 
 
-def _response(law: Law, record: Record) -> FloatArray | None:
+def _response(law: Law, u: FloatArray) -> FloatArray | None:
     try:
-        return law.response(record.u)
+        return law.response(u)
     except SimulationError:
         return None
 
 
 def _width(law: Law, record: Record) -> float:
-    y = _response(law, record)
+    y = _response(law, record.u)
     if y is None or not complete_cycles(record.u, TOLERANCE):
         return math.nan
     return metrics.loop_metrics(record.u, y).relative_width
@@ -239,16 +222,12 @@ def _rival_widths(linear: Rival | None, k: int, record: Record) -> tuple[float, 
 
 
 def _loops(law: Law, u: FloatArray) -> list[metrics.LoopMetrics | None]:
-    """Steady loops of a quarter of the input's range to all of it, around its middle; None where the law diverges."""
     middle, reach = 0.5 * (u.max() + u.min()), 0.5 * float(np.ptp(u))
     loops: list[metrics.LoopMetrics | None] = []
     for share in _AMPLITUDES:
         cycles = signals.triangle(middle - share * reach, middle + share * reach, cycles=_CYCLES, samples_per_cycle=64)
-        path = np.append(u[0], cycles)
-        try:
-            loops.append(metrics.loop_metrics(cycles, law.response(path)[1:]))
-        except SimulationError:
-            loops.append(None)
+        y = _response(law, np.append(u[0], cycles))
+        loops.append(None if y is None else metrics.loop_metrics(cycles, y[1:]))
     return loops
 
 
@@ -270,7 +249,7 @@ def _thinned(records: Sequence[Record]) -> list[Record]:
 
 
 def doubts(judgement: Judgement) -> tuple[str, ...]:
-    """Reasons to doubt a law, one sentence each, for `Discovery.warnings`."""
+    """Reasons to doubt a law, one sentence each."""
     errors = judgement.held_out
     law, plays, curve = errors[LAW], errors[PLAYS], errors[CURVE]
     linear = min((errors[name] for name in (RIVAL, RELAXATIONS) if not math.isnan(errors[name])), default=math.inf)
@@ -308,7 +287,7 @@ def _no_structure(judgement: Judgement, turning: float, linear: float, curve: fl
             "behind a curve. Identify the law and the dynamics together, for instance as hs.Actuator."
         )
     return (
-        f"Models that know time and models that do not predict held-out samples about equally well (rmse {linear:.3g} "
-        f"and {turning:.3g}): noise hides what the rates could tell. Record more cycles, or rates further "
+        f"Models that depend on time and models that do not predict held-out samples about equally well (rmse "
+        f"{linear:.3g} and {turning:.3g}): noise hides the effect of the rate. Record more cycles, or rates further "
         "apart, with less noise."
     )

@@ -2,9 +2,8 @@
 
     z' = A u' - beta |u'| |z|^(n-1) z - gamma u' |z|^n
 
-is the law of the terms u', |u'| |z|^(n-1) z and u' |z|^n. With y = feedthrough u + gain z only the products of gain
-with the others can be told: where there is a feedthrough A is 1, as everywhere in hysim, and otherwise the memory is
-the output and the gain is 1.
+With y = feedthrough u + gain z only the products of gain with the others are determined: with a feedthrough A is 1,
+otherwise the memory is the output and the gain is 1.
 """
 
 import math
@@ -29,10 +28,9 @@ OTHERS = ("n", "feedthrough", "offset", "gain")
 
 
 class ModelledLaw(NamedTuple):
-    """A law: a model for each record, its numbers and their standard errors by name, and the law as text.
+    """A model for each record, numbers and standard errors by name, and the law as text.
 
-    `parameters` are the numbers that are no coefficients, `initial_states` the memory at the first sample of each
-    record, in the letter of the equation.
+    `parameters` are the numbers that are no coefficients, `initial_states` the memory at the first samples.
     """
 
     models: tuple[Any, ...]
@@ -62,7 +60,6 @@ def law_from(candidate: Candidate[Any], records: Sequence[Record], letter: str) 
 
 
 def coefficients(structure: Terms, unknowns: FloatArray, letter: str) -> dict[str, float]:
-    """The coefficients of a structure with these numbers, by name."""
     return _coefficients(_numbers(structure, letter)(unknowns[: structure.size]))
 
 
@@ -92,7 +89,6 @@ def _of_any_exponent(unknowns: FloatArray, shifts: Sequence[str]) -> dict[str, f
 
 
 def _normalised(values: dict[str, float], n: float) -> dict[str, float]:
-    """The same Bouc-Wen law with A = 1 and a gain; as it is if A is zero."""
     gain = values.get(_A, 0.0)
     if gain == 0.0:
         return values
@@ -107,7 +103,6 @@ def _coefficients(values: dict[str, float]) -> dict[str, float]:
 
 
 def _stderr(candidate: Candidate[Any], numbers: Callable[[FloatArray], dict[str, float]]) -> dict[str, float]:
-    """Standard errors of the numbers, carried forward by their derivatives."""
     size = candidate.structure.size
     unknowns, covariance = candidate.unknowns[:size], candidate.covariance[:size, :size]
     steps = _STEP * np.diag(np.where(unknowns == 0.0, 1.0, unknowns))

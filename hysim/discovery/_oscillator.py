@@ -1,27 +1,21 @@
-"""The verb `discover_oscillator`: a memory found from an oscillator's input and output alone.
-
-    m y'' + c y' + k y + z = u,    z' = sum of coefficients times terms in (y', z)
-
-The search is `hysim.discovery._oscillator_search`; here its arguments are checked, and records are looked at for how
-they were made.
-"""
+"""The verb `discover_oscillator`: its arguments; `hysim.discovery._oscillator_search` has the search."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, check_positive
 from hysim._parallel import Progress
 from hysim.discovery._oscillator_response import Response
 from hysim.discovery._oscillator_search import Search
 from hysim.discovery._result import OscillatorDiscovery
-from hysim.laws.differential.terms import RELAXATION, Term, memory_terms, symmetric
-from hysim.plants.oscillator import BoucWenOscillator
-from hysim.plants.oscillator_structure import OscillatorStructure
-from hysim.records import Record
+from hysim.models.oscillator import BoucWenOscillator
+from hysim.models.oscillator_structure import OscillatorStructure
+from hysim.models.terms import RELAXATION, Term, memory_terms, symmetric
+from hysim.records import Record, several
 
-_REPEATS = 1e-3  # of the input's rms: how nearly a period must repeat itself to be seen
+_REPEATS = 1e-3  # of the input's rms: largest difference of two periods that count as alike
 _TRANSIENT = 1.5  # rms of what changes from period to period, early in the period over late
 
 
@@ -39,9 +33,8 @@ def discover_oscillator(
 ) -> OscillatorDiscovery:
     """Discover the law of the memory in a mass on a hysteretic spring, ``m y'' + c y' + k y + z = u``.
 
-    The plant and the law are found together, from force u and displacement y. Bouc-Wen laws, a linear relaxation and
-    laws of the terms that the records ask for are refined by the error of the simulated oscillator; the one of lowest
-    BIC is taken.
+    Plant and law are found together, from force u and displacement y. Bouc-Wen laws, a linear relaxation and laws of
+    other terms are refined by the error of the simulated oscillator; the one of lowest BIC is taken.
 
     Parameters
     ----------
@@ -49,8 +42,8 @@ def discover_oscillator(
         Force, displacement and time, evenly spaced; all of one plant. They must hold several swings, large enough for
         the memory to be curved: only its curvature distinguishes A from k.
     structure : OscillatorStructure, optional
-        How the records were made, from ``BoucWenOscillator.structure(...)``. By default a record whose input
-        repeats itself and whose periods are alike is taken as steady, any other record as beginning at rest.
+        How the records were made, from ``BoucWenOscillator.structure(...)``. By default a record is taken as steady if
+        its input repeats itself and its periods are alike, otherwise as beginning at rest.
     mass, damping, stiffness : float, optional
         Known parts of the plant [u per unit of y''; y'; y].
     degree : {1, 2, 3}
@@ -58,7 +51,7 @@ def discover_oscillator(
     symmetry : {None, "odd"}
         ``"odd"`` leaves out terms that do not change their sign with u and z.
     seed : int
-        Of the resampling behind `OscillatorDiscovery.inclusion`.
+        Seed of the resampling behind `OscillatorDiscovery.inclusion`.
     progress : callable, optional
         Called as ``progress(done, total)``.
 
@@ -87,16 +80,12 @@ def discover_oscillator(
     >>> {term: round(value) for term, value in dis.coefficients.items()}
     {"u'": 50000, "|u'| z": -800, "u' |z|": 300}
     """
-    records = (record_or_records,) if isinstance(record_or_records, Record) else record_or_records
-    if not isinstance(records, Sequence) or not records or not all(isinstance(each, Record) for each in records):
-        raise TypeError(
-            f"discover_oscillator takes a Record or several, got {type(records).__name__}: hs.Record(u=u, y=y, t=t)"
-        )
+    records = several(record_or_records, "discover_oscillator")
     library = _library(degree, symmetry)
     known = _known_plant({"mass": mass, "damping": damping, "stiffness": stiffness})
     chosen = _structure(records, structure)
     others = () if structure is not None or chosen.period is None else (replace(chosen, hold="foh"),)
-    search = Search(Response(chosen, tuple(records), known), library, seed, progress or (lambda done, total: None))
+    search = Search(Response(chosen, records, known), library, seed, progress or (lambda done, total: None))
     return search.result(others)
 
 
@@ -109,7 +98,7 @@ def recorded(record: Record) -> OscillatorStructure:
 
 
 def _library(degree: int, symmetry: str | None) -> tuple[Term, ...]:
-    """The terms by their power of z, those that are combinations of earlier ones being left out."""
+    """The terms by their power of z, without combinations of earlier ones."""
     if degree not in (1, 2, 3):
         raise ValueError(f"degree must be 1, 2 or 3, got {degree!r}")
     if symmetry not in (None, "odd"):
@@ -122,7 +111,7 @@ def _structure(records: Sequence[Record], structure: OscillatorStructure | None)
     if structure is None:
         made = {recorded(record) for record in records}
         if len(made) > 1:
-            raise ValueError("the records were not all made alike: say how by structure=, or give one at a time")
+            raise ValueError("the records were made in different ways: give structure=, or one record at a time")
         return made.pop()
     if not isinstance(structure, OscillatorStructure):
         raise TypeError(f"structure comes from BoucWenOscillator.structure(...), got {type(structure).__name__}")
@@ -141,13 +130,12 @@ def _known_plant(plant: Mapping[str, float | None]) -> dict[str, float]:
         if not np.isfinite(value):
             raise ValueError(f"{name} must be finite, got {value}")
         known[name] = float(value)
-    if known.get("mass", 1.0) <= 0.0:
-        raise ValueError(f"mass must be positive, got {known['mass']}")
+    check_positive(mass=known.get("mass"))
     return known
 
 
 def _period(u: FloatArray) -> int | None:
-    """The smallest shift, up to half of the record, by which an input repeats itself."""
+    """Smallest shift, up to half of the record, by which an input repeats itself."""
     n = u.size
     if np.ptp(u) == 0.0:
         return None

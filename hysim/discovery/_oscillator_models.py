@@ -1,11 +1,9 @@
-"""The model of a discovered oscillator: what hysim simulates of its law.
+"""Models of a discovered oscillator, where hysim has one.
 
-    z' = A y' - beta |y'| |z|^(n-1) z - gamma y' |z|^n    BoucWenOscillator
-    z' = A y' - r z                                       TransferFunction, since all of it is linear:
+z' = A y' - beta |y'| |z|^(n-1) z - gamma y' |z|^n    BoucWenOscillator
+z' = A y' - r z                                       TransferFunction, since all of it is linear:
 
-    Y / U = (s + r) / ((m s^2 + c s + k) (s + r) + A s)
-
-Any other law has no model.
+Y / U = (s + r) / ((m s^2 + c s + k) (s + r) + A s)
 """
 
 from collections.abc import Iterable, Mapping
@@ -34,15 +32,12 @@ _SAMPLES = 65  # of a branch
 
 
 class State(NamedTuple):
-    """Displacement, velocity and memory at the first sample."""
-
     y: float
     velocity: float
     z: float
 
 
 def verdict(terms: Iterable[Term]) -> str:
-    """The kind of law that has these terms."""
     present = set(terms)
     if RELAXATION in present:
         return LAG if present <= {SPRING, RELAXATION} else RATE_DEPENDENT
@@ -52,7 +47,7 @@ def verdict(terms: Iterable[Term]) -> str:
 def model(
     plant: Mapping[str, float], law: Mapping[Term, float], structure: OscillatorStructure, state: State
 ) -> Model | None:
-    """The model of an oscillator that begins in a state; None where hysim has none."""
+    """Model of an oscillator that begins in a state; None where hysim has none."""
     kind, n = verdict(law), bouc_wen_exponent(law)
     if kind == LAG:
         return _lag(plant, law[RELAXATION], law.get(SPRING, 0.0), structure.hold, state)
@@ -78,10 +73,7 @@ def diverges(oscillator: Model | None, y: FloatArray) -> bool:
 
 
 def steady_loop(oscillator: Model | None, y: FloatArray) -> tuple[float, float]:
-    """Relative width and signed area of the memory's steady loop over the range of the displacements `y`.
-
-    Both are nan where the memory is no Bouc-Wen law; a `SimulationError` says that it diverges.
-    """
+    """Relative width and signed area of the memory's loop over the range of `y`; nan if it is no Bouc-Wen law."""
     law = oscillator.law if isinstance(oscillator, BoucWenOscillator) else None
     if not isinstance(law, BoucWen):
         return np.nan, np.nan

@@ -2,9 +2,8 @@
 
     y = y0 + sum of (coefficient - its value) times dy/d(coefficient) + the same for m, c and k
 
-About a law that simulates the record well the residual is white, whatever the noise does to y' and z, and the slopes
-are free of noise. So this regression, unlike one of z' on noisy signals, has no bias, its standard errors are right and
-its BIC counts (`_term_regression`).
+About a law that simulates the record well the residual is white and the slopes are free of noise. Unlike one of z' on
+noisy signals, this regression has no bias, and its standard errors and BIC are right (`_term_regression`).
 """
 
 import itertools
@@ -34,8 +33,6 @@ _STEADY = 1e-9  # relative change of the state from period to period
 
 
 class Oscillator(NamedTuple):
-    """A plant and the coefficients of its memory."""
-
     plant: dict[str, float]
     coefficients: dict[Term, float]
 
@@ -50,12 +47,11 @@ class Response:
 
     @cached_property
     def measured(self) -> FloatArray:
-        """Outputs of all records, one after the other, (n_samples,)."""
         return np.concatenate([record.y for record in self.records])
 
     @cached_property
     def widest(self) -> FloatArray:
-        """The displacements of the record in which they have the largest range."""
+        """Displacements of the record in which they have the largest range."""
         return max((record.y for record in self.records), key=lambda y: float(np.ptp(y)))
 
     @cached_property
@@ -65,7 +61,6 @@ class Response:
 
     @cached_property
     def free(self) -> tuple[str, ...]:
-        """The plant's free parameters."""
         return tuple(name for name in PLANT if name not in self.known)
 
     @cached_property
@@ -73,14 +68,13 @@ class Response:
         return [(self.structure.fine_input(r.u), r.sample_time / self.structure.oversampling) for r in self.records]
 
     def outputs(self, oscillators: Sequence[Oscillator]) -> FloatArray:
-        """Simulated outputs, (n_oscillators, n_samples); inf where one diverges or never is steady."""
         outputs = np.full((len(oscillators), self.measured.size), np.inf)
         begins = np.cumsum([0, *map(len, self.records)])
 
         def work(start: int, stop: int) -> None:
             for k in range(start, stop):
-                for record, begin, given in zip(self.records, begins, self._inputs, strict=False):
-                    run = self._run(oscillators[k], *given)
+                for record, begin, force_and_step in zip(self.records, begins, self._inputs, strict=False):
+                    run = self._run(oscillators[k], *force_and_step)
                     if run is not None:
                         y = np.resize(self.structure.sampled(run[0]), len(record))
                         outputs[k, begin : begin + len(record)] = y
@@ -90,12 +84,13 @@ class Response:
 
     def initial_states(self, oscillator: Oscillator) -> tuple[State, ...]:
         """State at the first sample of each record: rest, or that of the steady motion under a periodic input."""
-        runs = [self._run(oscillator, *given) if self.structure.period else None for given in self._inputs]
+        runs = [
+            self._run(oscillator, *force_and_step) if self.structure.period else None for force_and_step in self._inputs
+        ]
         missing = np.nan if self.structure.period else 0.0
         return tuple(State(*([missing] * 3 if run is None else run[1].tolist())) for run in runs)
 
     def _run(self, oscillator: Oscillator, force: FloatArray, h: float) -> tuple[FloatArray, FloatArray] | None:
-        """Displacement at the ends of the steps, and the last state, in a steady motion that of the first sample."""
         degree = max((int(term.degree) for term in oscillator.coefficients if term.is_polynomial), default=0)
         polynomial, extra, power, relaxation = memory_arrays(oscillator.coefficients, degree)
         plant = np.array([*(oscillator.plant[name] for name in PLANT), relaxation, power])
@@ -125,10 +120,7 @@ class Response:
         return None
 
     def slopes(self, oscillator: Oscillator, terms: Sequence[Term]) -> FloatArray:
-        """Derivatives of the output by the plant's free parameters and the coefficients of `terms`, (n_samples, n).
-
-        Zero where the motion would diverge, or never be steady, with any of the differences.
-        """
+        """Derivatives of the output by free parameters and coefficients of `terms`, (n_samples, n); zero if unknown."""
         slopes = np.zeros((self.measured.size, len(self.free) + len(terms)))
         missing = np.arange(slopes.shape[1])
         for difference in _DIFFERENCES:
@@ -164,7 +156,6 @@ class Response:
             return np.asarray((ahead - behind).T / (2.0 * by))
 
     def descended(self, oscillator: Oscillator) -> Oscillator:
-        """The optimum below an oscillator."""
         terms = tuple(oscillator.coefficients)
 
         def at(x: FloatArray) -> Oscillator:
@@ -186,7 +177,7 @@ class Response:
         return at(descend(problem, np.array([start]), relative=1e-7, steps=100, schedule=OSCILLATOR_SCHEDULE).x[0])
 
     def regression(self, oscillator: Oscillator, residual: FloatArray, library: Sequence[Term]) -> TermRegression:
-        """The regression about an oscillator with this residual on all terms of the library and its own."""
+        """Regression about an oscillator with this residual on all terms of the library and its own."""
         terms = (*library, *(term for term in oscillator.coefficients if term not in library))
         slopes = self.slopes(oscillator, terms)
         n_plant = len(self.free)
@@ -195,17 +186,14 @@ class Response:
         return term_regression(terms, slopes[:, :n_plant], slopes[:, n_plant:], target, self.floor, self._blocks)
 
     def held_out_rmse(self, oscillator: Oscillator, residual: FloatArray) -> float:
-        """Rmse on each block, predicted by an oscillator with this residual that the other blocks fit [unit of y].
-
-        The fits are linear, about the oscillator.
-        """
+        """Rmse on each block, predicted by a linear fit about the oscillator to the other blocks [unit of y]."""
         slopes, total = self.slopes(oscillator, tuple(oscillator.coefficients)), 0.0
         sizes = np.linalg.norm(slopes, axis=0)
         slopes = slopes / np.where(sizes > 0.0, sizes, 1.0)
         for block in self._blocks:
-            seen = np.ones(residual.size, dtype=bool)
-            seen[block] = False
-            change = np.linalg.lstsq(slopes[seen], residual[seen], rcond=None)[0]
+            fitted = np.ones(residual.size, dtype=bool)
+            fitted[block] = False
+            change = np.linalg.lstsq(slopes[fitted], residual[fitted], rcond=None)[0]
             total += float(np.sum((residual[block] - slopes[block] @ change) ** 2))
         return float(np.sqrt(total / residual.size))
 

@@ -1,17 +1,15 @@
 """The search behind `hysim.discover_oscillator`: candidates for the law of the memory, and the choice of one.
 
-1. A rival without memory, a mass on a linear spring, is identified. About it all terms of the library are tried: if
-   none lowers the BIC, there is no structure.
-2. Along the measured motion the laws of Bouc and Wen with n = 1, 2 and 3 and a linear relaxation are regressed
+1. A mass on a linear spring is identified. If none of the library's terms lowers its BIC, there is no structure.
+2. Along the measured motion Bouc-Wen laws with n = 1, 2 and 3 and a linear relaxation are regressed
    (`_hidden_memory`); the search begins with the nearest one.
 3. It is refined by simulation error (`hysim.identify`).
-4. About the refined law the whole library is regressed, the law's own terms like all others: PySINDy's STLSQ and plain
-   elimination from dense to sparse, one structure by BIC, inclusion by bagging (`_oscillator_response`). Terms that are
-   not chosen leave the law, which is refined again. If terms come in, the Bouc-Wen law is refined with n free and with
-   n at the nearest whole number, and where terms come in about the best of these too, the law of these terms. All this
-   is done for each way in which the records may have been made.
-5. Of all refined laws that do not diverge, the linear spring among them, the one of the lowest BIC is taken, each with
-   the same samples and the same floor; every number that has a standard error counts as a parameter.
+4. About the refined law the whole library is regressed: PySINDy's STLSQ and plain elimination from dense to sparse, one
+   structure by BIC, inclusion by bagging (`_oscillator_response`). Terms that are not chosen leave the law, which is
+   refined again. If terms come in, the Bouc-Wen law is refined with n free and with n at the nearest whole number, and
+   where terms come in about these too, the law of these terms. All this is done for each structure of the records.
+5. Of all refined laws that do not diverge, the linear spring among them, the one of the lowest BIC is taken; every
+   number that has a standard error counts as a parameter.
 """
 
 import contextlib
@@ -26,15 +24,7 @@ from hysim._frozen import FloatArray
 from hysim._parallel import Progress
 from hysim.discovery._hidden_memory import PLANT, HiddenMemory, Regressed
 from hysim.discovery._judgement import NO_STRUCTURE
-from hysim.discovery._oscillator_models import (
-    RATE_DEPENDENT,
-    SPRING,
-    State,
-    diverges,
-    model,
-    steady_loop,
-    verdict,
-)
+from hysim.discovery._oscillator_models import RATE_DEPENDENT, SPRING, State, diverges, model, steady_loop, verdict
 from hysim.discovery._oscillator_response import Oscillator, Response
 from hysim.discovery._result import OscillatorDiscovery
 from hysim.discovery._term_regression import TermRegression
@@ -62,7 +52,7 @@ _DIVERGES = "A law of lower BIC diverges on cycles over the measured range, and 
 
 
 class _Fitted(NamedTuple):
-    """A refined oscillator, the standard errors by name, its residual (n_samples,), and what went wrong."""
+    """A refined oscillator, the standard errors by name, its residual (n_samples,), and warnings."""
 
     oscillator: Oscillator
     stderr: dict[str, float]
@@ -71,11 +61,9 @@ class _Fitted(NamedTuple):
 
     @property
     def terms(self) -> tuple[Term, ...]:
-        """The terms of the law."""
         return tuple(self.oscillator.coefficients)
 
     def bic(self, floor: float) -> float:
-        """Bayesian information criterion; each number that has a standard error counts as a parameter."""
         return information(float(np.mean(self.residual**2)), self.residual.size, len(self.stderr), floor=floor)
 
 
@@ -89,12 +77,11 @@ class _Tried(NamedTuple):
 
     @property
     def beyond(self) -> set[Term]:
-        """Terms that are chosen and not in the law."""
         return set(self.chosen) - set(self.fitted.terms)
 
 
 class Search(NamedTuple):
-    """The response of oscillators on some records, which says how these were made, and the library of terms."""
+    """The response of oscillators on records of one structure, and the library of terms."""
 
     response: Response
     library: tuple[Term, ...]
@@ -102,7 +89,7 @@ class Search(NamedTuple):
     progress: Progress
 
     def result(self, others: Sequence[OscillatorStructure] = ()) -> OscillatorDiscovery:
-        """Steps 1 to 5; `others` are other ways in which the records may have been made."""
+        """Steps 1 to 5; `others` are other structures that the records may have."""
         motions = [self.response.structure.motion(record) for record in self.response.records]
         linear = linear_plant(motions[0])
         if linear is None:
@@ -141,7 +128,7 @@ class Search(NamedTuple):
         return self._replace(response=replace(self.response, structure=structure))
 
     def _again(self, candidates: "Sequence[tuple[Search, _Tried]]") -> "list[tuple[Search, _Tried]]":
-        """Candidates by this belief about how the records were made; none if it suits the best Bouc-Wen law less."""
+        """Candidates by this structure of the records; none if it suits the best Bouc-Wen law less."""
         laws = [each for _, each in candidates if bouc_wen_exponent(each.fitted.terms) is not None]
         if not laws:
             return []
@@ -156,7 +143,7 @@ class Search(NamedTuple):
         return tried.fitted.bic(self.response.floor)
 
     def _without_memory(self, linear: Linear) -> _Fitted:
-        """The rival without a memory. Where the stiffness is given, z = A y is the rest of the spring."""
+        """The linear spring. Where the stiffness is known, z = A y is the rest of the spring."""
         plant: dict[str, float] = {**linear._asdict(), **self.response.known}
         springs = {SPRING: linear.stiffness - plant["stiffness"]} if "stiffness" in self.response.known else {}
         refined = self._simulated(Oscillator(plant, springs))
@@ -166,7 +153,6 @@ class Search(NamedTuple):
         return refined._replace(oscillator=Oscillator(plant, {}), stderr=stderr)
 
     def _refined(self, nearest: Regressed) -> _Fitted:
-        """Step 3."""
         if RELAXATION in nearest.coefficients:
             return self._simulated(Oscillator(nearest.plant, nearest.coefficients))
         return self._bouc_wen(tuple(nearest.coefficients))
@@ -191,12 +177,12 @@ class Search(NamedTuple):
     def _pruned(self, tried: _Tried) -> list[_Tried]:
         """A Bouc-Wen law, and the same without those of its terms that are not chosen."""
         law = tried.fitted.terms
-        kept = tuple(term for term in law if term == SPRING or term in tried.chosen)
-        n = bouc_wen_exponent(kept)
-        if bouc_wen_exponent(law) is None or len(kept) == len(law) or n is None or n != int(n):
+        smaller = tuple(term for term in law if term == SPRING or term in tried.chosen)
+        n = bouc_wen_exponent(smaller)
+        if bouc_wen_exponent(law) is None or len(smaller) == len(law) or n is None or n != int(n):
             return [tried]
         with contextlib.suppress(ValueError):  # the law with all terms stays
-            return [tried, self._about(self._bouc_wen(kept))]
+            return [tried, self._about(self._bouc_wen(smaller))]
         return [tried]
 
     def _extended(self, tried: _Tried) -> _Tried | None:
@@ -242,13 +228,7 @@ class Search(NamedTuple):
         return _Fitted(Oscillator(plant, coefficients), stderr, fit.residual, tuple(warnings))
 
     def _simulated(self, oscillator: Oscillator) -> _Fitted:
-        """A law of any terms, refined by the simulation behind the regression.
-
-        Raises
-        ------
-        ValueError
-            If it diverges.
-        """
+        """A law of any terms, refined by the simulation behind the regression; a ValueError if it diverges."""
         refined = self.response.descended(oscillator)
         terms = tuple(refined.coefficients)
         residual = self.response.measured - self.response.outputs([refined])[0]
@@ -265,10 +245,7 @@ class Search(NamedTuple):
         return _Fitted(refined, dict(zip(names, errors.tolist(), strict=True)), residual)
 
     def _about(self, fitted: _Fitted) -> _Tried:
-        """The library about a law; where n is free, the terms that differ from the law's own by their power are none.
-
-        The law itself is among the structures: a path of elimination need not meet it.
-        """
+        """The library about a law; where n is free, without the terms that differ from the law's own by their power."""
         law = fitted.oscillator.coefficients
         same = {(t.rectified, t.is_even_in_memory) for t in law if not (t.is_polynomial or t.relaxing)}
         library = [t for t in self.library if not t.degree or (t.rectified, t.is_even_in_memory) not in same]
@@ -289,9 +266,8 @@ class Search(NamedTuple):
         fitted, regression, structures = tried.fitted, tried.regression, tried.structures
         plant, law = fitted.oscillator
         measured, response = self.response.measured, self.response
-        coefficients = {term.named("z"): value for term, value in law.items()}
-        shares = regression.inclusion(np.random.default_rng(self.seed), N_DRAWS)
-        inclusion = {term.named("z"): share for term, share in shares.items()}
+        coefficients = _by_name(law)
+        inclusion = _by_name(regression.inclusion(np.random.default_rng(self.seed), N_DRAWS))
         states = response.initial_states(fitted.oscillator)
         models = [model(plant, law, response.structure, state) for state in states]
         nothing = (_NO_MODEL,) if models[0] is None else ()
@@ -324,7 +300,7 @@ class Search(NamedTuple):
             initial="rest" if response.structure.period is None else "periodic",
             initial_states=tuple(dict(zip(("y0", "y'0", "z0"), state, strict=True)) for state in states),
             rival=TransferFunction(num=(1.0,), den=tuple(elastic.oscillator.plant[name] for name in PLANT), hold="foh"),
-            regressed={term.named("z"): value for term, value in regressed.items()},
+            regressed=_by_name(regressed),
             inclusion=inclusion,
             left_out=tuple(term.named("z") for term in regression.dependent),
             path_n_terms=np.array([len(terms) for terms in structures], dtype=float),
@@ -357,6 +333,10 @@ def _tried(fitted: _Fitted, regression: TermRegression) -> _Tried:
     return _Tried(fitted, regression, structures, regression.best(structures))
 
 
+def _by_name(values: Mapping[Term, float]) -> dict[str, float]:
+    return {term.named("z"): value for term, value in values.items()}
+
+
 def _is_polynomial(terms: Sequence[Term]) -> bool:
     return all(term.is_polynomial or term.relaxing for term in terms)
 
@@ -368,7 +348,7 @@ def _motion(plant: Mapping[str, float]) -> str:
 
 def _message(kind: str, warnings: Sequence[str]) -> str:
     if kind == NO_STRUCTURE:
-        return "no term of the library is worth its parameter beside a linear spring"
+        return "no term of the library lowers the BIC of a linear spring"
     if kind == RATE_DEPENDENT:
         return "the memory depends on the rate"
     return "" if warnings else "every term is needed, and no other"
@@ -377,11 +357,11 @@ def _message(kind: str, warnings: Sequence[str]) -> str:
 def _warnings(tried: _Tried, inclusion: Mapping[str, float]) -> tuple[str, ...]:
     parts = []
     if verdict(tried.fitted.terms) != NO_STRUCTURE and tried.beyond:
-        parts.append(f"The records ask for more terms: {', '.join(term.named('z') for term in sorted(tried.beyond))}.")
+        parts.append(f"More terms would lower the BIC: {', '.join(term.named('z') for term in sorted(tried.beyond))}.")
     names = [term.named("z") for term in tried.fitted.terms]
     doubtful = [name for name in names if inclusion.get(name, 0.0) < _SURE]
     if doubtful:
         parts.append(f"Some terms are not in every fit to resampled data: {', '.join(doubtful)}.")
     if tried.fitted.terms and tried.regression.condition > _LARGEST_CONDITION:
-        parts.append(f"The terms are hard to tell apart on these records (condition {tried.regression.condition:.0e}).")
+        parts.append(f"The terms are nearly collinear on these records (condition {tried.regression.condition:.0e}).")
     return tuple(parts)

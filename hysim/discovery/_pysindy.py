@@ -1,8 +1,7 @@
 """The only place that touches PySINDy (2.1): its optimizers, from dense to sparse, and its ensembles.
 
-Features and slopes come scaled, as arrays: PySINDy never differentiates, so that nothing is taken across a
-reversal, and never sees a unit. Its ensembles draw from NumPy's global generator, which is seeded around the call
-and put back.
+Features and slopes are scaled arrays: PySINDy never differentiates, so that nothing is taken across a reversal. Its
+ensembles draw from NumPy's global generator, which is seeded around the call and restored.
 """
 
 import contextlib
@@ -33,10 +32,9 @@ OPTIMIZERS = ("STLSQ", "SR3", "SSR", "FROLS")
 def sparse_path(features: FloatArray, slope: FloatArray, optimizer: str = "STLSQ") -> list[tuple[float, FloatArray]]:
     """Thresholds from zero up, and the coefficients (n_terms,) that the optimizer finds at each.
 
-    The next threshold is just above the smallest coefficient of the last result, so that every threshold changes the
-    result and none that matters is missed; SR3, whose coefficients may be smaller than its threshold, goes on in steps
-    of STEP. The path ends with the last term. SSR and FROLS have no threshold: their own sequence of structures is the
-    path, each with its smallest coefficient.
+    The next threshold is just above the smallest coefficient of the last result, so that none that matters is missed;
+    SR3, whose coefficients may be smaller than its threshold, goes on in steps of STEP. SSR and FROLS have no
+    threshold: their own sequence of structures is the path, each with its smallest coefficient.
     """
     features, slope = compressed(features, slope)
     if optimizer in ("SSR", "FROLS"):
@@ -52,7 +50,7 @@ def sparse_path(features: FloatArray, slope: FloatArray, optimizer: str = "STLSQ
 
 
 def compressed(features: FloatArray, slope: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """A regression with as many rows as terms, and one more, whose least squares are those of all rows."""
+    """A regression with as many rows as terms, and one more, with the least squares of all rows."""
     triangle = np.asarray(np.linalg.qr(np.column_stack([features, slope]), mode="r"))
     return triangle[:, :-1], triangle[:, -1]
 
@@ -76,7 +74,7 @@ def inclusion(features: FloatArray, slope: FloatArray, threshold: float, *, n_mo
 
 
 def check(optimizer: str) -> None:
-    """Refuse an optimizer that no path can be made with: an ImportError says that its extra is not installed."""
+    """A ValueError for an unknown optimizer; an ImportError if its extra is not installed."""
     if optimizer in OPTIMIZERS:
         return
     extra = _EXTRAS.get(optimizer)

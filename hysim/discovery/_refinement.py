@@ -1,16 +1,15 @@
 """Refinement by simulation error: the numbers of a structure whose free run is nearest to the records.
 
-    minimise sum over the samples seen of (y_k - y(u; c, feedthrough, offset, y0)_k)^2
+    minimise sum over the visible samples of (y_k - y(u; c, feedthrough, offset, y0)_k)^2
 
-A derivative that fits says little about a law that must run on its own output, so every structure is judged by its
-free run alone. Records share all numbers but y0. A structure at rest has no y0: its memory begins at zero. Unknowns
-are measured in what they contribute, outputs in strokes. A free run that leaves BOUND strokes has diverged.
+Every structure is judged by its free run alone. Records share all numbers but y0; a structure at rest has none.
+Unknowns are measured in what they contribute, outputs in strokes. A free run beyond BOUND strokes has diverged.
 
     BIC = N ln(V + FLOOR^2) + d ln N,    V = mean squared residual in strokes,  d = n_parameters
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Generic, TypeVar
@@ -51,8 +50,8 @@ class Candidate(Generic[S]):
     """A refined structure.
 
     `unknowns` (size + n_records,) are its numbers and the y0 of each record, `residual` (n_samples,) is in strokes,
-    `jacobian` (n_samples, size + n_records) is its derivative. `settles` tells whether the law, when the input goes on
-    to and fro over its range, stays finite and comes to a steady loop.
+    `jacobian` (n_samples, size + n_records) is its derivative. `settles` is whether the law comes to a steady loop
+    under a cyclic input.
     """
 
     structure: S
@@ -63,22 +62,20 @@ class Candidate(Generic[S]):
 
     @cached_property
     def cost(self) -> float:
-        """Sum of squared residuals, in squared strokes."""
         return float(self.residual @ self.residual)
 
     @property
     def n_parameters(self) -> int:
-        """The numbers of the structure, and y0 of each record unless it is at rest there."""
+        """Numbers of the structure, and y0 of each record unless it is at rest."""
         return self.structure.size if self.structure.rest else len(self.unknowns)
 
     @cached_property
     def bic(self) -> float:
-        """Bayesian information criterion, the lower the better."""
         return bic_of(self.cost, self.residual.size, self.n_parameters)
 
     @property
     def covariance(self) -> FloatArray:
-        """Covariance of the unknowns, zero for y0 at rest; nan throughout where the records do not tell one of them."""
+        """Covariance of the unknowns, zero for y0 at rest; nan where the records do not determine all of them."""
         covariance, free = np.zeros((self.unknowns.size,) * 2), slice(self.n_parameters)
         covariance[free, free] = _covariance(self.jacobian[:, free], self.cost)
         return covariance
@@ -104,75 +101,71 @@ def _covariance(jacobian: FloatArray, cost: float) -> FloatArray:
 
 
 def cost_of(bic: float, n_samples: int, n_parameters: int) -> float:
-    """The sum of squared residuals, in squared strokes, of which `bic_of` is `bic`; negative if there is none."""
+    """Sum of squared residuals, in squared strokes, with this BIC; negative if there is none."""
     return n_samples * (math.exp((bic - n_parameters * math.log(n_samples)) / n_samples) - FLOOR**2)
 
 
 def bic_of(cost: float, n_samples: int, n_parameters: int) -> float:
-    """BIC of a sum of squared residuals in squared strokes."""
     return information(cost / n_samples, n_samples, n_parameters, floor=FLOOR)
 
 
 @dataclass(frozen=True)
 class FreeRun:
-    """The least-squares problem of some records.
+    """Least-squares problem of some records; `signs` are those that coefficients must have.
 
-    `seen`, shape (n_samples,) for each record, tells the samples whose outputs may be looked at; by default all. The
-    input is known at every sample. `signs` are those that coefficients must have.
+    `masks`, (n_samples,) for each record, mark the visible outputs; by default all.
     """
 
     records: tuple[Record, ...]
-    seen: tuple[Samples, ...] | None = None
+    masks: tuple[Samples, ...] | None = None
     signs: Mapping[Term, int] = field(default_factory=dict)
 
     @cached_property
     def visible(self) -> tuple[Record, ...]:
-        """The records without the samples that are not seen."""
-        if self.seen is None:
+        if self.masks is None:
             return self.records
         return tuple(
-            Record(u=record.u[kept], y=record.y[kept]) for record, kept in zip(self.records, self.seen, strict=True)
+            Record(u=record.u[mask], y=record.y[mask]) for record, mask in zip(self.records, self.masks, strict=True)
         )
 
     @cached_property
     def stroke(self) -> float:
-        """Range of the outputs seen, the unit of outputs and residuals."""
+        """Range of the visible outputs, the unit of outputs and residuals."""
         return float(max(record.y.max() for record in self.visible) - min(record.y.min() for record in self.visible))
 
     @cached_property
     def n_samples(self) -> int:
-        """Number of samples seen."""
         return sum(map(len, self.visible))
 
     @cached_property
     def largest(self) -> Record:
-        """The record with the widest input, which sets the units."""
+        """Record with the widest input, which sets the units."""
         return max(self.visible, key=lambda record: float(np.ptp(record.u)))
 
     @property
     def measured_starts(self) -> FloatArray:
-        """The first output seen of each record."""
+        """First visible output of each record."""
         return np.array([record.y[0] for record in self.visible])
 
     @property
     def line(self) -> FloatArray:
-        """Unknowns of y' = b u': the slope that the largest record has on the whole, and the first outputs."""
+        """Unknowns of y' = b u': the mean slope of the largest record, and the first outputs."""
         u, y = self.largest.u, self.largest.y
         return np.append(np.polyfit(u, y, 1)[0], self.measured_starts)
 
     def units(self, structure: Structure) -> FloatArray:
-        """Units of the unknowns (size + n_records,): what moves the output by about a stroke."""
+        """Units of the unknowns (size + n_records,): changes that move the output by about a stroke."""
         starts = np.full(len(self.records), self.stroke)
         return np.concatenate([structure.units(self.largest, self.stroke), starts])
 
     def residuals(self, structure: Structure, unknowns: FloatArray) -> FloatArray:
-        """Residuals (n_sets, n_samples) in strokes at the samples seen."""
+        """Residuals (n_sets, n_samples) in strokes at the visible samples."""
         return np.concatenate([self._residual(structure, unknowns, k) for k in range(len(self.records))], axis=1)
 
     def refine(
         self, structure: S, starts: FloatArray, *, tolerance: float = RANKING, hopeless: float = math.inf
     ) -> Candidate[S] | None:
-        """The optimum that is reached from the best of `starts` (n_starts, size + n_records); None if all diverge.
+        """Optimum that is reached from the best of `starts` (n_starts, size + n_records); None if all diverge.
 
         A descent that will not come below the cost `hopeless` [squared strokes] is given up.
         """
@@ -183,9 +176,7 @@ class FreeRun:
         if costs.min() >= DIVERGED**2:
             return None
         is_ranked = tolerance >= RANKING  # else polished
-
-        def residuals(x: FloatArray) -> FloatArray:
-            return self.residuals(structure, x * units)
+        residuals = self._scaled(structure)
 
         def slopes(x: FloatArray, residual: FloatArray) -> FloatArray:
             return differences(residuals, x, residual, central=not is_ranked)
@@ -202,21 +193,21 @@ class FreeRun:
         unknowns = self._with_starts(structure, x * units)
         return Candidate(structure, unknowns, slopes(x, residual) / units, residual, self._settles(structure, unknowns))
 
+    def _scaled(self, structure: Structure) -> Callable[[FloatArray], FloatArray]:
+        """The residuals as a function of the unknowns in their units."""
+        units = self.units(structure)
+        return lambda x: self.residuals(structure, x * units)
+
     def linearised(self, structure: Structure, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Residual (n_samples,) at some unknowns (size + n_records,), and its Jacobian in their units."""
-        units = self.units(structure)
-
-        def residuals(x: FloatArray) -> FloatArray:
-            return self.residuals(structure, x * units)
-
-        x = unknowns / units
+        residuals, x = self._scaled(structure), unknowns / self.units(structure)
         residual = residuals(x[np.newaxis])[0]
         return residual, differences(residuals, x, residual, central=True)
 
     def regressed(
         self, regression: Regression, structure: Terms, feedthrough: float = 0.0, offset: float = 0.0
     ) -> FloatArray:
-        """Starts (n_ridges, size + n_records) from ridge regressions: the stiffer, the tamer the free run."""
+        """Starts (n_ridges, size + n_records) from ridge regressions of increasing weight."""
         shift = [feedthrough] * structure.feedthrough + [offset] * structure.offset
         ends = [*shift, *self.measured_starts]
         return np.array([[*regression.ridge(structure.terms, weight), *ends] for weight in _RIDGES])
@@ -237,14 +228,6 @@ class FreeRun:
         starts = [output_at_rest(structure, numbers, float(record.u[0])) for record in self.records]
         return np.concatenate([unknowns[: structure.size], *starts])
 
-    def _run(self, structure: Structure, unknowns: FloatArray, k: int) -> FloatArray:
-        record, visible = self.records[k], self.visible[k]
-        bound = BOUND * self.stroke + float(np.abs(visible.y).max())
-        numbers, y0 = unknowns[:, : structure.size], unknowns[:, structure.size + k]
-        if structure.rest:
-            y0 = output_at_rest(structure, numbers, float(record.u[0]))
-        return structure.run(record.u, numbers, y0, bound)
-
     def _settles(self, structure: Structure, unknowns: FloatArray) -> bool:
         k = max(range(len(self.records)), key=lambda k: float(np.ptp(self.records[k].u)))
         for share in _AMPLITUDES:
@@ -259,9 +242,14 @@ class FreeRun:
         return True
 
     def _residual(self, structure: Structure, unknowns: FloatArray, k: int) -> FloatArray:
-        y = self._run(structure, unknowns, k)
-        if self.seen is not None:
-            y = y[:, self.seen[k]]
-        residual = (self.visible[k].y - y) / self.stroke
+        record, visible = self.records[k], self.visible[k]
+        bound = BOUND * self.stroke + float(np.abs(visible.y).max())
+        numbers, y0 = unknowns[:, : structure.size], unknowns[:, structure.size + k]
+        if structure.rest:
+            y0 = output_at_rest(structure, numbers, float(record.u[0]))
+        y = structure.run(record.u, numbers, y0, bound)
+        if self.masks is not None:
+            y = y[:, self.masks[k]]
+        residual = (visible.y - y) / self.stroke
         residual[~np.isfinite(residual)] = DIVERGED
         return residual

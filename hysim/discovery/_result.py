@@ -4,19 +4,20 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import field
-from typing import Any, Self
+from typing import Any
 
 from hysim._frozen import FloatArray, frozen
 from hysim._printing import printed, summary_text, wrapped
 from hysim.discovery._judgement import Judgement
-from hysim.identification import json_forms
-from hysim.laws.differential.terms import latex
-from hysim.plants.transfer_function import TransferFunction
+from hysim.identification.json_forms import Stored
+from hysim.models.terms import latex
+from hysim.models.transfer_function import TransferFunction
 
 
 @frozen
-class _Discovered(ABC):
-    """The fields and the text that both results have."""
+class _Discovered(Stored, ABC):
+    json_name = "discovery"
+    json_parts = (Judgement,)
 
     model: Any | None
     models: tuple[Any, ...]
@@ -45,7 +46,7 @@ class _Discovered(ABC):
 
     @abstractmethod
     def _rows(self, *, full: bool) -> dict[str, str]:
-        """Name and text of what only this result has, for `summary` in full and for `str` in short."""
+        """Rows of this result alone, for `summary` in full and for `str` in short."""
 
     def __str__(self) -> str:
         scores = self.scores
@@ -103,22 +104,6 @@ class _Discovered(ABC):
         value = self.stderr.get(name, math.nan)
         return "" if math.isnan(value) else f" +- {value:.2g}"
 
-    def to_json(self) -> str:
-        """The whole result as JSON, with the version of hysim; `from_json` returns it, every number to the bit."""
-        return json_forms.to_text("discovery", self)
-
-    @classmethod
-    def from_json(cls, text: str) -> Self:
-        """A result that `to_json` wrote.
-
-        Raises
-        ------
-        ValueError
-            If the text does not hold one.
-        """
-        result: Self = json_forms.from_text("discovery", text, (cls, Judgement))
-        return result
-
 
 @printed
 @frozen
@@ -127,10 +112,9 @@ class Discovery(_Discovered):
 
     Parameters
     ----------
-    model : BoucWen or Duhem
-        The law of `equation`, refined by simulation error, from the initial state of the first record.
-    models : tuple of model
-        One for each record: they differ in the state at the first sample.
+    model, models
+        BoucWen or Duhem law of `equation`, refined by simulation error, from the initial state of the first record; and
+        one for each record.
     coefficients : mapping
         Term to coefficient, for instance ``"|u'| z"``. With a feedthrough a Bouc-Wen law is scaled so that ``"u'"`` has
         the coefficient 1.
@@ -146,27 +130,26 @@ class Discovery(_Discovered):
         ``"threshold"``, the largest one whose structure still has all terms of the law, ``"n_structures"`` refined, and
         ``"condition"`` of the regression.
     n_parameters : int
-        Fitted numbers: those of the law, and the initial state of each record where it is free.
+        Number of fitted parameters, free initial states included.
     left_out : tuple of str
-        Terms of the library that the records cannot tell from those of lower degree.
+        Terms of the library that are combinations of those of lower degree on these records.
     regressed : mapping
-        The coefficients before their refinement, from the regression of slopes; empty for a scanned exponent.
+        Coefficients before their refinement, from the regression of slopes; empty for a scanned exponent.
     inclusion : mapping
         Term of the library to the share of an ensemble of sparse regressions that keeps it.
     path_n_terms, path_fit_percent, path_bic : array, shape (n_thresholds,)
-        The optimizer's path from dense to sparse, each structure refined on thinned records; a structure whose free run
-        diverges has a fit of -inf and a BIC of inf.
+        The optimizer's path from dense to sparse, each structure refined on thinned records; a fit of -inf and a BIC of
+        inf where its free run diverges.
     message : str
-        How the search ended; empty where there is nothing to add.
+        How the search ended.
     warnings : tuple of str
-        Reasons to doubt the law or its scores, one plain sentence each; empty where there are none.
+        Reasons to doubt the law or its scores, one sentence each.
     parameters : mapping
-        Numbers of the law that are no coefficients: ``"n"`` where it was searched, ``"feedthrough"``, ``"gain"``,
-        ``"offset"``.
+        Other numbers of the law: ``"n"`` where it was searched, ``"feedthrough"``, ``"gain"``, ``"offset"``.
     initial : {"free", "rest"}
-        ``"free"``: the initial states were fitted. ``"rest"``: the memory is held at zero at the first sample.
+        Whether the initial states were fitted, or the memory is zero at the first sample.
     initial_states : tuple of mapping
-        The state at the first sample of each record, in the letters of `equation`: ``"z0"`` or ``"y0"``.
+        State at the first sample of each record, in the letters of `equation`: ``"z0"`` or ``"y0"``.
     route : {"memory", "output"}
         What the law takes the measured output for.
     judgement : Judgement
@@ -174,7 +157,7 @@ class Discovery(_Discovered):
     cv_rmse : float
         Cross-validated rmse [unit of y], the whole search repeated for each fold; nan if it was not asked for.
     thresholds : array, shape (n_thresholds,)
-        Of the optimizer's path.
+        Thresholds of the optimizer's path.
     """
 
     route: str
@@ -183,7 +166,6 @@ class Discovery(_Discovered):
     thresholds: FloatArray
 
     def _rows(self, *, full: bool) -> dict[str, str]:
-        """The route, held-out errors, the cross-validation, and loop widths."""
         judged, rates = self.judgement, ", ".join(f"{rate:g}" for rate in self.judgement.rates)
         rows = {
             "route": self.route,
@@ -203,20 +185,12 @@ class OscillatorDiscovery(_Discovered):
 
     Parameters
     ----------
-    model : BoucWenOscillator, TransferFunction or None
-        The law of `equation` in its plant, from the initial state of the first record. Without a memory a linear
-        oscillator whose law has A = 0; with a lag a transfer function; None where hysim has no model of the law, as
-        `warnings` says.
-    models : tuple of model
-        One for each record, each from its initial state; empty where there is no model.
-    coefficients : mapping
-        Term to coefficient. Of a Bouc-Wen law with n = 1 A is that of ``"u'"``, -beta that of ``"|u'| z"`` and -gamma
-        that of ``"u' |z|"``.
-    stderr : mapping
-        Standard errors of the coefficients, of the parts of the plant that were not given, and of ``"n"`` where it was
-        free.
-    equation : str
-        The law and the equation of motion as text.
+    model, models
+        BoucWenOscillator, or TransferFunction of a lag, from the initial state of the first record; and one for each
+        record. Without a memory A = 0; None and empty where hysim has no model of the law, as `warnings` says.
+    coefficients, stderr, equation, left_out, regressed, inclusion, message, warnings
+        As in `Discovery`; `stderr` has the free parts of the plant and ``"n"`` too, where they were free. Of a Bouc-Wen
+        law with n = 1 A is the coefficient of ``"u'"``, -beta that of ``"|u'| z"`` and -gamma that of ``"u' |z|"``.
     verdict : str
         ``"rate-independent hysteresis"``, ``"rate-dependent hysteresis"``, ``"linear lag"`` or
         ``"no structure found"``.
@@ -226,19 +200,9 @@ class OscillatorDiscovery(_Discovered):
         ``"linear_held_out_rmse"`` and ``"linear_bic"`` of the rival without memory; ``"n_terms"``; ``"n_structures"``
         compared; ``"condition"`` of the regression on all terms.
     n_parameters : int
-        Fitted numbers of the plant and the law.
-    left_out : tuple of str
-        Terms whose effects on these records are linear combinations of those of the plant and of terms of lower degree.
-    regressed : mapping
-        Coefficients before the refinement, from the regression along the measured motion.
-    inclusion : mapping
-        Term to the share of fits to resampled data that keep it, for every term of the library that is not `left_out`.
+        Number of fitted parameters of the plant and the law.
     path_n_terms, path_fit_percent, path_bic : array, shape (n_structures,)
-        Sizes of the compared structures, the fit [%] of what is held out, and the BIC: for a Pareto figure.
-    message : str
-        How the search ended.
-    warnings : tuple of str
-        Reasons to doubt the law, one sentence each.
+        Sizes of the compared structures, their fit on held-out samples [%], and BIC: for a Pareto figure.
     parameters : mapping
         ``"mass"``, ``"damping"`` and ``"stiffness"`` of the plant, and ``"n"`` where it was free. Without a memory the
         stiffness is that of all springs.
@@ -247,12 +211,12 @@ class OscillatorDiscovery(_Discovered):
     initial_states : tuple of mapping
         Displacement, velocity and memory at the first sample of each record: ``"y0"``, ``"y'0"`` and ``"z0"``.
     rival : TransferFunction
-        The same mass on a linear spring, fitted to the records without a memory.
+        The same mass on a linear spring, fitted to the records.
     path_terms : tuple of str
-        The structures that were compared, from dense to sparse, each as its terms joined by commas.
+        The compared structures, from dense to sparse, each as its terms joined by commas.
     relative_width, dissipation : float
         Relative width and signed area [unit of y times unit of u] of the memory's steady loop over the range of the
-        displacements, as in `Judgement`; nan where the memory is no Bouc-Wen law.
+        displacements; nan where the memory is no Bouc-Wen law.
     """
 
     rival: TransferFunction
@@ -261,7 +225,6 @@ class OscillatorDiscovery(_Discovered):
     dissipation: float
 
     def _rows(self, *, full: bool) -> dict[str, str]:
-        """Held-out errors and the loop of the memory."""
         scores, width = self.scores, self.relative_width
         return {
             "held-out rmse": f"law {scores['held_out_rmse']:.4g}, rival {scores['linear_held_out_rmse']:.4g}",

@@ -1,4 +1,4 @@
-"""The linear rival of a law: what a plant without hysteresis, but with dynamics, makes of the same records.
+"""The linear rival of a law: a plant without hysteresis, but with dynamics, fitted to the same records.
 
     y = offset + G(s) u + free response,    G of the orders in ORDERS, or a line
 
@@ -28,19 +28,15 @@ _PER_PARAMETER = 3  # samples
 
 
 @checked
-class Seen(Record):
-    """A record of which samples are left out by `shares` (n,) of 0: they multiply its output and its regressors."""
+class WeightedRecord(Record):
+    """A record whose samples are left out by `shares` (n,) of 0, which multiply its output and its regressors."""
 
     shares: FloatArray
 
 
 @dataclass(frozen=True)
 class Rival:
-    """A linear plant with an offset, fitted to records.
-
-    `plants` are one for each record, alike but for the initial state; `bic` takes residuals below FLOOR strokes as
-    that.
-    """
+    """A linear plant with an offset, fitted to records; `plants` differ in the initial state alone."""
 
     plants: tuple[TransferFunction, ...]
     offset: float
@@ -48,11 +44,9 @@ class Rival:
 
     @property
     def is_line(self) -> bool:
-        """Whether the plant has no dynamics."""
         return self.plants[0].order == 0
 
     def outputs(self, records: Sequence[Record]) -> list[FloatArray]:
-        """Free runs, one for each record."""
         pairs = zip(self.plants, records, strict=True)
         return [self.offset + plant.response(record.u, record.sample_time) for plant, record in pairs]
 
@@ -65,7 +59,6 @@ class Rival:
 
 
 def rival(records: Sequence[Record]) -> Rival:
-    """The line or the plant of lowest BIC, of those that the records have samples for; their times are even."""
     everything = [np.ones(len(record)) for record in records]
     most = sum(len(record) for record in records) // _PER_PARAMETER
     orders = [(poles, zeros) for poles, zeros in ORDERS if poles * (1 + len(records)) + zeros + 2 <= most]
@@ -76,8 +69,7 @@ def rival(records: Sequence[Record]) -> Rival:
 def steady_width(plant: TransferFunction, cycle: Record, rate: float) -> float:
     """Relative width of the plant's steady loop where the cycle runs at `rate` times its rate; nan where it has none.
 
-    From period to period the free response falls by the factors lambda = exp(p T) of the poles p, so that weights
-    which are the coefficients of prod (x - lambda) take it out of as many periods as there are poles, and one more.
+    The coefficients of prod (x - exp(p T)), p the poles, take the free response out of as many periods and one more.
     """
     step, u = cycle.sample_time / rate, cycle.u[:-1]
     taken = np.atleast_1d(np.poly(np.exp(plant.poles * step * u.size))).real[::-1]
@@ -91,17 +83,13 @@ def steady_width(plant: TransferFunction, cycle: Record, rate: float) -> float:
 
 @dataclass(frozen=True)
 class _Affine(Identifiable):
-    """A transfer function with an offset, as `identify` takes it.
-
-    The box reaches from the longest of the records to the finest sampling; the search begins at `start`, if given.
-    """
+    """A transfer function with an offset, as `identify` takes it; the search begins at `start`, if given."""
 
     structure: TransferFunctionStructure
     records: Sequence[Record]
     start: TransferFunction | None = None
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The structure's own box, widened, and the offset among the linear parameters."""
         finest = min(self.records, key=lambda each: each.sample_time)
         longest = max(len(each) * each.sample_time for each in self.records)
         own = self.structure.search_space(finest, freedom)
@@ -119,12 +107,10 @@ class _Affine(Identifiable):
         )
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """The structure's columns and a one, times the shares of a record that is seen in part."""
         columns = np.insert(self.structure.regressors(parameters, record), -1, 1.0, axis=-1)
-        return columns * record.shares[:, np.newaxis] if isinstance(record, Seen) else columns
+        return columns * record.shares[:, np.newaxis] if isinstance(record, WeightedRecord) else columns
 
     def assemble(self, parameters: Mapping[str, float]) -> TransferFunction:
-        """The transfer function, without the offset."""
         return self.structure.assemble(parameters)
 
     def _scanned(self, own: SearchSpace) -> FloatArray:
@@ -139,7 +125,6 @@ class _Affine(Identifiable):
 
 
 def _coordinates(plant: TransferFunction, sample_time: float) -> FloatArray:
-    """Where a plant of one or two poles lies in the box (1, n_x): the logarithms of rate, or frequency and damping."""
     sizes = np.array(plant.den[1:]) * sample_time ** np.arange(1, len(plant.den))
     frequency = np.sqrt(sizes[-1])
     place = sizes if sizes.size == 1 else [frequency, sizes[0] / (2.0 * frequency)]
@@ -154,11 +139,11 @@ def _identified(
     start: TransferFunction | None = None,
 ) -> Rival:
     structure = TransferFunction.structure(poles=poles, zeros=zeros, hold="foh", initial="free")
-    seen = [
-        Seen(u=record.u, y=record.y * shares, t=record.t, shares=shares)
+    weighted = [
+        WeightedRecord(u=record.u, y=record.y * shares, t=record.t, shares=shares)
         for record, shares in zip(records, weights, strict=True)
     ]
-    fit = identify(_Affine(structure, records, start), seen)
+    fit = identify(_Affine(structure, records, start), weighted)
     return Rival(fit.models, fit.estimates["offset"], _information(records, fit.residual, fit.n_parameters))
 
 

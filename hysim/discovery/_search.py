@@ -1,15 +1,15 @@
 """One library on some records: from slopes to refined structures.
 
-**Shifts.** The slope of z = y - feedthrough u - offset is linear in the coefficients of its law, not in the two shifts.
-These are scanned, and the coefficients solved for at each (variable projection). The left side loses what the term u'
-gains by a feedthrough, so that misfits are comparable. The free runs begin at the best few places.
+**Shifts.** The slope of z = y - feedthrough u - offset is linear in the coefficients of its law, not in the two
+shifts. These are scanned, and the coefficients solved for at each (variable projection). The left side loses what the
+term u' gains by a feedthrough, so that misfits are comparable. The free runs begin at the best few places.
 
 **Any exponent.** A Bouc-Wen law whose exponent is no whole number has terms that are in no finite library,
 
     z' = A u' - beta |u'| |z|^(n-1) z - gamma u' |z|^n.
 
-Its exponent is scanned: at each one the slope is regressed on the three terms, and from the best of these the free run
-is refined, n with the other numbers. The law is taken where its BIC is lower by more than INDISTINCT.
+Its exponent is scanned; from the best regressions on the three terms the free run is refined, n with the other numbers.
+The law is taken where its BIC is lower by more than INDISTINCT.
 """
 
 import math
@@ -22,19 +22,8 @@ from hysim._frozen import FloatArray
 from hysim.discovery import _pysindy
 from hysim.discovery._held_out import about_trends, rms
 from hysim.discovery._refinement import POLISH, Candidate, FreeRun, Samples, bic_of
-from hysim.discovery._selection import (
-    ALIKE,
-    INDISTINCT,
-    SEARCHED,
-    Search,
-    Start,
-    gap,
-    preferred,
-    pruned,
-    thinning,
-    turning,
-)
-from hysim.discovery._slopes import FORMS, Feature, Slopes, slopes
+from hysim.discovery._selection import ALIKE, INDISTINCT, Search, Start, gap, preferred, pruned, thinned, turning
+from hysim.discovery._slopes import FORMS, Feature, Slopes, ridge, slopes
 from hysim.discovery._structures import AnyExponent, Terms, shifts
 from hysim.laws.differential.terms import Term, symmetric
 from hysim.records import Record
@@ -57,11 +46,9 @@ _RIDGES = (1e-9, 1e-4, 1e-2)
 
 @dataclass(frozen=True)
 class Library:
-    """The terms of laws, and what else these may have.
+    """Terms of laws; whether these have an offset, and a `feedthrough`: "no", "may" or "must".
 
-    `letter` is "y" where the memory is the output, else "z". `feedthrough` is "no", "may" or "must", `offset` whether
-    the memory may be zero at another output than zero. `rests` holds False where a memory that begins at a value of its
-    own is tried, and True where one that begins at zero is.
+    `letter` is "y" where the memory is the output, else "z"; `rests` are the values of `Terms.rest` to try.
     """
 
     terms: tuple[Term, ...]
@@ -71,16 +58,12 @@ class Library:
     rests: tuple[bool, ...] = (False,)
 
     def structure(self, terms: Sequence[Term]) -> Terms:
-        """The largest structure of these terms."""
         return Terms(tuple(terms), self.feedthrough != "no", self.offset, all(self.rests))
 
 
 @dataclass(frozen=True)
 class Options:
-    """How laws are looked for: the signs that coefficients must have, and the arguments of `discover`.
-
-    `enough` is the rmse that a law must come near for the search to go beyond the optimizer's path [unit of y].
-    """
+    """Signs of coefficients, and arguments of `discover`; `enough` is the rmse that makes a full search worth while."""
 
     signs: Mapping[Term, int] = field(default_factory=dict)
     optimizer: str = "STLSQ"
@@ -91,10 +74,7 @@ class Options:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The law that one library has for the records, and how it was found.
-
-    A search `is_short` if only the optimizer's path was looked at.
-    """
+    """Law of one library for the records, and its search; `is_short` if only the optimizer's path was searched."""
 
     library: Library
     candidate: Candidate[Terms]
@@ -106,7 +86,7 @@ class Outcome:
 
     @property
     def searched(self) -> Candidate[Terms]:
-        """The law as it is refined on the samples of the search, from the numbers that it has on all samples."""
+        """The law as it is refined on the samples of the search, from its numbers on all samples."""
         free_run = self.search.free_run
         if free_run.n_samples == self.candidate.residual.size:
             return self.candidate
@@ -114,13 +94,12 @@ class Outcome:
 
     @property
     def unstable(self) -> bool:
-        """Whether no structure but the line stays finite in free run."""
         lines = (LINE, LINE._replace(rest=True))
         return all(candidate is None for structure, candidate in self.search.tried.items() if structure not in lines)
 
     @property
     def threshold(self) -> float:
-        """The largest one whose structure still has all terms of the law; nan if none has."""
+        """Largest one whose structure still has all terms of the law; nan if none has."""
         terms = set(self.candidate.structure.terms)
         return max((t for t, structure in self.path if terms <= set(structure.terms)), default=math.nan)
 
@@ -143,22 +122,22 @@ def searched(
     options: Options,
     *,
     best: float = math.inf,
-    seen: Sequence[Samples] | None = None,
+    masks: Sequence[Samples] | None = None,
 ) -> Outcome | None:
     """The best law of a library; None if none can come near the BIC `best`.
 
-    Only the outputs `seen`, (n_samples,) for each record, are looked at. If no law on the optimizer's path, on which
-    are the largest ones, comes near an rmse that is enough, the search ends there: a smaller law does not fit better.
+    Only outputs in the `masks`, (n_samples,) for each record, are used. The search is short if no law on the
+    optimizer's path, which has the largest ones, comes near an rmse that is enough.
     """
-    free_run = FreeRun(tuple(records), None if seen is None else tuple(seen), options.signs)
-    thin = _thinned(free_run)
+    free_run = FreeRun(tuple(records), None if masks is None else tuple(masks), options.signs)
+    thin = thinned(free_run)
     optimizer, form = options.optimizer, options.derivative
     if form == "auto":
         form = _better_form(thin.visible, library, optimizer)
     rows = slopes(free_run.visible, form)
     starts = shifted(rows, library.terms, feedthrough=library.feedthrough != "no", offset=library.offset)
-    held = frozenset({"feedthrough"} if library.feedthrough == "must" else ())
-    search = Search(thin, starts, held, library.rests)
+    required = frozenset({"feedthrough"} if library.feedthrough == "must" else ())
+    search = Search(thin, starts, required, library.rests)
     for start in starts:
         search.refine(library.structure(start.regression.terms))
     if not search.could_win(1, best):
@@ -181,23 +160,16 @@ def searched(
 
 
 def _least_rmse(search: Search) -> float:
-    """The smallest rmse of the laws about a slow trend of each record [unit of y], as the judgement takes it."""
+    """Smallest rmse of the laws about a slow trend of each record [unit of y], as the judgement takes it."""
     free_run = search.free_run
     errors = (rms(about_trends(candidate.residual, free_run.visible)) for candidate in search.candidates)
     return min(errors, default=math.inf) * free_run.stroke
 
 
-def _thinned(free_run: FreeRun) -> FreeRun:
-    samples = [thinning(record, SEARCHED // len(free_run.records)) for record in free_run.records]
-    records = tuple(Record(u=r.u[kept], y=r.y[kept]) for r, kept in zip(free_run.records, samples, strict=True))
-    seen = free_run.seen and tuple(mask[kept] for mask, kept in zip(free_run.seen, samples, strict=True))
-    return FreeRun(records, seen, free_run.signs)
-
-
 def _path(start: Start, library: Library, optimizer: str) -> list[tuple[float, Terms]]:
     regression = start.regression
     path = _pysindy.sparse_path(regression.features, regression.slope, optimizer)
-    return [(threshold, library.structure(regression.kept(coefficients))) for threshold, coefficients in path]
+    return [(threshold, library.structure(regression.included(coefficients))) for threshold, coefficients in path]
 
 
 def _start_at(rows: Slopes, library: Library, candidate: Candidate[Terms]) -> Start:
@@ -207,20 +179,16 @@ def _start_at(rows: Slopes, library: Library, candidate: Candidate[Terms]) -> St
 
 
 def _better_form(records: Sequence[Record], library: Library, optimizer: str) -> str:
-    """The form whose regressions, as they are, run free nearest to samples that they have not seen.
-
-    Every third sample is held out; the input's path is kept.
-    """
     free_run, errors = FreeRun(tuple(records)), {}
-    unseen = np.concatenate([np.arange(len(record)) % _HELD_OUT == 1 for record in records])
+    held_out = np.concatenate([np.arange(len(record)) % _HELD_OUT == 1 for record in records])
     for form in FORMS:
         try:
-            rows = slopes([_seen(record) for record in records], form)
+            rows = slopes([_training(record) for record in records], form)
         except ValueError:
             continue
         starts = shifted(rows, library.terms, feedthrough=library.feedthrough != "no", offset=library.offset)
         runs = [
-            free_run.residuals(structure, free_run.regressed(start.regression, structure, *start[1:]))[:, unseen]
+            free_run.residuals(structure, free_run.regressed(start.regression, structure, *start[1:]))[:, held_out]
             for start in starts[:2]  # the output itself, and the best place of the scan
             for _, structure in _path(start, library, optimizer)
         ]
@@ -228,9 +196,9 @@ def _better_form(records: Sequence[Record], library: Library, optimizer: str) ->
     return min(errors, key=lambda form: errors[form], default="smoothed")
 
 
-def _seen(record: Record) -> Record:
-    kept = (np.arange(len(record)) % _HELD_OUT != 1) | turning(record.u)
-    return Record(u=record.u[kept], y=record.y[kept])
+def _training(record: Record) -> Record:
+    included = (np.arange(len(record)) % _HELD_OUT != 1) | turning(record.u)
+    return Record(u=record.u[included], y=record.y[included])
 
 
 def _on_all_samples(free_run: FreeRun, search: Search, library: Library, seed: int, restarts: int) -> Candidate[Terms]:
@@ -245,7 +213,7 @@ def _on_all_samples(free_run: FreeRun, search: Search, library: Library, seed: i
     restarted = _restarted(search.free_run, search.tried[chosen.structure] or chosen, seed, restarts)
     starts = np.stack([chosen.unknowns, restarted.unknowns])
     polished = free_run.refine(chosen.structure, starts, tolerance=POLISH) or chosen
-    return pruned(free_run, polished, search.held, POLISH)
+    return pruned(free_run, polished, search.required, POLISH)
 
 
 def _restarted(free_run: FreeRun, chosen: Candidate[Terms], seed: int, restarts: int) -> Candidate[Terms]:
@@ -261,7 +229,7 @@ def _restarted(free_run: FreeRun, chosen: Candidate[Terms], seed: int, restarts:
 
 
 def shifted(slopes: Slopes, terms: tuple[Term, ...], *, feedthrough: bool, offset: bool) -> tuple[Start, ...]:
-    """The regressions to begin at: that of the output itself, and those at the best places of the scan."""
+    """Regressions to begin at: that of the output itself, and those at the best places of the scan."""
     trial = symmetric(terms, "odd") or terms  # about the origin of z a law is odd, or nearly
     places = sorted(
         (slopes.misfit(trial, slope, level), slope, level)
@@ -274,7 +242,6 @@ def shifted(slopes: Slopes, terms: tuple[Term, ...], *, feedthrough: bool, offse
 
 
 def _slopes_tried(slopes: Slopes) -> list[float]:
-    """The chord of y over u, on the whole, sets the scale, and the sign."""
     chord = max((_chord(rows.u, rows.y) for rows in slopes.rows), key=abs)
     return [0.0, *(chord * _FEEDTHROUGHS).tolist()]
 
@@ -292,10 +259,7 @@ def _levels(slopes: Slopes, feedthrough: float) -> list[float]:
 def or_any_exponent(
     free_run: FreeRun, of_memory: Outcome, chosen: Outcome
 ) -> Candidate[Terms] | Candidate[AnyExponent]:
-    """The chosen law, or the Bouc-Wen law of any exponent where that explains the records of `free_run` better.
-
-    `of_memory` is the outcome of the library of z, from which the scan takes its slopes and shifts.
-    """
+    """The chosen law, or the Bouc-Wen law of any exponent where its BIC is lower; `of_memory` is the outcome for z."""
     thin, best = of_memory.search.free_run, chosen.searched
     if chosen.candidate.cost < free_run.n_samples * ALIKE**2:
         return chosen.candidate
@@ -313,7 +277,6 @@ def or_any_exponent(
 
 
 def _structures(library: Library) -> list[AnyExponent]:
-    """With all shifts first, with as few as the route allows last."""
     feedthroughs = {"no": (False,), "may": (True, False), "must": (True,)}[library.feedthrough]
     offsets = (True, False) if library.offset else (False,)
     return [
@@ -346,7 +309,4 @@ def _features(n: float) -> Feature:
 def _ridge(columns: FloatArray, target: FloatArray, weight: float) -> list[float]:
     sizes = np.sqrt(np.mean(columns**2, axis=0))
     sizes[sizes == 0.0] = 1.0
-    scaled = columns / sizes
-    normal = scaled.T @ scaled / len(target) + weight * np.eye(3)
-    solution = np.linalg.solve(normal, scaled.T @ target / len(target)) / sizes
-    return [float(value) for value in solution]
+    return [float(value) for value in ridge(columns / sizes, target, weight) / sizes]

@@ -4,22 +4,19 @@ Sparse regression of slopes orders the terms, but on short, noisy or quantised r
 y^2 are nearly the same. So the path is where the search begins:
 
 1. The law of all terms and every structure on the threshold path are refined by simulation error.
-2. About the best of these the free run is linearised in all numbers of the library, and of that linear problem all
-   smaller structures are solved (`_subsets`): which terms, which shifts, and whether the memory begins at zero or at a
-   value of its own. The MET ones of lowest BIC are refined. This is repeated about the new best ones until there are
-   none, at most ROUNDS times.
+2. About the best of these the free run is linearised in all numbers of the library, and all smaller structures of that
+   linear problem are solved (`_subsets`), with free memory and at rest. The MET ones of lowest BIC are refined. This is
+   repeated about the new best ones, at most ROUNDS times.
 3. The best structures are refined both with their memory at zero at the first sample and with a free one.
-4. Laws that come to no steady loop under a cyclic input are out. Structures within INDISTINCT of the lowest BIC are
-   equally good (Kass and Raftery 1995), and so are smaller ones whose free runs differ by less than ALIKE strokes in
-   rms. Among them the one of fewest numbers is taken, then a plain one, then the lowest BIC.
+4. Laws without a steady loop under a cyclic input are out. Structures within INDISTINCT of the lowest BIC are equally
+   good (Kass and Raftery 1995), and so are smaller ones whose free runs differ by less than ALIKE strokes in rms. Among
+   them the one of fewest numbers is taken, then a plain one, then the lowest BIC.
 5. Numbers within SIGNIFICANT standard errors of zero are taken out, the least certain first, as long as BIC does not
    rise by more than INDISTINCT.
 
-A structure in u and y is *plain* if it is complete: with each monomial it has all that divide it, so that its form
-does not depend on the zeros of u and y. A structure in z is plain if it is a Bouc-Wen law.
-
-Long records are searched on about SEARCHED of their samples, the reversals among them. The best structures are then
-refined on all samples, where step 4 is taken again.
+A structure in u and y is *plain* if it has, with each monomial, all that divide it: its form does not depend on the
+zeros of u and y. A structure in z is plain if it is a Bouc-Wen law. Long records are searched on about SEARCHED of
+their samples, the reversals among them; the best structures are then refined on all samples, and step 4 taken again.
 """
 
 import math
@@ -51,8 +48,6 @@ _TWINS = 6
 
 
 class Start(NamedTuple):
-    """A regression of z = y - feedthrough u - offset."""
-
     regression: Regression
     feedthrough: float = 0.0
     offset: float = 0.0
@@ -69,19 +64,27 @@ class Prediction(NamedTuple):
 def thinning(record: Record, most: int) -> npt.NDArray[np.intp]:
     """Every m-th sample of a record, its last one and its reversals, about `most` together, and 2 `most` at most."""
     stride = -(-len(record) // most)
-    kept = np.arange(len(record)) % stride == 0
-    kept[-1] = True
-    return np.flatnonzero(kept | turning(record.u))[: 2 * most]
+    included = np.arange(len(record)) % stride == 0
+    included[-1] = True
+    return np.flatnonzero(included | turning(record.u))[: 2 * most]
+
+
+def thinned(free_run: FreeRun) -> FreeRun:
+    """The same problem on about SEARCHED samples."""
+    samples = [thinning(record, SEARCHED // len(free_run.records)) for record in free_run.records]
+    records = tuple(
+        Record(u=r.u[included], y=r.y[included]) for r, included in zip(free_run.records, samples, strict=True)
+    )
+    masks = free_run.masks and tuple(mask[included] for mask, included in zip(free_run.masks, samples, strict=True))
+    return FreeRun(records, masks, free_run.signs)
 
 
 def turning(u: FloatArray) -> npt.NDArray[np.bool_]:
-    """Where an input turns, rests or leaves a rest, (n,): a path through these samples keeps its extremes."""
     direction = np.sign(np.diff(u))
     return np.concatenate([[False], direction[1:] != direction[:-1], [False]])
 
 
 def is_complete(terms: Iterable[Term]) -> bool:
-    """Whether all divisors of each term are there, so that the law's form is that at any origin of u and y."""
     present = set(terms)
     return all(term.divisors() <= present for term in present)
 
@@ -93,37 +96,32 @@ def is_plain(structure: Terms, letter: str) -> bool:
 
 @dataclass(frozen=True)
 class Search:
-    """The structures tried on some records, with their refinements: None where every free run diverged.
+    """Structures tried on some records, with their refinements: None where every free run diverged.
 
-    `held` are numbers that no structure may lose: "feedthrough", if the route says that there is one. `rests` tells
-    whether memories that begin at a value of their own are tried, False, or those that begin at zero, True, or both.
+    `required` are numbers that no structure may lose; `rests` the values of `Terms.rest` to try.
     """
 
     free_run: FreeRun
     starts: tuple[Start, ...]
-    held: frozenset[str] = frozenset()
+    required: frozenset[str] = frozenset()
     rests: tuple[bool, ...] = (False,)
     tried: dict[Terms, Candidate[Terms] | None] = field(default_factory=dict)
 
     def refine(self, structure: Terms, *unknowns: FloatArray, race: bool = False) -> Candidate[Terms] | None:
-        """Refine a structure, unless that has been done, from its regressions and the given starts.
-
-        In a `race` it is given up where it will not come near the best one (`followed`).
-        """
+        """Refine a structure once, from its regressions and these starts; in a `race` it may be given up."""
         if structure not in self.tried:
             regressed = [
                 self.free_run.regressed(start.regression, structure, start.feedthrough, start.offset)
                 for start in self.starts
                 if set(structure.terms) <= set(start.regression.terms)
             ]
-            given = np.array(unknowns).reshape(-1, structure.size + len(self.free_run.records))
-            starts, hopeless = np.concatenate([given, *regressed]), self._hopeless(structure) if race else math.inf
+            own = np.array(unknowns).reshape(-1, structure.size + len(self.free_run.records))
+            starts, hopeless = np.concatenate([own, *regressed]), self._hopeless(structure) if race else math.inf
             self.tried[structure] = self.free_run.refine(structure, starts, hopeless=hopeless)
         return self.tried[structure]
 
     @property
     def candidates(self) -> list[Candidate[Terms]]:
-        """The refined structures, lowest BIC first."""
         return sorted((c for c in self.tried.values() if c is not None), key=lambda c: (c.bic, c.structure))
 
     @property
@@ -145,7 +143,7 @@ class Search:
         return max(cost_of(best.bic + HOPELESS, n, d), best.cost + n * ALIKE**2)
 
     def explore(self, largest: Terms) -> None:
-        """Steps 2 and 3: the structures inside `largest` that the linearised free run says are best."""
+        """Steps 2 and 3: the structures inside `largest` that the linearised free run predicts to be best."""
         done: set[Terms] = set()
         for _ in range(ROUNDS):
             points = [c for c in self.sound[:_POINTS] if c.structure not in done]
@@ -166,10 +164,7 @@ class Search:
         return sorted((e for e in likely if e.bic < lowest + _LIKELY), key=lambda e: (e.bic, e.structure))[:MET]
 
     def could_win(self, size: int, best: float = math.inf) -> bool:
-        """Whether a structure of `size` numbers would be preferred if it ran as well as the best of any size.
-
-        To be preferred its BIC must come near the lowest found, and `best`.
-        """
+        """Whether a structure of `size` numbers would be preferred if it ran as well as the best of any size."""
         sound = self.sound
         least = min((candidate.cost for candidate in self.candidates), default=0.0)
         starts = 0 if True in self.rests else len(self.free_run.records)
@@ -177,7 +172,7 @@ class Search:
         return not sound or bound <= min(sound[0].bic, best) + INDISTINCT
 
     def _linearly(self, candidate: Candidate[Terms], largest: Terms, rest: bool) -> Iterator[Prediction]:
-        """The best predictions of one sort: the unknowns are the numbers of `largest` and each record's first z."""
+        """Predictions with or without rest; the unknowns are the numbers of `largest` and each record's first z."""
         free_run, size = self.free_run, largest.size
         u0 = np.array([record.u[0] for record in free_run.records])
         x = _placed(candidate, largest)
@@ -190,21 +185,20 @@ class Search:
             residual = residual - jacobian[:, size:] @ x[size:]
             jacobian, x = jacobian[:, :size], x[:size]
         removable = np.arange(x.size) < size
-        if "feedthrough" in self.held:
+        if "feedthrough" in self.required:
             removable[len(largest.terms)] = False
         for subsets in best_subsets(jacobian, residual, x, removable):
             for k in self._worth_refining(subsets, largest):
-                kept, unknowns = subsets.kept[k], subsets.x[k]
-                bic = bic_of(float(subsets.cost[k]), free_run.n_samples, int(kept.sum()))
+                included, unknowns = subsets.included[k], subsets.x[k]
+                bic = bic_of(float(subsets.cost[k]), free_run.n_samples, int(included.sum()))
                 starts = (np.zeros(u0.size) if rest else unknowns[size:]) + shift @ unknowns[:size]
-                numbers = unknowns[:size][kept[:size]]
-                yield Prediction(bic, _of(largest, kept, rest), np.concatenate([numbers, starts]))
+                numbers = unknowns[:size][included[:size]]
+                yield Prediction(bic, _of(largest, included, rest), np.concatenate([numbers, starts]))
 
     def _worth_refining(self, subsets: Subsets, largest: Terms) -> list[int]:
-        """The cheapest MET subsets that have a term, and the signs that are wanted."""
         n_terms = len(largest.terms)
         wanted = np.array([self.free_run.signs.get(term, 0) for term in largest.terms])
-        allowed = (subsets.x[:, :n_terms] * wanted >= 0.0).all(axis=1) & subsets.kept[:, :n_terms].any(axis=1)
+        allowed = (subsets.x[:, :n_terms] * wanted >= 0.0).all(axis=1) & subsets.included[:, :n_terms].any(axis=1)
         return [int(k) for k in np.flatnonzero(allowed)[:MET]]
 
 
@@ -219,31 +213,31 @@ def _names(structure: Terms) -> list[Any]:
 
 
 def _shift_columns(largest: Terms, u0: FloatArray) -> FloatArray:
-    """The change of each record's first output, (n_records, size), with the numbers while its memory stays."""
+    """Change of each record's first output, (n_records, size), with the numbers while its memory stays."""
     columns = {"feedthrough": u0, "offset": np.ones(u0.size)}
     return np.stack([columns.get(name, np.zeros(u0.size)) for name in _names(largest)], axis=1)
 
 
-def _of(largest: Terms, kept: npt.NDArray[np.bool_], rest: bool) -> Terms:
-    names = [name for name, is_kept in zip(_names(largest), kept.tolist(), strict=False) if is_kept]
+def _of(largest: Terms, included: npt.NDArray[np.bool_], rest: bool) -> Terms:
+    names = [name for name, is_kept in zip(_names(largest), included.tolist(), strict=False) if is_kept]
     terms = tuple(name for name in names if isinstance(name, Term))
     return Terms(terms, "feedthrough" in names, "offset" in names, rest)
 
 
 def preferred(candidates: Sequence[Candidate[Terms]], letter: str) -> Candidate[Terms]:
-    """Step 4, for structures whose memory is called `letter`."""
     lowest = min(candidate.bic for candidate in candidates)
     best = min(candidates, key=lambda candidate: candidate.bic)
     rivals = [c for c in candidates if c.bic <= lowest + INDISTINCT or _is_as_good(c, best)]
     return min(rivals, key=lambda c: (c.n_parameters, not is_plain(c.structure, letter), c.bic))
 
 
-def pruned(free_run: FreeRun, candidate: Candidate[Terms], held: frozenset[str], tolerance: float) -> Candidate[Terms]:
-    """Step 5."""
+def pruned(
+    free_run: FreeRun, candidate: Candidate[Terms], required: frozenset[str], tolerance: float
+) -> Candidate[Terms]:
     structure = candidate.structure
     for k in np.argsort(candidate.significance).tolist():
         smaller = structure.without(k)
-        needed = not smaller.terms or ("feedthrough" in held and not smaller.feedthrough)
+        needed = not smaller.terms or ("feedthrough" in required and not smaller.feedthrough)
         if candidate.significance[k] >= SIGNIFICANT:
             break
         if needed:
@@ -252,7 +246,7 @@ def pruned(free_run: FreeRun, candidate: Candidate[Terms], held: frozenset[str],
         worst = cost_of(candidate.bic + INDISTINCT, free_run.n_samples, candidate.n_parameters - 1)
         refined = free_run.refine(smaller, start[np.newaxis], tolerance=tolerance, hopeless=worst)
         if refined is not None and refined.bic <= candidate.bic + INDISTINCT and refined.settles >= candidate.settles:
-            return pruned(free_run, refined, held, tolerance)
+            return pruned(free_run, refined, required, tolerance)
     return candidate
 
 
@@ -261,5 +255,5 @@ def _is_as_good(candidate: Candidate[Terms], best: Candidate[Terms]) -> bool:
 
 
 def gap(candidate: Candidate[Any], best: Candidate[Any]) -> float:
-    """Rms difference in strokes that the better of two free runs makes up for."""
+    """Rms difference in strokes between two free runs."""
     return math.sqrt(max(candidate.cost - best.cost, 0.0) / best.residual.size)

@@ -1,20 +1,19 @@
 """Slopes of the memory along the loading length L, dL = |du|, and their regression on terms.
 
-A rate-independent law has no use for time. With s = sgn(du) and z = y - feedthrough u - offset, it is in two forms
+With s = sgn(du) and z = y - feedthrough u - offset, in two forms,
 
     dz/dL = sum c_k phi_k(u, z, s)                        smoothed
     int psi dz = sum c_k int psi phi_k(u, z, s) dL        weak, psi a bump that ends at zero
 
 **Smoothed.** On each branch, from one reversal of the input to the next, the output is smoothed by a polynomial
-in L whose degree is the lowest within 1 % of the best leave-one-out error, and dy/dL is the slope of that. Nothing
-is ever smoothed across a reversal, where the slope jumps. Samples between which the input rests count as one, with
-the mean of their outputs. Branches of fewer than MIN_SAMPLES such points are left out.
+in L whose degree is the lowest within 1 % of the best leave-one-out error; dy/dL is its slope. Nothing is smoothed
+across a reversal, where the slope jumps. Samples between which the input rests count as one, with the mean of their
+outputs. Branches of fewer than MIN_SAMPLES such points are left out.
 
-**Weak.** By parts, int psi dz = -int z dpsi: no slope of the output is taken at all, and a window may reach across
-reversals. Where a branch is long enough the features take its smoothed output, elsewhere the measured one.
+**Weak.** By parts, int psi dz = -int z dpsi: no slope of the output is taken, and a window may reach across reversals.
+Where a branch is long enough the features take its smoothed output, elsewhere the measured one.
 
-Each column is scaled to unit rms over the rows, and so is the slope: a threshold is then the share of a term in the
-slope.
+Each column is scaled to unit rms over the rows, and so is the slope: a threshold is the share of a term in the slope.
 """
 
 import itertools
@@ -27,7 +26,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.polynomial import chebyshev
 
 from hysim._frozen import FloatArray
-from hysim.laws.differential.terms import Term
+from hysim.discovery._pysindy import compressed
+from hysim.models.terms import Term
 from hysim.records import Record
 
 MIN_SAMPLES = 4
@@ -43,7 +43,7 @@ Feature = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
 @dataclass(frozen=True)
 class Branch:
-    """One monotone stretch of a record: inputs, smoothed outputs, dy/dL, each (n,), and the sign of du."""
+    """One monotone part of a record: inputs, smoothed outputs, dy/dL, each (n,), and the sign of du."""
 
     u: FloatArray
     y: FloatArray
@@ -53,7 +53,7 @@ class Branch:
 
 @dataclass(frozen=True)
 class Rows:
-    """The rows of a regression: points (n_points,) of the path, and what makes rows of them.
+    """Rows of a regression at points (n_points,) of the path.
 
     `slope` (n_rows,) is the left side for z = y. `window` (n_window,) sums values at points into rows, every `stride`
     points one, each times `length`; with None, each point is a row.
@@ -68,12 +68,12 @@ class Rows:
     stride: int = 1
 
     def columns(self, feature: Feature, feedthrough: float = 0.0, offset: float = 0.0) -> FloatArray:
-        """The right side, shape (n_rows, n_terms)."""
+        """Right side, shape (n_rows, n_terms)."""
         values = feature(self.u, self.y - feedthrough * self.u - offset, self.direction)
         return self._summed(values * self.length[:, np.newaxis])
 
     def target(self, feedthrough: float = 0.0) -> FloatArray:
-        """The left side for z = y - feedthrough u, shape (n_rows,)."""
+        """Left side for z = y - feedthrough u, shape (n_rows,)."""
         return self.slope - feedthrough * self._summed((self.direction * self.length)[:, np.newaxis])[:, 0]
 
     def _summed(self, values: FloatArray) -> FloatArray:
@@ -83,7 +83,7 @@ class Rows:
 
 
 def smoothed_rows(u: FloatArray, y: FloatArray) -> Rows | None:
-    """The smoothed form, or None where no branch is long enough."""
+    """Smoothed form, or None where no branch is long enough."""
     smooth = branches(u, y)
     if not smooth:
         return None
@@ -94,7 +94,7 @@ def smoothed_rows(u: FloatArray, y: FloatArray) -> Rows | None:
 
 
 def weak_rows(u: FloatArray, y: FloatArray) -> Rows | None:
-    """The weak form, or None where there are too few samples for a window."""
+    """Weak form, or None where there are too few samples for a window."""
     u, y = without_rests(u, y)
     n = u.size - 1
     if n < _SHORTEST:
@@ -112,13 +112,11 @@ def weak_rows(u: FloatArray, y: FloatArray) -> Rows | None:
 
 
 def branches(u: FloatArray, y: FloatArray) -> list[Branch]:
-    """The branches of a record that have enough samples, smoothed."""
     u, y = without_rests(u, y)
     return [smoothed(u[piece], y[piece]) for piece in pieces(u) if u[piece].size >= MIN_SAMPLES]
 
 
 def smoothed(u: FloatArray, y: FloatArray) -> Branch:
-    """The branch through the samples of one monotone stretch."""
     length = np.abs(u - u[0])
     x = 2.0 * length / length[-1] - 1.0
     series = _polynomial(x, y)
@@ -134,7 +132,7 @@ def without_rests(u: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]
 
 
 def pieces(u: FloatArray) -> list[slice]:
-    """Where the branches of an input without rests lie, each with both its ends."""
+    """Slices of the branches of an input without rests, each with both its ends."""
     direction = np.sign(np.diff(u))
     reversals = np.flatnonzero(direction[1:] != direction[:-1]) + 1
     return [slice(first, last + 1) for first, last in itertools.pairwise([0, *reversals.tolist(), u.size - 1])]
@@ -165,7 +163,6 @@ FORMS = {"smoothed": smoothed_rows, "weak": weak_rows}
 
 
 def signs_of(terms: Sequence[Term], signs: Mapping[str, int] | None) -> dict[Term, int]:
-    """The signs that coefficients must have, by term."""
     wanted = {Term.parse(name): sign for name, sign in (signs or {}).items()}
     for term, sign in wanted.items():
         if term not in terms:
@@ -177,10 +174,9 @@ def signs_of(terms: Sequence[Term], signs: Mapping[str, int] | None) -> dict[Ter
 
 @dataclass(frozen=True)
 class Regression:
-    """slope = features @ coefficients, in scaled units.
+    """slope = features @ coefficients, scaled by the rms values `sizes` (n_terms,) and `slope_size`.
 
-    `sizes` (n_terms,) are the rms values of the columns, `slope_size` that of the slope. `dependent` are the terms
-    left out since their columns are combinations of those of lower degree on these records.
+    `dependent` are terms left out since their columns are combinations of those of lower degree.
     """
 
     terms: tuple[Term, ...]
@@ -192,25 +188,22 @@ class Regression:
 
     @property
     def condition(self) -> float:
-        """Condition number of the scaled features."""
         return float(np.linalg.cond(self.features))
 
-    def kept(self, coefficients: FloatArray) -> tuple[Term, ...]:
-        """The terms whose coefficients (n_terms,) are not zero."""
+    def included(self, coefficients: FloatArray) -> tuple[Term, ...]:
         return tuple(term for term, value in zip(self.terms, coefficients, strict=True) if value != 0.0)
 
     def ridge(self, terms: Sequence[Term], weight: float) -> FloatArray:
         """Coefficients (n_terms,) of a law with these terms alone, by ridge regression."""
-        kept = [self.terms.index(term) for term in terms]
-        columns = self.features[:, kept]
-        normal = columns.T @ columns / len(columns) + weight * np.eye(len(kept))
-        scaled = np.linalg.solve(normal, columns.T @ self.slope / len(columns))
-        return np.asarray(scaled * self.slope_size / self.sizes[kept])
+        included = [self.terms.index(term) for term in terms]
+        return np.asarray(
+            ridge(self.features[:, included], self.slope, weight) * self.slope_size / self.sizes[included]
+        )
 
 
 @dataclass(frozen=True)
 class Slopes:
-    """The rows of several records in one form."""
+    """Rows of several records in one form."""
 
     rows: tuple[Rows, ...]
 
@@ -222,42 +215,35 @@ class Slopes:
         return columns, np.concatenate([rows.target(feedthrough) for rows in self.rows])
 
     def misfit(self, terms: Sequence[Term], feedthrough: float, offset: float) -> float:
-        """Rms of the slope that all terms together leave over."""
+        """Rms of the residual slope with all terms together."""
         columns, slope = self.equations(_features(terms), feedthrough, offset)
-        triangle = np.asarray(np.linalg.qr(np.column_stack([columns, slope]), mode="r"))
-        return abs(float(triangle[-1, -1])) / math.sqrt(len(slope))
+        return abs(float(compressed(columns, slope)[1][-1])) / math.sqrt(len(slope))
 
     def regression(self, terms: Sequence[Term], feedthrough: float = 0.0, offset: float = 0.0) -> Regression:
-        """The regression on those of the terms that the records can tell apart, for z = y - feedthrough u - offset."""
+        """Regression on the independent ones of the terms, for z = y - feedthrough u - offset."""
         raw, slope = self.equations(_features(terms), feedthrough, offset)
         sizes, slope_size = np.sqrt(np.mean(raw**2, axis=0)), float(np.sqrt(np.mean(slope**2))) or 1.0
         scaled = raw / np.where(sizes > 0.0, sizes, 1.0)
         by_degree = sorted(range(len(terms)), key=lambda k: (terms[k].degree, k))
-        kept = sorted(independent(scaled, np.empty((len(slope), 0)), by_degree, DEPENDENT))
+        included = sorted(independent(scaled, np.empty((len(slope), 0)), by_degree, DEPENDENT))
         return Regression(
-            terms=tuple(terms[k] for k in kept),
-            dependent=tuple(term for k, term in enumerate(terms) if k not in kept),
-            features=scaled[:, kept],
+            terms=tuple(terms[k] for k in included),
+            dependent=tuple(term for k, term in enumerate(terms) if k not in included),
+            features=scaled[:, included],
             slope=slope / slope_size,
-            sizes=sizes[kept],
+            sizes=sizes[included],
             slope_size=slope_size,
         )
 
 
 def slopes(records: Sequence[Record], form: str) -> Slopes:
-    """The rows of records in the "smoothed" or the "weak" form.
-
-    Raises
-    ------
-    ValueError
-        If the records cannot tell u' from |u'|: their input never reverses, or their branches are too short.
-    """
+    """Rows of records in the "smoothed" or the "weak" form; a ValueError if these cannot distinguish u' from |u'|."""
     parts = tuple(rows for record in records if (rows := FORMS[form](record.u, record.y)) is not None)
     directions = {sign for rows in parts for sign in np.unique(rows.direction).tolist()}
     if len(directions) < 2:
         raise ValueError(
             f"a memory law needs a rising and a falling branch of at least {MIN_SAMPLES} samples each: with one of "
-            "them alone u' and |u'| are the same thing. Give a record whose input reverses, sampled more finely"
+            "them alone u' and |u'| are equal. Give a record whose input reverses, sampled more finely"
         )
     return Slopes(parts)
 
@@ -270,25 +256,27 @@ def _features(terms: Sequence[Term]) -> Feature:
 
 
 def feature(term: Term, u: FloatArray, z: FloatArray, direction: FloatArray | float) -> FloatArray:
-    """The column of a term in dz/dL."""
     column = u**term.i * z**term.j
     if term.absolute:
         column = column * np.abs(z)
     return column if term.rectified else direction * column
 
 
-def independent(columns: FloatArray, basis: FloatArray, order: Sequence[int], least: float) -> list[int]:
-    """The columns that, taken in `order`, are no combinations of an orthonormal `basis` and of those before them.
+def ridge(columns: FloatArray, target: FloatArray, weight: float) -> FloatArray:
+    """Ridge regression on columns of about unit rms."""
+    normal = columns.T @ columns / len(columns) + weight * np.eye(columns.shape[1])
+    return np.asarray(np.linalg.solve(normal, columns.T @ target / len(columns)))
 
-    Columns (n, n_columns) of which a share below `least` remains count as combinations.
-    """
-    kept = []
+
+def independent(columns: FloatArray, basis: FloatArray, order: Sequence[int], least: float) -> list[int]:
+    """Columns, in `order`, of which a share of `least` is no combination of an orthonormal `basis` and those before."""
+    included = []
     for k in order:
         rest = columns[:, k]
         for _ in range(2):  # twice is enough for orthogonality to rounding
             rest = rest - basis @ (basis.T @ rest)
         size = float(np.linalg.norm(rest))
         if size > least * float(np.linalg.norm(columns[:, k])):
-            kept.append(k)
+            included.append(k)
             basis = np.column_stack([basis, rest / size])
-    return kept
+    return included

@@ -1,11 +1,11 @@
-"""What a law consists of, before its numbers are known: terms of a library, or a Bouc-Wen law of any exponent.
+"""Laws before their numbers are known: terms of a library, or a Bouc-Wen law of any exponent.
 
 A structure has `size` numbers, those of the memory first, then a feedthrough and an offset where it has them:
 
     y = offset + feedthrough u + z
 
-The memory at the first sample is not among them: each record has its own, unless the structure is at `rest` there.
-Then z is zero at the first sample of every record, so that y0 = offset + feedthrough u0 is no free number.
+Each record has its own initial memory, unless the structure is at `rest`: z is zero at the first sample, so that
+y0 = offset + feedthrough u0 is no free number.
 """
 
 from collections.abc import Mapping
@@ -33,11 +33,9 @@ class Terms(NamedTuple):
 
     @property
     def size(self) -> int:
-        """How many numbers it has."""
         return len(self.terms) + self.feedthrough + self.offset
 
     def without(self, k: int) -> Self:
-        """The structure that lacks its number `k`."""
         if k < len(self.terms):
             return self._replace(terms=self.terms[:k] + self.terms[k + 1 :])
         if self.feedthrough and k == len(self.terms):
@@ -50,7 +48,6 @@ class Terms(NamedTuple):
         return np.concatenate([of_terms, _shift_units(self, record, stroke)])
 
     def bounds(self, signs: Mapping[Term, int]) -> Bounds:
-        """Lower and upper bounds of the numbers, (size,) each."""
         wanted = np.array([signs.get(term, 0) for term in self.terms] + [0] * (self.feedthrough + self.offset))
         return np.where(wanted > 0, 0.0, -np.inf), np.where(wanted < 0, 0.0, np.inf)
 
@@ -75,7 +72,6 @@ class AnyExponent:
 
     @property
     def size(self) -> int:
-        """How many numbers it has."""
         return 4 + self.feedthrough + self.offset
 
     def units(self, record: Record, stroke: float) -> FloatArray:
@@ -107,7 +103,6 @@ def output_at_rest(structure: Structure, numbers: FloatArray, u0: float) -> Floa
 
 
 def shifts(structure: Structure, numbers: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Feedthrough and offset, (n_sets,) each, of numbers (n_sets, size)."""
     zero, first = np.zeros(len(numbers)), structure.size - structure.feedthrough - structure.offset
     feedthrough = numbers[:, first] if structure.feedthrough else zero
     return feedthrough, numbers[:, first + structure.feedthrough] if structure.offset else zero

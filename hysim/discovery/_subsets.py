@@ -4,9 +4,8 @@
 
 With C = (J^T J)^-1 and the optimum of all columns, leaving out column j costs x_j^2 / C_jj, moves the others by
 -C_j x_j / C_jj, and turns C into C - C_j C_j^T / C_jj. The subsets of each size follow from those of one more column;
-of each size the `width` cheapest are followed. Where there are no more subsets of any size, all are tried: so it is up
-to 12 columns with WIDTH. A chain of sweeps adds small positive costs, so that nothing cancels where the residual is
-rounding.
+of each size the `width` cheapest are followed, which with WIDTH are all up to 12 columns. A chain of sweeps adds small
+positive costs, so that nothing cancels where the residual is rounding.
 
 Source: G. M. Furnival and R. W. Wilson, Regressions by leaps and bounds, Technometrics 16 (1974) 499.
 """
@@ -26,9 +25,9 @@ _LEAST = 0.5  # C of columns of unit size has diagonals of 1 and more, but for r
 
 
 class Subsets(NamedTuple):
-    """Subsets of one size: the columns kept (n_subsets, n), their optima (n_subsets, n), zero elsewhere, and costs."""
+    """Subsets of one size: columns included (n_subsets, n), optima (n_subsets, n), zero elsewhere, and costs."""
 
-    kept: npt.NDArray[np.bool_]
+    included: npt.NDArray[np.bool_]
     x: FloatArray
     cost: FloatArray
 
@@ -53,13 +52,13 @@ def best_subsets(
     C = root @ root.T
     step = -root @ (basis[: residual.size].T @ residual)
     rest = residual + jacobian @ (step / sizes)
-    kept, best = np.ones((1, x.size), dtype=bool), (x * sizes + step)[np.newaxis]
+    included, best = np.ones((1, x.size), dtype=bool), (x * sizes + step)[np.newaxis]
     cost, C = np.array([float(rest @ rest)]), C[np.newaxis]
     while True:
-        yield Subsets(kept, best / sizes, cost)
+        yield Subsets(included, best / sizes, cost)
         diagonal = np.maximum(np.diagonal(C, axis1=1, axis2=2), _LEAST)
-        losses = np.where(kept & removable, best**2 / diagonal, np.inf)
-        parents, columns = _cheapest(kept, cost[:, np.newaxis] + losses, width)
+        losses = np.where(included & removable, best**2 / diagonal, np.inf)
+        parents, columns = _cheapest(included, cost[:, np.newaxis] + losses, width)
         if not parents.size:
             return
         here, rows = np.arange(parents.size), C[parents, columns]
@@ -67,19 +66,19 @@ def best_subsets(
         cost = cost[parents] + losses[parents, columns]
         best = best[parents] - rows * (best[parents, columns][:, np.newaxis] / pivot)
         C = C[parents] - rows[:, :, np.newaxis] * (rows / pivot)[:, np.newaxis, :]
-        kept = kept[parents]
-        kept[here, columns] = False
-        best[~kept] = 0.0
+        included = included[parents]
+        included[here, columns] = False
+        best[~included] = 0.0
         C[here, columns], C[here, :, columns] = 0.0, 0.0
 
 
 def _cheapest(
-    kept: npt.NDArray[np.bool_], costs: FloatArray, width: int
+    included: npt.NDArray[np.bool_], costs: FloatArray, width: int
 ) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
     """Parents and columns whose removal leaves the `width` cheapest different subsets, cheapest first."""
     parents, columns = np.nonzero(np.isfinite(costs))
-    codes = (1 << np.arange(kept.shape[1]))[::-1]
-    subsets = kept[parents] @ codes - codes[columns]
+    codes = (1 << np.arange(included.shape[1]))[::-1]
+    subsets = included[parents] @ codes - codes[columns]
     order = np.lexsort((subsets, costs[parents, columns]))
     first = np.sort(np.unique(subsets[order], return_index=True)[1])[:width]
     return parents[order][first], columns[order][first]

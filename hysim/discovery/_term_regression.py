@@ -1,8 +1,8 @@
 """The regression of an oscillator's output on the terms of its memory, the plant projected out.
 
 Columns are scaled so that the coefficients of all terms together have standard errors of one: a threshold is then a
-number of standard errors, without unit. Where terms are nearly collinear a small coefficient is no sign of a small
-loss, so that STLSQ's thresholds are accompanied by plain elimination.
+number of standard errors. Where terms are nearly collinear a small coefficient is no sign of a small loss, so that
+STLSQ's thresholds are accompanied by plain elimination.
 """
 
 from collections.abc import Sequence
@@ -27,10 +27,8 @@ DEPENDENT = 1e-5  # share of a slope that those before it do not explain, below 
 class TermRegression:
     """target = plant @ ... + features @ coefficients + noise of one, all about an oscillator.
 
-    `features` (n_samples, n_terms) and `target` are without what the plant explains, and scaled by `units`, the
-    standard errors of the coefficients of all terms together. `dependent` are the terms left out since their slopes
-    are combinations of the plant's and of those of lower degree. `n_others` counts fitted numbers that are neither the
-    plant's nor coefficients, such as an exponent.
+    `features` (n_samples, n_terms) and `target` have the plant projected out; `units` are the standard errors that
+    scale them. `dependent` are terms left out as combinations of others; `n_others` counts other fitted numbers.
     """
 
     terms: tuple[Term, ...]
@@ -46,28 +44,25 @@ class TermRegression:
 
     @cached_property
     def triangle(self) -> FloatArray:
-        """The R of [features, target]."""
         return np.asarray(np.linalg.qr(np.column_stack([self.features, self.target]), mode="r"))
 
     def thresholded(self) -> list[tuple[Term, ...]]:
-        """Structures on the path of PySINDy's STLSQ, from dense to sparse."""
         path = sparse_path(self.features, self.target) if self.terms else []
         return [tuple(t for t, value in zip(self.terms, values, strict=True) if value != 0.0) for _, values in path]
 
     def eliminated(self) -> list[tuple[Term, ...]]:
-        """Structures from dense to sparse, each without the term that the last one loses least by."""
-        R, kept, path = self.triangle, list(range(len(self.terms))), []
+        """Structures from dense to sparse, each without the term whose removal costs least."""
+        R, included, path = self.triangle, list(range(len(self.terms))), []
         sizes = np.linalg.norm(R[:, :-1], axis=0)
         columns = R[:, :-1] / np.where(sizes > 0.0, sizes, 1.0)
-        normal, right = columns.T @ columns + _RIDGE * np.eye(len(kept)), columns.T @ R[:, -1]
-        while kept:
-            path.append(tuple(self.terms[k] for k in kept))
-            inverse = np.linalg.inv(normal[np.ix_(kept, kept)])
-            kept.pop(int(np.argmin((inverse @ right[kept]) ** 2 / np.diag(inverse))))
+        normal, right = columns.T @ columns + _RIDGE * np.eye(len(included)), columns.T @ R[:, -1]
+        while included:
+            path.append(tuple(self.terms[k] for k in included))
+            inverse = np.linalg.inv(normal[np.ix_(included, included)])
+            included.pop(int(np.argmin((inverse @ right[included]) ** 2 / np.diag(inverse))))
         return path
 
     def best(self, structures: Sequence[tuple[Term, ...]]) -> tuple[Term, ...]:
-        """The structure of the lowest BIC, that without terms among them."""
         return min([*structures, ()], key=self.bic)
 
     def inclusion(self, rng: np.random.Generator, n_draws: int) -> dict[Term, float]:
@@ -82,27 +77,24 @@ class TermRegression:
 
     @cached_property
     def condition(self) -> float:
-        """Condition number of the features, each of unit size."""
         R = self.triangle[:, :-1]
         return float(np.linalg.cond(R / np.linalg.norm(R, axis=0))) if R.shape[1] else 1.0
 
     def places(self, terms: Sequence[Term]) -> list[int]:
-        """Columns of some terms."""
         return [self.terms.index(term) for term in terms]
 
     def squares(self, terms: Sequence[Term]) -> float:
-        """Sum of squares that a structure leaves, in units of the noise."""
-        kept, goal = self.triangle[:, self.places(terms)], self.triangle[:, -1]
-        rest = goal - kept @ np.linalg.lstsq(kept, goal, rcond=None)[0]
+        """Sum of squared residuals of a structure, in units of the noise."""
+        included, goal = self.triangle[:, self.places(terms)], self.triangle[:, -1]
+        rest = goal - included @ np.linalg.lstsq(included, goal, rcond=None)[0]
         return float(rest @ rest)
 
     def bic(self, terms: Sequence[Term]) -> float:
-        """Bayesian information criterion of a structure, [squared unit of y]."""
         n, n_parameters = self.target.size, self.n_plant + self.n_others + len(terms)
         return information(self.squares(terms) / n * self.sigma**2, n, n_parameters, floor=self.floor)
 
     def held_out_rmse(self, terms: Sequence[Term]) -> float:
-        """Root mean square error on each block of a structure that the other blocks have fitted [unit of y]."""
+        """Rmse on each block of a structure that the other blocks have fitted [unit of y]."""
         X, y = self.features[:, self.places(terms)], self.target
         normal, right, total = X.T @ X, X.T @ y, 0.0
         for block in self.blocks:
@@ -120,25 +112,22 @@ def term_regression(
     floor: float,
     blocks: list[slice],
 ) -> TermRegression:
-    """The regression of `target` (n_samples,) on slopes (n_samples, n_terms), the plant's (n_samples, n) aside.
-
-    `floor` is the noise below which nothing counts as evidence, `blocks` are what is held out in turn.
-    """
+    """Regression of `target` (n_samples,) on slopes (n_samples, n_terms), the plant's (n_samples, n) projected out."""
     sizes = np.linalg.norm(plant, axis=0)
     plant, sizes = plant[:, sizes > 0.0], sizes[sizes > 0.0]  # where the motion diverges a slope is unknown, and zero
     basis = np.linalg.qr(plant / sizes)[0]
-    n_plant, kept = basis.shape[1], independent(slopes, basis, range(len(terms)), DEPENDENT)
-    features = slopes[:, kept] - basis @ (basis.T @ slopes[:, kept])
+    n_plant, included = basis.shape[1], independent(slopes, basis, range(len(terms)), DEPENDENT)
+    features = slopes[:, included] - basis @ (basis.T @ slopes[:, included])
     goal = target - basis @ (basis.T @ target)
     size = np.linalg.norm(features, axis=0)
     scaled = features / size
     residual = goal - scaled @ np.linalg.lstsq(scaled, goal, rcond=None)[0]
-    freedom = max(goal.size - n_plant - len(kept), 1)
+    freedom = max(goal.size - n_plant - len(included), 1)
     sigma = max(float(np.sqrt(residual @ residual / freedom)), floor)
     units = sigma * np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled))) / size
     return TermRegression(
-        terms=tuple(terms[k] for k in kept),
-        dependent=tuple(term for k, term in enumerate(terms) if k not in kept),
+        terms=tuple(terms[k] for k in included),
+        dependent=tuple(term for k, term in enumerate(terms) if k not in included),
         features=features * units / sigma,
         target=goal / sigma,
         units=units,

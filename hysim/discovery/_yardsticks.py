@@ -4,10 +4,10 @@
     relaxations   y = c_0 u + sum_i g(log tau_i) x_i + trend,       tau_i x_i' + x_i = u
     plays         y = f(u) + sum_i (c_i p_i + d_i p_i^2 + e_i p_i^3) + trend,   p_i the play of the threshold r_i
 
-A curve has no memory, relaxations are linear creep over all times of a record, and plays do not depend on time. Every
-Preisach operator is a sum of functions of plays (M. Brokate and J. Sprekels, Hysteresis and Phase Transitions, 1996,
-section 2.4). The trend is a polynomial of time in each record, f is a cubic spline and g is linear between three
-places. The numbers come from a ridge regression whose weight minimises the generalised cross-validation
+Relaxations are linear creep over all times of a record. Every Preisach operator is a sum of functions of plays
+(M. Brokate and J. Sprekels, Hysteresis and Phase Transitions, 1996, section 2.4). The trend is a polynomial of time in
+each record, f is a cubic spline and g is linear between three places. The numbers come from a ridge regression whose
+weight minimises the generalised cross-validation
 
     GCV = (residual sum of squares / n) / (1 - degrees of freedom / n)^2.
 
@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import legendre
 from scipy.interpolate import BSpline
+from scipy.linalg import block_diag
 
 from hysim._cycles import TOLERANCE
 from hysim._frozen import FloatArray
@@ -39,43 +40,42 @@ _POWERS = (1, 2, 3)
 _PER_DECADE = 2  # relaxations
 _PLACES = np.linspace(0.0, 1.0, 3)  # of g, in shares of the range of log tau
 _BENDS = 4  # highest degree of a trend
-_BRANCHES = 3  # of a record for each degree of its trend: a trend of fewer cannot be told from the loop
+_BRANCHES = 3  # of a record for each degree of its trend: a trend of fewer cannot be distinguished from the loop
 _RIDGES = 10.0 ** np.arange(-12.0, 1.1, 0.5)  # in the largest squared singular value
 _MOST = 0.8  # degrees of freedom in samples
-_BEFORE = 0.1  # how strongly what was before a record is held near zero
-_SLOW = 1e-3  # the same of trends: they cannot be estimated from the few samples that are seen of a left-out record
+_BEFORE = 0.1  # ridge of the state before a record
+_SLOW = 1e-3  # ridge of trends: the first samples of a left-out record cannot determine them
 
 
 @dataclass(frozen=True)
 class Yardstick:
     """A model that is linear in its numbers, which multiply `columns` (n_samples, n_columns), and a constant.
 
-    Each number is held near zero, whatever the ridge, as strongly as `held` (n_columns,) says in squared sizes of its
-    column. Where `u` (n_samples,) is given, a smoothing spline of it is fitted first.
+    Each has a ridge of its own, `ridges` (n_columns,) in squared sizes. A smoothing spline of `u`, if any, is fitted
+    first.
     """
 
     columns: FloatArray
-    held: FloatArray
+    ridges: FloatArray
     u: FloatArray | None = None
 
     def outputs(self, y: FloatArray, weights: FloatArray) -> FloatArray:
         """Outputs at all samples, the numbers fitted to `y` where the weights are not zero."""
-        seen = weights > 0.0
+        fitted = weights > 0.0
         if self.u is not None:
-            first: FloatArray = SingleValued.fitted(self.u[seen], y[seen]).model.response(self.u)
+            first: FloatArray = SingleValued.fitted(self.u[fitted], y[fitted]).model.response(self.u)
             return np.asarray(first + replace(self, u=None).outputs(y - first, weights))
-        means = self.columns[seen].mean(axis=0)
+        means = self.columns[fitted].mean(axis=0)
         sizes = np.linalg.norm(self.columns - self.columns.mean(axis=0), axis=0)
         sizes[sizes == 0.0] = 1.0
-        columns, level = (self.columns - means) / sizes, float(y[seen].mean())
-        prior = np.diag(np.sqrt(self.held))[self.held > 0.0]
-        design = np.concatenate([columns[seen], prior])
-        target = np.concatenate([y[seen] - level, np.zeros(len(prior))])
-        return np.asarray(level + columns @ _ridge(design, target, int(seen.sum())))
+        columns, level = (self.columns - means) / sizes, float(y[fitted].mean())
+        prior = np.diag(np.sqrt(self.ridges))[self.ridges > 0.0]
+        design = np.concatenate([columns[fitted], prior])
+        target = np.concatenate([y[fitted] - level, np.zeros(len(prior))])
+        return np.asarray(level + columns @ _ridge(design, target, int(fitted.sum())))
 
 
 def curve(records: Sequence[Record]) -> Yardstick:
-    """A function of the input alone."""
     return _yardstick([_spline(records)], _trends(records), u=_inputs(records))
 
 
@@ -91,7 +91,6 @@ def relaxations(records: Sequence[Record]) -> Yardstick:
 
 
 def plays(records: Sequence[Record]) -> Yardstick:
-    """A curve and functions of plays."""
     u = _inputs(records)
     middle, reach = 0.5 * (u.max() + u.min()), 0.5 * float(np.ptp(u))
     positions, before = [], []
@@ -101,24 +100,24 @@ def plays(records: Sequence[Record]) -> Yardstick:
         positions.append(0.5 * (high + low))
         before.append(high - low)
     powers = [np.concatenate(positions) ** power for power in _POWERS]
-    return _yardstick([_spline(records), *powers], _trends(records), _apart(before), u)
+    return _yardstick([_spline(records), *powers], _trends(records), block_diag(*before), u)
 
 
 def means(u: FloatArray, y: FloatArray, weights: FloatArray) -> FloatArray:
-    """Outputs at all inputs of straight lines through mean outputs of neighbouring inputs that have a weight.
+    """Straight lines through mean outputs of neighbouring inputs that have a weight, at all inputs.
 
-    Where inputs repeat themselves, this curve has steps and kinks that no smooth one has. A mean is that of several
-    samples: those of single ones would know the path of an input that another record repeats.
+    Where inputs repeat themselves, this curve has steps and kinks that no smooth one has. Single samples would know the
+    path of an input that another record repeats: a mean is that of several.
     """
-    seen = weights > 0.0
-    order = np.argsort(u[seen], kind="stable")
-    new = np.append(True, _steps(u[seen]))
+    fitted = weights > 0.0
+    order = np.argsort(u[fitted], kind="stable")
+    new = np.append(True, _steps(u[fitted]))
     begins = [0]
     for k in range(1, order.size):
         if new[k] and k - begins[-1] >= _IN_MEAN:
             begins.append(k)
     counts = np.diff([*begins, order.size])
-    at, levels = (np.add.reduceat(values[seen][order], begins) / counts for values in (u, y))
+    at, levels = (np.add.reduceat(values[fitted][order], begins) / counts for values in (u, y))
     return np.asarray(np.interp(u, at, levels))
 
 
@@ -137,19 +136,19 @@ def _yardstick(
     groups = [(np.concatenate(parts, axis=1), 0.0), (trends, _SLOW)]
     groups += [] if before is None else [(before, _BEFORE)]
     columns = np.concatenate([each for each, _ in groups], axis=1)
-    return Yardstick(columns, np.concatenate([np.full(each.shape[1], held) for each, held in groups]), u)
+    return Yardstick(columns, np.concatenate([np.full(each.shape[1], ridges) for each, ridges in groups]), u)
 
 
 def _ridge(design: FloatArray, target: FloatArray, n: int) -> FloatArray:
-    """The numbers of least squares with the ridge of least GCV, one number of the n samples being their mean."""
+    """Least squares with the ridge of least GCV, one number of the n samples being their mean."""
     basis, singular, right = np.linalg.svd(design, full_matrices=False)
     along = basis.T @ target
     beyond = max(float(target @ target - along @ along), 0.0)
     best, chosen = np.inf, np.zeros(singular.size)
     for ridge in _RIDGES * singular[0] ** 2:
-        kept = singular**2 / (singular**2 + ridge)
-        freedom = 1.0 + float(kept.sum())
-        cost = (beyond + float(np.sum(((1.0 - kept) * along) ** 2))) / (1.0 - freedom / n) ** 2
+        filters = singular**2 / (singular**2 + ridge)
+        freedom = 1.0 + float(filters.sum())
+        cost = (beyond + float(np.sum(((1.0 - filters) * along) ** 2))) / (1.0 - freedom / n) ** 2
         if freedom < _MOST * n and cost < best:
             best, chosen = cost, singular / (singular**2 + ridge) * along
     return np.asarray(right.T @ chosen)
@@ -183,13 +182,4 @@ def _inputs(records: Sequence[Record]) -> FloatArray:
 
 
 def _trends(records: Sequence[Record]) -> FloatArray:
-    return _apart([trend(record) for record in records])
-
-
-def _apart(parts: Sequence[FloatArray]) -> FloatArray:
-    rows = [np.zeros((len(part), sum(each.shape[1] for each in parts))) for part in parts]
-    begin = 0
-    for row, part in zip(rows, parts, strict=True):
-        row[:, begin : begin + part.shape[1]] = part
-        begin += part.shape[1]
-    return np.concatenate(rows)
+    return np.asarray(block_diag(*(trend(record) for record in records)))

@@ -34,7 +34,7 @@ class Constraint(NamedTuple):
 
 
 class Reached(NamedTuple):
-    """The ends of a descent: theta (n_sets, n_theta), minus the log-likelihood, sigma, and whether each is at rest."""
+    """Ends of a descent: theta (n_sets, n_theta), minus the log-likelihood, sigma, and whether each came to rest."""
 
     theta: FloatArray
     loss: FloatArray
@@ -44,10 +44,7 @@ class Reached(NamedTuple):
 
 @dataclass(frozen=True)
 class Descent:
-    """Outputs `targets` to be met with `weights`, each (n_sets, n_samples), or (1, n_samples) for all sets.
-
-    `projected` solves for b anew after each step, which leads farther from a poor start; it is for sums of squares.
-    """
+    """Outputs `targets` to be met with `weights`, (n_sets or 1, n_samples); `projected` solves for b at each step."""
 
     problem: Problem
     noise: Noise
@@ -68,12 +65,10 @@ class Descent:
         return Reached(reached.x, reached.loss, reached.evaluated[2][:, 0], reached.at_rest)
 
     def box(self) -> tuple[FloatArray, FloatArray]:
-        """Lower and upper bounds of theta."""
         space, linear = self.problem.space, self.problem.linear_box()
         return np.concatenate([space.lower, linear[0]]), np.concatenate([space.upper, linear[1]])
 
     def slopes(self, theta: FloatArray, outputs: FloatArray, columns: FloatArray) -> FloatArray:
-        """dm/dtheta, (n_sets, n_samples, n_theta), by one-sided differences in x: exact enough to descend by."""
         n_sets, n_x = len(theta), self.problem.n_x
         if not n_x:
             return columns
@@ -87,7 +82,7 @@ class Descent:
         return np.concatenate([by_x.transpose(0, 2, 1), columns], axis=2)
 
     def pivots(self, theta: FloatArray, constraint: Constraint) -> tuple[Sets, FloatArray]:
-        """The element of theta that each constraint is solved for, and d theta_pivot / d theta_others on it."""
+        """Element of theta that each constraint is solved for, and d theta_pivot / d theta_others on it."""
         rows = np.arange(len(theta))
         by_theta = named_slopes(self.problem, theta)[rows, constraint.place]
         space = self.problem.space
@@ -99,7 +94,7 @@ class Descent:
         return pivot, shares
 
     def restored(self, theta: FloatArray, constraint: Constraint, pivot: Sets) -> FloatArray:
-        """Bring the pivot onto the constraint by the secant method, inside the box."""
+        """The pivot brought onto the constraint by the secant method, inside the box."""
         theta, rows = theta.copy(), np.arange(len(theta))
         lower, upper = (side[pivot] for side in self.box())
         short = self.short(theta, constraint)
@@ -114,27 +109,24 @@ class Descent:
         return theta
 
     def keeps(self, theta: FloatArray, constraint: Constraint) -> Flags:
-        """Whether each set is on its constraint."""
         allowed = 1e3 * _ON_CONSTRAINT * np.abs(constraint.value)
         return np.asarray(np.abs(self.short(theta, constraint)) <= allowed)
 
     def short(self, theta: FloatArray, constraint: Constraint) -> FloatArray:
-        """What the constrained parameter of each set lacks, (n_sets,)."""
+        """Value of the constraint minus that of the parameter, (n_sets,)."""
         named = self.problem.named(theta)
         return np.asarray(constraint.value - named[np.arange(len(theta)), constraint.place])
 
 
 @dataclass(frozen=True)
 class _Sets:
-    """The sets of one descent, as `descend` takes them."""
-
     descent: Descent
     targets: FloatArray
     weights: FloatArray
     constraint: Constraint | None
 
     def evaluate(self, x: FloatArray, sets: Sets) -> tuple[FloatArray, tuple[FloatArray, ...]]:
-        """Minus the log-likelihood; outputs, columns and sigma. The linear part of `x` is the best if `projected`."""
+        """Minus the log-likelihood; outputs, columns, sigma. If `projected`, the linear part of `x` is solved for."""
         problem, n_x = self.descent.problem, self.descent.problem.n_x
         columns, fixed_part = problem.split(x[:, :n_x])
         if self.descent.projected:
@@ -152,7 +144,6 @@ class _Sets:
         return loss, (outputs, columns, sigma)
 
     def linearised(self, x: FloatArray, sets: Sets, evaluated: tuple[FloatArray, ...]) -> tuple[FloatArray, FloatArray]:
-        """The weighted regression of the next step."""
         outputs, columns, sigma = evaluated
         _, slope, curvature = self.descent.noise.terms(self.targets[sets] - outputs, sigma)
         root = np.sqrt(self.weights[sets] * np.maximum(curvature, 1e-12 / sigma**2))
@@ -162,7 +153,6 @@ class _Sets:
     def stepped(
         self, x: FloatArray, sets: Sets, jacobian: FloatArray, goal: FloatArray, damping: FloatArray
     ) -> FloatArray:
-        """The next trial, on the constraint."""
         (lower, upper), n_x = self.descent.box(), self.descent.problem.n_x
         constraint = self._constraint(sets)
         if constraint is None:

@@ -14,8 +14,6 @@ _MOST_LAGS = 20
 
 
 class FitMeasures(TypedDict):
-    """The fields of `Identification` that follow from the residual alone."""
-
     fit_percent: float
     rmse: float
     fpe: float
@@ -39,8 +37,8 @@ def fit_measures(y: FloatArray, residual: FloatArray, n_parameters: int) -> FitM
 def whiteness(residual: FloatArray, n_parameters: int) -> float:
     """Probability of residuals at least as correlated as these if they were white (Ljung and Box 1978).
 
-    Q = N (N + 2) sum over lags k of r_k^2 / (N - k), against chi^2 with as many degrees of freedom as lags; the lags
-    are a fifth of the samples and at most 20. nan where they are too few or all equal.
+    Q = N (N + 2) sum over lags k of r_k^2 / (N - k) against chi^2; the lags are a fifth of the samples and at most 20.
+    nan where they are too few or all equal.
     """
     from scipy.stats import chi2
 
@@ -56,7 +54,6 @@ def whiteness(residual: FloatArray, n_parameters: int) -> float:
 
 
 def loop_widths(descent: Descent, theta: FloatArray) -> FloatArray:
-    """Largest width of the loop of the first record for each theta, (n_sets,); empty where it has no loop."""
     record = descent.problem.parts[0].record
     outputs = descent.problem.model(theta)[:, : len(record)]
     finite = outputs[np.isfinite(outputs).all(axis=1)]

@@ -1,7 +1,6 @@
-"""A family that is fitted in one step (`hysim.models.search_space.Direct`): the fit, and the result that describes it.
+"""A family that is fitted in one step (`hysim.models.protocols.Direct`): the fit, and its result.
 
-It has no parameters with names, and so no standard errors; its number of parameters is that of its degrees of freedom,
-rounded. A sample that is left out is predicted by a fit that repeats every choice without it.
+Its number of parameters is that of its degrees of freedom, rounded; it has none by name, and no standard errors.
 """
 
 from collections.abc import Sequence
@@ -22,7 +21,6 @@ from hysim.records import Record
 
 
 def refuse(family: Direct, freedom: Freedom, noise: str, intervals: str) -> None:
-    """Refuse, by a ValueError, parameters by name, other noise than normal, and intervals."""
     name = family.__name__ if isinstance(family, type) else type(family).__name__
     if freedom.fixed or freedom.free or freedom.bounds:
         raise ValueError(f"{name} has no parameters by name: leave out fixed=, free= and bounds=")
@@ -35,7 +33,6 @@ def refuse(family: Direct, freedom: Freedom, noise: str, intervals: str) -> None
 def identified(
     family: Direct, records: Sequence[Record], folds: Sequence[npt.NDArray[np.intp]], seed: int
 ) -> Identification:
-    """The fit to all records together, described as a search is."""
     u = np.concatenate([record.u for record in records])
     y = np.concatenate([record.y for record in records])
     fit = family.fitted(u, y)
@@ -65,12 +62,11 @@ def identified(
 
 
 def _left_out_errors(family: Direct, u: FloatArray, y: FloatArray, folds: Sequence[npt.NDArray[np.intp]]) -> FloatArray:
-    """Error of each sample, (n,), in the fit without its fold; nan where no fold has it."""
     errors = np.full(y.size, np.nan)
     for fold in folds:
-        kept = np.ones(y.size, dtype=bool)
-        kept[fold] = False
-        errors[fold] = y[fold] - family.fitted(u[kept], y[kept]).model.response(u[fold])
+        training = np.ones(y.size, dtype=bool)
+        training[fold] = False
+        errors[fold] = y[fold] - family.fitted(u[training], y[training]).model.response(u[fold])
     return errors
 
 

@@ -21,7 +21,7 @@ from hysim.identification.folds import left_out
 from hysim.identification.swapped import swapped_columns, swapped_for
 from hysim.models.protocols import Direct, Identifiable, needs_time
 from hysim.models.search_space import Freedom
-from hysim.records import Record
+from hysim.records import Record, several
 
 
 def identify(
@@ -63,14 +63,12 @@ def identify(
         Normal noise; normal noise before a sensor that rounds to multiples of `Record.resolution`; or Student's t with
         4 degrees of freedom, for records with outliers.
     intervals : {"linear", "profile", "bootstrap"}
-        How `Identification.intervals`, at 95 %, are computed: from the standard errors, by the profile of the
-        likelihood, or from 500 records drawn anew.
+        Intervals at 95 %: from the standard errors, by the profile of the likelihood, or from 500 records drawn anew.
     cross_validate : {None, "loo", "cycles", "records"} or int, optional
-        ``"loo"`` leaves one output sample out at a time, an int one of that many blocks of samples, ``"cycles"`` a
-        cycle of the input but the first, ``"records"`` a record; the input is kept. Fills `Identification.cv_rmse`
-        and `Identification.cv_residual`.
+        What is left out at a time: an output sample, a cycle of the input (not the first), a record, or one of that
+        many blocks of samples; the input is kept. Fills `Identification.cv_rmse` and `Identification.cv_residual`.
     seed : int
-        Of the starts of the search, and of random draws. The optimum does not depend on it.
+        Seed of the starts and of random draws. The optimum does not depend on it.
     workers : int, optional
         Number of threads; by default one for each core.
     progress : callable, optional
@@ -97,7 +95,7 @@ def identify(
     >>> round(fit.estimates["beta"], 6), round(fit.estimates["gain"], 6)
     (0.7, 2.0)
     """
-    records, options = _records(record_or_records), _freedom(fixed or {}, free, bounds or {})
+    records, options = several(record_or_records, "identify"), _freedom(fixed or {}, free, bounds or {})
     if intervals not in ("linear", "profile", "bootstrap"):
         raise ValueError(f'intervals must be "linear", "profile" or "bootstrap", got {intervals!r}')
     if noise not in ("gaussian", "quantised", "robust"):
@@ -111,8 +109,8 @@ def identify(
             doubt = swapped_columns(records)
         else:
             family = _family(model_or_class)
-            whole = problem(family, records, options, initial)
-            fit = _searched(whole, noise, intervals, left_out(cross_validate, records), seed, progress)
+            least_squares = problem(family, records, options, initial)
+            fit = _searched(least_squares, noise, intervals, left_out(cross_validate, records), seed, progress)
             doubt = swapped_columns(records)
             if not doubt and not needs_time(fit.model):
                 doubt = swapped_for(family, records, options, initial, 1.0 - fit.fit_percent / 100.0)
@@ -129,7 +127,7 @@ def _searched(
 ) -> Identification:
     n_samples, n_names = problem.y.size, len(problem.space.names)
     if not n_names:
-        raise ValueError("every parameter is fixed: nothing is left to identify")
+        raise ValueError("every parameter is fixed: leave at least one free")
     if n_samples < n_names:
         raise ValueError(f"{n_names} parameters cannot be estimated from {n_samples} samples; fix some of them")
     density = _density(noise, problem)
@@ -144,16 +142,6 @@ def _searched(
     return replace(result, regions=search.regions(likely[0]), cv_residual=errors, cv_rmse=rms_of_known(errors))
 
 
-def _records(given: Record | Sequence[Record]) -> tuple[Record, ...]:
-    records = (given,) if isinstance(given, Record) else given
-    if not isinstance(records, Sequence) or not all(isinstance(record, Record) for record in records):
-        what = type(given).__name__
-        raise TypeError(f"identify takes a Record or several of them, got {what}: hs.Record(u=u, y=y)")
-    if not records:
-        raise ValueError("there is no record to identify from")
-    return tuple(records)
-
-
 def _freedom(fixed: Mapping[str, float], free: Sequence[str], bounds: Mapping[str, tuple[float, float]]) -> Freedom:
     for name, value in fixed.items():
         if not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
@@ -165,7 +153,7 @@ def _freedom(fixed: Mapping[str, float], free: Sequence[str], bounds: Mapping[st
 
 
 def _family(model_or_class: Any) -> Identifiable:
-    """The object that declares the search: a class stands for the model with its defaults."""
+    """The object that declares the search; a class stands for the model with its defaults."""
     family: Any = model_or_class
     if not isinstance(family, Identifiable):
         raise TypeError(f"identify takes a model, a model class or a structure, got {model_or_class!r}")

@@ -1,17 +1,16 @@
-"""What the measured output is believed to be: the model's, disturbed by one of three densities of scale sigma.
+"""Densities of the measured output y about the model's output m, r = y - m, each of scale sigma.
 
-    gaussian    y = m + sigma e,  e normal:        -ln p = r^2 / (2 sigma^2) + ln sigma,   r = y - m
+    gaussian    y = m + sigma e,  e normal:        -ln p = r^2 / (2 sigma^2) + ln sigma
     quantised   y is the nearest multiple of q:    -ln p = -ln [Phi((r + q/2) / sigma) - Phi((r - q/2) / sigma)]
     robust      e of Student's t, nu = 4:          -ln p = (nu + 1)/2 ln(1 + r^2 / (nu sigma^2)) + ln sigma
 
-Constants are left out of the first and the last. For given residuals the best sigma is found first, so that only
-the model's parameters are left to search. A density gives, for each sample, -ln p, its slope in m, and a curvature
-in m that is not negative: with these a descent is a sequence of weighted regressions. Many sets at once: residuals
-are (n_sets, n_samples), sigma is (n_sets, 1).
+Constants are left out of the first and the last. `scale` is the most likely sigma (n_sets, 1) for residuals
+(n_sets, n_samples), so that only the model's parameters are searched. `terms` are, for each sample, -ln p and its slope
+and non-negative curvature in m: a descent is a sequence of weighted regressions. `draw` makes measured outputs.
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,44 +22,22 @@ _LOG_ROOT_2PI = 0.5 * np.log(2.0 * np.pi)
 
 
 class Terms(NamedTuple):
-    """Of each sample: -ln p, its slope and its curvature in the model's output, (n_sets, n_samples)."""
+    """-ln p of each sample, its slope and its curvature in the model's output, (n_sets, n_samples)."""
 
     loss: FloatArray
     slope: FloatArray
     curvature: FloatArray
 
 
-class Noise(Protocol):
-    """One of the densities."""
-
-    @property
-    def name(self) -> str:
-        """Its name, as `identify` takes it."""
-        ...
-
-    def scale(self, residual: FloatArray, weights: FloatArray) -> FloatArray:
-        """The most likely sigma, (n_sets, 1)."""
-        ...
-
-    def terms(self, residual: FloatArray, sigma: FloatArray) -> Terms:
-        """The loss of each sample, with slope and curvature."""
-        ...
-
-    def draw(self, y: FloatArray, sigma: float, rng: np.random.Generator) -> FloatArray:
-        """Outputs as they could have been measured, of the shape of the model's outputs `y`."""
-        ...
-
-
 @dataclass(frozen=True)
 class Gaussian:
-    """Normal noise. `floor` keeps sigma off zero where a model is perfect [unit of y]."""
+    """Normal noise; `floor` is the smallest sigma [unit of y]."""
 
     floor: float
     name: str = "gaussian"
 
     def scale(self, residual: FloatArray, weights: FloatArray) -> FloatArray:
-        mean_square = np.sum(weights * residual**2, axis=1, keepdims=True) / weights.sum(axis=1, keepdims=True)
-        return np.asarray(np.maximum(np.sqrt(mean_square), self.floor))
+        return np.asarray(np.maximum(_rms(residual, weights), self.floor))
 
     def terms(self, residual: FloatArray, sigma: FloatArray) -> Terms:
         normal = residual / sigma
@@ -72,7 +49,7 @@ class Gaussian:
 
 @dataclass(frozen=True)
 class Robust:
-    """Student's t, for records with outliers."""
+    """Student's t, for records with outliers; `floor` is the smallest sigma [unit of y]."""
 
     floor: float
     name: str = "robust"
@@ -100,9 +77,8 @@ class Robust:
 class Quantised:
     """Normal noise before a sensor that rounds to multiples of `quantum`; sigma is at least `floor` [unit of y].
 
-    The most likely sigma is too small, the more the fewer samples there are for each parameter, and intervals that
-    rest on it are too short. The mean squared residual s^2 on N - d degrees of freedom is not: without the variance of
-    rounding (Sheppard) it leaves sigma^2 = s^2 - quantum^2 / 12.
+    The most likely sigma is too small for few samples. The mean squared residual s^2 on N - d degrees of freedom, less
+    the variance of rounding (Sheppard), is not: sigma^2 = s^2 - quantum^2 / 12.
     """
 
     quantum: float
@@ -115,10 +91,9 @@ class Quantised:
         return Quantised(self.quantum, float(np.sqrt(max(variance, 0.0))))
 
     def scale(self, residual: FloatArray, weights: FloatArray) -> FloatArray:
-        """By bisection on ln sigma: ln p is concave in 1 / sigma, so that its slope changes sign but once."""
-        widest = np.sqrt(np.sum(weights * residual**2, axis=1, keepdims=True) / weights.sum(axis=1, keepdims=True))
+        """Bisection on ln sigma: ln p is concave in 1 / sigma, so that its slope changes sign once."""
         low = np.full((len(residual), 1), np.log(max(self.floor, _FINEST * self.quantum)))
-        high = np.maximum(np.log(widest + self.quantum), low)
+        high = np.maximum(np.log(_rms(residual, weights) + self.quantum), low)
         for _ in range(26):
             middle = 0.5 * (low + high)
             falls = np.sum(weights * self._scale_slope(residual, np.exp(middle)), axis=1, keepdims=True) < 0.0
@@ -150,3 +125,11 @@ class Quantised:
         shares = [np.minimum(np.exp(np.minimum(-0.5 * end**2 - _LOG_ROOT_2PI - log_p, 700.0)), most)
                   for end in (near, far)]  # fmt: skip
         return near, far, log_p, *shares
+
+
+Noise = Gaussian | Robust | Quantised
+
+
+def _rms(residual: FloatArray, weights: FloatArray) -> FloatArray:
+    total = weights.sum(axis=1, keepdims=True)
+    return np.asarray(np.sqrt(np.sum(weights * residual**2, axis=1, keepdims=True) / total))

@@ -1,13 +1,12 @@
-"""One family on one or several records: an output that is affine in some parameters, and what is fitted to it.
+"""One family on one or several records: an output that is affine in some parameters, and the regression on them.
 
-The family's coordinates x are searched in a box. For given x the output is affine in the linear parameters b,
+The family's coordinates x are searched in a box. The output is affine in the linear parameters b,
 
-    y(x, b) = C(x) b + e(x),
+    y(x, b) = C(x) b + e(x),        b(x) = C(x)^+ (y - e(x)),
 
-and the best b is a regression, b(x) = C(x)^+ (y - e(x)); what is left to minimise is the norm of the projected
-residual r(x) = y - e(x) - C(x) b(x) (Golub and Pereyra 1973). Several records follow each other: they share all
-parameters but those of the state at the first sample, of which each record has its own, named ``z0[0]``,
-``z0[1]``, ... Everything is evaluated for many x at once.
+so that the norm of r(x) = y - e(x) - C(x) b(x) is minimised over x alone (Golub and Pereyra 1973). Records share all
+parameters but the state at the first sample, which each has as ``z0[0]``, ``z0[1]``, ... Everything is evaluated for
+many x at once.
 """
 
 from collections.abc import Mapping, Sequence
@@ -44,7 +43,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Problem:
-    """The least-squares problem of one family. `space` is that of all records, `own` the family's for one."""
+    """Least-squares problem of one family; `space` is that of all records, `own` the family's for one."""
 
     family: Identifiable
     space: SearchSpace
@@ -53,12 +52,11 @@ class Problem:
 
     @property
     def n_x(self) -> int:
-        """Number of coordinates: theta (n_theta,) is the coordinates x and then the linear parameters b."""
+        """Number of coordinates; theta (n_theta,) is the coordinates x, then the linear parameters b."""
         return len(self.space.coordinates)
 
     @cached_property
     def y(self) -> FloatArray:
-        """All measured outputs, one record after the other."""
         return np.concatenate([part.record.y for part in self.parts])
 
     @cached_property
@@ -77,7 +75,6 @@ class Problem:
         return np.concatenate([x, np.concatenate(linear)], axis=1)
 
     def costs(self, x: FloatArray) -> FloatArray:
-        """Sums of squares (n_sets,), without holding the residuals of all sets at once."""
         return np.concatenate([np.sum(self._solve(x[part])[1] ** 2, axis=1) for part in self._chunks(len(x))])
 
     def _chunks(self, n_sets: int) -> list[slice]:
@@ -89,10 +86,7 @@ class Problem:
         return self.regression(columns, self.y - fixed_part)
 
     def regression(self, columns: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Linear parameters (n_sets, n_linear) and residuals (n_sets, n_samples), inf for a set that diverges.
-
-        Sets that are not finite in the columns or the target are set to zero in place.
-        """
+        """Linear parameters (n_sets, n_linear) and residuals (n_sets, n_samples), inf for a set that diverges."""
         broken = ~((np.abs(columns) < _LARGEST).all(axis=(1, 2)) & (np.abs(target) < _LARGEST).all(axis=1))
         columns[broken], target[broken] = 0.0, 0.0
         linear = self._regress(columns, target)
@@ -101,7 +95,6 @@ class Problem:
         return linear, residual
 
     def model(self, theta: FloatArray) -> FloatArray:
-        """Outputs (n_sets, n_samples), without holding the columns of all sets at once."""
         outputs = np.empty((len(theta), self.y.size))
         for sets in self._chunks(len(theta)):
             columns, fixed_part = self.split(theta[sets, : self.n_x])
@@ -152,7 +145,7 @@ class Problem:
         return self.own.parameters(own) | resting
 
     def named(self, theta: FloatArray) -> FloatArray:
-        """The user's free parameters, shape (n_sets, n_names), in the order of `space.names`."""
+        """The user's free parameters, (n_sets, n_names), in the order of `space.names`."""
         x = theta[:, : self.n_x]
         known = dict(zip(self.space.linear, theta[:, self.n_x :].T, strict=True))
         for part in self.parts:
@@ -205,7 +198,6 @@ class Problem:
         return np.array(solutions).reshape(len(columns), lower.size)
 
     def linear_box(self) -> tuple[FloatArray, FloatArray]:
-        """Lower and upper bounds of the free linear parameters."""
         limits = [self.space.bounds.get(name, (-np.inf, np.inf)) for name in self.space.linear]
         lower, upper = np.array(limits).reshape(-1, 2).T
         return lower, upper
@@ -214,7 +206,7 @@ class Problem:
 def problem(
     family: Identifiable, records: Sequence[Record], freedom: Freedom, initial: str | Sequence[str] | None
 ) -> Problem:
-    """Put the records of one family together; a ValueError says what of `initial` or `freedom` does not fit."""
+    """Put the records of one family together; a ValueError says why `initial` or `freedom` does not fit."""
     kinds = _kinds(initial, len(records))
     shared = None if kinds[0] is None else "free" if "free" in kinds else "rest"
     widest = max(records, key=lambda record: (float(np.ptp(record.u)), len(record)))  # it scales the box
@@ -226,7 +218,6 @@ def problem(
 
 
 def _kinds(initial: str | Sequence[str] | None, n: int) -> list[str | None]:
-    """What is known of the state at the first sample of each record; None where the family's default holds."""
     kinds: list[Any] = list(initial) if isinstance(initial, (list, tuple)) else [initial] * n
     if len(kinds) != n:
         raise ValueError(f"initial must be one word, or one for each of the {n} records, got {initial!r}")
@@ -283,7 +274,6 @@ def _called(name: str, k: int | None) -> str:
 
 
 def _place(order: Sequence[tuple[Any, int | None]], k: int, key: Any) -> int:
-    """Where something shared, or of the record `k`, stands in the order; -1 where the record has none."""
     return next((place for place, (other, owner) in enumerate(order) if other == key and owner in (None, k)), -1)
 
 

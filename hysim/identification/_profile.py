@@ -1,14 +1,11 @@
 """Confidence intervals by the likelihood's profile.
 
-The profile of a parameter p at a value v is the best the others can do with p = v,
+    D(v) = 2 (min over theta with p(theta) = v of loss - min of loss)
 
-    D(v) = 2 (min over theta with p(theta) = v of loss - min of loss).
-
-The interval holds the values with D(v) <= N ln(1 + t^2 / (N - d)), t the quantile of Student's distribution with
-N - d degrees of freedom: for a model that is linear in its parameters and normal noise this is the exact interval.
-Its ends are found by the secant method on sqrt(D), which is nearly straight, all ends of all parameters at once; an
-interval that reaches a side of the box ends there. Where other optima lie inside the interval their profiles count
-too.
+The interval of a parameter p holds the values with D(v) <= N ln(1 + t^2 / (N - d)), t the quantile of Student's
+distribution with N - d degrees of freedom, which is exact for a linear model and normal noise. Its ends are found by
+the secant method on sqrt(D), all ends of all parameters at once; an interval that reaches a side of the box ends
+there. Other optima inside the interval count too.
 """
 
 import numpy as np
@@ -27,15 +24,16 @@ _BETTER = 0.02  # of the deviance: below minus this, an optimum is another
 
 @frozen
 class Profile:
-    """The likelihood's profile of one parameter.
+    """Likelihood's profile of one parameter.
 
     Parameters
     ----------
     lower, upper : float
+        Interval at 95 %, infinite where the profile stays inside the limit.
     at_box : (bool, bool)
-        Interval at 95 %, infinite where the profile stays inside the limit, and whether the box ends it.
+        Whether the box ends it, on either side.
     values, deviance : array, shape (n_points,)
-        Values of the parameter, and how much twice the logarithm of the likelihood falls there.
+        Values of the parameter, and the fall of twice the logarithm of the likelihood there.
     limit : float
         Deviance at the ends of the interval.
     """
@@ -49,7 +47,6 @@ class Profile:
 
 
 def threshold(n_samples: int, n_parameters: int, level: float) -> float:
-    """Deviance at the end of an interval."""
     from scipy.stats import t
 
     freedom = n_samples - n_parameters
@@ -58,11 +55,7 @@ def threshold(n_samples: int, n_parameters: int, level: float) -> float:
 
 
 class _Ends:
-    """The two ends of the intervals of some parameters around some optima, on the way.
-
-    Of each end: the outermost value that is known to be inside, the innermost one outside (nan if none is), the
-    roots of the deviance there, and theta inside with its slope along the profile.
-    """
+    """Outermost values inside and innermost ones outside (nan if unknown) of each interval, with sqrt(D) there."""
 
     def __init__(self, values: FloatArray, root: FloatArray, theta: FloatArray, slope: FloatArray) -> None:
         self.inside, self.r_inside = values.copy(), root.copy()
@@ -73,7 +66,6 @@ class _Ends:
         self.doubtful = np.zeros(values.size, dtype=bool)  # whether the outer value was reached from farther away
 
     def move_in(self, which: npt.NDArray[np.intp], values: FloatArray, root: FloatArray, theta: FloatArray) -> None:
-        """Inner values, farther out than the ones before."""
         step, distance = values - self.inside[which], values - self.origin[which]
         far = np.abs(step) > 0.1 * np.abs(distance)  # of neighbours the difference is that of how far each descended
         self.slope[which[far]] = (theta[far] - self.theta[which[far]]) / step[far, np.newaxis]
@@ -82,7 +74,6 @@ class _Ends:
         self.outside[which] = np.where(self.doubtful[which], self.outside[which], np.nan)
 
     def move_out(self, which: npt.NDArray[np.intp], values: FloatArray, root: FloatArray) -> None:
-        """Outer values, reached from the inner ones."""
         self.outside[which], self.r_outside[which], self.doubtful[which] = values, root, False
 
 
@@ -94,11 +85,10 @@ def profiles(
     spread: FloatArray,
     limit: float,
 ) -> tuple[dict[str, Profile], FloatArray | None]:
-    """Profiles of all parameters whose standard error is known, and a better optimum (n_theta,) if one was met.
+    """Profiles of all parameters with a standard error, and a better optimum (n_theta,) if one was met.
 
-    `optima` (n_optima, n_theta) and their `losses` begin with the best; the others are those inside the `limit` of the
-    deviance. `covariance` (n_names, n_names) is that of the parameters, `spread` (n_theta, n_names) that of theta with
-    them.
+    `optima` (n_optima, n_theta) lie within the `limit` of the deviance, best first. `covariance` (n_names, n_names) is
+    that of the parameters, `spread` (n_theta, n_names) that of theta with them.
     """
     problem = descent.problem
     variance = np.diag(covariance)
@@ -144,16 +134,11 @@ def profiles(
     at_box = np.isnan(ends.end) & np.isfinite(ends.outside) & ~np.isfinite(ends.r_outside)
     open_ended = np.where(np.isnan(ends.outside), side * np.inf, ends.inside)
     end = np.where(np.isnan(ends.end), open_ended, ends.end)
-    return _gathered(problem.space.names, place, side, end, at_box, points, limit), None if better is None else better[
-        1
-    ]
+    curves = _gathered(problem.space.names, place, side, end, at_box, points, limit)
+    return curves, None if better is None else better[1]
 
 
 def _next(ends: _Ends, active: npt.NDArray[np.intp], side: FloatArray, step: FloatArray, root: float) -> FloatArray:
-    """The next value of each end: on the secant between inside and outside, well inside the gap, or farther out.
-
-    What was outside as seen from farther away is tried again from nearer by, where the slope says that it is inside.
-    """
     inside, outside = ends.inside[active], ends.outside[active]
     r_in, r_out = ends.r_inside[active], ends.r_outside[active]
     share = np.where(np.isfinite(r_out), (root - r_in) / np.where(np.isfinite(r_out), r_out - r_in, 1.0), 0.5)
@@ -164,7 +149,6 @@ def _next(ends: _Ends, active: npt.NDArray[np.intp], side: FloatArray, step: Flo
 
 
 def _farther(ends: _Ends, won: npt.NDArray[np.intp], step: FloatArray, root: float) -> FloatArray:
-    """How far to go from an inner end that does not have an outer one yet."""
     gone, risen = np.abs(ends.inside - ends.origin)[won], (ends.r_inside - ends.r_origin)[won]
     straight = 1.1 * (root - ends.r_inside[won]) * gone / np.where(risen > 0.0, risen, np.inf)
     return np.where(risen > 0.0, np.clip(straight, 0.1 * step, _FARTHEST * step), _FARTHEST * step)
@@ -200,12 +184,12 @@ def _gathered(
 def _outline(values: FloatArray, deviance: FloatArray) -> npt.NDArray[np.intp]:
     """Points of the profile in order of their values, without those that a point farther out lies below."""
     centre = values[np.argmin(deviance)]
-    kept: list[int] = []
+    outline: list[int] = []
     for sign in (-1.0, 1.0):
         lowest = np.inf
         for k in np.lexsort((deviance, -sign * values)).tolist():
             if sign * (values[k] - centre) >= 0.0 and deviance[k] < lowest:
                 lowest = deviance[k]
-                kept.append(k)
-    chosen = np.unique(kept)
+                outline.append(k)
+    chosen = np.unique(outline)
     return chosen[np.argsort(values[chosen], kind="stable")]

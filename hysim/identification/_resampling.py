@@ -1,7 +1,4 @@
-"""The same search on other data: samples left out, and records drawn from the model.
-
-Both begin at the optima of the whole record and descend for all sets at once.
-"""
+"""The same search on other data, from the optima of the whole record: samples left out, and records drawn anew."""
 
 from collections.abc import Sequence
 
@@ -34,7 +31,6 @@ def left_out_errors(
 
 
 def rms_of_known(errors: FloatArray) -> float:
-    """Root mean square of the errors that are not nan; nan where all are."""
     known = errors[~np.isnan(errors)]
     if not np.isfinite(known).all():
         return float("inf")
@@ -44,7 +40,6 @@ def rms_of_known(errors: FloatArray) -> float:
 def _left_out_errors(
     problem: Problem, noise: Noise, starts: FloatArray, left_out: Sequence[npt.NDArray[np.intp]]
 ) -> FloatArray:
-    """Errors of the samples that each of some folds leaves out, one fold after the other."""
     weights = np.ones((len(left_out), problem.y.size))
     for fold, samples in enumerate(left_out):
         weights[fold, samples] = 0.0
@@ -58,11 +53,7 @@ def _left_out_errors(
 def bootstrap(
     problem: Problem, noise: Noise, theta: FloatArray, residual: FloatArray, sigma: float, *, draws: int, seed: int
 ) -> FloatArray:
-    """Theta (draws, n_theta) of records that are drawn anew.
-
-    With normal noise the residuals are drawn, enlarged by sqrt(N / (N - d)) for what the fit took from them; with
-    the other densities the noise is drawn from them, and a quantised record is rounded again.
-    """
+    """Theta (draws, n_theta) of records drawn anew: residuals enlarged by sqrt(N / (N - d)), or other noise."""
     rng = np.random.default_rng(seed)
     y_model = np.broadcast_to(problem.y - residual, (draws, residual.size))
     freedom = residual.size - len(problem.space.names)

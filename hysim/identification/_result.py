@@ -2,14 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import field
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
 from hysim._frozen import FloatArray, frozen
 from hysim._printing import bic_in_words, printed, summary_text, wrapped
-from hysim.identification import json_forms
 from hysim.identification._profile import Profile
+from hysim.identification.json_forms import Stored
 
 
 @frozen
@@ -24,7 +24,7 @@ class Candidate:
 
 @frozen
 class Width:
-    """The largest width of a loop, and the interval at 95 % that the parameters' uncertainty leaves [unit of y]."""
+    """Largest width of a loop, and its interval at 95 % [unit of y]."""
 
     value: float
     lower: float
@@ -33,45 +33,41 @@ class Width:
 
 @printed
 @frozen
-class Identification:
+class Identification(Stored):
     """Parameters of a model, identified on one or several records.
 
     Parameters
     ----------
     model : model
-        The identified model; of several records as the first begins.
+        The identified model, from the state at the first sample of the first record.
     models : tuple of model
-        One for each record: they differ in the state at the first sample.
+        One for each record.
     estimates : mapping
-        Every parameter by name, the held ones included.
+        Every parameter by name, the fixed ones included.
     stderr : mapping
-        Standard error of each free parameter by the linearised model; nan where the data do not determine it, with
-        the reason in `message`.
+        Standard error of each free parameter by the linearised model; nan where the data do not determine it.
     intervals : mapping
         Name to (lower, upper) at 95 %; nan where the data do not determine it.
     interval_method : {"linear", "profile", "bootstrap"}
-        How they were found.
     profiles : mapping
         Name to the profile of the likelihood, where it was computed.
     covariance : array, shape (n_parameters, n_parameters)
-        Of the free parameters, in the order of `free_names`.
+        Covariance of the free parameters, in the order of `free_names`.
     condition : float
         Condition number of the Jacobian whose columns have length one.
     redundant : tuple of tuples of str
         Groups of parameters that the data do not determine separately.
-    free_names : tuple of str
-        The parameters that were identified.
-    n_parameters : int
-        Their number d.
+    free_names, n_parameters
+        The parameters that were identified, and their number d.
     fit_percent, rmse : float
         100 (1 - ||residual|| / ||y - mean(y)||), and the residual's root mean square [unit of y].
     fpe, aic, bic : float
         V (1 + d/N) / (1 - d/N), N ln V + 2 d, N ln V + d ln N, with V the mean squared residual.
     noise : {"gaussian", "quantised", "robust"}
     sigma, log_likelihood : float
-        Density of the noise, its most likely scale [unit of y], and the largest likelihood without constants.
+        Most likely scale of the noise [unit of y], and the largest likelihood without constants.
     least_squares : Candidate or None
-        The optimum of the sum of squares, where the noise is not Gaussian.
+        Optimum of the sum of squares, where the noise is not Gaussian.
     residual : array, shape (n,)
         Measured minus model, one record after the other [unit of y].
     resolution : float or None
@@ -79,7 +75,7 @@ class Identification:
     response_stderr : array, shape (n,)
         Standard error of the model's output [unit of y].
     loop_width : Width or None
-        The largest width of the first record's loop with its band; None if the record has no complete cycle.
+        Largest width of the first record's loop; None without a complete cycle.
     whiteness : float
         Probability of residuals at least as correlated if they were white (Ljung and Box); nan if unknown.
     success : bool
@@ -89,18 +85,18 @@ class Identification:
     rivals : tuple of Candidate
         Other optima whose likelihood ratio is inside the 95 % region of this one, best first.
     regions : mapping
-        Name to the best candidate inside a region that the family names (for Bouc-Wen ``"admissible"``),
-        where the optimum lies outside.
-    cv_rmse : float
-        Cross-validated rmse [unit of y]; nan if it was not asked for.
-    cv_residual : array, shape (n,)
-        Measured minus model at each sample by the fit that leaves it out [unit of y]; nan where there is none.
+        Region that the family names (for Bouc-Wen ``"admissible"``) to its best candidate, if the optimum is outside.
+    cv_rmse, cv_residual : float, and array, shape (n,)
+        Cross-validated rmse, and measured minus model at each sample by the fit without it [unit of y]; nan if unknown.
     seed : int
-        Of the starts of the search.
+        Seed of the search.
     warnings : tuple of str
         Sentences on a search that did not converge, a constant output, unknown standard errors, correlated residuals,
         or input and output that may be swapped.
     """
+
+    json_name = "identification"
+    json_parts = (Candidate, Width, Profile)
 
     model: Any
     models: tuple[Any, ...]
@@ -146,20 +142,20 @@ class Identification:
 
     @property
     def residual_quanta(self) -> FloatArray | None:
-        """The residual in quanta of the sensor, shape (n,); None where no resolution is known."""
+        """Residual in quanta of the sensor, shape (n,); None without a resolution."""
         return None if self.resolution is None else self.residual / self.resolution
 
     def __str__(self) -> str:
         state = "" if self.success else ", NOT converged"
         free = [f"{name} {self.estimates[name]:.4g} +- {self.stderr[name]:.2g}" for name in self.free_names]
-        held = [f"{name} {value:.4g}" for name, value in self.estimates.items() if name not in self.free_names]
+        fixed = [f"{name} {value:.4g}" for name, value in self.estimates.items() if name not in self.free_names]
         width = self.loop_width
         return summary_text(
             [
                 f"Identification of {type(self.model).__name__}: {self._fit_in_words()}, rmse {self.rmse:.4g}, "
                 f"{self.n_parameters} parameters{state}",
                 wrapped(free, most=4),
-                wrapped(held, most=1, first="  held: "),
+                wrapped(fixed, most=1, first="  held: "),
             ],
             {
                 "residual": f"{self._residual_in_words()}, {self.residual.size} samples",
@@ -171,15 +167,15 @@ class Identification:
         )
 
     def summary(self) -> str:
-        """The result in a few lines."""
+        """Report of several lines."""
         family = type(self.model).__name__
         lines = [
             f"{family}: {self._fit_in_words()}, rmse {self.rmse:.4g}, FPE {self.fpe:.4g}, "
             f"{bic_in_words(self.bic)}, {self.n_parameters} parameters from {self.residual.size} samples"
         ]
         lines += [self._line(name) for name in self.free_names]
-        held = [f"{name} = {value:g}" for name, value in self.estimates.items() if name not in self.free_names]
-        lines += [f"  held: {', '.join(held)}"] if held else []
+        fixed = [f"{name} = {value:g}" for name, value in self.estimates.items() if name not in self.free_names]
+        lines += [f"  held: {', '.join(fixed)}"] if fixed else []
         lines += [f"  residual: {self._residual_in_words()}"]
         if self.loop_width is not None:
             width = self.loop_width
@@ -207,25 +203,3 @@ class Identification:
         if not np.isnan(self.whiteness):
             words.append(f"p = {self.whiteness:.2g} if white")
         return ", ".join(words)
-
-    def to_json(self) -> str:
-        """The whole result as JSON, with the version of hysim; `from_json` returns it, every number to the bit.
-
-        Raises
-        ------
-        TypeError
-            If the model is not of one of hysim's families.
-        """
-        return json_forms.to_text("identification", self)
-
-    @classmethod
-    def from_json(cls, text: str) -> Self:
-        """A result that `to_json` wrote.
-
-        Raises
-        ------
-        ValueError
-            If the text does not hold one.
-        """
-        result: Self = json_forms.from_text("identification", text, (cls, Candidate, Width, Profile))
-        return result

@@ -1,8 +1,7 @@
-"""The global search: many starts descend together, the best are polished.
+"""The global search: many starts descend together, and the best are polished.
 
-A scrambled Sobol sequence covers the box. Its best points that lie apart from each other, and the family's
-own starts, descend by projected Levenberg-Marquardt steps, all of them in one batch. The distinct optima
-that come out best descend to the end in the same way.
+The best points of a scrambled Sobol sequence that lie apart from each other, and the family's own starts, descend by
+projected Levenberg-Marquardt steps in one batch. The best distinct optima descend to the end.
 """
 
 import math
@@ -33,7 +32,7 @@ PERFECT = 1e-14  # smallest sigma, in units of the output's size
 
 
 class Optimum(NamedTuple):
-    """A local optimum: coordinates (n_x,), sum of squares, and whether the polish converged."""
+    """Local optimum: coordinates (n_x,), sum of squares, and whether the polish converged."""
 
     x: FloatArray
     cost: float
@@ -41,7 +40,7 @@ class Optimum(NamedTuple):
 
 
 def optima(problem: Problem, *, seed: int, progress: Progress | None = None) -> list[Optimum]:
-    """Distinct local optima of `problem`, best first; empty if nothing in the box stays finite."""
+    """Distinct local optima, best first; empty if every parameter set diverges."""
     space = problem.space
     if not space.coordinates:
         return polish(problem, np.empty((1, 0)))
@@ -61,7 +60,7 @@ def optima(problem: Problem, *, seed: int, progress: Progress | None = None) -> 
 
 
 def brief_cost(problem: Problem) -> float:
-    """The sum of squares that a short search reaches: an upper bound of the least one, inf if nothing stays finite."""
+    """Sum of squares that a short search reaches; inf if every parameter set diverges."""
     space = problem.space
     if not space.coordinates:
         return float(problem.costs(np.empty((1, 0)))[0])
@@ -73,7 +72,6 @@ def brief_cost(problem: Problem) -> float:
 
 
 def polish(problem: Problem, starts: FloatArray) -> list[Optimum]:
-    """The local optima that are reached from `starts` (n, n_x)."""
     reached = _descended(problem, starts, exact=True)
     x = reached.theta[:, : starts.shape[1]]
     costs = problem.costs(x)
@@ -95,7 +93,6 @@ def _starts(problem: Problem, screened: int, seed: int, most: int, n_given: int 
 
 
 def _uniform(space: SearchSpace, n: int, seed: int) -> FloatArray:
-    """Spread `n` points over the box, or its part from which they are drawn, by a scrambled Sobol sequence."""
     from scipy.stats import qmc
 
     sequence = qmc.Sobol(space.lower.size, rng=np.random.default_rng(seed))
@@ -107,7 +104,7 @@ def _uniform(space: SearchSpace, n: int, seed: int) -> FloatArray:
 def _apart(
     space: SearchSpace, points: FloatArray, cost: FloatArray, distance: float, most: int, n_given: int = 0
 ) -> FloatArray:
-    """The first `n_given` points, and the best others that are apart from those already taken."""
+    """The first `n_given` points, and the best others that are apart from those already chosen."""
     unit = (points - space.lower) / (space.upper - space.lower)
     ranked = np.concatenate([np.arange(n_given), n_given + np.argsort(cost[n_given:], kind="stable")])
     chosen: list[int] = []
@@ -120,9 +117,8 @@ def _apart(
 
 
 def _distinct(optima: list[Optimum]) -> list[Optimum]:
-    """Optima of different cost, best first: the same cost to 1e-6 is the same optimum."""
-    kept: list[Optimum] = []
+    distinct: list[Optimum] = []
     for optimum in sorted(optima, key=lambda candidate: candidate.cost):
-        if not kept or optimum.cost > kept[-1].cost * (1.0 + 1e-6):
-            kept.append(optimum)
-    return kept
+        if not distinct or optimum.cost > distinct[-1].cost * (1.0 + 1e-6):
+            distinct.append(optimum)
+    return distinct

@@ -28,7 +28,7 @@ _EXACT = 100.0  # smallest sigmas: below, nothing is left to explain
 
 
 class LocalOptimum(NamedTuple):
-    """A local optimum: theta (n_theta,), minus the log-likelihood, sigma, and whether the search converged."""
+    """Local optimum: theta (n_theta,), minus the log-likelihood, sigma, and whether the search converged."""
 
     theta: FloatArray
     loss: float
@@ -38,8 +38,6 @@ class LocalOptimum(NamedTuple):
 
 @dataclass(frozen=True)
 class Search:
-    """One problem with its noise."""
-
     problem: Problem
     noise: Noise
     seed: int
@@ -49,7 +47,6 @@ class Search:
         return Descent(self.problem, self.noise, self.problem.y[np.newaxis], np.ones((1, self.problem.y.size)))
 
     def likely(self, squares: Sequence[Optimum]) -> list[LocalOptimum]:
-        """Distinct optima, best first: those of the sum of squares, and for other noise what they descend to."""
         theta = self.problem.completed(np.array([optimum.x for optimum in squares]))
         steps = 0 if isinstance(self.noise, Gaussian) else 200
         reached = self.descent.run(theta, tolerance=1e-9, steps=steps)
@@ -63,7 +60,7 @@ class Search:
         return distinct
 
     def regions(self, best: LocalOptimum) -> dict[str, Candidate]:
-        """The best candidate inside each named region that the optimum is not in."""
+        """Best candidate inside each named region that the optimum is not in."""
         space, candidates = self.problem.space, {}
         x = best.theta[: self.problem.n_x]
         for name, (lower, upper) in space.regions.items():
@@ -76,7 +73,6 @@ class Search:
         return candidates
 
     def candidate(self, theta: FloatArray) -> Candidate:
-        """The model at `theta`, and how well it fits."""
         problem = self.problem
         parameters, residual = problem.estimates(theta), self.residual(theta)
         own = () if len(problem.parts) == 1 else [name for name in problem.own.state if name not in problem.own.held]
@@ -90,16 +86,12 @@ class Search:
         )
 
     def residual(self, theta: FloatArray) -> FloatArray:
-        """Measured minus model."""
         return np.asarray(self.problem.y - self.problem.model(theta[np.newaxis])[0])
 
     def described(
         self, likely: list[LocalOptimum], intervals: str, least_squares: FloatArray
     ) -> tuple[Identification, list[LocalOptimum]]:
-        """The result at the best optimum; a better one that its profiles meet takes its place.
-
-        `least_squares` are the coordinates of the least sum of squares.
-        """
+        """Result at the best optimum, or at a better one that its profiles meet; `least_squares` are coordinates."""
         known = self._uncertainty(likely[0])
         curves: dict[str, Profile] = {}
         if intervals == "profile":
@@ -177,11 +169,10 @@ class Search:
         )
 
     def _notes(self, best: LocalOptimum, draws: FloatArray) -> list[str]:
-        """Phrases of the family, and one on records that rounding makes alike."""
         family, record = self.problem.family, self.problem.parts[0].record
         notes = []
         if len(draws) and isinstance(self.noise, Quantised) and best.sigma < _FAINT * self.noise.quantum:
-            notes.append("noise this far below the quantum hardly changes a record drawn anew: ask for profiles")
+            notes.append('with noise this far below the quantum bootstrap intervals are too short: use "profile"')
         return [*notes, *family.notes(record, family.assemble(self.problem.estimates(best.theta)))]
 
     def _draws(self, best: LocalOptimum, residual: FloatArray) -> FloatArray:
@@ -238,7 +229,7 @@ def _phrases(
     phrases = ["converged" if converged else "the search did not converge", *known.reasons]
     inputs = [part.record.u for part in problem.parts]
     if all((np.diff(u) >= 0.0).all() or (np.diff(u) <= 0.0).all() for u in inputs):
-        phrases.append("the input never turns back: nothing shows what unloading does")
+        phrases.append("the input never turns back: the parameters of unloading are not determined")
     phrases += [
         f"the interval of {name} ends at its search bound" for name, curve in curves.items() if any(curve.at_box)
     ]

@@ -1,8 +1,4 @@
-"""The verb `select`: several candidates identified on the same records, and ranked by a criterion.
-
-The criteria are those of `hysim.metrics`, or the cross-validated rmse. Without noise the residual is rounding, and BIC,
-AIC and FPE mean nothing.
-"""
+"""The verb `select`: several candidates identified on the same records, and ranked by a criterion."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -26,14 +22,14 @@ CRITERIA: dict[str, Callable[[Identification], float]] = {
 @printed
 @frozen
 class Selection:
-    """Candidates that were identified on the same records, ranked.
+    """Candidates identified on the same records, ranked.
 
     Parameters
     ----------
     criterion : {"bic", "aic", "fpe", "cv_rmse"}
-        By which they are ranked.
+        Criterion of the ranking.
     name : str
-        Name of the best one.
+        Name of the best candidate.
     fits : mapping
         Name to `Identification`, the best first.
     """
@@ -44,7 +40,7 @@ class Selection:
 
     @property
     def best(self) -> Identification:
-        """The fit of the best candidate."""
+        """Fit of the best candidate."""
         return self.fits[self.name]
 
     def __str__(self) -> str:
@@ -86,12 +82,13 @@ def select(
     Parameters
     ----------
     candidates : mapping or sequence
-        Name to what `identify` takes: a class, a model as the start, or a structure. Those of a sequence are
-        named by themselves, a class by its name.
+        Name to what `identify` takes: a class, a model as the start, or a structure. In a sequence a class is named by
+        its name, anything else by its text.
     record_or_records : Record or sequence of Record
         As in `identify`, the same for all.
     criterion : {"bic", "aic", "fpe", "cv_rmse"}
-        By which they are ranked; the last needs `cross_validate`.
+        Criterion of the ranking; the last needs `cross_validate`. Without noise the residual is rounding, and the
+        others mean nothing.
     initial, noise, cross_validate, seed, workers
         As in `identify`, the same for all.
     progress : callable, optional

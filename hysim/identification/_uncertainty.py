@@ -1,12 +1,12 @@
 """Standard errors by the linearised model, and the parameters that the data do not determine.
 
-With J = dm/dtheta at the optimum, theta the searched coordinates and the linear parameters, W the curvature of the
-loss in the model's output (1/sigma^2 for normal noise), and G = d(the user's parameters)/d(theta),
+With J = dm/dtheta at the optimum, theta the coordinates and the linear parameters, W the curvature of the loss in the
+model's output (1/sigma^2 for normal noise), and G = d(the user's parameters)/d(theta),
 
     cov = N / (N - d) G (J^T W J)^-1 G^T.
 
-A coordinate at a side of its box is taken as known, where the output depends on it; it and a direction along which
-the output does not change have no standard error. The condition number is that of W^(1/2) J with columns of length one.
+A coordinate at a side of its box counts as known if it has an effect; it and a direction without effect have no
+standard error. The condition number is that of W^(1/2) J with columns of length one.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ _TAKES_PART = 0.05  # share of a parameter in a direction, of the largest share 
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """What is known of the parameters at an optimum."""
+    """Covariances and notes at an optimum."""
 
     covariance: FloatArray  # (n_names, n_names), nan where it is unknown
     of_theta: FloatArray  # (n_theta, n_theta), zero along what is not known
@@ -36,7 +36,7 @@ class Uncertainty:
 
 
 def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> Uncertainty:
-    """The covariance at `theta` (n_theta,) for the curvature of the loss (n_samples,)."""
+    """Covariance at `theta` (n_theta,) for the curvature of the loss (n_samples,)."""
     space, n_samples = problem.space, problem.y.size
     n_names = len(space.names)
     if n_samples <= n_names:
@@ -104,7 +104,7 @@ def _unknown(problem: Problem, theta: FloatArray, reason: str) -> Uncertainty:
 
 
 def _named(names: tuple[str, ...], direction: FloatArray, size: FloatArray) -> tuple[str, ...]:
-    """The parameters that move along a direction, each measured by its largest move along any."""
+    """Parameters that move along a direction, each measured by its largest move along any."""
     share = np.abs(direction) / np.where(size == 0.0, 1.0, size)
     return tuple(np.array(names)[share > _TAKES_PART * max(share.max(initial=0.0), 1e-12)].tolist())
 

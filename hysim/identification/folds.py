@@ -10,13 +10,7 @@ from hysim.records import Record
 
 
 def folds(count: str | int, n: int, *, name: str = "folds") -> list[npt.NDArray[np.intp]]:
-    """Samples of each fold, every one of `n` samples in one: ``"loo"`` is one at a time, an int that many blocks.
-
-    Raises
-    ------
-    ValueError
-        If `count`, which the message calls `name`, is neither.
-    """
+    """Samples of each fold of `n`: ``"loo"`` is one at a time, an int that many blocks; else a ValueError."""
     number = n if count == "loo" else count
     if not isinstance(number, int) or isinstance(number, bool) or not 2 <= number <= n:
         raise ValueError(f'{name} must be "loo" or a number of blocks from 2 to {n}, got {count!r}')
@@ -24,13 +18,7 @@ def folds(count: str | int, n: int, *, name: str = "folds") -> list[npt.NDArray[
 
 
 def left_out(cross_validate: str | int | None, records: Sequence[Record]) -> list[npt.NDArray[np.intp]]:
-    """Samples of each fold of records that follow each other, by `cross_validate` of `identify`.
-
-    Raises
-    ------
-    ValueError
-        If `cross_validate` is unknown, or the records have too few samples or cycles, or are too few.
-    """
+    """Samples of each fold of records that follow each other, by `cross_validate` of `identify`; else a ValueError."""
     if cross_validate is None:
         return []
     cuts = [0, *np.cumsum([len(record) for record in records]).tolist()]
@@ -44,7 +32,6 @@ def left_out(cross_validate: str | int | None, records: Sequence[Record]) -> lis
 
 
 def _cycles(records: Sequence[Record], cuts: Sequence[int]) -> list[npt.NDArray[np.intp]]:
-    """The samples between every second turning point of each record's input, but the first, which tell its state."""
     cycles = []
     for record, begin in zip(records, cuts, strict=False):
         turns = record.reversals(TOLERANCE)[1::2]

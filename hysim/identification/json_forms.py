@@ -6,7 +6,7 @@ import types
 import typing
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
-from typing import Any
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -16,37 +16,30 @@ from hysim.models import storage
 _INFINITE = ("inf", "-inf")
 
 
-def to_text(name: str, result: Any) -> str:
-    """A result as JSON under its name, with the version of hysim; `from_text` returns it, every number to the bit.
+class Stored:
+    """A result that is stored as JSON under `json_name`; its parts are results of the classes `json_parts`."""
 
-    Raises
-    ------
-    TypeError
-        If one of its models is not of hysim's families.
-    """
-    document = {"hysim": __version__, name: to_plain(result)}
-    return json.dumps(document, indent=2, allow_nan=False) + "\n"
+    json_name: ClassVar[str]
+    json_parts: ClassVar[tuple[type, ...]] = ()
 
+    def to_json(self) -> str:
+        """The whole result as JSON, with the version of hysim; a TypeError if a model is not of hysim's families."""
+        document = {"hysim": __version__, self.json_name: to_plain(self)}
+        return json.dumps(document, indent=2, allow_nan=False) + "\n"
 
-def from_text(name: str, text: str, kinds: Sequence[type]) -> Any:
-    """The result of the first of `kinds` that `to_text` wrote; its parts are of the others.
-
-    Raises
-    ------
-    ValueError
-        If the text does not hold one.
-    """
-    try:
-        result = from_plain(json.loads(text)[name], kinds)
-    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
-        raise ValueError(f"this is no {name} of hysim: {type(error).__name__}: {error}") from None
-    if not isinstance(result, kinds[0]):
-        raise ValueError(f"this is no {name} of hysim, but {type(result).__name__}")
-    return result
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """The result that `to_json` wrote, every number to the bit; a ValueError if the text does not hold one."""
+        try:
+            result = from_plain(json.loads(text)[cls.json_name], (cls, *cls.json_parts))
+        except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+            raise ValueError(f"this is no {cls.json_name} of hysim: {type(error).__name__}: {error}") from None
+        if not isinstance(result, cls):
+            raise ValueError(f"this is no {cls.json_name} of hysim, but {type(result).__name__}")
+        return result
 
 
 def to_plain(value: Any) -> Any:
-    """The JSON form of a value."""
     if storage.is_model(value):
         return storage.to_document(value)
     if is_dataclass(value) and not isinstance(value, type):
@@ -70,8 +63,8 @@ def from_plain(value: Any, kinds: Sequence[type]) -> Any:
     if isinstance(value, dict) and value.keys() == {"result", "fields"}:
         kind = {each.__name__: each for each in kinds}[value["result"]]
         hints = typing.get_type_hints(kind)
-        given = {name: _field(each, hints[name], kinds) for name, each in value["fields"].items()}
-        return kind(**given)
+        arguments = {name: _field(each, hints[name], kinds) for name, each in value["fields"].items()}
+        return kind(**arguments)
     if storage.is_document(value):
         return storage.from_document(value, "the text")
     if isinstance(value, dict):
@@ -82,6 +75,5 @@ def from_plain(value: Any, kinds: Sequence[type]) -> Any:
 
 
 def _field(value: Any, hint: Any, kinds: Sequence[type]) -> Any:
-    """One field: null is None where the field may be None, else nan."""
     optional = typing.get_origin(hint) in (types.UnionType, typing.Union) and type(None) in typing.get_args(hint)
     return None if value is None and optional else from_plain(value, kinds)

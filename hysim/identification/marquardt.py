@@ -3,8 +3,7 @@
     minimise the loss f(x), near x about f = 1/2 ||J d - goal||^2,    step d:  min ||J d - goal||^2 + damping ||D d||^2
 
 D are the norms of the columns of J. Each set has its own damping, which falls after a step that lowers the loss and
-rises after one that does not. Several dampings may be tried at once, which pays where many evaluations together cost
-little more than one.
+rises after one that does not. Several dampings may be tried at once.
 """
 
 from collections.abc import Callable
@@ -28,10 +27,10 @@ _ONE_SIDED = 1e-7  # those of a one-sided one near 1e-7, at half the cost
 
 @dataclass(frozen=True)
 class Schedule:
-    """How the damping begins and changes.
+    """Damping: each trial has the set's times one of `factors`; a set ends beyond `most`.
 
-    Each trial has the set's damping times one of `factors`. After a step that lowers the loss the next damping is that
-    of the best trial times `success`, otherwise the last one times `failure`; a set ends beyond `most`.
+    After a step that lowers the loss it is that of the best trial times `success`, otherwise the last one times
+    `failure`.
     """
 
     factors: tuple[float, ...] = (1.0,)
@@ -46,25 +45,23 @@ class Problem(Protocol):
     """A loss to minimise; `sets` (n,) says which set each point belongs to."""
 
     def evaluate(self, x: FloatArray, sets: Sets) -> tuple[FloatArray, tuple[FloatArray, ...]]:
-        """Losses (n,) at points `x` (n, n_x), inf where it diverges, and arrays of n rows that `linearised` takes.
+        """Losses (n,) at points `x` (n, n_x), inf where it diverges, and arrays of n rows for `linearised`.
 
         Numbers that follow from the others may be changed in `x`, in place.
         """
         ...
 
-    def linearised(self, x: FloatArray, sets: Sets, evaluated: tuple[FloatArray, ...]) -> tuple[FloatArray, FloatArray]:
-        """J (n, n_rows, n_x) and goal (n, n_rows)."""
-        ...
+    def linearised(
+        self, x: FloatArray, sets: Sets, evaluated: tuple[FloatArray, ...]
+    ) -> tuple[FloatArray, FloatArray]: ...
 
     def stepped(
         self, x: FloatArray, sets: Sets, jacobian: FloatArray, goal: FloatArray, damping: FloatArray
-    ) -> FloatArray:
-        """The next points (n, n_x), for dampings (n,)."""
-        ...
+    ) -> FloatArray: ...
 
 
 class Reached(NamedTuple):
-    """Ends of a descent (n_sets, n_x), their losses, what was evaluated there, and whether each set came to rest."""
+    """Ends of a descent (n_sets, n_x), their losses, the arrays evaluated there, and whether each set came to rest."""
 
     x: FloatArray
     loss: FloatArray
@@ -84,8 +81,7 @@ def descend(
 ) -> Reached:
     """Descend from `x` (n_sets, n_x) until a step lowers the loss by at most `tolerance` + `relative` times the loss.
 
-    A set also ends where the remaining steps, each lowering the loss by as much as the last one, would not bring it
-    below `hopeless`: steps become smaller near an optimum.
+    A set also ends where the remaining steps, each as good as the last one, would not bring it below `hopeless`.
     """
     x, every, factors = x.copy(), np.arange(len(x)), np.array(schedule.factors)
     loss, evaluated = problem.evaluate(x, every)
@@ -110,8 +106,8 @@ def descend(
         is_better = losses[best] < before
         won, place = moving[is_better], best[is_better]
         x[won], loss[won], is_stale[won] = trial[place], losses[place], True
-        for kept, there in zip(evaluated, evaluated_there, strict=True):
-            kept[won] = there[place]
+        for values, trial_values in zip(evaluated, evaluated_there, strict=True):
+            values[won] = trial_values[place]
         lowered = np.clip(dampings[best] * schedule.success, schedule.least, schedule.most)
         damping[moving] = np.where(is_better, lowered, damping[moving] * schedule.failure)
         rests = (gained <= tolerance + relative * before) | (before - (1 + remaining) * gained > hopeless)
@@ -129,23 +125,22 @@ def bounded_steps(
     is_free: Flags | None = None,
     n_damped: int | None = None,
 ) -> FloatArray:
-    """Damped steps (n_sets, n_x) between `lower` and `upper`, but for numbers that are free of bounds.
+    """Damped steps (n_sets, n_x) between `lower` and `upper`, except for numbers that are free of bounds.
 
-    A step that would go beyond a bound ends there, and the other numbers make the best of it. The first `n_damped`
-    numbers are damped, by default all.
+    A step beyond a bound ends there, and the others make the best of it. The first `n_damped` numbers are damped.
     """
-    held, steps = np.zeros(lower.shape, dtype=bool), np.zeros(lower.shape)
+    at_bound, steps = np.zeros(lower.shape, dtype=bool), np.zeros(lower.shape)
     for _ in range(_PASSES):
-        short = goal - (jacobian @ np.where(held, steps, 0.0)[..., np.newaxis])[..., 0]
-        others = _regressed(np.where(held[:, np.newaxis], 0.0, jacobian), short, damping, n_damped)
-        steps = np.where(held, steps, others)
-        beyond = ((steps < lower) | (steps > upper)) & ~held
+        short = goal - (jacobian @ np.where(at_bound, steps, 0.0)[..., np.newaxis])[..., 0]
+        others = _regressed(np.where(at_bound[:, np.newaxis], 0.0, jacobian), short, damping, n_damped)
+        steps = np.where(at_bound, steps, others)
+        beyond = ((steps < lower) | (steps > upper)) & ~at_bound
         if is_free is not None:
             beyond &= ~is_free
         if not beyond.any():
             break
         steps = np.clip(steps, lower, upper)
-        held |= beyond
+        at_bound |= beyond
     return steps
 
 
@@ -162,10 +157,10 @@ def _regressed(jacobian: FloatArray, goal: FloatArray, damping: FloatArray, n_da
 
 @dataclass(frozen=True)
 class SumOfSquares:
-    """The problem of one set: the sum of squared residuals between bounds.
+    """Problem of one set: the sum of squared residuals between bounds.
 
-    `residuals` maps points (n, n_x) to residuals (n, n_samples), not finite where they diverge; `slopes` maps one point
-    (n_x,) and its residual to the derivatives (n_samples, n_x). `sizes`, where it is given, maps one point to D (n_x,).
+    `residuals` maps points (n, n_x) to residuals (n, n_samples); `slopes` one point (n_x,) and its residual to
+    derivatives (n_samples, n_x); `sizes`, if given, one point to D (n_x,).
     """
 
     residuals: Callable[[FloatArray], FloatArray]
@@ -181,7 +176,6 @@ class SumOfSquares:
         return np.where(np.isfinite(squares), squares, np.inf), (residual,)
 
     def linearised(self, x: FloatArray, sets: Sets, evaluated: tuple[FloatArray, ...]) -> tuple[FloatArray, FloatArray]:
-        """J^T J and minus the gradient, of which `stepped` makes the normal equations."""
         residual = evaluated[0][0]
         jacobian = self.slopes(x[0], residual)
         return (jacobian.T @ jacobian)[np.newaxis], -(jacobian.T @ residual)[np.newaxis]
@@ -189,7 +183,7 @@ class SumOfSquares:
     def stepped(
         self, x: FloatArray, sets: Sets, jacobian: FloatArray, goal: FloatArray, damping: FloatArray
     ) -> FloatArray:
-        """See `Problem`; numbers at a bound against which the gradient pushes stay."""
+        """The next points; numbers at a bound against which the gradient pushes stay."""
         sizes = np.sqrt(np.diagonal(jacobian, axis1=1, axis2=2))
         stays = ((x <= self.lower) & (goal < 0.0)) | ((x >= self.upper) & (goal > 0.0)) | (sizes == 0.0)
         if self.sizes is not None:
@@ -206,7 +200,7 @@ class SumOfSquares:
 def differences(
     residuals: Callable[[FloatArray], FloatArray], x: FloatArray, residual: FloatArray, *, central: bool
 ) -> FloatArray:
-    """Derivatives (n_samples, n_x) of the residual at `x` (n_x,), by central or one-sided differences."""
+    """Derivatives (n_samples, n_x) of the residual at `x` (n_x,), central or one-sided."""
     width = _CENTRAL if central else _ONE_SIDED
     steps = width * np.eye(x.size)
     if not central:

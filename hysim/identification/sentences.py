@@ -1,4 +1,4 @@
-"""Sentences on what a user of a result should not overlook."""
+"""Warnings for users of a result."""
 
 from collections.abc import Mapping
 
@@ -21,10 +21,7 @@ def sentences(
     reasons: tuple[str, ...],
     success: bool,
 ) -> tuple[str, ...]:
-    """One sentence for each; `spread` is the standard deviation of the output and `size` its largest magnitude.
-
-    `reasons` say why standard errors are unknown.
-    """
+    """Warnings; `spread` and `size` are the output's standard deviation and largest magnitude."""
     warnings = [] if success else ["the search did not converge: better parameters may exist"]
     if spread == 0.0:
         warnings.append(CONSTANT)

@@ -1,13 +1,11 @@
 """Whether the input and the output of a record were swapped.
 
-**By the columns.** The output is a waveform that a generator makes, a triangle of equal steps or one sine, and the
-input is none. Measured outputs are not so regular.
+**By the columns.** The output is a waveform of a generator, a triangle of equal steps or one sine, and the input is
+none.
 
-**By a family.** The loop of an actuator runs counterclockwise, and clockwise where the columns were swapped. A force
-that a displacement takes runs clockwise too, so that a clockwise record is doubted only where the same family fits well
-from y to u and clearly better than from u to y: noise on what is then the input makes false reversals, and few
-hysteresis laws are closed under inversion. The reverse fit is short, on at most 500 samples, and an upper bound of the
-error: it may overlook swapped columns but hardly accuses right ones.
+**By a family.** An actuator's loop runs counterclockwise, and clockwise where the columns were swapped; but so does a
+force that follows from a displacement. A clockwise record is doubted only where the same family fits well from y to u
+and clearly better than from u to y, in a short fit on at most 500 samples whose error is an upper bound.
 """
 
 from collections.abc import Sequence
@@ -46,12 +44,10 @@ def swapped_columns(records: Sequence[Record]) -> str:
 
 
 def _moves(signal: FloatArray) -> bool:
-    """Whether a signal changes in most samples; a step or a square wave does not."""
     return bool(np.mean(np.diff(signal) != 0.0) >= _MOSTLY)
 
 
 def _is_generated(signal: FloatArray) -> bool:
-    """Whether a signal is a triangle or staircase of equal steps, or one sine, with hardly any noise."""
     steps = np.diff(signal)
     if signal.size < _FEWEST or not np.any(steps):
         return False

@@ -17,6 +17,10 @@ are those of `hysim.kernels.loop`, its rings of past values kept with the newest
 The inverse of the law is a step (`hysim.kernels.inverses`); `bound` makes a controller of a kernel and this step.
 The parameters are a head and blocks one behind the other, in the order in which the kernel takes them; so is the
 state, which begins with the command before the limits.
+
+The parts are functions that are inlined into one kernel, and not steps behind pointers: each link of a chain of
+pointers is a closure that no cache holds, 0.3 s of compilation in every process, and a chain of four (shaper, PID,
+notch, feed-forward) took 24 % longer a sample than the kernel.
 """
 
 import math
