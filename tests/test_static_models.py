@@ -78,7 +78,7 @@ def test_a_smooth_curve_without_a_loop_is_found_in_noise():
 
 def test_the_spline_is_that_of_scipy():
     """The same strength and a knot at every group: the penalised problem of make_smoothing_spline."""
-    from hysim.models import _smoothing
+    from hysim.laws import _smoothing
 
     rng = np.random.default_rng(2)
     x = np.sort(rng.uniform(0.0, 1.0, 30))

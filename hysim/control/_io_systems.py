@@ -20,12 +20,12 @@ from hysim.control._tracking import TrackingController
 from hysim.errors import SimulationError
 from hysim.kernels import boucwen_inverse
 from hysim.kernels.charts import N_WORK
-from hysim.models.actuator import Actuator
-from hysim.models.boucwen_inverse import BoucWenInverse
-from hysim.models.chain import Chain, ChainState
-from hysim.models.oscillator import BoucWenOscillator, OscillatorState
+from hysim.laws.differential.boucwen_inverse import BoucWenInverse
 from hysim.models.protocols import CompiledController, Continuable, Remembering
-from hysim.models.sensor import Sensor
+from hysim.plants.actuator import Actuator
+from hysim.plants.chain import Chain, ChainState
+from hysim.plants.oscillator import BoucWenOscillator, OscillatorState
+from hysim.plants.sensor import Sensor
 
 Rule = Callable[[float, FloatArray, FloatArray, Any], FloatArray]
 """A function of python-control: time, state, input and parameters to the state's change or to the output."""

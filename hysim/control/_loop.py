@@ -15,8 +15,10 @@ from hysim.control._protocols import Controller, limits_of, preview
 from hysim.errors import SimulationError
 from hysim.models.model import in_brief
 from hysim.models.protocols import CompiledController, Remembering, Responding
-from hysim.models.sampled import Vibration
-from hysim.models.state_space import linear_plant
+from hysim.plants.actuator import Actuator, is_law
+from hysim.plants.chain import Signals
+from hysim.plants.sampled import Vibration
+from hysim.plants.state_space import linear_plant
 from hysim.records import even_step
 
 

@@ -28,7 +28,7 @@ from hysim.discovery._slopes import FORMS, signs_of
 from hysim.discovery._structures import AnyExponent
 from hysim.identification.folds import folds
 from hysim.identification.swapped import swapped_columns
-from hysim.models.terms import duhem_terms, memory_terms, named_terms, symmetric
+from hysim.laws.differential.terms import duhem_terms, memory_terms, named_terms, symmetric
 from hysim.records import Record, several
 
 _POOR = 80.0  # fit of a law without dynamics [%] below which the records may be an oscillator's

@@ -3,7 +3,7 @@
     m y'' + c y' + k y + z = u,    z' = sum of coefficients times terms in (y', z)
 
 For given coefficients z follows from y by integration, so that no noise is differentiated. Both sides of the equation
-of motion are filtered alike (`hysim.models.equation_of_motion`); m, c and k are projected out, and a Gauss-Newton step
+of motion are filtered alike (`hysim.plants.equation_of_motion`); m, c and k are projected out, and a Gauss-Newton step
 is a regression on the slopes of z. Only the curvature of the memory distinguishes A from k: the descent begins from
 several shares of the stiffness. Noise lengthens the path of y, a bias of about a percent; a simulation refines it.
 """

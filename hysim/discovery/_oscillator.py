@@ -10,9 +10,9 @@ from hysim._parallel import Progress
 from hysim.discovery._oscillator_response import Response
 from hysim.discovery._oscillator_search import Search
 from hysim.discovery._result import OscillatorDiscovery
-from hysim.models.oscillator import BoucWenOscillator
-from hysim.models.oscillator_structure import OscillatorStructure
-from hysim.models.terms import RELAXATION, Term, memory_terms, symmetric
+from hysim.laws.differential.terms import RELAXATION, Term, memory_terms, symmetric
+from hysim.plants.oscillator import BoucWenOscillator
+from hysim.plants.oscillator_structure import OscillatorStructure
 from hysim.records import Record, several
 
 _REPEATS = 1e-3  # of the input's rms: largest difference of two periods that count as alike

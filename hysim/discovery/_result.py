@@ -10,8 +10,8 @@ from hysim._frozen import FloatArray, frozen
 from hysim._printing import printed, summary_text, wrapped
 from hysim.discovery._judgement import Judgement
 from hysim.identification.json_forms import Stored
-from hysim.models.terms import latex
-from hysim.models.transfer_function import TransferFunction
+from hysim.laws.differential.terms import latex
+from hysim.plants.transfer_function import TransferFunction
 
 
 @frozen

@@ -27,7 +27,7 @@ from numpy.polynomial import chebyshev
 
 from hysim._frozen import FloatArray
 from hysim.discovery._pysindy import compressed
-from hysim.models.terms import Term
+from hysim.laws.differential.terms import Term
 from hysim.records import Record
 
 MIN_SAMPLES = 4
