@@ -25,6 +25,7 @@ from hysim.records import Record
 _CHUNK = 200_000  # samples that are evaluated at once, to bound the memory
 _LARGEST = 1e150  # beyond it squares overflow: such a set counts as one that has diverged
 _RANK = 1e-11  # singular values of the normalised columns below this are taken as zero
+_TURN = 0.01  # of the span: smaller reversals are noise, or change little
 _DIFFERENCE = 1e-6  # step of a central difference in units of the box: truncation and rounding both ~1e-10
 
 STATES = ("free", "rest", "periodic")
@@ -68,6 +69,22 @@ class Problem:
     def cuts(self) -> list[int]:
         """Where each record begins, and the number of samples."""
         return [0, *np.cumsum([len(part.record) for part in self.parts]).tolist()]
+
+    def thinned(self, samples: int) -> "Problem | None":
+        """The same problem on about so many samples of each record: all reversals, and others evenly between them.
+
+        It is None where that saves less than half, or where the family depends on time. A rate-independent law passes
+        through the same memories at the samples that remain, except for reversals of less than 1 % of the span.
+        """
+        parts = tuple(replace(part, record=_thinned(part.record, samples)) for part in self.parts)
+        short = replace(self, parts=parts)
+        if 2 * sum(len(part.record) for part in parts) > self.y.size:
+            return None
+        try:
+            short.split(0.5 * (self.space.lower + self.space.upper)[np.newaxis])
+        except ValueError:  # the records have no time any more
+            return None
+        return short
 
     def completed(self, x: FloatArray) -> FloatArray:
         """Theta (n_sets, n_theta): the coordinates `x` and the best linear parameters."""
@@ -201,6 +218,13 @@ class Problem:
         limits = [self.space.bounds.get(name, (-np.inf, np.inf)) for name in self.space.linear]
         lower, upper = np.array(limits).reshape(-1, 2).T
         return lower, upper
+
+
+def _thinned(record: Record, samples: int) -> Record:
+    """Ends, reversals and about `samples` others, without the times."""
+    evenly = np.linspace(0, len(record) - 1, min(samples, len(record))).round().astype(np.intp)
+    chosen = np.union1d(evenly, record.reversals(tolerance=_TURN))
+    return Record(u=record.u[chosen], y=record.y[chosen], units=record.units, resolution=record.resolution)
 
 
 def problem(

@@ -21,9 +21,11 @@ N_DESCENDING = 64
 N_STEPS = 40
 N_POLISHED = 8
 N_POLISHING = 200
+N_POLISHED_WHOLE = 3  # optima of a thinned record that descend on all samples
 N_BRIEF_SCREENED = 512
 N_BRIEF_DESCENDING = 12
 _LONG = 512  # samples beyond which fewer points are tried: each costs more, and longer records have fewer optima
+_SHORT = 250  # samples of a thinned record beside its reversals
 _APART = 0.05  # distance of two starts, in units of the box, under which the better one stands for both
 _SAME = 0.01  # likewise of two points after the descent
 _GAIN = 1e-5  # share of the sum of squares: a descent that gains less rests
@@ -44,6 +46,9 @@ def optima(problem: Problem, *, seed: int, progress: Progress | None = None) -> 
     space = problem.space
     if not space.coordinates:
         return polish(problem, np.empty((1, 0)))
+    if problem.y.size > _LONG and (short := problem.thinned(_SHORT)) is not None:
+        likely = optima(short, seed=seed, progress=progress)[:N_POLISHED_WHOLE]
+        return _distinct(polish(problem, np.array([each.x for each in likely]))) if likely else []
     share = min(1.0, _LONG / problem.y.size)
     screened = max(256, round(N_SCREENED * share)) if space.screened is None else space.screened
     n_starts = max(16, round(N_DESCENDING * share))
@@ -64,6 +69,8 @@ def brief_cost(problem: Problem) -> float:
     space = problem.space
     if not space.coordinates:
         return float(problem.costs(np.empty((1, 0)))[0])
+    if problem.y.size > _LONG and (short := problem.thinned(_SHORT)) is not None:
+        return brief_cost(short) * problem.y.size / short.y.size
     screened = N_BRIEF_SCREENED if space.screened is None else min(space.screened, N_BRIEF_SCREENED)
     best = _starts(problem, screened, 0, N_BRIEF_DESCENDING)
     if not len(best):
