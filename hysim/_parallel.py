@@ -24,6 +24,8 @@ from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
 from typing import Any, TypeVar
 
+from hysim._frozen import check_count
+
 T = TypeVar("T")
 
 _LONGEST = 2_000_000  # samples to begin with, which take some tenths of a second
@@ -140,8 +142,8 @@ def at_most(workers: int | None) -> Iterator[None]:
 
 
 def _check(workers: int | None) -> None:
-    if workers is not None and (not isinstance(workers, int) or workers < 1):
-        raise ValueError(f"workers must be an integer of at least 1, got {workers}")
+    if workers is not None:
+        check_count("workers", workers)
 
 
 def awaited(future: Future[T]) -> T:

@@ -6,7 +6,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, frozen, read_only
+from hysim._frozen import FloatArray, frozen, vectors
 from hysim._printing import extent, printed, summary_text
 from hysim.models.protocols import needs_time
 from hysim.records import check_increasing, even_step
@@ -100,11 +100,9 @@ def simulate(
     """
     if not isinstance(plant, _HasResponse):
         raise TypeError(f"simulate takes a model with a response, got {type(plant).__name__}")
-    inputs = read_only(u, "u", ndim=1)
-    times = None if t is None else read_only(t, "t", ndim=1)
+    inputs, *clock = vectors(u=u) if t is None else vectors(u=u, t=t)
+    times = clock[0] if clock else None
     if times is not None:
-        if times.size != inputs.size:
-            raise ValueError(f"u and t must have equal lengths, got {inputs.size} and {times.size}")
         check_increasing(times)
     signals = _signals(plant, inputs, times)
     memory = plant.memory(inputs) if "z" not in signals and isinstance(plant, _HasMemory) else signals.get("z")

@@ -1,14 +1,13 @@
 """Results of a controller's design, as `hysim control` prints, writes and draws them."""
 
 import math
-import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, is_dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hysim._printing import LETTERS, extent, quantity
+from hysim._printing import extent, folded, quantity
 from hysim.cli import outputs
 from hysim.cli.designs import CYCLES, Task
 from hysim.control import HysteresisAssessment, StepAssessment, Tuning
@@ -72,11 +71,7 @@ def document(design: Design) -> dict[str, Any]:
 def text(design: Design) -> str:
     """All results, in words."""
     lines = [*_head(design), *_triangle(design), *_step(design), *_conditions(design)]
-    return "\n".join(
-        part
-        for line in lines
-        for part in textwrap.wrap(line, LETTERS, subsequent_indent=12 * " ", break_on_hyphens=False)
-    )
+    return "\n".join(part for line in lines for part in folded(line, indent=12 * " "))
 
 
 def _head(design: Design) -> Iterator[str]:

@@ -9,6 +9,7 @@ from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hysim._versions import optional
 from hysim.cli import outputs, studies
 from hysim.cli.options import JSON, Command
 from hysim.cli.records import STANDARD
@@ -80,12 +81,9 @@ def _executor(options: argparse.Namespace) -> Iterator[Any]:
     if not options.dask:
         yield "processes" if options.processes else "threads"
         return
-    try:
-        from distributed import Client
-    except ImportError:
-        raise ValueError("--dask needs distributed: pip install 'hysim[dask]'") from None
+    client_class = optional("distributed", "--dask", "dask", ValueError).Client
     is_file = Path(options.dask).is_file()
-    with Client(scheduler_file=options.dask) if is_file else Client(options.dask) as client:
+    with client_class(scheduler_file=options.dask) if is_file else client_class(options.dask) as client:
         yield client
 
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from hysim._frozen import FloatArray, frozen
-from hysim._printing import bic_in_words, printed, summary_text
+from hysim._frozen import FloatArray, check_choice, frozen
+from hysim._printing import bic_in_words, listed, printed, summary_text
 from hysim.comparison import _tables
 from hysim.comparison._verdict import Contrast, contrasts
 from hysim.identification.sentences import CONSTANT, SWAPPED
@@ -162,8 +162,7 @@ class Comparison:
         (['one play', 'plays'], ['plays', 'one play'])
         """
         known = ("cv_rmse", "bic", "aic", "fpe", "rmse", "test_rmse")
-        if criterion not in known:
-            raise ValueError(f"criterion must be one of {', '.join(known)}, got {criterion!r}")
+        check_choice("criterion", criterion, known)
         scores = [(float(vars(row)[criterion]), row) for row in self.rows]
         return tuple(row for score, row in sorted(scores, key=lambda pair: pair[0]) if score == score)
 
@@ -234,11 +233,11 @@ class Comparison:
         method = "(signed ranks of left-out errors, 5 % after Holm's correction)"
         smaller = tuple(each.name for each in self.contrasts if each.contradicts)
         if similar := tuple(name for name in self.undecided if name not in smaller):
-            return f"{len(self.record)} samples show no significant difference to {_listed(similar)} {method}"
+            return f"{len(self.record)} samples show no significant difference to {listed(similar)} {method}"
         if any(math.isnan(each.probability) and not each.diverged for each in self.contrasts):
             return "the errors that would show a difference to the others are not all known"
         if smaller:
-            return f"all others but {_listed(smaller)} are significantly worse {method}"
+            return f"all others but {listed(smaller)} are significantly worse {method}"
         nearest = self.contrasts[0]
         if nearest.diverged:
             return "all others diverged or are significantly worse"
@@ -251,11 +250,11 @@ class Comparison:
         """Models that diverged, and those whose ranks and rmse disagree."""
         diverged = tuple(each.name for each in self.contrasts if each.diverged)
         smaller = tuple(each.name for each in self.contrasts if each.contradicts)
-        sentences = [f"{_listed(diverged)} diverged on samples left out."] if diverged else []
+        sentences = [f"{listed(diverged)} diverged on samples left out."] if diverged else []
         if smaller:
             has = "has" if len(smaller) == 1 else "have"
             sentences.append(
-                f"{_listed(smaller)} {has} significantly smaller typical errors than {self.winner} but a larger rmse: "
+                f"{listed(smaller)} {has} significantly smaller typical errors than {self.winner} but a larger rmse: "
                 "a few large errors decide the ranking."
             )
         return sentences
@@ -282,7 +281,3 @@ class Comparison:
         An ImportError is raised if pandas, of the extra ``tables``, is not installed.
         """
         return _tables.to_frame(self, timings=timings)
-
-
-def _listed(names: tuple[str, ...]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -1,15 +1,12 @@
 """A comparison as text, CSV, Markdown, LaTeX and columns, all written from one list of columns."""
 
-import csv
 import html
-import io
 import math
 import re
-import textwrap
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from hysim._printing import LETTERS, summary_text
+from hysim._printing import aligned, csv_text, folded, summary_text
+from hysim._versions import optional
 
 Value = str | int | float | bool
 _WIDE = 110  # letters in a line of text
@@ -80,12 +77,10 @@ def rows(comparison: Any) -> list[dict[str, Any]]:
 
 def to_text(comparison: Any, *, timings: bool) -> str:
     """The short table for a terminal, the models that could not be compared, and the verdict."""
-    lines = _aligned(_short(comparison, timings))
+    lines = aligned(_short(comparison, timings))
     notes = [f"not compared: {name}: {reason}" for name, reason in comparison.failed.items()] + [comparison.verdict]
-    folded = textwrap.TextWrapper(_WIDE, subsequent_indent="  ", break_on_hyphens=False)
-    wrapped = [line for note in notes if note for line in folded.wrap(note)]
-    inside = textwrap.TextWrapper(_WIDE, initial_indent="  ", subsequent_indent="    ", break_on_hyphens=False)
-    warnings = [line for each in comparison.warnings for line in inside.wrap(each)]
+    wrapped = [line for note in notes if note for line in folded(note, _WIDE, indent="  ")]
+    warnings = [line for each in comparison.warnings for line in folded(each, _WIDE, "  ", "    ")]
     return "\n".join(
         [lines[0], "-" * len(lines[0]), *lines[1:], *wrapped, *(["Warnings"] if warnings else []), *warnings]
     )
@@ -109,10 +104,8 @@ def to_words(comparison: Any) -> str:
         comparison.verdict,
         f"Warnings: {'; '.join(comparison.warnings)}" if comparison.warnings else "",
     ]
-    notes += textwrap.wrap(
-        " ".join(filter(None, sentences)), LETTERS, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False
-    )
-    return summary_text([f"{head}{len(comparison.record)} samples", *(f"  {line}" for line in _aligned(table)), *notes])
+    notes += folded(" ".join(filter(None, sentences)), first="  ", indent="  ")
+    return summary_text([f"{head}{len(comparison.record)} samples", *(f"  {line}" for line in aligned(table)), *notes])
 
 
 def to_html(comparison: Any) -> str:
@@ -146,12 +139,8 @@ def to_latex(comparison: Any, *, timings: bool) -> str:
 
 def to_csv(comparison: Any, *, timings: bool) -> str:
     """Every column with all digits; an unknown number is an empty cell."""
-    buffer = io.StringIO()
     table = to_columns(comparison, timings=timings)
-    writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(table)
-    writer.writerows([map(_exact, row) for row in zip(*table.values(), strict=True)])
-    return buffer.getvalue()
+    return csv_text([table, *(map(_exact, row) for row in zip(*table.values(), strict=True))])
 
 
 def to_columns(comparison: Any, *, timings: bool) -> dict[str, list[Value | None]]:
@@ -163,23 +152,7 @@ def to_columns(comparison: Any, *, timings: bool) -> dict[str, list[Value | None
 
 def to_frame(comparison: Any, *, timings: bool) -> Any:
     """The columns as a DataFrame."""
-    try:
-        import pandas
-    except ImportError as error:
-        raise ImportError(
-            "to_frame needs pandas, which hysim does not install by itself: install hysim with the extra 'tables', "
-            "or take to_csv"
-        ) from error
-    return pandas.DataFrame(to_columns(comparison, timings=timings))
-
-
-def _aligned(table: Sequence[Sequence[str]]) -> list[str]:
-    """Lines of cells; the first column is aligned to the left, the others to the right."""
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    return [
-        "  ".join([cells[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(cells[1:], widths[1:], strict=True))])
-        for cells in table
-    ]
+    return optional("pandas", "to_frame", "tables").DataFrame(to_columns(comparison, timings=timings))
 
 
 def _short(comparison: Any, timings: bool) -> list[list[str]]:
@@ -198,7 +171,7 @@ def _printed(value: Value, digits: int) -> str:
 
 
 def _exact(value: Value | None) -> str:
-    if value is None or (isinstance(value, float) and math.isnan(value)):
+    if value is None or value != value:
         return ""
     return repr(float(value)) if isinstance(value, float) else _printed(value, 0)
 

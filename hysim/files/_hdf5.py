@@ -25,6 +25,7 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from hysim._versions import optional
 from hysim.files._arrays import KINDS, MOST_BYTES, NOTES, TEXT, Array, Arrays, with_notes
 from hysim.files._table import UnreadableError, damaged, require
 
@@ -44,10 +45,7 @@ _KINDS = KINDS | {"O": "references or texts"}
 @contextmanager
 def hdf5(file: BinaryIO, path: Path | None, *, matlab: bool) -> Iterator[Arrays]:
     """The datasets of an open file, which may have a path; ValueError if it is damaged, or h5py is not installed."""
-    try:
-        import h5py
-    except ImportError:
-        raise UnreadableError("a file of HDF5 (MATLAB's -v7.3) needs h5py: pip install 'hysim[io]'") from None
+    h5py = optional("h5py", "a file of HDF5 (MATLAB's -v7.3)", "io", UnreadableError)
     form = "MAT" if matlab else "HDF5"
     with ExitStack() as stack:
         with damaged(form):

@@ -12,7 +12,7 @@ from typing import Literal, overload
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, check_choice
 from hysim._resolution import output_quantum
 from hysim.files._delimited import delimited
 from hysim.files._hdf5 import hdf5
@@ -140,8 +140,7 @@ def load(
     >>> rec.u.tolist(), dict(rec.units)
     ([0.0, 5.0, 10.0], {'u': 'V', 'y': 'um'})
     """
-    if on_missing not in ON_MISSING:
-        raise ValueError(f"on_missing must be one of {', '.join(ON_MISSING)}, got {on_missing!r}")
+    check_choice("on_missing", on_missing, ON_MISSING)
     if delimiter is not None and len(delimiter) != 1:
         raise ValueError(f"delimiter must be one character, got {delimiter!r}")
     if decimal is not None and decimal not in DECIMALS:

@@ -17,10 +17,7 @@ Sources: L. S. Jacobsen, Trans. ASME 52 (1930) 169; A. K. Chopra, Dynamics of St
 equivalent damping of a cycle.
 """
 
-import csv
-import io
 import math
-import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -31,7 +28,7 @@ import numpy.typing as npt
 from hysim._cycles import ROUNDING, TOLERANCE, too_few
 from hysim._excursions import Loops, protocol
 from hysim._frozen import FloatArray, frozen
-from hysim._printing import LETTERS, extent, printed, quantity, summary_text
+from hysim._printing import aligned, csv_text, extent, folded, printed, quantity, summary_text
 from hysim.metrics._loop import COUNTERCLOCKWISE, FORCE, LoopMetrics, measure, samples_of_a_loop
 
 
@@ -196,10 +193,7 @@ class CycleMetrics:
         header = ["cycle", *(column.heading for column in shown)]
         second = ["", *(_bracketed(column.unit_in(units or {})) for column in shown)]
         rows = [[f"{row['cycle']}", *(column.cell(row[column.field]) for column in shown)] for row in self.rows()]
-        heads = [header, second]
-        widths = [max(map(len, cells)) for cells in zip(*heads, *rows, strict=True)]
-        lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in heads + rows]
-        rule = "-" * (sum(widths) + 2 * len(widths) - 2)
+        lines = aligned([header, second, *rows], first=str.rjust)
         unit = _Column("", "", "y u").unit_in(units or {})
         notes = [
             f"Cycles begin and end at u = {quantity(self.level, (units or {}).get('u', ''))}.",
@@ -207,23 +201,19 @@ class CycleMetrics:
             f"outside of the cycles {quantity(self.energy_outside, unit)}.",
             self.sign_convention,
         ]
-        wrapped = [line for note in notes for line in textwrap.wrap(note, LETTERS, break_on_hyphens=False)]
-        return "\n".join([*lines[: len(heads)], rule, *lines[len(heads) :], *wrapped])
+        below = [line for note in notes for line in folded(note)]
+        return "\n".join([*lines[:2], "-" * len(lines[0]), *lines[2:], *below])
 
     def to_csv(self, units: Mapping[str, str] | None = None) -> str:
         """Every column as comma-separated values with all digits; an unknown number is an empty cell.
 
         `units` are labels of the units of ``"u"`` and ``"y"``, which are added to the names.
         """
-        buffer = io.StringIO()
-        writer = csv.writer(buffer, lineterminator="\n")
-        named = [
+        header = [
             column.field if column.unit == "%" else f"{column.field} {_bracketed(column.unit_in(units or {}))}".rstrip()
             for column in _COLUMNS
         ]
-        writer.writerow(["cycle", *named])
-        writer.writerows([["" if value != value else value for value in row.values()] for row in self.rows()])
-        return buffer.getvalue()
+        return csv_text([["cycle", *header], *(row.values() for row in self.rows())])
 
 
 def cycle_metrics(

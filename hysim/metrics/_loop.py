@@ -34,7 +34,7 @@ import numpy.typing as npt
 
 from hysim._cycles import ROUNDING, TOLERANCE, Cycle, settled
 from hysim._excursions import measured_cycles
-from hysim._frozen import FloatArray, frozen, read_only
+from hysim._frozen import FloatArray, frozen, vectors
 from hysim._printing import extent, printed, summary_text
 
 COUNTERCLOCKWISE = (
@@ -285,9 +285,8 @@ def _orientation(area: float, rounding: float) -> Literal["counterclockwise", "c
 
 
 def samples_of_a_loop(u: npt.ArrayLike, y: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    inputs, outputs = read_only(u, "u", ndim=1), read_only(y, "y", ndim=1)
-    if inputs.size != outputs.size:
-        raise ValueError(f"u and y must have equal lengths, got {inputs.size} and {outputs.size}")
+    """Input and output as arrays; ValueError unless they have equal lengths and could hold a loop."""
+    inputs, outputs = vectors(u=u, y=y)
     if inputs.size < 3:
         raise ValueError(f"a loop needs at least 3 samples, got {inputs.size}")
     if np.ptp(inputs) == 0:

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from hysim._frozen import check_choice
 from hysim._parallel import GLANCE, Progress
 from hysim.sweeps._chunks import Chunk, Outcome, part_of
 from hysim.sweeps._executors import Workers, workers_of
@@ -96,8 +97,7 @@ def sweep(
     >>> result["width"].round(3).tolist()
     [0.337, 0.299, 0.264, 0.509, 0.442, 0.378]
     """
-    if on_change not in ON_CHANGE:
-        raise ValueError(f"on_change must be one of {', '.join(ON_CHANGE)}, got {on_change!r}")
+    check_choice("on_change", on_change, ON_CHANGE)
     tasks = space_of(space)
     takes_seed = _takes_seed(task, tasks)
     task_seeds = seeds(seed, np.arange(tasks.n_tasks))
