@@ -309,6 +309,51 @@ sys.exit(main(["metrics", sys.argv[1]]))
 """
 
 
+IN_EXEC = """
+import signal, sys, types
+
+def interrupted(*_, **__):
+    exec("signal.raise_signal(signal.SIGINT)", {"signal": signal})
+
+sys.modules["hysim.metrics"] = types.SimpleNamespace(loop_metrics=interrupted, cycle_metrics=interrupted)
+"""
+
+
+def test_an_interrupt_while_a_module_is_loaded_has_the_same_exit_code(tmp_path):
+    (tmp_path / "sitecustomize.py").write_text(IN_EXEC)  # which Python imports before it runs anything
+    (tmp_path / "loop.csv").write_text("u,y\n0,0\n1,1\n0,0.1\n")
+    path = os.pathsep.join([str(tmp_path), os.path.dirname(os.path.dirname(__file__)), *sys.path])
+    command = [sys.executable, "-m", "hysim", "metrics", str(tmp_path / "loop.csv")]
+    done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path})
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "hysim: interrupted\n")
+
+
+CALLED_BACK = STUCK.replace(
+    "def stuck",
+    """
+import ctypes
+
+@ctypes.CFUNCTYPE(None)
+def called_back():  # as numba compiles; Python prints what is raised here, and goes on
+    print("at work", flush=True)
+    time.sleep(600)
+
+def stuck""",
+).replace('print("at work", flush=True)\n        time', "called_back()\n        time")
+
+
+@linux
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_in_a_callback_of_a_compiled_library_is_one_line_too(started, tmp_path, number):
+    (tmp_path / "loop.csv").write_text("u,y\n0,0\n1,1\n0,0.1\n")
+    child = started("-c", CALLED_BACK, tmp_path / "loop.csv")
+    assert child.stdout.readline() == "at work\n"
+    _, err, seconds = ended(child, number)
+    said = "interrupted" if number == signal.SIGINT else "ended by SIGTERM"
+    assert (child.returncode, err) == (128 + number, f"hysim: {said}\n")
+    assert seconds < PROMISED + BUSY
+
+
 @linux
 @pytest.mark.parametrize(("number", "said"), [(signal.SIGINT, "interrupted"), (signal.SIGTERM, "ended by SIGTERM")])
 def test_a_command_that_cannot_end_in_order_is_ended(started, tmp_path, number, said):
