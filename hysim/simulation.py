@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen, vectors
 from hysim._printing import extent, printed, summary_text
-from hysim.models.protocols import needs_time
+from hysim.models.protocols import Remembering, Responding, needs_time
 from hysim.records import check_increasing, even_step
 
 
@@ -47,18 +47,8 @@ class Simulation:
 
 
 @runtime_checkable
-class _HasResponse(Protocol):
-    def response(self, u: FloatArray, /, *time: float) -> FloatArray: ...
-
-
-@runtime_checkable
 class _HasSignals(Protocol):
     def signals(self, u: FloatArray, /, *time: float) -> Mapping[str, FloatArray]: ...
-
-
-@runtime_checkable
-class _HasMemory(Protocol):
-    def memory(self, u: FloatArray, /) -> FloatArray: ...
 
 
 def simulate(
@@ -98,14 +88,14 @@ def simulate(
     >>> sim.y.round(6).tolist()
     [0.0, 0.632121, -0.307799]
     """
-    if not isinstance(plant, _HasResponse):
+    if not isinstance(plant, Responding):
         raise TypeError(f"simulate takes a model with a response, got {type(plant).__name__}")
     inputs, *clock = vectors(u=u) if t is None else vectors(u=u, t=t)
     times = clock[0] if clock else None
     if times is not None:
         check_increasing(times)
     signals = _signals(plant, inputs, times)
-    memory = plant.memory(inputs) if "z" not in signals and isinstance(plant, _HasMemory) else signals.get("z")
+    memory = plant.memory(inputs) if "z" not in signals and isinstance(plant, Remembering) else signals.get("z")
     every = {"t": times, "u": inputs, "z": memory, **signals}
     return Simulation(
         u=inputs,
@@ -117,7 +107,7 @@ def simulate(
     )
 
 
-def _signals(plant: _HasResponse, u: FloatArray, times: FloatArray | None) -> Mapping[str, FloatArray]:
+def _signals(plant: Responding, u: FloatArray, times: FloatArray | None) -> Mapping[str, FloatArray]:
     """The plant's own signals, at least its output."""
     time: tuple[float, ...] = ()
     if needs_time(plant):

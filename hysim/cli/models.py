@@ -6,10 +6,9 @@ import pkgutil
 import re
 import sys
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import hysim
-from hysim._frozen import FloatArray
 from hysim.cli.records import STANDARD
 
 FORMS = "name of a family, such as bouc-wen; MODEL.json; or module:name of your own"
@@ -29,13 +28,6 @@ transfer function:
 _SHORT = {"zhu-wang": "ZhuWangBoucWen", "baber-noori": "BoucWenBaberNoori"}
 _STRUCTURE = ("poles", "zeros", "hold", "sample")
 _NEEDED = ("poles", "zeros")
-
-
-@runtime_checkable
-class Responding(Protocol):
-    """A law or a plant."""
-
-    def response(self, u: FloatArray, /) -> FloatArray: ...
 
 
 def names() -> list[str]:
@@ -89,6 +81,7 @@ def is_import_path(text: str) -> bool:
 def imported(path: str) -> Any:
     """The family or model at an import path; a ValueError if there is no such name, or it is no law."""
     from hysim.models.candidates import is_identifiable
+    from hysim.models.protocols import Responding
 
     law = resolved(path)
     if not (isinstance(law, Responding) or is_identifiable(law)):
@@ -144,6 +137,8 @@ def name_of(path: str) -> str:
 
 def simulated(model: Any, record: "hysim.Record", units: dict[str, str]) -> "hysim.Simulation":
     """The model's free run over the record's input; a ValueError if it has no response, such as a controller."""
+    from hysim.models.protocols import Responding
+
     if not isinstance(model, Responding):
         raise ValueError(f"a {type(model).__name__} has no response to simulate: give a law or a plant")
     return hysim.simulate(model, record.t, record.u, units=units)

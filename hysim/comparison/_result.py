@@ -151,8 +151,8 @@ class Comparison:
     def ranked(self, criterion: str = "cv_rmse") -> tuple[ComparisonRow, ...]:
         """The rows by a measure, the smallest first; rows without the measure are left out.
 
-            `criterion` is one of ``"cv_rmse"``, ``"bic"``, ``"aic"``, ``"fpe"``, ``"rmse"`` and ``"test_rmse"``; any
-            other word is a ValueError.
+        `criterion` is one of ``"cv_rmse"``, ``"bic"``, ``"aic"``, ``"fpe"``, ``"rmse"`` and ``"test_rmse"``; any
+        other word is a ValueError.
 
         Examples
         --------
@@ -189,12 +189,7 @@ class Comparison:
 
     @property
     def probabilities(self) -> dict[str, float]:
-        """Probability of each other model's left-out errors, if it predicted as well as the winner.
-
-        Name to the two-sided probability of equally one-sided signed ranks, on which single large errors have
-        little influence, with the correlation of neighbours and Holm's correction for the number of models; nan if
-        errors are unknown.
-        """
+        """Name of each other model to the `probability` of its `Contrast` with the winner."""
         return {each.name: each.probability for each in self.contrasts}
 
     @property
@@ -204,7 +199,7 @@ class Comparison:
 
     @property
     def verdict(self) -> str:
-        """The winner, the models that the record cannot tell from it, and the models that diverged, in words."""
+        """The winner, models that are not significantly worse, and models that diverged, in words."""
         by_bic = self.ranked("bic")
         sentences = [f"The BIC prefers {by_bic[0].name}."] if len(by_bic) > 1 and by_bic[0].bic > -math.inf else []
         if self.winner is not None:
@@ -216,12 +211,7 @@ class Comparison:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Warnings about the comparison, one sentence each.
-
-        They say that the output is constant; the warnings of the best model, which predicts best, or else has the
-        smallest rmse; and, from the best model that says so, that input and output may be swapped. `verdict` names
-        models that diverged, and `failed` those that could not be compared.
-        """
+        """Warnings, one sentence each: a constant output, those of the best model, and a swap of input and output."""
         constant = [CONSTANT] if np.ptp(self.record.y) == 0.0 else []
         ranked = self.ranked() or self.ranked("rmse")
         every = [(row.name, each) for row in ranked for each in row.warnings]
@@ -264,7 +254,7 @@ class Comparison:
         return _tables.to_text(self, timings=timings and any(row.seconds == row.seconds for row in self.rows))
 
     def to_markdown(self, *, timings: bool = False) -> str:
-        """The table in Markdown; `timings` adds the seconds that each fit took."""
+        """The table in Markdown; `timings` adds the seconds of each fit."""
         return _tables.to_markdown(self, timings=timings)
 
     def to_latex(self, *, timings: bool = False) -> str:
