@@ -23,15 +23,13 @@ _PLAIN_UNIT = re.compile(r"[^\[\]()\s,;\"#%]+(?: [^\[\]()\s,;\"#%]+)*")
 def save_record(record: Record, path: str | Path) -> None:
     """Save a record to a file, in the format that its ending names.
 
-    The file holds `u`, `y` and, if there is one, `t`, to the last bit; and where they are known the units, the
-    resolution and the name. `hysim.load` returns an equal record from the path alone.
+    The file holds the arrays to the last bit, and units, resolution and name; `hysim.load` returns an equal record. It
+    is written completely or not at all, with the same bytes each time.
 
     - ``.csv``, ``.tsv``: a header ``t [s],u [V],y [um]``, below comments ``# name:`` and ``# resolution:``;
     - ``.npz``: arrays `t`, `u`, `y`, `resolution`, and texts `name`, ``u_units`` and so on;
     - ``.mat``: the same as variables, numbers in columns, compressed; version 5, which MATLAB and Octave load;
     - ``.h5``, ``.hdf5``: datasets with an attribute `units`; attributes `resolution` and `name` of the file.
-
-    The file is written completely or not at all, with the same bytes each time.
 
     Parameters
     ----------
@@ -68,13 +66,7 @@ def save_record(record: Record, path: str | Path) -> None:
 
 
 def packed(columns: Mapping[str, FloatArray], path: str | Path, notes: Notes) -> bytes:
-    """Columns of equal lengths as the content of a file, in the format that the ending of its path names.
-
-    Raises
-    ------
-    ValueError
-        If the ending is none of these, h5py is missing for HDF5, or a name or a unit cannot be written.
-    """
+    """Columns of equal lengths as the content of a file, in the format of its ending; errors as in `save_record`."""
     write = _WRITERS[ending(path)]
     for text in (notes.name or "", *notes.units.values()):
         if "\0" in text or text.encode("utf-8", "replace").decode() != text:
