@@ -38,7 +38,7 @@ _CHECKSUM = 4  # bytes
 _SLACK = 1024  # bytes by which a packed chunk may be longer than its content
 _LONGEST_ATTRIBUTE = 10_000  # bytes
 _WORDS = (8, 8)  # bytes of an address and a length
-_HEAD_BYTES, _LEAST_HEAP = 16, 4096  # bytes of the head of a heap or an object, and of a heap
+_HEAD_BYTES, _LEAST_HEAP = 16, 4096  # bytes: head of a heap or an object, smallest heap
 _KINDS = KINDS | {"O": "references or texts"}
 
 
@@ -59,7 +59,7 @@ def hdf5(file: BinaryIO, path: Path | None, *, matlab: bool) -> Iterator[Arrays]
 
 
 class _Reader(NamedTuple):
-    """Reads the datasets of a file, of MATLAB or another one; texts of variable length only if `texts` is true."""
+    """Reader of the datasets of a file; texts of variable length are read only if `texts` is true."""
 
     h5py: Any
     matlab: bool
@@ -86,8 +86,8 @@ class _Reader(NamedTuple):
         if "MATLAB_empty" in dataset.attrs:
             shape = (0,)
         kind, unit = self.kind(dataset, shape), self.attribute(dataset, "units")
-        unit = unit if isinstance(unit, str) else None
-        return Array(label, shape, kind, dataset.dtype.itemsize, partial(self.values, dataset, shape, kind), unit)
+        read = partial(self.values, dataset, shape, kind)
+        return Array(label, shape, kind, dataset.dtype.itemsize, read, unit if isinstance(unit, str) else None)
 
     def kind(self, dataset: Any, shape: tuple[int, ...]) -> str:
         """The kind of a dataset's content."""
