@@ -81,8 +81,8 @@ def settled(u: FloatArray) -> npt.NDArray[np.intp]:
     """The samples of a branch in the order of their inputs; of several with equal inputs the last."""
     order = np.argsort(u, kind="stable")
     x = u[order]
-    kept: npt.NDArray[np.intp] = order[np.append(x[1:] > x[:-1], True)]
-    return kept
+    samples: npt.NDArray[np.intp] = order[np.append(x[1:] > x[:-1], True)]
+    return samples
 
 
 def too_few(u: FloatArray, tolerance: float, wanted: int, present: int) -> str:

@@ -39,10 +39,10 @@ class Simulation:
     units: Mapping[str, str] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        known = {"t": self.t, "u": self.u, "y": self.y, "z": self.z, **self.signals}
+        arrays = {"t": self.t, "u": self.u, "y": self.y, "z": self.z, **self.signals}
         return summary_text(
             [f"Simulation: {self.u.size} samples"],
-            {name: extent(values, self.units.get(name, "")) for name, values in known.items() if values is not None},
+            {name: extent(values, self.units.get(name, "")) for name, values in arrays.items() if values is not None},
         )
 
 

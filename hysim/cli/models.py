@@ -89,7 +89,7 @@ def imported(path: str) -> Any:
     return law
 
 
-def chosen(text: str) -> Any:
+def model_or_family(text: str) -> Any:
     """The family or model that ``--model`` names: a family's name, a JSON file, or an import path."""
     if Path(text).suffix == ".json":
         return read(text)[0]
@@ -106,7 +106,7 @@ def to_identify(options: argparse.Namespace) -> Any:
     if options.model != "transfer-function":
         if structure:
             raise ValueError(f"--{next(iter(structure))} is no option of the model {options.model}")
-        return chosen(options.model)
+        return model_or_family(options.model)
     if missing := [name for name in _NEEDED if name not in structure]:
         raise ValueError(f"the model transfer-function needs --{missing[0]}")
     return hysim.TransferFunction.structure(**structure)

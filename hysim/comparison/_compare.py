@@ -156,11 +156,11 @@ class _Protocol:
             if _is_family(subject):
                 subject = identify(subject, self.record, cross_validate=self.cross_validate, seed=self.seed)
                 seconds = time.perf_counter() - begin
-            return self._judged(name, subject, seconds)
+            return self._measured_row(name, subject, seconds)
         except _FAILURES as error:
             return " ".join(str(error).split())
 
-    def _judged(self, name: str, subject: Any, seconds: float) -> ComparisonRow:
+    def _measured_row(self, name: str, subject: Any, seconds: float) -> ComparisonRow:
         record, measured, model = self.record, self.measured, _model_of(subject)
         identified_here = math.isfinite(seconds)
         y = simulate(model, record.t, record.u).y
@@ -176,7 +176,7 @@ class _Protocol:
             fitted |= {"success": subject.success, "message": subject.message if identified_here else ""}
         sense = -1.0 if {loop.orientation, measured.orientation} == {"clockwise", "counterclockwise"} else 1.0
         deviation = _rate_deviation(model, record, y)
-        test_fit, test_rmse = self._tested(subject, model, identified_here)
+        test_fit, test_rmse = self._test_errors(subject, model, identified_here)
         return ComparisonRow(
             name=name,
             model=model,
@@ -199,15 +199,15 @@ class _Protocol:
             **fitted,
         )
 
-    def _tested(self, subject: Any, model: Any, identified_here: bool) -> tuple[float, float]:
+    def _test_errors(self, subject: Any, model: Any, identified_here: bool) -> tuple[float, float]:
         """Fit and rmse on the test."""
         if self.trial is None:
             return math.nan, math.nan
-        drive, judged = self.trial.drive, self.trial.record
+        drive, test = self.trial.drive, self.trial.record
         if self.trial.own_state and identified_here:
             model = _with_initial_state(drive, subject, self.seed)
         y = simulate(model, drive.t, drive.u).y[self.trial.begin :]
-        return metrics.fit_percent(judged.y, y), metrics.rmse(judged.y, y)
+        return metrics.fit_percent(test.y, y), metrics.rmse(test.y, y)
 
 
 def _subjects(models: Mapping[str, Any] | str | None) -> dict[str, Any]:

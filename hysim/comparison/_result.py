@@ -161,8 +161,8 @@ class Comparison:
         >>> [row.name for row in tab.ranked("bic")], [row.name for row in tab.ranked("rmse")]
         (['one play', 'plays'], ['plays', 'one play'])
         """
-        known = ("cv_rmse", "bic", "aic", "fpe", "rmse", "test_rmse")
-        check_choice("criterion", criterion, known)
+        criteria = ("cv_rmse", "bic", "aic", "fpe", "rmse", "test_rmse")
+        check_choice("criterion", criterion, criteria)
         scores = [(float(vars(row)[criterion]), row) for row in self.rows]
         return tuple(row for score, row in sorted(scores, key=lambda pair: pair[0]) if score == score)
 

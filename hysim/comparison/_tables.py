@@ -92,10 +92,10 @@ def to_words(comparison: Any) -> str:
     unknown = [row.name for row in comparison.rows if math.isnan(row.cv_rmse)]
     by_name = {row["name"]: row for row in rows(comparison)}
     names = ("name", "n_parameters", "fit_percent", "rmse", "cv_rmse", "rmse_ratio", "max_width")
-    chosen = [column for column in columns(comparison, timings=False) if column.name in names]
+    selected = [column for column in columns(comparison, timings=False) if column.name in names]
     ordered = [by_name[name] for name in best + unknown]
-    table = [["", *(column.heading for column in chosen[1:])]]
-    table += [[_printed(row[column.name], column.digits) for column in chosen] for row in ordered[:_PRINTED]]
+    table = [["", *(column.heading for column in selected[1:])]]
+    table += [[_printed(row[column.name], column.digits) for column in selected] for row in ordered[:_PRINTED]]
     more, many = len(ordered) - _PRINTED, len(ordered)
     head = f"Comparison of {many} model{'' if many == 1 else 's'} on {comparison.record.name or 'a record'}, "
     notes = [f"  ... and {more} more"] if more > 0 else []
@@ -157,9 +157,9 @@ def to_frame(comparison: Any, *, timings: bool) -> Any:
 
 def _short(comparison: Any, timings: bool) -> list[list[str]]:
     """Headings and printed cells of the short columns, one row a model."""
-    chosen = [column for column in columns(comparison, timings=timings) if column.short]
-    body = [[_printed(row[column.name], column.digits) for column in chosen] for row in rows(comparison)]
-    return [[column.heading for column in chosen], *body]
+    selected = [column for column in columns(comparison, timings=timings) if column.short]
+    body = [[_printed(row[column.name], column.digits) for column in selected] for row in rows(comparison)]
+    return [[column.heading for column in selected], *body]
 
 
 def _printed(value: Value, digits: int) -> str:

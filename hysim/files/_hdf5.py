@@ -150,8 +150,8 @@ def _check_chunks(dataset: Any) -> None:
     stored: list[Any] = []
     dataset.id.chunk_iter(stored.append)
     for chunk in stored:
-        used = [number for k, number in enumerate(filters) if not chunk.filter_mask >> k & 1]
-        is_sound = _is_sound(dataset, chunk, used, plain)
+        applied = [number for k, number in enumerate(filters) if not chunk.filter_mask >> k & 1]
+        is_sound = _is_sound(dataset, chunk, applied, plain)
         require(is_sound, f"the file is damaged: a chunk does not have the {plain:,} bytes it says")
 
 

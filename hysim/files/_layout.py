@@ -156,7 +156,7 @@ def _heads(rows: list[list[str]], below: list[list[str]], line: int, width: int,
         {place: _kind(cell, decimal) for place, cell in enumerate(row) if len(row) != width or place in numeric}
         for row in rows
     ]
-    texts, counts = ([place for place, kind in kinds_of[0].items() if kind == wanted] for wanted in ("text", "number"))
+    texts, counts = ([place for place, kind in kinds_of[0].items() if kind == one] for one in ("text", "number"))
     if texts and counts:
         raise ValueError(
             f"line {line} is half a header: column {counts[0]} holds the number {rows[0][counts[0]]!r}, column "

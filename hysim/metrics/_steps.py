@@ -194,7 +194,7 @@ def _settling_time(t: FloatArray, eta: FloatArray) -> float:
 
 
 def _crossing(t: FloatArray, eta: FloatArray, k: int, level: float) -> float:
-    """When the line from sample k - 1 to sample k passes the level."""
+    """Time at which the line from sample k - 1 to sample k passes the level."""
     if k == 0:
         return float(t[0])
     return float(t[k - 1] + (t[k] - t[k - 1]) * (level - eta[k - 1]) / (eta[k] - eta[k - 1]))

@@ -57,8 +57,8 @@ def response_task(
     y : array, shape (n,), optional
         Output to compare the response with, for ``"rmse"`` and ``"sse"``.
     measure : {"rmse", "sse", "max_width", "area", "final", "response"}
-        Root of the mean, or sum, of the squared differences from `y`; a measure of `loop_metrics` (last complete
-        cycle); the last sample; or the response itself as an array. It is inf for a law that diverges.
+        Root of the mean, or sum, of the squared differences from `y`; a measure of `loop_metrics`; the last sample; or
+        the response itself as an array. It is inf for a law that diverges.
 
     Returns
     -------

@@ -115,10 +115,10 @@ class Sweep:
         for message, number in Counter(self.errors.values()).most_common(5):
             lines.append(f"  {number} x {message}")
         for name, values in self.outputs.items():
-            known = values[np.isfinite(values)]
-            if known.size:
-                low, middle, high = np.quantile(known, [0.0, 0.5, 1.0])
-                lines.append(f"{name}: {low:.4g} to {high:.4g}, median {middle:.4g}, {n - known.size} not finite")
+            finite = values[np.isfinite(values)]
+            if finite.size:
+                low, middle, high = np.quantile(finite, [0.0, 0.5, 1.0])
+                lines.append(f"{name}: {low:.4g} to {high:.4g}, median {middle:.4g}, {n - finite.size} not finite")
         return "\n".join(lines)
 
     def _along_axes(self, values: Column) -> Column:

@@ -51,10 +51,9 @@ class Sample:
         Name of a parameter to its distribution: one of `scipy.stats` with its arguments, such as
         ``scipy.stats.norm(1.0, 0.1)``, or a pair ``(low, high)`` for a uniform one.
     n : int
-        Number of tasks; for ``"sobol"`` a power of 2. For ``"saltelli"`` a power of 2 too, and there are n (d + 2)
-        tasks for d parameters.
+        Number of tasks; a power of 2, except for a Latin hypercube. ``"saltelli"`` has n (d + 2) for d parameters.
     method : {"sobol", "latin_hypercube", "saltelli"}
-        Scrambled Sobol sequence, or Latin hypercube, both of `scipy.stats.qmc`; or the sample for `sobol_indices`.
+        Scrambled Sobol sequence or Latin hypercube of `scipy.stats.qmc`; or the sample for `sobol_indices`.
     seed : int
         Seed of the sample. The tasks' own seeds come from the seed of `sweep`.
 

@@ -4,9 +4,9 @@
     results    task, seed, seconds, error, shard; then the parameters, then the outputs that are numbers
 
 Rows are written in transactions. The arrays of a transaction are in one file, a shard, which is complete before the
-transaction begins. Its name begins with digits of the study: no other file in the folder is ever changed, and none
-outside it read. Columns have no declared type, which would cost zeros their sign; an output that is nan is NULL in a
-row without an error. Between transactions the writer holds SQLite's lock for writing: others may read, not write.
+transaction begins. Shards begin with digits of the study: other files in the folder are never changed, and files
+outside it never read. Columns have no declared type, since zeros would lose their sign; nan is NULL in a row without an
+error. Between transactions the writer keeps SQLite's lock for writing: others may read, not write.
 """
 
 import errno
@@ -282,10 +282,10 @@ class Store:
 
     def _remove_shards_without_rows(self, study: Study) -> None:
         """Remove the shards of a study that no row names: their transaction failed, or the study was replaced."""
-        used = {*self._column("shard")}
+        shards = {*self._column("shard")}
         for path in self._folder.iterdir() if self._folder.is_dir() else ():
             name = re.sub(r"^\.(.*\.npz)\.[0-9a-f]{16}$", r"\1", path.name)  # without what the name has during writing
-            if self._is_shard(name, study) and path.name not in used:
+            if self._is_shard(name, study) and path.name not in shards:
                 path.unlink()
 
 

@@ -187,7 +187,7 @@ class _Run:
         outcomes, lost = {}, None
         for future in list(self.running):
             if future.done() and not future.cancelled() and future.exception() is None:
-                outcomes[future] = self.table.judged(future.result())
+                outcomes[future] = self.table.judge(future.result())
                 continue
             if future.done():
                 lost = future
