@@ -33,15 +33,10 @@ def check(options: argparse.Namespace) -> None:
     A ValueError is raised if a folder does not exist or may not be written to, the ending of a picture or a table is
     unknown, two results would go to one place, such as the standard output, or a result would overwrite an input.
     """
-    inputs: list[str] = []
-    results: list[tuple[str, str]] = []
-    for name, role in options.roles.items():
-        value = vars(options)[name] if role else None
-        paths = value if isinstance(value, list) else [] if value is None else [value]
-        if role == INPUT:
-            inputs += paths
-        else:
-            results += [(path, role) for path in paths]
+    values = [(vars(options)[name], role) for name, role in options.roles.items() if role]
+    lists = [(value if isinstance(value, list) else [value], role) for value, role in values if value is not None]
+    files = [(path, role) for paths, role in lists for path in paths]
+    results = [(path, role) for path, role in files if role != INPUT]
     for path, role in results:
         if path != STANDARD:
             _check_path(path, role)
@@ -52,7 +47,7 @@ def check(options: argparse.Namespace) -> None:
         raise ValueError("two results would go to the standard output: write one of them to a file, or leave it out")
     if len({os.path.realpath(path) for path, _ in results}) < len(results):
         raise ValueError(f"two results would go to one file, {results[0][0]}")
-    keep(inputs, [path for path, _ in results])
+    keep([path for path, role in files if role == INPUT], [path for path, _ in results])
 
 
 def _check_path(path: str, role: str) -> None:

@@ -134,11 +134,13 @@ class Comparison:
     failed: Mapping[str, str] = field(default_factory=dict)
     test: Record | None = None
 
-    def __str__(self) -> str:
-        return _tables.to_words(self)
-
-    def _repr_html_(self) -> str:
-        return _tables.to_html(self)
+    __str__ = _tables.to_words
+    _repr_html_ = _tables.to_html
+    to_text = _tables.to_text
+    to_markdown = _tables.to_markdown
+    to_latex = _tables.to_latex
+    to_csv = _tables.to_csv
+    to_frame = _tables.to_frame
 
     def __getitem__(self, name: str) -> ComparisonRow:
         for row in self.rows:
@@ -248,26 +250,3 @@ class Comparison:
                 "a few large errors decide the ranking."
             )
         return sentences
-
-    def to_text(self, *, timings: bool = True) -> str:
-        """The table for a terminal, and the verdict below it; `timings` adds the seconds of each fit."""
-        return _tables.to_text(self, timings=timings and any(row.seconds == row.seconds for row in self.rows))
-
-    def to_markdown(self, *, timings: bool = False) -> str:
-        """The table in Markdown; `timings` adds the seconds of each fit."""
-        return _tables.to_markdown(self, timings=timings)
-
-    def to_latex(self, *, timings: bool = False) -> str:
-        """The table as a plain LaTeX tabular, which needs no package; `timings` adds the seconds of each fit."""
-        return _tables.to_latex(self, timings=timings)
-
-    def to_csv(self, *, timings: bool = False) -> str:
-        """Every measure as comma-separated values with all digits; `timings` adds the seconds of each fit."""
-        return _tables.to_csv(self, timings=timings)
-
-    def to_frame(self, *, timings: bool = False) -> Any:
-        """Every measure as a pandas DataFrame, one row a model; `timings` adds the seconds of each fit.
-
-        An ImportError is raised if pandas, of the extra ``tables``, is not installed.
-        """
-        return _tables.to_frame(self, timings=timings)

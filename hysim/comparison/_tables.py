@@ -1,4 +1,4 @@
-"""A comparison as text, CSV, Markdown, LaTeX and columns, all written from one list of columns."""
+"""Methods of `Comparison` that write it as text, CSV, Markdown, LaTeX and columns, from one list of columns."""
 
 import html
 import math
@@ -75,8 +75,9 @@ def rows(comparison: Any) -> list[dict[str, Any]]:
     return values
 
 
-def to_text(comparison: Any, *, timings: bool) -> str:
-    """The short table for a terminal, the models that could not be compared, and the verdict."""
+def to_text(comparison: Any, *, timings: bool = True) -> str:
+    """The table for a terminal, and the verdict below it; `timings` adds the seconds of each fit."""
+    timings = timings and any(row.seconds == row.seconds for row in comparison.rows)
     lines = aligned(_short(comparison, timings))
     notes = [f"not compared: {name}: {reason}" for name, reason in comparison.failed.items()] + [comparison.verdict]
     wrapped = [line for note in notes if note for line in folded(note, _WIDE, indent="  ")]
@@ -119,16 +120,16 @@ def to_html(comparison: Any) -> str:
     return f"<table><thead><tr>{head}</tr></thead><tbody>{lines}</tbody></table>{verdict}{warnings}"
 
 
-def to_markdown(comparison: Any, *, timings: bool) -> str:
-    """The short table in Markdown, with a row for each model that could not be compared."""
+def to_markdown(comparison: Any, *, timings: bool = False) -> str:
+    """The table in Markdown; `timings` adds the seconds of each fit."""
     header, *body = _short(comparison, timings)
     body += [[name, reason, *[""] * (len(header) - 2)] for name, reason in comparison.failed.items()]
     lines = [header, ["---", *("---:" for _ in header[1:])], *body]
     return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |" for cells in lines)
 
 
-def to_latex(comparison: Any, *, timings: bool) -> str:
-    """The short table as a plain tabular, which needs no package."""
+def to_latex(comparison: Any, *, timings: bool = False) -> str:
+    """The table as a plain LaTeX tabular, which needs no package; `timings` adds the seconds of each fit."""
     (header, *body), failed = _short(comparison, timings), comparison.failed.items()
     spans = rf"\multicolumn{{{len(header) - 1}}}{{l}}"
     lines = [" & ".join(map(_escaped, cells)) for cells in body]
@@ -137,8 +138,8 @@ def to_latex(comparison: Any, *, timings: bool) -> str:
     return "\n".join([*head, r"\hline", *(rf"{line} \\" for line in lines), r"\hline", r"\end{tabular}"])
 
 
-def to_csv(comparison: Any, *, timings: bool) -> str:
-    """Every column with all digits; an unknown number is an empty cell."""
+def to_csv(comparison: Any, *, timings: bool = False) -> str:
+    """Every measure as comma-separated values with all digits, nan as an empty cell; `timings` adds the seconds."""
     table = to_columns(comparison, timings=timings)
     return csv_text([table, *(map(_exact, row) for row in zip(*table.values(), strict=True))])
 
@@ -150,8 +151,8 @@ def to_columns(comparison: Any, *, timings: bool) -> dict[str, list[Value | None
     return {column.heading: [row.get(column.name) for row in every] for column in columns(comparison, timings=timings)}
 
 
-def to_frame(comparison: Any, *, timings: bool) -> Any:
-    """The columns as a DataFrame."""
+def to_frame(comparison: Any, *, timings: bool = False) -> Any:
+    """Every measure as a DataFrame of pandas, which must be installed, one row a model; `timings` adds the seconds."""
     return optional("pandas", "to_frame", "tables").DataFrame(to_columns(comparison, timings=timings))
 
 
