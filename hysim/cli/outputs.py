@@ -6,7 +6,9 @@ import json
 import math
 import os
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from datetime import timedelta
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -183,12 +185,21 @@ def loop_of_model(record: "Record", model: Any) -> "Figure":
 
 
 def progress() -> Callable[[int, int], None] | None:
-    """A counter on the standard error, if that is a terminal; a total of 0 stands for an unknown total."""
+    """Tasks done, their rate and the remaining time, on the standard error if that is a terminal.
+
+    A total of 0 stands for an unknown total.
+    """
     if not sys.stderr.isatty():
         return None
+    begin: list[tuple[float, int]] = []
 
     def show(done: int, total: int) -> None:
+        begin[1:] = [(time.monotonic(), done)]
+        elapsed, computed = begin[-1][0] - begin[0][0], done - begin[0][1]
+        rate = computed / max(elapsed, 1e-9)
         text = f"{done}/{total}" if total else f"{done}"
-        print(f"\r{text}", end="\n" if 0 < total <= done else "", file=sys.stderr, flush=True)
+        if total and rate > 0.0:
+            text += f", {rate:.3g} a second, {timedelta(seconds=round((total - done) / rate))} left"
+        print(f"\r\x1b[K{text}", end="\n" if 0 < total <= done else "", file=sys.stderr, flush=True)
 
     return show
