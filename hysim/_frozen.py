@@ -39,12 +39,8 @@ def read_only(
 ) -> FloatArray:
     """Return a read-only contiguous float64 copy of `values`.
 
-    Raises
-    ------
-    TypeError
-        If the values are not real numbers.
-    ValueError
-        If an element is masked, the number of axes is not `ndim`, or (with `finite`) an element is not finite.
+    A TypeError is raised unless they are real numbers, a ValueError if an element is masked, the number of axes is not
+    `ndim`, or (with `finite`) an element is not finite.
     """
     array = _as_float_array(values, name)
     if ndim is not None and array.ndim != ndim:

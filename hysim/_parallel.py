@@ -53,20 +53,10 @@ def in_chunks(
     minimum: int = 64,
     n_samples: int = 1,
 ) -> None:
-    """Call `work(start, stop)` so that the calls cover `range(n_items)` once.
+    """Call `work(start, stop)` on several threads so that the calls cover `range(n_items)` once.
 
-    Parameters
-    ----------
-    work : callable
-        Computes the items from `start` to `stop - 1`, and writes nothing else.
-    n_items : int
-        Number of items.
-    workers : int, optional
-        Number of threads; by default one for each core.
-    minimum : int
-        Smallest number of items for a thread; for items of many samples it is smaller.
-    n_samples : int
-        Number of samples of an item.
+    A call computes the items from `start` to `stop - 1`. The number of threads is `workers`, by default one for each
+    core; each has at least `minimum` items, or fewer if an item has many samples, `n_samples`.
     """
     _check(workers)
     minimum = max(1, min(minimum, _LONGEST // max(1, n_samples)))

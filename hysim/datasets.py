@@ -21,22 +21,10 @@ SQUARE_WAVE_FREQUENCY = 1.01626
 
 
 def table1(dwell: float = 1.0) -> Record:
-    """Table 1: a staircase of 52 voltages from 0 to 125 V and back, and the displacements at them.
+    """Table 1: a staircase of 52 voltages [V] from 0 to 125 V and back, and the displacements at them [um].
 
-    Parameters
-    ----------
-    dwell : float
-        Time from one sample to the next [s]; the paper prints none.
-
-    Returns
-    -------
-    Record
-        Voltage [V], displacement [um] and time `dwell * k` [s]; the resolution is one camera pixel.
-
-    Raises
-    ------
-    ValueError
-        If the dwell is not positive and finite.
+    Sample k has the time `dwell` times k [s]; a ValueError is raised if the dwell is not positive and finite. The
+    resolution is one camera pixel.
 
     Examples
     --------
@@ -52,12 +40,9 @@ def table1(dwell: float = 1.0) -> Record:
 
 
 def table2() -> Record:
-    """Table 2: 10 samples of a square wave between 18 and 50 V, and the displacements at them.
+    """Table 2: 10 samples of a square wave between 18 and 50 V [V], and the displacements at them [um].
 
-    Returns
-    -------
-    Record
-        Voltage [V], displacement [um] and time [s]: four samples a period of 1.01626 Hz. No resolution is known.
+    There are four samples a period of 1.01626 Hz, with times [s]. No resolution is known.
 
     Examples
     --------

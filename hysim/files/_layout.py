@@ -51,13 +51,7 @@ class Layout(NamedTuple):
 
 
 def layout(text: str, delimiter: str | None, decimal: str | None) -> Layout:
-    """Find the layout of a text with one sample a line.
-
-    Raises
-    ------
-    ValueError
-        If there is no sample, a row is too long or short, or the first line is half a header.
-    """
+    """Detect the layout of a text with one sample a line; ValueError if it has none."""
     every = text.split("\n")
     numbers = [k for k, line in enumerate(every, start=1) if line.strip() and not line.lstrip().startswith(COMMENTS)]
     require(numbers, "the file is empty, there is no header and no sample")
