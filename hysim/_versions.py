@@ -3,7 +3,6 @@
 import importlib
 import platform
 import sys
-from importlib import metadata
 from typing import Any
 
 from hysim._release import __version__
@@ -40,6 +39,8 @@ def optional(library: str, purpose: str, extra: str, error: type[Exception] = Im
 
 
 def _version(name: str) -> str:
+    from importlib import metadata  # which takes as long to import as the front door of hysim
+
     try:
         return metadata.version(name)
     except metadata.PackageNotFoundError:

@@ -16,6 +16,7 @@ from hysim import _atomic, _parallel
 from hysim._atomic import write_all
 from hysim._parallel import in_chunks, map_on_threads, processes, second_process, threads
 from hysim.cli import main
+from hysim.cli.signals import Ended
 
 ON_LINUX = sys.platform.startswith("linux")
 linux = pytest.mark.skipif(not ON_LINUX, reason="processes are found by /proc, and forked on Linux alone")
@@ -319,13 +320,36 @@ sys.modules["hysim.metrics"] = types.SimpleNamespace(loop_metrics=interrupted, c
 """
 
 
-def test_an_interrupt_while_a_module_is_loaded_has_the_same_exit_code(tmp_path):
-    (tmp_path / "sitecustomize.py").write_text(IN_EXEC)  # which Python imports before it runs anything
+BEFORE_MAIN = """
+import signal, sys
+
+class Finder:
+    def find_spec(self, name, *_):
+        if name == "hysim.cli":
+            signal.raise_signal(signal.SIGINT)
+
+sys.meta_path.insert(0, Finder())
+"""
+
+
+@pytest.mark.parametrize("moment", [IN_EXEC, BEFORE_MAIN], ids=["in exec", "before main"])
+def test_an_interrupt_while_modules_are_loaded_has_the_same_exit_code(tmp_path, moment):
+    (tmp_path / "sitecustomize.py").write_text(moment)  # which Python imports before it runs anything
     (tmp_path / "loop.csv").write_text("u,y\n0,0\n1,1\n0,0.1\n")
     path = os.pathsep.join([str(tmp_path), os.path.dirname(os.path.dirname(__file__)), *sys.path])
     command = [sys.executable, "-m", "hysim", "metrics", str(tmp_path / "loop.csv")]
     done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path})
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "hysim: interrupted\n")
+
+
+@pytest.mark.parametrize(("cause", "code"), [(KeyboardInterrupt(), 130), (Ended(signal.SIGTERM), 143), (None, 2)])
+def test_an_interrupted_import_of_a_compiled_module_is_an_interrupt(monkeypatch, tmp_path, capsys, cause, code):
+    def load(*_, **__):
+        raise ImportError("initialization failed") from cause
+
+    monkeypatch.setattr("hysim.cli.records.read", load)
+    assert main(["metrics", str(tmp_path / "loop.csv")]) == code
+    assert capsys.readouterr().err.count("\n") == 1
 
 
 CALLED_BACK = STUCK.replace(
