@@ -46,8 +46,11 @@ _UNITS = {"t": "s", "u": "N", "y": "m"}
 def noel_schoukens_plant() -> BoucWenOscillator:
     """Return the benchmark's oscillator, with the integration step of its data when sampled at 15 kHz.
 
-    It has ``method="newmark"`` and one step a sample: the recipe. For the solution of the equation itself replace the
-    method by `dataclasses.replace`.
+    Returns
+    -------
+    BoucWenOscillator
+        ``method="newmark"`` with one step a sample: the recipe. For the solution of the equation itself
+        take the same with another method, by `dataclasses.replace`.
 
     Examples
     --------

@@ -21,10 +21,22 @@ SQUARE_WAVE_FREQUENCY = 1.01626
 
 
 def table1(dwell: float = 1.0) -> Record:
-    """Table 1: a staircase of 52 voltages [V] from 0 to 125 V and back, and the displacements at them [um].
+    """Table 1: a staircase of 52 voltages from 0 to 125 V and back, and the displacements at them.
 
-    Sample k has the time `dwell` times k [s]; a ValueError is raised if the dwell is not positive and finite. The
-    resolution is one camera pixel.
+    Parameters
+    ----------
+    dwell : float
+        Time from one sample to the next [s]; the paper prints none.
+
+    Returns
+    -------
+    Record
+        Voltage [V], displacement [um] and time `dwell * k` [s]; the resolution is one camera pixel.
+
+    Raises
+    ------
+    ValueError
+        If the dwell is not positive and finite.
 
     Examples
     --------
@@ -40,9 +52,12 @@ def table1(dwell: float = 1.0) -> Record:
 
 
 def table2() -> Record:
-    """Table 2: 10 samples of a square wave between 18 and 50 V [V], and the displacements at them [um].
+    """Table 2: 10 samples of a square wave between 18 and 50 V, and the displacements at them.
 
-    There are four samples a period of 1.01626 Hz, with times [s]. No resolution is known.
+    Returns
+    -------
+    Record
+        Voltage [V], displacement [um] and time [s]: four samples a period of 1.01626 Hz. No resolution is known.
 
     Examples
     --------

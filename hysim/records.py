@@ -127,8 +127,14 @@ class Record:
     def reversals(self, tolerance: float = 0.0) -> npt.NDArray[np.intp]:
         """Samples at which the input turns, the middle one of a plateau; the record's ends are not counted.
 
-        Reversals up to the fraction `tolerance` of the input's span are ignored; it is from 0 to below 0.5, else a
-        ValueError is raised. The result has shape (n_reversals,).
+        Parameters
+        ----------
+        tolerance : float
+            Reversals up to this fraction of the input's span are ignored; a ValueError unless from 0 to below 0.5.
+
+        Returns
+        -------
+        array of int, shape (n_reversals,)
 
         Examples
         --------
@@ -144,8 +150,21 @@ class Record:
         """Branches on which the input rises or falls, in the order of time; none if the input is constant.
 
         A plateau between two branches is divided in its middle; the sample in the very middle, and a reversal without a
+<<<<<<< ours
         plateau, belong to both. Reversals within the `tolerance`, as in `reversals`, do not end a branch; at the ends
         of the record they are left out.
+=======
+        plateau, belong to both.
+
+        Parameters
+        ----------
+        tolerance : float
+            As in `reversals`: smaller reversals do not end a branch, and are left out at the record's ends.
+
+        Returns
+        -------
+        tuple of Record
+>>>>>>> theirs
 
         Examples
         --------
@@ -162,7 +181,16 @@ class Record:
         `hysim.loop_metrics` measures the last one. Cycles are counted from the end and share no branch, so that the
         initial rise of a record is left out. If there are none, as in 0 -> max -> min -> 0 and in growing protocols,
         they are the cycles of full amplitude about a level; `hysim.cycle_metrics` has the smaller ones too: cycle k of
-        its table is ``rec[table.start[k]:table.stop[k]]``. The `tolerance` is that of `reversals`.
+        its table is ``rec[table.start[k]:table.stop[k]]``.
+
+        Parameters
+        ----------
+        tolerance : float
+            As in `reversals`.
+
+        Returns
+        -------
+        tuple of Record
 
         Examples
         --------
@@ -181,9 +209,22 @@ class Record:
     def resample(self, sample_time: float) -> Self:
         """Interpolate the record linearly at even times, from the first time on.
 
-        `sample_time` is the step between two samples [``units["t"]``]. An extreme of the input between two new samples
-        is lost: choose a step well below the time between reversals. A ValueError is raised if the record has no time,
-        or the step is not positive, longer than the record, or gives more than 1e8 samples.
+        An extreme of the input between two new samples is lost: choose a step well below the time between reversals.
+
+        Parameters
+        ----------
+        sample_time : float
+            Time between two samples [``units["t"]``].
+
+        Returns
+        -------
+        Record
+
+        Raises
+        ------
+        ValueError
+            If the record has no time, or the step is not positive, longer than the record, or gives more than 1e8
+            samples.
 
         Examples
         --------
@@ -209,8 +250,21 @@ class Record:
         `scipy.signal.detrend`; its mean over these cycles is kept. A first cycle that follows another curve than the
         others looks like drift: cut it off before.
 
-        `order` is the polynomial's degree, and `tolerance` that of `cycles`. A ValueError is raised if the order is
-        below 1, or there are fewer than ``order + 1`` complete cycles.
+        Parameters
+        ----------
+        order : int
+            Degree of the polynomial.
+        tolerance : float
+            As in `reversals`.
+
+        Returns
+        -------
+        Record
+
+        Raises
+        ------
+        ValueError
+            If the order is below 1, or there are fewer than ``order + 1`` complete cycles.
 
         Examples
         --------
@@ -236,9 +290,21 @@ class Record:
     def split(self, *places: float) -> tuple[Self, ...]:
         """Cut the record in two or more parts without common samples, such as one to identify from and one to test on.
 
-        Each of the increasing `places` is the number of the next part's first sample, or a fraction of the samples
-        between 0 and 1; anything else is a TypeError. A ValueError is raised if there is no place, or a part has fewer
-        than 2 samples.
+        Parameters
+        ----------
+        *places : int or float
+            Increasing places to cut at: the number of the next part's first sample, or a fraction of the samples.
+
+        Returns
+        -------
+        tuple of Record
+
+        Raises
+        ------
+        ValueError
+            If there is no place, or a part has fewer than 2 samples.
+        TypeError
+            If a place is neither an integer nor a fraction between 0 and 1.
 
         Examples
         --------
@@ -257,9 +323,20 @@ class Record:
     def convert(self, units: Mapping[str, str]) -> Self:
         """Convert the record to units that differ from its own by an SI prefix.
 
-        `units` maps ``"t"``, ``"u"`` or ``"y"`` to new units: ``{"y": "nm"}`` for an output in um. Values, and with the
-        output also the resolution, are multiplied by a power of ten. A ValueError is raised if a signal has no unit or
-        no values, or its units differ by more than a prefix.
+        Parameters
+        ----------
+        units : mapping
+            New units of ``"t"``, ``"u"`` or ``"y"``: ``{"y": "nm"}`` for an output in um.
+
+        Returns
+        -------
+        Record
+            Values, and with the output also the resolution, are multiplied by a power of ten.
+
+        Raises
+        ------
+        ValueError
+            If a signal has no unit or no values, or its unit and the new one differ by more than a prefix.
 
         Examples
         --------
@@ -283,8 +360,12 @@ class Record:
 
         It is the greatest step of which all outputs are whole multiples, up to a constant and to a tenth of the step,
         if values without a quantum would hardly fit as well. Values printed with three decimals have at least the step
-        0.001, and evenly spaced ones, such as a noise-free triangle, have a step that is not a resolution. The result
-        is None if there is no step down to 1/65536 of the outputs' span, or there are too few values.
+        0.001, and evenly spaced ones, such as a noise-free triangle, have a step that is not a resolution.
+
+        Returns
+        -------
+        float or None
+            None if there is no step down to 1/65536 of the outputs' span, or there are too few values.
 
         Examples
         --------
@@ -310,7 +391,13 @@ def check_increasing(t: FloatArray) -> None:
 
 
 def even_step(t: FloatArray) -> float:
-    """Constant step of times; ValueError unless they are 2 or more, increase, and have even steps to 1e-6."""
+    """The constant step of increasing times, shape (n_samples,).
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than 2 samples, times do not increase, or steps differ by more than 1e-6 of their mean.
+    """
     if t.size < 2:
         raise ValueError(f"t must hold at least 2 samples, got {t.size}")
     check_increasing(t)

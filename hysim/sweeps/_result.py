@@ -132,10 +132,24 @@ class Sweep:
 
 
 def load_sweep(path: str | Path) -> Sweep:
-    """Read the finished rows in the store of a study that has ended, was interrupted or is still running.
+    """Read the store of a study that is finished, interrupted or still running.
 
-    `path` is the argument `store` of `sweep`. An OSError is raised if it cannot be read, a ValueError if it is not a
-    store.
+    Parameters
+    ----------
+    path : path
+        The argument `store` of `sweep`.
+
+    Returns
+    -------
+    Sweep
+        The rows that are in the store.
+
+    Raises
+    ------
+    OSError
+        If the store cannot be read.
+    ValueError
+        If the file is not a store.
 
     Examples
     --------

@@ -59,8 +59,21 @@ class SobolIndices:
 def sobol_indices(result: Sweep, *, seed: int = 0) -> SobolIndices:
     """Sobol indices of every output of a study of a ``Sample(..., method="saltelli")``.
 
-    `result` has every task of the sample, and `seed` is that of the bootstrap. A ValueError is raised if the sample is
-    another one, a task is missing or failed, or an output is not finite or constant.
+    Parameters
+    ----------
+    result : Sweep
+        Result with every task of the sample.
+    seed : int
+        Seed of the bootstrap.
+
+    Returns
+    -------
+    SobolIndices
+
+    Raises
+    ------
+    ValueError
+        If the sample is another one, a task is missing or failed, or an output is not finite or constant.
 
     Examples
     --------

@@ -291,9 +291,14 @@ class Store:
 
 @contextmanager
 def opened(path: str | Path, *, to_read: bool = False) -> Iterator[Store]:
-    """The store in a file, which is created to be written if it is missing.
+    """The store in a file, which is created if it is missing and to be written.
 
-    An OSError says why it cannot be opened, read or written; a ValueError that it is not a store.
+    Raises
+    ------
+    OSError
+        If it cannot be opened, read or written, with the reason.
+    ValueError
+        If the file is not a store.
     """
     path = Path(path)
     if to_read and not path.is_file():
