@@ -62,13 +62,7 @@ def complete_cycles(u: FloatArray, tolerance: float) -> list[Cycle]:
 
 
 def turns(u: FloatArray, tolerance: float) -> Turns:
-    """The turning points after reversals of more than `tolerance` times the input's span, and the branches.
-
-    Raises
-    ------
-    ValueError
-        If the tolerance is not from 0 to below 0.5.
-    """
+    """The turning points after reversals of more than `tolerance` times the input's span, and the branches."""
     if not 0 <= tolerance < 0.5:
         raise ValueError(f"tolerance is a fraction of the input's span from 0 to below 0.5, got {tolerance}")
     plateaus = _turning_points(u, tolerance * float(np.ptp(u)))
@@ -81,8 +75,8 @@ def settled(u: FloatArray) -> npt.NDArray[np.intp]:
     """The samples of a branch in the order of their inputs; of several with equal inputs the last."""
     order = np.argsort(u, kind="stable")
     x = u[order]
-    kept: npt.NDArray[np.intp] = order[np.append(x[1:] > x[:-1], True)]
-    return kept
+    samples: npt.NDArray[np.intp] = order[np.append(x[1:] > x[:-1], True)]
+    return samples
 
 
 def too_few(u: FloatArray, tolerance: float, wanted: int, present: int) -> str:

@@ -23,16 +23,16 @@ def drift(cycles: list[Cycle], u: FloatArray, y: FloatArray, times: FloatArray, 
     compared = np.column_stack([y, powers])
     rows = []
     for branches in ([cycle.loading for cycle in cycles], [cycle.unloading for cycle in cycles]):
-        kept = [np.arange(u.size)[branch][settled(u[branch])] for branch in branches]
-        low, high = max(u[samples[0]] for samples in kept), min(u[samples[-1]] for samples in kept)
+        passages = [np.arange(u.size)[branch][settled(u[branch])] for branch in branches]
+        low, high = max(u[samples[0]] for samples in passages), min(u[samples[-1]] for samples in passages)
         nodes = np.linspace(low, high, _NODES)
-        passed = np.array([_at(nodes, u[samples], compared[samples]) for samples in kept])
-        rows.append((passed - passed.mean(axis=0)).reshape(-1, compared.shape[1]))
+        values = np.array([_at(nodes, u[samples], compared[samples]) for samples in passages])
+        rows.append((values - values.mean(axis=0)).reshape(-1, compared.shape[1]))
     differences = np.concatenate(rows)
     coefficients = np.linalg.lstsq(differences[:, 1:], differences[:, 0])[0]
     inside = np.unique(np.concatenate([np.arange(u.size)[cycle.path] for cycle in cycles]))
-    values: FloatArray = (powers - powers[inside].mean(axis=0)) @ coefficients
-    return values
+    polynomial: FloatArray = (powers - powers[inside].mean(axis=0)) @ coefficients
+    return polynomial
 
 
 def _at(nodes: FloatArray, u: FloatArray, columns: FloatArray) -> FloatArray:

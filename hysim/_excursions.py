@@ -76,14 +76,9 @@ class _Excursion(NamedTuple):
 
 
 def measured_cycles(u: FloatArray, cycles: int, tolerance: float) -> Loops:
-    """The last complete cycles between the record's extremes, or else the last of full amplitude about a level.
+    """The last complete cycles between the record's extremes, or else of full amplitude about a level, latest first.
 
-    They are sorted from the latest to the earliest.
-
-    Raises
-    ------
-    ValueError
-        If the record has fewer of both kinds, the number is below 1, or the tolerance is not from 0 to below 0.5.
+    A ValueError is raised if the record has too few of both kinds, or an argument is out of its range.
     """
     if cycles < 1:
         raise ValueError(f"cycles must be at least 1, got {cycles}")

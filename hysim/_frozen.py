@@ -9,7 +9,7 @@ import functools
 import math
 import sys
 import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, TypeVar, dataclass_transform
 
@@ -53,12 +53,8 @@ def read_only(
 ) -> FloatArray:
     """Return a read-only contiguous float64 copy of `values`.
 
-    Raises
-    ------
-    TypeError
-        If the values are not real numbers.
-    ValueError
-        If an element is masked, the number of axes is not `ndim`, or (with `finite`) an element is not finite.
+    A TypeError is raised unless they are real numbers, a ValueError if an element is masked, the number of axes is not
+    `ndim`, or (with `finite`) an element is not finite.
     """
     array = _as_float_array(values, name)
     if ndim is not None and array.ndim != ndim:
@@ -73,6 +69,29 @@ def read_only(
         raise ValueError(f"{name} must be finite, got {array[place]} at index {index}")
     array.setflags(write=False)
     return array
+
+
+def vectors(**values: npt.ArrayLike) -> list[FloatArray]:
+    """Return read-only copies of vectors of equal lengths; other errors are those of `read_only`."""
+    arrays = {name: read_only(each, name, ndim=1) for name, each in values.items()}
+    first, *others = arrays
+    for name in others:
+        if arrays[name].size != arrays[first].size:
+            sizes = f"{arrays[first].size} and {arrays[name].size}"
+            raise ValueError(f"{first} and {name} must have equal lengths, got {sizes}")
+    return [*arrays.values()]
+
+
+def check_choice(name: str, value: object, choices: Iterable[object]) -> None:
+    """Raise a ValueError if the argument of this name is not one of the choices."""
+    if value not in (known := tuple(choices)):
+        raise ValueError(f"{name} must be one of {', '.join(map(str, known))}, got {value!r}")
+
+
+def check_count(name: str, value: object) -> None:
+    """Raise a ValueError if the argument of this name is not an integer of at least 1."""
+    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+        raise ValueError(f"{name} must be an integer of at least 1, got {value!r}")
 
 
 def _as_float_array(values: npt.ArrayLike, name: str) -> FloatArray:

@@ -24,6 +24,8 @@ from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
 from typing import Any, TypeVar
 
+from hysim._frozen import check_count
+
 T = TypeVar("T")
 
 _LONGEST = 2_000_000  # samples to begin with, which take some tenths of a second
@@ -51,20 +53,10 @@ def in_chunks(
     minimum: int = 64,
     n_samples: int = 1,
 ) -> None:
-    """Call `work(start, stop)` so that the calls cover `range(n_items)` once.
+    """Call `work(start, stop)` on several threads so that the calls cover `range(n_items)` once.
 
-    Parameters
-    ----------
-    work : callable
-        Computes the items from `start` to `stop - 1`, and writes nothing else.
-    n_items : int
-        Number of items.
-    workers : int, optional
-        Number of threads; by default one for each core.
-    minimum : int
-        Smallest number of items for a thread; for items of many samples it is smaller.
-    n_samples : int
-        Number of samples of an item.
+    A call computes the items from `start` to `stop - 1`. The number of threads is `workers`, by default one for each
+    core; each has at least `minimum` items, or fewer if an item has many samples, `n_samples`.
     """
     _check(workers)
     minimum = max(1, min(minimum, _LONGEST // max(1, n_samples)))
@@ -140,8 +132,8 @@ def at_most(workers: int | None) -> Iterator[None]:
 
 
 def _check(workers: int | None) -> None:
-    if workers is not None and (not isinstance(workers, int) or workers < 1):
-        raise ValueError(f"workers must be an integer of at least 1, got {workers}")
+    if workers is not None:
+        check_count("workers", workers)
 
 
 def awaited(future: Future[T]) -> T:
@@ -280,11 +272,11 @@ def _without_signals() -> Iterator[None]:
     if sys.platform == "win32":
         yield
         return
-    held = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, held)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _begin(begin: Callable[..., None], arguments: tuple[Any, ...]) -> None:

@@ -3,9 +3,11 @@
 The text is the ``__str__`` of a result, its first line the ``repr``; notebooks show all of it. No array is listed.
 """
 
+import csv
+import io
 import math
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -50,19 +52,34 @@ def wrapped(parts: Iterable[str], *, most: int = 3, first: str = "  ") -> str:
     for number in range(len(unbroken), 0, -1):
         more = len(unbroken) - number
         text = ", ".join(unbroken[:number]) + (f", and\0{more}\0more" if more else "")
-        lines = textwrap.wrap(text, LETTERS, initial_indent=first, subsequent_indent=indent, break_on_hyphens=False)
+        lines = folded(text, first=first, indent=indent)
         if len(lines) <= most:
             return "\n".join(lines).replace("\0", " ")
     return ""
 
 
-def aligned(table: Sequence[Sequence[str]]) -> list[str]:
+def aligned(table: Sequence[Sequence[str]], first: Callable[[str, int], str] = str.ljust) -> list[str]:
     """Lines of cells; the first column is aligned to the left, the others to the right."""
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    return [
-        "  ".join([cells[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(cells[1:], widths[1:], strict=True))])
-        for cells in table
-    ]
+    return ["  ".join([first(row[0], widths[0]), *map(str.rjust, row[1:], widths[1:])]) for row in table]
+
+
+def folded(text: str, width: int = LETTERS, first: str = "", indent: str = "") -> list[str]:
+    """Lines of at most so many letters; words with hyphens stay whole."""
+    return textwrap.wrap(text, width, initial_indent=first, subsequent_indent=indent, break_on_hyphens=False)
+
+
+def csv_text(rows: Iterable[Iterable[Any]], *, delimiter: str = ",", nan: str = "") -> str:
+    """Rows as comma-separated values; floats with all digits, None as an empty cell."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, delimiter=delimiter, lineterminator="\n")
+    writer.writerows([nan if value != value else value for value in row] for row in rows)
+    return buffer.getvalue()
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names in a sentence: a, b and c."""
+    return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else "".join(names)
 
 
 def quantity(value: float, unit: str = "") -> str:

@@ -1,8 +1,9 @@
-"""Versions of hysim and its dependencies, for bug reports."""
+"""The libraries that hysim uses: their versions, for bug reports, and those that are optional."""
 
+import importlib
 import platform
 import sys
-from importlib import metadata
+from typing import Any
 
 from hysim._release import __version__
 
@@ -29,7 +30,17 @@ def show_versions() -> None:
     print("\n".join(f"{name:<{width}}  {version}" for name, version in versions.items()))
 
 
+def optional(library: str, purpose: str, extra: str, error: type[Exception] = ImportError) -> Any:
+    """Import a library of an extra; without it, raise an error that says what to install."""
+    try:
+        return importlib.import_module(library)
+    except ImportError:
+        raise error(f"{purpose} needs {library.partition('.')[0]}: pip install 'hysim[{extra}]'") from None
+
+
 def _version(name: str) -> str:
+    from importlib import metadata  # which takes as long to import as the front door of hysim
+
     try:
         return metadata.version(name)
     except metadata.PackageNotFoundError:

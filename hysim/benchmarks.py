@@ -129,10 +129,10 @@ def noel_schoukens(
     y = noel_schoukens_plant().response(force, 1.0 / (SAMPLE_RATE * _OVERSAMPLING))
     if noise > 0.0:
         y += noise * _band_limited_noise(y.size, disturbances)
-    kept = slice(lead, lead + n_samples)
+    part = slice(lead, lead + n_samples)
     return Record(
-        u=force[::_OVERSAMPLING][kept],
-        y=decimated(y, _STAGES[kind])[kept],
+        u=force[::_OVERSAMPLING][part],
+        y=decimated(y, _STAGES[kind])[part],
         t=np.arange(n_samples) / SAMPLE_RATE,
         units=_UNITS,
         name=f"Noel-Schoukens {kind}",

@@ -69,20 +69,23 @@ class Record:
     name: str = ""
 
     def __post_init__(self) -> None:
-        for name, values in (("u", self.u), ("y", self.y), ("t", self.t)):
-            if values is not None and values.ndim != 1:
+        for name, values in self._signals().items():
+            if values.ndim != 1:
                 raise ValueError(f"{name} must have one axis, got shape {values.shape}")
+            if values.size != self.u.size:
+                raise ValueError(f"u and {name} must have equal lengths, got {self.u.size} and {values.size}")
         if self.u.size < 2:
             raise ValueError(f"a record needs at least 2 samples, got {self.u.size}")
-        for name, values in (("y", self.y), ("t", self.t)):
-            if values is not None and values.size != self.u.size:
-                raise ValueError(f"u and {name} must have equal lengths, got {self.u.size} and {values.size}")
         if self.t is not None:
             check_increasing(self.t)
         if unknown := set(self.units) - {"t", "u", "y"}:
             raise ValueError(f'units are labels of "t", "u" and "y", got {sorted(unknown)}')
         if self.resolution is not None and self.resolution <= 0:
             raise ValueError(f"resolution must be positive, got {self.resolution}")
+
+    def _signals(self) -> dict[str, FloatArray]:
+        """The arrays by name, without the time if there is none."""
+        return {"u": self.u, "y": self.y} | ({} if self.t is None else {"t": self.t})
 
     def __str__(self) -> str:
         t, u, y = (self.units.get(signal, "") for signal in ("t", "u", "y"))
@@ -111,39 +114,27 @@ class Record:
     def __getitem__(self, samples: slice) -> Self:
         if not isinstance(samples, slice):
             raise TypeError(f"a record is cut by a slice, got {samples!r}; take single values from its arrays")
-        return type(self)(
-            u=self.u[samples],
-            y=self.y[samples],
-            t=None if self.t is None else self.t[samples],
-            units=self.units,
-            resolution=self.resolution,
-            name=self.name,
-        )
+        cut: dict[str, Any] = {name: values[samples] for name, values in self._signals().items()}
+        return dataclasses.replace(self, **cut)
 
     @property
     def sample_time(self) -> float:
-        """The constant step of the time [``units["t"]``]; ValueError without a time or with an uneven one."""
+        """Constant step of the time [``units["t"]``]; ValueError if the record has no time, or uneven steps."""
         if self.t is None:
             raise ValueError("the record has no time: give t, or use a rate-independent law")
         return even_step(self.t)
 
     def reversals(self, tolerance: float = 0.0) -> npt.NDArray[np.intp]:
-        """Samples at which the input turns, of a plateau the middle one; the record's ends are not counted.
+        """Samples at which the input turns, the middle one of a plateau; the record's ends are not counted.
 
         Parameters
         ----------
         tolerance : float
-            Reversals up to this fraction of the input's span are ignored, from 0 to below 0.5.
+            Reversals up to this fraction of the input's span are ignored; a ValueError unless from 0 to below 0.5.
 
         Returns
         -------
         array of int, shape (n_reversals,)
-            Increasing numbers of samples.
-
-        Raises
-        ------
-        ValueError
-            If the tolerance is not from 0 to below 0.5.
 
         Examples
         --------
@@ -156,25 +147,24 @@ class Record:
         return np.array(middles, dtype=np.intp)
 
     def branches(self, tolerance: float = 0.0) -> tuple[Self, ...]:
-        """The branches on which the input rises or falls, in the order of time.
+        """Branches on which the input rises or falls, in the order of time; none if the input is constant.
 
-        A plateau between two branches is divided in its middle; a middle sample, and a reversal without a plateau,
-        belongs to both. A constant input has no branch.
+        A plateau between two branches is divided in its middle; the sample in the very middle, and a reversal without a
+<<<<<<< ours
+        plateau, belong to both. Reversals within the `tolerance`, as in `reversals`, do not end a branch; at the ends
+        of the record they are left out.
+=======
+        plateau, belong to both.
 
         Parameters
         ----------
         tolerance : float
-            Reversals up to this fraction of the input's span do not end a branch; such ones at the record's ends
-            are left out.
+            As in `reversals`: smaller reversals do not end a branch, and are left out at the record's ends.
 
         Returns
         -------
         tuple of Record
-
-        Raises
-        ------
-        ValueError
-            If the tolerance is not from 0 to below 0.5.
+>>>>>>> theirs
 
         Examples
         --------
@@ -185,30 +175,22 @@ class Record:
         return tuple(self[samples] for samples in turns(self.u, tolerance).branches)
 
     def cycles(self, tolerance: float = TOLERANCE) -> tuple[Self, ...]:
-        """The complete cycles of the input, in the order of time.
+        """Complete cycles of the input, in the order of time; none if there is no complete cycle.
 
         A cycle goes from one extreme of the record to the other and back, each within 5 % of the input's span;
-        `hysim.loop_metrics` measures the last one. Cycles are counted from the end and share no branch, which leaves
-        out the initial rise of a record.
-
-        A record without such cycles, as 0 -> max -> min -> 0 or a growing protocol, is divided into its cycles of full
-        amplitude about a level, each with the fewest samples that contain it. The smaller cycles of a growing protocol
-        are in ``hysim.cycle_metrics(rec.u, rec.y)``: cycle k is ``rec[table.start[k]:table.stop[k]]``.
+        `hysim.loop_metrics` measures the last one. Cycles are counted from the end and share no branch, so that the
+        initial rise of a record is left out. If there are none, as in 0 -> max -> min -> 0 and in growing protocols,
+        they are the cycles of full amplitude about a level; `hysim.cycle_metrics` has the smaller ones too: cycle k of
+        its table is ``rec[table.start[k]:table.stop[k]]``.
 
         Parameters
         ----------
         tolerance : float
-            Reversals up to this fraction of the input's span are ignored.
+            As in `reversals`.
 
         Returns
         -------
         tuple of Record
-            Empty if there is no complete cycle.
-
-        Raises
-        ------
-        ValueError
-            If the tolerance is not from 0 to below 0.5.
 
         Examples
         --------
@@ -225,10 +207,9 @@ class Record:
         return tuple(self[about_level.slices[k]] for k in full_amplitude(self.u, about_level))
 
     def resample(self, sample_time: float) -> Self:
-        """The record at even times, with input and output linear between their samples.
+        """Interpolate the record linearly at even times, from the first time on.
 
-        The times begin with the first one and end with the last whole step. An extreme of the input between two new
-        samples is lost, and with it its effect on a memory: choose a step well below the time between reversals.
+        An extreme of the input between two new samples is lost: choose a step well below the time between reversals.
 
         Parameters
         ----------
@@ -262,12 +243,11 @@ class Record:
         return dataclasses.replace(self, t=t, u=u, y=y)
 
     def detrend(self, order: int = 1, *, tolerance: float = TOLERANCE) -> Self:
-        """The record without the drift of its output, and with an unchanged loop.
+        """Remove the drift of the output, and leave the loop as it is.
 
-        The model of the output is a loop that repeats itself in every cycle plus a polynomial of the time, or of the
-        sample's number. The polynomial is fitted to the differences between complete cycles at equal inputs of the
-        same branch, so that the loop's slope and width have no influence, unlike in `scipy.signal.detrend`. The
-        polynomial less its mean over the complete cycles is subtracted. A first cycle on another curve than the
+        A polynomial of the time, or of the sample's number, is fitted to the differences between complete cycles at
+        equal inputs of the same branch, so that the loop's slope and width have no influence, unlike in
+        `scipy.signal.detrend`; its mean over these cycles is kept. A first cycle that follows another curve than the
         others looks like drift: cut it off before.
 
         Parameters
@@ -275,7 +255,7 @@ class Record:
         order : int
             Degree of the polynomial.
         tolerance : float
-            Reversals up to this fraction of the input's span are ignored in the search for cycles.
+            As in `reversals`.
 
         Returns
         -------
@@ -308,25 +288,23 @@ class Record:
         return dataclasses.replace(self, y=self.y - drift(cycles, self.u, self.y, times, order))
 
     def split(self, *places: float) -> tuple[Self, ...]:
-        """The record cut in two or more parts, such as one to identify from and one to test on.
+        """Cut the record in two or more parts without common samples, such as one to identify from and one to test on.
 
         Parameters
         ----------
         *places : int or float
-            Increasing places to cut at: an integer is the number of the next part's first sample, a float between 0
-            and 1 a fraction of the samples.
+            Increasing places to cut at: the number of the next part's first sample, or a fraction of the samples.
 
         Returns
         -------
         tuple of Record
-            Parts that share no sample. A law needs an initial memory for each of them.
 
         Raises
         ------
         ValueError
             If there is no place, or a part has fewer than 2 samples.
         TypeError
-            If a place is not a number.
+            If a place is neither an integer nor a fraction between 0 and 1.
 
         Examples
         --------
@@ -343,7 +321,7 @@ class Record:
         return tuple(self[start:stop] for start, stop in pairwise(cuts))
 
     def convert(self, units: Mapping[str, str]) -> Self:
-        """The record in other units, which differ from its own by an SI prefix.
+        """Convert the record to units that differ from its own by an SI prefix.
 
         Parameters
         ----------
@@ -367,35 +345,27 @@ class Record:
         >>> rec.convert({"y": "nm"}).y.tolist(), rec.convert({"y": "nm"}).resolution
         ([0.0, 79.0], 1.0)
         """
-        changed = self
+        signals, changes = self._signals(), dict[str, Any](units={**self.units, **units})
         for signal, unit in units.items():
-            values: Any = {"t": changed.t, "u": changed.u, "y": changed.y}.get(signal)
-            if values is None or signal not in changed.units:
+            if signal not in signals or signal not in self.units:
                 raise ValueError(f"the record has no {signal!r} with a unit to convert: give it units first")
-            power = power_of_ten(changed.units[signal], unit)
-            resolution = changed.resolution
-            if signal == "y" and resolution is not None:
-                resolution = _scaled(resolution, power)
-            changed = dataclasses.replace(
-                changed,
-                **{signal: _scaled(values, power)},
-                units={**changed.units, signal: unit},
-                resolution=resolution,
-            )
-        return changed
+            power = power_of_ten(self.units[signal], unit)
+            changes[signal] = _scaled(signals[signal], power)
+            if signal == "y" and self.resolution is not None:
+                changes["resolution"] = _scaled(self.resolution, power)
+        return dataclasses.replace(self, **changes)
 
     def detect_resolution(self) -> float | None:
-        """The quantum of the output, estimated from its values [unit of y].
+        """Estimate the quantum of the output from its values [unit of y].
 
-        It is the greatest step of which all outputs are whole multiples, up to a constant and to a tenth of the step
-        (rounding, an uneven sensor), if values without a quantum would hardly fit as well. Values printed with three
-        decimals have at least the step 0.001. Evenly spaced values without a sensor, such as a noise-free triangle,
-        have a step too: decide whether it is a resolution.
+        It is the greatest step of which all outputs are whole multiples, up to a constant and to a tenth of the step,
+        if values without a quantum would hardly fit as well. Values printed with three decimals have at least the step
+        0.001, and evenly spaced ones, such as a noise-free triangle, have a step that is not a resolution.
 
         Returns
         -------
         float or None
-            None if there is no step down to 1/65536 of the outputs' span, or too few values to detect one.
+            None if there is no step down to 1/65536 of the outputs' span, or there are too few values.
 
         Examples
         --------

@@ -6,9 +6,9 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, frozen, read_only
+from hysim._frozen import FloatArray, frozen, vectors
 from hysim._printing import extent, printed, summary_text
-from hysim.models.protocols import needs_time
+from hysim.models.protocols import Remembering, Responding, needs_time
 from hysim.records import check_increasing, even_step
 
 
@@ -39,26 +39,16 @@ class Simulation:
     units: Mapping[str, str] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        known = {"t": self.t, "u": self.u, "y": self.y, "z": self.z, **self.signals}
+        arrays = {"t": self.t, "u": self.u, "y": self.y, "z": self.z, **self.signals}
         return summary_text(
             [f"Simulation: {self.u.size} samples"],
-            {name: extent(values, self.units.get(name, "")) for name, values in known.items() if values is not None},
+            {name: extent(values, self.units.get(name, "")) for name, values in arrays.items() if values is not None},
         )
-
-
-@runtime_checkable
-class _HasResponse(Protocol):
-    def response(self, u: FloatArray, /, *time: float) -> FloatArray: ...
 
 
 @runtime_checkable
 class _HasSignals(Protocol):
     def signals(self, u: FloatArray, /, *time: float) -> Mapping[str, FloatArray]: ...
-
-
-@runtime_checkable
-class _HasMemory(Protocol):
-    def memory(self, u: FloatArray, /) -> FloatArray: ...
 
 
 def simulate(
@@ -98,16 +88,14 @@ def simulate(
     >>> sim.y.round(6).tolist()
     [0.0, 0.632121, -0.307799]
     """
-    if not isinstance(plant, _HasResponse):
+    if not isinstance(plant, Responding):
         raise TypeError(f"simulate takes a model with a response, got {type(plant).__name__}")
-    inputs = read_only(u, "u", ndim=1)
-    times = None if t is None else read_only(t, "t", ndim=1)
+    inputs, *clock = vectors(u=u) if t is None else vectors(u=u, t=t)
+    times = clock[0] if clock else None
     if times is not None:
-        if times.size != inputs.size:
-            raise ValueError(f"u and t must have equal lengths, got {inputs.size} and {times.size}")
         check_increasing(times)
     signals = _signals(plant, inputs, times)
-    memory = plant.memory(inputs) if "z" not in signals and isinstance(plant, _HasMemory) else signals.get("z")
+    memory = plant.memory(inputs) if "z" not in signals and isinstance(plant, Remembering) else signals.get("z")
     every = {"t": times, "u": inputs, "z": memory, **signals}
     return Simulation(
         u=inputs,
@@ -119,7 +107,7 @@ def simulate(
     )
 
 
-def _signals(plant: _HasResponse, u: FloatArray, times: FloatArray | None) -> Mapping[str, FloatArray]:
+def _signals(plant: Responding, u: FloatArray, times: FloatArray | None) -> Mapping[str, FloatArray]:
     """The plant's own signals, at least its output."""
     time: tuple[float, ...] = ()
     if needs_time(plant):

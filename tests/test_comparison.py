@@ -426,7 +426,7 @@ def test_a_frame_holds_the_columns_of_the_csv(quick, monkeypatch):
 
 def test_a_missing_pandas_is_named_with_the_extra_that_brings_it(quick, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(ImportError, match="extra 'tables'"):
+    with pytest.raises(ImportError, match=r"needs pandas: pip install 'hysim\[tables\]'"):
         quick.to_frame()
 
 

@@ -16,6 +16,7 @@ from hysim import _atomic, _parallel
 from hysim._atomic import write_all
 from hysim._parallel import in_chunks, map_on_threads, processes, second_process, threads
 from hysim.cli import main
+from hysim.cli.signals import Ended
 
 ON_LINUX = sys.platform.startswith("linux")
 linux = pytest.mark.skipif(not ON_LINUX, reason="processes are found by /proc, and forked on Linux alone")
@@ -307,6 +308,74 @@ def stuck(*_, **__):
 sys.modules["hysim.metrics"] = __import__("types").SimpleNamespace(loop_metrics=stuck, cycle_metrics=stuck)
 sys.exit(main(["metrics", sys.argv[1]]))
 """
+
+
+IN_EXEC = """
+import signal, sys, types
+
+def interrupted(*_, **__):
+    exec("signal.raise_signal(signal.SIGINT)", {"signal": signal})
+
+sys.modules["hysim.metrics"] = types.SimpleNamespace(loop_metrics=interrupted, cycle_metrics=interrupted)
+"""
+
+
+BEFORE_MAIN = """
+import signal, sys
+
+class Finder:
+    def find_spec(self, name, *_):
+        if name == "hysim.cli":
+            signal.raise_signal(signal.SIGINT)
+
+sys.meta_path.insert(0, Finder())
+"""
+
+
+@pytest.mark.parametrize("moment", [IN_EXEC, BEFORE_MAIN], ids=["in exec", "before main"])
+def test_an_interrupt_while_modules_are_loaded_has_the_same_exit_code(tmp_path, moment):
+    (tmp_path / "sitecustomize.py").write_text(moment)  # which Python imports before it runs anything
+    (tmp_path / "loop.csv").write_text("u,y\n0,0\n1,1\n0,0.1\n")
+    path = os.pathsep.join([str(tmp_path), os.path.dirname(os.path.dirname(__file__)), *sys.path])
+    command = [sys.executable, "-m", "hysim", "metrics", str(tmp_path / "loop.csv")]
+    done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path})
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "hysim: interrupted\n")
+
+
+@pytest.mark.parametrize(("cause", "code"), [(KeyboardInterrupt(), 130), (Ended(signal.SIGTERM), 143), (None, 2)])
+def test_an_interrupted_import_of_a_compiled_module_is_an_interrupt(monkeypatch, tmp_path, capsys, cause, code):
+    def load(*_, **__):
+        raise ImportError("initialization failed") from cause
+
+    monkeypatch.setattr("hysim.cli.records.read", load)
+    assert main(["metrics", str(tmp_path / "loop.csv")]) == code
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+CALLED_BACK = STUCK.replace(
+    "def stuck",
+    """
+import ctypes
+
+@ctypes.CFUNCTYPE(None)
+def called_back():  # as numba compiles; Python prints what is raised here, and goes on
+    print("at work", flush=True)
+    time.sleep(600)
+
+def stuck""",
+).replace('print("at work", flush=True)\n        time', "called_back()\n        time")
+
+
+@linux
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_in_a_callback_of_a_compiled_library_is_one_line_too(started, tmp_path, number):
+    (tmp_path / "loop.csv").write_text("u,y\n0,0\n1,1\n0,0.1\n")
+    child = started("-c", CALLED_BACK, tmp_path / "loop.csv")
+    assert child.stdout.readline() == "at work\n"
+    _, err, seconds = ended(child, number)
+    said = "interrupted" if number == signal.SIGINT else "ended by SIGTERM"
+    assert (child.returncode, err) == (128 + number, f"hysim: {said}\n")
+    assert seconds < PROMISED + BUSY
 
 
 @linux

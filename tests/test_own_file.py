@@ -8,6 +8,7 @@ import sys
 import xml.etree.ElementTree as ET
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -252,10 +253,17 @@ def test_progress_is_shown_on_a_terminal_only(monkeypatch):
     monkeypatch.setattr("sys.stderr", io.StringIO())
     assert outputs.progress() is None
     monkeypatch.setattr("sys.stderr", terminal := Terminal())
+    times = iter([0.0, 0.5, 1.0, 2.0])
+    monkeypatch.setattr("hysim.cli.outputs.time", SimpleNamespace(monotonic=lambda: next(times)))
     show = outputs.progress()
-    show(1, 2)
-    show(2, 2)
-    assert terminal.getvalue() == "\r1/2\r2/2\n"
+    show(1, 4)
+    show(2, 4)
+    show(4, 4)
+    first, second, third = terminal.getvalue().split("\r\x1b[K")[1:]
+    assert (first, second, third) == ("1/4", "2/4, 2 a second, 0:00:01 left", "4/4, 3 a second, 0:00:00 left\n")
+    count = outputs.progress()
+    count(7, 0)  # of an unknown total
+    assert terminal.getvalue().endswith("7")
 
 
 CORPUS = {

@@ -57,16 +57,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 return _run(sys.argv[1:] if arguments is None else list(arguments))
         finally:
             print(end="", flush=True)
-    except KeyboardInterrupt:
-        return _failed(signals.INTERRUPTED, signals.message(signal.SIGINT))
-    except signals.Ended as request:
-        return _failed(128 + request.number, signals.message(request.number))
+    except (KeyboardInterrupt, signals.Ended) as request:
+        return _ended(request)
     except BrokenPipeError:  # the reader of the output has closed it
         return _discard(DONE)
     except MemoryError:
         return _failed(BAD_INPUT, "error: there is not enough memory for this")
     except (ValueError, TypeError, OSError, ImportError, SimulationError) as error:
+        cause: BaseException | None = error  # an interrupted import of a compiled module is an ImportError
+        while cause is not None:
+            if isinstance(cause, (KeyboardInterrupt, signals.Ended)):
+                return _ended(cause)
+            cause = cause.__cause__ or cause.__context__
         return _failed(BAD_INPUT, f"error: {_line(error)}")
+
+
+def _ended(request: "KeyboardInterrupt | signals.Ended") -> int:
+    number = request.number if isinstance(request, signals.Ended) else signal.SIGINT
+    return _failed(128 + number, signals.message(number))
 
 
 def parsers(only: str | None = None) -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParser]]:

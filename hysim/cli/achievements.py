@@ -1,14 +1,13 @@
 """Results of a controller's design, as `hysim control` prints, writes and draws them."""
 
 import math
-import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, is_dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hysim._printing import LETTERS, extent, quantity
+from hysim._printing import extent, folded, quantity
 from hysim.cli import outputs
 from hysim.cli.designs import CYCLES, Task
 from hysim.control import HysteresisAssessment, StepAssessment, Tuning
@@ -72,11 +71,7 @@ def document(design: Design) -> dict[str, Any]:
 def text(design: Design) -> str:
     """All results, in words."""
     lines = [*_head(design), *_triangle(design), *_step(design), *_conditions(design)]
-    return "\n".join(
-        part
-        for line in lines
-        for part in textwrap.wrap(line, LETTERS, subsequent_indent=12 * " ", break_on_hyphens=False)
-    )
+    return "\n".join(part for line in lines for part in folded(line, indent=12 * " "))
 
 
 def _head(design: Design) -> Iterator[str]:
@@ -126,13 +121,15 @@ def _row(name: str, value: str) -> str:
 
 def _conditions(design: Design) -> Iterator[str]:
     """The conditions of all results, with the model as the plant."""
-    known, u, y = design.triangle.closed.conditions, design.units.get("u", ""), design.units.get("y", "")
-    limits = "none" if known["limits"] is None else extent(known["limits"], u)
-    times = ", ".join(f"{name.replace('_', ' ')} {known[name]:.4g} s" for name in ("sample_time", "delay", "preview"))
-    noise = f"sensor noise {quantity(known['noise'], y)} rms (seed {known['seed']})"
+    conditions, u, y = design.triangle.closed.conditions, design.units.get("u", ""), design.units.get("y", "")
+    limits = "none" if conditions["limits"] is None else extent(conditions["limits"], u)
+    times = ", ".join(
+        f"{name.replace('_', ' ')} {conditions[name]:.4g} s" for name in ("sample_time", "delay", "preview")
+    )
+    noise = f"sensor noise {quantity(conditions['noise'], y)} rms (seed {conditions['seed']})"
     yield "conditions  simulated, with the model as the plant"
     yield f"            {times}, limits {limits}"
-    yield f"            {noise}, quantum {quantity(known['sensor_quantum'], y)}"
+    yield f"            {noise}, quantum {quantity(conditions['sensor_quantum'], y)}"
     for name, closed in (("triangle", design.triangle.closed), ("step", design.step.closed)):
         limited = f"limited at {closed.conditions['limited_samples']} of {closed.t.size} samples"
         rms = quantity(closed.conditions["voltage_noise_rms"], u)

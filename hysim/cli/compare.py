@@ -48,7 +48,7 @@ def _subjects(name: str) -> dict[str, Any]:
     """Subjects of the comparison for a family's name, a file or an import path."""
     from hysim.models.candidates import candidates
 
-    model = models.chosen(name)
+    model = models.model_or_family(name)
     if name.endswith(".json") or models.is_import_path(name):
         return {models.name_of(name): model}
     family = model.__name__

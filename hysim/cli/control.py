@@ -63,12 +63,12 @@ def _designed(options: argparse.Namespace) -> "Design":
     task = designs.task(actuator, options, limits)
     template = designs.feedback(actuator, options.controller, limits)
 
-    def controller(feedback: Any) -> Any:
+    def with_feedback(feedback: Any) -> Any:
         return designs.controller(actuator, options.controller, limits, feedback, preview=options.preview)
 
-    chosen = controller(template or PID(kp=1.0, limits=limits))
+    controller = with_feedback(template or PID(kp=1.0, limits=limits))
     if options.c:
-        _c_code(options, chosen)  # a controller that cannot be exported is an error before the search
+        _c_code(options, controller)  # a controller that cannot be exported is an error before the search
     reference = designs.reference(task, designs.rest(actuator, task.u0), options.reference)
     tuning = None
     if options.controller != "inverse":
@@ -78,18 +78,18 @@ def _designed(options: argparse.Namespace) -> "Design":
             variations=designs.variations(actuator, options.vary_mode), transient=reference.transient,
             u0=task.u0 if options.reference == "step" else 0.0,
         )  # fmt: skip
-        chosen = controller(tuning.controller)
+        controller = with_feedback(tuning.controller)
     h = task.sample_time
     return Design(
         actuator=actuator,
-        controller=chosen,
+        controller=controller,
         tuning=tuning,
         task=task,
         triangle=assess_hysteresis(
-            actuator, chosen, low=task.low, high=task.high, period=task.period, sample_time=h, cycles=designs.CYCLES
+            actuator, controller, low=task.low, high=task.high, period=task.period, sample_time=h, cycles=designs.CYCLES
         ),
-        step=assess_step(actuator, chosen, step=task.step, duration=task.duration, sample_time=h, u0=task.u0),
-        file_rms=designs.file_rms(actuator, chosen, reference, options.reference),
+        step=assess_step(actuator, controller, step=task.step, duration=task.duration, sample_time=h, u0=task.u0),
+        file_rms=designs.file_rms(actuator, controller, reference, options.reference),
         fit_percent=designs.fit_percent(model, record),
         units={**units, **({} if record is None else record.units)},
     )

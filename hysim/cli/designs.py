@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 
 from hysim import metrics, signals
 from hysim._frozen import FloatArray, read_only
+from hysim.cli.options import positive
 from hysim.control import (
     PID,
     InverseFeedforward,
@@ -105,15 +106,15 @@ def limits(options: argparse.Namespace, record: Record | None) -> Pair | None:
 
 def task(actuator: Actuator, options: argparse.Namespace, within: Pair | None) -> Task:
     """The task of the loop; a ValueError if no option limits the range, or a number is outside its bounds."""
-    h = _positive("--sample-time", options.sample_time)
+    h = positive("--sample-time", options.sample_time)
     low, high = options.range or _reach(actuator, within)
     if not low < high:
         raise ValueError(f"the range must be LOW,HIGH with LOW below HIGH, got {low:g},{high:g}")
     frequency = min(1.0 / (_SAMPLES * h), _slow(actuator)) if options.frequency is None else options.frequency
-    half = max(1, round(0.5 / (_positive("--frequency", frequency) * h)))
+    half = max(1, round(0.5 / (positive("--frequency", frequency) * h)))
     rests = max(_SAMPLES * h, _AT_REST / _slowest_decay(actuator))
     duration = rests if options.duration is None else options.duration
-    longest = max(CYCLES * 2 * half, _positive("--duration", duration) / h)
+    longest = max(CYCLES * 2 * half, positive("--duration", duration) / h)
     if longest > CYCLES * _MOST_SAMPLES:
         raise ValueError(
             f"the loop would take {longest:.2g} samples: the plant is slow beside the sample time; give --frequency "
@@ -224,8 +225,7 @@ def _reach(actuator: Actuator, within: Pair | None) -> Pair:
             "the range of the loop is unknown: give --range LOW,HIGH, or --limits LOW,HIGH, or --record FILE"
         )
     u = signals.triangle(float(span[0]), float(span[1]), cycles=2, samples_per_cycle=2 * _SAMPLES)
-    behind = replace(actuator, amplifier=None).dc_gain
-    y = behind * actuator.level(u)[-2 * _SAMPLES :]
+    y = replace(actuator, amplifier=None).dc_gain * actuator.level(u)[-2 * _SAMPLES :]
     margin = _MARGIN * float(np.ptp(y))
     return float(y.min()) + margin, float(y.max()) - margin
 
@@ -265,9 +265,3 @@ def _slow(actuator: Actuator) -> float:
 def _slowest_decay(actuator: Actuator) -> float:
     """The smallest decay rate of a free motion [1/s]; infinite for a plant without vibration."""
     return float(min((-pole.real for pole in _poles(actuator) if pole.real < 0.0), default=math.inf))
-
-
-def _positive(name: str, value: float) -> float:
-    if not 0.0 < value < math.inf:
-        raise ValueError(f"{name} must be positive, got {value:g}")
-    return value

@@ -4,7 +4,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from hysim.cli import outputs
-from hysim.cli.options import JSON, Command
+from hysim.cli.options import JSON, Command, positive
 
 if TYPE_CHECKING:
     from hysim._frozen import FloatArray
@@ -37,8 +37,8 @@ def _log(options: argparse.Namespace) -> "Record | None":
     """The voltages as a record, whose output is of no interest."""
     from hysim.files import load
 
-    if options.frame_rate is not None and not 0.0 < options.frame_rate < float("inf"):
-        raise ValueError(f"--frame-rate must be positive, got {options.frame_rate}")
+    if options.frame_rate is not None:
+        positive("--frame-rate", options.frame_rate)
     if options.voltage is None and (options.u is not None or options.t is not None):
         raise ValueError("--u and --t are columns of a file with voltages: give --voltage FILE")
     if options.voltage is not None and options.u is None:

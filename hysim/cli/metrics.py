@@ -1,11 +1,10 @@
 """`hysim metrics`: the width, area and orientation of a measured loop, or a table of every cycle."""
 
 import argparse
-import textwrap
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from hysim._printing import LETTERS, quantity
+from hysim._printing import folded, quantity
 from hysim.cli import outputs, records
 from hysim.cli.options import JSON, Command
 
@@ -65,7 +64,7 @@ def _lines(loop: "LoopMetrics", units: Mapping[str, str]) -> Iterator[str]:
     width = max(map(len, values))
     yield from (f"{name:<{width}}  {value.rstrip()}" for name, value in values.items())
     if loop.orientation == "counterclockwise":
-        yield from textwrap.wrap(loop.sign_convention, LETTERS)
+        yield from folded(loop.sign_convention)
 
 
 def _step(record: "Record") -> Iterator[str]:

@@ -6,10 +6,9 @@ import pkgutil
 import re
 import sys
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import hysim
-from hysim._frozen import FloatArray
 from hysim.cli.records import STANDARD
 
 FORMS = "name of a family, such as bouc-wen; MODEL.json; or module:name of your own"
@@ -29,13 +28,6 @@ transfer function:
 _SHORT = {"zhu-wang": "ZhuWangBoucWen", "baber-noori": "BoucWenBaberNoori"}
 _STRUCTURE = ("poles", "zeros", "hold", "sample")
 _NEEDED = ("poles", "zeros")
-
-
-@runtime_checkable
-class Responding(Protocol):
-    """A law or a plant."""
-
-    def response(self, u: FloatArray, /) -> FloatArray: ...
 
 
 def names() -> list[str]:
@@ -89,6 +81,7 @@ def is_import_path(text: str) -> bool:
 def imported(path: str) -> Any:
     """The family or model at an import path; a ValueError if there is no such name, or it is no law."""
     from hysim.models.candidates import is_identifiable
+    from hysim.models.protocols import Responding
 
     law = resolved(path)
     if not (isinstance(law, Responding) or is_identifiable(law)):
@@ -96,7 +89,7 @@ def imported(path: str) -> Any:
     return law
 
 
-def chosen(text: str) -> Any:
+def model_or_family(text: str) -> Any:
     """The family or model that ``--model`` names: a family's name, a JSON file, or an import path."""
     if Path(text).suffix == ".json":
         return read(text)[0]
@@ -113,7 +106,7 @@ def to_identify(options: argparse.Namespace) -> Any:
     if options.model != "transfer-function":
         if structure:
             raise ValueError(f"--{next(iter(structure))} is no option of the model {options.model}")
-        return chosen(options.model)
+        return model_or_family(options.model)
     if missing := [name for name in _NEEDED if name not in structure]:
         raise ValueError(f"the model transfer-function needs --{missing[0]}")
     return hysim.TransferFunction.structure(**structure)
@@ -144,6 +137,8 @@ def name_of(path: str) -> str:
 
 def simulated(model: Any, record: "hysim.Record", units: dict[str, str]) -> "hysim.Simulation":
     """The model's free run over the record's input; a ValueError if it has no response, such as a controller."""
+    from hysim.models.protocols import Responding
+
     if not isinstance(model, Responding):
         raise ValueError(f"a {type(model).__name__} has no response to simulate: give a law or a plant")
     return hysim.simulate(model, record.t, record.u, units=units)

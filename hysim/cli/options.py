@@ -139,6 +139,13 @@ def numbers(form: str, number: Callable[[str], float] = float) -> Callable[[str]
     return read
 
 
+def positive(option: str, value: float) -> float:
+    """The value of an option; ValueError unless it is positive and finite."""
+    if not 0.0 < value < float("inf"):
+        raise ValueError(f"{option} must be positive, got {value:g}")
+    return value
+
+
 def column(text: str) -> str | int:
     """A column by its name, or by its number from 0."""
     return int(text) if text.isascii() and text.isdigit() else text
@@ -174,4 +181,4 @@ READERS: dict[str, Callable[[str], Any]] = {
     "x|y|DEGREES": word_or_number("x, y or an angle in degrees", "x", "y", number=float),
     "first|running|NUMBER": word_or_number("first, running or the number of a frame", "first", "running", least=0),
 }
-"""How a value is read, by its name; others are texts."""
+"""Readers of values by their names; other values are texts."""

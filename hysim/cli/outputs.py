@@ -6,7 +6,9 @@ import json
 import math
 import os
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from datetime import timedelta
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -33,15 +35,10 @@ def check(options: argparse.Namespace) -> None:
     A ValueError is raised if a folder does not exist or may not be written to, the ending of a picture or a table is
     unknown, two results would go to one place, such as the standard output, or a result would overwrite an input.
     """
-    inputs: list[str] = []
-    results: list[tuple[str, str]] = []
-    for name, role in options.roles.items():
-        value = vars(options)[name] if role else None
-        paths = value if isinstance(value, list) else [] if value is None else [value]
-        if role == INPUT:
-            inputs += paths
-        else:
-            results += [(path, role) for path in paths]
+    values = [(vars(options)[name], role) for name, role in options.roles.items() if role]
+    lists = [(value if isinstance(value, list) else [value], role) for value, role in values if value is not None]
+    files = [(path, role) for paths, role in lists for path in paths]
+    results = [(path, role) for path, role in files if role != INPUT]
     for path, role in results:
         if path != STANDARD:
             _check_path(path, role)
@@ -52,7 +49,7 @@ def check(options: argparse.Namespace) -> None:
         raise ValueError("two results would go to the standard output: write one of them to a file, or leave it out")
     if len({os.path.realpath(path) for path, _ in results}) < len(results):
         raise ValueError(f"two results would go to one file, {results[0][0]}")
-    keep(inputs, [path for path, _ in results])
+    keep([path for path, role in files if role == INPUT], [path for path, _ in results])
 
 
 def _check_path(path: str, role: str) -> None:
@@ -188,12 +185,21 @@ def loop_of_model(record: "Record", model: Any) -> "Figure":
 
 
 def progress() -> Callable[[int, int], None] | None:
-    """A counter on the standard error, if that is a terminal; a total of 0 stands for an unknown total."""
+    """Tasks done, their rate and the remaining time, on the standard error if that is a terminal.
+
+    A total of 0 stands for an unknown total.
+    """
     if not sys.stderr.isatty():
         return None
+    begin: list[tuple[float, int]] = []
 
     def show(done: int, total: int) -> None:
+        begin[1:] = [(time.monotonic(), done)]
+        elapsed, computed = begin[-1][0] - begin[0][0], done - begin[0][1]
+        rate = computed / max(elapsed, 1e-9)
         text = f"{done}/{total}" if total else f"{done}"
-        print(f"\r{text}", end="\n" if 0 < total <= done else "", file=sys.stderr, flush=True)
+        if total and rate > 0.0:
+            text += f", {rate:.3g} a second, {timedelta(seconds=round((total - done) / rate))} left"
+        print(f"\r\x1b[K{text}", end="\n" if 0 < total <= done else "", file=sys.stderr, flush=True)
 
     return show

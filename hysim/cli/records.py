@@ -5,6 +5,7 @@ import io
 import sys
 from typing import Any
 
+from hysim.cli.options import positive
 from hysim.records import Record
 
 STANDARD = "-"
@@ -64,8 +65,5 @@ def read(options: argparse.Namespace, file: str | None = None) -> Record:
     )
     if options.sample_time is None:
         return record
-    if not 0.0 < options.sample_time < float("inf"):
-        raise ValueError(f"--sample-time must be positive, got {options.sample_time}")
-    if record.t is None:
-        return replace(record, t=options.sample_time * np.arange(len(record)))
-    return record.resample(options.sample_time)
+    step = positive("--sample-time", options.sample_time)
+    return replace(record, t=step * np.arange(float(len(record)))) if record.t is None else record.resample(step)

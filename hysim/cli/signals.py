@@ -11,7 +11,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from types import FrameType
-from typing import NoReturn
+from typing import Any, NoReturn
 
 INTERRUPTED = 128 + signal.SIGINT
 """Exit code after Ctrl-C; after any signal it is 128 plus its number, as in shells."""
@@ -49,12 +49,20 @@ def handled() -> Iterator[None]:
     watched = [*unhandled, *(number for number in numbers if signal.getsignal(number) is signal.default_int_handler)]
     for number in unhandled:
         signal.signal(number, _raise)
+    report, sys.unraisablehook = sys.unraisablehook, _report_errors
     try:
         with _watched(frozenset(watched)):
             yield
     finally:
+        sys.unraisablehook = report
         for number in unhandled:
             signal.signal(number, signal.SIG_DFL)
+
+
+def _report_errors(unraisable: Any) -> None:
+    """Print errors that could not be raised, but no interrupts, which may come in a callback of a compiled library."""
+    if issubclass(unraisable.exc_type, Exception):
+        sys.__unraisablehook__(unraisable)
 
 
 def _raise(number: int, _: FrameType | None) -> NoReturn:

@@ -1,14 +1,12 @@
 """`hysim sweep`: a study in a file, over all cores or a cluster, which can be resumed."""
 
 import argparse
-import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hysim._versions import optional
 from hysim.cli import outputs, studies
 from hysim.cli.options import JSON, Command
 from hysim.cli.records import STANDARD
@@ -72,7 +70,7 @@ def _computed(options: argparse.Namespace) -> Any:
     outputs.keep(files, [options.out, options.csv, options.plot])
     with _executor(options) as executor:
         how = outputs.fields_of(options, ("workers", "on_change"))
-        return sweep(task, space, executor=executor, store=options.out, seed=seed, progress=progress(), **how)
+        return sweep(task, space, executor=executor, store=options.out, seed=seed, progress=outputs.progress(), **how)
 
 
 @contextmanager
@@ -80,31 +78,10 @@ def _executor(options: argparse.Namespace) -> Iterator[Any]:
     if not options.dask:
         yield "processes" if options.processes else "threads"
         return
-    try:
-        from distributed import Client
-    except ImportError:
-        raise ValueError("--dask needs distributed: pip install 'hysim[dask]'") from None
+    client_class = optional("distributed", "--dask", "dask", ValueError).Client
     is_file = Path(options.dask).is_file()
-    with Client(scheduler_file=options.dask) if is_file else Client(options.dask) as client:
+    with client_class(scheduler_file=options.dask) if is_file else client_class(options.dask) as client:
         yield client
-
-
-def progress() -> Callable[[int, int], None] | None:
-    """Tasks done, their rate and the remaining time, on the standard error if that is a terminal."""
-    if not sys.stderr.isatty():
-        return None
-    first: list[tuple[float, int]] = []
-
-    def show(done: int, total: int) -> None:
-        first.append((time.monotonic(), done)) if not first else None
-        elapsed, computed = time.monotonic() - first[0][0], done - first[0][1]
-        rate = computed / elapsed if computed else 0.0
-        remaining = timedelta(seconds=round((total - done) / rate)) if rate else None
-        speed = f", {rate:.3g} a second, {remaining} left" if rate else ""
-        end = "\n" if done >= total else ""
-        print(f"\r\x1b[K{done}/{total}{speed}", end=end, file=sys.stderr, flush=True)
-
-    return show
 
 
 COMMAND = Command(

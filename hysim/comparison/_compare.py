@@ -22,7 +22,7 @@ from hysim.errors import SimulationError
 from hysim.identification import Identification, identify
 from hysim.metrics import LoopMetrics, loop_metrics
 from hysim.models.candidates import candidates, is_identifiable, is_searched
-from hysim.models.protocols import Direct, needs_time
+from hysim.models.protocols import Direct, Responding, needs_time
 from hysim.records import Record
 from hysim.simulation import simulate
 
@@ -48,18 +48,17 @@ def compare(
     Parameters
     ----------
     models : mapping, "all" or None
-        Name to a model, which is not changed; to a result of `identify` or `discover`; or to a class or structure,
-        which is identified on the record. ``"all"``, or None, is every family that can be identified without further
-        arguments; families that cannot be identified on this record are listed with the reason.
+        Name to a model; to a result of `identify` or `discover`; or to a class or structure, which is identified on the
+        record. ``"all"``, or None, is every family that can be identified without further arguments; those that cannot
+        be identified on this record are listed with the reason.
     record : Record
         With at least one complete cycle of the input.
     cross_validate : {"auto", "loo", "cycles", None} or int
         Cross-validation of the classes and structures; see `identify`. ``"auto"`` leaves out one sample at a time on
         records of up to 200 samples, and one of 10 blocks on longer ones.
     test : Record or int, optional
-        Data that no fit uses: another record, or a number of last complete cycles of this one. On another record, the
-        initial state of a model that was identified here is identified, with everything else fixed; on the last cycles
-        the free run continues.
+        Data for no fit: another record, on which models that were identified here get a new initial state; or a number
+        of last complete cycles of this one, on which the free run continues.
     seed : int
         Seed of the random starts of the searches.
     workers : int, optional
@@ -117,13 +116,6 @@ def _last_loop(record: Record) -> LoopMetrics:
 
 
 @runtime_checkable
-class _Responding(Protocol):
-    """A model."""
-
-    def response(self, u: FloatArray, /) -> FloatArray: ...
-
-
-@runtime_checkable
 class _Result(Protocol):
     """A result of `identify` or `discover`."""
 
@@ -164,11 +156,11 @@ class _Protocol:
             if _is_family(subject):
                 subject = identify(subject, self.record, cross_validate=self.cross_validate, seed=self.seed)
                 seconds = time.perf_counter() - begin
-            return self._judged(name, subject, seconds)
+            return self._measured_row(name, subject, seconds)
         except _FAILURES as error:
             return " ".join(str(error).split())
 
-    def _judged(self, name: str, subject: Any, seconds: float) -> ComparisonRow:
+    def _measured_row(self, name: str, subject: Any, seconds: float) -> ComparisonRow:
         record, measured, model = self.record, self.measured, _model_of(subject)
         identified_here = math.isfinite(seconds)
         y = simulate(model, record.t, record.u).y
@@ -184,7 +176,7 @@ class _Protocol:
             fitted |= {"success": subject.success, "message": subject.message if identified_here else ""}
         sense = -1.0 if {loop.orientation, measured.orientation} == {"clockwise", "counterclockwise"} else 1.0
         deviation = _rate_deviation(model, record, y)
-        test_fit, test_rmse = self._tested(subject, model, identified_here)
+        test_fit, test_rmse = self._test_errors(subject, model, identified_here)
         return ComparisonRow(
             name=name,
             model=model,
@@ -207,15 +199,15 @@ class _Protocol:
             **fitted,
         )
 
-    def _tested(self, subject: Any, model: Any, identified_here: bool) -> tuple[float, float]:
+    def _test_errors(self, subject: Any, model: Any, identified_here: bool) -> tuple[float, float]:
         """Fit and rmse on the test."""
         if self.trial is None:
             return math.nan, math.nan
-        drive, judged = self.trial.drive, self.trial.record
+        drive, test = self.trial.drive, self.trial.record
         if self.trial.own_state and identified_here:
             model = _with_initial_state(drive, subject, self.seed)
         y = simulate(model, drive.t, drive.u).y[self.trial.begin :]
-        return metrics.fit_percent(judged.y, y), metrics.rmse(judged.y, y)
+        return metrics.fit_percent(test.y, y), metrics.rmse(test.y, y)
 
 
 def _subjects(models: Mapping[str, Any] | str | None) -> dict[str, Any]:
@@ -226,7 +218,7 @@ def _subjects(models: Mapping[str, Any] | str | None) -> dict[str, Any]:
     if not models:
         raise ValueError("there is nothing to compare: give at least one model by name")
     for name, subject in models.items():
-        if not (is_identifiable(subject) or isinstance(_model_of(subject), _Responding)):
+        if not (is_identifiable(subject) or isinstance(_model_of(subject), Responding)):
             raise TypeError(f"compare takes a model, a result, a model class or a structure, got {subject!r} as {name}")
     return dict(models)
 
@@ -235,19 +227,19 @@ def _trial(record: Record, test: Record | int | None) -> _Trial | None:
     if test is None:
         return None
     if isinstance(test, Record):
-        return _Trial(training=record, drive=test, begin=0, own_state=True)
+        return _Trial(record, test, begin=0, own_state=True)
     if not isinstance(test, int) or isinstance(test, bool):
         raise TypeError(f"test takes a Record or a number of last cycles, got {test!r}")
     loops = measured_cycles(record.u, test, TOLERANCE)
     begin = loops.first_sample(loops.cycles[-1]) + 1
     if begin < 3:
         raise ValueError(f"a test on {test} of the record's cycles leaves no samples to identify from")
-    return _Trial(training=record[:begin], drive=record, begin=begin, own_state=False)
+    return _Trial(record[:begin], record, begin, own_state=False)
 
 
 def _is_family(subject: Any) -> bool:
     """Whether the subject is a class or a structure, to be identified."""
-    return isinstance(subject, type) or not isinstance(subject, _Responding | _Result)
+    return isinstance(subject, type) or not isinstance(subject, Responding | _Result)
 
 
 def _model_of(subject: Any) -> Any:
@@ -273,15 +265,10 @@ def _loop(model: Any, record: Record, y: FloatArray) -> LoopMetrics:
     if not isinstance(model, Direct):
         return loop
     curve, zeros = model.response(loop.u), np.zeros(loop.u.size)
-    none: dict[str, Any] = dict.fromkeys(
-        ("max_width", "mean_width", "mid_width", "area", "relative_width", "energy"), 0.0
-    )
+    names = ("max_width", "mean_width", "mid_width", "area", "relative_width", "energy")
+    changes: dict[str, Any] = dict.fromkeys(names, 0.0) | {"loading": curve, "unloading": curve, "width": zeros}
     damping = 0.0 if loop.secant_stiffness > 0.0 else math.nan
-    at = float(loop.u[0])
-    return replace(
-        loop, **none, max_width_at=at, orientation="none", equivalent_damping=damping, loading=curve, unloading=curve,
-        width=zeros,
-    )  # fmt: skip
+    return replace(loop, **changes, max_width_at=float(loop.u[0]), orientation="none", equivalent_damping=damping)
 
 
 def _rate_deviation(model: Any, record: Record, y: FloatArray) -> float:

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from hysim._frozen import FloatArray, frozen
-from hysim._printing import bic_in_words, printed, summary_text
+from hysim._frozen import FloatArray, check_choice, frozen
+from hysim._printing import bic_in_words, listed, printed, summary_text
 from hysim.comparison import _tables
 from hysim.comparison._verdict import Contrast, contrasts
 from hysim.identification.sentences import CONSTANT, SWAPPED
@@ -134,11 +134,13 @@ class Comparison:
     failed: Mapping[str, str] = field(default_factory=dict)
     test: Record | None = None
 
-    def __str__(self) -> str:
-        return _tables.to_words(self)
-
-    def _repr_html_(self) -> str:
-        return _tables.to_html(self)
+    __str__ = _tables.to_words
+    _repr_html_ = _tables.to_html
+    to_text = _tables.to_text
+    to_markdown = _tables.to_markdown
+    to_latex = _tables.to_latex
+    to_csv = _tables.to_csv
+    to_frame = _tables.to_frame
 
     def __getitem__(self, name: str) -> ComparisonRow:
         for row in self.rows:
@@ -151,8 +153,8 @@ class Comparison:
     def ranked(self, criterion: str = "cv_rmse") -> tuple[ComparisonRow, ...]:
         """The rows by a measure, the smallest first; rows without the measure are left out.
 
-            `criterion` is one of ``"cv_rmse"``, ``"bic"``, ``"aic"``, ``"fpe"``, ``"rmse"`` and ``"test_rmse"``; any
-            other word is a ValueError.
+        `criterion` is one of ``"cv_rmse"``, ``"bic"``, ``"aic"``, ``"fpe"``, ``"rmse"`` and ``"test_rmse"``; any
+        other word is a ValueError.
 
         Examples
         --------
@@ -161,9 +163,8 @@ class Comparison:
         >>> [row.name for row in tab.ranked("bic")], [row.name for row in tab.ranked("rmse")]
         (['one play', 'plays'], ['plays', 'one play'])
         """
-        known = ("cv_rmse", "bic", "aic", "fpe", "rmse", "test_rmse")
-        if criterion not in known:
-            raise ValueError(f"criterion must be one of {', '.join(known)}, got {criterion!r}")
+        criteria = ("cv_rmse", "bic", "aic", "fpe", "rmse", "test_rmse")
+        check_choice("criterion", criterion, criteria)
         scores = [(float(vars(row)[criterion]), row) for row in self.rows]
         return tuple(row for score, row in sorted(scores, key=lambda pair: pair[0]) if score == score)
 
@@ -190,12 +191,7 @@ class Comparison:
 
     @property
     def probabilities(self) -> dict[str, float]:
-        """Probability of each other model's left-out errors, if it predicted as well as the winner.
-
-        Name to the two-sided probability of equally one-sided signed ranks, on which single large errors have
-        little influence, with the correlation of neighbours and Holm's correction for the number of models; nan if
-        errors are unknown.
-        """
+        """Name of each other model to the `probability` of its `Contrast` with the winner."""
         return {each.name: each.probability for each in self.contrasts}
 
     @property
@@ -205,7 +201,7 @@ class Comparison:
 
     @property
     def verdict(self) -> str:
-        """The winner, the models that the record cannot tell from it, and the models that diverged, in words."""
+        """The winner, models that are not significantly worse, and models that diverged, in words."""
         by_bic = self.ranked("bic")
         sentences = [f"The BIC prefers {by_bic[0].name}."] if len(by_bic) > 1 and by_bic[0].bic > -math.inf else []
         if self.winner is not None:
@@ -217,12 +213,7 @@ class Comparison:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Warnings about the comparison, one sentence each.
-
-        They say that the output is constant; the warnings of the best model, which predicts best, or else has the
-        smallest rmse; and, from the best model that says so, that input and output may be swapped. `verdict` names
-        models that diverged, and `failed` those that could not be compared.
-        """
+        """Warnings, one sentence each: a constant output, those of the best model, and a swap of input and output."""
         constant = [CONSTANT] if np.ptp(self.record.y) == 0.0 else []
         ranked = self.ranked() or self.ranked("rmse")
         every = [(row.name, each) for row in ranked for each in row.warnings]
@@ -234,11 +225,11 @@ class Comparison:
         method = "(signed ranks of left-out errors, 5 % after Holm's correction)"
         smaller = tuple(each.name for each in self.contrasts if each.contradicts)
         if similar := tuple(name for name in self.undecided if name not in smaller):
-            return f"{len(self.record)} samples show no significant difference to {_listed(similar)} {method}"
+            return f"{len(self.record)} samples show no significant difference to {listed(similar)} {method}"
         if any(math.isnan(each.probability) and not each.diverged for each in self.contrasts):
             return "the errors that would show a difference to the others are not all known"
         if smaller:
-            return f"all others but {_listed(smaller)} are significantly worse {method}"
+            return f"all others but {listed(smaller)} are significantly worse {method}"
         nearest = self.contrasts[0]
         if nearest.diverged:
             return "all others diverged or are significantly worse"
@@ -251,38 +242,11 @@ class Comparison:
         """Models that diverged, and those whose ranks and rmse disagree."""
         diverged = tuple(each.name for each in self.contrasts if each.diverged)
         smaller = tuple(each.name for each in self.contrasts if each.contradicts)
-        sentences = [f"{_listed(diverged)} diverged on samples left out."] if diverged else []
+        sentences = [f"{listed(diverged)} diverged on samples left out."] if diverged else []
         if smaller:
             has = "has" if len(smaller) == 1 else "have"
             sentences.append(
-                f"{_listed(smaller)} {has} significantly smaller typical errors than {self.winner} but a larger rmse: "
+                f"{listed(smaller)} {has} significantly smaller typical errors than {self.winner} but a larger rmse: "
                 "a few large errors decide the ranking."
             )
         return sentences
-
-    def to_text(self, *, timings: bool = True) -> str:
-        """The table for a terminal, and the verdict below it; `timings` adds the seconds of each fit."""
-        return _tables.to_text(self, timings=timings and any(row.seconds == row.seconds for row in self.rows))
-
-    def to_markdown(self, *, timings: bool = False) -> str:
-        """The table in Markdown; `timings` adds the seconds that each fit took."""
-        return _tables.to_markdown(self, timings=timings)
-
-    def to_latex(self, *, timings: bool = False) -> str:
-        """The table as a plain LaTeX tabular, which needs no package; `timings` adds the seconds of each fit."""
-        return _tables.to_latex(self, timings=timings)
-
-    def to_csv(self, *, timings: bool = False) -> str:
-        """Every measure as comma-separated values with all digits; `timings` adds the seconds of each fit."""
-        return _tables.to_csv(self, timings=timings)
-
-    def to_frame(self, *, timings: bool = False) -> Any:
-        """Every measure as a pandas DataFrame, one row a model; `timings` adds the seconds of each fit.
-
-        An ImportError is raised if pandas, of the extra ``tables``, is not installed.
-        """
-        return _tables.to_frame(self, timings=timings)
-
-
-def _listed(names: tuple[str, ...]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

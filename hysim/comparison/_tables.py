@@ -1,15 +1,12 @@
-"""A comparison as text, CSV, Markdown, LaTeX and columns, all written from one list of columns."""
+"""Methods of `Comparison` that write it as text, CSV, Markdown, LaTeX and columns, from one list of columns."""
 
-import csv
 import html
-import io
 import math
 import re
-import textwrap
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from hysim._printing import LETTERS, summary_text
+from hysim._printing import aligned, csv_text, folded, summary_text
+from hysim._versions import optional
 
 Value = str | int | float | bool
 _WIDE = 110  # letters in a line of text
@@ -78,14 +75,13 @@ def rows(comparison: Any) -> list[dict[str, Any]]:
     return values
 
 
-def to_text(comparison: Any, *, timings: bool) -> str:
-    """The short table for a terminal, the models that could not be compared, and the verdict."""
-    lines = _aligned(_short(comparison, timings))
+def to_text(comparison: Any, *, timings: bool = True) -> str:
+    """The table for a terminal, and the verdict below it; `timings` adds the seconds of each fit."""
+    timings = timings and any(row.seconds == row.seconds for row in comparison.rows)
+    lines = aligned(_short(comparison, timings))
     notes = [f"not compared: {name}: {reason}" for name, reason in comparison.failed.items()] + [comparison.verdict]
-    folded = textwrap.TextWrapper(_WIDE, subsequent_indent="  ", break_on_hyphens=False)
-    wrapped = [line for note in notes if note for line in folded.wrap(note)]
-    inside = textwrap.TextWrapper(_WIDE, initial_indent="  ", subsequent_indent="    ", break_on_hyphens=False)
-    warnings = [line for each in comparison.warnings for line in inside.wrap(each)]
+    wrapped = [line for note in notes if note for line in folded(note, _WIDE, indent="  ")]
+    warnings = [line for each in comparison.warnings for line in folded(each, _WIDE, "  ", "    ")]
     return "\n".join(
         [lines[0], "-" * len(lines[0]), *lines[1:], *wrapped, *(["Warnings"] if warnings else []), *warnings]
     )
@@ -97,10 +93,10 @@ def to_words(comparison: Any) -> str:
     unknown = [row.name for row in comparison.rows if math.isnan(row.cv_rmse)]
     by_name = {row["name"]: row for row in rows(comparison)}
     names = ("name", "n_parameters", "fit_percent", "rmse", "cv_rmse", "rmse_ratio", "max_width")
-    chosen = [column for column in columns(comparison, timings=False) if column.name in names]
+    selected = [column for column in columns(comparison, timings=False) if column.name in names]
     ordered = [by_name[name] for name in best + unknown]
-    table = [["", *(column.heading for column in chosen[1:])]]
-    table += [[_printed(row[column.name], column.digits) for column in chosen] for row in ordered[:_PRINTED]]
+    table = [["", *(column.heading for column in selected[1:])]]
+    table += [[_printed(row[column.name], column.digits) for column in selected] for row in ordered[:_PRINTED]]
     more, many = len(ordered) - _PRINTED, len(ordered)
     head = f"Comparison of {many} model{'' if many == 1 else 's'} on {comparison.record.name or 'a record'}, "
     notes = [f"  ... and {more} more"] if more > 0 else []
@@ -109,10 +105,8 @@ def to_words(comparison: Any) -> str:
         comparison.verdict,
         f"Warnings: {'; '.join(comparison.warnings)}" if comparison.warnings else "",
     ]
-    notes += textwrap.wrap(
-        " ".join(filter(None, sentences)), LETTERS, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False
-    )
-    return summary_text([f"{head}{len(comparison.record)} samples", *(f"  {line}" for line in _aligned(table)), *notes])
+    notes += folded(" ".join(filter(None, sentences)), first="  ", indent="  ")
+    return summary_text([f"{head}{len(comparison.record)} samples", *(f"  {line}" for line in aligned(table)), *notes])
 
 
 def to_html(comparison: Any) -> str:
@@ -126,16 +120,16 @@ def to_html(comparison: Any) -> str:
     return f"<table><thead><tr>{head}</tr></thead><tbody>{lines}</tbody></table>{verdict}{warnings}"
 
 
-def to_markdown(comparison: Any, *, timings: bool) -> str:
-    """The short table in Markdown, with a row for each model that could not be compared."""
+def to_markdown(comparison: Any, *, timings: bool = False) -> str:
+    """The table in Markdown; `timings` adds the seconds of each fit."""
     header, *body = _short(comparison, timings)
     body += [[name, reason, *[""] * (len(header) - 2)] for name, reason in comparison.failed.items()]
     lines = [header, ["---", *("---:" for _ in header[1:])], *body]
     return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |" for cells in lines)
 
 
-def to_latex(comparison: Any, *, timings: bool) -> str:
-    """The short table as a plain tabular, which needs no package."""
+def to_latex(comparison: Any, *, timings: bool = False) -> str:
+    """The table as a plain LaTeX tabular, which needs no package; `timings` adds the seconds of each fit."""
     (header, *body), failed = _short(comparison, timings), comparison.failed.items()
     spans = rf"\multicolumn{{{len(header) - 1}}}{{l}}"
     lines = [" & ".join(map(_escaped, cells)) for cells in body]
@@ -144,14 +138,10 @@ def to_latex(comparison: Any, *, timings: bool) -> str:
     return "\n".join([*head, r"\hline", *(rf"{line} \\" for line in lines), r"\hline", r"\end{tabular}"])
 
 
-def to_csv(comparison: Any, *, timings: bool) -> str:
-    """Every column with all digits; an unknown number is an empty cell."""
-    buffer = io.StringIO()
+def to_csv(comparison: Any, *, timings: bool = False) -> str:
+    """Every measure as comma-separated values with all digits, nan as an empty cell; `timings` adds the seconds."""
     table = to_columns(comparison, timings=timings)
-    writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(table)
-    writer.writerows([map(_exact, row) for row in zip(*table.values(), strict=True)])
-    return buffer.getvalue()
+    return csv_text([table, *(map(_exact, row) for row in zip(*table.values(), strict=True))])
 
 
 def to_columns(comparison: Any, *, timings: bool) -> dict[str, list[Value | None]]:
@@ -161,32 +151,16 @@ def to_columns(comparison: Any, *, timings: bool) -> dict[str, list[Value | None
     return {column.heading: [row.get(column.name) for row in every] for column in columns(comparison, timings=timings)}
 
 
-def to_frame(comparison: Any, *, timings: bool) -> Any:
-    """The columns as a DataFrame."""
-    try:
-        import pandas
-    except ImportError as error:
-        raise ImportError(
-            "to_frame needs pandas, which hysim does not install by itself: install hysim with the extra 'tables', "
-            "or take to_csv"
-        ) from error
-    return pandas.DataFrame(to_columns(comparison, timings=timings))
-
-
-def _aligned(table: Sequence[Sequence[str]]) -> list[str]:
-    """Lines of cells; the first column is aligned to the left, the others to the right."""
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    return [
-        "  ".join([cells[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(cells[1:], widths[1:], strict=True))])
-        for cells in table
-    ]
+def to_frame(comparison: Any, *, timings: bool = False) -> Any:
+    """Every measure as a DataFrame of pandas, which must be installed, one row a model; `timings` adds the seconds."""
+    return optional("pandas", "to_frame", "tables").DataFrame(to_columns(comparison, timings=timings))
 
 
 def _short(comparison: Any, timings: bool) -> list[list[str]]:
     """Headings and printed cells of the short columns, one row a model."""
-    chosen = [column for column in columns(comparison, timings=timings) if column.short]
-    body = [[_printed(row[column.name], column.digits) for column in chosen] for row in rows(comparison)]
-    return [[column.heading for column in chosen], *body]
+    selected = [column for column in columns(comparison, timings=timings) if column.short]
+    body = [[_printed(row[column.name], column.digits) for column in selected] for row in rows(comparison)]
+    return [[column.heading for column in selected], *body]
 
 
 def _printed(value: Value, digits: int) -> str:
@@ -198,7 +172,7 @@ def _printed(value: Value, digits: int) -> str:
 
 
 def _exact(value: Value | None) -> str:
-    if value is None or (isinstance(value, float) and math.isnan(value)):
+    if value is None or value != value:
         return ""
     return repr(float(value)) if isinstance(value, float) else _printed(value, 0)
 

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
-from hysim.files._table import Column, Notes, damaged, listed, number_of, positive, shown
+from hysim.files._table import Column, Notes, damaged, listed, number_of, positive, require, shown
 
 MOST_BYTES = 2_000_000_000
 """Most bytes of one array's numbers; a larger one is refused before it is read."""
@@ -65,32 +65,19 @@ class Array:
 
     def column(self, text: str | None = None) -> Column:
         """The column with these numbers of the axes after the first, or the whole array if it has one long axis."""
-        name = shown(self.label)
-        if self.kind != NUMBERS:
-            raise ValueError(f"array {name} holds {self.kind}: a column must hold real numbers")
-        if self.size * max(self.item_bytes, 8) > MOST_BYTES:
-            raise ValueError(
-                f"array {name} is too large: it says it has {self.size:,} numbers, at most {MOST_BYTES // 8:,} are read"
-            )
+        name, most = f"array {shown(self.label)}", MOST_BYTES // 8
+        require(self.kind == NUMBERS, f"{name} holds {self.kind}: a column must hold real numbers")
+        is_small = self.size * max(self.item_bytes, 8) <= MOST_BYTES
+        require(is_small, f"{name} is too large: it says it has {self.size:,} numbers, at most {most:,} are read")
+        name, rule = f"{name} has shape {self.shape}", "samples run along the first axis"
         if text is None:
-            if self.is_vector:
-                return Column((self, ()), self.label, self.unit or "")
             first = f"{self.label}[{','.join('0' for _ in self.shape[1:])}]"
-            raise ValueError(
-                f"array {name} has shape {self.shape}: name one of its columns, such as {first!r}; samples run along "
-                "the first axis"
-            )
+            require(self.is_vector, f"{name}: name one of its columns, such as {first!r}; {rule}")
+            return Column((self, ()), self.label, self.unit or "")
         index = tuple(map(int, text.split(",")))
-        if (
-            self.is_vector
-            or len(index) != len(self.shape) - 1
-            or not np.less(index, self.shape[1:]).all()
-            or min(index) < 0
-        ):
-            raise ValueError(
-                f"array {name} has shape {self.shape}: it has no column [{text}]; samples run along the first axis, "
-                "and each of the others takes a number from 0"
-            )
+        has_column = not self.is_vector and len(index) == len(self.shape) - 1
+        has_column = has_column and bool(np.less(index, self.shape[1:]).all()) and min(index) >= 0
+        require(has_column, f"{name}: it has no column [{text}]; {rule}, and each of the others takes a number from 0")
         return Column((self, index), f"{self.label}[{text}]", self.unit or "")
 
     def numbers(self) -> FloatArray:
@@ -115,18 +102,18 @@ class Arrays:
 
     def column(self, key: str | int) -> Column:
         """The column of this name, or of this number: of the arrays in order, of the columns of a single array."""
+        array, index = None, None
         if isinstance(key, str):
-            array, index = self._called(key), None
+            array = self._called(key)
             if array is None and (parts := _INDEXED.fullmatch(key)):
                 array, index = self._called(parts[1]), parts[2]
-            if array is None:
-                raise ValueError(f"no array {key!r}, {self._overview()}")
-            return array.column(index)
-        if len(self.arrays) == 1 and not self.arrays[0].is_vector:
-            return self.arrays[0].column(f"{operator.index(key)}")
-        if not 0 <= operator.index(key) < len(self.arrays):
-            raise ValueError(f"no array {key}, {self._overview()}")
-        return self.arrays[key].column()
+        elif len(self.arrays) == 1 and not self.arrays[0].is_vector:
+            array, index = self.arrays[0], f"{operator.index(key)}"
+        elif 0 <= operator.index(key) < len(self.arrays):
+            array = self.arrays[key]
+        if array is None:
+            raise ValueError(f"no array {key!r}, {self._overview()}")
+        return array.column(index)
 
     def values(self, columns: list[Column]) -> FloatArray:
         """The numbers of the columns, shape (n_columns, n_samples), nan where one is missing."""

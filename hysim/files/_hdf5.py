@@ -25,6 +25,7 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from hysim._versions import optional
 from hysim.files._arrays import KINDS, MOST_BYTES, NOTES, TEXT, Array, Arrays, with_notes
 from hysim.files._table import UnreadableError, damaged, require
 
@@ -37,17 +38,14 @@ _CHECKSUM = 4  # bytes
 _SLACK = 1024  # bytes by which a packed chunk may be longer than its content
 _LONGEST_ATTRIBUTE = 10_000  # bytes
 _WORDS = (8, 8)  # bytes of an address and a length
-_HEAD_BYTES, _LEAST_HEAP = 16, 4096  # bytes of the head of a heap or an object, and of a heap
+_HEAD_BYTES, _LEAST_HEAP = 16, 4096  # bytes: head of a heap or an object, smallest heap
 _KINDS = KINDS | {"O": "references or texts"}
 
 
 @contextmanager
 def hdf5(file: BinaryIO, path: Path | None, *, matlab: bool) -> Iterator[Arrays]:
     """The datasets of an open file, which may have a path; ValueError if it is damaged, or h5py is not installed."""
-    try:
-        import h5py
-    except ImportError:
-        raise UnreadableError("a file of HDF5 (MATLAB's -v7.3) needs h5py: pip install 'hysim[io]'") from None
+    h5py = optional("h5py", "a file of HDF5 (MATLAB's -v7.3)", "io", UnreadableError)
     form = "MAT" if matlab else "HDF5"
     with ExitStack() as stack:
         with damaged(form):
@@ -61,7 +59,7 @@ def hdf5(file: BinaryIO, path: Path | None, *, matlab: bool) -> Iterator[Arrays]
 
 
 class _Reader(NamedTuple):
-    """Reads the datasets of a file, of MATLAB or another one; texts of variable length only if `texts` is true."""
+    """Reader of the datasets of a file; texts of variable length are read only if `texts` is true."""
 
     h5py: Any
     matlab: bool
@@ -88,8 +86,8 @@ class _Reader(NamedTuple):
         if "MATLAB_empty" in dataset.attrs:
             shape = (0,)
         kind, unit = self.kind(dataset, shape), self.attribute(dataset, "units")
-        unit = unit if isinstance(unit, str) else None
-        return Array(label, shape, kind, dataset.dtype.itemsize, partial(self.values, dataset, shape, kind), unit)
+        read = partial(self.values, dataset, shape, kind)
+        return Array(label, shape, kind, dataset.dtype.itemsize, read, unit if isinstance(unit, str) else None)
 
     def kind(self, dataset: Any, shape: tuple[int, ...]) -> str:
         """The kind of a dataset's content."""
@@ -152,8 +150,8 @@ def _check_chunks(dataset: Any) -> None:
     stored: list[Any] = []
     dataset.id.chunk_iter(stored.append)
     for chunk in stored:
-        used = [number for k, number in enumerate(filters) if not chunk.filter_mask >> k & 1]
-        is_sound = _is_sound(dataset, chunk, used, plain)
+        applied = [number for k, number in enumerate(filters) if not chunk.filter_mask >> k & 1]
+        is_sound = _is_sound(dataset, chunk, applied, plain)
         require(is_sound, f"the file is damaged: a chunk does not have the {plain:,} bytes it says")
 
 

@@ -1,4 +1,4 @@
-"""The layout of a text file: what separates its cells, how it writes decimals, and where its samples begin.
+"""The layout of a text file: its delimiter, its decimal sign, and the line where its samples begin.
 
 Every pair of a delimiter and a decimal sign is tried on some lines spread over the file. Its score is the share
 of the lines that have the most common number of cells, at least two, times the share of the cells that are
@@ -15,7 +15,7 @@ from collections import Counter
 from typing import NamedTuple, TypeVar
 
 from hysim.files._cells import MISSING, parse
-from hysim.files._table import Column
+from hysim.files._table import Column, require
 
 DELIMITERS = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "white space"}
 DECIMALS = (".", ",")
@@ -51,17 +51,10 @@ class Layout(NamedTuple):
 
 
 def layout(text: str, delimiter: str | None, decimal: str | None) -> Layout:
-    """Find the layout of a text with one sample a line.
-
-    Raises
-    ------
-    ValueError
-        If there is no sample, a row is too long or short, or the first line is half a header.
-    """
+    """Detect the layout of a text with one sample a line; ValueError if it has none."""
     every = text.split("\n")
     numbers = [k for k, line in enumerate(every, start=1) if line.strip() and not line.lstrip().startswith(COMMENTS)]
-    if not numbers:
-        raise ValueError("the file is empty, there is no header and no sample")
+    require(numbers, "the file is empty, there is no header and no sample")
     lines = [every[k - 1] for k in numbers]
     delimiter, decimal = _signs(lines, delimiter, decimal)
     top = _rows(lines[:2], numbers, delimiter)
@@ -69,14 +62,13 @@ def layout(text: str, delimiter: str | None, decimal: str | None) -> Layout:
     width = _most_common([len(row) for row in [top[0], *below]])
     has_header, has_units = _heads(top, [row for row in below if len(row) == width], numbers[0], width, decimal)
     first = has_header + has_units
-    if first == len(lines):
-        raise ValueError("there is a header, but no sample")
+    require(first < len(lines), "there is a header, but no sample")
     if has_header:
         names = _names(lines[0], delimiter)
     else:
         names = _commented(every[: numbers[0] - 1], delimiter, width, decimal) or [str(k) for k in range(width)]
-    if len(names) != width:
-        raise ValueError(f"line {numbers[0]} names {len(names)} columns, most lines below have {width} cells")
+    is_named = len(names) == width
+    require(is_named, f"line {numbers[0]} names {len(names)} columns, most lines below have {width} cells")
     columns = [_column(place, label) for place, label in enumerate(names)]
     if has_units:
         columns = [c._replace(unit=c.unit or _unit(cell)) for c, cell in zip(columns, top[1], strict=True)]
@@ -92,20 +84,19 @@ def layout(text: str, delimiter: str | None, decimal: str | None) -> Layout:
 
 
 def _signs(lines: list[str], delimiter: str | None, decimal: str | None) -> tuple[str, str]:
-    """The delimiter and the decimal sign, found where they are None."""
-    looked_at = _spread(lines)
-    quoted = any('"' in line for line in looked_at)
+    """The delimiter and the decimal sign, detected where they are None."""
+    sample = _spread(lines)
+    quoted = any('"' in line for line in sample)
     candidates = [
         (between, point)
         for between in ([delimiter] if delimiter else DELIMITERS)
         for point in ([decimal] if decimal else DECIMALS)
         if between != point or quoted
     ]
-    if not candidates:
-        raise ValueError(f"delimiter and decimal sign must differ, both are {delimiter!r}")
-    best = max(candidates, key=lambda signs: _score(looked_at, *signs))
-    if _score(looked_at, *best) == 0.0 and delimiter is None:
-        present = (between for between in DELIMITERS if any(between in line.strip() for line in looked_at))
+    require(candidates, f"delimiter and decimal sign must differ, both are {delimiter!r}")
+    best = max(candidates, key=lambda signs: _score(sample, *signs))
+    if _score(sample, *best) == 0.0 and delimiter is None:
+        present = (between for between in DELIMITERS if any(between in line.strip() for line in sample))
         return next(present, " "), decimal or "."
     return best
 
@@ -159,7 +150,7 @@ def _heads(rows: list[list[str]], below: list[list[str]], line: int, width: int,
         {place: _kind(cell, decimal) for place, cell in enumerate(row) if len(row) != width or place in numeric}
         for row in rows
     ]
-    texts, counts = ([place for place, kind in kinds_of[0].items() if kind == wanted] for wanted in ("text", "number"))
+    texts, counts = ([place for place, kind in kinds_of[0].items() if kind == one] for one in ("text", "number"))
     if texts and counts:
         raise ValueError(
             f"line {line} is half a header: column {counts[0]} holds the number {rows[0][counts[0]]!r}, column "

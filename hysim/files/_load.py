@@ -7,12 +7,12 @@ numbers of the chosen columns become a record, or several, with gaps where a val
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Literal, overload
+from typing import Literal, TypedDict, Unpack, overload
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, check_choice
 from hysim._resolution import output_quantum
 from hysim.files._delimited import delimited
 from hysim.files._hdf5 import hdf5
@@ -28,36 +28,24 @@ ON_MISSING = ("error", "drop", "split")
 SIGNALS = {"u": "input", "y": "output"}
 
 
+class _Options(TypedDict, total=False):
+    """Keyword arguments of `load` that do not change the type of its result."""
+
+    u: str | int | None
+    y: str | int | None
+    t: str | int | None
+    delimiter: str | None
+    decimal: Literal[".", ","] | None
+    encoding: str | None
+    units: Mapping[str, str] | None
+    resolution: float | Literal["detect"] | None
+    name: str | None
+
+
 @overload
-def load(
-    path: Source,
-    *,
-    u: str | int | None = None,
-    y: str | int | None = None,
-    t: str | int | None = None,
-    on_missing: Literal["error", "drop"] = "error",
-    delimiter: str | None = None,
-    decimal: Literal[".", ","] | None = None,
-    encoding: str | None = None,
-    units: Mapping[str, str] | None = None,
-    resolution: float | Literal["detect"] | None = None,
-    name: str | None = None,
-) -> Record: ...
+def load(path: Source, *, on_missing: Literal["error", "drop"] = "error", **options: Unpack[_Options]) -> Record: ...
 @overload
-def load(
-    path: Source,
-    *,
-    u: str | int | None = None,
-    y: str | int | None = None,
-    t: str | int | None = None,
-    on_missing: Literal["split"],
-    delimiter: str | None = None,
-    decimal: Literal[".", ","] | None = None,
-    encoding: str | None = None,
-    units: Mapping[str, str] | None = None,
-    resolution: float | Literal["detect"] | None = None,
-    name: str | None = None,
-) -> tuple[Record, ...]: ...
+def load(path: Source, *, on_missing: Literal["split"], **options: Unpack[_Options]) -> tuple[Record, ...]: ...
 def load(
     path: Source,
     *,
@@ -75,18 +63,15 @@ def load(
     """Load a record from a file: text, NPZ, NPY, MAT or HDF5.
 
     The format is read from the file's first bytes. A text has one sample a line; blank lines and lines that begin
-    with ``#`` or ``%`` are skipped. Delimiter and decimal sign are those under which most cells are numbers. A first
-    line of text above numbers is the header; without one, a comment right above the samples that names as many
-    columns is used, as `numpy.savetxt` writes it. Under ``voltage [V]`` or ``voltage (V)`` the column is `voltage`
-    and its unit V; a second line of text holds the units of all columns. Only the chosen columns must be numbers.
-    Missing values are empty cells, nan, na, n/a, null and none.
+    with ``#`` or ``%`` are skipped. Delimiter and decimal sign are those that give the most numbers. A first line of
+    text above numbers is the header; without one, a comment right above the samples with as many names is used, as
+    `numpy.savetxt` writes it. ``voltage [V]`` or ``voltage (V)`` is a name with a unit; a second line of text holds
+    the units of all columns. Missing values are empty cells, nan, na, n/a, null and none.
 
     In the other formats a column is an array by its name: a variable, a field of a struct (``rec.u``), a dataset
-    (``group/displacement``). Of an array with several axes the first is that of the samples, and a column is
-    ``x[2]`` or ``x[0,1]``. Its unit is an attribute `units` in HDF5, or a text beside it called ``u_units``. A
-    missing value is nan. HDF5, and MATLAB's ``-v7.3``, need h5py.
-
-    A file of `hysim.save_record` needs no further arguments, and keeps resolution and name.
+    (``group/displacement``). Samples run along the first axis; a column of an array with several axes is ``x[2]`` or
+    ``x[0,1]``. Its unit is an attribute `units` in HDF5, or a text beside it called ``u_units``. A missing value is
+    nan. HDF5, and MATLAB's ``-v7.3``, need h5py. A file of `hysim.save_record` needs no further arguments.
 
     Parameters
     ----------
@@ -94,24 +79,23 @@ def load(
         An open file of text or of bytes is read from its current position. A text, or an open file, may have 0.5 GB;
         an array 2 GB.
     u, y : str or int, optional
-        Columns of input and output, by name or by number from 0: of the columns of a text or of a single array, of
-        the arrays in their order otherwise (HDF5: of their names). By default those called u and y.
+        Columns of input and output, by name or by number from 0: the number of a column of a text or of a single array,
+        else of an array (in HDF5 in the order of the names). By default those called u and y.
     t : str or int, optional
         Column of time; by default that called t, if there is one; False for a record without time.
     on_missing : {"error", "drop", "split"}
         Where a chosen column has no value: raise, leave the sample out, or cut the record there into several.
     delimiter : str, optional
-        One character between the cells of a text, or a blank for any white space; by default found among tab,
-        semicolon, comma and white space.
+        One character between the cells of a text, or a blank for any white space; by default tab, semicolon, comma or
+        white space is detected.
     decimal : {".", ","}, optional
-        Decimal sign of a text; by default found. There is no sign between thousands.
+        Decimal sign of a text; detected by default. There is no sign between thousands.
     encoding : str, optional
-        Of a text; by default UTF-8, or UTF-16 or UTF-32 where the file begins with their byte order mark.
+        Encoding of a text; by default UTF-8, or UTF-16 or UTF-32 after their byte order mark.
     units : mapping, optional
         Labels of the units of ``"t"``, ``"u"`` and ``"y"``; they replace those of the file.
     resolution : float or "detect", optional
-        Quantum of the output's sensor [unit of y], which replaces that of the file; ``"detect"`` for that of
-        `Record.detect_resolution`.
+        Quantum of the output's sensor [unit of y], in place of the file's; or ``"detect"`` it from the values.
     name : str, optional
         Name of the record; by default the one in the file, or the file's name without its ending.
 
@@ -127,9 +111,9 @@ def load(
     TypeError
         If `path` is neither a path nor an open file.
     ValueError
-        If the file is damaged, too large or has no samples; a column is unknown; a row is too long or short; a value
-        is missing or not finite; columns have unequal lengths; the time does not increase; or an argument for text
-        comes with another format. The message is one line that names the file, the line or sample, and the column.
+        If the file is damaged or too large, a column is unknown, a row is too long or short, a value is missing or not
+        finite, lengths differ, the time does not increase, or an argument for text is used with another format. The
+        message is one line that names the file, the line or sample, and the column.
 
     Examples
     --------
@@ -140,8 +124,7 @@ def load(
     >>> rec.u.tolist(), dict(rec.units)
     ([0.0, 5.0, 10.0], {'u': 'V', 'y': 'um'})
     """
-    if on_missing not in ON_MISSING:
-        raise ValueError(f"on_missing must be one of {', '.join(ON_MISSING)}, got {on_missing!r}")
+    check_choice("on_missing", on_missing, ON_MISSING)
     if delimiter is not None and len(delimiter) != 1:
         raise ValueError(f"delimiter must be one character, got {delimiter!r}")
     if decimal is not None and decimal not in DECIMALS:
@@ -226,9 +209,9 @@ def _parts(
             f"{table.place(k)}, column {shown([*columns.values()][j].label)}: the value is missing; "
             'on_missing="drop" leaves such samples out, on_missing="split" cuts the record there'
         )
-    kept = np.flatnonzero(~is_missing.any(axis=0))
+    samples = np.flatnonzero(~is_missing.any(axis=0))
     is_cut = on_missing == "split"
-    parts = np.split(kept, np.flatnonzero(np.diff(kept) > 1) + 1 if is_cut else [])
+    parts = np.split(samples, np.flatnonzero(np.diff(samples) > 1) + 1 if is_cut else [])
     long_enough = [part for part in parts if part.size >= 2]
     if not long_enough:
         longest = max(part.size for part in parts)

@@ -1,6 +1,5 @@
 """The verb `save_record`: a record into a file, in the format that its ending names."""
 
-import csv
 import io
 import json
 import re
@@ -13,6 +12,8 @@ import numpy as np
 
 from hysim._atomic import write_all
 from hysim._frozen import FloatArray
+from hysim._printing import csv_text
+from hysim._versions import optional
 from hysim.files._table import Notes
 from hysim.records import Record
 
@@ -22,15 +23,13 @@ _PLAIN_UNIT = re.compile(r"[^\[\]()\s,;\"#%]+(?: [^\[\]()\s,;\"#%]+)*")
 def save_record(record: Record, path: str | Path) -> None:
     """Save a record to a file, in the format that its ending names.
 
-    The file holds `u`, `y` and, if there is one, `t`, to the last bit; and where they are known the units, the
-    resolution and the name. `hysim.load` returns an equal record from the path alone.
+    The file holds the arrays to the last bit, and units, resolution and name; `hysim.load` returns an equal record. It
+    is written completely or not at all, with the same bytes each time.
 
     - ``.csv``, ``.tsv``: a header ``t [s],u [V],y [um]``, below comments ``# name:`` and ``# resolution:``;
     - ``.npz``: arrays `t`, `u`, `y`, `resolution`, and texts `name`, ``u_units`` and so on;
     - ``.mat``: the same as variables, numbers in columns, compressed; version 5, which MATLAB and Octave load;
     - ``.h5``, ``.hdf5``: datasets with an attribute `units`; attributes `resolution` and `name` of the file.
-
-    The file is written completely or not at all, with the same bytes each time.
 
     Parameters
     ----------
@@ -67,13 +66,7 @@ def save_record(record: Record, path: str | Path) -> None:
 
 
 def packed(columns: Mapping[str, FloatArray], path: str | Path, notes: Notes) -> bytes:
-    """Columns of equal lengths as the content of a file, in the format that the ending of its path names.
-
-    Raises
-    ------
-    ValueError
-        If the ending is none of these, h5py is missing for HDF5, or a name or a unit cannot be written.
-    """
+    """Columns of equal lengths as the content of a file, in the format of its ending; errors as in `save_record`."""
     write = _WRITERS[ending(path)]
     for text in (notes.name or "", *notes.units.values()):
         if "\0" in text or text.encode("utf-8", "replace").decode() != text:
@@ -90,17 +83,13 @@ def ending(path: str | Path) -> str:
 
 
 def _text(columns: Mapping[str, FloatArray], notes: Notes, *, delimiter: str) -> bytes:
-    buffer = io.StringIO()
-    for what, value in (("name", notes.name), ("resolution", notes.resolution)):
-        if value:
-            buffer.write(f"# {what}: {json.dumps(value)}\n")
     plain = {label: unit for label, unit in notes.units.items() if label in columns and _PLAIN_UNIT.fullmatch(unit)}
-    if dict(notes.units) != plain:
-        buffer.write(f"# units: {json.dumps(dict(notes.units))}\n")
-    writer = csv.writer(buffer, delimiter=delimiter, lineterminator="\n")
-    writer.writerow([f"{label} [{plain[label]}]" if label in plain else label for label in columns])
-    writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
-    return buffer.getvalue().encode()
+    comments: dict[str, Any] = {"name": notes.name, "resolution": notes.resolution}
+    comments["units"] = dict(notes.units) if dict(notes.units) != plain else None
+    header = [f"{label} [{plain[label]}]" if label in plain else label for label in columns]
+    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+    lines = "".join(f"# {name}: {json.dumps(value)}\n" for name, value in comments.items() if value)
+    return (lines + csv_text([header, *rows], delimiter=delimiter, nan="nan")).encode()
 
 
 def _arrays(columns: Mapping[str, FloatArray], notes: Notes) -> dict[str, Any]:
@@ -131,10 +120,7 @@ _MAT_TITLE = b"MATLAB 5.0 MAT-file, saved by hysim".ljust(116)
 
 
 def _hdf5(columns: Mapping[str, FloatArray], notes: Notes) -> bytes:
-    try:
-        import h5py
-    except ImportError:
-        raise ValueError("a file of HDF5 needs h5py: pip install 'hysim[io]'") from None
+    h5py = optional("h5py", "a file of HDF5", "io", ValueError)
     buffer = io.BytesIO()
     with h5py.File(buffer, "w") as root:
         for name, value in _arrays(columns, notes).items():

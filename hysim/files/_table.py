@@ -46,7 +46,7 @@ class Table(Protocol):
         """The numbers of the columns, shape (n_columns, n_samples), nan where one is missing."""
 
     def place(self, sample: int) -> str:
-        """Where the sample is in the file: "line 12"."""
+        """Place of the sample in the file: "line 12"."""
 
 
 class UnreadableError(ValueError):
@@ -74,12 +74,9 @@ def damaged(form: str) -> Iterator[None]:
 
 
 def number_of(key: str, kind: str, *names: Sequence[str]) -> int | None:
-    """Number of the one column with this name, looked for in each list of names in turn; None if there is none.
+    """Number of the one column with this name, from the first list of names that has it; None if there is none.
 
-    Raises
-    ------
-    ValueError
-        If several columns of a list have the name; `kind` is the plural that the message calls them by.
+    If there are several in a list, a ValueError calls them by the plural `kind`.
     """
     for labels in names:
         matches = [k for k, label in enumerate(labels) if label == key]

@@ -17,10 +17,7 @@ Sources: L. S. Jacobsen, Trans. ASME 52 (1930) 169; A. K. Chopra, Dynamics of St
 equivalent damping of a cycle.
 """
 
-import csv
-import io
 import math
-import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -31,7 +28,7 @@ import numpy.typing as npt
 from hysim._cycles import ROUNDING, TOLERANCE, too_few
 from hysim._excursions import Loops, protocol
 from hysim._frozen import FloatArray, frozen
-from hysim._printing import LETTERS, extent, printed, quantity, summary_text
+from hysim._printing import aligned, csv_text, extent, folded, printed, quantity, summary_text
 from hysim.metrics._loop import COUNTERCLOCKWISE, FORCE, LoopMetrics, measure, samples_of_a_loop
 
 
@@ -103,8 +100,7 @@ class CycleMetrics:
         Slope of the line through the loop's ends [unit of y / unit of u].
     equivalent_damping : array
         Damping ratio of the viscous oscillator of that stiffness that dissipates the magnitude of the energy at its
-        resonance, at least 0 [1]; nan if the stiffness is not positive. It is the same with u as the force and y as the
-        displacement, if both have their extremes together.
+        resonance, at least 0 [1]; nan if the stiffness is not positive.
     closure_gap : array
         Output at the cycle's end minus output at its start [unit of y].
     orientation : tuple of {"counterclockwise", "clockwise", "none"}
@@ -188,18 +184,12 @@ class CycleMetrics:
         return [{"cycle": k + 1} | {name: values[k] for name, values in columns.items()} for k in range(len(self))]
 
     def to_text(self, units: Mapping[str, str] | None = None) -> str:
-        """The table for a terminal, one row a cycle, and below it the meaning of the energy's sign.
-
-        `units` are labels of the units of ``"u"`` and ``"y"``, such as those of a `Record`.
-        """
+        """The table for a terminal, one row a cycle; `units` are labels of the units of ``"u"`` and ``"y"``."""
         shown = [column for column in _COLUMNS if column.in_text]
         header = ["cycle", *(column.heading for column in shown)]
         second = ["", *(_bracketed(column.unit_in(units or {})) for column in shown)]
         rows = [[f"{row['cycle']}", *(column.cell(row[column.field]) for column in shown)] for row in self.rows()]
-        heads = [header, second]
-        widths = [max(map(len, cells)) for cells in zip(*heads, *rows, strict=True)]
-        lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in heads + rows]
-        rule = "-" * (sum(widths) + 2 * len(widths) - 2)
+        lines = aligned([header, second, *rows], first=str.rjust)
         unit = _Column("", "", "y u").unit_in(units or {})
         notes = [
             f"Cycles begin and end at u = {quantity(self.level, (units or {}).get('u', ''))}.",
@@ -207,23 +197,16 @@ class CycleMetrics:
             f"outside of the cycles {quantity(self.energy_outside, unit)}.",
             self.sign_convention,
         ]
-        wrapped = [line for note in notes for line in textwrap.wrap(note, LETTERS, break_on_hyphens=False)]
-        return "\n".join([*lines[: len(heads)], rule, *lines[len(heads) :], *wrapped])
+        below = [line for note in notes for line in folded(note)]
+        return "\n".join([*lines[:2], "-" * len(lines[0]), *lines[2:], *below])
 
     def to_csv(self, units: Mapping[str, str] | None = None) -> str:
-        """Every column as comma-separated values with all digits; an unknown number is an empty cell.
-
-        `units` are labels of the units of ``"u"`` and ``"y"``, which are added to the names.
-        """
-        buffer = io.StringIO()
-        writer = csv.writer(buffer, lineterminator="\n")
-        named = [
+        """Every column as comma-separated values with all digits, nan as an empty cell; `units` go into the header."""
+        header = [
             column.field if column.unit == "%" else f"{column.field} {_bracketed(column.unit_in(units or {}))}".rstrip()
             for column in _COLUMNS
         ]
-        writer.writerow(["cycle", *named])
-        writer.writerows([["" if value != value else value for value in row.values()] for row in self.rows()])
-        return buffer.getvalue()
+        return csv_text([["cycle", *header], *(row.values() for row in self.rows())])
 
 
 def cycle_metrics(
@@ -233,12 +216,9 @@ def cycle_metrics(
 
     A cycle leaves a level of the input to one side, returns to it, leaves it to the other side and returns again: two
     half cycles, as ATC-24 and FEMA 461 pair them. A half cycle whose neighbours lie on its own side, as in
-    0 -> 5 -> 0 -> 8 -> 0, is a cycle of its own. Samples before the first and after the last cycle, such as a last half
-    cycle, are in no row; `energy_outside` counts them. A cycle that begins between two samples is cut there, with the
-    output linear between the samples, so that each cycle is closed in u.
-
-    `loop_metrics` measures the last cycle from one extreme of the record to the other and back; the last row here
-    begins and ends at the level. Both use the same code.
+    0 -> 5 -> 0 -> 8 -> 0, is a cycle of its own. Samples outside of the cycles, such as a last half cycle, are in no
+    row; `energy_outside` counts them. A cycle that begins between two samples is cut there, with linear interpolation,
+    so that each cycle is closed in u. `loop_metrics` measures the last cycle between the extremes of the record.
 
     Parameters
     ----------
@@ -247,12 +227,12 @@ def cycle_metrics(
     y : array, shape (n,)
         Output.
     level : float, optional
-        Input at which cycles begin and end [unit of u]; by default the first input, or else the middle of the levels
-        that most of the branches' length reaches: whichever gives cycles of the larger total span.
+        Input at which cycles begin and end [unit of u]; by default the first input, or the middle of the levels that
+        most of the branches' length reaches: whichever gives cycles of the larger total span.
     tolerance : float
         Reversals of the input smaller than this fraction of its span are ignored as noise, and a turning point this
         near to the level counts as at the level. Larger reversals inside a half cycle do not divide it: the energy is
-        that of the whole path, while the width, from branches sorted by their input, then depends on the minor loops.
+        that of the whole path, but the width depends on the minor loops.
 
     Returns
     -------

@@ -42,15 +42,11 @@ class _Dynamic(Protocol):
 def describing_function(
     law: Any, amplitudes: npt.ArrayLike, *, mean: float = 0.0, samples_per_cycle: int = 2000
 ) -> npt.NDArray[np.complex128]:
-    """First harmonic of a law's steady cycle under a sine, over the sine.
+    """First harmonic of a law's steady cycle under ``u = mean + a sin(phi)``, over the sine.
 
-    ::
-
-        N(a) = 1 / (pi a) times the integral of y (sin(phi) + i cos(phi)) d phi,    u = mean + a sin(phi)
-
-    The law begins with its own memory at the input `mean`, and cycles until its output repeats, to 1e-12 of its span
-    or, after 262 128 cycles, to 1e-6. The gain is ``abs(N)``, the phase ``np.angle(N)`` [rad], negative where the
-    output lags.
+    It is N(a), 1 / (pi a) times the integral of y (sin(phi) + i cos(phi)) d phi: the gain is ``abs(N)``, the phase
+    ``np.angle(N)`` [rad], negative where the output lags. The law begins with its own memory at the input `mean`, and
+    cycles until its output repeats, to 1e-12 of its span or, after 262 128 cycles, to 1e-6.
 
     Parameters
     ----------

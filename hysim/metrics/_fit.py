@@ -14,7 +14,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
+from hysim._frozen import FloatArray, read_only, vectors
 from hysim.metrics.criteria import information
 
 
@@ -111,9 +111,7 @@ def bic(residual: npt.ArrayLike, n_parameters: int, *, floor: float = 0.0) -> fl
 
 
 def _measured_and_model(y: npt.ArrayLike, y_model: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    measured, model = read_only(y, "y", ndim=1), read_only(y_model, "y_model", ndim=1)
-    if measured.size != model.size:
-        raise ValueError(f"y and y_model must have equal lengths, got {measured.size} and {model.size}")
+    measured, model = vectors(y=y, y_model=y_model)
     if measured.size == 0:
         raise ValueError("a fit needs at least 1 sample, got none")
     return measured, model

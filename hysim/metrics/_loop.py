@@ -18,8 +18,8 @@ displacement (the mean of the two branches there) and D half the span of u,
     equivalent_damping = energy / (4 pi E_S),    E_S = secant_stiffness D^2 / 2
 
 The last is the damping ratio of the viscous oscillator that dissipates as much at its resonance. Energy and ratio are
-negative for a counterclockwise loop: there y lags u, and the loss is the integral of u dy. The magnitude of the ratio
-is the same whichever of u and y is the force, if both have their extremes together.
+negative for a counterclockwise loop, where y lags u. The magnitude of the ratio is the same whichever of u and y is the
+force, if both have their extremes together.
 
 Sources: L. S. Jacobsen, Trans. ASME 52 (1930) 169, for the equivalence; FEMA 356 (2000), section 2.8.4, and ASCE 41 for
 the secant stiffness between the extremes of displacement, not of force.
@@ -34,7 +34,7 @@ import numpy.typing as npt
 
 from hysim._cycles import ROUNDING, TOLERANCE, Cycle, settled
 from hysim._excursions import measured_cycles
-from hysim._frozen import FloatArray, frozen, read_only
+from hysim._frozen import FloatArray, frozen, vectors
 from hysim._printing import extent, printed, summary_text
 
 COUNTERCLOCKWISE = (
@@ -124,7 +124,7 @@ class LoopMetrics:
 
     @property
     def sign_convention(self) -> str:
-        """How the sign of the energy is to be read, in a sentence."""
+        """Meaning of the energy's sign, in a sentence."""
         return f"The loop runs {COUNTERCLOCKWISE}" if self.orientation == "counterclockwise" else FORCE
 
     @overload
@@ -149,18 +149,13 @@ def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, toleran
     """Measure the loop of the last complete cycle, or the average loop of the last few.
 
     A cycle is three consecutive turning points of the input, the outer two within 5 % of the input's span of one
-    extreme of the record, the middle one within 5 % of the other: min-max-min or max-min-max. The record's ends count
-    as turning points. The path may fail to close by those 5 %, and its energy lacks that part: in a protocol whose
-    amplitude grows by 4 % a cycle, 2.3 % of a Bouc-Wen law's loop.
+    extreme of the record, the middle one within 5 % of the other. The record's ends count as turning points. The path
+    may fail to close by those 5 %, and its energy lacks that part. If the record has too few such cycles, as in
+    0 -> max -> min -> 0 and in growing protocols, they are those of `hysim.cycle_metrics` that have at least 90 % of
+    the widest one's span and no minor loops; they are closed in u.
 
-    If the record has too few such cycles, as 0 -> max -> min -> 0 and growing protocols, the cycles are those of
-    `hysim.cycle_metrics`, which begin and end at one level of the input, as far as they have at least 90 % of the
-    widest one's span and no minor loops. They are closed in u.
-
-    A plateau at a turning point is divided in its middle, half to each branch (a sample in the very middle to both); at
-    the record's ends it belongs to the cycle. Of several samples of a branch at one input the last, settled one is
-    taken. The samples of a branch are sorted by input, so that reversals below the tolerance do not break the
-    interpolation.
+    A plateau at a turning point is divided in its middle, half to each branch. If a branch has several samples at one
+    input, the last one is taken. The samples of a branch are sorted by input.
 
     Parameters
     ----------
@@ -169,8 +164,8 @@ def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, toleran
     y : array, shape (n,)
         Output.
     cycles : int
-        Number of last complete cycles whose branches are averaged at their common inputs, against noise. All measures
-        are then those of the averaged loop.
+        Number of last complete cycles whose branches are averaged at their common inputs; all measures are those of
+        the averaged loop.
     tolerance : float
         Reversals of the input smaller than this fraction of its span are ignored as noise.
 
@@ -255,8 +250,8 @@ def width_rmse(a: LoopMetrics, b: LoopMetrics) -> float:
 
 
 def _curve(u: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    kept = settled(u)
-    return u[kept], y[kept]
+    samples = settled(u)
+    return u[samples], y[samples]
 
 
 def common_inputs(inputs: list[FloatArray]) -> FloatArray:
@@ -285,9 +280,8 @@ def _orientation(area: float, rounding: float) -> Literal["counterclockwise", "c
 
 
 def samples_of_a_loop(u: npt.ArrayLike, y: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    inputs, outputs = read_only(u, "u", ndim=1), read_only(y, "y", ndim=1)
-    if inputs.size != outputs.size:
-        raise ValueError(f"u and y must have equal lengths, got {inputs.size} and {outputs.size}")
+    """Input and output as arrays; ValueError unless they have equal lengths and could hold a loop."""
+    inputs, outputs = vectors(u=u, y=y)
     if inputs.size < 3:
         raise ValueError(f"a loop needs at least 3 samples, got {inputs.size}")
     if np.ptp(inputs) == 0:

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._cycles import ROUNDING
-from hysim._frozen import FloatArray, frozen, read_only
+from hysim._frozen import FloatArray, frozen, vectors
 from hysim._printing import printed, summary_text
 
 SETTLED = 0.02
@@ -172,9 +172,7 @@ def reduction_percent(before: float, after: float) -> float:
 
 
 def _normalised(t: npt.ArrayLike, y: npt.ArrayLike) -> tuple[FloatArray, FloatArray, float, float]:
-    times, outputs = read_only(t, "t", ndim=1), read_only(y, "y", ndim=1)
-    if times.size != outputs.size:
-        raise ValueError(f"t and y must have equal lengths, got {times.size} and {outputs.size}")
+    times, outputs = vectors(t=t, y=y)
     if times.size < 10:
         raise ValueError(f"the response to a step needs at least 10 samples, got {times.size}")
     initial, final = float(outputs[0]), float(outputs[-(outputs.size // 10) :].mean())
@@ -196,7 +194,7 @@ def _settling_time(t: FloatArray, eta: FloatArray) -> float:
 
 
 def _crossing(t: FloatArray, eta: FloatArray, k: int, level: float) -> float:
-    """When the line from sample k - 1 to sample k passes the level."""
+    """Time at which the line from sample k - 1 to sample k passes the level."""
     if k == 0:
         return float(t[0])
     return float(t[k - 1] + (t[k] - t[k - 1]) * (level - eta[k - 1]) / (eta[k] - eta[k - 1]))

@@ -25,10 +25,10 @@ class LoopRows:
         loops = measured_cycles(self.u, 1, TOLERANCE)
         u, rows = loops.of(self.u), loops.of(y)
         branches = [(part, settled(u[part])) for part in (loops.cycles[0].unloading, loops.cycles[0].loading)]
-        inputs = [u[part][kept] for part, kept in branches]
+        inputs = [u[part][order] for part, order in branches]
         grid = common_inputs(inputs)
         outputs = [
-            _interpolated(grid, x, rows[:, part][:, kept]) for x, (part, kept) in zip(inputs, branches, strict=True)
+            _interpolated(grid, x, rows[:, part][:, order]) for x, (part, order) in zip(inputs, branches, strict=True)
         ]
         widths: FloatArray = np.abs(outputs[0] - outputs[1]).max(axis=1)
         return widths

@@ -4,8 +4,6 @@ Everything is computed first and written last, each file beside its place and th
 whole files only. Same input, same bytes: no dates, no timings, one way of writing a number.
 """
 
-import csv
-import io
 import json
 import math
 import tempfile
@@ -19,6 +17,7 @@ from hysim._atomic import write_all
 from hysim._blas import one_blas_thread
 from hysim._frozen import frozen
 from hysim._parallel import awaited, second_process
+from hysim._printing import csv_text
 from hysim.comparison import Comparison
 from hysim.datasets import table2
 from hysim.discovery import Discovery
@@ -193,9 +192,7 @@ def _by_columns(rows: Sequence[dict[str, Any]]) -> list[list[Any]]:
 
 
 def _csv(table: Sequence[Sequence[Any]]) -> str:
-    buffer = io.StringIO()
-    csv.writer(buffer, lineterminator="\n").writerows([[_cell(value) for value in row] for row in table])
-    return buffer.getvalue()
+    return csv_text([_cell(value) for value in row] for row in table)
 
 
 def _cell(value: Any) -> str:

@@ -48,9 +48,8 @@ def residuals(
 ) -> AxesArray:
     """Draw measured minus model against the input, one panel per model: loading filled, unloading open.
 
-    Residuals are counted in quanta of the sensor, with lines at half a quantum, which rounding alone leaves, and at
-    one; `quanta` is their name, such as ``"pixels"``. If the record has no resolution, residuals have the unit of y.
-    The result has one Axes for each row of `comparison`.
+    Residuals are counted in quanta of the sensor, with lines at half a quantum (rounding) and at one; `quanta` is their
+    name, such as ``"pixels"``. Without a resolution they have the unit of y. The result has one Axes for each row.
     """
     quantum, unit = _quantum(comparison.record, quanta)
     with _panels(axes, comparison) as panels:
@@ -119,10 +118,10 @@ def identification(
     """Draw the model over the measured loop, the residuals, and the profiles of the likelihood if there are any.
 
     `record` is the Record, or the sequence of them, from which `fit` was identified; another one is a ValueError. The
-    band is two standard errors of the model's output wide to each side. Residuals are counted in quanta of the sensor
-    if its resolution is known, with lines at one quantum. A profile is the signed root of the deviance over the
-    distance from the estimate in standard errors: the diagonal, where the likelihood is that of a normal distribution.
-    The interval at 95 % lies between the horizontal lines. The result has shape (2,), or (3,) with profiles.
+    band is two standard errors of the model's output to each side. Residuals are counted in quanta of the sensor if its
+    resolution is known, with lines at one quantum. A profile is the signed root of the deviance over the distance from
+    the estimate in standard errors, on the diagonal for a normal distribution; the interval at 95 % lies between the
+    horizontal lines. The result has shape (2,), or (3,) with profiles.
 
     Examples
     --------

@@ -14,6 +14,7 @@ import matplotlib
 from matplotlib.figure import Figure
 
 from hysim._atomic import write_text
+from hysim._frozen import check_choice
 from hysim.plot._style import house_style
 
 _DOTS = 200  # per inch
@@ -74,8 +75,7 @@ def to_bytes(figure: Figure, form: str, *, name: str = "figure") -> bytes:
     >>> hs.plot.to_bytes(hs.plot.figure(), "png")[1:4]
     b'PNG'
     """
-    if form not in FORMATS:
-        raise ValueError(f"form must be one of {', '.join(FORMATS)}, got {form!r}")
+    check_choice("form", form, FORMATS)
     if form == "svg":
         return (to_svg(figure, name=name) + "\n").encode()
     buffer = io.BytesIO()

@@ -39,13 +39,13 @@ def residual_map(
     """Draw the residual, measured minus model, over the input and the cycles, loading beside unloading.
 
     A change from left to right is an error of the loop's shape, a change of sign between the panels one of its width,
-    and a change from bottom to top is drift. Grey is zero, lighter is more, darker is less. A cell is the mean over the
-    samples of one branch in one interval of the input, and white if there are none.
+    and a change from bottom to top is drift. A cell is the mean over the samples of one branch in one interval of the
+    input; grey is zero, lighter is more, darker is less, and white has no samples.
 
-    `model` is a model, a Simulation of the record's input, or an Identification. `bins` is the number of intervals of
-    the input, by default half as many as a branch has samples, at most 40. Reversals of the input up to the fraction
-    `tolerance` of its span do not end a branch. `quanta` is the name of the sensor's quanta, in which residuals are
-    counted if the record has a resolution. The result has shape (2,).
+    `model` is a model, a Simulation of the record's input, or an Identification. `bins` is the number of intervals, by
+    default half as many as a branch has samples, at most 40. Reversals up to the fraction `tolerance` of the input's
+    span do not end a branch. `quanta` is the name of the sensor's quanta, in which residuals are counted if the record
+    has a resolution. The result has shape (2,).
 
     Raises
     ------
@@ -114,9 +114,9 @@ def forc(
         raise ValueError(f'coordinates must be "thresholds" or "centre", got {coordinates!r}')
     if isinstance(source, Record):
         law: PreisachRelays | Preisach = Preisach.from_reversal_curves(source, tolerance=tolerance)
-        known = source.units if units is None else units
+        labels = source.units if units is None else units
     else:
-        law, known = source, units or {}
+        law, labels = source, units or {}
     if not law.levels:
         raise ValueError("the law has no relays: give it levels and weights, or a record of reversal curves")
     levels = np.array(law.levels)
@@ -130,9 +130,9 @@ def forc(
         corners = np.column_stack(place(levels[[0, -1, -1]], levels[[0, 0, -1]]))
         half = axes.add_patch(Polygon(corners, fill=False, edgecolor=GUIDE, linewidth=0.8))
         cells.set_clip_path(half)
-        axes.set(**{f"{axis}label": in_unit(name, known.get("u", "")) for axis, name in zip("xy", names, strict=True)})
+        axes.set(**{f"{axis}label": in_unit(name, labels.get("u", "")) for axis, name in zip("xy", names, strict=True)})
         axes.set(xlim=(corners[:, 0].min(), corners[:, 0].max()), ylim=(corners[:, 1].min(), corners[:, 1].max()))
-        unit = f"{known['y']}/{known['u']}²" if {"u", "y"} <= known.keys() else ""
+        unit = f"{labels['y']}/{labels['u']}²" if {"u", "y"} <= labels.keys() else ""
         axes.figure.colorbar(cells, ax=axes, label=in_unit("Density of relays", unit))
     return axes
 

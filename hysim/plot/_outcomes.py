@@ -128,7 +128,7 @@ def describing_function(
     >>> gain.get_ylabel(), phase.get_ylabel()
     ('Gain', 'Phase [degrees]')
     """
-    known = units or {}
+    labels = units or {}
     laws = law if isinstance(law, Mapping) else {type(law).__name__: law}
     with several(axes, 2, height=2.4) as (upper, lower):
         for k, (name, each) in enumerate(laws.items()):
@@ -136,8 +136,8 @@ def describing_function(
             phase = np.where(harmonic == 0.0, np.nan, np.degrees(np.angle(harmonic)))
             upper.plot(amplitudes, np.abs(harmonic), label=name, **line(k))
             lower.plot(amplitudes, phase, label=name, **line(k))
-        upper.set_ylabel(in_unit("Gain", f"{known['y']}/{known['u']}" if {"u", "y"} <= known.keys() else ""))
-        lower.set(xlabel=in_unit("Amplitude", known.get("u", "")), ylabel="Phase [degrees]")
+        upper.set_ylabel(in_unit("Gain", f"{labels['y']}/{labels['u']}" if {"u", "y"} <= labels.keys() else ""))
+        lower.set(xlabel=in_unit("Amplitude", labels.get("u", "")), ylabel="Phase [degrees]")
         if len(laws) > 1:
             upper.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4)
     return np.array([upper, lower])

@@ -77,9 +77,8 @@ def units_of(*results: Any) -> dict[str, str]:
 def loop(*results: InputOutput, ax: Axes | None = None) -> Axes:
     """Draw outputs against inputs, over each other.
 
-    Each of `results` is a Record, a Simulation or anything with arrays `u` and `y` of one length. A record is drawn as
-    points, anything else as a line with an arrow on its last loading and unloading branch. A ValueError is raised if
-    there is no result.
+    Each of `results` is a Record, drawn as points, a Simulation or anything with arrays `u` and `y`, drawn as a line
+    with an arrow on its last loading and unloading branch. Without a result a ValueError is raised.
 
     Examples
     --------
@@ -109,10 +108,9 @@ def loop(*results: InputOutput, ax: Axes | None = None) -> Axes:
 def history(result: InputOutput, axes: Sequence[Axes] | AxesArray | None = None, *, hold: str = "zoh") -> AxesArray:
     """Draw output, input and, if there is one, memory against time, one over the other.
 
-    `result` is a Record, whose output is drawn as points, a Simulation or anything with arrays `u` and `y`; without
-    times they are drawn against the sample's number. With two `axes` the memory z is left out. `hold` is ``"zoh"``,
-    which draws the input as steps, or ``"foh"``, straight lines between samples; another word is a ValueError. The
-    result has shape (2,) or (3,).
+    `result` is a Record, a Simulation or anything with arrays `u` and `y`; without times they are drawn against the
+    sample's number. With two `axes` the memory z is left out. `hold` is ``"zoh"``, which draws the input as steps, or
+    ``"foh"``, straight lines; another word is a ValueError. The result has shape (2,) or (3,).
 
     Examples
     --------

@@ -83,8 +83,8 @@ def quantile_bands(result: Sweep, parameter: str, output: str, ax: Axes | None =
     >>> hs.plot.quantile_bands(result, "a", "y", ax=hs.plot.figure().add_subplot()).get_ylabel()
     'y'
     """
-    known = np.isfinite(result[output])
-    x, y = np.asarray(result[parameter], dtype=float)[known], result[output][known]
+    finite = np.isfinite(result[output])
+    x, y = np.asarray(result[parameter], dtype=float)[finite], result[output][finite]
     order = np.argsort(x, kind="stable")
     distinct = np.unique(x)
     if distinct.size <= slices:
@@ -113,8 +113,8 @@ def parallel_coordinates(result: Sweep, output: str, ax: Axes | None = None) -> 
     >>> len(hs.plot.parallel_coordinates(result, "y", ax=hs.plot.figure().add_subplot()).lines)
     6
     """
-    known = np.flatnonzero(np.isfinite(result[output]))
-    order = known[np.argsort(result[output][known], kind="stable")]
+    finite = np.flatnonzero(np.isfinite(result[output]))
+    order = finite[np.argsort(result[output][finite], kind="stable")]
     names = [*result.parameters]
     heights = np.transpose([_scaled(result[name]) for name in names])
     colours = colormaps[_COLOURS](_scaled(result[output][order]))
@@ -127,8 +127,8 @@ def parallel_coordinates(result: Sweep, output: str, ax: Axes | None = None) -> 
 
 
 def _median(values: FloatArray) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.median(known)) if known.size else float("nan")
+    finite = values[np.isfinite(values)]
+    return float(np.median(finite)) if finite.size else float("nan")
 
 
 def _scaled(values: FloatArray) -> FloatArray:

@@ -70,13 +70,13 @@ def _singly(task: Task, chunk: Chunk) -> Outcome:
         except Exception as error:
             errors[place] = _message(error)
         else:
-            places, kept = rows.setdefault(layout, ([], []))
+            places, outputs = rows.setdefault(layout, ([], []))
             places.append(place)
-            kept.append(row)
+            outputs.append(row)
         seconds.append(clock() - begin)
     groups = tuple(
-        Group(layout, np.array(places), tuple(_plain(np.array(column)) for column in zip(*kept, strict=True)))
-        for layout, (places, kept) in rows.items()
+        Group(layout, np.array(places), tuple(_plain(np.array(column)) for column in zip(*outputs, strict=True)))
+        for layout, (places, outputs) in rows.items()
     )
     return Outcome(chunk.places, groups, errors, np.array(seconds))
 

@@ -8,6 +8,7 @@ from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
+from hysim._frozen import check_count
 from hysim._parallel import cores, processes, threads
 from hysim.sweeps._chunks import Chunk, Outcome, Task, computed
 
@@ -36,8 +37,8 @@ class Workers(NamedTuple):
 @contextmanager
 def workers_of(executor: Any, number: int | None, task: Task) -> Iterator[Workers]:
     """The workers that the argument `executor` of `sweep` stands for; own threads and processes end with the block."""
-    if number is not None and (isinstance(number, bool) or not isinstance(number, int) or number < 1):
-        raise ValueError(f"workers must be an integer of at least 1, got {number!r}")
+    if number is not None:
+        check_count("workers", number)
     if executor in (None, "threads"):
         with threads(number or cores()) as pool:
             yield Workers(lambda chunk: pool.submit(computed, task, chunk), lambda: number or cores())

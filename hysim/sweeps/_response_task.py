@@ -7,7 +7,7 @@ from typing import Any, Literal, Protocol, get_args, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, checked, items, read_only
+from hysim._frozen import FloatArray, check_choice, checked, items, vectors
 
 Measure = Literal["rmse", "sse", "max_width", "area", "final", "response"]
 _WITH_TARGET = ("rmse", "sse")
@@ -57,8 +57,8 @@ def response_task(
     y : array, shape (n,), optional
         Output to compare the response with, for ``"rmse"`` and ``"sse"``.
     measure : {"rmse", "sse", "max_width", "area", "final", "response"}
-        Root of the mean, or sum, of the squared differences from `y`; a measure of `loop_metrics` (last complete
-        cycle); the last sample; or the response itself as an array. It is inf for a law that diverges.
+        Root of the mean, or sum, of the squared differences from `y`; a measure of `loop_metrics`; the last sample; or
+        the response itself as an array. It is inf for a law that diverges.
 
     Returns
     -------
@@ -81,8 +81,7 @@ def response_task(
     >>> len(result), result["rmse"].shape
     (6, (6,))
     """
-    if measure not in get_args(Measure):
-        raise ValueError(f"measure must be one of {', '.join(get_args(Measure))}, got {measure!r}")
+    check_choice("measure", measure, get_args(Measure))
     family = law if isinstance(law, type) else type(law)
     reduces = isinstance(family, _ComputesMany) and "reduce" in inspect.signature(family.responses).parameters
     if not (isinstance(family, _ComputesMany) and (reduces or measure == "response")):
@@ -90,8 +89,5 @@ def response_task(
     if (measure in _WITH_TARGET) != (y is not None):
         raise ValueError(f"y is needed for the measures {' and '.join(_WITH_TARGET)}, and for no other")
     fixed = {} if isinstance(law, type) else items(law)
-    inputs = read_only(u, "u", ndim=1)
-    target = None if y is None else read_only(y, "y", ndim=1)
-    if target is not None and target.size != inputs.size:
-        raise ValueError(f"u and y must have equal lengths, got {inputs.size} and {target.size}")
-    return ResponseTask(family=family, fixed=fixed, u=inputs, y=target, measure=measure)
+    inputs, *target = vectors(u=u) if y is None else vectors(u=u, y=y)
+    return ResponseTask(family=family, fixed=fixed, u=inputs, y=target[0] if target else None, measure=measure)

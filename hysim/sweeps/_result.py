@@ -1,8 +1,5 @@
 """The result of `sweep`: a table with one row for each task."""
 
-import csv
-import importlib
-import io
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen
-from hysim._printing import printed, summary_text
+from hysim._printing import csv_text, printed, summary_text
+from hysim._versions import optional
 from hysim.sweeps._seeds import seeds
 from hysim.sweeps._space import Column
 from hysim.sweeps._store import opened
@@ -84,16 +82,12 @@ class Sweep:
 
     def to_csv(self) -> str:
         """The columns as comma-separated values, every digit kept; arrays are left out."""
-        buffer = io.StringIO()
-        writer = csv.writer(buffer, lineterminator="\n")
-        writer.writerow(["task", *self.columns])
-        values = [self.task, *self.columns.values()]
-        writer.writerows(zip(*(column.tolist() for column in values), strict=True))
-        return buffer.getvalue()
+        columns = {"task": self.task, **self.columns}
+        return csv_text([columns, *zip(*(column.tolist() for column in columns.values()), strict=True)], nan="nan")
 
     def to_frame(self) -> Any:
         """The columns as a `pandas.DataFrame` with the tasks as index, without arrays; ImportError without pandas."""
-        pandas = _installed("pandas", "to_frame")
+        pandas = optional("pandas", "to_frame", "tables")
         return pandas.DataFrame(self.columns, index=pandas.Index(self.task, name="task"))
 
     def to_xarray(self) -> Any:
@@ -101,7 +95,7 @@ class Sweep:
 
         Further axes of an output `name` are called ``name_0``, ``name_1``; values are nan where there is no row.
         """
-        xarray = _installed("xarray", "to_xarray")
+        xarray = optional("xarray", "to_xarray", "tables")
         own = {"seed": self.seed, "seconds": self.seconds, "error": self.error}
         if self.axes is None:
             dims: tuple[str, ...] = ("task",)
@@ -121,10 +115,10 @@ class Sweep:
         for message, number in Counter(self.errors.values()).most_common(5):
             lines.append(f"  {number} x {message}")
         for name, values in self.outputs.items():
-            known = values[np.isfinite(values)]
-            if known.size:
-                low, middle, high = np.quantile(known, [0.0, 0.5, 1.0])
-                lines.append(f"{name}: {low:.4g} to {high:.4g}, median {middle:.4g}, {n - known.size} not finite")
+            finite = values[np.isfinite(values)]
+            if finite.size:
+                low, middle, high = np.quantile(finite, [0.0, 0.5, 1.0])
+                lines.append(f"{name}: {low:.4g} to {high:.4g}, median {middle:.4g}, {n - finite.size} not finite")
         return "\n".join(lines)
 
     def _along_axes(self, values: Column) -> Column:
@@ -135,13 +129,6 @@ class Sweep:
         every = np.full((self.n_tasks, *values.shape[1:]), missing, dtype=values.dtype)
         every[self.task] = values
         return every.reshape(*shape, *values.shape[1:])
-
-
-def _installed(library: str, method: str) -> Any:
-    try:
-        return importlib.import_module(library)
-    except ImportError:
-        raise ImportError(f"{method} needs {library}: pip install 'hysim[tables]'") from None
 
 
 def load_sweep(path: str | Path) -> Sweep:

@@ -4,9 +4,8 @@ Task k has the seed of ``numpy.random.SeedSequence(seed).spawn(n)[k]``,
 
     SeedSequence(seed, spawn_key=(k,)).generate_state(1, np.uint64) >> 1.
 
-NumPy needs 10 us for each. Here they are computed for all tasks at once: NumPy's pool of four words is mixed with the
-words of `seed` first, which all tasks share, and with k last (M. E. O'Neill's ``seed_seq_fe``, which NumPy keeps
-stable). One bit is dropped because SQL has no unsigned integers.
+NumPy needs 10 us for each; here they are computed for all tasks at once by its algorithm, M. E. O'Neill's
+``seed_seq_fe``, which NumPy keeps stable. One bit is dropped because SQL has no unsigned integers.
 """
 
 from typing import Any

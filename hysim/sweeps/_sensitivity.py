@@ -73,7 +73,7 @@ def sobol_indices(result: Sweep, *, seed: int = 0) -> SobolIndices:
     Raises
     ------
     ValueError
-        If the study has another sample, tasks are missing or have failed, or an output is not finite or constant.
+        If the sample is another one, a task is missing or failed, or an output is not finite or constant.
 
     Examples
     --------

@@ -7,7 +7,7 @@ from typing import Any, Literal, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, frozen
+from hysim._frozen import FloatArray, check_choice, check_count, frozen
 
 Column = npt.NDArray[Any]
 """Values of one parameter, shape (n_tasks,): float64, int64, bool or strings."""
@@ -51,10 +51,9 @@ class Sample:
         Name of a parameter to its distribution: one of `scipy.stats` with its arguments, such as
         ``scipy.stats.norm(1.0, 0.1)``, or a pair ``(low, high)`` for a uniform one.
     n : int
-        Number of tasks; for ``"sobol"`` a power of 2. For ``"saltelli"`` a power of 2 too, and there are n (d + 2)
-        tasks for d parameters.
+        Number of tasks; a power of 2, except for a Latin hypercube. ``"saltelli"`` has n (d + 2) for d parameters.
     method : {"sobol", "latin_hypercube", "saltelli"}
-        Scrambled Sobol sequence, or Latin hypercube, both of `scipy.stats.qmc`; or the sample for `sobol_indices`.
+        Scrambled Sobol sequence or Latin hypercube of `scipy.stats.qmc`; or the sample for `sobol_indices`.
     seed : int
         Seed of the sample. The tasks' own seeds come from the seed of `sweep`.
 
@@ -83,10 +82,8 @@ class Sample:
     def __post_init__(self) -> None:
         if not self.distributions:
             raise ValueError("a sample needs at least one distribution")
-        if isinstance(self.n, bool) or not isinstance(self.n, int) or self.n < 1:
-            raise ValueError(f"n must be an integer of at least 1, got {self.n!r}")
-        if self.method not in _DESIGNS:
-            raise ValueError(f"method must be one of {', '.join(_DESIGNS)}, got {self.method!r}")
+        check_count("n", self.n)
+        check_choice("method", self.method, _DESIGNS)
         if self.method != "latin_hypercube" and self.n & (self.n - 1):
             above = 1 << self.n.bit_length()
             raise ValueError(

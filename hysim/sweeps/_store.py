@@ -4,9 +4,9 @@
     results    task, seed, seconds, error, shard; then the parameters, then the outputs that are numbers
 
 Rows are written in transactions. The arrays of a transaction are in one file, a shard, which is complete before the
-transaction begins. Its name begins with digits of the study: no other file in the folder is ever changed, and none
-outside it read. Columns have no declared type, which would cost zeros their sign; an output that is nan is NULL in a
-row without an error. Between transactions the writer holds SQLite's lock for writing: others may read, not write.
+transaction begins. Shards begin with digits of the study: other files in the folder are never changed, and files
+outside it never read. Columns have no declared type, since zeros would lose their sign; nan is NULL in a row without an
+error. Between transactions the writer keeps SQLite's lock for writing: others may read, not write.
 """
 
 import errno
@@ -15,7 +15,8 @@ import re
 import secrets
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
+from itertools import chain, count
 from pathlib import Path
 from typing import Any, Literal
 
@@ -130,35 +131,20 @@ class Store:
         outputs = [output.column for output in self._study.layout or () if not output.shape]
         shard = self._write_shard(outcomes)
         for outcome in outcomes:
-            for group in outcome.groups:
-                numbers = [column for (_, shape), column in zip(group.layout, group.columns, strict=True) if not shape]
-                self._insert(outcome, group.places, shard, [*names, *outputs], numbers)
-            self._insert(outcome, np.array([*outcome.errors], dtype=np.int64), None, names, [])
-
-    def _insert(
-        self,
-        outcome: Outcome,
-        places: npt.NDArray[np.int64],
-        shard: str | None,
-        names: list[str],
-        outputs: list[FloatArray],
-    ) -> None:
-        seconds = dict(zip(outcome.places.tolist(), outcome.seconds.tolist(), strict=True))
-        keys = places.tolist()
-        seeds, *parameters = (column[places].tolist() for column in self._tasks)
-        columns = [
-            keys,
-            seeds,
-            [seconds[place] for place in keys],
-            [outcome.errors.get(place) for place in keys],
-            [shard] * len(keys),
-            *parameters,
-            *(column.tolist() for column in outputs),
-        ]
-        self._database.executemany(
-            f"INSERT OR REPLACE INTO results ({_quoted(names)}) VALUES ({', '.join('?' * len(names))})",
-            zip(*columns, strict=True),
-        )
+            seconds = dict(zip(outcome.places.tolist(), outcome.seconds.tolist(), strict=True))
+            failed = Group((), np.array([*outcome.errors], dtype=np.int64), ())
+            for group in (*outcome.groups, failed):
+                keys, numbers = group.places.tolist(), zip(group.layout, group.columns, strict=True)
+                seeds, *parameters = (column[group.places].tolist() for column in self._tasks)
+                own = (
+                    keys, seeds, [seconds[key] for key in keys], [outcome.errors.get(key) for key in keys],
+                    [shard if group.layout else None] * len(keys),
+                )  # fmt: skip
+                columns = [*own, *parameters, *(column.tolist() for (_, shape), column in numbers if not shape)]
+                filled = _quoted([*names, *(outputs if group.layout else [])])
+                places = ", ".join("?" * len(columns))
+                rows = zip(*columns, strict=True)
+                self._database.executemany(f"INSERT OR REPLACE INTO results ({filled}) VALUES ({places})", rows)
 
     @property
     def _study(self) -> Study:
@@ -197,25 +183,18 @@ class Store:
         )
 
     def _create(self, identity: Mapping[str, str], space: Space, before: Study | None) -> None:
-        if before is not None:
-            self._database.execute("DROP TABLE results")
-            self._database.execute("DROP TABLE study")
+        for table in ("results", "study") if before is not None else ():
+            self._database.execute(f"DROP TABLE {table}")
         parameters = _distinct(space.columns, _OWN_COLUMNS)
         self._database.execute("CREATE TABLE study (name TEXT PRIMARY KEY, value TEXT)")
         self._database.execute(
             "CREATE TABLE results (task INTEGER PRIMARY KEY, seed INTEGER, seconds, error TEXT, shard TEXT, "
             f"{_quoted(parameters.values())})"
         )
+        kinds = {name: column.dtype.kind for name, column in space.columns.items()}
+        axes = tuple((name, values.tolist()) for name, values in (space.axes or {}).items()) or None
         self._remember(
-            Study(
-                identity=identity,
-                n_tasks=space.n_tasks,
-                parameters=parameters,
-                kinds={name: column.dtype.kind for name, column in space.columns.items()},
-                axes=tuple((name, values.tolist()) for name, values in (space.axes or {}).items()) or None,
-                layout=None,
-                shards=secrets.token_hex(8),
-            )
+            Study(identity, space.n_tasks, parameters, kinds, axes, layout=None, shards=secrets.token_hex(8))
         )
 
     def _add_outputs(self, layout: Layout) -> None:
@@ -303,10 +282,10 @@ class Store:
 
     def _remove_shards_without_rows(self, study: Study) -> None:
         """Remove the shards of a study that no row names: their transaction failed, or the study was replaced."""
-        used = {*self._column("shard")}
+        shards = {*self._column("shard")}
         for path in self._folder.iterdir() if self._folder.is_dir() else ():
             name = re.sub(r"^\.(.*\.npz)\.[0-9a-f]{16}$", r"\1", path.name)  # without what the name has during writing
-            if self._is_shard(name, study) and path.name not in used:
+            if self._is_shard(name, study) and path.name not in shards:
                 path.unlink()
 
 
@@ -324,14 +303,10 @@ def opened(path: str | Path, *, to_read: bool = False) -> Iterator[Store]:
     path = Path(path)
     if to_read and not path.is_file():
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
-    with _built_in_errors(path):
-        database = _connected(path, "rw" if to_read else "rwc")
-        try:
-            if to_read:
-                database.execute("BEGIN")  # so that all rows are of one moment
-            yield Store(path, database)
-        finally:
-            database.close()  # which rolls back what is not committed
+    with _built_in_errors(path), closing(_connected(path, "rw" if to_read else "rwc")) as database:
+        if to_read:
+            database.execute("BEGIN")  # so that all rows are of one moment
+        yield Store(path, database)  # whose open transaction is rolled back in the end
 
 
 def _connected(path: Path, mode: str) -> sqlite3.Connection:
@@ -354,29 +329,21 @@ def _built_in_errors(path: Path) -> Iterator[None]:
 
 def _changes(before: Mapping[str, str], now: Mapping[str, str]) -> dict[str, str]:
     """Descriptions of the differences."""
-    words = {
-        name: f"the {name} was {before.get(name)} and is {value}"
-        for name, value in now.items()
-        if before.get(name) != value
-    }
-    if "task" in words:
-        words["task"] = "the task's source or a value bound to it has changed"
+    words = {name: f"the {name} was {before.get(name)} and is {value}" for name, value in now.items()}
+    words["task"] = "the task's source or a value bound to it has changed"
     tasks = now["space"].rpartition(" (")[0]  # without the digest of the values
-    if "space" in words and before.get("space", "").rpartition(" (")[0] == tasks:
+    if before.get("space", "").rpartition(" (")[0] == tasks:
         words["space"] = f"other values of the parameters ({tasks}, as before)"
-    return words
+    return {name: text for name, text in words.items() if before.get(name) != now[name]}
 
 
 def _distinct(names: Iterable[str], taken: tuple[str, ...]) -> dict[str, str]:
     """Names of columns that differ in SQL, where A equals a."""
     used, columns = {name.lower() for name in taken}, {}
     for name in names:
-        column, k = name, 1
-        while column.lower() in used:
-            k += 1
-            column = f"{name}_{k}"
-        used.add(column.lower())
-        columns[name] = column
+        numbered = chain([name], (f"{name}_{k}" for k in count(2)))
+        columns[name] = next(column for column in numbered if column.lower() not in used)
+        used.add(columns[name].lower())
     return columns
 
 

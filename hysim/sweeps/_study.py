@@ -1,4 +1,4 @@
-"""The facts of a study, checked when they are read from a store, which may be damaged.
+"""The facts of a study, which are checked when they are read from a store.
 
 identity     name to text, which must be equal for two studies to be the same
 n_tasks      number of tasks
@@ -64,15 +64,10 @@ class Study(NamedTuple):
 def study_of(rows: Mapping[str, Any]) -> Study:
     """The study in the rows of a store; any of `_DAMAGE` if they are damaged."""
     facts = {name: json.loads(text) for name, text in rows.items()}
-    study = Study(
-        identity=_texts(facts["identity"]),
-        n_tasks=_number(facts["n_tasks"]),
-        parameters=_texts(facts["parameters"]),
-        kinds=_texts(facts["kinds"]),
-        axes=None if facts["axes"] is None else tuple((_of(str, name), _of(list, v)) for name, v in facts["axes"]),
-        layout=tuple(_output(*each) for each in _of(list, facts["layout"])) if "layout" in facts else None,
-        shards=_of(str, facts["shards"]),
-    )
+    identity, parameters, kinds = (_texts(facts[name]) for name in ("identity", "parameters", "kinds"))
+    axes = None if facts["axes"] is None else tuple((_of(str, name), _of(list, v)) for name, v in facts["axes"])
+    layout = tuple(_output(*each) for each in _of(list, facts["layout"])) if "layout" in facts else None
+    study = Study(identity, _number(facts["n_tasks"]), parameters, kinds, axes, layout, _of(str, facts["shards"]))
     int(study.identity["seed"])
     if study.layout == ():
         raise ValueError("the layout has no output")

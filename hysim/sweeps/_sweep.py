@@ -1,9 +1,8 @@
-"""The verb `sweep`: one function over many parameters, on whatever computes, and resumable.
+"""The verb `sweep`: one function over many parameters, on threads, processes or a cluster, and resumable.
 
-A chunk is a number of tasks that are sent together. The first chunk is one task; chunks grow at most fourfold from
-one finished chunk to the next, until one takes `_CHUNK`, so that sending, about a millisecond, costs little; at the
-end they shrink so that all workers end together. Finished chunks are written before they are reported. No result
-depends on how the tasks were divided.
+Tasks are sent in chunks. The first chunk is one task; chunks grow at most fourfold, until one takes `_CHUNK`, so that
+sending, about a millisecond, costs little; at the end they shrink so that all workers end together. Finished chunks are
+written before they are reported. No result depends on the division into chunks.
 """
 
 import inspect
@@ -16,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from hysim._frozen import check_choice
 from hysim._parallel import GLANCE, Progress
 from hysim.sweeps._chunks import Chunk, Outcome, part_of
 from hysim.sweeps._executors import Workers, workers_of
@@ -56,35 +56,32 @@ def sweep(
         Names to sequences of values, of which all combinations are computed, the last name changing fastest; or
         one mapping of names to values for each task; or a sample of distributions.
     executor : {"threads", "processes"}, Executor or dask client, optional
-        Threads by default, which suit tasks that spend their time in kernels; or any `concurrent.futures.Executor` or
-        `distributed.Client`.
+        Threads by default; or any `concurrent.futures.Executor` or `distributed.Client`.
     workers : int, optional
-        Number of threads or processes, by default one for each core; or number of chunks that an executor of unknown
-        size computes at a time.
+        Number of threads or processes, by default one for each core; for an executor of unknown size, the number of
+        chunks that it computes at a time.
     store : path, optional
-        File to keep finished rows in. A second call with the same study computes only the missing ones.
+        File for the finished rows. A second call with the same study computes only the missing ones.
     seed : int
         Seed of the study. Task k gets its own seed from this one and k: an integer for `numpy.random.default_rng`.
     on_change : {"error", "keep", "restart"}
-        If the store holds a study with another task, space or seed, or of another version of hysim: raise; keep the
-        finished rows if space and seed are the same; or start again.
+        If the store holds a study with another task, space, seed or version of hysim: raise; keep the finished rows if
+        space and seed are the same; or start again.
     progress : callable, optional
         Called as ``progress(done, total)`` when rows are finished and written.
 
     Returns
     -------
     Sweep
-        Apart from the seconds the same bits with every executor. A task that raises, or returns other names or shapes
-        than the first that succeeded, is a row with its error.
+        The same bits with every executor, apart from the seconds. The row of a task that raises, or returns other names
+        or shapes than the first that succeeded, holds its error.
 
     Raises
     ------
-    TypeError
-        If the task does not take the parameters, or an argument is of the wrong kind.
-    ValueError
-        If there is no task, a name or a value cannot be used, or the store holds another study.
+    TypeError, ValueError
+        If the task does not take the parameters, an argument is wrong, or the store holds another study.
     OSError
-        If the store is locked, read-only or full, or the executor fails. Reported rows are kept.
+        If the store is locked, read-only or full, or the executor fails. Reported rows are not lost.
 
     Examples
     --------
@@ -96,8 +93,7 @@ def sweep(
     >>> result["width"].round(3).tolist()
     [0.337, 0.299, 0.264, 0.509, 0.442, 0.378]
     """
-    if on_change not in ON_CHANGE:
-        raise ValueError(f"on_change must be one of {', '.join(ON_CHANGE)}, got {on_change!r}")
+    check_choice("on_change", on_change, ON_CHANGE)
     tasks = space_of(space)
     takes_seed = _takes_seed(task, tasks)
     task_seeds = seeds(seed, np.arange(tasks.n_tasks))
@@ -191,7 +187,7 @@ class _Run:
         outcomes, lost = {}, None
         for future in list(self.running):
             if future.done() and not future.cancelled() and future.exception() is None:
-                outcomes[future] = self.table.judged(future.result())
+                outcomes[future] = self.table.judge(future.result())
                 continue
             if future.done():
                 lost = future

@@ -24,20 +24,20 @@ class Table:
         self.done = np.zeros(n_tasks, dtype=bool)
         self._other_names = (*OWN_NAMES, *parameters)
 
-    def judged(self, outcome: Outcome) -> Outcome:
+    def judge(self, outcome: Outcome) -> Outcome:
         """The outcome with the values of the study's layout, and an error for every task that returned another.
 
         Until a task has succeeded, outcomes must be passed in the order of their places.
         """
         if self.layout is None and outcome.groups:
             self.begin(min(outcome.groups, key=lambda group: int(group.places.min())).layout)
-        errors, kept = dict(outcome.errors), []
+        errors, groups = dict(outcome.errors), []
         for group in outcome.groups:
             if dict(group.layout) == dict(self.layout or ()):
-                kept.append(self._in_order(group))
+                groups.append(self._in_order(group))
             else:
                 errors |= dict.fromkeys(group.places.tolist(), self._mismatch(group.layout))
-        return outcome._replace(groups=tuple(kept), errors=errors)
+        return outcome._replace(groups=tuple(groups), errors=errors)
 
     def begin(self, layout: Layout) -> None:
         """Set the layout of the study; ValueError if an output has the name of another column."""
@@ -54,7 +54,7 @@ class Table:
         self.enter(outcome)
 
     def enter(self, outcome: Outcome) -> None:
-        """Enter an outcome of `judged`."""
+        """Enter an outcome of `judge`."""
         for group in outcome.groups:
             for (name, _), column in zip(group.layout, group.columns, strict=True):
                 self.values[name][group.places] = column

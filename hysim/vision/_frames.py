@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import frozen
+from hysim._versions import optional
 
 Picture = npt.NDArray[np.float32]
 
@@ -140,17 +141,9 @@ def _natural(path: Path) -> list[tuple[int, int | str]]:
     return [(0, int(part)) if part.isdigit() else (1, part) for part in re.split(r"(\d+)", path.name.lower()) if part]
 
 
-def _imageio() -> Any:
-    try:
-        import imageio.v3
-    except ImportError:
-        raise ImportError("reading frames needs imageio: pip install 'hysim[vision]'") from None
-    return imageio.v3
-
-
 def _count(file: Path) -> int | None:
     """Number of frames in a file, None if unknown; an error if the content does not suit the ending of the name."""
-    library, reader = _imageio(), _READERS[file.suffix.lower()]
+    library, reader = optional("imageio.v3", "reading frames", "vision"), _READERS[file.suffix.lower()]
     if reader == "pillow":
         return 1
     with _reading(file), library.imopen(file, "r", plugin=reader) as opened:
@@ -159,7 +152,7 @@ def _count(file: Path) -> int | None:
 
 
 def _frames_of(file: Path, expected: int | None) -> Iterator[npt.NDArray[Any]]:
-    library, reader = _imageio(), _READERS[file.suffix.lower()]
+    library, reader = optional("imageio.v3", "reading frames", "vision"), _READERS[file.suffix.lower()]
     k = 0
     with _reading(file), library.imopen(file, "r", plugin=reader) as opened:
         for frame in _opened(opened, reader):
