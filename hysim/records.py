@@ -150,10 +150,6 @@ class Record:
         """Branches on which the input rises or falls, in the order of time; none if the input is constant.
 
         A plateau between two branches is divided in its middle; the sample in the very middle, and a reversal without a
-<<<<<<< ours
-        plateau, belong to both. Reversals within the `tolerance`, as in `reversals`, do not end a branch; at the ends
-        of the record they are left out.
-=======
         plateau, belong to both.
 
         Parameters
@@ -164,7 +160,7 @@ class Record:
         Returns
         -------
         tuple of Record
->>>>>>> theirs
+
 
         Examples
         --------
