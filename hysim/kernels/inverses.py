@@ -97,10 +97,12 @@ def plays(parameters: FloatArray, state: FloatArray, y: float) -> float:
 
 
 @inlined
-def _tried(step: Step, parameters: FloatArray, state: FloatArray, trial: FloatArray, u: float) -> float:
-    """Output at `u`; the state does not change."""
+def _rise(
+    step: Step, parameters: FloatArray, state: FloatArray, trial: FloatArray, u: float, side: float, level: float
+) -> float:
+    """Output at `u` less `level`, counted positive on one side of it; the state does not change."""
     trial[:] = state
-    return step(parameters, trial, u)
+    return side * (step(parameters, trial, u) - level)
 
 
 @inlined
@@ -136,7 +138,7 @@ def _bracket(
     high, too_far = min(guess, 0.5 * limit), limit
     high_error = math.nan
     for _ in range(_DOUBLINGS):
-        high_error = side * (_tried(step, parameters, state, trial, here + direction * high) - wanted)
+        high_error = _rise(step, parameters, state, trial, here + direction * high, side, wanted)
         if 0.0 <= high_error < math.inf:
             return low, low_error, high, high_error
         rises = -math.inf < high_error < 0.0 and high_error >= low_error - noise
@@ -176,7 +178,7 @@ def _closed_in(
             length = 0.5 * (low + high)
         if high_error == 0.0 or not _apart(here, direction, low, length, high):
             break
-        error = side * (_tried(step, parameters, state, trial, here + direction * length) - wanted)
+        error = _rise(step, parameters, state, trial, here + direction * length, side, wanted)
         if error < 0.0:
             low, low_error = length, error
             high_error *= 0.5 if last_side < 0 else 1.0
@@ -205,7 +207,7 @@ def _turn(
     before = 0.0
     for i in range(1, _POINTS + 1):
         part = length * i / _POINTS
-        rise = side * (_tried(step, parameters, state, trial, here + direction * part) - reached)
+        rise = _rise(step, parameters, state, trial, here + direction * part, side, reached)
         if not rise > before - noise:
             return part
         before = rise
@@ -231,9 +233,7 @@ def _falls_back(
     """
     near, noise, known = _NEAR, 0.0, False
     while near > _NEAREST:
-        back = side * (
-            _tried(step, parameters, state, trial, here - direction * (near * largest / steepness)) - reached
-        )
+        back = _rise(step, parameters, state, trial, here - direction * (near * largest / steepness), side, reached)
         if back < -noise and math.isfinite(back):
             return True
         known = known or math.isfinite(back)

@@ -31,22 +31,32 @@ def exponentials(matrices: FloatArray, out: FloatArray) -> None:
     their digits beside fast ones. A matrix that is not finite gives nan, one that overflows infinities or nan.
     """
     m = matrices.shape[1]
-    product = np.empty((m, m))
+    scaled, product = np.empty((m, m)), np.empty((m, m))
     for i in range(len(matrices)):
-        norm = np.abs(matrices[i]).sum()
+        norm, less_one = 0.0, out[i]
+        for row in range(m):
+            for column in range(m):
+                norm += abs(matrices[i, row, column])
         if not norm < math.inf:
-            out[i] = math.nan
+            for row in range(m):
+                for column in range(m):
+                    less_one[row, column] = math.nan
             continue
         squarings = max(0, math.ceil(math.log2(norm)) + 1) if norm > 0.0 else 0
-        scaled = matrices[i] * 0.5**squarings
-        less_one = out[i]
-        less_one[:] = 0.0
+        for row in range(m):
+            for column in range(m):
+                scaled[row, column] = matrices[i, row, column] * 0.5**squarings
+                less_one[row, column] = 0.0
         for k in range(_N_TERMS, 0, -1):
             multiply(scaled, less_one, product)
-            less_one[:] = (scaled + product) / k
+            for row in range(m):
+                for column in range(m):
+                    less_one[row, column] = (scaled[row, column] + product[row, column]) / k
         for _ in range(squarings):
             multiply(less_one, less_one, product)
-            less_one[:] = 2.0 * less_one + product
+            for row in range(m):
+                for column in range(m):
+                    less_one[row, column] = 2.0 * less_one[row, column] + product[row, column]
         for row in range(m):
             less_one[row, row] += 1.0
 
