@@ -26,21 +26,27 @@ hypothesis.settings.register_profile("hysim", deadline=None, derandomize=True, m
 hypothesis.settings.load_profile("hysim")
 
 
-def pytest_configure(config):
-    """Know the mark of pytest-xdist without it."""
-    config.addinivalue_line("markers", "xdist_group(name): tests that run in one worker")
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Divide the tests among the workers, whatever ``--dist`` says: pytest 9.2 does not see the groups of loadgroup.
 
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
-    """Skip tests that need missing packages, and divide the tests for ``--dist loadgroup``.
-
-    The tests of a file run in one worker, because they share fixtures; the experiments and the pages of the
-    documentation, which take seconds each, are divided one by one.
+    The tests of a file run in one worker, because they share fixtures and kernels; the experiments and the pages of
+    the documentation, which take seconds each, are divided one by one. Short files come last and even out the ends.
     """
+    from xdist.scheduler import LoadScopeScheduling
+
+    class Files(LoadScopeScheduling):
+        def _split_scope(self, nodeid):
+            file = nodeid.partition("::")[0]
+            return nodeid if file.endswith(("test_experiments.py", "test_docs.py")) else file
+
+    config.option.loadscopereorder = False  # which would put files of many tests before those of long ones
+    return Files(config, log)
+
+
+def pytest_collection_modifyitems(items):
+    """Skip tests that need missing packages."""
     for item in items:
-        if item.path.name not in ("test_experiments.py", "test_docs.py"):
-            item.add_marker(pytest.mark.xdist_group(str(item.path)))
         wanted = {package for mark in item.iter_markers("extra") for package in mark.args}
         if missing := sorted(package for package in wanted if find_spec(package) is None):
             item.add_marker(pytest.mark.skip(reason=f"needs {', '.join(missing)}"))
