@@ -2,6 +2,7 @@
 
 import contextlib
 import hashlib
+import importlib
 import os
 import pickle
 import sqlite3
@@ -42,6 +43,24 @@ def pytest_xdist_make_scheduler(config, log):
 
     config.option.loadscopereorder = False  # which would put files of many tests before those of long ones
     return Files(config, log)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection(session):
+    """Load kernels and tests in every second worker from the last to the first, when the whole suite is collected.
+
+    All workers load all of them, and what is compiled while they are loaded comes from a cache where another worker
+    has compiled it. From both ends each compiles a half; in the same order all would compile everything.
+    """
+    number = os.environ.get("PYTEST_XDIST_WORKER", "").removeprefix("gw")
+    if number.isdigit() and session.config.args_source is session.config.ArgsSource.TESTPATHS:
+        step = -1 if int(number) % 2 else 1
+        for kernel in sorted((ROOT / "hysim" / "kernels").glob("[a-z]*.py"))[::step]:
+            importlib.import_module(f"hysim.kernels.{kernel.stem}")
+        if step < 0:
+            for file in sorted((ROOT / "tests").glob("test_*.py"), reverse=True):
+                with contextlib.suppress(Exception, pytest.skip.Exception):  # the collection reports them
+                    importlib.import_module(file.stem)
 
 
 def pytest_collection_modifyitems(items):
