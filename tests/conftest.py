@@ -110,8 +110,8 @@ def paper_study(reproduction):
 
 
 @pytest.fixture(scope="session")
-def discovered_table1():
+def discovered_table1(tmp_path_factory):
     """The law of Table 1, discovered once for all tests."""
     import hysim as hs
 
-    return hs.discover(hs.datasets.table1())
+    return once_for_all_processes(tmp_path_factory, "discovered_table1", lambda _: hs.discover(hs.datasets.table1()))
