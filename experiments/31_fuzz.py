@@ -35,7 +35,7 @@ from malformed_files import corrupt
 from results_folder import write_results
 
 RESULTS = Path(__file__).parent / "results" / "fuzz"
-N_CASES, N_SMOKE = 10_000, 300
+N_CASES, N_SMOKE = 10_000, 100
 SAMPLES = "t [s],u [V],y [um]\n0,0,0.0\n1,1,0.5\n2,2,1.5\n3,1,1.0\n4,0,0.2\n"
 STUDY = """seed = 1
 [response]

@@ -41,7 +41,7 @@ from results_folder import write_results
 from hysim.plot import Figure, figure
 
 RESULTS = Path(__file__).parent / "results" / "more_samples"
-N_CASES, N_SMOKE, BATCH = 10_000, 2, 100
+N_CASES, N_SMOKE, BATCH = 10_000, 1, 100
 LARGEST = 1e300  # a number that every JSON reader knows, in place of inf
 TIMED = "RateDependentPrandtlIshlinskii"
 NOT_IN_BATCHES = ("CustomLaw", "Line", "SingleValued", "Sum", "Cascade")

@@ -2,6 +2,7 @@
 
 import contextlib
 import hashlib
+import importlib
 import os
 import pickle
 import sqlite3
@@ -17,6 +18,9 @@ os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".numba_cache" / hashlib.sha
 os.environ.setdefault("MPLBACKEND", "agg")
 # Workers of the tests share the cores: threads of a BLAS that wait for each other would take most of the time.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# Some thirty tests start a Python of their own, which without bytecode would compile every module anew.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 import hypothesis  # noqa: E402  numba must not be imported before the cache folder is set
 import pytest  # noqa: E402
@@ -26,21 +30,45 @@ hypothesis.settings.register_profile("hysim", deadline=None, derandomize=True, m
 hypothesis.settings.load_profile("hysim")
 
 
-def pytest_configure(config):
-    """Know the mark of pytest-xdist without it."""
-    config.addinivalue_line("markers", "xdist_group(name): tests that run in one worker")
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Divide the tests among the workers, whatever ``--dist`` says: pytest 9.2 does not see the groups of loadgroup.
+
+    The tests of a file run in one worker, because they share fixtures and kernels; the experiments and the pages of
+    the documentation, which take seconds each, are divided one by one. Short files come last and even out the ends.
+    """
+    from xdist.scheduler import LoadScopeScheduling
+
+    class Files(LoadScopeScheduling):
+        def _split_scope(self, nodeid):
+            file = nodeid.partition("::")[0]
+            return nodeid if file.endswith(("test_experiments.py", "test_docs.py")) else file
+
+    config.option.loadscopereorder = False  # which would put files of many tests before those of long ones
+    return Files(config, log)
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
-    """Skip tests that need missing packages, and divide the tests for ``--dist loadgroup``.
+def pytest_collection(session):
+    """Load kernels and tests in every second worker from the last to the first, when the whole suite is collected.
 
-    The tests of a file run in one worker, because they share fixtures; the experiments and the pages of the
-    documentation, which take seconds each, are divided one by one.
+    All workers load all of them, and what is compiled while they are loaded comes from a cache where another worker
+    has compiled it. From both ends each compiles a half; in the same order all would compile everything.
     """
+    number = os.environ.get("PYTEST_XDIST_WORKER", "").removeprefix("gw")
+    if number.isdigit() and session.config.args_source is session.config.ArgsSource.TESTPATHS:
+        step = -1 if int(number) % 2 else 1
+        for kernel in sorted((ROOT / "hysim" / "kernels").glob("[a-z]*.py"))[::step]:
+            importlib.import_module(f"hysim.kernels.{kernel.stem}")
+        if step < 0:
+            for file in sorted((ROOT / "tests").glob("test_*.py"), reverse=True):
+                with contextlib.suppress(Exception, pytest.skip.Exception):  # the collection reports them
+                    importlib.import_module(file.stem)
+
+
+def pytest_collection_modifyitems(items):
+    """Skip tests that need missing packages."""
     for item in items:
-        if item.path.name not in ("test_experiments.py", "test_docs.py"):
-            item.add_marker(pytest.mark.xdist_group(str(item.path)))
         wanted = {package for mark in item.iter_markers("extra") for package in mark.args}
         if missing := sorted(package for package in wanted if find_spec(package) is None):
             item.add_marker(pytest.mark.skip(reason=f"needs {', '.join(missing)}"))
@@ -82,8 +110,8 @@ def paper_study(reproduction):
 
 
 @pytest.fixture(scope="session")
-def discovered_table1():
+def discovered_table1(tmp_path_factory):
     """The law of Table 1, discovered once for all tests."""
     import hysim as hs
 
-    return hs.discover(hs.datasets.table1())
+    return once_for_all_processes(tmp_path_factory, "discovered_table1", lambda _: hs.discover(hs.datasets.table1()))

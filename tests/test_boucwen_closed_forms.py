@@ -87,10 +87,14 @@ def test_symmetric_unit_loop_has_its_lambert_form():
 
 
 def travelled(z0: float, z1: float, A: float, c: float, n: float) -> float:
-    """Input from z0 to z1 on dz/du = A - c z^n, by 30-digit quadrature."""
+    """Input from z0 to z1 on dz/du = A - c z^n, which is z / A 2F1(1, 1/n; 1 + 1/n; c z^n / A), with 30 digits."""
     with mpmath.workdps(30):
-        points = mpmath.linspace(mpmath.mpf(z0), mpmath.mpf(z1), 9)
-        return float(mpmath.quad(lambda w: 1 / (A - c * w ** mpmath.mpf(n)), points))
+        power = mpmath.mpf(n)
+
+        def from_zero(z: float) -> mpmath.mpf:
+            return mpmath.mpf(z) / A * mpmath.hyp2f1(1, 1 / power, 1 + 1 / power, c * mpmath.mpf(z) ** power / A)
+
+        return float(from_zero(z1) - from_zero(z0))
 
 
 @pytest.mark.parametrize("n", [0.5, 0.7, 1.0, 1.0001, 1.5, 2.0, 2.0001, 3.3, 7.0, 20.0])

@@ -10,7 +10,7 @@ from discovered import DAHL, LAW, TRUTH, duhem, multisine, record_of, zigzag
 import hysim as hs
 from hysim import plot
 from hysim.cli import main
-from hysim.discovery._discover import discover
+from hysim.discovery import discover
 from hysim.discovery._oscillator_response import Oscillator, Response
 from hysim.discovery._oscillator_search import Search, _Fitted, _tried
 from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_terms, power_term

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import hysim as hs
+from hysim.identification import Candidate
 from hysim.identification._problem import problem
-from hysim.identification._result import Candidate
 from hysim.identification._searched import _phrases
 from hysim.identification._uncertainty import _named, uncertainty
 from hysim.identification.folds import left_out

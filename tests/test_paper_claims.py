@@ -9,18 +9,22 @@ import pytest
 import hysim as hs
 from hysim.paper import printed
 from hysim.paper.approximations import approximations
-from hysim.paper.claims import VERDICTS, Claim, claims
+from hysim.paper.claims import (
+    VERDICTS,
+    Claim,
+    claims,
+    controller_claims,
+    experiment_claims,
+    headline_claims,
+    hysteresis_claims,
+    introduction,
+    state_space_claims,
+    table1_claims,
+    vibration_claims,
+)
 from hysim.paper.claims import _controller as controller
 from hysim.paper.claims import _experiment as experiment
 from hysim.paper.claims._claim import MATERIAL, compared, cross_checked, decided, unseen
-from hysim.paper.claims._controller import controller_claims
-from hysim.paper.claims._experiment import experiment_claims
-from hysim.paper.claims._headline import headline_claims
-from hysim.paper.claims._hysteresis import hysteresis_claims
-from hysim.paper.claims._introduction import introduction
-from hysim.paper.claims._state_space import state_space_claims
-from hysim.paper.claims._table1 import table1_claims
-from hysim.paper.claims._vibration import vibration_claims
 from hysim.paper.claims.rounding import Spread, exactly, half_unit, spread, stands_for
 from hysim.paper.reidentification import information, time_units
 

@@ -11,8 +11,7 @@ from hysim.control import to_control
 from hysim.metrics import step_metrics
 from hysim.paper import approximations
 from hysim.paper.approximations import step_fit
-from hysim.paper.claims import _controller
-from hysim.paper.claims._controller import controller_claims
+from hysim.paper.claims import _controller, controller_claims
 from hysim.paper.equations import (
     EQUATION_1,
     EQUATION_4,
