@@ -183,10 +183,7 @@ def _normal_equations(
 
 
 def _solved(bands: FloatArray, goals: FloatArray, penalty: FloatArray) -> FloatArray:
-    """Coefficients for each block left out and each strength, (n_blocks, n_strengths, count).
-
-    All systems are solved as one: one after the other on the diagonal of a banded matrix.
-    """
+    """Coefficients for each block left out and each strength, (n_blocks, n_strengths, count)."""
     from scipy.linalg import solveh_banded
 
     systems = bands[:, np.newaxis] + _STRENGTHS[:, np.newaxis, np.newaxis] * penalty
@@ -197,10 +194,7 @@ def _solved(bands: FloatArray, goals: FloatArray, penalty: FloatArray) -> FloatA
 
 
 def _quadratic_form(bands: FloatArray, z: FloatArray) -> FloatArray:
-    """z^T M z for each row of `z` (m, count), M symmetric with these lower diagonals.
-
-    By diagonals and not as a product of matrices: threads of a linear algebra library cost more than they save here.
-    """
+    """z^T M z for each row of `z` (m, count), M symmetric with these lower diagonals."""
     total = z**2 @ bands[0]
     for k in range(1, 4):
         total += 2.0 * (z[:, k:] * z[:, :-k]) @ bands[k, :-k]

@@ -140,14 +140,7 @@ class CustomLaw(Law):
         return self.outputs_of(parameters, u).result(reduce, target, workers)
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box of the bounded parameters.
-
-        Raises
-        ------
-        ValueError
-            If the input is constant, `initial` is unknown, a name does not fit, or bounds are missing or not
-            finite.
-        """
+        """The box of the bounded parameters."""
         boxes = {**self.bounds, **freedom.bounds}
         searched = [
             Parameter(name, *boxes[name], log=boxes[name][0] > 0.0) for name in boxes if name not in self.linear

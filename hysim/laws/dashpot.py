@@ -81,13 +81,7 @@ class Dashpot(Identifiable, Composable):
         return self.c * (np.diff(inputs, prepend=before) / sample_time), float(inputs[-1])
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """Nothing to search: the output is linear in c.
-
-        Raises
-        ------
-        ValueError
-            If the record has no even time, its input is constant, or a name does not fit.
-        """
+        """Nothing to search: the output is linear in c."""
         if not record.sample_time or np.ptp(record.u) == 0.0:
             raise ValueError("the input is constant: nothing can be identified from it")
         return linear_space({"c": self.c}, freedom)

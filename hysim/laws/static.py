@@ -104,10 +104,7 @@ class SingleValued(Composable):
     def fitted(cls, u: FloatArray, y: FloatArray) -> DirectFit:
         """The smoothing spline of outputs `y` at inputs `u`, both of shape (n,).
 
-        Raises
-        ------
-        ValueError
-            If the input is constant.
+        Raises ValueError if the input is constant.
         """
         if np.ptp(u) == 0.0:
             raise ValueError("the input is constant: nothing can be identified from it")

@@ -57,13 +57,7 @@ class CascadeStructure(Identifiable, Composable):
         return next((k for k, stage in enumerate(self.stages) if isinstance(stage, LinearStructure)), 0)
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The stages' spaces side by side.
-
-        Raises
-        ------
-        ValueError
-            If a name is unknown, or as a stage's `search_space`.
-        """
+        """The stages' spaces side by side."""
         names = labels(self.stages)
         before = names[: self.carrier]
         spaces = declared(

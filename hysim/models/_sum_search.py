@@ -41,13 +41,7 @@ class SumStructure(Identifiable, Composable):
         object.__setattr__(self, "parts", parts)
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The parts' spaces side by side; of columns that repeat each other one is free.
-
-        Raises
-        ------
-        ValueError
-            If a name is unknown, or as a part's `search_space`.
-        """
+        """The parts' spaces side by side; of columns that repeat each other one is free."""
         found = self._identified
         spaces = declared(
             {label: lambda free, part=part: part.search_space(record, free) for label, part in found.items()},  # type: ignore[misc]
@@ -73,13 +67,7 @@ class SumStructure(Identifiable, Composable):
         return np.concatenate([*(block[..., :-1] for block in whole), last], axis=-1)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        """The parameters with the parts' states in the steady cycle of which `record` is one period or more.
-
-        Raises
-        ------
-        ValueError
-            If a part has a state whose steady cycle cannot be computed.
-        """
+        """The parameters with the parts' states in the steady cycle of which `record` is one period or more."""
         states: dict[str, Any] = {}
         for label, part in self._identified.items():
             if part.search_space(record).state:

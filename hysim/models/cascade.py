@@ -158,10 +158,7 @@ class Cascade(Composite):
     def compiled(self, u0: float = 0.0) -> CompiledLaw:
         """The cascade as compiled loops take it; the state is that of a first sample at the input `u0`.
 
-        Raises
-        ------
-        TypeError
-            If a stage is not a law that can be stepped.
+        Raises TypeError if a stage is not a law that can be stepped.
         """
         laws, level = [], u0
         for stage in self.stages:

@@ -30,10 +30,7 @@ def inverse_step(
     `y` is the output there, by default that of the step; `terms` is the size of the terms that it is the sum of, where
     they are larger: their rounding is the output's.
 
-    Raises
-    ------
-    ValueError
-        If the output does not rise or fall through `u`.
+    Raises ValueError if the output does not rise or fall through `u`.
     """
     trial = np.empty_like(forward.state)
 
@@ -55,10 +52,7 @@ def inverse_step(
 def inverse_response(inverse: CompiledLaw, y: FloatArray) -> FloatArray:
     """Inputs for the outputs `y`, whose inverse is stepped from where it stands.
 
-    Raises
-    ------
-    SimulationError
-        If an output has no input; it names the sample.
+    Raises SimulationError if an output has no input; it names the sample.
     """
     u = np.empty(y.size)
     with np.errstate(all="ignore"):  # a bracket may reach where a memory overflows
@@ -98,11 +92,7 @@ def first_input(law: Any, y: float) -> float:
 
 
 def _slope(output: Callable[[float], float], here: float) -> float:
-    """Slope of the output at the input `here`, zero where it does not rise or fall through it.
-
-    The law has a length of its own, on which its output may turn, and rounding hides shorter rises. So the slope is
-    that on the shortest length on which the output is linear on both sides.
-    """
+    """Slope of the output at the input `here`, zero where it does not rise or fall through it."""
     reached, fallback, highest = output(here), 0.0, 0.0
     reach = max(_SHORTEST * abs(here), _NEXT_TO_NOTHING)
     while reach < _REACH * (1.0 + abs(here)) or (highest < _HIDDEN * abs(reached) and reach < _FARTHEST):

@@ -374,10 +374,7 @@ class Law(Composable, ABC):
 
         One pass through the record contracts the memory; the fixed point is found by the secant method.
 
-        Raises
-        ------
-        ValueError
-            If an affine parameter moves the memory: it is not known yet where the others are searched.
+        Raises ValueError if an affine parameter moves the memory: it is not known yet where the others are searched.
         """
         names, u = self.initial_names, np.append(record.u, record.u[0])
         passed = self._one_pass(parameters, u)
@@ -401,10 +398,7 @@ class Law(Composable, ABC):
         return dict(zip(names, np.where(np.isfinite(z), z, np.nan).T, strict=True))
 
     def _one_pass(self, parameters: Parameters, u: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        """A function from the memory before the input `u` to that after it, (n_sets, n_memory).
-
-        It is nan where the law diverges.
-        """
+        """A function from the memory before the input `u` to that after it, (n_sets, n_memory)."""
         from hysim.kernels.memories import drive_to_end  # compiled where it is needed
 
         tables, inputs = tables_of(type(self).__name__, self.arguments, parameters, u)
@@ -532,12 +526,7 @@ def tables_of(
 
     A parameter is a field, or an element ``name[k]`` of a tuple.
 
-    Raises
-    ------
-    TypeError
-        If a name is unknown.
-    ValueError
-        If a value has too many axes, or lengths do not fit.
+    Raises TypeError if a name is unknown, and ValueError if a value has too many axes, or lengths do not fit.
     """
     inputs = np.atleast_2d(read_only(u, "u"))
     if inputs.ndim != 2:

@@ -154,10 +154,7 @@ class Identifiable(Protocol):
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
         """The state at the first sample of a record that repeats itself, by name.
 
-        Raises
-        ------
-        ValueError
-            If it cannot be computed.
+        Raises ValueError if it cannot be computed.
         """
         raise ValueError(f'a {type(self).__name__} has no steady cycle that could be computed: use initial="free"')
 

@@ -155,10 +155,7 @@ class Sum(Composite):
     def compiled(self, u0: float = 0.0) -> CompiledLaw:
         """The sum as compiled loops take it; the state is that of a first sample at the input `u0`.
 
-        Raises
-        ------
-        TypeError
-            If a part is not a law that can be stepped.
+        Raises TypeError if a part is not a law that can be stepped.
         """
         laws = [compiled_law(part, u0) for part in self.parts]
         return reduce(lambda first, second: compiled_pair(side_by_side, first, second), laws)

@@ -116,10 +116,7 @@ class Chain:
     def rest(self, u0: float) -> ChainState:
         """At rest at the command `u0`.
 
-        Raises
-        ------
-        ValueError
-            If u0 is not finite, or a plant that integrates is to rest at an output other than zero.
+        Raises ValueError if u0 is not finite, or a plant that integrates is to rest at an output other than zero.
         """
         if not math.isfinite(u0):
             raise ValueError(f"u0 must be finite, got {u0}")

@@ -78,14 +78,7 @@ class OscillatorStructure(Identifiable):
             raise ValueError('hold="band-limited" needs initial="periodic": an input is interpolated by its spectrum')
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box around the plant of small motions, and where the equation of motion says to begin.
-
-        Raises
-        ------
-        ValueError
-            If the record has no even time, is too short, does not repeat itself, has a constant input, or is not
-            that of a mass on springs; if `initial` is given; or if a name or a bound does not fit.
-        """
+        """The box around the plant of small motions, and where the equation of motion says to begin."""
         if freedom.initial is not None:
             raise ValueError("the structure says how the record begins: BoucWenOscillator.structure(initial=...)")
         motion = self.motion(record)

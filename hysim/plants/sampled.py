@@ -168,11 +168,7 @@ def whole_and_part(ratio: float) -> tuple[int, float]:
 def _moved(
     stage: Stage, step: float, part: float, at: float, linear: bool
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The states at the part `at` of a sub-step, as matrices of those at its begin and of the three inputs.
-
-    The inputs are the newer, the older and the oldest one. The older value ends at the part `part`; last comes
-    what the input itself is at the end.
-    """
+    """The states at the part `at` of a sub-step, as matrices of those at its begin and of the three inputs."""
     early, late = min(at, part), max(at - part, 0.0)
     (first, second), begins, ends = (
         stack[0] for stack in transitions(stage.F[np.newaxis], stage.rate * step * np.array([[early, late]]), stage.g)

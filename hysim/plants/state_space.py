@@ -85,10 +85,7 @@ def resting_states(A: FloatArray, B: FloatArray) -> FloatArray:
 def linear_plant(system: Any) -> Any:
     """A system of another package as a plant of hysim; what shows no matrices or polynomials comes back as it is.
 
-    Raises
-    ------
-    ValueError
-        If it has several inputs or outputs, or is discrete.
+    Raises ValueError if it has several inputs or outputs, or is discrete.
     """
     by_matrices = all(hasattr(system, name) for name in "ABCD")  # systems of SciPy and python-control share no class
     own = isinstance(system, StateSpace | TransferFunction)

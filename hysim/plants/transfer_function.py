@@ -351,14 +351,7 @@ class TransferFunctionStructure(Identifiable, Composable):
         return ("delay",) if self.delay is None else ()
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box of the sections, and of the delay where it is free.
-
-        Raises
-        ------
-        ValueError
-            If the record has no even time or no input, `initial` or a name is unknown, a coefficient of the
-            denominator is fixed or bounded, or a delay is negative.
-        """
+        """The box of the sections, and of the delay where it is free."""
         sample_time = record.sample_time
         if np.ptp(record.u) == 0.0 and record.u[0] == 0.0:
             raise ValueError("the input is zero throughout: nothing can be identified from it")
@@ -432,10 +425,7 @@ class TransferFunctionStructure(Identifiable, Composable):
     def _starts(
         self, record: Record, lower: FloatArray, upper: FloatArray, delay: float | None, *, at_rest: bool
     ) -> tuple[FloatArray, bool]:
-        """What regressions find on a long record, and whether that is enough; a short one is covered by the search.
-
-        With one delay they have to agree; the best of several delays need not.
-        """
+        """What regressions find on a long record, and whether that is enough; a short one is covered by the search."""
         if len(record) < _LONG:
             return np.empty((0, lower.size)), False
         h = record.sample_time

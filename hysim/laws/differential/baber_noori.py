@@ -182,10 +182,8 @@ class BoucWenBaberNoori(SteppedLaw):
     def to_opensees(self) -> dict[str, float]:
         """The arguments of `from_opensees`, with Ao = A.
 
-        Raises
-        ------
-        ValueError
-            If the law pinches, has an offset, an initial memory, more than one input coefficient, or no stiffness.
+        Raises ValueError if the law pinches, has an offset, an initial memory, more than one input coefficient, or no
+        stiffness.
         """
         return _boucwen_conversions.to_opensees_degrading(self)
 
@@ -226,22 +224,16 @@ class BoucWenBaberNoori(SteppedLaw):
     def to_opensees_bwbn(self) -> dict[str, float]:
         """The arguments of `from_opensees_bwbn`, with Ao = A.
 
-        Raises
-        ------
-        ValueError
-            If the law degrades, has an offset, an initial memory, more than one input coefficient, or no stiffness.
+        Raises ValueError if the law degrades, has an offset, an initial memory, more than one input coefficient, or no
+        stiffness.
         """
         return _boucwen_conversions.to_opensees_pinching(self)
 
     def energy(self, u: npt.ArrayLike) -> FloatArray:
         """Work e done on the memory at the samples of `u`, shape (n_samples,) [unit of z unit of u].
 
-        Raises
-        ------
-        SimulationError
-            If the memory diverges; the message names the sample.
-        ValueError
-            If u is not finite or has not one axis.
+        Raises SimulationError if the memory diverges; the message names the sample, and ValueError if u is not finite
+        or has not one axis.
         """
         return self.remembered(u)[:, 1]
 
@@ -251,13 +243,7 @@ class BoucWenBaberNoori(SteppedLaw):
         return tuple((name,) for name in ("delta_a", *(() if pinches else _PINCHING)))
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
-        """Memory z0 with which a record that repeats itself ends as it began, of a law that does not wear off.
-
-        Raises
-        ------
-        ValueError
-            If it wears off or pinches: it then has no steady cycle.
-        """
+        """Memory z0 with which a record that repeats itself ends as it began, of a law that does not wear off."""
         values = {**self.scalars, **parameters}
         if any(np.any(values[name]) for name in ("delta_a", "delta_nu", "delta_eta", "zeta_s")):
             raise ValueError('a law that wears off has no steady cycle: use initial="free"')

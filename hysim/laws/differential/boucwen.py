@@ -95,10 +95,7 @@ class BoucWen(BoucWenLaw):
     def to_low_guo(self) -> dict[str, float]:
         """The arguments of `from_low_guo`; there is one set only.
 
-        Raises
-        ------
-        ValueError
-            If n is not 1, there is an offset, or feedthrough or gain is zero.
+        Raises ValueError if n is not 1, there is an offset, or feedthrough or gain is zero.
         """
         return conversions.to_low_guo(self)
 
@@ -151,10 +148,7 @@ class BoucWen(BoucWenLaw):
     def to_wen(self) -> dict[str, float]:
         """The arguments of `from_wen`, of all sets with this response the one with A = D = 1.
 
-        Raises
-        ------
-        ValueError
-            If there is an offset, A = 0, or no stiffness at z = 0.
+        Raises ValueError if there is an offset, A = 0, or no stiffness at z = 0.
         """
         return conversions.to_wen(self)
 
@@ -181,10 +175,7 @@ class BoucWen(BoucWenLaw):
     def to_normalized(self) -> dict[str, float]:
         """The arguments of `from_normalized`; there is one set only.
 
-        Raises
-        ------
-        ValueError
-            If beta + gamma <= 0 or A <= 0, for which nothing saturates at 1, or there is an offset.
+        Raises ValueError if beta + gamma <= 0 or A <= 0, for which nothing saturates at 1, or there is an offset.
         """
         return conversions.to_normalized(self)
 
@@ -220,10 +211,7 @@ class BoucWen(BoucWenLaw):
     def to_noel_schoukens(self) -> dict[str, float]:
         """The arguments of `from_noel_schoukens`, of all sets with this response the one with beta = 1.
 
-        Raises
-        ------
-        ValueError
-            If there is a feedthrough or an offset, or the gain is zero.
+        Raises ValueError if there is a feedthrough or an offset, or the gain is zero.
         """
         return conversions.to_noel_schoukens(self)
 
@@ -267,10 +255,7 @@ class BoucWen(BoucWenLaw):
     def to_opensees(self) -> dict[str, float]:
         """The arguments of `from_opensees`, of all sets with this response the one with Ao = 1.
 
-        Raises
-        ------
-        ValueError
-            If there is an offset or an initial memory, A = 0, or no stiffness at z = 0.
+        Raises ValueError if there is an offset or an initial memory, A = 0, or no stiffness at z = 0.
         """
         return conversions.to_opensees(self)
 
@@ -320,10 +305,7 @@ class BoucWen(BoucWenLaw):
     def to_opensees_original(self) -> dict[str, float]:
         """The arguments of `from_opensees_original`, of all sets with this response the one with beta + gamma = 1.
 
-        Raises
-        ------
-        ValueError
-            If there is an offset or an initial memory, A = 0, no stiffness at z = 0, or nothing yields.
+        Raises ValueError if there is an offset or an initial memory, A = 0, no stiffness at z = 0, or nothing yields.
         """
         return conversions.to_opensees_original(self)
 
@@ -355,11 +337,5 @@ class BoucWen(BoucWenLaw):
         return cls(**conversions.from_opensees_original(elastic_modulus, yield_stress, hardening, 0.0, **shape))
 
     def to_suanpan(self) -> dict[str, float]:
-        """The arguments of `from_suanpan`; there is one set only.
-
-        Raises
-        ------
-        ValueError
-            As `to_opensees_original`.
-        """
+        """The arguments of `from_suanpan`; there is one set only. Raises ValueError as `to_opensees_original`."""
         return conversions.to_suanpan(self)

@@ -202,10 +202,7 @@ class BoucWenInverse:
 def inverse(law: MonotoneLaw, u: float = 0.0) -> BoucWenInverse:
     """The inverse with the direction that the law has at the input `u` and z = 0.
 
-    Raises
-    ------
-    ValueError
-        If its slope is zero there.
+    Raises ValueError if its slope is zero there.
     """
     slope = float(np.polynomial.polynomial.polyval(u, derivative(law))) + law.gain * law.A
     if slope == 0.0:

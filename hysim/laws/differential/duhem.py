@@ -350,11 +350,7 @@ class Duhem(Law):
         return _duhem_search.search_space(self.scalars, record, freedom)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """The output itself, shape (n_sets, n_samples, 1): it is affine in none of the parameters.
-
-        A law whose memory goes 1000 times as far as the record counts as one that escapes: following it costs
-        much and can only lose.
-        """
+        """The output itself, shape (n_sets, n_samples, 1): it is affine in none of the parameters."""
         values = {**self.scalars, **parameters}
         names = [name for name in values if name not in _OUTPUT]
         columns = np.broadcast_arrays(*(np.atleast_1d(values[name]) for name in (*names, *_OUTPUT)))

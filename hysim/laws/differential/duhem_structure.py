@@ -34,13 +34,7 @@ class DuhemStructure(Identifiable, Composable):
     terms: tuple[Term, ...]
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box of `Duhem.search_space` around the regression on this record.
-
-        Raises
-        ------
-        ValueError
-            If the input is constant, `initial` is unknown, or a name or a bound does not fit.
-        """
+        """The box of `Duhem.search_space` around the regression on this record."""
         names = [term.name for term in self.terms]
         degrees = sorted({term.degree for term in self.terms}, reverse=True)
         level = {"feedthrough": 0.0, "offset": 0.0, "y0": float(record.y[0]) if len(record) else 0.0}
@@ -84,10 +78,7 @@ class DuhemStructure(Identifiable, Composable):
 def of_degree(degree: int, family: Identifiable) -> DuhemStructure:
     """Every monomial of u and y up to `degree`, with u' and with ``|u'|``.
 
-    Raises
-    ------
-    TypeError, ValueError
-        If the degree is not a whole number of at least zero.
+    Raises TypeError or ValueError if the degree is not a whole number of at least zero.
     """
     if isinstance(degree, bool) or not isinstance(degree, int):
         raise TypeError(f"degree must be a whole number, got {degree!r}")
@@ -99,10 +90,7 @@ def of_degree(degree: int, family: Identifiable) -> DuhemStructure:
 def of_terms(names: tuple[str, ...], family: Identifiable) -> DuhemStructure:
     """The terms with these names.
 
-    Raises
-    ------
-    ValueError
-        If there is none, a name is not in the vocabulary, or holds ``|z|``.
+    Raises ValueError if there is none, a name is not in the vocabulary, or holds ``|z|``.
     """
     terms = tuple(sorted({Term.parse(name) for name in names}))
     if not terms:

@@ -109,13 +109,7 @@ class ClampStructure(Identifiable, Composable):
         check_elements(self.law, *[np.atleast_2d(self.thresholds)] * 3)
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """Thresholds and memory as coordinates where they are free; the rest is linear.
-
-        Raises
-        ------
-        ValueError
-            If the input is constant, `initial` is unknown, or a name or a bound does not fit.
-        """
+        """Thresholds and memory as coordinates where they are free; the rest is linear."""
         half = half_span(record)
         thresholds = self._thresholds(half)
         names, columns = self._names("thresholds", thresholds.size), self._columns(thresholds.size)
@@ -168,10 +162,7 @@ class ClampStructure(Identifiable, Composable):
         return np.concatenate([elements, *static, ones, np.zeros_like(ones)], axis=-1)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        """The parameters with the positions of the steady cycle of which `record` is one period or more.
-
-        One run through the record wipes out what was before it.
-        """
+        """The parameters with the positions of the steady cycle of which `record` is one period or more."""
         thresholds, z0 = self._elements(parameters)
         z = self.pushing.positions(parameters, thresholds, z0, record)[:, -1]
         shape = np.broadcast_shapes(*map(np.shape, parameters.values()))
@@ -223,13 +214,7 @@ class ClampStructure(Identifiable, Composable):
 
 
 def half_span(record: Record) -> float:
-    """Half the span of the input: the largest threshold of which a cycle can tell.
-
-    Raises
-    ------
-    ValueError
-        If the input is constant.
-    """
+    """Half the span of the input: the largest threshold of which a cycle can tell."""
     span = float(np.ptp(record.u))
     if span == 0.0:
         raise ValueError("the input is constant: nothing can be identified from it")

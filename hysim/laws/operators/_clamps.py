@@ -204,11 +204,7 @@ def check_elements(cls: type[Bank], thresholds: FloatArray, weights: FloatArray,
 
 
 def end_positions(thresholds: FloatArray, z0: FloatArray, u: FloatArray) -> FloatArray:
-    """Positions (n_sets, n_plays) at the end of the input `u`, from those before its first sample.
-
-    A play that has been carried along forgets where it stood. Else it has been pushed by the largest and by
-    the smallest input, in either order, to the same place.
-    """
+    """Positions (n_sets, n_plays) at the end of the input `u`, from those before its first sample."""
     z = z0.copy()
     for value in _turning_values(u):
         z = np.minimum(np.maximum(z, value - thresholds), value + thresholds)

@@ -46,13 +46,7 @@ class DeadZoneStructure(Identifiable, Composable):
             check_dead_zones(*[np.atleast_2d(self.dead_zones)] * 2)
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The plays' weights as coordinates; the dead zones' weights and the offset are linear.
-
-        Raises
-        ------
-        ValueError
-            If the input is constant, `initial` is neither "rest" nor "periodic", or a name or a bound does not fit.
-        """
+        """The plays' weights as coordinates; the dead zones' weights and the offset are linear."""
         if not freedom.starts_at_rest("rest"):
             raise ValueError('the memory of plays before dead zones is not searched: use initial="rest" or "periodic"')
         own = self.plays.search_space(record)

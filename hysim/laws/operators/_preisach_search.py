@@ -52,13 +52,7 @@ class PreisachStructure(Identifiable, Composable):
         check_relays(levels[np.newaxis], np.zeros((1, _n_weights(levels))))
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The memory as a coordinate where it is free; the rest is linear.
-
-        Raises
-        ------
-        ValueError
-            If the input is constant, `initial` is unknown, or a name or a bound does not fit.
-        """
+        """The memory as a coordinate where it is free; the rest is linear."""
         scale = half_span(record)
         levels = self._levels(record)
         places = {f"levels[{k}]": value for k, value in enumerate(levels.tolist())}
@@ -91,10 +85,7 @@ class PreisachStructure(Identifiable, Composable):
         return np.concatenate([outputs, ones, np.zeros_like(ones)], axis=-1)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        """The parameters with the memory of the steady cycle of which `record` is one period or more.
-
-        One run through the record wipes out what was before it, unless that went beyond the record's inputs.
-        """
+        """The parameters with the memory of the steady cycle of which `record` is one period or more."""
         shape = np.broadcast_shapes(*map(np.shape, parameters.values()))
         levels = _table("levels", parameters)[0]
         extremes = self._law(levels, np.zeros(_n_weights(levels))).advance(record.u)[1][1:]

@@ -140,10 +140,7 @@ class MaxwellSlip(ByStructure, ClampLaw):
     def to_prandtl_ishlinskii(self) -> PrandtlIshlinskii:
         """The same law as a sum of plays: weights -k_i beside their sum at the threshold zero.
 
-        Raises
-        ------
-        ValueError
-            If elements that slip at one elongation begin at different positions: no play stands at both.
+        Raises ValueError if elements that slip at one elongation begin at different positions: no play stands at both.
         """
         slope, slips, weights = self.as_plays
         thresholds, element = np.unique(np.concatenate([[0.0], slips]), return_inverse=True)

@@ -225,13 +225,7 @@ def wrong_sum(weights: npt.ArrayLike) -> int | None:
 
 
 def _consistent(r: FloatArray, z: FloatArray) -> FloatArray:
-    """The positions with that of threshold zero, which the first sample sets anyway, within reach of the others.
-
-    Raises
-    ------
-    ValueError
-        If two others are further apart than their thresholds, where no input takes them.
-    """
+    """The positions with that of threshold zero, which the first sample sets anyway, within reach of the others."""
     slack = _CONSISTENT * r[-1]
     apart = np.abs(z[1:, np.newaxis] - z[1:]) - np.abs(r[1:, np.newaxis] - r[1:])
     if (apart > slack).any():

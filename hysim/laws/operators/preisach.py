@@ -365,10 +365,7 @@ class Preisach(SearchedRelays):
     def inverse_from(self, past: State, limits: Limits = UNLIMITED, *, room: int = 0) -> CompiledLaw:
         """The inverse after the inputs `past`, as `hysim.kernels.inverses` has it, with room for so many more extremes.
 
-        Raises
-        ------
-        ValueError
-            If the slope vanishes or changes its sign.
+        Raises ValueError if the slope vanishes or changes its sign.
         """
         slowest, fastest = self.slope_bounds()
         if not slowest * fastest > 0.0:

@@ -154,13 +154,7 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
         return ClampStructure(law=cls, thresholds=given, plays=plays, one_signed=one_signed, pushing=Widening())
 
     def at(self, sample_time: float) -> PlaysAtSampleTime:
-        """The law at one sample time [s], as loops step it.
-
-        Raises
-        ------
-        ValueError
-            If the sample time is not positive.
-        """
+        """The law at one sample time [s], as loops step it. Raises ValueError if the sample time is not positive."""
         if not sample_time > 0.0:
             raise ValueError(f"sample_time must be positive, got {sample_time}")
         return PlaysAtSampleTime(
