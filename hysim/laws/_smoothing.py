@@ -8,8 +8,7 @@ output y_g,
 With f = B c in cubic B-splines on even knots this is (B^T W B + strength P) c = B^T W y, banded. The strength is
 the one that predicts best what is left out: the groups between the first and the last, *in the order of their
 inputs*, are cut into contiguous blocks, and each block is predicted from the others. Loading and unloading lie in
-the same block, so that the spline cannot read one branch from its neighbour on the other, as it could if samples were
-left out one at a time: it averages them.
+the same block, so that the spline averages them.
 
 Sources: P. J. Green and B. W. Silverman, Nonparametric Regression and Generalized Linear Models (1994), ch. 2 for the
 spline, section 3.3.4 for its degrees of freedom, the trace of the matrix that takes y to f; T. Hastie, J. R. Stat.

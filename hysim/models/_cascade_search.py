@@ -1,4 +1,4 @@
-"""What is searched of a cascade.
+"""The search for the parameters of a cascade.
 
 The last stage that is not a transfer function carries the gain: what it is linear in stays linear, each of its columns
 passing through the linear stages behind it. A structure of a transfer function before or behind it has the gain one at

@@ -101,7 +101,7 @@ def _of_part(label: str, space: Space, freedom: Freedom) -> SearchSpace:
 def without_repetition(
     space: SearchSpace, columns: Callable[[FloatArray], FloatArray], values: Mapping[str, float], freedom: Freedom
 ) -> SearchSpace:
-    """The space with linear parameters held of which others have the same column."""
+    """The space in which all but one of the linear parameters with equal columns are held, at `values` or at zero."""
     points = np.stack([space.lower + share * (space.upper - space.lower) for share in (0.45, 0.55)])
     shapes = np.concatenate(columns(points), axis=0)  # two places in the box: what moves with neither is the same
     chosen = {*freedom.free, *freedom.bounds}

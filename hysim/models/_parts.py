@@ -1,4 +1,4 @@
-"""What sums and cascades share: names of their parts, and parts that are stepped."""
+"""Names and compiled steps of the parts of sums and cascades."""
 
 import functools
 import re

@@ -1,4 +1,4 @@
-"""What is searched of a sum: the parts' own spaces side by side (`hysim.models._joint_space`).
+"""The search for the parameters of a sum: the parts' own spaces side by side.
 
 What is linear in a part is linear in the sum. A part that cannot be identified adds an output that is known.
 """

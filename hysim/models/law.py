@@ -83,7 +83,7 @@ class Law(Composable, ABC):
 
     @classmethod
     def check(cls, tables: Tables) -> None:
-        """Raise a ValueError where a set of parameters is no law; the tables hold every field over sets."""
+        """Raise a ValueError where the tables, every field over sets, hold parameters that are no law."""
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
@@ -269,7 +269,7 @@ class Law(Composable, ABC):
             One input for all sets, or one for each.
         reduce : {"sse", "max_width", "area", "final"}, optional
             Keep of each output only the sum of its squared differences from `target`, the measure of this name of
-            `loop_metrics` (last complete cycle), or the last sample. A million sets then need no million rows.
+            `loop_metrics` (last complete cycle), or the last sample.
         target : array, shape (n_samples,)
             With ``reduce="sse"`` what the outputs are compared with [unit of y].
         workers : int, optional
@@ -332,12 +332,12 @@ class Law(Composable, ABC):
         return inverse_response(inverse_step(forward, state[0]), outputs)
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
-        """The inverse, stepped; a search on the law's own step unless the family has a closed form.
+        """The inverse, stepped: in the closed form of its family, or by a search on the law's own step.
 
         Parameters
         ----------
         u0 : float
-            Input at which the law rests [unit of u].
+            Input at which the law rests [unit of u]; ValueError if the output does not rise or fall through it.
         limits : (float, float)
             Lowest and highest input to which the inverse's copy of the law moves [unit of u].
         sample_time : float
@@ -347,11 +347,6 @@ class Law(Composable, ABC):
         -------
         CompiledLaw
             ``u = step(parameters, state, y)``, nan where no input has the output y.
-
-        Raises
-        ------
-        ValueError
-            If the output does not rise or fall through u0.
         """
         return inverse_step(self.compiled(u0), u0, limits=limits)
 
@@ -372,9 +367,8 @@ class Law(Composable, ABC):
     def steady(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
         """Initial memory with which a periodic record ends as it began, (n_sets,) by name; nan where it diverges.
 
-        One pass through the record contracts the memory; the fixed point is found by the secant method.
-
-        Raises ValueError if an affine parameter moves the memory: it is not known yet where the others are searched.
+        One pass through the record contracts the memory; the fixed point is computed by the secant method. Raises
+        ValueError if an affine parameter moves the memory: it is not known yet where the others are searched.
         """
         names, u = self.initial_names, np.append(record.u, record.u[0])
         passed = self._one_pass(parameters, u)

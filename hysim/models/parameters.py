@@ -121,7 +121,7 @@ def space_of(
 ) -> SearchSpace:
     """The space of the coordinates that are not held, started at `points`: names to values, `defaults` for the rest.
 
-    `columns` are the parameters in which the output is affine, `limits` the user's bounds; `others` goes to
+    `columns` are the parameters in which the output is affine, `limits` the user's bounds; `others` are fields of
     `SearchSpace`.
     """
     searched = [each.limited(limits) for each in coordinates if each.name not in held]

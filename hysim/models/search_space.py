@@ -1,4 +1,4 @@
-"""What a family declares about itself, so that `identify` needs to know none.
+"""Search boxes, as families declare them for `identify`, which knows no family.
 
 Identification searches a box of *coordinates* that the family chooses: scaled, free of redundancy,
 of order one. The family turns coordinates into the user's parameters. Parameters in which the output is
@@ -71,7 +71,7 @@ class SearchSpace:
 
 @dataclass(frozen=True)
 class Freedom:
-    """What the user says about the parameters; see `hysim.identify` for the meaning."""
+    """The user's wishes about the parameters; see `hysim.identify` for the meaning."""
 
     fixed: Mapping[str, float] = field(default_factory=dict)
     free: tuple[str, ...] = ()

@@ -29,7 +29,11 @@ def affine_columns(
     hold: str = "zoh",
     sample: str = "start",
 ) -> FloatArray:
-    """What the output is affine in: the numerator, highest power first, the initial state, and zero."""
+    """Columns in which the output is affine, (n_sets, n_samples, zeros + n + 2): numerator, initial state, and zero.
+
+    `monic` (n_sets, n) holds the denominators without their leading one, in seconds; the numerators have the degree
+    `zeros`, by default n, highest power first.
+    """
     n_sets, n = monic.shape
     out = np.empty((n_sets, u.size, n + 2 + (n if zeros is None else zeros)))
     with np.errstate(all="ignore"):
@@ -101,7 +105,7 @@ class LinearPlants(NamedTuple):
     def continued(
         self, u: FloatArray, state: LinearState, k: int = 0, *, hold: str, sample: str, free: bool = False
     ) -> tuple[FloatArray, LinearState]:
-        """Outputs of the plant `k` for inputs `u` (n_inputs, n_samples), and the state at the last sample."""
+        """Outputs of the plant `k` for (n_inputs, n_samples), the last a free response with `free`; and the state."""
         before = state.past.shape[1]
         level = np.concatenate([np.zeros((len(u), 1)), state.past, u], axis=1)
         rise = np.zeros_like(level)

@@ -1,6 +1,4 @@
-"""What a record cannot show of a transfer function that was fitted to it.
-
-A linear plant has memory, and so has hysteresis. Two things are worth a sentence:
+"""Warnings about a transfer function that was fitted to a record: its lag may be hysteresis.
 
 * A curve y = f(u) without memory fits as well. The curve is a polynomial with as many coefficients as the plant,
   on a record whose input levels repeat. It fits as well if the mean difference of both squared residuals is below

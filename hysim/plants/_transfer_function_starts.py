@@ -74,7 +74,7 @@ def likely_delays(record: Record, earliest: float, latest: float) -> list[float]
 def _refined(
     record: Record, poles: int, zeros: int, delay: float, cutoff: float, *, hold: str, sample: str, at_rest: bool
 ) -> Guess | None:
-    """What the rounds come to from one cutoff [rad/s]; None where they leave the finite numbers."""
+    """The guess after all rounds from one cutoff [rad/s]; None where they diverge."""
     h = record.sample_time
     roots = np.full(poles, -cutoff, dtype=complex)
     numerator, cost = None, np.inf

@@ -137,7 +137,7 @@ class OscillatorStructure(Identifiable):
         )
 
     def motion(self, record: Record) -> Motion:
-        """Force and displacement that the start is found from: of a periodic record, the mean period."""
+        """Force and displacement from which the start is computed; of a periodic record, the mean period."""
         sample_time = record.sample_time
         if np.ptp(record.u) == 0.0:
             raise ValueError("the input is constant: nothing can be identified from it")
@@ -177,7 +177,7 @@ class OscillatorStructure(Identifiable):
         return np.asarray(run(force, step))
 
     def sampled(self, y: FloatArray) -> FloatArray:
-        """What the record keeps of an output at the ends of the steps."""
+        """The record's samples of an output at the ends of the steps."""
         if self.decimation:
             return decimated(y, self.decimation, periodic=self.period is not None)
         return y[:: self.oversampling]

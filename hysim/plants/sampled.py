@@ -118,25 +118,10 @@ def _companion(plant: TransferFunction, sample_time: float) -> Stage:
 
 
 def sampled(stage: Stage, step: float, delay: float = 0.0, *, creeping: int = 0, linear: bool = False) -> SampledStage:
-    """The exact discrete form of a stage.
+    """The exact discrete form of a stage for sub-steps of the length `step` [s]; its rest may be infinite or nan.
 
-    Parameters
-    ----------
-    stage : Stage
-        What is stepped.
-    step : float
-        Length of a sub-step [s].
-    delay : float
-        Dead time of its input [s].
-    creeping : int
-        Number of states, from the first on, that do not look at others.
-    linear : bool
-        Whether the input is linear along a sub-step; by default it is held.
-
-    Returns
-    -------
-    SampledStage
-        `rest` is infinite or nan for a stage with a pole at zero.
+    The input has a dead time `delay` [s], and is held over a sub-step or `linear` along it. The first `creeping` states
+    do not depend on others.
     """
     lag, part = whole_and_part(delay / step)
     moved, B, through = _moved(stage, step, part, 1.0, linear)

@@ -1,9 +1,4 @@
-"""Displacement sensors: what a sampled controller gets to see.
-
-    measurement_k = quantum floor((y(t_k - delay) + noise_k) / quantum + 1/2)
-
-The noise is gaussian and white from sample to sample, a function of the seed and the sample alone.
-"""
+"""Displacement sensors of a sampled controller."""
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +10,9 @@ from hysim.models.model import family
 @family
 class Sensor:
     """From the true displacement to the measured one.
+
+    ``measurement_k = quantum floor((y(t_k - delay) + noise_k) / quantum + 1/2)``; the noise is gaussian and white from
+    sample to sample, a function of the seed and the sample alone.
 
     Parameters
     ----------

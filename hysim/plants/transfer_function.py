@@ -1,16 +1,12 @@
 """Continuous-time transfer functions, simulated and identified from sampled data.
 
-    G(s) = exp(-delay s) (num_0 s^m + ... + num_m) / (den_0 s^n + ... + den_n),   m <= n
+Where the input is held, the output of a sample may be taken at the start of the hold, before that sample's input has
+moved the states, or at its end. System identification tools take the start. A staircase that was read when each step
+had settled belongs to the end: taken as the start, each output must be explained by the step before, and is one sample
+too early for it.
 
-The input between two samples is held (``hold="zoh"``) or linear (``hold="foh"``); under either the response
-is exact, by matrix exponentials. Where the input is held, the output of a sample may be taken at the start
-of the hold (``sample="start"``), before that sample's input has moved the states, or at its end. System
-identification tools take the start. A staircase that was read when each step had settled belongs to the end:
-taken as the start, each output must be explained by the step before, and is one sample too early for it.
-
-With den monic the output is affine in the numerator and in the initial state, which is the free response
-and its derivatives at the begin of the first hold, (y, y', ..., y^(n-1)): the state of the observability
-form. The delay, where it is not known, is searched beside the denominator.
+With den monic the output is affine in the numerator and in the initial state, the state of the observability form. The
+delay, where it is not known, is searched beside the denominator.
 """
 
 from collections.abc import Iterable, Mapping
@@ -42,7 +38,9 @@ _SCREENED = 64  # random points beside starts that differ
 
 @family
 class TransferFunction(Composable):
-    """Continuous-time transfer function.
+    """Continuous-time transfer function. ::
+
+        G(s) = exp(-delay s) (num_0 s^m + ... + num_m) / (den_0 s^n + ... + den_n),   m <= n
 
     Parameters
     ----------
@@ -115,51 +113,19 @@ class TransferFunction(Composable):
             return float(np.divide(self.num[-1], self.den[-1]))
 
     def response(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
-        """Output at the samples of `u`, exact under the hold.
+        """Output (n,) at the samples of `u` (n,), which is zero before the first of them, exact under the hold.
 
-        Parameters
-        ----------
-        u : array, shape (n,)
-            Input, zero before its first sample.
-        sample_time : float
-            Time between two samples [s].
-
-        Returns
-        -------
-        array, shape (n,)
-
-        Raises
-        ------
-        SimulationError
-            If the output leaves the finite numbers, as an unstable plant's may; it names the sample.
-        ValueError
-            If `u` is not finite or has not one axis, or the sample time is not positive.
+        The samples are `sample_time` apart [s]. Raises SimulationError if the output diverges, as an unstable plant's
+        may, and ValueError if `u` is not finite or has not one axis, or the sample time is not positive.
         """
         return self.advance(u, sample_time)[0]
 
     def advance(
         self, u: npt.ArrayLike, sample_time: float, state: LinearState | None = None
     ) -> tuple[FloatArray, LinearState]:
-        """Output at the samples of `u`, continued from `state`, and the state after the last sample.
+        """As `response`, continued from `state`, by default the initial one, and the state after the last sample.
 
-        Parameters
-        ----------
-        u, sample_time
-            As in `response`; the time is the same for every part of a record.
-        state : LinearState, optional
-            What an earlier call returned; by default the initial state, with no input before.
-
-        Returns
-        -------
-        y : array, shape (n,)
-            The same bits as from one uncut input.
-        state : LinearState
-            To continue from.
-
-        Raises
-        ------
-        SimulationError, ValueError
-            As `response`.
+        The bits are those of one uncut input.
         """
         inputs = read_only(u, "u", ndim=1)
         if not 0.0 < sample_time < np.inf:
@@ -181,7 +147,7 @@ class TransferFunction(Composable):
         return y, end
 
     def filtered(self, signals: FloatArray, sample_time: float) -> FloatArray:
-        """Outputs from rest for several inputs at once, (n_signals, n_samples); what is not finite stays."""
+        """Outputs (n_signals, n_samples) from rest for several inputs at once; they may be infinite or nan."""
         plant = self._plant(sample_time)
         return np.asarray(plant.filtered(signals[np.newaxis], hold=self.hold, sample=self.sample)[0])
 
@@ -196,7 +162,7 @@ class TransferFunction(Composable):
         sample: str = "start",
         initial: str = "rest",
     ) -> "TransferFunctionStructure":
-        """What `hysim.identify` takes: numbers of poles and zeros, and how the record was sampled.
+        """Numbers of poles and zeros for `hysim.identify`, and how the record was sampled.
 
         Parameters
         ----------
@@ -239,7 +205,7 @@ class TransferFunction(Composable):
 
     @classmethod
     def candidates(cls) -> dict[str, "TransferFunctionStructure"]:
-        """What `hysim.compare` tries of this family: two poles and one zero, one mode or a lag with a creep."""
+        """Two poles and one zero for `hysim.compare`: one mode, or a lag with a creep."""
         return {cls.__name__: cls.structure(poles=2, zeros=1)}
 
     @classmethod
@@ -253,28 +219,10 @@ class TransferFunction(Composable):
         sample: str = "start",
         initial: str = "rest",
     ) -> dict[str, "TransferFunctionStructure"]:
-        """Candidates for `hysim.select`: every combination of the numbers and delays.
+        """Candidates for `hysim.select`: a structure for every combination of the numbers and delays, by its name.
 
-        Parameters
-        ----------
-        poles : iterable of int
-            Numbers of poles.
-        zeros : iterable of int, optional
-            Numbers of zeros, of which those below the number of poles are taken; by default all of them.
-        delays : iterable of float or "free"
-            As in `structure` [s].
-        hold, sample, initial : str
-            As in `structure`.
-
-        Returns
-        -------
-        dict
-            Name to structure, ``"2 poles, 1 zero"`` and so on.
-
-        Raises
-        ------
-        ValueError, TypeError
-            As `structure`.
+        `zeros` below the number of poles are taken, by default all of them; the other arguments and the errors are
+        those of `structure`.
 
         Examples
         --------
@@ -425,7 +373,7 @@ class TransferFunctionStructure(Identifiable, Composable):
     def _starts(
         self, record: Record, lower: FloatArray, upper: FloatArray, delay: float | None, *, at_rest: bool
     ) -> tuple[FloatArray, bool]:
-        """What regressions find on a long record, and whether that is enough; a short one is covered by the search."""
+        """Starts by regression on a long record, and whether they suffice: those of one delay must agree."""
         if len(record) < _LONG:
             return np.empty((0, lower.size)), False
         h = record.sample_time

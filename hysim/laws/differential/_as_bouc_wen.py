@@ -1,4 +1,4 @@
-"""Laws that are Bouc-Wen's with n = 1 and gamma = 0 under other names: everything is evaluated as that law."""
+"""Laws that are Bouc-Wen laws with n = 1 and gamma = 0 under other names: everything is evaluated as such a law."""
 
 import math
 from abc import abstractmethod
@@ -25,14 +25,14 @@ class AsBoucWen(BoucWenStep):
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
-        """As the Bouc-Wen law is packed."""
+        """The constants and the memory of the Bouc-Wen law."""
         parameters = cls.equivalent(tables)
         plain = {name: np.full_like(parameters["A"], value) for name, value in BoucWen.defaults().items()}
         return BoucWen.pack({**plain, **parameters})
 
     @property
     def bouc_wen(self) -> BoucWen:
-        """The same law as Bouc-Wen's."""
+        """The `BoucWen` law with the same output."""
         return BoucWen(**{name: float(table[0, 0]) for name, table in self.equivalent(self.tables).items()})
 
     def tangent(self, direction: npt.ArrayLike, z: npt.ArrayLike) -> FloatArray:

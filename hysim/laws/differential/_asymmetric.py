@@ -17,31 +17,11 @@ class SteppedLaw(MemoryLaw):
     """A Bouc-Wen law whose inverse is found numerically."""
 
     def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
-        """Input that gives the output `y`, linear between the samples.
+        """Input that gives the output `y`, linear between the samples; see `hysim.Law.inverse_response`.
 
-        Parameters
-        ----------
-        y : array, shape (n_samples,)
-            Wanted output.
-        u0 : float, optional
-            Input at which the law rests, its memory at z0, before it moves to the first sample. By default it
-            rests at the first sample: the input that gives y[0] with the memory at z0, found from u = 0.
-        state : tuple of float, optional
-            Input and memory to continue from, in place of u0 and z0.
-
-        Returns
-        -------
-        array, shape (n_samples,)
-            Its `response` is y to the rounding of its terms, and to 1e-12 of the memory's stroke where the law is
-            stepped by power series. Where the law turns later, the input is the first one that gives y.
-
-        Raises
-        ------
-        SimulationError
-            If the output does not reach a sample, or does not rise (or fall) all the way there; it names the sample.
-        ValueError
-            If y is not finite or has not one axis, both u0 and state are given, its first sample does not determine
-            the first input (give u0), or the slope is zero where the record begins.
+        It is y to the rounding of its terms, and to 1e-12 of the memory's stroke for a law that is stepped by power
+        series. With neither u0 nor state the law rests, its memory at z0, at the input that gives y[0], searched for
+        from u = 0.
         """
         if state is not None and u0 is not None:
             raise ValueError("give u0 or state, not both: the state has its own input")

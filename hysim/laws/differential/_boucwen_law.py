@@ -1,12 +1,10 @@
-"""What all Bouc-Wen laws share: the memory and what follows from it.
+"""The laws whose memory is that of Bouc and Wen: facts, limit cycle and inverse.
 
     dz/du = A - |z|^n (gamma + beta sign(z du))
     y = offset + c1 u + c2 u^2 + ... + gain z
 
-u is the input, z the memory, y the output. The memory is evaluated exactly at the samples of an input
-that is linear between them (`hysim.kernels.boucwen`); it does not depend on time. `A` and `gain` enter
-only as a product. With A > 0 and beta > 0 the loop of y runs clockwise for a positive gain (a restoring
-force) and counterclockwise for a negative one (a piezoelectric displacement).
+`A` and `gain` enter only as a product. With A > 0 and beta > 0 the loop of y runs clockwise for a positive gain (a
+restoring force) and counterclockwise for a negative one (a piezoelectric displacement).
 
 Sources: R. Bouc 1967; Y. K. Wen, J. Eng. Mech. Div. 102 (1976); the classes after Ikhouane and Rodellar 2007.
 """
@@ -28,7 +26,7 @@ from hysim.records import Record
 
 
 class BoucWenLaw(BoucWenStep, MemoryLaw):
-    """The memory of Bouc and Wen; what it shares with other laws is in `hysim.laws.differential._memory_law`."""
+    """A law with the memory of Bouc and Wen, exact at the samples of an input that is linear between them."""
 
     @property
     def admissible(self) -> bool:
@@ -58,34 +56,20 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
 
     @property
     def saturation(self) -> float:
-        """What ``|z|`` tends to on a long way of the input, (A / (beta + gamma))^(1/n) for A > 0; inf if nothing."""
+        """Limit of ``|z|`` on a long stroke of the input, (A / (beta + gamma))^(1/n) for A > 0; inf if it has none."""
         return _boucwen_facts.saturation(self.A, self.beta, self.gamma, self.n)
 
     @property
     def memory_bound(self) -> float:
-        """Bound of ``|z|`` for every input that begins with z0; inf if there is none."""
+        """Bound of ``|z|`` for every input that begins with z0; inf if it has none."""
         return _boucwen_facts.memory_bound(self.A, self.beta, self.gamma, self.n, self.z0, self.stability_class)
 
     def limit_cycle(self, amplitude: float) -> LimitCycle:
-        """Steady loop of the memory between the inputs -amplitude and amplitude.
+        """Steady loop of the memory between the inputs -amplitude and amplitude [unit of u].
 
-        Parameters
-        ----------
-        amplitude : float
-            [unit of u].
-
-        Returns
-        -------
-        LimitCycle
-            Peak, coercive input, width at u = 0 and energy, to rounding; a law with beta > 0 approaches it
-            from every memory inside its bound.
-
-        Raises
-        ------
-        ValueError
-            If the amplitude is not positive, or A = 0.
-        SimulationError
-            If the memory diverges within one stroke.
+        It has the peak, the coercive input, the width at u = 0 and the energy, to rounding; a law with beta > 0
+        approaches it from every memory inside its bound. Raises ValueError if the amplitude is not positive or A = 0,
+        and SimulationError if the memory diverges within one stroke.
 
         Examples
         --------
@@ -97,25 +81,15 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
         return limit_cycle.limit_cycle(self.A, self.beta, self.gamma, self.n, float(amplitude))
 
     def slope_bounds(self, low: float = -np.inf, high: float = np.inf) -> tuple[float, float]:
-        """Bounds of the slope dy/du over every input between `low` and `high` that begins with z0.
+        """Lowest and highest slope dy/du over every input between `low` and `high` [unit of u] that begins with z0.
 
-        Parameters
-        ----------
-        low, high : float
-            Range of the input [unit of u]; a law without polynomial does not depend on it.
-
-        Returns
-        -------
-        (float, float)
-            Infinite where the memory is not bounded and the slope neither. They are approached by inputs
-            that saturate the memory, so that they are sharp for a law without polynomial.
+        They are infinite where neither the memory nor the slope is bounded. Inputs that saturate the memory approach
+        them, so that they are sharp for a law without polynomial; such a law's do not depend on the range of the input.
 
         Examples
         --------
-        A piezoelectric stack by Low and Guo: 1 - 0.56 is left of the slope just after a reversal.
-
         >>> import hysim as hs
-        >>> law = hs.BoucWen(A=0.35, beta=0.02, gamma=0.005, feedthrough=1.0, gain=-1.0)
+        >>> law = hs.BoucWen(A=0.35, beta=0.02, gamma=0.005, feedthrough=1.0, gain=-1.0)  # Low and Guo's stack
         >>> [round(bound, 12) for bound in law.slope_bounds()]
         [0.44, 1.0]
         """
@@ -132,57 +106,25 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
     def is_invertible(self, low: float = -np.inf, high: float = np.inf) -> bool:
         """Whether the slope keeps its sign for every input between `low` and `high`: its bounds have one sign.
 
-        This is sufficient for an inverse, not necessary: on one record a law may do without, and
-        `inverse_response` looks at the record. For a piezoelectric stack by Low and Guo it reads
-        alpha max(1, 2 beta / (beta + gamma)) < 1. A bound of zero to rounding counts as zero.
+        This is sufficient for an inverse, not necessary: `inverse_response` looks at the one record that it is given.
+        For a piezoelectric stack by Low and Guo it reads alpha max(1, 2 beta / (beta + gamma)) < 1. A bound of zero to
+        rounding counts as zero.
         """
         bounds = self.slope_bounds(low, high)
         rounding = 1e-14 * (abs(self.gain * self.A) + float(np.abs(boucwen_inverse.coefficients(self)).max()))
         return bounds[0] > rounding or bounds[1] < -rounding
 
     def inverse(self) -> BoucWenInverse:
-        """The law's inverse as an object, for loops that run sample by sample.
-
-        Returns
-        -------
-        BoucWenInverse
-            In the direction that the output has at u = 0, z = 0.
-
-        Raises
-        ------
-        ValueError
-            If the slope is zero there.
-        """
+        """The inverse as an object for loops, in the direction of the output at u = z = 0, else ValueError."""
         return boucwen_inverse.inverse(self)
 
     def inverse_response(
         self, y: npt.ArrayLike, u0: float | None = None, state: State | InverseState | None = None
     ) -> FloatArray:
-        """Input that gives the output `y`, linear between the samples.
+        """Input that gives the output `y`, linear between the samples; see `hysim.Law.inverse_response`.
 
-        Parameters
-        ----------
-        y : array, shape (n_samples,)
-            Wanted output.
-        u0 : float, optional
-            Input at which the law rests, its memory at z0, before it moves to the first sample. By default
-            it rests at the first sample: the input that gives y[0] with the memory at z0, found from u = 0.
-        state : tuple of float, optional
-            Input and memory (and output) to continue from, in place of u0 and z0.
-
-        Returns
-        -------
-        array, shape (n_samples,)
-            Its `response` is y to rounding.
-
-        Raises
-        ------
-        SimulationError
-            If the slope dy/du does not keep its sign on the way, or the output does not reach a sample; the
-            message names the sample, the input and the slope there.
-        ValueError
-            If y is not finite or has not one axis, its first sample does not tell the first input (give u0),
-            or the slope is zero where the record begins.
+        Its `response` is y to rounding. With neither u0 nor state the law rests, its memory at z0, at the input that
+        gives y[0], searched for from u = 0. An error names the sample, and the input and the slope there.
 
         Examples
         --------
@@ -194,11 +136,10 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
         return boucwen_inverse.inverse_response(self, y, u0, state)
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
-        """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""
         return boucwen_inverse.inverse(self, u0).compiled(u0=u0, limits=limits)
 
     def notes(self, record: Record, model: "BoucWenLaw") -> tuple[str, ...]:
-        """What the identified law promises for other inputs."""
+        """Stability class and passivity of the identified law."""
         if model.admissible and model.stability_class == "I":
             return ("the law is of stability class I and passive",)
         kind = model.stability_class
@@ -211,7 +152,7 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
         return Packed(cls.joined(tables, "A", "beta", "gamma", "n"), cls.initial_memory(tables))
 
     def divergence(self, sample: int, u: float, y: float) -> str:
-        """The sums of parameters that let the memory diverge."""
+        """Message with the sums of parameters that let the memory diverge."""
         loading, unloading = self.beta + self.gamma, self.beta - self.gamma
         return (
             f"the memory diverges at sample {sample} (u = {u:g}): with beta + gamma = {loading:g} and beta - gamma = "

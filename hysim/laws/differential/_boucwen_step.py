@@ -19,14 +19,13 @@ class BoucWenStep(Law):
 
     @classmethod
     def prepare(cls, parameters: FloatArray, state: FloatArray) -> None:
-        """The charts of the exponent."""
+        """Fill in the charts of the exponent."""
         A, beta, gamma, n = parameters[:4].tolist()
         if n not in (1.0, 2.0):
             kernels.prepare(A, beta, gamma, n, 0.0, state)
 
     @classmethod
     def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:
-        """As `Law.path`, the exponent looked at once for all samples."""
         A, beta, gamma, n = map(float, law.parameters[:4])
         last_u, z = map(float, law.state[:2])
         if n == 1.0:
@@ -42,7 +41,6 @@ class BoucWenStep(Law):
 
     @classmethod
     def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
-        """As `Law.rows`, laws of n = 1 side by side, and the charts shared by neighbours of equal n."""
         parameters, memory = cls.pack(tables)
         laws = read_only(np.concatenate([parameters[:, :4], memory[:, 1:]], axis=1), finite=False)
         with np.errstate(all="ignore"):  # a memory that diverges overflows, and uncompiled kernels would warn of it

@@ -46,7 +46,7 @@ class MemoryLaw(Law):
 
     @classmethod
     def order(cls, tables: Tables) -> npt.NDArray[np.intp] | None:
-        """The order of n: neighbours of equal n share their charts (`hysim.kernels.charts`)."""
+        """Laws of equal n, which share their charts (`hysim.kernels.charts`), beside each other."""
         n = tables["n"][:, 0]
         return None if (np.diff(n) >= 0.0).all() else np.argsort(n, kind="stable")
 
@@ -77,26 +77,10 @@ class MemoryLaw(Law):
     def tangent(
         self, direction: npt.ArrayLike, z: npt.ArrayLike, u: npt.ArrayLike = 0.0, *others: npt.ArrayLike
     ) -> FloatArray:
-        """Slope dy/du of the output at the memory `z`, for an input at `u` that moves in `direction`.
+        """Slope dy/du [unit of y / unit of u] at the memory `z`, for an input at `u` that moves in `direction`.
 
-        Parameters
-        ----------
-        direction : array
-            Velocity u' or its sign, not zero.
-        z, u : array
-            Memory and input, broadcast against the direction; only a polynomial's slope depends on u.
-        *others : array
-            Further elements of the law's state, in their order.
-
-        Returns
-        -------
-        array
-            [unit of y / unit of u].
-
-        Raises
-        ------
-        ValueError
-            If a direction is zero: the slopes ahead and behind differ.
+        The direction is the velocity u' or its sign; one that is zero has two slopes, and raises ValueError. z, u and
+        the further elements of the law's state, `others` in their order, are broadcast against it.
         """
         velocity, memory = np.asarray(direction, dtype=float), np.asarray(z, dtype=float)
         if not np.all(velocity):
@@ -111,7 +95,6 @@ class MemoryLaw(Law):
         """Slope dz/du for an input at `u` that moves in `direction`, 1 or -1."""
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box that `hysim.identify` searches, in the coordinates of `hysim.laws.differential._boucwen_search`."""
         return _boucwen_search.search_space(
             self.scalars, self.columns, record, freedom, alike=self.alike(record, freedom)
         )
@@ -121,8 +104,6 @@ class MemoryLaw(Law):
         return ()
 
     def _one_pass(self, parameters: Parameters, u: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        """As `Law._one_pass`, by the faster rows that a family may have."""
-
         def passed(z: FloatArray) -> FloatArray:
             sets = {**parameters, **self.memory_only, "z0": np.nan_to_num(z[:, 0], posinf=0.0, neginf=0.0)}
             end = self.outputs_of(sets, u).reduced("final", None, None)[:, np.newaxis]

@@ -1,15 +1,10 @@
 """The inverse of a Bouc-Wen law: the input that gives a wanted output.
 
-    offset + P(u) + gain z(u) = y,    segment by segment from the last sample to the next
+    offset + P(u) + gain z(u) = y,    stroke by stroke from the last sample to the next
 
-It exists where the output is monotone, that is, where dy/du = P'(u) + gain dz/du keeps one sign along the
-way, and on the way back from each sample. `hysim.kernels.boucwen_inverse` finds it to rounding. The state is
-that of the law, and the last output, so that an output that stands still leaves the input where it is, to
-the bit.
-
-Where the memory is bounded, so is the slope, and a law whose bounds have one sign has an inverse for every
-output that it can reach. For a piezoelectric stack, y = d (u - h) with the memory h of Low and Guo, this is
-their alpha max(1, 2 beta / (beta + gamma)) < 1.
+It exists where dy/du = P'(u) + gain dz/du keeps one sign on the way, and on the way back from each sample;
+`hysim.kernels.boucwen_inverse` computes it to rounding. The state is that of the law and the last output, so that an
+output that stands still leaves the input where it is, to the bit.
 """
 
 import math
@@ -33,7 +28,7 @@ InverseState = tuple[float, float, float]
 
 
 class MonotoneLaw(Protocol):
-    """What a law must have to be inverted; both Bouc-Wen laws do."""
+    """Fields and methods of a law that can be inverted."""
 
     A: float
     beta: float
@@ -92,29 +87,12 @@ class BoucWenInverse:
     def advance(
         self, y: npt.ArrayLike, state: LawState | InverseState | None = None
     ) -> tuple[FloatArray, InverseState | None]:
-        """Input at the samples of `y`, continued from `state`, and the state after the last sample.
+        """Input at the samples of `y`, a number or (n_samples,) [unit of y], and the state after the last sample.
 
-        Parameters
-        ----------
-        y : float or array, shape (n_samples,)
-            Wanted output [unit of y].
-        state : (float, float) or (float, float, float), optional
-            Input and memory at the last sample so far, and its output; by default the first sample finds the
-            memory at z0.
-
-        Returns
-        -------
-        u : array of the shape of y
-            Input [unit of u]; the same bits as from one uncut output.
-        state : (float, float, float)
-            To continue from.
-
-        Raises
-        ------
-        SimulationError
-            If the output is not monotone in the input, or does not reach a sample; it names the place.
-        ValueError
-            If y is not finite, or its first sample does not tell the first input.
+        It continues from `state`, input and memory at the last sample so far and its output where known, with the same
+        bits as from one uncut output; by default the first sample meets the memory at z0. Raises SimulationError if the
+        output is not monotone in the input or does not reach a sample, and ValueError if y is not finite or its first
+        sample does not determine the first input.
         """
         outputs = read_only(y, "y")
         if outputs.ndim > 1:
@@ -137,21 +115,10 @@ class BoucWenInverse:
     def compiled(
         self, y0: float | None = None, *, u0: float | None = None, limits: tuple[float, float] = (-math.inf, math.inf)
     ) -> CompiledLaw:
-        """The inverse as compiled loops take it, ``u = step(parameters, state, y)``; see `hysim.kernels.inverses`.
+        """The inverse as compiled loops take it, ``u = step(parameters, state, y)``, nan where no input has the output.
 
-        Parameters
-        ----------
-        y0 : float, optional
-            Output at which the law rests before the first sample, its memory at z0.
-        u0 : float, optional
-            Or the input at which it rests; by default zero.
-        limits : (float, float)
-            Lowest and highest input to which its copy of the law moves.
-
-        Returns
-        -------
-        CompiledLaw
-            Its step returns nan where there is no inverse.
+        The law rests, its memory at z0, at the output `y0` or the input `u0`, by default zero. Its copy of the law
+        moves between the `limits` of the input.
         """
         if y0 is not None and u0 is None:
             return self._compiled(self._rest(float(y0)), limits)

@@ -1,4 +1,4 @@
-"""The steady loop of a Bouc-Wen memory under an input that goes to and fro between -X and X.
+"""The steady loop of a Bouc-Wen memory under an input between -X and X.
 
     dz/du = A - |z|^n (gamma + beta sign(z du)),    s = beta + gamma,  d = gamma - beta,  A > 0
 

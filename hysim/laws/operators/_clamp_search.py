@@ -1,25 +1,21 @@
-"""What is searched of a law of plays or stops.
+"""The search for the parameters of a law of plays or stops.
 
-The output is affine in the weights, the feedthrough and the offset. A bank has its thresholds given: where a
-record says nothing else, they are spread evenly over half the span of the input, the way that a cycle can move.
-A threshold that the user frees is searched between the middles of the gaps to its neighbours, so that their
-order stays. The threshold of a single element is searched on all of that way.
+The output is affine in the weights, the feedthrough and the offset. A bank has its thresholds given, by default evenly
+over half the span of the input. A threshold that the user frees is searched between the middles of the gaps to its
+neighbours, so that their order stays.
 
-One-signed weights (the default) are those of the classical operator, of one density: all elements past the
-threshold zero turn the loop the way in which the record's own runs. Least squares without it fit noise by
-weights of alternating sign, and such a law may have no inverse.
+One-signed weights (the default) are those of the classical operator, of one density: all elements past the threshold
+zero turn the loop in the sense of the record's own. Without it least squares fit noise by weights of alternating sign,
+and such a law may have no inverse.
 
-A law whose plays are pushed by more than the input (`Pushing`) adds what is searched of that.
+The memory of many plays is as many unknowns, which no record determines. With ``initial="rest"``, the default of a
+bank, the plays stand at zero before the first sample. With ``"free"`` the memory is that of a single former turning
+point, the stroke from rest at zero to `turn`:
 
-The memory of many plays is as many unknowns, which no record can tell. With ``initial="rest"``, the default of
-a bank, the plays stand at zero before the first sample. With ``"free"`` the memory is the one that a single
-former turning point leaves behind:
+    z_i = sign(turn) max(|turn| - r_i, 0)
 
-    z_i = sign(turn) max(|turn| - r_i, 0)        the way from rest at zero to `turn`, then to the first sample
-
-It holds every record that begins at rest or at a turning point of its cycle, or in a cycle about zero;
-any other steady cycle is ``"periodic"``: the positions that the record itself leaves behind. A single element
-has its z0, searched where the first input allows it to be.
+It holds for every record that begins at rest or at a turning point of its cycle, or in a cycle about zero; any other
+steady cycle is ``"periodic"``: the positions that the record itself leaves behind.
 """
 
 import itertools
@@ -162,7 +158,7 @@ class ClampStructure(Identifiable, Composable):
         return np.concatenate([elements, *static, ones, np.zeros_like(ones)], axis=-1)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        """The parameters with the positions of the steady cycle of which `record` is one period or more."""
+        """The parameters with the positions after one run through the record, which erases what was before it."""
         thresholds, z0 = self._elements(parameters)
         z = self.pushing.positions(parameters, thresholds, z0, record)[:, -1]
         shape = np.broadcast_shapes(*map(np.shape, parameters.values()))

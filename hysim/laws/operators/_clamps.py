@@ -4,9 +4,8 @@
     y      = offset + feedthrough u + sum_i w_i z_i              plays
     y      = offset + feedthrough u + sum_i w_i (u - z_i)        stops
 
-The positions z_i are the memory. z0 is where they stand before the first sample, which pushes them like any
-other; the default, zero, is a memory at rest at u = 0. With c = feedthrough + sum w_i for stops, a stop is a
-play of the negative weight beside c u, so that every law is
+The positions z_i are the memory; z0 is where they stand before the first sample, which pushes them like any other. A
+stop is a play of the negative weight beside a line, so that with c = feedthrough + sum w_i for stops every law is
 
     y = offset + c u + sum_i v_i z_i,    v_i = w_i or -w_i
 """
@@ -85,7 +84,6 @@ class ClampLaw(Bank):
 
     @classmethod
     def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:
-        """As `Law.path`, the plays of a sample side by side."""
         output, elements = np.split(law.parameters, [kernels.N_OUTPUT])
         thresholds, weights = np.split(elements, 2)
         kernels.path(thresholds, weights, output, law.state[1:], np.empty(weights.size), u, y)
@@ -94,32 +92,15 @@ class ClampLaw(Bank):
 
     @classmethod
     def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
-        """As `Law.rows`, the plays of a sample side by side."""
         output = cls.pack(tables).parameters[:, : kernels.N_OUTPUT]
         thresholds, weights = (read_only(tables[name]) for name in (cls.thresholds_name, cls.weights_name))
         kernels.batch(thresholds, weights, read_only(output), read_only(tables["z0"]), u, y)
 
     def tangent(self, direction: npt.ArrayLike, z: npt.ArrayLike, u: npt.ArrayLike) -> FloatArray:
-        """Slope dy/du at the positions `z`, for an input at `u` that moves in `direction`.
+        """Slope dy/du [unit of y / unit of u] at the positions `z`, for an input at `u` that moves in `direction`.
 
-        Parameters
-        ----------
-        direction : array
-            Velocity u' or its sign, not zero.
-        z : array, shape (..., n_plays)
-            Positions as `memory` gives them; without the last axis for a single play or stop.
-        u : array
-            Input, broadcast against the direction.
-
-        Returns
-        -------
-        array
-            [unit of y / unit of u], of the shape of the direction and the input.
-
-        Raises
-        ------
-        ValueError
-            If a direction is zero: the slope ahead and the one behind differ.
+        The direction is the velocity u' or its sign, ValueError if zero; u is broadcast against it. z has the shape
+        (..., n_plays) of `memory`, without the last axis for a single play or stop.
         """
         velocity, inputs = (np.asarray(values, dtype=float)[..., np.newaxis] for values in (direction, u))
         if not np.all(velocity):
@@ -133,9 +114,8 @@ class ClampLaw(Bank):
     def slope_bounds(self) -> tuple[float, float]:
         """Lowest and highest slope dy/du over every input.
 
-        After a reversal the plays are pushed one after the other in the order of their thresholds, so that
-        the slopes are c, c + v_0, c + v_0 + v_1, ...; of these, the first is never seen where a threshold is
-        zero.
+        After a reversal the plays are pushed one after the other in the order of their thresholds: the slopes are c, c
+        + v_0, c + v_0 + v_1, ..., the first of them only where no threshold is zero.
         """
         slope, thresholds, weights = self.as_plays
         slopes = slope + np.concatenate([[0.0], np.cumsum(weights)])
@@ -143,27 +123,13 @@ class ClampLaw(Bank):
         return float(seen.min()), float(seen.max())
 
     def limit_cycle(self, amplitude: float) -> LimitCycle:
-        """Steady loop between the inputs -amplitude and amplitude, about the offset.
-
-        A play of threshold r < X goes to and fro between -(X - r) and X - r. So with the amplitude X ::
+        """Steady loop of y - offset between the inputs -X and X, the `amplitude` [unit of u]. ::
 
             peak      = c X + sum v (X - r)         mid_width = 2 |sum v min(r, X - r)|
             energy    = -4 sum v r (X - r)          over the plays with r < X
 
-        Parameters
-        ----------
-        amplitude : float
-            [unit of u].
-
-        Returns
-        -------
-        LimitCycle
-            Of y - offset; the energy is positive for a loop that runs clockwise.
-
-        Raises
-        ------
-        ValueError
-            If the amplitude is not positive and finite.
+        The energy is positive for a loop that runs clockwise. Raises ValueError if the amplitude is not positive and
+        finite.
 
         Examples
         --------

@@ -1,11 +1,11 @@
-"""What is searched of the modified Prandtl-Ishlinskii law.
+"""The search for the parameters of the modified Prandtl-Ishlinskii law.
 
     y = offset + S(sum_i w_i z_i),    S(x) = x + sum_j c_j S_(d_j)(x)
 
 With given weights of the plays the output is affine in those of the dead zones, which are solved for. The plays'
 weights are searched; the search begins with the plain law's least squares, and with a law's own weights where there
-is one. Plays have their thresholds given, as for the plain law, and so have the dead zones: where a record says nothing
-else, they are spread evenly inside the range of x that the plain law has on it. The weight of the dead zone zero is
+is one. The thresholds of plays and dead zones are given,
+by default evenly inside the range that the plain law's x has on the record. The weight of the dead zone zero is
 one, because a factor on x could be taken for one on S. At the first sample the plays stand at zero, or where a periodic
 record leaves them.
 """

@@ -1,4 +1,4 @@
-"""What the extended Prandtl-Ishlinskii laws share: the rows of numbers that `hysim.kernels.play_sums` takes."""
+"""The parts that the extended Prandtl-Ishlinskii laws share: numbers as `hysim.kernels.play_sums` takes them."""
 
 import math
 from typing import ClassVar

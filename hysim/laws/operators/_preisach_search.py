@@ -1,8 +1,8 @@
-"""What is searched of a law of relays.
+"""The search for the parameters of a law of relays.
 
 The output is affine in the weights and the offset. The levels are given: where the user says nothing else, they
-divide the span of the input evenly. One-signed weights (the default) turn the loop the way in which the record's own
-runs; those of the diagonal, which turn none, are free.
+divide the span of the input evenly. One-signed weights (the default) turn the loop in the sense of the record's own;
+those of the diagonal, which turn none, are free.
 
 With ``initial="rest"``, the default, all relays are down before the first sample. With ``"free"`` the memory is that
 of a single former turning point: all down, up to `turn`, then to the first sample. ``"periodic"`` is the memory that
@@ -85,7 +85,7 @@ class PreisachStructure(Identifiable, Composable):
         return np.concatenate([outputs, ones, np.zeros_like(ones)], axis=-1)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        """The parameters with the memory of the steady cycle of which `record` is one period or more."""
+        """The parameters with the memory after one run through the record, which erases what was before it."""
         shape = np.broadcast_shapes(*map(np.shape, parameters.values()))
         levels = _table("levels", parameters)[0]
         extremes = self._law(levels, np.zeros(_n_weights(levels))).advance(record.u)[1][1:]
@@ -148,33 +148,17 @@ class SearchedRelays(ByStructure, RelayLaw):
 
     @classmethod
     def structure(cls, *, intervals: int = 4, levels: npt.ArrayLike = (), one_signed: bool = True) -> PreisachStructure:
-        """What `hysim.identify` takes: where the levels are.
+        """Levels for `hysim.identify`: equal `intervals` of the span of the input, or the `levels` [unit of u].
 
-        Parameters
-        ----------
-        intervals : int
-            Their number N, of equal length over the span of the input. There are N (N + 1) / 2 weights; one loop
-            between two inputs tells 2 N - 1 combinations of them.
-        levels : sequence of float, optional
-            The N + 1 levels themselves [unit of u].
-        one_signed : bool
-            Whether all weights off the diagonal have the sign of the record's loop (positive for a counterclockwise
-            one). Else they are free, and may be of alternating signs on noisy records.
-
-        Returns
-        -------
-        PreisachStructure
-
-        Raises
-        ------
-        ValueError, TypeError
-            If the number is not a positive int, or the levels are not finite or do not increase.
+        N intervals have N (N + 1) / 2 weights; one loop between two inputs determines 2 N - 1 combinations of them.
+        With `one_signed` all weights off the diagonal have the sign of the record's loop, positive for a
+        counterclockwise one; else they are free, and may be of alternating signs on noisy records. Raises ValueError or
+        TypeError if the number is not a positive int, or the levels are not finite or do not increase.
 
         Examples
         --------
         >>> import hysim as hs
-        >>> fit = hs.identify(hs.Preisach.structure(intervals=3), hs.datasets.table1())
-        >>> fit.n_parameters
+        >>> hs.identify(hs.Preisach.structure(intervals=3), hs.datasets.table1()).n_parameters
         6
         """
         given = tuple(read_only(levels, "levels", ndim=1).tolist())

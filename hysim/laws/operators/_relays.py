@@ -1,4 +1,4 @@
-"""What the laws of relays share.
+"""Laws of relays.
 
 A relay R_ab is up (1) once the input has reached a, and down (-1) once it has reached b < a. The relays stand on
 the pairs of N intervals between N + 1 levels L_0 < ... < L_N, an upper one i and a lower one j <= i, with the weights
@@ -50,7 +50,7 @@ class RelayLaw(Law):
         return read_only(everett_of(np.array([self.weights]))[0])
 
     def advance(self, u: npt.ArrayLike, state: State | None = None) -> tuple[FloatArray, State]:
-        """As `Law.advance`; the state is the last input and the dominant extremes, the oldest first."""
+        """Output and state as of `Law.advance`: the last input and the dominant extremes, the oldest first."""
         inputs = read_only(u, "u", ndim=1)
         past = self.z0 if state is None else state[1:]
         parameters, x, outputs, d = self._staircase(past, inputs.size)
@@ -66,22 +66,10 @@ class RelayLaw(Law):
         return y, (float(inputs[-1]) if y.size else before, *x[1 : d + 1].tolist())
 
     def staircase(self, u: npt.ArrayLike) -> FloatArray:
-        """The line in the plane of the relays' thresholds that the input leaves: those below it are up.
+        """The line in the plane of the relays' thresholds that an input (n_samples,) leaves; those below it are up.
 
-        Parameters
-        ----------
-        u : array, shape (n_samples,)
-            Input.
-
-        Returns
-        -------
-        array, shape (n_corners, 2)
-            Corners (a, b) [unit of u], from the largest input on the edge b = L_0 to the last one on the diagonal.
-
-        Raises
-        ------
-        ValueError
-            If u is not finite or has not one axis.
+        The result (n_corners, 2) holds its corners (a, b) [unit of u], from the largest input on the edge b = L_0 to
+        the last one on the diagonal. Raises ValueError if u is not finite or has not one axis.
 
         Examples
         --------
@@ -97,7 +85,7 @@ class RelayLaw(Law):
     memory = None  # type: ignore[assignment]  # a staircase of any length, see `staircase`
 
     def compiled(self, u0: float = 0.0) -> CompiledLaw:
-        """As `Law.compiled`; the state is the last input, the place of the last extreme, extremes and outputs there."""
+        """As `Law.compiled`; the state holds the place of the last extreme, extremes, and outputs there."""
         state = np.zeros(2 + 2 * _ROOM)
         parameters, x, y, d = self._staircase((*self.z0, u0), 0)
         kept = min(d + 1, _ROOM)
@@ -107,7 +95,6 @@ class RelayLaw(Law):
 
     @classmethod
     def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
-        """As `Law.rows`, with room for as many extremes as there are samples."""
         parameters = cls._rows(tables["levels"], tables["weights"], tables["offset"][:, 0])
         kernels.batch(read_only(parameters), read_only(tables["z0"]), u, y)
 

@@ -1,19 +1,4 @@
-"""The generalised Prandtl-Ishlinskii law: plays that the input pushes through envelope functions.
-
-    z_i(k) = max(gamma_left(u_k) - r_i, min(gamma_right(u_k) + r_i, z_i(k-1)))
-    y      = offset + sum_i w_i z_i
-    gamma(u) = a_0 tanh(a_1 u + a_2) + a_3 + a_4 u,    increasing
-
-u is the input, z_i the memory, y the output. An input that rises pushes the plays along the left envelope, one
-that falls along the right one; the tanh lets the loop saturate, and two different envelopes make the rising
-branch another curve than the falling one. With one envelope the law is the plain one behind gamma, with
-the inverse u = gamma^-1(H^-1[y]). With two, the output stands still in the gap between them after a reversal, so
-that many inputs give it: the inverse takes the nearest. Both are found by Newton's method on the output itself,
-which is monotone along each stretch.
-
-Sources: M. Al Janaideh, S. Rakheja and C.-Y. Su, IEEE/ASME Trans. Mechatronics 16 (2011), for the law and its
-inverse, with the envelopes a_0 tanh(a_1 u + a_2) + a_3 and a_4 u + a_3; the sum of the two is ours.
-"""
+"""The generalised Prandtl-Ishlinskii law: plays that the input pushes through envelope functions."""
 
 import math
 from collections.abc import Mapping
@@ -38,7 +23,13 @@ _STARTS: tuple[tuple[float, ...], ...] = ((0.3, 1.0), (0.0, -1.0, 1.0), (0.2,))
 
 @family
 class GeneralizedPrandtlIshlinskii(ExtendedPlays):
-    """Generalised Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i`` over plays behind envelopes.
+    """Generalised Prandtl-Ishlinskii law: plays that the input pushes through envelope functions. ::
+
+        z_i(k) = max(gamma_left(u_k) - r_i, min(gamma_right(u_k) + r_i, z_i(k-1)))
+        y      = offset + sum_i w_i z_i,    gamma(u) = a_0 tanh(a_1 u + a_2) + a_3 + a_4 u,    increasing
+
+    A rising input pushes the plays along the left envelope, a falling one along the right one; the tanh lets the loop
+    saturate, and two different envelopes make the rising branch another curve than the falling one.
 
     Parameters
     ----------
@@ -49,12 +40,10 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
     left : sequence of float, length 5
         a_0 ... a_4 of the envelope along which a rising input pushes; by default gamma(u) = u.
     right : sequence of float, length 5 or 0
-        Those of a falling one; empty for the same. The play of the threshold r is one where
-        gamma_left - gamma_right is at most 2 r; else it follows the left envelope.
-    offset : float
-        Output at z = 0 [unit of y].
-    z0 : float or sequence of float, length n_plays
-        Positions before the first sample, which pushes them [unit of gamma].
+        Those of a falling one; empty for the same. Where gamma_left - gamma_right exceeds 2 r, the play of the
+        threshold r follows the left envelope.
+    offset, z0
+        As in `PrandtlIshlinskii` [unit of y, unit of gamma].
 
     Raises
     ------
@@ -62,12 +51,16 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
         If lengths differ, a number is not finite, thresholds are negative or do not increase, or an envelope
         does not increase.
 
+    Notes
+    -----
+    Sources: M. Al Janaideh, S. Rakheja and C.-Y. Su, IEEE/ASME Trans. Mechatronics 16 (2011), for the law and its
+    inverse, with the envelopes a_0 tanh(a_1 u + a_2) + a_3 and a_4 u + a_3; the sum of the two is ours.
+
     Examples
     --------
     >>> import hysim as hs
-    >>> law = hs.GeneralizedPrandtlIshlinskii(
-    ...     thresholds=(0.0, 0.5), weights=(1.0, 1.0), left=(1.0, 2.0, 0.0, 0.0, 0.0)
-    ... )
+    >>> envelope = (1.0, 2.0, 0.0, 0.0, 0.0)
+    >>> law = hs.GeneralizedPrandtlIshlinskii(thresholds=(0.0, 0.5), weights=(1.0, 1.0), left=envelope)
     >>> law.response([0.0, 1.0, 0.5, -1.0]).round(6).tolist()
     [0.0, 1.428055, 1.225622, -1.428055]
     >>> law.inverse_response(law.response([0.0, 1.0, 0.5, -1.0])).round(6).tolist()
@@ -98,35 +91,19 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
         left: npt.ArrayLike = (),
         right: npt.ArrayLike = (),
     ) -> ClampStructure:
-        """What `hysim.identify` takes: where the plays are, and what is known of the envelopes.
+        """Plays and envelopes for `hysim.identify`; `plays`, `thresholds` and `one_signed` as of `PrandtlIshlinskii`.
 
-        The envelopes that are searched take the ends of the record's input to themselves, so that thresholds mean
-        there what they mean for `PrandtlIshlinskii`: ``bend`` is how far the tanh is gone through on half the way
-        (none for a straight envelope), ``skew`` where its middle is.
-
-        Parameters
-        ----------
-        plays, thresholds, one_signed
-            As of `PrandtlIshlinskii.structure`.
-        envelopes : {1, 2}
-            Whether one envelope is searched, or the right one has a ``lead`` in skew before the left one.
-        left, right : sequence of float, length 5, optional
-            Envelopes that are known, and not searched.
-
-        Returns
-        -------
-        ClampStructure
-
-        Raises
-        ------
-        ValueError, TypeError
-            As `PrandtlIshlinskii.structure`, if `envelopes` is not 1 or 2, or an envelope does not increase.
+        One envelope is searched, or with ``envelopes=2`` also the ``lead`` in skew of the right one before the left
+        one. It takes the ends of the record's input to themselves, so that thresholds mean what they mean for
+        `PrandtlIshlinskii`: ``bend`` is the part of the tanh passed on half the stroke (none for a straight envelope),
+        ``skew`` the place of its middle. Envelopes `left` and `right` that are given, 5 coefficients each, are not
+        searched. Raises ValueError or TypeError as `PrandtlIshlinskii.structure`, if `envelopes` is not 1 or 2, or an
+        envelope does not increase.
 
         Examples
         --------
         >>> import hysim as hs
-        >>> fit = hs.identify(hs.GeneralizedPrandtlIshlinskii.structure(plays=4), hs.datasets.table1())
-        >>> fit.n_parameters
+        >>> hs.identify(hs.GeneralizedPrandtlIshlinskii.structure(plays=4), hs.datasets.table1()).n_parameters
         7
         """
         if envelopes not in (1, 2):
@@ -140,44 +117,24 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
         )  # fmt: skip
 
     def is_invertible(self) -> bool:
-        """Whether `inverse_response` gives an input for every output that the envelopes reach.
+        """Whether the law has an inverse for every output that the envelopes reach.
 
-        With one envelope where the plain law of the same plays is invertible, with two where the weights have one
-        sign.
+        With one envelope that is so where the plain law of the same plays is invertible, with two where the weights
+        have one sign.
         """
         return self._refusal() is None
 
     def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
-        """Input that gives the output `y`, monotone between the samples; the nearest where there are several.
+        """Input that gives the output `y`, monotone between the samples; see `hysim.Law.inverse_response`.
 
-        Parameters
-        ----------
-        y : array, shape (n_samples,)
-            Wanted output.
-        u0 : float, optional
-            Input at which the law rests before it moves to the first sample; by default the first sample
-            finds the plays at z0.
-        state : tuple of float, optional
-            Input and positions to continue from, in place of u0 and z0.
-
-        Returns
-        -------
-        array, shape (n_samples,)
-            Its `response` is y to rounding.
-
-        Raises
-        ------
-        SimulationError
-            If the envelopes end before an output is reached; it names the sample.
-        ValueError
-            If the law is not invertible, z0 holds positions that no input leads to, or y is not finite or has
-            not one axis.
+        It is computed to rounding by Newton's method on the output. With two envelopes the output stands still in the
+        gap between them after a reversal, and the nearest of its inputs is taken. Raises ValueError also if z0 holds
+        positions that no input leads to.
         """
         self.check_invertible()
         return self.input_of(y, u0, state)
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
-        """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""
         self.check_invertible()
         return self.inverse_from(self.advance([u0])[1], limits)
 

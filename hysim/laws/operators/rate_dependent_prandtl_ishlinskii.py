@@ -1,25 +1,14 @@
 """The rate-dependent Prandtl-Ishlinskii law: plays whose thresholds grow with the speed of the input.
 
-    rho_i(k) = r_i + beta |u'_k| for r_i > 0,  0 for r_0 = 0        u'_k = (u_k - u_(k-1)) / sample_time
-    z_i(k)   = max(u_k - rho_i(k), min(u_k + rho_i(k), z_i(k-1)))
-    y        = offset + sum_i w_i z_i
-
-u is the input, z_i the memory, y the output. The input moves evenly from one sample to the next; at the first
-sample it stands still. Where the speed is known beforehand, the thresholds are functions of time, and the inverse is
-a law of the same kind at the same speed, with the weights and thresholds of the plain law's inverse and
-
-    beta' = |w_0| beta
-
-because the distances of the thresholds past the first do not change in time. Where the speed is that of the input
-which is sought, each sample is one equation for it. With b = beta / sample_time and the sums s_i = w_0 + ... + w_i it
-has one solution, and its error does not grow from sample to sample, where all
+Where the speed is known beforehand, the thresholds are functions of time, and the inverse is a law of the same kind at
+the same speed, with the weights and thresholds of the plain law's inverse and beta' = |w_0| beta, because the distances
+of the thresholds past the first do not change in time. Where the speed is that of the unknown input, each sample is one
+equation for it. With b = beta / sample_time and the sums s_i = w_0 + ... + w_i it has one solution, and its error does
+not grow from sample to sample, where all
 
     s_i - 2 b |s_i - s_0|    (times the sign of s_0)
 
-are positive: samples must be further apart than about 2 beta. Closer ones follow the analytic inverse only.
-
-Sources: M. Al Janaideh and P. Krejci, IEEE/ASME Trans. Mechatronics 18 (2013), for the law and the analytic inverse;
-M. Al Janaideh, P. Krejci and G. A. Monteiro, Applications of Mathematics (2023). The condition on samples is ours.
+are positive: samples must be further apart than about 2 beta. The condition on samples is ours.
 """
 
 import math
@@ -50,7 +39,7 @@ _STARTS = (0.0, 0.1, 0.3)
 
 @checked
 class PlaysAtSampleTime(ExtendedPlays):
-    """The law at one sample time, thresholds ``r_i + width |u_k - u_(k-1)|``: a law by its step."""
+    """The law at one sample time, with thresholds ``r_i + width |u_k - u_(k-1)|``."""
 
     thresholds: tuple[float, ...] = ()
     weights: tuple[float, ...] = ()
@@ -78,7 +67,14 @@ class PlaysAtSampleTime(ExtendedPlays):
 
 @family
 class RateDependentPrandtlIshlinskii(ByStructure, Composable):
-    """Rate-dependent Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i``, thresholds ``r_i + beta |u'|``.
+    """Rate-dependent Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i``, thresholds ``r_i + beta |u'|``. ::
+
+        rho_i(k) = r_i + beta |u'_k| for r_i > 0,  0 for r_0 = 0        u'_k = (u_k - u_(k-1)) / sample_time
+        z_i(k)   = max(u_k - rho_i(k), min(u_k + rho_i(k), z_i(k-1)))
+
+    The input moves evenly from one sample to the next; at the first sample it stands still. Sources: M. Al Janaideh and
+    P. Krejci, IEEE/ASME Trans. Mechatronics 18 (2013), for the law and the analytic inverse; M. Al Janaideh, P. Krejci
+    and G. A. Monteiro, Applications of Mathematics (2023).
 
     Parameters
     ----------
@@ -134,22 +130,7 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
 
     @classmethod
     def structure(cls, *, plays: int = 10, thresholds: npt.ArrayLike = (), one_signed: bool = True) -> ClampStructure:
-        """What `hysim.identify` takes: where the plays are; beta is searched.
-
-        Parameters
-        ----------
-        plays, thresholds, one_signed
-            As of `PrandtlIshlinskii.structure`.
-
-        Returns
-        -------
-        ClampStructure
-
-        Raises
-        ------
-        ValueError, TypeError
-            As `PrandtlIshlinskii.structure`.
-        """
+        """Plays for `hysim.identify`, as of `PrandtlIshlinskii.structure`; beta is searched."""
         given = tuple(read_only(thresholds, "thresholds", ndim=1).tolist())
         return ClampStructure(law=cls, thresholds=given, plays=plays, one_signed=one_signed, pushing=Widening())
 
@@ -200,33 +181,15 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
         return {"y": law.response(u), "z": law.memory(u)}
 
     def advance(self, u: npt.ArrayLike, sample_time: float, state: State | None = None) -> tuple[FloatArray, State]:
-        """Output continued from `state`, and the state after the last sample.
+        """Output continued from `state`, input and positions at the last sample so far, and the state at the end.
 
-        Parameters
-        ----------
-        u : array, shape (n_samples,)
-            Input, moving evenly between its samples and from the state's input to the first of them.
-        sample_time : float
-            Time between two samples [s].
-        state : tuple of float, optional
-            Input and positions at the last sample so far; by default ``(u[0], *z0)``.
-
-        Returns
-        -------
-        y : array, shape (n_samples,)
-            The same bits as from one uncut input.
-        state : tuple of float
-            To continue from.
-
-        Raises
-        ------
-        ValueError
-            As `response`, or if the state does not hold one position for each play.
+        The bits are those of one uncut input, which moves evenly from the state's input to its first sample; arguments
+        and errors are those of `response`. By default the state is ``(u[0], *z0)``.
         """
         return self.at(sample_time).advance(u, state)
 
     def compiled(self, u0: float = 0.0, *, sample_time: float) -> CompiledLaw:
-        """The law as compiled loops take it; the state is that of a first sample at the input `u0`."""
+        """The law as compiled loops take it, after a first sample at the input `u0`."""
         return self.at(sample_time).compiled(u0)
 
     @classmethod
@@ -240,29 +203,7 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
         target: npt.ArrayLike | None = None,
         workers: int | None = None,
     ) -> FloatArray:
-        """Outputs of many laws at once, on all cores, or one number of each.
-
-        Parameters
-        ----------
-        parameters : mapping
-            As of `PrandtlIshlinskii.responses`, and ``beta``.
-        u : array, shape (n_samples,) or (n_sets, n_samples)
-            One input for all sets, or one for each.
-        sample_time : float
-            Time between two samples [s].
-        reduce, target, workers
-            As there.
-
-        Returns
-        -------
-        array, shape (n_sets, n_samples), or (n_sets,) with `reduce`
-            Each row the same bits as `response`.
-
-        Raises
-        ------
-        TypeError, ValueError
-            As there, or if the sample time is not positive.
-        """
+        """Outputs of many laws at one sample time [s]; else as `PrandtlIshlinskii.responses`, with ``beta``."""
         if not sample_time > 0.0:
             raise ValueError(f"sample_time must be positive, got {sample_time}")
         known = [field.name for field in fields(cls)]
@@ -280,15 +221,7 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
     def inverse(self) -> "RateDependentPrandtlIshlinskii":
         """The law that gives the input for a wanted output, exactly, at the same speed of the input.
 
-        Returns
-        -------
-        RateDependentPrandtlIshlinskii
-            To be used as ``inverse.response(y, sample_time, speed=...)``.
-
-        Raises
-        ------
-        ValueError
-            As `PrandtlIshlinskii.inverse`.
+        Use it as ``inverse.response(y, sample_time, speed=...)``. Errors are those of `PrandtlIshlinskii.inverse`.
 
         Examples
         --------
@@ -316,32 +249,11 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
         *,
         speed: npt.ArrayLike | None = None,
     ) -> FloatArray:
-        """Input that gives the output `y`.
+        """Input that gives the output `y` every `sample_time` [s], to rounding; see `hysim.Law.inverse_response`.
 
-        Parameters
-        ----------
-        y : array, shape (n_samples,)
-            Wanted output.
-        sample_time : float
-            Time between two samples [s].
-        u0 : float, optional
-            Input at which the law rests before it moves to the first sample; by default the first sample
-            finds the plays at z0, at rest.
-        state : tuple of float, optional
-            Input and positions to continue from, in place of u0 and z0.
-        speed : array, shape (n_samples,), optional
-            ``|u'|`` of the input, where it is known beforehand, as from the reference: the analytic inverse.
-
-        Returns
-        -------
-        array, shape (n_samples,)
-            Its `response` (at that speed, where one is given) is y to rounding.
-
-        Raises
-        ------
-        ValueError
-            If the law is not invertible, the sample time is too short for it, z0 holds positions that no input leads
-            to, a speed is given beside u0 or state, or an array does not fit.
+        With ``speed``, ``|u'|`` of the input (n_samples,) where it is known beforehand, it is the analytic inverse.
+        Raises ValueError if the law is not invertible, the sample time is too short for it, z0 holds positions that no
+        input leads to, a speed is given beside u0 or state, or an array does not fit.
         """
         if speed is not None:
             if u0 is not None or state is not None:
@@ -351,7 +263,7 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
         return self.at(sample_time).input_of(y, u0, state)
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
-        """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""
+        """The inverse at a sample time [s], stepped; see `hysim.Law.compiled_inverse`."""
         self.check_invertible(sample_time)
         steps = self.at(sample_time)
         return steps.inverse_from(steps.advance([u0])[1], limits)
