@@ -10,7 +10,7 @@ from hysim._frozen import FloatArray, read_only
 from hysim.models import _parts
 from hysim.models.by_structure import ByStructure
 from hysim.models.composable import Composable
-from hysim.models.inverse_search import inverse_response_of
+from hysim.models.inverse_search import inverse_at_rest, inverse_response
 from hysim.models.protocols import CompiledLaw, Continuable, needs_time
 
 State = tuple[Any, ...]
@@ -60,7 +60,7 @@ class Composite(ByStructure, Composable):
         outputs = read_only(y, "y", ndim=1)
         if self.dynamic:
             raise ValueError("what moves in time has no inverse that depends on the output alone")
-        return inverse_response_of(self, outputs, u0)
+        return inverse_response(inverse_at_rest(self, float(outputs[0]), u0), outputs) if outputs.size else outputs
 
 
 def continued(part: Any, u: FloatArray, sample_time: float | None, state: Any) -> tuple[FloatArray, Any]:

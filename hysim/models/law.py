@@ -24,7 +24,7 @@ from hysim.kernels.stepping import Step, drive
 from hysim.models.batch import Batch, Reduction, Sets
 from hysim.models.compiled_step import compiled_step
 from hysim.models.composable import Composable
-from hysim.models.inverse_search import inverse_response, inverse_response_of, inverse_step
+from hysim.models.inverse_search import inverse_at_rest, inverse_response, inverse_step, not_reached
 from hysim.models.parameters import Parameter, declared_space
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
@@ -323,13 +323,24 @@ class Law(Composable, ABC):
             If y is not finite or has not one axis, both u0 and state are given, or the output does not determine where
             the input begins.
         """
+        outputs = read_only(y, "y", ndim=1)
         if state is not None and u0 is not None:
             raise ValueError("give u0 or state, not both: the state has its own input")
-        outputs = read_only(y, "y", ndim=1)
-        if state is None:
-            return inverse_response_of(self, outputs, u0)
-        forward, _ = self._begun(np.array([state[0]]), state)
-        return inverse_response(inverse_step(forward, state[0]), outputs)
+        if not outputs.size:
+            return outputs
+        return inverse_response(self.inverse_begun(outputs, u0, state), outputs, self.unreached)
+
+    def inverse_begun(self, y: FloatArray, u0: float | None, state: State | None) -> CompiledLaw:
+        """The inverse before it moves to the outputs `y`, stepped; `u0` and `state` as of `inverse_response`."""
+        return inverse_at_rest(self, float(y[0]), u0) if state is None else self.search_inverse(state)
+
+    def search_inverse(self, state: State, *, terms: float = 0.0) -> CompiledLaw:
+        """The inverse of the law in this state by a search on its step; see `hysim.models.inverse_search`."""
+        return inverse_step(self._begun(np.array([state[0]]), state)[0], state[0], terms=terms)
+
+    def unreached(self, sample: int, y: float, inverse: CompiledLaw) -> str:
+        """Message for an output that has no input."""
+        return not_reached(sample, y, inverse)
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
         """The inverse, stepped: in the closed form of its family, or by a search on the law's own step.

@@ -19,7 +19,9 @@ class CompiledAmplifier(NamedTuple):
 
 @family
 class Amplifier:
-    """From the command to the voltage at the actuator. ::
+    """From the command to the voltage at the actuator.
+
+    ::
 
         s   = gain u + offset, within the limits        the output's target
         s'  within +-slew rate                          the output

@@ -18,7 +18,9 @@ _TIMES_PER_DECADE = 20  # at which the bank is fitted
 
 @family
 class Creep:
-    """A bank of Kelvin-Voigt elements side by side, behind a spring. ::
+    """A bank of Kelvin-Voigt elements side by side, behind a spring.
+
+    ::
 
         y = g_0 v + sum w_i q_i,    tau_i q_i' = v - q_i
         G(s) = g_0 + sum w_i / (tau_i s + 1)        step response    g_0 + sum w_i (1 - exp(-t / tau_i))

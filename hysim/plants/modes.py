@@ -32,7 +32,9 @@ def mode(natural_frequency: float, damping_ratio: float, gain: float = 1.0, *, d
 
 @family
 class Modes:
-    """Several resonances side by side. ::
+    """Several resonances side by side.
+
+    ::
 
         G(s) = exp(-delay s) sum_i  g_i w_i^2 / (s^2 + 2 zeta_i w_i s + w_i^2)
         d/dt (q_i, q_i' / w_i) = w_i [[0, 1], [-1, -2 zeta_i]] (q_i, q_i' / w_i) + (0, w_i v),    y = sum g_i q_i

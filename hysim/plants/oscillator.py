@@ -276,8 +276,8 @@ class BoucWenOscillator:
 
         Parameters
         ----------
-        method, excitation : str
-            As in the constructor; the method ``"newmark"`` is that of the Noel-Schoukens benchmark.
+        method : str
+            As in the constructor; ``"newmark"`` is that of the Noel-Schoukens benchmark.
         oversampling : int
             Steps of the method between two samples of the record.
         decimation : sequence of int
@@ -292,6 +292,8 @@ class BoucWenOscillator:
         hold : {"foh", "zoh", "band-limited"}
             Whether the input between samples is linear, held, or for a periodic one the sum of the lines below
             half the record's rate.
+        excitation : str
+            As in the constructor.
 
         Returns
         -------

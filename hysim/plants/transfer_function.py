@@ -38,7 +38,9 @@ _SCREENED = 64  # random points beside starts that differ
 
 @family
 class TransferFunction(Composable):
-    """Continuous-time transfer function. ::
+    """Continuous-time transfer function.
+
+    ::
 
         G(s) = exp(-delay s) (num_0 s^m + ... + num_m) / (den_0 s^n + ... + den_n),   m <= n
 

@@ -10,19 +10,56 @@ Sources: R. Bouc 1967; Y. K. Wen, J. Eng. Mech. Div. 102 (1976); the classes aft
 """
 
 import math
+from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, read_only
+from hysim.kernels import boucwen as kernels
+from hysim.kernels.charts import N_WORK
 from hysim.laws.differential import _boucwen_facts, boucwen_inverse, limit_cycle
-from hysim.laws.differential._boucwen_step import BoucWenStep
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen_inverse import BoucWenInverse, InverseState
 from hysim.laws.differential.limit_cycle import LimitCycle
-from hysim.models.law import Packed, State, Tables
+from hysim.models.law import Law, Packed, State, Tables
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.records import Record
+
+
+class BoucWenStep(Law):
+    """A law that packs the parameters (A, beta, gamma, n, gain, offset, c1, c2, ...) and the memory (u, z)."""
+
+    step = staticmethod(kernels.step)
+    workspace: ClassVar[int] = N_WORK - 2
+
+    @classmethod
+    def prepare(cls, parameters: FloatArray, state: FloatArray) -> None:
+        """Fill in the charts of the exponent."""
+        A, beta, gamma, n = parameters[:4].tolist()
+        if n not in (1.0, 2.0):
+            kernels.prepare(A, beta, gamma, n, 0.0, state)
+
+    @classmethod
+    def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:
+        A, beta, gamma, n = map(float, law.parameters[:4])
+        last_u, z = map(float, law.state[:2])
+        if n == 1.0:
+            lost = kernels.linear_path(A, beta, gamma, last_u, z, u, y)
+        elif n == 2.0:
+            lost = kernels.quadratic_path(A, beta, gamma, last_u, z, u, y)
+        else:
+            lost = kernels.power_path(A, beta, gamma, n, last_u, z, u, law.state, y)
+        if lost < 0:
+            law.state[:2] = u[-1], y[-1]
+            kernels.to_output(law.parameters, 4, u, y)
+        return int(lost)
+
+    @classmethod
+    def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
+        parameters, memory = cls.pack(tables)
+        laws = read_only(np.concatenate([parameters[:, :4], memory[:, 1:]], axis=1), finite=False)
+        with np.errstate(all="ignore"):  # a memory that diverges overflows, and uncompiled kernels would warn of it
+            kernels.batch(laws, read_only(parameters[:, 4:], finite=False), u, y, 0, len(y))
 
 
 class BoucWenLaw(BoucWenStep, MemoryLaw):
@@ -97,7 +134,7 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
             raise ValueError(f"low must not be above high, got {low} and {high}")
         memory = _boucwen_facts.memory_slopes(self.A, self.beta, self.gamma, self.n, self.memory_bound)
         scaled = sorted(self.gain * slope if self.gain else 0.0 for slope in memory)
-        static = _boucwen_facts.polynomial_range(boucwen_inverse.derivative(self), low, high)
+        static = _boucwen_facts.polynomial_range(self.input_slope, low, high)
         with np.errstate(invalid="ignore"):
             total = np.add(static, scaled)
         lowest, highest = np.where(np.isnan(total), [-np.inf, np.inf], total).tolist()
@@ -111,29 +148,22 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
         rounding counts as zero.
         """
         bounds = self.slope_bounds(low, high)
-        rounding = 1e-14 * (abs(self.gain * self.A) + float(np.abs(boucwen_inverse.coefficients(self)).max()))
+        rounding = 1e-14 * (abs(self.gain * self.A) + float(np.abs(self.input_polynomial).max()))
         return bounds[0] > rounding or bounds[1] < -rounding
 
     def inverse(self) -> BoucWenInverse:
         """The inverse as an object for loops, in the direction of the output at u = z = 0, else ValueError."""
         return boucwen_inverse.inverse(self)
 
-    def inverse_response(
-        self, y: npt.ArrayLike, u0: float | None = None, state: State | InverseState | None = None
-    ) -> FloatArray:
-        """Input that gives the output `y`, linear between the samples; see `hysim.Law.inverse_response`.
+    def inverse_begun(self, y: FloatArray, u0: float | None, state: State | InverseState | None) -> CompiledLaw:
+        """In closed form, from the input that gives the first output with the memory at z0."""
+        rest = boucwen_inverse.at_rest(self, float(y[0])) if u0 is None and state is None else (u0, self.z0)
+        begin: Any = rest if state is None else state
+        return boucwen_inverse.inverse(self, float(begin[0])).begun(begin)
 
-        Its `response` is y to rounding. With neither u0 nor state the law rests, its memory at z0, at the input that
-        gives y[0], searched for from u = 0. An error names the sample, and the input and the slope there.
-
-        Examples
-        --------
-        >>> import hysim as hs
-        >>> law = hs.BoucWen(A=0.35, beta=0.02, gamma=0.005, feedthrough=1.0, gain=-1.0)
-        >>> law.inverse_response(law.response([0.0, 30.0, 10.0])).round(9).tolist()
-        [0.0, 30.0, 10.0]
-        """
-        return boucwen_inverse.inverse_response(self, y, u0, state)
+    def unreached(self, sample: int, y: float, inverse: CompiledLaw) -> str:
+        """Message with the input and the slope there."""
+        return boucwen_inverse.unreached(sample, y, inverse)
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
         return boucwen_inverse.inverse(self, u0).compiled(u0=u0, limits=limits)

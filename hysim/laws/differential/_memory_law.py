@@ -15,13 +15,17 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim.laws.differential import _boucwen_search, boucwen_inverse
-from hysim.models.law import Law, Tables
+from hysim.models.law import Law, State, Tables
+from hysim.models.protocols import CompiledLaw
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
 
 class MemoryLaw(Law):
     """A law with one memory z, and an output that is a polynomial of u plus gain z.
+
+    Its inverse is exact to the rounding of the output's terms, or to 1e-12 of the memory's stroke if stepped by
+    power series.
 
     `polynomial` names the field of the coefficients c1, c2, ..., a tuple or a single number.
     """
@@ -61,6 +65,17 @@ class MemoryLaw(Law):
         return tuple(name for name in self.scalars if name.partition("[")[0] == self.polynomial)
 
     @property
+    def input_polynomial(self) -> FloatArray:
+        """(c1, c2, ...)."""
+        return np.array([self.scalars[name] for name in self.coefficient_names])
+
+    @property
+    def input_slope(self) -> FloatArray:
+        """Slope of the polynomial of the input, coefficients in ascending powers."""
+        c = self.input_polynomial
+        return np.asarray(c * np.arange(1.0, c.size + 1.0))
+
+    @property
     def columns(self) -> tuple[str, ...]:
         """Names in which the output is affine."""
         return (*self.coefficient_names, "gain", "offset")
@@ -86,7 +101,7 @@ class MemoryLaw(Law):
         if not np.all(velocity):
             raise ValueError("direction must not be zero: an input that stands still has two slopes")
         inputs = np.asarray(u, dtype=float)
-        static = np.polynomial.polynomial.polyval(inputs, boucwen_inverse.derivative(self))
+        static = np.polynomial.polynomial.polyval(inputs, self.input_slope)
         further = (np.asarray(other, dtype=float) for other in others)
         return np.asarray(static + self.gain * self._memory_slope(np.sign(velocity), memory, inputs, *further))
 
@@ -102,6 +117,15 @@ class MemoryLaw(Law):
     def alike(self, record: Record, freedom: Freedom) -> tuple[tuple[str, ...], ...]:
         """Groups of parameters of which one is held on this record."""
         return ()
+
+    def inverse_begun(self, y: FloatArray, u0: float | None, state: State | None) -> CompiledLaw:
+        """By a search on the step, from the input that gives the first output with the memory at z0."""
+        if state is None:
+            first = boucwen_inverse.at_rest(self, float(y[0]))[0] if u0 is None else float(u0)
+            state = self.start(first, self.packed[1])
+        u, z, *_ = state
+        powers = [abs(c * u**k) for k, c in enumerate(self.input_polynomial.tolist(), 1)]
+        return self.search_inverse(state, terms=float(abs(self.offset) + sum(powers) + abs(self.gain * z)))
 
     def _one_pass(self, parameters: Parameters, u: FloatArray) -> Callable[[FloatArray], FloatArray]:
         def passed(z: FloatArray) -> FloatArray:

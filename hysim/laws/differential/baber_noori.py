@@ -8,7 +8,7 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray
 from hysim.kernels import baber_noori as kernels
 from hysim.laws.differential import _boucwen_conversions, _power_units
-from hysim.laws.differential._asymmetric import SteppedLaw
+from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.models.holding import Holding
 from hysim.models.law import Packed, Tables
 from hysim.models.model import family
@@ -20,8 +20,10 @@ _OWN = ("delta_a", "delta_nu", "delta_eta", *_PINCHING)
 
 
 @family
-class BoucWenBaberNoori(SteppedLaw):
-    """Bouc-Wen law with degradation and pinching, after Baber and Noori (1985) and Foliente (1995). ::
+class BoucWenBaberNoori(MemoryLaw):
+    """Bouc-Wen law with degradation and pinching, after Baber and Noori (1985) and Foliente (1995).
+
+    ::
 
         dz/du = h (A - delta_a e - (1 + delta_nu e) |z|^n (gamma + beta sgn(z u'))) / (1 + delta_eta e),    de/du = z
         h     = 1 - zeta1 exp(-(z sgn(u') - q z_u)^2 / zeta2^2),    z_u = (1 / ((1 + delta_nu e) (beta + gamma)))^(1/n)

@@ -3,14 +3,14 @@
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.laws.differential._as_bouc_wen import AsBoucWen
+from hysim.laws.differential._equivalent_boucwen import EquivalentBoucWen
 from hysim.models.law import Tables
 from hysim.models.model import family
 from hysim.models.parameters import Parameter
 
 
 @family
-class ColemanHodgdon(AsBoucWen):
+class ColemanHodgdon(EquivalentBoucWen):
     """Backlash-like Duhem law, ``y' = alpha |u'| (c u + offset - y) + B u'``.
 
     Whatever the direction, y is drawn to the line offset + c u, and in the end runs beside it at the distance

@@ -3,7 +3,7 @@
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.laws.differential._as_bouc_wen import AsBoucWen
+from hysim.laws.differential._equivalent_boucwen import EquivalentBoucWen
 from hysim.models.law import Tables
 from hysim.models.model import family
 from hysim.models.parameters import Parameter
@@ -12,7 +12,7 @@ _STARTS = ((0.03, 0.5), (0.1, 0.5), (0.3, 0.7), (1.0, 1.5))  # coulomb / stiffne
 
 
 @family
-class Dahl(AsBoucWen):
+class Dahl(EquivalentBoucWen):
     """Dahl friction, ``F' = stiffness (u' - |u'| F / coulomb)`` and ``y = offset + F``.
 
     u is the displacement and F the friction force; Dahl's exponent is 1. It is the Bouc-Wen law with A = stiffness,

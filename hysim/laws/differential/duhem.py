@@ -13,7 +13,6 @@ from hysim.laws.differential import _duhem_search, duhem_structure
 from hysim.laws.differential.duhem_runs import branches, free_runs, outputs
 from hysim.laws.differential.duhem_structure import DuhemStructure
 from hysim.laws.differential.terms import Polynomials, Term, equation, latex, polynomials, terms_of
-from hysim.models import inverse_search
 from hysim.models.law import Law, Packed, State, Tables
 from hysim.models.model import family
 from hysim.models.protocols import CompiledLaw
@@ -30,7 +29,9 @@ def _none() -> FloatArray:
 
 @family
 class Duhem(Law):
-    """Polynomial Duhem law, ``y = offset + feedthrough u + z`` with ``z' = u' p(u, z) + |u'| q(u, z)``. ::
+    """Polynomial Duhem law, ``y = offset + feedthrough u + z`` with ``z' = u' p(u, z) + |u'| q(u, z)``.
+
+    ::
 
         p = sum (p_ij + p_abs_ij |z|) u^i z^j,    q = sum (q_ij + q_abs_ij |z|) u^i z^j
         Coleman-Hodgdon    p = b,                q = a (c u - y)
@@ -59,6 +60,11 @@ class Duhem(Law):
     ------
     ValueError
         If an array is empty, has not two axes, or a number is not finite.
+
+    Notes
+    -----
+    Without u0 and state the `inverse_response` begins at rest at u = 0, the output at y0: the law that comes from there
+    has the wanted output to 1e-12 of its range, and so has its `response` if that begins at y0.
 
     Examples
     --------
@@ -190,26 +196,11 @@ class Duhem(Law):
         size = np.abs(memory)
         return np.asarray(self.feedthrough + (p + size * p_abs) + np.sign(velocity) * (q + size * q_abs))
 
-    def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
-        """Input that gives the output `y`, linear between the samples; see `hysim.Law.inverse_response`.
-
-        By default the law rests at u = 0, its output at y0. The law that comes from there has the output y to 1e-12 of
-        its range; so has its `response` if y begins at y0.
-
-        Examples
-        --------
-        >>> import hysim as hs
-        >>> law = hs.Duhem.from_terms({"u'": 1.0, "u' |z|": -0.3, "|u'| z": -0.6}, feedthrough=2.0)
-        >>> law.inverse_response(law.response([0.0, 1.0, 0.2])).round(9).tolist()
-        [0.0, 1.0, 0.2]
-        """
-        if state is not None and u0 is not None:
-            raise ValueError("give u0 or state, not both: the state has its own input")
-        outputs = read_only(y, "y", ndim=1)
-        start = state or self.start(float(u0 or 0.0), np.empty(0))
-        terms = abs(self.offset) + abs(self.feedthrough * start[0]) + abs(start[1])
-        forward = self._begun(np.array([start[0]]), start)[0]
-        return inverse_search.inverse_response(inverse_search.inverse_step(forward, start[0], terms=terms), outputs)
+    def inverse_begun(self, y: FloatArray, u0: float | None, state: State | None) -> CompiledLaw:
+        """By a search on the step; by default from rest at u = 0, the output at y0."""
+        begin = state or self.start(float(u0 or 0.0), np.empty(0))
+        terms = abs(self.offset) + abs(self.feedthrough * begin[0]) + abs(begin[1])
+        return self.search_inverse(begin, terms=terms)
 
     @property
     def workspace(self) -> int:  # type: ignore[override]

@@ -6,7 +6,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.kernels import generalized as kernels
-from hysim.laws.differential._asymmetric import SteppedLaw
+from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.models.law import Packed, Tables
 from hysim.models.model import family
 from hysim.models.search_space import Freedom
@@ -18,7 +18,7 @@ _ONE_SIDED = (("b6", "gamma"), ("b3", "b5"), ("b2", "b4"))
 
 
 @family
-class GeneralizedBoucWen(SteppedLaw):
+class GeneralizedBoucWen(MemoryLaw):
     """Bouc-Wen law with a shape for each sector of the loop, after Song and Der Kiureghian (2006).
 
     A loop in the (u, z) plane has six sectors by the signs of u', z and u; psi is one number in each.

@@ -13,13 +13,13 @@ import numpy as np
 from hysim._frozen import FloatArray
 from hysim.kernels import zhu_wang as kernels
 from hysim.laws.differential import _power_units
-from hysim.laws.differential._asymmetric import SteppedLaw
+from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.models.law import Packed, Tables
 from hysim.models.model import family
 
 
 @family
-class ZhuWangBoucWen(SteppedLaw):
+class ZhuWangBoucWen(MemoryLaw):
     """Bouc-Wen law with the term ``delta u sgn(du)``, after Zhu and Wang (2012).
 
     ``dz/du = A - |z|^n (gamma + beta sgn(z du)) + delta u sgn(du)``, ``y = offset + sum c_k u^k + gain z``

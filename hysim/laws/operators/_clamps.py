@@ -123,7 +123,9 @@ class ClampLaw(Bank):
         return float(seen.min()), float(seen.max())
 
     def limit_cycle(self, amplitude: float) -> LimitCycle:
-        """Steady loop of y - offset between the inputs -X and X, the `amplitude` [unit of u]. ::
+        """Steady loop of y - offset between the inputs -X and X, the `amplitude` [unit of u].
+
+        ::
 
             peak      = c X + sum v (X - r)         mid_width = 2 |sum v min(r, X - r)|
             energy    = -4 sum v r (X - r)          over the plays with r < X

@@ -23,7 +23,9 @@ _STARTS: tuple[tuple[float, ...], ...] = ((0.3, 1.0), (0.0, -1.0, 1.0), (0.2,))
 
 @family
 class GeneralizedPrandtlIshlinskii(ExtendedPlays):
-    """Generalised Prandtl-Ishlinskii law: plays that the input pushes through envelope functions. ::
+    """Generalised Prandtl-Ishlinskii law: plays that the input pushes through envelope functions.
+
+    ::
 
         z_i(k) = max(gamma_left(u_k) - r_i, min(gamma_right(u_k) + r_i, z_i(k-1)))
         y      = offset + sum_i w_i z_i,    gamma(u) = a_0 tanh(a_1 u + a_2) + a_3 + a_4 u,    increasing

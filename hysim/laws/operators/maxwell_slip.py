@@ -15,7 +15,9 @@ from hysim.models.model import family
 
 @family
 class MaxwellSlip(ByStructure, ClampLaw):
-    """Maxwell-slip law: springs side by side, each of which slips at an elongation of its own. ::
+    """Maxwell-slip law: springs side by side, each of which slips at an elongation of its own.
+
+    ::
 
         F = offset + feedthrough u + sum_i k_i (u - z_i),    z_i = min(max(z_i, u - d_i), u + d_i)
 

@@ -21,7 +21,9 @@ from hysim.models.model import family
 
 @family
 class ModifiedPrandtlIshlinskii(ExtendedPlays):
-    """Modified Prandtl-Ishlinskii law: plays, and behind them dead zones, for loops that are not odd. ::
+    """Modified Prandtl-Ishlinskii law: plays, and behind them dead zones, for loops that are not odd.
+
+    ::
 
         x = sum_i w_i z_i,    z_i(k) = min(max(z_i(k-1), u_k - r_i), u_k + r_i)
         y = offset + S(x),    S(x) = sum_j c_j S_(d_j)(x)

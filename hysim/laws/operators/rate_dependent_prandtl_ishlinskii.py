@@ -67,7 +67,9 @@ class PlaysAtSampleTime(ExtendedPlays):
 
 @family
 class RateDependentPrandtlIshlinskii(ByStructure, Composable):
-    """Rate-dependent Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i``, thresholds ``r_i + beta |u'|``. ::
+    """Rate-dependent Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i``, thresholds ``r_i + beta |u'|``.
+
+    ::
 
         rho_i(k) = r_i + beta |u'_k| for r_i > 0,  0 for r_0 = 0        u'_k = (u_k - u_(k-1)) / sample_time
         z_i(k)   = max(u_k - rho_i(k), min(u_k + rho_i(k), z_i(k-1)))

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
-from hysim.laws.differential._boucwen_step import BoucWenStep
+from hysim.laws.differential._boucwen_law import BoucWenStep
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.laws.differential.boucwen_inverse import BoucWenInverse, InverseState
 from hysim.laws.differential.limit_cycle import LimitCycle
@@ -15,7 +15,7 @@ from hysim.models.law import Packed, State, Tables
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 
 
-class AsBoucWen(BoucWenStep):
+class EquivalentBoucWen(BoucWenStep):
     """A law that says which Bouc-Wen law it is."""
 
     @classmethod
@@ -47,11 +47,13 @@ class AsBoucWen(BoucWenStep):
         """The law's inverse as an object, where its slope keeps its sign; see `hysim.BoucWen.inverse`."""
         return self.bouc_wen.inverse()
 
-    def inverse_response(
-        self, y: npt.ArrayLike, u0: float | None = None, state: State | InverseState | None = None
-    ) -> FloatArray:
-        """Input that gives the output `y` from the input `u0`; see `hysim.BoucWen.inverse_response`."""
-        return self.bouc_wen.inverse_response(y, u0, state)
+    def inverse_begun(self, y: FloatArray, u0: float | None, state: State | InverseState | None) -> CompiledLaw:
+        """That of the Bouc-Wen law."""
+        return self.bouc_wen.inverse_begun(y, u0, state)
+
+    def unreached(self, sample: int, y: float, inverse: CompiledLaw) -> str:
+        """Message with the input and the slope there."""
+        return self.bouc_wen.unreached(sample, y, inverse)
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
         """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""
