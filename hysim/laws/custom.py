@@ -11,9 +11,10 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, checked, read_only
 from hysim.models.batch import Reduction
 from hysim.models.compiled_step import compiled_step
-from hysim.models.law import Law, Packed, Tables, rows_by_step
+from hysim.models.law import Law, Packed, rows_by_step
 from hysim.models.parameters import Parameter, declared_space
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.tables import Tables
 from hysim.records import Record
 
 

@@ -16,14 +16,13 @@ import numpy as np
 
 from hysim._frozen import FloatArray, checked
 from hysim.models._joint_space import declared, together
-from hysim.models._parts import checked_tuple, labels, own, response_of
-from hysim.models._sum_search import started, time_of
+from hysim.models._parts import labels, own, response_of
+from hysim.models._sum_search import assembled, started, time_of
 from hysim.models.composable import Composable, composed
 from hysim.models.protocols import (
     Identifiable,
     LinearStage,
     LinearStructure,
-    Responding,
     UnitGainStructure,
     needs_time,
 )
@@ -38,10 +37,8 @@ class CascadeStructure(Identifiable, Composable):
     stages: tuple[Any, ...]
 
     def __post_init__(self) -> None:
-        stages = started(checked_tuple(self.stages, "stages"))
+        stages = started(self.stages, "stages")
         for stage in stages:
-            if not isinstance(stage, Identifiable | Responding):
-                raise TypeError(f"stages must hold models or structures, got {type(stage).__name__}")
             if isinstance(stage, LinearStage) and stage.initial_state:
                 raise ValueError("a transfer function that is given must not hold an initial state")
         object.__setattr__(self, "stages", stages)
@@ -92,12 +89,7 @@ class CascadeStructure(Identifiable, Composable):
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
         """The cascade with these parameters."""
-        searched = self._searched
-        stages = zip(labels(self.stages), self.stages, strict=True)
-        members = (
-            searched[label].assemble(own(parameters, label)) if label in searched else stage for label, stage in stages
-        )
-        return composed(">>", tuple(members))
+        return composed(">>", assembled(self.stages, self._searched, parameters))
 
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
         """What the law that carries the gain says of itself."""

@@ -17,14 +17,26 @@ from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
 
-def started(parts: Sequence[Any]) -> tuple[Any, ...]:
-    """The parts, of a class the model with its defaults."""
-    return tuple(part() if isinstance(part, type) else part for part in parts)
+def started(parts: Any, what: str) -> tuple[Any, ...]:
+    """Models and structures as a tuple, of a class the model with its defaults."""
+    members = tuple(part() if isinstance(part, type) else part for part in checked_tuple(parts, what))
+    for member in members:
+        if not isinstance(member, Identifiable | Responding):
+            raise TypeError(f"{what} must hold models or structures, got {type(member).__name__}")
+    return members
 
 
 def time_of(part: Any, record: Record) -> float | None:
     """The sample time where the part needs one."""
     return record.sample_time if needs_time(part) else None
+
+
+def assembled(members: Sequence[Any], searched: Mapping[str, Any], parameters: Parameters) -> tuple[Any, ...]:
+    """The models of the members, those that are searched by their labels with their parameters."""
+    parts = zip(labels(members), members, strict=True)
+    return tuple(
+        searched[label].assemble(own(parameters, label)) if label in searched else part for label, part in parts
+    )
 
 
 @checked
@@ -34,11 +46,7 @@ class SumStructure(Identifiable, Composable):
     parts: tuple[Any, ...]
 
     def __post_init__(self) -> None:
-        parts = started(checked_tuple(self.parts, "parts"))
-        for part in parts:
-            if not isinstance(part, Identifiable | Responding):
-                raise TypeError(f"parts must hold models or structures, got {type(part).__name__}")
-        object.__setattr__(self, "parts", parts)
+        object.__setattr__(self, "parts", started(self.parts, "parts"))
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The parts' spaces side by side; of columns that repeat each other one is free."""
@@ -80,11 +88,7 @@ class SumStructure(Identifiable, Composable):
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
         """The sum with these parameters."""
-        parts = zip(labels(self.parts), self.parts, strict=True)
-        members = (
-            part.assemble(own(parameters, label)) if isinstance(part, Identifiable) else part for label, part in parts
-        )
-        return composed("+", tuple(members))
+        return composed("+", assembled(self.parts, self._identified, parameters))
 
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
         """What the laws among the parts say of themselves."""

@@ -21,8 +21,9 @@ from hysim.laws.differential import _boucwen_facts, boucwen_inverse, limit_cycle
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen_inverse import BoucWenInverse, InverseState
 from hysim.laws.differential.limit_cycle import LimitCycle
-from hysim.models.law import Law, Packed, State, Tables
+from hysim.models.law import Law, Packed, State
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
+from hysim.models.tables import Tables
 from hysim.records import Record
 
 

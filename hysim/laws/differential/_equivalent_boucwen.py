@@ -11,8 +11,9 @@ from hysim.laws.differential._boucwen_law import BoucWenStep
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.laws.differential.boucwen_inverse import BoucWenInverse, InverseState
 from hysim.laws.differential.limit_cycle import LimitCycle
-from hysim.models.law import Packed, State, Tables
+from hysim.models.law import Packed, State
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
+from hysim.models.tables import Tables
 
 
 class EquivalentBoucWen(BoucWenStep):

@@ -15,9 +15,10 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim.laws.differential import _boucwen_search, boucwen_inverse
-from hysim.models.law import Law, State, Tables
+from hysim.models.law import Law, State
 from hysim.models.protocols import CompiledLaw
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.tables import Tables
 from hysim.records import Record
 
 

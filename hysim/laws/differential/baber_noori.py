@@ -10,9 +10,10 @@ from hysim.kernels import baber_noori as kernels
 from hysim.laws.differential import _boucwen_conversions, _power_units
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.models.holding import Holding
-from hysim.models.law import Packed, Tables
+from hysim.models.law import Packed
 from hysim.models.model import family
 from hysim.models.search_space import Freedom, Parameters
+from hysim.models.tables import Tables
 from hysim.records import Record
 
 _PINCHING = ("zeta_s", "q", "p", "psi", "delta_psi", "lambda_")

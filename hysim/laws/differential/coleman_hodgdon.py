@@ -4,9 +4,9 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.laws.differential._equivalent_boucwen import EquivalentBoucWen
-from hysim.models.law import Tables
 from hysim.models.model import family
 from hysim.models.parameters import Parameter
+from hysim.models.tables import Tables
 
 
 @family

@@ -4,9 +4,9 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.laws.differential._equivalent_boucwen import EquivalentBoucWen
-from hysim.models.law import Tables
 from hysim.models.model import family
 from hysim.models.parameters import Parameter
+from hysim.models.tables import Tables
 
 _STARTS = ((0.03, 0.5), (0.1, 0.5), (0.3, 0.7), (1.0, 1.5))  # coulomb / stiffness in spans of u, coulomb in spans of y
 

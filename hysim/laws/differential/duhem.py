@@ -9,14 +9,24 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
 from hysim.kernels import duhem as kernels
-from hysim.laws.differential import _duhem_search, duhem_structure
+from hysim.laws.differential import _duhem_search
 from hysim.laws.differential.duhem_runs import branches, free_runs, outputs
 from hysim.laws.differential.duhem_structure import DuhemStructure
-from hysim.laws.differential.terms import Polynomials, Term, equation, latex, polynomials, terms_of
-from hysim.models.law import Law, Packed, State, Tables
+from hysim.laws.differential.terms import (
+    Polynomials,
+    Term,
+    duhem_terms,
+    equation,
+    latex,
+    named_terms,
+    polynomials,
+    terms_of,
+)
+from hysim.models.law import Law, Packed, State
 from hysim.models.model import family
 from hysim.models.protocols import CompiledLaw
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.tables import Tables
 from hysim.records import Record
 
 _BOUND = 1e3
@@ -163,9 +173,9 @@ class Duhem(Law):
         3.1635
         """
         if degree is not None and terms is None:
-            return duhem_structure.of_degree(degree, cls(p=_none(), q=_none()))
+            return DuhemStructure(family=cls(p=_none(), q=_none()), terms=duhem_terms(degree))
         if terms is not None and degree is None:
-            return duhem_structure.of_terms(tuple(terms), cls(p=_none(), q=_none()))
+            return DuhemStructure(family=cls(p=_none(), q=_none()), terms=named_terms(terms))
         raise ValueError("give degree or terms, one of the two")
 
     @property

@@ -7,9 +7,10 @@ import numpy as np
 from hysim._frozen import FloatArray
 from hysim.kernels import generalized as kernels
 from hysim.laws.differential._memory_law import MemoryLaw
-from hysim.models.law import Packed, Tables
+from hysim.models.law import Packed
 from hysim.models.model import family
 from hysim.models.search_space import Freedom
+from hysim.models.tables import Tables
 from hysim.records import Record
 
 _SECTORS = ("b2", "b3", "b4", "b5", "b6")

@@ -14,8 +14,9 @@ from hysim._frozen import FloatArray
 from hysim.kernels import zhu_wang as kernels
 from hysim.laws.differential import _power_units
 from hysim.laws.differential._memory_law import MemoryLaw
-from hysim.models.law import Packed, Tables
+from hysim.models.law import Packed
 from hysim.models.model import family
+from hysim.models.tables import Tables
 
 
 @family

@@ -21,14 +21,14 @@ steady cycle is ``"periodic"``: the positions that the record itself leaves behi
 import itertools
 from collections.abc import Mapping
 from dataclasses import fields, replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray, checked
+from hysim._frozen import FloatArray, check_whole, checked
 from hysim.laws.operators._clamps import check_elements, positions
 from hysim.models.composable import Composable
-from hysim.models.parameters import Coordinate, space_of
+from hysim.models.parameters import Coordinate, space_of, spans
 from hysim.models.protocols import Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
@@ -46,44 +46,24 @@ class Axis(NamedTuple):
     scale: float
 
 
-class Pushing(Protocol):
-    """How a law's plays are pushed, as far as its parameters are to be identified."""
+@checked
+class Pushing:
+    """How the input pushes the plays of a law, as far as its parameters are searched: here by itself."""
 
     def axes(self, record: Record) -> dict[str, Axis]:
-        """What is searched beside thresholds and turning point, by name."""
-        ...
+        """Coordinates beside thresholds and turning point, by name."""
+        return {}
 
     def derived(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
-        """What the law has in place of the coordinates, by name, (n_sets,) each."""
-        ...
+        """Parameters of the law in place of the coordinates, by name, (n_sets,) each."""
+        return {}
 
     def positions(self, parameters: Parameters, thresholds: FloatArray, z0: FloatArray, record: Record) -> FloatArray:
         """Positions (n_sets, n_samples, n_plays) for thresholds and initial positions (n_sets, n_plays)."""
-        ...
-
-    def arguments(self, parameters: Mapping[str, float]) -> dict[str, Any]:
-        """The constructor's arguments beside those of every bank."""
-        ...
-
-
-@checked
-class ByTheInput:
-    """Plays and stops that the input itself pushes."""
-
-    def axes(self, record: Record) -> dict[str, Axis]:
-        """Nothing."""
-        return {}
-
-    def derived(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
-        """Nothing."""
-        return {}
-
-    def positions(self, parameters: Parameters, thresholds: FloatArray, z0: FloatArray, record: Record) -> FloatArray:
-        """Positions (n_sets, n_samples, n_plays)."""
         return positions(thresholds, z0, record.u)
 
     def arguments(self, parameters: Mapping[str, float]) -> dict[str, Any]:
-        """Nothing."""
+        """The constructor's arguments beside those of every bank."""
         return {}
 
 
@@ -95,18 +75,15 @@ class ClampStructure(Identifiable, Composable):
     thresholds: tuple[float, ...] = ()
     plays: int = 10
     one_signed: bool = True
-    pushing: Pushing = ByTheInput()
+    pushing: Pushing = Pushing()
 
     def __post_init__(self) -> None:
-        if isinstance(self.plays, bool) or not isinstance(self.plays, int):
-            raise TypeError(f"plays must be an int, got {self.plays!r}")
-        if self.plays < 1:
-            raise ValueError(f"plays must be at least 1, got {self.plays}")
+        check_whole(self.plays, "plays")
         check_elements(self.law, *[np.atleast_2d(self.thresholds)] * 3)
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """Thresholds and memory as coordinates where they are free; the rest is linear."""
-        half = half_span(record)
+        half = spans(record)["h"]
         thresholds = self._thresholds(half)
         names, columns = self._names("thresholds", thresholds.size), self._columns(thresholds.size)
         first, axes = float(record.u[0]), self.pushing.axes(record)
@@ -207,14 +184,6 @@ class ClampStructure(Identifiable, Composable):
             return {}
         side = (0.0, np.inf) if self.law.stops == runs_clockwise(record) else (-np.inf, 0.0)
         return {name: side for name, threshold in thresholds.items() if threshold > 0.0}
-
-
-def half_span(record: Record) -> float:
-    """Half the span of the input: the largest threshold of which a cycle can tell."""
-    span = float(np.ptp(record.u))
-    if span == 0.0:
-        raise ValueError("the input is constant: nothing can be identified from it")
-    return 0.5 * span
 
 
 def _after(turn: Any, thresholds: FloatArray) -> FloatArray:

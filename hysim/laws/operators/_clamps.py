@@ -18,17 +18,18 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, items, read_only
 from hysim.kernels import clamps as kernels
 from hysim.laws.differential.limit_cycle import LimitCycle
-from hysim.models.law import Law, Packed, Tables
+from hysim.models.law import Law, Packed
 from hysim.models.protocols import CompiledLaw
+from hysim.models.tables import Tables
 
 
 class Bank(Law):
     """Plays or stops; a law says what its thresholds and weights are called, and adds its fields."""
 
-    thresholds_name: ClassVar[str]
-    weights_name: ClassVar[str]
-    stops: ClassVar[bool]
-    bank: ClassVar[bool]  # whether thresholds, weights and z0 are tuples
+    thresholds_name: ClassVar[str] = "thresholds"
+    weights_name: ClassVar[str] = "weights"
+    stops: ClassVar[bool] = False
+    bank: ClassVar[bool] = True  # whether thresholds, weights and z0 are tuples
     ordered: ClassVar[bool] = False  # whether the thresholds must increase
     offset: float
     z0: Any

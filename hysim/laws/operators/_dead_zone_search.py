@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hysim._frozen import FloatArray, checked
+from hysim._frozen import FloatArray, check_whole, checked
 from hysim.laws.operators._clamp_search import ClampStructure
 from hysim.laws.operators._play_sums import check_dead_zones, dead_zone
 from hysim.models.composable import Composable
@@ -38,10 +38,7 @@ class DeadZoneStructure(Identifiable, Composable):
     weights: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        if isinstance(self.count, bool) or not isinstance(self.count, int):
-            raise TypeError(f"dead_zones must be an int, or thresholds, got {self.count!r}")
-        if self.count < 0:
-            raise ValueError(f"dead_zones must not be negative, got {self.count}")
+        check_whole(self.count, "dead_zones", least=0)
         if self.dead_zones:
             check_dead_zones(*[np.atleast_2d(self.dead_zones)] * 2)
 

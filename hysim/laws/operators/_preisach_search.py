@@ -20,12 +20,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, checked, read_only
-from hysim.laws.operators._clamp_search import TURN, half_span, runs_clockwise
-from hysim.laws.operators._relays import RelayLaw, check_relays
-from hysim.models.by_structure import ByStructure
+from hysim._frozen import FloatArray, check_whole, checked
+from hysim.laws.operators._clamp_search import TURN, runs_clockwise
 from hysim.models.composable import Composable
-from hysim.models.parameters import Coordinate, space_of
+from hysim.models.law import Law
+from hysim.models.parameters import Coordinate, space_of, spans
 from hysim.models.protocols import Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
@@ -38,22 +37,19 @@ _RANK = 1e-9  # of a column's length: what is left of one that others make up fo
 class PreisachStructure(Identifiable, Composable):
     """A bank of relays to be identified; see `Preisach.structure`."""
 
-    law: type[RelayLaw]
+    law: type[Law]
     levels: tuple[float, ...] = ()
     intervals: int = 4
     one_signed: bool = True
 
     def __post_init__(self) -> None:
-        if isinstance(self.intervals, bool) or not isinstance(self.intervals, int):
-            raise TypeError(f"intervals must be an int, got {self.intervals!r}")
-        if self.intervals < 1:
-            raise ValueError(f"intervals must be at least 1, got {self.intervals}")
+        check_whole(self.intervals, "intervals")
         levels = np.array(self.levels)
         check_relays(levels[np.newaxis], np.zeros((1, _n_weights(levels))))
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The memory as a coordinate where it is free; the rest is linear."""
-        scale = half_span(record)
+        scale = spans(record)["h"]
         levels = self._levels(record)
         places = {f"levels[{k}]": value for k, value in enumerate(levels.tolist())}
         columns = (*(f"weights[{k}]" for k in range(_n_weights(levels))), "offset")
@@ -91,13 +87,13 @@ class PreisachStructure(Identifiable, Composable):
         extremes = self._law(levels, np.zeros(_n_weights(levels))).advance(record.u)[1][1:]
         return {**parameters} | {f"z0[{k}]": np.full(shape, value)[()] for k, value in enumerate(extremes)}
 
-    def assemble(self, parameters: Mapping[str, float]) -> RelayLaw:
+    def assemble(self, parameters: Mapping[str, float]) -> Any:
         """The law with these parameters, one number for each name."""
         levels, weights = (_table(name, parameters)[0] for name in ("levels", "weights"))
         past = [value for value in _memory(parameters)[0].tolist() if value > levels[0]]
         return self._law(levels, weights, offset=parameters["offset"], z0=tuple(past))
 
-    def notes(self, record: Record, law: RelayLaw) -> tuple[str, ...]:
+    def notes(self, record: Record, law: Any) -> tuple[str, ...]:
         """How many of the weights the record tells apart, where these are not all."""
         places = {f"levels[{k}]": value for k, value in enumerate(law.levels)}
         columns = self.regressors({**places, TURN: law.levels[0]}, record)[0, :, :-1]
@@ -126,9 +122,9 @@ class PreisachStructure(Identifiable, Composable):
         kept = _independent(relays, [rows.size, *nearest[used[nearest]], *nearest[~used[nearest]]])
         return tuple(f"weights[{k}]" for k in range(rows.size) if k not in kept)
 
-    def _law(self, levels: FloatArray, weights: FloatArray, **others: Any) -> RelayLaw:
+    def _law(self, levels: FloatArray, weights: FloatArray, **others: Any) -> Any:
         law: Any = self.law
-        return law(levels=tuple(levels), weights=tuple(weights), **others)  # type: ignore[no-any-return]
+        return law(levels=tuple(levels), weights=tuple(weights), **others)
 
     def _signs(self, record: Record, n: int) -> dict[str, tuple[float, float]]:
         """Bounds at zero of the weights off the diagonal."""
@@ -139,30 +135,15 @@ class PreisachStructure(Identifiable, Composable):
         return {f"weights[{k}]": side for k in np.flatnonzero(rows > columns).tolist()}
 
 
-class SearchedRelays(ByStructure, RelayLaw):
-    """A law of relays that `hysim.identify` takes."""
-
-    def as_structure(self) -> PreisachStructure:
-        """The structure with the levels of this law."""
-        return PreisachStructure(law=type(self), levels=self.levels)
-
-    @classmethod
-    def structure(cls, *, intervals: int = 4, levels: npt.ArrayLike = (), one_signed: bool = True) -> PreisachStructure:
-        """Levels for `hysim.identify`: equal `intervals` of the span of the input, or the `levels` [unit of u].
-
-        N intervals have N (N + 1) / 2 weights; one loop between two inputs determines 2 N - 1 combinations of them.
-        With `one_signed` all weights off the diagonal have the sign of the record's loop, positive for a
-        counterclockwise one; else they are free, and may be of alternating signs on noisy records. Raises ValueError or
-        TypeError if the number is not a positive int, or the levels are not finite or do not increase.
-
-        Examples
-        --------
-        >>> import hysim as hs
-        >>> hs.identify(hs.Preisach.structure(intervals=3), hs.datasets.table1()).n_parameters
-        6
-        """
-        given = tuple(read_only(levels, "levels", ndim=1).tolist())
-        return PreisachStructure(law=cls, levels=given, intervals=intervals, one_signed=one_signed)
+def check_relays(levels: FloatArray, weights: FloatArray) -> None:
+    """Refuse tables (n_sets, n_levels) and (n_sets, n_weights) that are no relays."""
+    n = max(levels.shape[1] - 1, 0)
+    if levels.shape[1] == 1 or weights.shape[1] != n * (n + 1) // 2:
+        raise ValueError(
+            f"levels and weights must be N + 1 and N (N + 1) / 2 numbers, got {levels.shape[1]} and {weights.shape[1]}"
+        )
+    if not (np.diff(levels) > 0.0).all():
+        raise ValueError(f"levels must increase, got {levels[0].tolist() if len(levels) == 1 else levels}")
 
 
 def _n_weights(levels: FloatArray) -> int:

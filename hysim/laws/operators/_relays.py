@@ -21,14 +21,17 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, read_only
 from hysim._parallel import in_pieces
 from hysim.kernels import preisach as kernels
-from hysim.models.law import Law, State, Tables
+from hysim.laws.operators._preisach_search import PreisachStructure, check_relays
+from hysim.models.by_structure import ByStructure
+from hysim.models.law import Law, State
 from hysim.models.protocols import CompiledLaw
+from hysim.models.tables import Tables
 
 _ROOM = 1000  # extremes that a compiled loop remembers
 _NOTHING = np.array([[0.0, 1.0]]), np.array([[0.0]])  # levels and weights of a law without any
 
 
-class RelayLaw(Law):
+class RelayLaw(ByStructure, Law):
     """A bank of weighted relays; a law says whether they are spread over their intervals, and adds its fields."""
 
     spread: ClassVar[bool]
@@ -82,7 +85,7 @@ class RelayLaw(Law):
         corners = [(max(pair), min(pair)) for pair in zip(extremes[1:], extremes, strict=False)]
         return np.array([*corners, (extremes[-1], extremes[-1])])
 
-    memory = None  # type: ignore[assignment]  # a staircase of any length, see `staircase`
+    memory = remembered = None  # type: ignore[assignment]  # a staircase of any length, see `staircase`
 
     def compiled(self, u0: float = 0.0) -> CompiledLaw:
         """As `Law.compiled`; the state holds the place of the last extreme, extremes, and outputs there."""
@@ -97,6 +100,28 @@ class RelayLaw(Law):
     def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
         parameters = cls._rows(tables["levels"], tables["weights"], tables["offset"][:, 0])
         kernels.batch(read_only(parameters), read_only(tables["z0"]), u, y)
+
+    def as_structure(self) -> PreisachStructure:
+        """The structure with the levels of this law."""
+        return PreisachStructure(law=type(self), levels=self.levels)
+
+    @classmethod
+    def structure(cls, *, intervals: int = 4, levels: npt.ArrayLike = (), one_signed: bool = True) -> PreisachStructure:
+        """Levels for `hysim.identify`: equal `intervals` of the span of the input, or the `levels` [unit of u].
+
+        N intervals have N (N + 1) / 2 weights; one loop between two inputs determines 2 N - 1 combinations of them.
+        With `one_signed` all weights off the diagonal have the sign of the record's loop, positive for a
+        counterclockwise one; else they are free, and may be of alternating signs on noisy records. Raises ValueError or
+        TypeError if the number is not a positive int, or the levels are not finite or do not increase.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> hs.identify(hs.Preisach.structure(intervals=3), hs.datasets.table1()).n_parameters
+        6
+        """
+        given = tuple(read_only(levels, "levels", ndim=1).tolist())
+        return PreisachStructure(law=cls, levels=given, intervals=intervals, one_signed=one_signed)
 
     def _staircase(self, past: State, n_samples: int) -> tuple[FloatArray, FloatArray, FloatArray, int]:
         """Parameters, extremes and outputs as kernels take them after the inputs `past`, and the last place."""
@@ -118,17 +143,6 @@ class RelayLaw(Law):
         rows[:, kernels.HEAD : kernels.HEAD + n] = levels
         rows[:, kernels.HEAD + n :] = (everett - everett.transpose(0, 2, 1)).reshape(len(everett), n * n)
         return rows
-
-
-def check_relays(levels: FloatArray, weights: FloatArray) -> None:
-    """Refuse tables (n_sets, n_levels) and (n_sets, n_weights) that are no relays."""
-    n = max(levels.shape[1] - 1, 0)
-    if levels.shape[1] == 1 or weights.shape[1] != n * (n + 1) // 2:
-        raise ValueError(
-            f"levels and weights must be N + 1 and N (N + 1) / 2 numbers, got {levels.shape[1]} and {weights.shape[1]}"
-        )
-    if not (np.diff(levels) > 0.0).all():
-        raise ValueError(f"levels must increase, got {levels[0].tolist() if len(levels) == 1 else levels}")
 
 
 def everett_of(weights: FloatArray) -> FloatArray:

@@ -1,19 +1,21 @@
 """The generalised Prandtl-Ishlinskii law: plays that the input pushes through envelope functions."""
 
-import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, checked, read_only
-from hysim.laws.operators._clamp_search import Axis, ClampStructure, half_span
+from hysim.laws.operators._clamp_search import Axis, ClampStructure, Pushing
 from hysim.laws.operators._play_sums import IDENTITY, ExtendedPlays, kernel_rows, positions_of
-from hysim.models.law import Packed, State, Tables
+from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
+from hysim.models.law import Packed
 from hysim.models.model import family
-from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
+from hysim.models.parameters import spans
 from hysim.models.search_space import Parameters
+from hysim.models.tables import Tables
 from hysim.records import Record
 
 _BENDS = (0.02, 3.0)  # of the envelope between the ends of the input: nearly straight, nearly a step
@@ -113,39 +115,9 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
         known = tuple(tuple(read_only(side, "envelopes", ndim=1).tolist()) for side in (left, right))
         if known[0]:
             _envelopes(*(np.atleast_2d(side) for side in known))
-        return ClampStructure(
-            law=cls, thresholds=tuple(read_only(thresholds, "thresholds", ndim=1).tolist()), plays=plays,
-            one_signed=one_signed, pushing=Envelopes(left=known[0], right=known[1], count=envelopes),
-        )  # fmt: skip
-
-    def is_invertible(self) -> bool:
-        """Whether the law has an inverse for every output that the envelopes reach.
-
-        With one envelope that is so where the plain law of the same plays is invertible, with two where the weights
-        have one sign.
-        """
-        return self._refusal() is None
-
-    def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
-        """Input that gives the output `y`, monotone between the samples; see `hysim.Law.inverse_response`.
-
-        It is computed to rounding by Newton's method on the output. With two envelopes the output stands still in the
-        gap between them after a reversal, and the nearest of its inputs is taken. Raises ValueError also if z0 holds
-        positions that no input leads to.
-        """
-        self.check_invertible()
-        return self.input_of(y, u0, state)
-
-    def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
-        self.check_invertible()
-        return self.inverse_from(self.advance([u0])[1], limits)
-
-    def check_invertible(self) -> None:
-        """Raise a ValueError if the law is not invertible, or z0 holds positions that no input leads to."""
-        if (refusal := self._refusal()) is not None:
-            raise ValueError(refusal)
-        if self._has_one_envelope():
-            self.plays.inverse()  # refuses these positions
+        pushing = Envelopes(left=known[0], right=known[1], count=envelopes)
+        plain = PrandtlIshlinskii.structure(plays=plays, thresholds=thresholds, one_signed=one_signed)
+        return replace(plain, law=cls, pushing=pushing)
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
@@ -162,7 +134,12 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
     def _has_one_envelope(self) -> bool:
         return self.right in ((), self.left)
 
-    def _refusal(self) -> str | None:
+    def refusal(self) -> str | None:
+        """Why the law has no inverse; None where it has one.
+
+        With one envelope it has one where the plain law of the same plays is invertible, with two where the weights
+        have one sign. In the gap between two envelopes the output stands still, and the nearest of its inputs is taken.
+        """
         if self._has_one_envelope():
             return self.plays.refusal()
         if any(self.weights) and min(self.weights) * max(self.weights) >= 0.0:
@@ -171,7 +148,7 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
 
 
 @checked
-class Envelopes:
+class Envelopes(Pushing):
     """What is searched of envelopes: nothing where the left one is known."""
 
     left: tuple[float, ...] = ()
@@ -218,7 +195,7 @@ class Envelopes:
 
 def _between_the_ends(bend: FloatArray, phase: FloatArray, record: Record) -> list[FloatArray]:
     """Coefficients of the envelope of this shape that takes the lowest and the highest input to themselves."""
-    half, middle = half_span(record), 0.5 * float(record.u.max() + record.u.min())
+    half, middle = spans(record)["h"], 0.5 * float(record.u.max() + record.u.min())
     low, high = np.tanh(phase - bend), np.tanh(phase + bend)
     height = 2.0 * half / (high - low)
     level = middle - 0.5 * height * (high + low)

@@ -62,7 +62,6 @@ class MaxwellSlip(ByStructure, ClampLaw):
     thresholds_name: ClassVar[str] = "slips"
     weights_name: ClassVar[str] = "stiffness"
     stops: ClassVar[bool] = True
-    bank: ClassVar[bool] = True
 
     stiffness: tuple[float, ...] = ()
     slips: tuple[float, ...] = ()

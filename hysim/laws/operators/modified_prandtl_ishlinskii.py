@@ -6,6 +6,7 @@ either side. Where these sums have one sign it has an inverse of its own kind, e
     c'_0 = 1 / c_0,    c'_j = -c_j / (s_j s_(j-1)),    d'_j = sum_(i<=j) c_i (d_j - d_i)
 """
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -15,8 +16,11 @@ from hysim._frozen import FloatArray, read_only
 from hysim.laws.operators._dead_zone_search import DeadZoneStructure
 from hysim.laws.operators._play_sums import ExtendedPlays, check_dead_zones, dead_zone, kernel_rows
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii, wrong_sum
-from hysim.models.law import Packed, State, Tables
+from hysim.models.inverse_search import inverse_step
+from hysim.models.law import Packed, State
 from hysim.models.model import family
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
+from hysim.models.tables import Tables
 
 
 @family
@@ -106,17 +110,13 @@ class ModifiedPrandtlIshlinskii(ExtendedPlays):
             dead_zones=() if counted else tuple(read_only(dead_zones, "dead_zones", ndim=1).tolist()),
         )
 
-    def is_invertible(self) -> bool:
-        """Whether r_0 = 0, one dead zone has the threshold zero, and the sums of both weights have one sign each."""
-        return self.plays.is_invertible() and self._refusal() is None
-
     def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
         """Input that gives the output `y`, monotone between the samples; see `hysim.Law.inverse_response`.
 
         It is the inverse of S, then that of the plays, and exact to rounding. Raises ValueError also if z0 holds
         positions that no input leads to; one for a law that is not invertible names the weight.
         """
-        if (refusal := self._refusal()) is not None:
+        if (refusal := self.refusal()) is not None:
             raise ValueError(refusal)
         wanted = read_only(y, "y", ndim=1) - self.offset
         slope = self.dead_zone_weights[self.dead_zones.index(0.0)]
@@ -146,7 +146,11 @@ class ModifiedPrandtlIshlinskii(ExtendedPlays):
         thresholds, weights = zip(*((d, c) for d, c in ranked if d >= 0.0), strict=True)
         return PrandtlIshlinskii(thresholds=tuple(np.abs(thresholds).tolist()), weights=weights)
 
-    def _refusal(self) -> str | None:
+    def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
+        return inverse_step(self.compiled(u0), u0, limits=limits)
+
+    def refusal(self) -> str | None:
+        """Why the law has no inverse: r_0 > 0, no dead zone of threshold zero, or weights whose sums change sign."""
         if 0.0 not in self.dead_zones:
             return "the law has no inverse: without a dead zone of threshold zero its output stands still about x = 0"
         for side in (1.0, -1.0):
@@ -157,4 +161,4 @@ class ModifiedPrandtlIshlinskii(ExtendedPlays):
                     f"but with the weight {zones.weights[wrong]:g} of the dead zone "
                     f"{side * zones.thresholds[wrong]:g} they come to {sum(zones.weights[: wrong + 1]):g}"
                 )
-        return None
+        return self.plays.refusal()

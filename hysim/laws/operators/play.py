@@ -68,7 +68,6 @@ class Play(_Element):
     [0.0, 1.5, 1.5, 0.5]
     """
 
-    stops: ClassVar[bool] = False
     threshold: float = 1.0
     gain: float = 1.0
     offset: float = 0.0

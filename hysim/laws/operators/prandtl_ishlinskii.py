@@ -69,10 +69,6 @@ class PrandtlIshlinskii(ByStructure, ClampLaw):
     [0.0, 1.0, 0.5, -1.0]
     """
 
-    thresholds_name: ClassVar[str] = "thresholds"
-    weights_name: ClassVar[str] = "weights"
-    stops: ClassVar[bool] = False
-    bank: ClassVar[bool] = True
     ordered: ClassVar[bool] = True
 
     thresholds: tuple[float, ...] = ()
@@ -110,10 +106,8 @@ class PrandtlIshlinskii(ByStructure, ClampLaw):
         >>> fit.n_parameters, round(fit.fit_percent, 1)
         (5, 93.5)
         """
-        return ClampStructure(
-            law=cls, thresholds=tuple(read_only(thresholds, "thresholds", ndim=1).tolist()), plays=plays,
-            one_signed=one_signed,
-        )  # fmt: skip
+        given = tuple(read_only(thresholds, "thresholds", ndim=1).tolist())
+        return ClampStructure(law=cls, thresholds=given, plays=plays, one_signed=one_signed)
 
     def is_one_signed(self) -> bool:
         """Whether all weights past the threshold zero have one sign."""

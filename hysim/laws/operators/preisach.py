@@ -26,12 +26,8 @@ import numpy.typing as npt
 
 from hysim._cycles import TOLERANCE
 from hysim._frozen import FloatArray, read_only
-from hysim._parallel import in_pieces
-from hysim.errors import SimulationError
 from hysim.kernels import preisach as kernels
-from hysim.kernels.stepping import drive
-from hysim.laws.operators._preisach_search import SearchedRelays
-from hysim.laws.operators._relays import everett_of, weights_of
+from hysim.laws.operators._relays import RelayLaw, everett_of, weights_of
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.law import State
 from hysim.models.model import family
@@ -47,7 +43,7 @@ _ROOM = 1000  # extremes that the inverse keeps in a loop
 
 
 @family
-class PreisachRelays(SearchedRelays):
+class PreisachRelays(RelayLaw):
     """Preisach law of single relays, ``y = offset + sum w_ij R_ij``: its output jumps.
 
     Parameters
@@ -84,7 +80,7 @@ class PreisachRelays(SearchedRelays):
 
 
 @family
-class Preisach(SearchedRelays):
+class Preisach(RelayLaw):
     """Preisach law of a density that is even between levels; its output is continuous.
 
     Each weight of `PreisachRelays` is spread evenly over its pair of intervals, along the diagonal over one interval
@@ -264,25 +260,18 @@ class Preisach(SearchedRelays):
         low, high = self.slope_bounds()
         return low * high > 0.0
 
-    def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
-        """Input that gives the output `y`, monotone between the samples; see `hysim.Law.inverse_response`.
-
-        It is exact to rounding. Raises SimulationError if a sample is beyond the saturation, and ValueError if the
-        slope vanishes or changes its sign.
-        """
-        if state is not None and u0 is not None:
-            raise ValueError("give u0 or state, not both: the state has its own input")
-        wanted = read_only(y, "y", ndim=1)
+    def inverse_begun(self, y: FloatArray, u0: float | None, state: State | None) -> CompiledLaw:
+        """In closed form, after the inputs before the first sample."""
         past = state[1:] if state is not None else self.z0 if u0 is None else (*self.z0, u0)
-        u, inverse = np.empty(wanted.size), self.inverse_from(past, room=wanted.size)
-        lost = in_pieces(lambda k: drive(inverse.step, inverse.parameters, inverse.state, wanted[k], u[k]), u.size)
-        if lost >= 0:
-            bound = abs(float(self.everett[-1, 0]))
-            raise SimulationError(
-                f"the law has no inverse at sample {lost} (y = {wanted[lost]:g}): it saturates at "
-                f"{self.offset - bound:g} and {self.offset + bound:g}"
-            )
-        return u
+        return self.inverse_from(past, room=y.size)
+
+    def unreached(self, sample: int, y: float, inverse: CompiledLaw) -> str:
+        """Message with the outputs between which the law saturates."""
+        bound = abs(float(self.everett[-1, 0]))
+        return (
+            f"the law has no inverse at sample {sample} (y = {y:g}): it saturates at {self.offset - bound:g} and "
+            f"{self.offset + bound:g}"
+        )
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
         return self.inverse_from((*self.z0, u0), limits, room=_ROOM)

@@ -13,7 +13,7 @@ are positive: samples must be further apart than about 2 beta. The condition on 
 
 import math
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -21,16 +21,18 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, checked, read_only
 from hysim.kernels import play_sums as kernels
-from hysim.laws.operators._clamp_search import Axis, ClampStructure, half_span
+from hysim.laws.operators._clamp_search import Axis, ClampStructure, Pushing
 from hysim.laws.operators._play_sums import ExtendedPlays, kernel_rows, positions_of
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.batch import Reduction
 from hysim.models.by_structure import ByStructure
 from hysim.models.composable import Composable
-from hysim.models.law import Packed, State, Tables
+from hysim.models.law import Packed, State
 from hysim.models.model import family
+from hysim.models.parameters import spans
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.search_space import Parameters
+from hysim.models.tables import Tables
 from hysim.records import Record
 
 _LARGEST = 1.0  # of the widening at the record's highest speed, in half spans
@@ -55,6 +57,22 @@ class PlaysAtSampleTime(ExtendedPlays):
     def as_structure(self) -> ClampStructure:
         """The structure with the thresholds of this law."""
         return ClampStructure(law=PrandtlIshlinskii, thresholds=self.thresholds)
+
+    def refusal(self) -> str | None:
+        """Why the law has no inverse at its sample time; None where it has one."""
+        if (refusal := self.plays.refusal()) is not None:
+            return refusal
+        sums = np.cumsum(self.weights)
+        with np.errstate(divide="ignore"):
+            limits = np.abs(sums) / (2.0 * np.abs(sums - sums[0]))
+        i = int(np.argmin(limits))
+        if self.width < limits[i]:
+            return None
+        return (
+            f"the law has no stable inverse at this sample time: beta / sample_time is {self.width:g}, but the sums of "
+            f"weights s_i = w_0 + ... + w_i ask for less than |s_i| / (2 |s_i - s_0|), {limits[i]:g} for i = {i}; "
+            "give the speed, or take longer samples"
+        )
 
     def response_at(self, u: npt.ArrayLike, widening: FloatArray) -> FloatArray:
         """Output at the samples of `u` of plays whose thresholds are wider by `widening`, shape (n_samples,)."""
@@ -123,7 +141,7 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "z0", self.plays.z0)
-        _check_beta(np.array(self.beta))
+        _width(np.array(self.beta), 1.0)
 
     @property
     def plays(self) -> PrandtlIshlinskii:
@@ -133,17 +151,15 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
     @classmethod
     def structure(cls, *, plays: int = 10, thresholds: npt.ArrayLike = (), one_signed: bool = True) -> ClampStructure:
         """Plays for `hysim.identify`, as of `PrandtlIshlinskii.structure`; beta is searched."""
-        given = tuple(read_only(thresholds, "thresholds", ndim=1).tolist())
-        return ClampStructure(law=cls, thresholds=given, plays=plays, one_signed=one_signed, pushing=Widening())
+        plain = PrandtlIshlinskii.structure(plays=plays, thresholds=thresholds, one_signed=one_signed)
+        return replace(plain, law=cls, pushing=Widening())
 
     def at(self, sample_time: float) -> PlaysAtSampleTime:
         """The law at one sample time [s], as loops step it. Raises ValueError if the sample time is not positive."""
-        if not sample_time > 0.0:
-            raise ValueError(f"sample_time must be positive, got {sample_time}")
         return PlaysAtSampleTime(
             thresholds=self.thresholds,
             weights=self.weights,
-            width=self.beta / sample_time,
+            width=float(_width(np.array(self.beta), sample_time)),
             offset=self.offset,
             z0=self.z0,
         )
@@ -206,19 +222,16 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
         workers: int | None = None,
     ) -> FloatArray:
         """Outputs of many laws at one sample time [s]; else as `PrandtlIshlinskii.responses`, with ``beta``."""
-        if not sample_time > 0.0:
-            raise ValueError(f"sample_time must be positive, got {sample_time}")
+        width = _width(np.asarray(parameters.get("beta", cls.beta), dtype=float), sample_time)
         known = [field.name for field in fields(cls)]
         if wrong := [name for name in parameters if name not in known]:
             raise TypeError(f"unknown parameter {wrong[0]!r}: {cls.__name__} has {', '.join(known)}")
-        beta = np.asarray(parameters.get("beta", cls.beta), dtype=float)
-        _check_beta(beta)
-        sets = {name: value for name, value in parameters.items() if name != "beta"} | {"width": beta / sample_time}
+        sets = {name: value for name, value in parameters.items() if name != "beta"} | {"width": width}
         return PlaysAtSampleTime.responses(sets, u, reduce=reduce, target=target, workers=workers)
 
     def is_invertible(self, sample_time: float | None = None) -> bool:
         """Whether there is an `inverse`, for a known speed; with a sample time, an `inverse_response` without one."""
-        return self.plays.is_invertible() and (sample_time is None or self._refusal(sample_time) is None)
+        return self.plays.is_invertible() and (sample_time is None or self.at(sample_time).is_invertible())
 
     def inverse(self) -> "RateDependentPrandtlIshlinskii":
         """The law that gives the input for a wanted output, exactly, at the same speed of the input.
@@ -261,20 +274,11 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
             if u0 is not None or state is not None:
                 raise ValueError("a speed goes with the z0 of the law: replace that in place of u0 or state")
             return self.inverse().response(y, sample_time, speed=speed)
-        self.check_invertible(sample_time)
-        return self.at(sample_time).input_of(y, u0, state)
+        return self.at(sample_time).inverse_response(y, u0, state)
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
         """The inverse at a sample time [s], stepped; see `hysim.Law.compiled_inverse`."""
-        self.check_invertible(sample_time)
-        steps = self.at(sample_time)
-        return steps.inverse_from(steps.advance([u0])[1], limits)
-
-    def check_invertible(self, sample_time: float) -> None:
-        """Raise a ValueError if the law is not invertible at this sample time, or no input leads to z0."""
-        if (refusal := self._refusal(sample_time)) is not None:
-            raise ValueError(refusal)
-        self.plays.inverse()  # refuses such positions
+        return self.at(sample_time).compiled_inverse(u0, limits)
 
     def as_structure(self) -> ClampStructure:
         """The structure with the thresholds and beta of this law."""
@@ -283,38 +287,19 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
             law=type(self), thresholds=self.thresholds, one_signed=one_signed, pushing=Widening(beta=self.beta)
         )
 
-    def _refusal(self, sample_time: float) -> str | None:
-        if (refusal := self.plays.refusal()) is not None:
-            return refusal
-        b, sums = self.beta / sample_time, np.cumsum(self.weights)
-        with np.errstate(divide="ignore"):
-            limits = np.abs(sums) / (2.0 * np.abs(sums - sums[0]))
-        i = int(np.argmin(limits))
-        if b < limits[i]:
-            return None
-        return (
-            f"the law has no stable inverse at the sample time {sample_time:g}: beta / sample_time is {b:g}, but the "
-            f"sums of weights s_i = w_0 + ... + w_i ask for less than |s_i| / (2 |s_i - s_0|), {limits[i]:g} for "
-            f"i = {i}; give the speed, or take longer samples"
-        )
-
 
 @checked
-class Widening:
+class Widening(Pushing):
     """What is searched of thresholds that grow with the speed: beta, from a law's own or from none."""
 
     beta: float | None = None
 
     def axes(self, record: Record) -> dict[str, Axis]:
         """Beta, up to half a span of the input at its highest speed."""
-        half = half_span(record)
+        half = spans(record)["h"]
         scale = half / (float(np.abs(np.diff(record.u)).max()) / record.sample_time)
         own = () if self.beta is None else (self.beta,)
         return {"beta": Axis(0.0, _LARGEST * scale, (*own, *(scale * start for start in _STARTS)), scale)}
-
-    def derived(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
-        """Nothing."""
-        return {}
 
     def positions(self, parameters: Parameters, thresholds: FloatArray, z0: FloatArray, record: Record) -> FloatArray:
         """Positions (n_sets, n_samples, n_plays)."""
@@ -335,6 +320,10 @@ def _as_speed(speed: npt.ArrayLike, u: npt.ArrayLike) -> FloatArray:
     return given
 
 
-def _check_beta(beta: FloatArray) -> None:
+def _width(beta: FloatArray, sample_time: float) -> FloatArray:
+    """Growth of the thresholds with the step of the input."""
     if (beta < 0.0).any():
         raise ValueError(f"beta must not be negative, got {beta.min():g}")
+    if not sample_time > 0.0:
+        raise ValueError(f"sample_time must be positive, got {sample_time}")
+    return np.asarray(beta / sample_time)
