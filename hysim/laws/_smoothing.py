@@ -61,12 +61,12 @@ def smoothing_spline(u: FloatArray, y: FloatArray) -> Smooth:
     coefficients = inverse @ moments[0]
     low, high = float(u.min()), float(u.max())
     knots = np.concatenate([[0.0], x, [1.0]])
-    inputs, kept = np.unique(
+    inputs, remaining = np.unique(
         np.clip(low + (high - low) * knots, low, high), return_index=True
     )  # in u, where they round
     return Smooth(
         u=inputs,
-        y=splines.at(knots[kept]).combined(coefficients),
+        y=splines.at(knots[remaining]).combined(coefficients),
         degrees_of_freedom=float(np.sum(gram * inverse)),
         spread=np.sqrt(_quadratic_form(bands[0], rows.combined(inverse)) / u.size)[place],
     )
@@ -130,7 +130,7 @@ class _Splines(NamedTuple):
 
     @property
     def size(self) -> int:
-        """How many there are."""
+        """Number of splines."""
         return self.knots.size - 4
 
     def at(self, x: FloatArray) -> _Rows:
@@ -147,8 +147,8 @@ def _strength(splines: _Splines, rows: _Rows, share: FloatArray, y: FloatArray) 
     if not n_blocks:
         return float(_STRENGTHS[-1])
     bands, moments = _normal_equations(rows, share, y, block, n_blocks + 1, splines.size)
-    kept, goals = bands.sum(axis=0) - bands[:-1], moments.sum(axis=0) - moments[:-1]
-    coefficients = _solved(kept, goals, splines.penalty)
+    remaining, goals = bands.sum(axis=0) - bands[:-1], moments.sum(axis=0) - moments[:-1]
+    coefficients = _solved(remaining, goals, splines.penalty)
     inside = np.flatnonzero(block < n_blocks)
     predicted = np.zeros((inside.size, _STRENGTHS.size))
     for k in range(4):

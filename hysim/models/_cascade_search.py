@@ -92,11 +92,11 @@ class CascadeStructure(Identifiable, Composable):
         return composed(">>", assembled(self.stages, self._searched, parameters))
 
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
-        """What the law that carries the gain says of itself."""
-        carrier, found = self.stages[self.carrier], model.stages[self.carrier]
-        if needs_time(found):
+        """Remarks of the law that carries the gain."""
+        carrier, law = self.stages[self.carrier], model.stages[self.carrier]
+        if needs_time(law):
             return ()
-        return tuple(f"{labels(self.stages)[self.carrier]}: {note}" for note in carrier.notes(record, found))
+        return tuple(f"{labels(self.stages)[self.carrier]}: {note}" for note in carrier.notes(record, law))
 
     @property
     def _by_label(self) -> dict[str, Any]:

@@ -70,5 +70,7 @@ def continued(part: Any, u: FloatArray, sample_time: float | None, state: Any) -
     if isinstance(part, Composite):
         return part.advance(u, state, sample_time=sample_time)
     plant: Any = part
-    y, end = plant.advance(u, _parts.given(part, sample_time), state) if needs_time(part) else part.advance(u, state)
+    y, end = (
+        plant.advance(u, _parts.needed_time(part, sample_time), state) if needs_time(part) else part.advance(u, state)
+    )
     return np.asarray(y["y"] if isinstance(y, dict) else y), end

@@ -55,11 +55,11 @@ class SumStructure(Identifiable, Composable):
             {label: lambda free, part=part: part.search_space(record, free) for label, part in found.items()},  # type: ignore[misc]
             freedom,
         )
-        whole = together(spaces)
+        joint = together(spaces)
         return without_repetition(
-            whole,
-            lambda x: self.regressors(whole.parameters(x), record)[..., :-1],
-            self._values(whole.columns),
+            joint,
+            lambda x: self.regressors(joint.parameters(x), record)[..., :-1],
+            self._values(joint.columns),
             freedom,
         )
 
@@ -70,9 +70,9 @@ class SumStructure(Identifiable, Composable):
         fixed = sum((response_of(part, record.u, time_of(part, record)) for part in known), np.zeros(len(record)))
         blocks = [part.regressors(own(parameters, label), record) for label, part in found.items()]
         n_sets = max([len(block) for block in blocks], default=1)
-        whole = [np.broadcast_to(block, (n_sets, *block.shape[1:])) for block in blocks]
-        last = sum((block[..., -1:] for block in whole), np.broadcast_to(fixed[:, np.newaxis], (n_sets, fixed.size, 1)))
-        return np.concatenate([*(block[..., :-1] for block in whole), last], axis=-1)
+        joint = [np.broadcast_to(block, (n_sets, *block.shape[1:])) for block in blocks]
+        last = sum((block[..., -1:] for block in joint), np.broadcast_to(fixed[:, np.newaxis], (n_sets, fixed.size, 1)))
+        return np.concatenate([*(block[..., :-1] for block in joint), last], axis=-1)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
         """The parameters with the parts' states in the steady cycle of which `record` is one period or more."""
@@ -91,7 +91,7 @@ class SumStructure(Identifiable, Composable):
         return composed("+", assembled(self.parts, self._identified, parameters))
 
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
-        """What the laws among the parts say of themselves."""
+        """Remarks of the laws among the parts."""
         return tuple(
             f"{label}: {note}"
             for label, part, found in zip(labels(self.parts), self.parts, model.parts, strict=True)

@@ -95,10 +95,10 @@ class Cascade(Composite):
 
     def signals(self, u: npt.ArrayLike, sample_time: float | None = None) -> dict[str, FloatArray]:
         """Output ``"y"`` and those of the stages by name, such as ``"bouc_wen"``; see `response`."""
-        signal, found = read_only(u, "u", ndim=1), {}
+        signal, signals = read_only(u, "u", ndim=1), {}
         for label, stage in zip(labels(self.stages), self.stages, strict=True):
-            signal = found[label] = response_of(stage, signal, sample_time)
-        return {"y": signal, **found}
+            signal = signals[label] = response_of(stage, signal, sample_time)
+        return {"y": signal, **signals}
 
     def compiled(self, u0: float = 0.0) -> CompiledLaw:
         laws, level = [], u0

@@ -28,13 +28,12 @@ from hysim.models.inverse_search import inverse_at_rest, inverse_response, inver
 from hysim.models.parameters import Parameter, declared_space
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.steady_cycle import fixed_point
 from hysim.models.tables import Tables, arguments_of, scalars_of, table_of_one, tables_of
 from hysim.records import Record
 
 State = tuple[float, ...]
 """Last input, and what the law remembers."""
-
-_PASSES = 40  # secant steps to the steady cycle
 
 
 class Packed(NamedTuple):
@@ -390,15 +389,7 @@ class Law(Composable, ABC):
                 f"a {type(self).__name__} has no steady cycle that could be computed, since {' or '.join(affine)} "
                 'moves its memory: use initial="free"'
             )
-        drift_before = z - before
-        for _ in range(_PASSES):
-            with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-                drift = passed(z) - z
-                if not (np.abs(drift) > 1e-15 * np.abs(z)).any():
-                    break
-                secant = z - drift * (z - before) / (drift - drift_before)
-            before, drift_before, z = z, drift, np.where(np.isfinite(secant), secant, z + drift)
-        return dict(zip(names, np.where(np.isfinite(z), z, np.nan).T, strict=True))
+        return dict(zip(names, fixed_point(passed, before, z).T, strict=True))
 
     def _one_pass(self, parameters: Parameters, u: FloatArray) -> Callable[[FloatArray], FloatArray]:
         """A function from the memory before the input `u` to that after it, (n_sets, n_memory)."""

@@ -17,7 +17,7 @@ from hysim.records import Record
 
 @dataclass(frozen=True)
 class Parameter:
-    """How `hysim.identify` treats a field of a family.
+    """The treatment of a field of a family by `hysim.identify`.
 
     `lower` and `upper` are the box in units of `unit`: a quotient of the spans of input and output such as ``"y/u"``;
     ``"h"`` is half the span of the input. The box of a parameter with `from_first` stands about the first input, and

@@ -124,7 +124,7 @@ class Offering(Protocol):
 
 @runtime_checkable
 class Identifiable(Protocol):
-    """What `identify` takes: a model class, a model as the start, or a structure."""
+    """A subject of `identify`: a model class, a model as the start, or a structure."""
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """Declare the box for `record`."""

@@ -182,11 +182,11 @@ class Actuator:
             parts["hysteresis"] = replace(self, creep=None, vibration=None)
         if self.amplifier is not None:
             parts["amplifier"] = replace(self, hysteresis=None, creep=None, vibration=None)
-        found = {name: part.response(u, sample_time, substeps=substeps) for name, part in parts.items()}
+        signals = {name: part.response(u, sample_time, substeps=substeps) for name, part in parts.items()}
         if self.sensor is not None:
-            found["measurement"] = self.measured(u, sample_time, substeps=substeps)
+            signals["measurement"] = self.measured(u, sample_time, substeps=substeps)
         memory = self.memory(u, sample_time, substeps=substeps)
-        return found if memory is None else found | {"z": memory}
+        return signals if memory is None else signals | {"z": memory}
 
     def memory(
         self, u: npt.ArrayLike, sample_time: float | None = None, *, substeps: int | None = None

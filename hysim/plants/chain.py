@@ -193,7 +193,7 @@ class Chain:
 
 
 def linear_stage(creep: Creep | None, vibration: Vibration | None, step: float) -> Stage:
-    """What is behind the law."""
+    """The linear stage behind the law."""
     first = gain(1.0) if creep is None else creep_stage(creep)
     return first if vibration is None else first.then(vibration_stage(vibration, step))
 

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import expm
 
-from hysim._frozen import FloatArray, items, read_only
+from hysim._frozen import FloatArray, check_whole, items, read_only
 from hysim.errors import SimulationError
 from hysim.kernels import oscillator as kernels
 from hysim.kernels.boucwen import prepare
@@ -121,16 +121,14 @@ class BoucWenOscillator:
         for name, allowed in options.items():
             if items(self)[name] not in allowed:
                 raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {items(self)[name]!r}")
-        if self.substeps is not None and (isinstance(self.substeps, bool) or not isinstance(self.substeps, int)):
-            raise TypeError(f"substeps must be a whole number or None, got {self.substeps!r}")
-        if self.substeps is not None and self.substeps < 1:
-            raise ValueError(f"substeps must be at least 1, got {self.substeps}")
+        if self.substeps is not None:
+            check_whole(self.substeps, "substeps")
         if len(self.initial_state) not in (0, 2):
             raise ValueError(f"initial_state must be empty or hold 2 numbers, got {len(self.initial_state)}")
 
     @property
     def natural_frequency(self) -> float:
-        """Of small motions about y = 0, z = 0, undamped [rad/s]; that of the size of a negative stiffness."""
+        """Undamped, of small motions about y = z = 0 [rad/s]; for the size of the stiffness where that is negative."""
         return math.sqrt(abs(self.stiffness + self._coefficients[0] + self.law.gain * self.law.A) / self.mass)
 
     @property
@@ -204,13 +202,13 @@ class BoucWenOscillator:
             for begin in range(0, inputs.size, _SETTLING_CHUNK):
                 piece = slice(begin, begin + _SETTLING_CHUNK)
                 try:
-                    found = self._states(inputs[piece], sample_time, state, None)[1]
+                    states = self._states(inputs[piece], sample_time, state, None)[1]
                 except SimulationError:
                     raise SimulationError("the motion leaves the finite numbers before it is steady") from None
-                state = OscillatorState(float(inputs[piece][-1]), *found[-1].tolist())
-                change = np.abs(found[-1, :3] - motion[piece][-1])
-                motion[piece] = found[:, :3]
-                largest = np.maximum(largest, np.abs(found[-1, :3]))
+                state = OscillatorState(float(inputs[piece][-1]), *states[-1].tolist())
+                change = np.abs(states[-1, :3] - motion[piece][-1])
+                motion[piece] = states[:, :3]
+                largest = np.maximum(largest, np.abs(states[-1, :3]))
                 if np.all(change <= tolerance * largest):
                     return motion[:, 0].copy()
         raise SimulationError(f"the motion has not settled within {ATTEMPTS[-1]} periods")
@@ -330,7 +328,7 @@ class BoucWenOscillator:
 
     @property
     def _coefficients(self) -> tuple[float, ...]:
-        """Of y, y^2, ... in the law's output."""
+        """Coefficients of y, y^2, ... in the law's output."""
         law = self.law
         return law.input_coefficients if isinstance(law, PolynomialBoucWen) else (law.feedthrough,)
 
@@ -381,15 +379,15 @@ class BoucWenOscillator:
         law, (slope, *curve) = self.law, self._coefficients
         stiffness, substeps, held = self.stiffness + slope, self._substeps(sample_time), self.hold == "zoh"
         plant = [self.mass, self.damping, stiffness, law.offset, law.gain, law.A, law.beta, law.gamma, law.n]
-        given = substeps, held, np.array(plant), np.array(curve)
+        constants = substeps, held, np.array(plant), np.array(curve)
         if self.method in ("newmark", "runge-kutta"):
-            return partial(kernels.whole_steps, self.method == "newmark", *given, sample_time)
+            return partial(kernels.whole_steps, self.method == "newmark", *constants, sample_time)
         work = np.empty(N_WORK)
         prepare(law.A, law.beta, law.gamma, law.n, 0.0, work)
         if self.method == "split":
-            return partial(kernels.split_path, *given, work, sample_time)
+            return partial(kernels.split_path, *constants, work, sample_time)
         flow = _linear_flow(self.mass, self.damping, stiffness + law.gain * law.A, sample_time / substeps)
-        return partial(kernels.strang_path, *given, flow, work, sample_time)
+        return partial(kernels.strang_path, *constants, flow, work, sample_time)
 
 
 def _linear_flow(mass: float, damping: float, stiffness: float, h: float) -> FloatArray:

@@ -38,8 +38,8 @@ def _stage(y: FloatArray, factor: int, periodic: bool) -> FloatArray:
         before, after = y[-HALF_FILTER:], y[:HALF_FILTER]
     else:
         before, after = 2.0 * y[0] - y[HALF_FILTER:0:-1], 2.0 * y[-1] - y[-2 : -2 - HALF_FILTER : -1]
-    # the first of the kept outputs is number 2 * HALF_FILTER of the convolution: zeros move it onto the grid
+    # the first of the filtered outputs is number 2 * HALF_FILTER of the convolution: zeros move it onto the grid
     lead = np.zeros(-2 * HALF_FILTER % factor)
-    kept = upfirdn(taps, np.concatenate([lead, before, y, after]), down=factor)
+    filtered = upfirdn(taps, np.concatenate([lead, before, y, after]), down=factor)
     first = (lead.size + 2 * HALF_FILTER) // factor
-    return np.asarray(kept[first : first - (-y.size // factor)])
+    return np.asarray(filtered[first : first - (-y.size // factor)])

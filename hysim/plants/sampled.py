@@ -27,7 +27,7 @@ _WHOLE = 1e-6  # of a sub-step: a delay this close to a whole number of them is 
 
 
 Vibration = TransferFunction | StateSpace | Modes
-"""What moves behind the law."""
+"""Linear dynamics behind the law."""
 
 
 class Stage(NamedTuple):
@@ -124,10 +124,10 @@ def sampled(stage: Stage, step: float, delay: float = 0.0, *, creeping: int = 0,
     do not depend on others.
     """
     lag, part = whole_and_part(delay / step)
-    moved, B, through = _moved(stage, step, part, 1.0, linear)
+    carried, B, through = _transition(stage, step, part, 1.0, linear)
     return SampledStage(
         decline=read_only(np.expm1(np.diag(stage.F)[:creeping] * (stage.rate * step))),
-        A=read_only(moved[creeping:]),
+        A=read_only(carried[creeping:]),
         B=read_only(B),
         output=read_only([0.0, stage.D * through[0], stage.D * through[1], *stage.C]),
         lag=lag,
@@ -138,8 +138,8 @@ def sampled(stage: Stage, step: float, delay: float = 0.0, *, creeping: int = 0,
 def seen_within(stage: Stage, step: float, delay: float, at: float, *, linear: bool = False) -> FloatArray:
     """As `SampledStage.output`, of the displacement at the part `at` of a sub-step, from the states at its begin."""
     _, part = whole_and_part(delay / step)
-    moved, B, through = _moved(stage, step, part, at, linear)
-    return read_only([*(stage.C @ B.T + stage.D * through), *(stage.C @ moved)])
+    carried, B, through = _transition(stage, step, part, at, linear)
+    return read_only([*(stage.C @ B.T + stage.D * through), *(stage.C @ carried)])
 
 
 def whole_and_part(ratio: float) -> tuple[int, float]:
@@ -150,7 +150,7 @@ def whole_and_part(ratio: float) -> tuple[int, float]:
     return math.floor(ratio), ratio % 1.0
 
 
-def _moved(
+def _transition(
     stage: Stage, step: float, part: float, at: float, linear: bool
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The states at the part `at` of a sub-step, as matrices of those at its begin and of the three inputs."""

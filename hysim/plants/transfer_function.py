@@ -23,7 +23,7 @@ from hysim.models.protocols import Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.plants._linear_response import LinearPlants, LinearState, affine_columns
 from hysim.plants._transfer_function_notes import notes
-from hysim.plants._transfer_function_starts import Guess, guesses, likely_delays, sections
+from hysim.plants._transfer_function_starts import Guess, denominators, guesses, likely_delays, sections
 from hysim.plants._unit_gain import UnitGain
 from hysim.records import Record
 
@@ -233,14 +233,14 @@ class TransferFunction(Composable):
         ['1 pole, 0 zeros, free delay', '2 poles, 0 zeros']
         """
         numbers, late = None if zeros is None else set(zeros), tuple(delays)
-        found = [
+        results = [
             cls.structure(poles=n, zeros=m, delay=delay, hold=hold, sample=sample, initial=initial)
             for n in poles
             for m in range(n)
             if numbers is None or m in numbers
             for delay in late
         ]
-        return {str(structure): structure for structure in found}
+        return {str(structure): structure for structure in results}
 
     def _plant(self, sample_time: float) -> LinearPlants:
         with np.errstate(all="ignore"):
@@ -381,8 +381,8 @@ class TransferFunctionStructure(Identifiable, Composable):
         h = record.sample_time
         delays = likely_delays(record, lower[-1] * h, upper[-1] * h) if delay is None else [delay]
         options = {"hold": self.hold, "sample": self.sample}
-        found = guesses(record, self.poles, self.zeros, delays, at_rest=at_rest, **options)
-        starts = np.array([self._coordinates(each, h)[: lower.size] for each in found]).reshape(-1, lower.size)
+        results = guesses(record, self.poles, self.zeros, delays, at_rest=at_rest, **options)
+        starts = np.array([self._coordinates(each, h)[: lower.size] for each in results]).reshape(-1, lower.size)
         starts = np.clip(starts, lower, upper)
         if delay is None or len(starts) < _MAJORITY:
             return starts, len(starts) >= _MAJORITY
@@ -394,15 +394,10 @@ class TransferFunctionStructure(Identifiable, Composable):
 
     def _searched(self, x: FloatArray, sample_time: float, delay: float | None) -> dict[str, FloatArray]:
         """The denominators, and the delay where it is not the structure's own."""
-        product = np.ones((len(x), 1))
-        for k in range(self.poles // 2):
-            frequency, damping = np.exp(x[:, 2 * k]), np.exp(x[:, 2 * k + 1])
-            product = _times(product, [np.ones(len(x)), 2.0 * damping * frequency, frequency**2])
-        if self.poles % 2:
-            product = _times(product, [np.ones(len(x)), np.exp(x[:, self.poles - 1])])
-        found = {name: product[:, k] / sample_time**k for k, name in enumerate(self.denominator, 1)}
+        columns = denominators(x, self.poles).T
+        results = {name: columns[k] / sample_time**k for k, name in enumerate(self.denominator, 1)}
         late = x[:, -1] * sample_time if delay is None else np.full(len(x), delay)
-        return found | dict.fromkeys(self.free_delay, late)
+        return results | dict.fromkeys(self.free_delay, late)
 
 
 def _check_options(hold: str, sample: str) -> None:
@@ -412,11 +407,3 @@ def _check_options(hold: str, sample: str) -> None:
         raise ValueError(f'sample must be "start" or "end", got {sample!r}')
     if (hold, sample) == ("foh", "end"):
         raise ValueError('sample="end" needs an input that is held, hold="zoh"')
-
-
-def _times(polynomials: FloatArray, factor: list[FloatArray]) -> FloatArray:
-    """Products of rows of polynomials with one factor for each row."""
-    product = np.zeros((len(polynomials), polynomials.shape[1] + len(factor) - 1))
-    for k, coefficient in enumerate(factor):
-        product[:, k : k + polynomials.shape[1]] += coefficient[:, np.newaxis] * polynomials
-    return product

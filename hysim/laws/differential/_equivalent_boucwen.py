@@ -49,7 +49,7 @@ class EquivalentBoucWen(BoucWenStep):
         return self.bouc_wen.inverse()
 
     def inverse_begun(self, y: FloatArray, u0: float | None, state: State | InverseState | None) -> CompiledLaw:
-        """That of the Bouc-Wen law."""
+        """The inverse of the Bouc-Wen law."""
         return self.bouc_wen.inverse_begun(y, u0, state)
 
     def unreached(self, sample: int, y: float, inverse: CompiledLaw) -> str:

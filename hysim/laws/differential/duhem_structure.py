@@ -42,11 +42,11 @@ class DuhemStructure(Identifiable, Composable):
         names = [term.name for term in self.terms]
         degrees = sorted({term.degree for term in self.terms}, reverse=True)
         level = {"feedthrough": 0.0, "offset": 0.0, "y0": float(record.y[0]) if len(record) else 0.0}
-        found = [{**dict.fromkeys(names, 0.0), **self._regression(record, degree), **level} for degree in degrees]
-        found.sort(key=lambda values: self._distance(values, record))
-        space = _duhem_search.search_space(found[0], record, freedom)
+        candidates = [{**dict.fromkeys(names, 0.0), **self._regression(record, degree), **level} for degree in degrees]
+        candidates.sort(key=lambda values: self._distance(values, record))
+        space = _duhem_search.search_space(candidates[0], record, freedom)
         unit = {name: values[0] for name, values in space.parameters(np.ones(space.lower.size)).items()}
-        starts = np.array([[values[name] / unit[name] for name in space.coordinates] for values in found])
+        starts = np.array([[values[name] / unit[name] for name in space.coordinates] for values in candidates])
         return replace(space, starts=np.clip(starts, space.lower, space.upper), screened=0)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:

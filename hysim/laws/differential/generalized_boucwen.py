@@ -15,7 +15,7 @@ from hysim.records import Record
 
 _SECTORS = ("b2", "b3", "b4", "b5", "b6")
 _ONE_SIDED = (("b6", "gamma"), ("b3", "b5"), ("b2", "b4"))
-"""Where u keeps its sign, the terms of a pair are the same to a sign."""
+"""Pairs of terms that are the same to a sign as long as u keeps its sign."""
 
 
 @family

@@ -145,10 +145,10 @@ def named_terms(names: Iterable[str]) -> tuple[Term, ...]:
 
     Raises ValueError if there is none, or one is unknown or given twice.
     """
-    given = [names] if isinstance(names, str) else list(names)
-    terms = tuple(sorted({Term.parse(name) for name in given}))
-    if len(terms) < len(given) or not terms:
-        raise ValueError(f"a library is a list of different terms, got {given}")
+    listed = [names] if isinstance(names, str) else list(names)
+    terms = tuple(sorted({Term.parse(name) for name in listed}))
+    if len(terms) < len(listed) or not terms:
+        raise ValueError(f"a library is a list of different terms, got {listed}")
     return terms
 
 
@@ -205,12 +205,12 @@ def polynomials(terms: Sequence[Term], coefficients: FloatArray) -> Polynomials:
 
 def terms_of(polynomials: Polynomials) -> dict[Term, float]:
     """The coefficients of one law that are not zero, in the one order."""
-    found = {}
+    coefficients = {}
     for k, part in enumerate(polynomials):
         rectified, absolute = bool(k % 2), k >= 2
         for i, j in np.argwhere(part).tolist():
-            found[Term(rectified, i + j + absolute, j, absolute)] = float(part[i, j])
-    return {term: found[term] for term in sorted(found)}
+            coefficients[Term(rectified, i + j + absolute, j, absolute)] = float(part[i, j])
+    return {term: coefficients[term] for term in sorted(coefficients)}
 
 
 def coefficient_units(u: FloatArray, y: FloatArray, terms: Iterable[Term]) -> FloatArray:
@@ -263,7 +263,7 @@ _TYPESETTING = (
 
 
 def latex(text: str) -> str:
-    """What `equation` wrote, for LaTeX."""
+    """The text of `equation` for LaTeX."""
     for pattern, replacement in _TYPESETTING:
         text = re.sub(pattern, replacement, text)
     return text

@@ -48,7 +48,7 @@ class Axis(NamedTuple):
 
 @checked
 class Pushing:
-    """How the input pushes the plays of a law, as far as its parameters are searched: here by itself."""
+    """The search for the way in which the input pushes plays; here it pushes them itself."""
 
     def axes(self, record: Record) -> dict[str, Axis]:
         """Coordinates beside thresholds and turning point, by name."""
@@ -93,8 +93,8 @@ class ClampStructure(Identifiable, Composable):
             **dict.fromkeys(columns, 0.0),
             TURN: first,
         }
-        given = freedom.held(defaults, at_rest=(TURN,) if freedom.starts_at_rest("rest") else ())
-        held = {name: defaults[name] for name in names if name not in freedom.free} | given
+        chosen = freedom.held(defaults, at_rest=(TURN,) if freedom.starts_at_rest("rest") else ())
+        held = {name: defaults[name] for name in names if name not in freedom.free} | chosen
         limits = freedom.limits(defaults, held)
         gaps = zip(names, _gaps(thresholds), strict=True)
         box = [
@@ -152,7 +152,7 @@ class ClampStructure(Identifiable, Composable):
         return law(**tuples, **others, **self.pushing.arguments(parameters))
 
     def _thresholds(self, half: float) -> FloatArray:
-        """Those given, or in even steps: from zero for plays; for stops, which are nothing there, up to the end."""
+        """The structure's own, or even steps: from zero for plays, up to the end for stops, which vanish at zero."""
         if self.thresholds:
             return np.array(self.thresholds)
         steps = np.arange(self.plays) + float(self.law.stops)

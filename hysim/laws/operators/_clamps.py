@@ -120,8 +120,8 @@ class ClampLaw(Bank):
         """
         slope, thresholds, weights = self.as_plays
         slopes = slope + np.concatenate([[0.0], np.cumsum(weights)])
-        seen = slopes[np.count_nonzero(thresholds == 0.0) :]
-        return float(seen.min()), float(seen.max())
+        reached = slopes[np.count_nonzero(thresholds == 0.0) :]
+        return float(reached.min()), float(reached.max())
 
     def limit_cycle(self, amplitude: float) -> LimitCycle:
         """Steady loop of y - offset between the inputs -X and X, the `amplitude` [unit of u].
@@ -198,6 +198,6 @@ def _turning_values(u: FloatArray) -> FloatArray:
 
 
 def _first_zero(u: FloatArray, y: FloatArray) -> float:
-    """Where a polyline through points of falling `u`, whose ends are opposite, crosses zero first."""
+    """First zero of a polyline through points of falling `u`, whose ends are opposite."""
     k = int(np.argmax(np.sign(y[:-1]) * np.sign(y[1:]) <= 0.0))
     return float(u[k] - y[k] * (u[k + 1] - u[k]) / (y[k + 1] - y[k])) if y[k] else float(u[k])

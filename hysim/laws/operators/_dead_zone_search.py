@@ -99,7 +99,7 @@ class DeadZoneStructure(Identifiable, Composable):
         return weights, columns[:, :-1] @ weights
 
     def _zones(self, x: FloatArray) -> FloatArray:
-        """Those given, or zero and even steps inside the range of x."""
+        """The structure's own, or zero and even steps inside the range of x."""
         if self.dead_zones:
             return np.array(self.dead_zones)
         inside = np.linspace(float(x.min()), float(x.max()), self.count + 2)[1:-1]

@@ -61,8 +61,8 @@ class PreisachStructure(Identifiable, Composable):
         resting = {TURN: lowest} if freedom.starts_at_rest("rest") and TURN not in freedom.free else {}
         turns = freedom.fixed.get(TURN, lowest if resting else np.linspace(lowest, highest, _STARTS))
         untold = self._untold(record, {**places, TURN: turns}, signs)
-        given = freedom.held(defaults)
-        held = {**places, **resting, **{name: 0.0 for name in untold if name not in freedom.free}, **given}
+        chosen = freedom.held(defaults)
+        held = {**places, **resting, **{name: 0.0 for name in untold if name not in freedom.free}, **chosen}
         limits = freedom.limits(defaults, held)
         turn = Coordinate(TURN, *limits.get(TURN, (lowest, highest)), scale)
         points = [
@@ -94,7 +94,7 @@ class PreisachStructure(Identifiable, Composable):
         return self._law(levels, weights, offset=parameters["offset"], z0=tuple(past))
 
     def notes(self, record: Record, law: Any) -> tuple[str, ...]:
-        """How many of the weights the record tells apart, where these are not all."""
+        """Number of the weights that the record does not determine."""
         places = {f"levels[{k}]": value for k, value in enumerate(law.levels)}
         columns = self.regressors({**places, TURN: law.levels[0]}, record)[0, :, :-1]
         untold = columns.shape[1] - int(np.linalg.matrix_rank(columns))
@@ -102,7 +102,7 @@ class PreisachStructure(Identifiable, Composable):
         return (told,) if untold else ()
 
     def _levels(self, record: Record) -> FloatArray:
-        """Those given, or even steps over the span of the input."""
+        """The structure's own, or even steps over the span of the input."""
         if self.levels:
             return np.array(self.levels)
         return np.linspace(record.u.min(), record.u.max(), self.intervals + 1)
@@ -119,8 +119,8 @@ class PreisachStructure(Identifiable, Composable):
         if np.linalg.matrix_rank(relays) == relays.shape[1]:
             return ()
         used = _support(relays, goal[:, 0], [signs.get(f"weights[{k}]", (-np.inf, np.inf)) for k in range(rows.size)])
-        kept = _independent(relays, [rows.size, *nearest[used[nearest]], *nearest[~used[nearest]]])
-        return tuple(f"weights[{k}]" for k in range(rows.size) if k not in kept)
+        independent = _independent(relays, [rows.size, *nearest[used[nearest]], *nearest[~used[nearest]]])
+        return tuple(f"weights[{k}]" for k in range(rows.size) if k not in independent)
 
     def _law(self, levels: FloatArray, weights: FloatArray, **others: Any) -> Any:
         law: Any = self.law
@@ -170,18 +170,18 @@ def _support(columns: FloatArray, goal: FloatArray, bounds: list[tuple[float, fl
     sides += [(len(bounds), 1.0), (len(bounds), -1.0)]
     places, signs = np.array([k for k, _ in sides]), np.array([sign for _, sign in sides])
     size = np.linalg.norm(columns, axis=0)[places]
-    found, _ = nnls(signs * columns[:, places] / np.where(size > 0.0, size, 1.0), goal)
-    return np.isin(np.arange(len(bounds)), places[found > 0.0])
+    solution, _ = nnls(signs * columns[:, places] / np.where(size > 0.0, size, 1.0), goal)
+    return np.isin(np.arange(len(bounds)), places[solution > 0.0])
 
 
 def _independent(columns: FloatArray, order: list[int]) -> set[int]:
     """The columns that are no combination of those before them in the order."""
     basis = np.empty((len(columns), 0))
-    kept: set[int] = set()
+    independent: set[int] = set()
     for k in order:
         rest = columns[:, k] - basis @ (basis.T @ columns[:, k])
         rest -= basis @ (basis.T @ rest)
         size = float(np.linalg.norm(rest))
         if size > _RANK * float(np.linalg.norm(columns[:, k])):
-            basis, kept = np.column_stack([basis, rest / size]), kept | {int(k)}
-    return kept
+            basis, independent = np.column_stack([basis, rest / size]), independent | {int(k)}
+    return independent

@@ -91,9 +91,9 @@ class RelayLaw(ByStructure, Law):
         """As `Law.compiled`; the state holds the place of the last extreme, extremes, and outputs there."""
         state = np.zeros(2 + 2 * _ROOM)
         parameters, x, y, d = self._staircase((*self.z0, u0), 0)
-        kept = min(d + 1, _ROOM)
-        state[0], state[1] = u0, kept - 1
-        state[2 : 2 + kept], state[2 + _ROOM : 2 + _ROOM + kept] = x[:kept], y[:kept]
+        size = min(d + 1, _ROOM)
+        state[0], state[1] = u0, size - 1
+        state[2 : 2 + size], state[2 + _ROOM : 2 + _ROOM + size] = x[:size], y[:size]
         return CompiledLaw(kernels.step, parameters, state)
 
     @classmethod
@@ -120,8 +120,8 @@ class RelayLaw(ByStructure, Law):
         >>> hs.identify(hs.Preisach.structure(intervals=3), hs.datasets.table1()).n_parameters
         6
         """
-        given = tuple(read_only(levels, "levels", ndim=1).tolist())
-        return PreisachStructure(law=cls, levels=given, intervals=intervals, one_signed=one_signed)
+        places = tuple(read_only(levels, "levels", ndim=1).tolist())
+        return PreisachStructure(law=cls, levels=places, intervals=intervals, one_signed=one_signed)
 
     def _staircase(self, past: State, n_samples: int) -> tuple[FloatArray, FloatArray, FloatArray, int]:
         """Parameters, extremes and outputs as kernels take them after the inputs `past`, and the last place."""

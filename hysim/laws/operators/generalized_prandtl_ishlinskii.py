@@ -149,7 +149,7 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
 
 @checked
 class Envelopes(Pushing):
-    """What is searched of envelopes: nothing where the left one is known."""
+    """The search for envelopes, unless the left one is known."""
 
     left: tuple[float, ...] = ()
     right: tuple[float, ...] = ()
@@ -160,8 +160,8 @@ class Envelopes(Pushing):
         if self.left:
             return {}
         bends, skews, leads = _STARTS
-        found = {"bend": Axis(*_BENDS, bends, 1.0), "skew": Axis(*_SKEWS, skews, 1.0)}
-        return found | ({"lead": Axis(0.0, _SKEWS[1], leads, 1.0)} if self.count == 2 else {})
+        axes = {"bend": Axis(*_BENDS, bends, 1.0), "skew": Axis(*_SKEWS, skews, 1.0)}
+        return axes | ({"lead": Axis(0.0, _SKEWS[1], leads, 1.0)} if self.count == 2 else {})
 
     def derived(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
         """Coefficients ``left[0]`` ... ``left[4]``, and those of the right envelope where there are two."""

@@ -93,8 +93,8 @@ class MaxwellSlip(ByStructure, ClampLaw):
         ValueError or TypeError if the number is not a positive int, or an elongation is not a finite number
         [unit of u].
         """
-        given = tuple(read_only(slips, "slips", ndim=1).tolist())
-        return ClampStructure(law=cls, thresholds=given, plays=elements, one_signed=one_signed)
+        places = tuple(read_only(slips, "slips", ndim=1).tolist())
+        return ClampStructure(law=cls, thresholds=places, plays=elements, one_signed=one_signed)
 
     @property
     def limits(self) -> tuple[float, ...]:

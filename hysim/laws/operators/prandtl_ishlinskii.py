@@ -106,8 +106,8 @@ class PrandtlIshlinskii(ByStructure, ClampLaw):
         >>> fit.n_parameters, round(fit.fit_percent, 1)
         (5, 93.5)
         """
-        given = tuple(read_only(thresholds, "thresholds", ndim=1).tolist())
-        return ClampStructure(law=cls, thresholds=given, plays=plays, one_signed=one_signed)
+        places = tuple(read_only(thresholds, "thresholds", ndim=1).tolist())
+        return ClampStructure(law=cls, thresholds=places, plays=plays, one_signed=one_signed)
 
     def is_one_signed(self) -> bool:
         """Whether all weights past the threshold zero have one sign."""

@@ -290,7 +290,7 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
 
 @checked
 class Widening(Pushing):
-    """What is searched of thresholds that grow with the speed: beta, from a law's own or from none."""
+    """The search for beta, from a law's own or from none."""
 
     beta: float | None = None
 
@@ -312,12 +312,12 @@ class Widening(Pushing):
 
 
 def _as_speed(speed: npt.ArrayLike, u: npt.ArrayLike) -> FloatArray:
-    given = read_only(speed, "speed", ndim=1)
-    if given.size != np.size(u):
-        raise ValueError(f"speed must have {np.size(u)} samples as the signal has, got {given.size}")
-    if (given < 0.0).any():
-        raise ValueError(f"speed must not be negative, got {given.min():g}")
-    return given
+    speeds = read_only(speed, "speed", ndim=1)
+    if speeds.size != np.size(u):
+        raise ValueError(f"speed must have {np.size(u)} samples as the signal has, got {speeds.size}")
+    if (speeds < 0.0).any():
+        raise ValueError(f"speed must not be negative, got {speeds.min():g}")
+    return speeds
 
 
 def _width(beta: FloatArray, sample_time: float) -> FloatArray:
