@@ -152,7 +152,7 @@ def check_whole(value: Any, name: str, *, least: int = 1) -> None:
     if isinstance(value, bool) or not isinstance(value, int):
         raise TypeError(f"{name} must be a whole number, got {value!r}")
     if value < least:
-        raise ValueError(f"{name} must be at least {least}, got {value}")
+        raise ValueError(f"{name} must {f'be at least {least}' if least else 'not be negative'}, got {value}")
 
 
 def items(value: Any) -> dict[str, Any]:

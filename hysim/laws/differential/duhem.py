@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
+from hysim._frozen import FloatArray, check_whole, read_only
 from hysim.kernels import duhem as kernels
 from hysim.laws.differential import _duhem_search
 from hysim.laws.differential.duhem_runs import branches, free_runs, outputs
@@ -18,7 +18,6 @@ from hysim.laws.differential.terms import (
     duhem_terms,
     equation,
     latex,
-    named_terms,
     polynomials,
     terms_of,
 )
@@ -173,9 +172,10 @@ class Duhem(Law):
         3.1635
         """
         if degree is not None and terms is None:
+            check_whole(degree, "degree", least=0)
             return DuhemStructure(family=cls(p=_none(), q=_none()), terms=duhem_terms(degree))
         if terms is not None and degree is None:
-            return DuhemStructure(family=cls(p=_none(), q=_none()), terms=named_terms(terms))
+            return DuhemStructure(family=cls(p=_none(), q=_none()), terms=tuple(sorted(set(map(Term.parse, terms)))))
         raise ValueError("give degree or terms, one of the two")
 
     @property

@@ -34,6 +34,8 @@ class DuhemStructure(Identifiable, Composable):
     terms: tuple[Term, ...]
 
     def __post_init__(self) -> None:
+        if not self.terms:
+            raise ValueError("terms must name at least one term")
         if barred := [term.name for term in self.terms if term.absolute]:
             raise ValueError(f"{barred[0]!r} needs a memory of its own: begin the search from a law, Duhem.from_terms")
 
