@@ -363,7 +363,7 @@ def test_slopes_lie_between_their_bounds(law, u):
         (lambda: hs.Preisach.responses({"offset": [[1.0]]}, [0.0]), ValueError, "too many axes"),
         (lambda: hs.Preisach.responses({"offset": [1, 2], "z0": [[1]] * 3}, [0.0]), ValueError, "one length"),
         (lambda: hs.Preisach.structure(intervals=0), ValueError, "at least 1"),
-        (lambda: hs.Preisach.structure(intervals=2.0), TypeError, "intervals must be an int"),
+        (lambda: hs.Preisach.structure(intervals=2.0), TypeError, "intervals must be a whole number"),
         (lambda: hs.Preisach.structure(levels=(1, 0)), ValueError, "increase"),
         (lambda: hs.identify(hs.Preisach, hs.Record(u=[1, 1], y=[0, 1])), ValueError, "the input is constant"),
         (
