@@ -534,3 +534,10 @@ def test_nothing_in_nothing_out():
     assert law.advance([])[1] == (0.2, 0.5, 0.2)
     assert law.inverse_response([]).size == 0
     assert hs.Preisach(offset=2.0).response([0.0, 1.0, -3.0]).tolist() == [2.0, 2.0, 2.0]
+
+
+@pytest.mark.parametrize("law", [hs.Preisach(), hs.PreisachRelays()])
+def test_a_memory_of_any_length_is_not_offered_as_an_array(law):
+    """The arrays of other laws have no room for extremes: filling them wrote beyond their end."""
+    assert law.memory is None
+    assert law.remembered is None
