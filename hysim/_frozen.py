@@ -180,6 +180,14 @@ def _as_mapping(values: Mapping[Any, Any], name: str) -> Mapping[Any, Any]:
     return MappingProxyType(dict(values))
 
 
+def check_whole(value: Any, name: str, *, least: int = 1) -> None:
+    """Refuse what is no whole number from `least` up: TypeError if it is no int, ValueError if it is too small."""
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise TypeError(f"{name} must be a whole number, got {value!r}")
+    if value < least:
+        raise ValueError(f"{name} must {f'be at least {least}' if least else 'not be negative'}, got {value}")
+
+
 def items(value: Any) -> dict[str, Any]:
     """Fields of a frozen value by name."""
     return {field.name: vars(value)[field.name] for field in dataclasses.fields(value)}

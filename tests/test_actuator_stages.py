@@ -235,7 +235,7 @@ def test_readings_are_steps_of_noisy_displacements():
         (lambda: hs.StateSpace(A=[[1.0]], B=[1.0], C=[1.0], delay=-1.0), ValueError, "delay must not be negative"),
         (lambda: hs.Sensor(noise=-1.0), ValueError, "noise must not be negative"),
         (lambda: hs.Sensor(seed=-1), ValueError, "seed must not be negative"),
-        (lambda: hs.Sensor(seed=0.5), TypeError, "seed must be an integer"),
+        (lambda: hs.Sensor(seed=0.5), TypeError, "seed must be a whole number"),
         (
             lambda: hs.Actuator(vibration=control.tf([1.0], [1.0, 0.5], 0.1)),
             ValueError,

@@ -455,7 +455,7 @@ def test_the_steady_state_of_single_laws_repeats():
         (lambda: hs.Play.responses({"threshold": [1.0, -2.0]}, [0.0]), ValueError, "negative"),
         (lambda: hs.Play.responses({"gain": [1, 2], "z0": [1, 2, 3]}, [0.0]), ValueError, "one length or length 1"),
         (lambda: hs.PrandtlIshlinskii.structure(plays=0), ValueError, "at least 1"),
-        (lambda: hs.PrandtlIshlinskii.structure(plays=2.0), TypeError, "plays must be an int"),
+        (lambda: hs.PrandtlIshlinskii.structure(plays=2.0), TypeError, "plays must be a whole number"),
         (lambda: hs.PrandtlIshlinskii.structure(thresholds=(1, 0)), ValueError, "increase"),
     ],
 )

@@ -176,7 +176,7 @@ def test_decimation_is_the_filter_at_every_rth_sample():
         ({"excitation": "ground"}, ValueError, "excitation must be one of"),
         ({"initial": "free"}, ValueError, "initial must be one of rest, periodic"),
         ({"oversampling": 0}, ValueError, "must be at least 1, got 0"),
-        ({"oversampling": 2.5}, TypeError, "must be whole numbers, got 2.5"),
+        ({"oversampling": 2.5}, TypeError, "must be a whole number, got 2.5"),
         ({"oversampling": 20, "decimation": (2, 5)}, ValueError, "must multiply to the oversampling 20"),
         ({"initial": "periodic"}, ValueError, "takes a period in samples"),
         ({"period": 100}, ValueError, "takes a period in samples"),

@@ -363,7 +363,7 @@ def test_slopes_lie_between_their_bounds(law, u):
         (lambda: hs.Preisach.responses({"offset": [[1.0]]}, [0.0]), ValueError, "too many axes"),
         (lambda: hs.Preisach.responses({"offset": [1, 2], "z0": [[1]] * 3}, [0.0]), ValueError, "one length"),
         (lambda: hs.Preisach.structure(intervals=0), ValueError, "at least 1"),
-        (lambda: hs.Preisach.structure(intervals=2.0), TypeError, "intervals must be an int"),
+        (lambda: hs.Preisach.structure(intervals=2.0), TypeError, "intervals must be a whole number"),
         (lambda: hs.Preisach.structure(levels=(1, 0)), ValueError, "increase"),
         (lambda: hs.identify(hs.Preisach, hs.Record(u=[1, 1], y=[0, 1])), ValueError, "the input is constant"),
         (
@@ -534,3 +534,10 @@ def test_nothing_in_nothing_out():
     assert law.advance([])[1] == (0.2, 0.5, 0.2)
     assert law.inverse_response([]).size == 0
     assert hs.Preisach(offset=2.0).response([0.0, 1.0, -3.0]).tolist() == [2.0, 2.0, 2.0]
+
+
+@pytest.mark.parametrize("law", [hs.Preisach(), hs.PreisachRelays()])
+def test_a_memory_of_any_length_is_not_offered_as_an_array(law):
+    """The arrays of other laws have no room for extremes: filling them wrote beyond their end."""
+    assert law.memory is None
+    assert law.remembered is None

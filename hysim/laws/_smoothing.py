@@ -8,8 +8,7 @@ output y_g,
 With f = B c in cubic B-splines on even knots this is (B^T W B + strength P) c = B^T W y, banded. The strength is
 the one that predicts best what is left out: the groups between the first and the last, *in the order of their
 inputs*, are cut into contiguous blocks, and each block is predicted from the others. Loading and unloading lie in
-the same block, so that the spline cannot read one branch from its neighbour on the other, as it could if samples were
-left out one at a time: it averages them.
+the same block, so that the spline averages them.
 
 Sources: P. J. Green and B. W. Silverman, Nonparametric Regression and Generalized Linear Models (1994), ch. 2 for the
 spline, section 3.3.4 for its degrees of freedom, the trace of the matrix that takes y to f; T. Hastie, J. R. Stat.
@@ -62,12 +61,12 @@ def smoothing_spline(u: FloatArray, y: FloatArray) -> Smooth:
     coefficients = inverse @ moments[0]
     low, high = float(u.min()), float(u.max())
     knots = np.concatenate([[0.0], x, [1.0]])
-    inputs, kept = np.unique(
+    inputs, remaining = np.unique(
         np.clip(low + (high - low) * knots, low, high), return_index=True
     )  # in u, where they round
     return Smooth(
         u=inputs,
-        y=splines.at(knots[kept]).combined(coefficients),
+        y=splines.at(knots[remaining]).combined(coefficients),
         degrees_of_freedom=float(np.sum(gram * inverse)),
         spread=np.sqrt(_quadratic_form(bands[0], rows.combined(inverse)) / u.size)[place],
     )
@@ -131,7 +130,7 @@ class _Splines(NamedTuple):
 
     @property
     def size(self) -> int:
-        """How many there are."""
+        """Number of splines."""
         return self.knots.size - 4
 
     def at(self, x: FloatArray) -> _Rows:
@@ -148,8 +147,8 @@ def _strength(splines: _Splines, rows: _Rows, share: FloatArray, y: FloatArray) 
     if not n_blocks:
         return float(_STRENGTHS[-1])
     bands, moments = _normal_equations(rows, share, y, block, n_blocks + 1, splines.size)
-    kept, goals = bands.sum(axis=0) - bands[:-1], moments.sum(axis=0) - moments[:-1]
-    coefficients = _solved(kept, goals, splines.penalty)
+    remaining, goals = bands.sum(axis=0) - bands[:-1], moments.sum(axis=0) - moments[:-1]
+    coefficients = _solved(remaining, goals, splines.penalty)
     inside = np.flatnonzero(block < n_blocks)
     predicted = np.zeros((inside.size, _STRENGTHS.size))
     for k in range(4):
@@ -183,10 +182,7 @@ def _normal_equations(
 
 
 def _solved(bands: FloatArray, goals: FloatArray, penalty: FloatArray) -> FloatArray:
-    """Coefficients for each block left out and each strength, (n_blocks, n_strengths, count).
-
-    All systems are solved as one: one after the other on the diagonal of a banded matrix.
-    """
+    """Coefficients for each block left out and each strength, (n_blocks, n_strengths, count)."""
     from scipy.linalg import solveh_banded
 
     systems = bands[:, np.newaxis] + _STRENGTHS[:, np.newaxis, np.newaxis] * penalty
@@ -197,10 +193,7 @@ def _solved(bands: FloatArray, goals: FloatArray, penalty: FloatArray) -> FloatA
 
 
 def _quadratic_form(bands: FloatArray, z: FloatArray) -> FloatArray:
-    """z^T M z for each row of `z` (m, count), M symmetric with these lower diagonals.
-
-    By diagonals and not as a product of matrices: threads of a linear algebra library cost more than they save here.
-    """
+    """z^T M z for each row of `z` (m, count), M symmetric with these lower diagonals."""
     total = z**2 @ bands[0]
     for k in range(1, 4):
         total += 2.0 * (z[:, k:] * z[:, :-k]) @ bands[k, :-k]

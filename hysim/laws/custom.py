@@ -1,12 +1,4 @@
-"""A law of one's own: a scalar function, compiled once, that every verb and every loop takes.
-
-    y = step(parameters, state, u)
-
-The function gets the parameters in the order in which they were named, the state, whose first element is the
-last input, and the next input. It changes the state in place (the last input among it) and returns the
-output. It is compiled by numba to the one type that compiled loops take (`hysim.kernels.stepping`): scalars
-and `math`, no allocation, no exceptions; nan says that the law is lost.
-"""
+"""A law of one's own: a scalar function ``y = step(parameters, state, u)``, compiled once, for every verb and loop."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import field, replace
@@ -19,9 +11,10 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, checked, read_only
 from hysim.models.batch import Reduction
 from hysim.models.compiled_step import compiled_step
-from hysim.models.law import Law, Packed, Tables, rows_by_step
+from hysim.models.law import Law, Packed, rows_by_step
 from hysim.models.parameters import Parameter, declared_space
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.tables import Tables
 from hysim.records import Record
 
 
@@ -32,9 +25,10 @@ class CustomLaw(Law):
     Parameters
     ----------
     step : callable
-        ``step(parameters, state, u) -> y``, a plain function or one that numba has compiled; it is compiled
-        anew for the loops' own types. ``state[0]`` is the last input, which the function must move to `u`;
-        the initial values of `state` follow. At the first sample the last input is that sample itself.
+        ``step(parameters, state, u) -> y``, a plain function or one that numba has compiled; it is compiled anew for
+        the loops' own types: scalars and `math`, no allocation, no exceptions; nan says that the law has diverged.
+        ``state[0]`` is the last input, which the function must move to `u`; the initial values of `state` follow. At
+        the first sample the last input is that sample itself.
     parameters : mapping
         Names to numbers, in the order in which `step` reads them.
     state : mapping
@@ -57,8 +51,6 @@ class CustomLaw(Law):
 
     Examples
     --------
-    Play of half width r, in the form that every loop takes:
-
     >>> import hysim as hs
     >>> def play(parameters, state, u):
     ...     gain, r = parameters
@@ -124,7 +116,6 @@ class CustomLaw(Law):
         return Packed(constants, np.concatenate(memory, axis=1))
 
     def rows(self, tables: Tables, u: FloatArray, y: FloatArray) -> None:  # type: ignore[override]
-        """As `Law.rows`."""
         rows_by_step(compiled_step(self.step), self.pack(tables), 0, u, y)
 
     def responses(  # type: ignore[override]
@@ -140,14 +131,7 @@ class CustomLaw(Law):
         return self.outputs_of(parameters, u).result(reduce, target, workers)
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box of the bounded parameters.
-
-        Raises
-        ------
-        ValueError
-            If the input is constant, `initial` is unknown, a name does not fit, or bounds are missing or not
-            finite.
-        """
+        """The box of the bounded parameters."""
         boxes = {**self.bounds, **freedom.bounds}
         searched = [
             Parameter(name, *boxes[name], log=boxes[name][0] > 0.0) for name in boxes if name not in self.linear

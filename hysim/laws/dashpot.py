@@ -1,11 +1,4 @@
-"""A viscous damper, the part of a force that depends on the velocity.
-
-    y = c u'
-
-Between the samples of an input that is linear there, u' is constant. At a sample the output is that of the stretch
-which ends there, y_k = c (u_k - u_(k-1)) / h: the left limit, which asks for no later input. Before its first
-sample the input rests.
-"""
+"""A viscous damper, the part of a force that depends on the velocity."""
 
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self
@@ -26,6 +19,9 @@ from hysim.records import Record
 class Dashpot(Identifiable, Composable):
     """Viscous damper, ``y = c u'``.
 
+    Between the samples of an input that is linear there, u' is constant. At a sample the output is that of the stroke
+    which ends there, the left limit: ``y_k = c (u_k - u_(k-1)) / h``.
+
     Parameters
     ----------
     c : float
@@ -44,27 +40,13 @@ class Dashpot(Identifiable, Composable):
 
     @classmethod
     def candidates(cls) -> dict[str, Any]:
-        """What `hysim.compare` tries of this family: nothing, it is a part of sums."""
+        """None for `hysim.compare`: a dashpot is a part of sums."""
         return {}
 
     def response(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
-        """Output at the samples of `u`, by the difference to the sample before.
+        """Output (n,) at the samples of `u` (n,), which rests before the first of them, every `sample_time` [s].
 
-        Parameters
-        ----------
-        u : array, shape (n,)
-            Input, at rest before its first sample.
-        sample_time : float
-            Time between two samples [s].
-
-        Returns
-        -------
-        array, shape (n,)
-
-        Raises
-        ------
-        ValueError
-            If `u` is not finite or has not one axis, or the sample time is not positive.
+        Raises ValueError if `u` is not finite or has not one axis, or the sample time is not positive.
         """
         return self.advance(u, sample_time)[0]
 
@@ -81,13 +63,7 @@ class Dashpot(Identifiable, Composable):
         return self.c * (np.diff(inputs, prepend=before) / sample_time), float(inputs[-1])
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """Nothing to search: the output is linear in c.
-
-        Raises
-        ------
-        ValueError
-            If the record has no even time, its input is constant, or a name does not fit.
-        """
+        """Nothing to search: the output is linear in c."""
         if not record.sample_time or np.ptp(record.u) == 0.0:
             raise ValueError("the input is constant: nothing can be identified from it")
         return linear_space({"c": self.c}, freedom)

@@ -1,9 +1,4 @@
-"""Yardsticks without memory: a model that does not beat them has learnt nothing about hysteresis.
-
-Line           y = offset + slope u
-SingleValued   y = f(u), linear between knots; fitted to a record, f is a cubic smoothing spline
-               (`hysim.laws._smoothing`), whose loop has no width
-"""
+"""Yardsticks without memory: a model that does not beat them has learnt nothing about hysteresis."""
 
 import math
 from collections.abc import Mapping
@@ -49,7 +44,6 @@ class Line(Law):
     memory = None  # type: ignore[assignment]  # a line remembers nothing
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
-        """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""
         if not self.slope:
             raise ValueError("the law has no inverse: its slope is zero")
         parameters = read_only([*limits, self.offset, self.slope], finite=False)
@@ -62,9 +56,8 @@ class SingleValued(Composable):
 
     `hysim.identify` fits a cubic smoothing spline to the mean outputs of equal inputs, and takes its values at the
     record's inputs as the knots (at most about a thousand). The spline's strength is the one that predicts best what
-    is left out, in blocks of neighbouring *inputs*: a curve that read each sample from its neighbour would follow
-    loading and unloading by turns, and measure their noise instead of their mean. The number of parameters is that of
-    the spline's degrees of freedom, rounded.
+    is left out, in blocks of neighbouring inputs, so that it follows the mean of loading and unloading
+    (`hysim.laws._smoothing`). The number of parameters is that of its degrees of freedom, rounded.
 
     Parameters
     ----------
@@ -104,10 +97,7 @@ class SingleValued(Composable):
     def fitted(cls, u: FloatArray, y: FloatArray) -> DirectFit:
         """The smoothing spline of outputs `y` at inputs `u`, both of shape (n,).
 
-        Raises
-        ------
-        ValueError
-            If the input is constant.
+        Raises ValueError if the input is constant.
         """
         if np.ptp(u) == 0.0:
             raise ValueError("the input is constant: nothing can be identified from it")
@@ -116,19 +106,10 @@ class SingleValued(Composable):
 
     @classmethod
     def through_means(cls, record: Record) -> Self:
-        """The curve through the mean output at each input of a record.
+        """The curve through the mean output at each input of a record, equal to 1e-9 of their span.
 
         No function of the input fits the record better: its fit is the bound of all models without memory. It predicts
         nothing where inputs do not repeat, and is no model of the actuator; that is what `hysim.identify` fits.
-
-        Parameters
-        ----------
-        record : Record
-            Inputs that differ by less than 1e-9 of their span count as equal.
-
-        Returns
-        -------
-        SingleValued
 
         Examples
         --------

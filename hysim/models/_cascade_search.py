@@ -1,4 +1,4 @@
-"""What is searched of a cascade.
+"""The search for the parameters of a cascade.
 
 The last stage that is not a transfer function carries the gain: what it is linear in stays linear, each of its columns
 passing through the linear stages behind it. A structure of a transfer function before or behind it has the gain one at
@@ -16,14 +16,13 @@ import numpy as np
 
 from hysim._frozen import FloatArray, checked
 from hysim.models._joint_space import declared, together
-from hysim.models._parts import checked_tuple, labels, own, response_of
-from hysim.models._sum_search import started, time_of
+from hysim.models._parts import labels, own, response_of
+from hysim.models._sum_search import assembled, started, time_of
 from hysim.models.composable import Composable, composed
 from hysim.models.protocols import (
     Identifiable,
     LinearStage,
     LinearStructure,
-    Responding,
     UnitGainStructure,
     needs_time,
 )
@@ -38,10 +37,8 @@ class CascadeStructure(Identifiable, Composable):
     stages: tuple[Any, ...]
 
     def __post_init__(self) -> None:
-        stages = started(checked_tuple(self.stages, "stages"))
+        stages = started(self.stages, "stages")
         for stage in stages:
-            if not isinstance(stage, Identifiable | Responding):
-                raise TypeError(f"stages must hold models or structures, got {type(stage).__name__}")
             if isinstance(stage, LinearStage) and stage.initial_state:
                 raise ValueError("a transfer function that is given must not hold an initial state")
         object.__setattr__(self, "stages", stages)
@@ -57,13 +54,7 @@ class CascadeStructure(Identifiable, Composable):
         return next((k for k, stage in enumerate(self.stages) if isinstance(stage, LinearStructure)), 0)
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The stages' spaces side by side.
-
-        Raises
-        ------
-        ValueError
-            If a name is unknown, or as a stage's `search_space`.
-        """
+        """The stages' spaces side by side."""
         names = labels(self.stages)
         before = names[: self.carrier]
         spaces = declared(
@@ -98,19 +89,14 @@ class CascadeStructure(Identifiable, Composable):
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
         """The cascade with these parameters."""
-        searched = self._searched
-        stages = zip(labels(self.stages), self.stages, strict=True)
-        members = (
-            searched[label].assemble(own(parameters, label)) if label in searched else stage for label, stage in stages
-        )
-        return composed(">>", tuple(members))
+        return composed(">>", assembled(self.stages, self._searched, parameters))
 
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
-        """What the law that carries the gain says of itself."""
-        carrier, found = self.stages[self.carrier], model.stages[self.carrier]
-        if needs_time(found):
+        """Remarks of the law that carries the gain."""
+        carrier, law = self.stages[self.carrier], model.stages[self.carrier]
+        if needs_time(law):
             return ()
-        return tuple(f"{labels(self.stages)[self.carrier]}: {note}" for note in carrier.notes(record, found))
+        return tuple(f"{labels(self.stages)[self.carrier]}: {note}" for note in carrier.notes(record, law))
 
     @property
     def _by_label(self) -> dict[str, Any]:

@@ -74,17 +74,11 @@ def together(spaces: Mapping[str, SearchSpace]) -> SearchSpace:
 
 
 def declared(spaces: Mapping[str, Space], freedom: Freedom) -> dict[str, SearchSpace]:
-    """Each part's space with its share of what the user says.
-
-    Raises
-    ------
-    ValueError
-        If a name is unknown, or a part refuses; the message names the part.
-    """
+    """Each part's space with its share of what the user says."""
     asked = {label: space(replace(freedom, fixed={}, free=(), bounds={})) for label, space in spaces.items()}
     known = [f"{label}.{name}" for label, space in asked.items() for name in (*space.names, *space.held)]
-    given = {"fixed": freedom.fixed, "free": freedom.free, "bounds": freedom.bounds}
-    for argument, names in given.items():
+    wishes = {"fixed": freedom.fixed, "free": freedom.free, "bounds": freedom.bounds}
+    for argument, names in wishes.items():
         for name in names:
             if name not in known:
                 raise ValueError(f"{argument} names {name!r}; the parameters are {', '.join(known)}")
@@ -107,19 +101,7 @@ def _of_part(label: str, space: Space, freedom: Freedom) -> SearchSpace:
 def without_repetition(
     space: SearchSpace, columns: Callable[[FloatArray], FloatArray], values: Mapping[str, float], freedom: Freedom
 ) -> SearchSpace:
-    """The space with linear parameters held of which others have the same column.
-
-    Parameters
-    ----------
-    space : SearchSpace
-        Of all parts together.
-    columns : callable
-        Coordinates (n_sets, n_x) to the columns (n_sets, n_samples, n_columns).
-    values : mapping
-        What each linear parameter is held at; zero where it is not named.
-    freedom : Freedom
-        Names that are free or bounded are not held.
-    """
+    """The space in which all but one of the linear parameters with equal columns are held, at `values` or at zero."""
     points = np.stack([space.lower + share * (space.upper - space.lower) for share in (0.45, 0.55)])
     shapes = np.concatenate(columns(points), axis=0)  # two places in the box: what moves with neither is the same
     chosen = {*freedom.free, *freedom.bounds}

@@ -1,4 +1,4 @@
-"""What sums and cascades share: names of their parts, and parts that are stepped."""
+"""Names and compiled steps of the parts of sums and cascades."""
 
 import functools
 import re
@@ -47,10 +47,10 @@ def checked_tuple(parts: Any, what: str) -> tuple[Any, ...]:
 
 def response_of(part: Any, u: FloatArray, sample_time: float | None) -> FloatArray:
     """Output of a part from its first sample on."""
-    return np.asarray(part.response(u, given(part, sample_time)) if needs_time(part) else part.response(u))
+    return np.asarray(part.response(u, needed_time(part, sample_time)) if needs_time(part) else part.response(u))
 
 
-def given(part: Any, sample_time: float | None) -> float:
+def needed_time(part: Any, sample_time: float | None) -> float:
     """The sample time, which a part that moves in time cannot do without."""
     if sample_time is None:
         raise ValueError(f"a {type(part).__name__} moves in time: give sample_time")

@@ -1,4 +1,4 @@
-"""What is searched of a sum: the parts' own spaces side by side (`hysim.models._joint_space`).
+"""The search for the parameters of a sum: the parts' own spaces side by side.
 
 What is linear in a part is linear in the sum. A part that cannot be identified adds an output that is known.
 """
@@ -17,14 +17,26 @@ from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
 
-def started(parts: Sequence[Any]) -> tuple[Any, ...]:
-    """The parts, of a class the model with its defaults."""
-    return tuple(part() if isinstance(part, type) else part for part in parts)
+def started(parts: Any, what: str) -> tuple[Any, ...]:
+    """Models and structures as a tuple, of a class the model with its defaults."""
+    members = tuple(part() if isinstance(part, type) else part for part in checked_tuple(parts, what))
+    for member in members:
+        if not isinstance(member, Identifiable | Responding):
+            raise TypeError(f"{what} must hold models or structures, got {type(member).__name__}")
+    return members
 
 
 def time_of(part: Any, record: Record) -> float | None:
     """The sample time where the part needs one."""
     return record.sample_time if needs_time(part) else None
+
+
+def assembled(members: Sequence[Any], searched: Mapping[str, Any], parameters: Parameters) -> tuple[Any, ...]:
+    """The models of the members, those that are searched by their labels with their parameters."""
+    parts = zip(labels(members), members, strict=True)
+    return tuple(
+        searched[label].assemble(own(parameters, label)) if label in searched else part for label, part in parts
+    )
 
 
 @checked
@@ -34,30 +46,20 @@ class SumStructure(Identifiable, Composable):
     parts: tuple[Any, ...]
 
     def __post_init__(self) -> None:
-        parts = started(checked_tuple(self.parts, "parts"))
-        for part in parts:
-            if not isinstance(part, Identifiable | Responding):
-                raise TypeError(f"parts must hold models or structures, got {type(part).__name__}")
-        object.__setattr__(self, "parts", parts)
+        object.__setattr__(self, "parts", started(self.parts, "parts"))
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The parts' spaces side by side; of columns that repeat each other one is free.
-
-        Raises
-        ------
-        ValueError
-            If a name is unknown, or as a part's `search_space`.
-        """
+        """The parts' spaces side by side; of columns that repeat each other one is free."""
         found = self._identified
         spaces = declared(
             {label: lambda free, part=part: part.search_space(record, free) for label, part in found.items()},  # type: ignore[misc]
             freedom,
         )
-        whole = together(spaces)
+        joint = together(spaces)
         return without_repetition(
-            whole,
-            lambda x: self.regressors(whole.parameters(x), record)[..., :-1],
-            self._values(whole.columns),
+            joint,
+            lambda x: self.regressors(joint.parameters(x), record)[..., :-1],
+            self._values(joint.columns),
             freedom,
         )
 
@@ -68,18 +70,12 @@ class SumStructure(Identifiable, Composable):
         fixed = sum((response_of(part, record.u, time_of(part, record)) for part in known), np.zeros(len(record)))
         blocks = [part.regressors(own(parameters, label), record) for label, part in found.items()]
         n_sets = max([len(block) for block in blocks], default=1)
-        whole = [np.broadcast_to(block, (n_sets, *block.shape[1:])) for block in blocks]
-        last = sum((block[..., -1:] for block in whole), np.broadcast_to(fixed[:, np.newaxis], (n_sets, fixed.size, 1)))
-        return np.concatenate([*(block[..., :-1] for block in whole), last], axis=-1)
+        joint = [np.broadcast_to(block, (n_sets, *block.shape[1:])) for block in blocks]
+        last = sum((block[..., -1:] for block in joint), np.broadcast_to(fixed[:, np.newaxis], (n_sets, fixed.size, 1)))
+        return np.concatenate([*(block[..., :-1] for block in joint), last], axis=-1)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        """The parameters with the parts' states in the steady cycle of which `record` is one period or more.
-
-        Raises
-        ------
-        ValueError
-            If a part has a state whose steady cycle cannot be computed.
-        """
+        """The parameters with the parts' states in the steady cycle of which `record` is one period or more."""
         states: dict[str, Any] = {}
         for label, part in self._identified.items():
             if part.search_space(record).state:
@@ -92,14 +88,10 @@ class SumStructure(Identifiable, Composable):
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
         """The sum with these parameters."""
-        parts = zip(labels(self.parts), self.parts, strict=True)
-        members = (
-            part.assemble(own(parameters, label)) if isinstance(part, Identifiable) else part for label, part in parts
-        )
-        return composed("+", tuple(members))
+        return composed("+", assembled(self.parts, self._identified, parameters))
 
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
-        """What the laws among the parts say of themselves."""
+        """Remarks of the laws among the parts."""
         return tuple(
             f"{label}: {note}"
             for label, part, found in zip(labels(self.parts), self.parts, model.parts, strict=True)

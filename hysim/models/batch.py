@@ -1,4 +1,4 @@
-"""Many laws at once, and what is kept of each: its row, or one number of it.
+"""Many laws at once, each with its row of outputs, or one number of it.
 
 The laws are computed in blocks that stay in the cache, each on one thread. A reduction sees a block and
 forgets it, so that a million sets need no million rows.

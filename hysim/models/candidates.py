@@ -1,8 +1,7 @@
-"""What the registry offers to `hysim.compare`: every family that can be identified without being told more.
+"""The models that the registry offers to `hysim.compare`: every family that can be identified without being told more.
 
-A public family is its own candidate: `identify` takes the class. One that is identified through a structure, or
-only from a start, names in a class method ``candidates()`` what is tried instead, name to what `identify` takes;
-one that makes no sense without being told more names nothing.
+A public family is its own candidate. One that is identified through a structure, or only from a start, names in a class
+method ``candidates()`` what is tried instead; one that makes no sense without being told more names nothing.
 """
 
 from typing import Any

@@ -14,10 +14,7 @@ from hysim.kernels.stepping import Step
 def compiled_step(function: Callable[[Any, Any, float], float]) -> Step:
     """The step of a family: a kernel of hysim, or a function that numba compiles for the loops' own types.
 
-    Raises
-    ------
-    TypeError
-        If it is no function of (parameters, state, u), or does not compile to one number.
+    Raises TypeError if it is no function of (parameters, state, u), or does not compile to one number.
     """
     if isinstance(function, Dispatcher) and function.py_func.__module__.startswith("hysim.kernels."):
         return function

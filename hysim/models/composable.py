@@ -46,11 +46,11 @@ class Composable:
 def _joined(first: Any, second: Any, kind: _Kind) -> Any:
     if not isinstance(second, Composable):
         return NotImplemented
-    whole = kind.model, kind.structure
+    kinds = kind.model, kind.structure
     members = [
         member
         for operand in (first, second)
-        for member in (items(operand)[kind.field] if isinstance(operand, whole) else (operand,))
+        for member in (items(operand)[kind.field] if isinstance(operand, kinds) else (operand,))
     ]
     simulated = all(isinstance(member, Responding) for member in members)
     return (kind.model if simulated else kind.structure)(**{kind.field: tuple(members)})

@@ -19,6 +19,9 @@ _NEXT_TO_NOTHING = 1e-150
 _HIDDEN, _FARTHEST = 2.0**-44, 1e150  # part of the output by which rounding may hide a rise: it is then sought further
 _LINEAR = 0.1  # part by which rises over once, twice and four times a length are no multiples of each other
 
+Unreached = Callable[[int, float, CompiledLaw], str]
+"""Message for the number of a sample, an output that has no input, and the inverse there."""
+
 _searched = functools.lru_cache(maxsize=256)(kernels.searched)
 
 
@@ -30,10 +33,7 @@ def inverse_step(
     `y` is the output there, by default that of the step; `terms` is the size of the terms that it is the sum of, where
     they are larger: their rounding is the output's.
 
-    Raises
-    ------
-    ValueError
-        If the output does not rise or fall through `u`.
+    Raises ValueError if the output does not rise or fall through `u`.
     """
     trial = np.empty_like(forward.state)
 
@@ -52,31 +52,28 @@ def inverse_step(
     )
 
 
-def inverse_response(inverse: CompiledLaw, y: FloatArray) -> FloatArray:
-    """Inputs for the outputs `y`, whose inverse is stepped from where it stands.
-
-    Raises
-    ------
-    SimulationError
-        If an output has no input; it names the sample.
-    """
+def inverse_response(inverse: CompiledLaw, y: FloatArray, unreached: Unreached | None = None) -> FloatArray:
+    """Inputs for the outputs `y`, by steps of the inverse; SimulationError if an output has none."""
     u = np.empty(y.size)
     with np.errstate(all="ignore"):  # a bracket may reach where a memory overflows
         lost = in_pieces(lambda k: drive(inverse.step, inverse.parameters, inverse.state, y[k], u[k]), y.size)
     if lost >= 0:
-        raise SimulationError(
-            f"the law has no inverse at sample {lost} (y = {y[lost]:g}): from u = {inverse.state[0]:g} on the output "
-            "does not reach it, or turns on the way"
-        )
+        raise SimulationError((unreached or not_reached)(lost, float(y[lost]), inverse))
     return u
 
 
-def inverse_response_of(law: Any, y: FloatArray, u0: float | None) -> FloatArray:
-    """Inputs for the outputs `y` of a law that rests at `u0`; by default at the first input with the first output."""
-    if not y.size:
-        return y
-    here, reached = (first_input(law, float(y[0])), float(y[0])) if u0 is None else (float(u0), None)
-    return inverse_response(inverse_step(law.compiled(here), here, reached), y)
+def not_reached(sample: int, y: float, inverse: CompiledLaw) -> str:
+    """Message for an output that has no input."""
+    return (
+        f"the law has no inverse at sample {sample} (y = {y:g}): from u = {inverse.state[0]:g} on the output "
+        "does not reach it, or turns on the way"
+    )
+
+
+def inverse_at_rest(law: Any, y: float, u0: float | None) -> CompiledLaw:
+    """The inverse of a law that rests at `u0`; by default at the first input with the first output `y`."""
+    here, reached = (first_input(law, y), y) if u0 is None else (float(u0), None)
+    return inverse_step(law.compiled(here), here, reached)
 
 
 def first_input(law: Any, y: float) -> float:
@@ -98,11 +95,7 @@ def first_input(law: Any, y: float) -> float:
 
 
 def _slope(output: Callable[[float], float], here: float) -> float:
-    """Slope of the output at the input `here`, zero where it does not rise or fall through it.
-
-    The law has a length of its own, on which its output may turn, and rounding hides shorter rises. So the slope is
-    that on the shortest length on which the output is linear on both sides.
-    """
+    """Slope of the output at the input `here`, zero where it does not rise or fall through it."""
     reached, fallback, highest = output(here), 0.0, 0.0
     reach = max(_SHORTEST * abs(here), _NEXT_TO_NOTHING)
     while reach < _REACH * (1.0 + abs(here)) or (highest < _HIDDEN * abs(reached) and reach < _FARTHEST):

@@ -8,38 +8,17 @@ from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, StepwiseInver
 
 
 def inverse_step(law: Any, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
-    """The inverse of a law at rest, as `hysim.kernels.inverses` has it.
+    """The inverse of a law at rest at `u0`, as a step; see `hysim.Law.compiled_inverse`.
 
-    Parameters
-    ----------
-    law : law
-        Any law that can be stepped, such as `BoucWen`, a `Sum` or a `Cascade`.
-    u0 : float
-        Input at which it rests [unit of u].
-    limits : (float, float)
-        Lowest and highest input to which the inverse's copy of the law moves [unit of u].
-    sample_time : float
-        Of a law that depends on the rate of its input [s].
-
-    Returns
-    -------
-    CompiledLaw
-        ``u = step(parameters, state, y)``, nan where no input has the output y.
-
-    Raises
-    ------
-    TypeError
-        If the law cannot be stepped.
-    ValueError
-        If the law has no inverse.
+    Raises TypeError if the law cannot be stepped, and ValueError if it has no inverse.
 
     Examples
     --------
     >>> import hysim as hs
     >>> from hysim.models.inverse_steps import inverse_step
-    >>> step, parameters, state = inverse_step(hs.Dahl() + hs.Line(slope=1.0), 0.0)
-    >>> y = (hs.Dahl() + hs.Line(slope=1.0)).response([0.0, 0.5, 0.2])
-    >>> [round(step(parameters, state, value), 9) for value in y.tolist()]
+    >>> law = hs.Dahl() + hs.Line(slope=1.0)
+    >>> step, parameters, state = inverse_step(law, 0.0)
+    >>> [round(step(parameters, state, y), 9) for y in law.response([0.0, 0.5, 0.2]).tolist()]
     [0.0, 0.5, 0.2]
     """
     if isinstance(law, StepwiseInvertible):

@@ -24,19 +24,16 @@ from hysim.kernels.stepping import Step, drive
 from hysim.models.batch import Batch, Reduction, Sets
 from hysim.models.compiled_step import compiled_step
 from hysim.models.composable import Composable
-from hysim.models.inverse_search import inverse_response, inverse_response_of, inverse_step
+from hysim.models.inverse_search import inverse_at_rest, inverse_response, inverse_step, not_reached
 from hysim.models.parameters import Parameter, declared_space
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.steady_cycle import fixed_point
+from hysim.models.tables import Tables, arguments_of, scalars_of, table_of_one, tables_of
 from hysim.records import Record
 
 State = tuple[float, ...]
 """Last input, and what the law remembers."""
-
-Tables = Mapping[str, FloatArray]
-"""Every field over sets: (n_sets, 1) for a number, (n_sets, length) for a tuple, (n_sets, rows, columns)."""
-
-_PASSES = 40  # secant steps to the steady cycle
 
 
 class Packed(NamedTuple):
@@ -83,7 +80,7 @@ class Law(Composable, ABC):
 
     @classmethod
     def check(cls, tables: Tables) -> None:
-        """Raise a ValueError where a set of parameters is no law; the tables hold every field over sets."""
+        """Raise a ValueError where the tables, every field over sets, hold parameters that are no law."""
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
@@ -143,7 +140,7 @@ class Law(Composable, ABC):
     @cached_property
     def tables(self) -> dict[str, FloatArray]:
         """Every field as a table of one set."""
-        return {name: _table_of_one(value) for name, value in self.arguments.items()}
+        return {name: table_of_one(value) for name, value in self.arguments.items()}
 
     @cached_property
     def packed(self) -> tuple[FloatArray, FloatArray]:
@@ -269,7 +266,7 @@ class Law(Composable, ABC):
             One input for all sets, or one for each.
         reduce : {"sse", "max_width", "area", "final"}, optional
             Keep of each output only the sum of its squared differences from `target`, the measure of this name of
-            `loop_metrics` (last complete cycle), or the last sample. A million sets then need no million rows.
+            `loop_metrics` (last complete cycle), or the last sample.
         target : array, shape (n_samples,)
             With ``reduce="sse"`` what the outputs are compared with [unit of y].
         workers : int, optional
@@ -323,21 +320,32 @@ class Law(Composable, ABC):
             If y is not finite or has not one axis, both u0 and state are given, or the output does not determine where
             the input begins.
         """
+        outputs = read_only(y, "y", ndim=1)
         if state is not None and u0 is not None:
             raise ValueError("give u0 or state, not both: the state has its own input")
-        outputs = read_only(y, "y", ndim=1)
-        if state is None:
-            return inverse_response_of(self, outputs, u0)
-        forward, _ = self._begun(np.array([state[0]]), state)
-        return inverse_response(inverse_step(forward, state[0]), outputs)
+        if not outputs.size:
+            return outputs
+        return inverse_response(self.inverse_begun(outputs, u0, state), outputs, self.unreached)
+
+    def inverse_begun(self, y: FloatArray, u0: float | None, state: State | None) -> CompiledLaw:
+        """The inverse before it moves to the outputs `y`, stepped; `u0` and `state` as of `inverse_response`."""
+        return inverse_at_rest(self, float(y[0]), u0) if state is None else self.search_inverse(state)
+
+    def search_inverse(self, state: State, *, terms: float = 0.0) -> CompiledLaw:
+        """The inverse of the law in this state by a search on its step; see `hysim.models.inverse_search`."""
+        return inverse_step(self._begun(np.array([state[0]]), state)[0], state[0], terms=terms)
+
+    def unreached(self, sample: int, y: float, inverse: CompiledLaw) -> str:
+        """Message for an output that has no input."""
+        return not_reached(sample, y, inverse)
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
-        """The inverse, stepped; a search on the law's own step unless the family has a closed form.
+        """The inverse, stepped: in the closed form of its family, or by a search on the law's own step.
 
         Parameters
         ----------
         u0 : float
-            Input at which the law rests [unit of u].
+            Input at which the law rests [unit of u]; ValueError if the output does not rise or fall through it.
         limits : (float, float)
             Lowest and highest input to which the inverse's copy of the law moves [unit of u].
         sample_time : float
@@ -347,11 +355,6 @@ class Law(Composable, ABC):
         -------
         CompiledLaw
             ``u = step(parameters, state, y)``, nan where no input has the output y.
-
-        Raises
-        ------
-        ValueError
-            If the output does not rise or fall through u0.
         """
         return inverse_step(self.compiled(u0), u0, limits=limits)
 
@@ -372,12 +375,8 @@ class Law(Composable, ABC):
     def steady(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
         """Initial memory with which a periodic record ends as it began, (n_sets,) by name; nan where it diverges.
 
-        One pass through the record contracts the memory; the fixed point is found by the secant method.
-
-        Raises
-        ------
-        ValueError
-            If an affine parameter moves the memory: it is not known yet where the others are searched.
+        One pass through the record contracts the memory; the fixed point is computed by the secant method. Raises
+        ValueError if an affine parameter moves the memory: it is not known yet where the others are searched.
         """
         names, u = self.initial_names, np.append(record.u, record.u[0])
         passed = self._one_pass(parameters, u)
@@ -390,21 +389,10 @@ class Law(Composable, ABC):
                 f"a {type(self).__name__} has no steady cycle that could be computed, since {' or '.join(affine)} "
                 'moves its memory: use initial="free"'
             )
-        drift_before = z - before
-        for _ in range(_PASSES):
-            with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-                drift = passed(z) - z
-                if not (np.abs(drift) > 1e-15 * np.abs(z)).any():
-                    break
-                secant = z - drift * (z - before) / (drift - drift_before)
-            before, drift_before, z = z, drift, np.where(np.isfinite(secant), secant, z + drift)
-        return dict(zip(names, np.where(np.isfinite(z), z, np.nan).T, strict=True))
+        return dict(zip(names, fixed_point(passed, before, z).T, strict=True))
 
     def _one_pass(self, parameters: Parameters, u: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        """A function from the memory before the input `u` to that after it, (n_sets, n_memory).
-
-        It is nan where the law diverges.
-        """
+        """A function from the memory before the input `u` to that after it, (n_sets, n_memory)."""
         from hysim.kernels.memories import drive_to_end  # compiled where it is needed
 
         tables, inputs = tables_of(type(self).__name__, self.arguments, parameters, u)
@@ -499,77 +487,3 @@ def rows_by_step(step: Step, laws: Packed, workspace: int, u: FloatArray, y: Flo
     parameters, memory = (read_only(table, finite=False) for table in laws)
     with np.errstate(all="ignore"):
         drive_each(step, parameters, memory, workspace, u, y, 0, len(y))
-
-
-# ---------------------------------------------------------------------------------- names, numbers and tables
-
-
-def scalars_of(values: Mapping[str, Any]) -> dict[str, float]:
-    """One number for each name, those of a tuple as ``name[k]``."""
-    numbers: dict[str, float] = {}
-    for name, value in values.items():
-        if isinstance(value, tuple):
-            numbers |= {f"{name}[{k}]": each for k, each in enumerate(value)}
-        else:
-            numbers[name] = value
-    return numbers
-
-
-def arguments_of(scalars: Mapping[str, float]) -> dict[str, Any]:
-    """The constructor's arguments, those named ``name[k]`` as one tuple."""
-    arguments: dict[str, Any] = {}
-    for name, value in scalars.items():
-        whole, bracket, _ = name.partition("[")
-        number = float(np.asarray(value).item())
-        arguments[whole] = (*arguments.get(whole, ()), number) if bracket else number
-    return arguments
-
-
-def tables_of(
-    family: str, defaults: Mapping[str, Any], parameters: Parameters, u: npt.ArrayLike
-) -> tuple[dict[str, FloatArray], FloatArray]:
-    """Every field over sets, (n_sets, ...), and the inputs (1 or n_sets, n_samples).
-
-    A parameter is a field, or an element ``name[k]`` of a tuple.
-
-    Raises
-    ------
-    TypeError
-        If a name is unknown.
-    ValueError
-        If a value has too many axes, or lengths do not fit.
-    """
-    inputs = np.atleast_2d(read_only(u, "u"))
-    if inputs.ndim != 2:
-        raise ValueError(f"u must have 1 axis or 2, got shape {inputs.shape}")
-    whole = {**defaults, **{name: value for name, value in parameters.items() if "[" not in name}}
-    elements = {name: value for name, value in parameters.items() if "[" in name}
-    for name in (*whole, *(name.partition("[")[0] for name in elements)):
-        if name not in defaults:
-            raise TypeError(f"unknown parameter {name!r}: {family} has {', '.join(defaults)}")
-    tables = {name: _table(name, value, np.ndim(defaults[name])) for name, value in whole.items()}
-    columns = {name: _table(name, value, 0) for name, value in elements.items()}
-    lengths = {name: len(table) for name, table in {**tables, **columns, "u": inputs}.items() if len(table) != 1}
-    if len(set(lengths.values())) > 1:
-        raise ValueError(f"parameters and inputs must have one length or length 1, got {lengths}")
-    n_sets = next(iter(lengths.values()), 1)
-    tables = {name: np.broadcast_to(table, (n_sets, *table.shape[1:])) for name, table in tables.items()}
-    for name, column in columns.items():
-        field, _, place = name.partition("[")
-        tables[field] = np.where(np.arange(tables[field].shape[1]) == int(place[:-1]), column, tables[field])
-    return tables, inputs
-
-
-def _table_of_one(value: Any) -> FloatArray:
-    """A number (1, 1), or a field with axes of its own behind one of length 1."""
-    return np.array([[value]]) if isinstance(value, float) else np.array([value], dtype=float)
-
-
-def _table(name: str, values: npt.ArrayLike, ndim: int) -> FloatArray:
-    """Values over sets, of a number (n_sets, 1), of a field with `ndim` axes (n_sets, ...)."""
-    array = read_only(values, name)
-    if array.ndim > ndim + 1:
-        raise ValueError(f"{name} has too many axes: got shape {array.shape}")
-    if array.ndim == ndim:
-        array = array[np.newaxis]
-    return array[:, np.newaxis] if ndim == 0 else array

@@ -1,7 +1,7 @@
-"""What every model shares: the `family` decorator, the registry of families, and the protocols.
+"""The `family` decorator of models, and the registry of families.
 
 A model is a specification. It is frozen and keyword-only, its numbers are finite floats, and it is
-compared by value. Evolving state is separate: it is passed in and handed back.
+compared by value. Evolving state is separate: it is passed in and returned.
 """
 
 import importlib

@@ -17,7 +17,7 @@ from hysim.records import Record
 
 @dataclass(frozen=True)
 class Parameter:
-    """How `hysim.identify` treats a field of a family.
+    """The treatment of a field of a family by `hysim.identify`.
 
     `lower` and `upper` are the box in units of `unit`: a quotient of the spans of input and output such as ``"y/u"``;
     ``"h"`` is half the span of the input. The box of a parameter with `from_first` stands about the first input, and
@@ -54,10 +54,7 @@ class Coordinate(NamedTuple):
     def limited(self, limits: Mapping[str, tuple[float, float]]) -> "Coordinate":
         """The coordinate in the user's bounds.
 
-        Raises
-        ------
-        ValueError
-            If a side is not finite, or not positive on a log scale.
+        Raises ValueError if a side is not finite, or not positive on a log scale.
         """
         lower, upper = limits.get(self.name, (self.lower, self.upper))
         positive = " positive and" if self.log else ""
@@ -81,10 +78,7 @@ def declared_space(
     values; `initial` are the fields of its initial memory, held at zero where the record begins at rest. A parameter
     that is not declared is held, unless it is free and bounded.
 
-    Raises
-    ------
-    ValueError
-        If the input is constant, `freedom.initial` is unknown, or a name or a bound does not fit.
+    Raises ValueError if the input is constant, `freedom.initial` is unknown, or a name or a bound does not fit.
     """
     units, first = spans(record), float(record.u[0])
     declared = {parameter.name: parameter for parameter in parameters}
@@ -127,7 +121,7 @@ def space_of(
 ) -> SearchSpace:
     """The space of the coordinates that are not held, started at `points`: names to values, `defaults` for the rest.
 
-    `columns` are the parameters in which the output is affine, `limits` the user's bounds; `others` goes to
+    `columns` are the parameters in which the output is affine, `limits` the user's bounds; `others` are fields of
     `SearchSpace`.
     """
     searched = [each.limited(limits) for each in coordinates if each.name not in held]
@@ -157,13 +151,7 @@ def space_of(
 
 
 def spans(record: Record) -> dict[str, float]:
-    """Spans of input and output, the latter 1 where it is constant.
-
-    Raises
-    ------
-    ValueError
-        If the input is constant.
-    """
+    """Spans of input and output, the latter 1 where it is constant. Raises ValueError if the input is constant."""
     span = float(np.ptp(record.u))
     if span == 0.0:
         raise ValueError("the input is constant: nothing can be identified from it")

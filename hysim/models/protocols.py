@@ -44,7 +44,6 @@ class Responding(Protocol):
     @property
     def response(self) -> Callable[..., FloatArray]:
         """``response(u)``, or ``response(u, sample_time)`` of a `Dynamic` model."""
-        ...
 
 
 @runtime_checkable
@@ -55,7 +54,6 @@ class Dynamic(Protocol):
 
     def response(self, u: FloatArray, sample_time: float) -> FloatArray:
         """Output at the samples of `u`, shape (n,), taken every `sample_time` [s]."""
-        ...
 
 
 @runtime_checkable
@@ -65,7 +63,6 @@ class Continuable(Protocol):
     @property
     def advance(self) -> Callable[..., tuple[Any, Any]]:
         """``advance(u, state)`` returns output and state; a `Dynamic` model has the sample time in between."""
-        ...
 
 
 @runtime_checkable
@@ -74,7 +71,6 @@ class Steppable(Protocol):
 
     def compiled(self, u0: float = 0.0) -> CompiledLaw:
         """The step, its parameters, and the state after a first sample at the input `u0`."""
-        ...
 
 
 @runtime_checkable
@@ -83,7 +79,6 @@ class Sampled(Protocol):
 
     def at(self, sample_time: float) -> Steppable:
         """The law at one sample time [s]."""
-        ...
 
 
 @runtime_checkable
@@ -92,7 +87,6 @@ class Remembering(Protocol):
 
     def memory(self, u: FloatArray) -> FloatArray:
         """Memory at the samples of `u`, shape (n,) or (n, n_memory)."""
-        ...
 
 
 @runtime_checkable
@@ -102,7 +96,6 @@ class Invertible(Protocol):
     @property
     def inverse_response(self) -> Callable[..., FloatArray]:
         """``inverse_response(y, u0=None)``, the input that gives the output `y`."""
-        ...
 
 
 @runtime_checkable
@@ -111,7 +104,6 @@ class StepwiseInvertible(Protocol):
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
         """The inverse of the law at rest at `u0`; see `hysim.models.inverse_steps`."""
-        ...
 
 
 @runtime_checkable
@@ -128,16 +120,14 @@ class Offering(Protocol):
     @classmethod
     def candidates(cls) -> Mapping[str, Any]:
         """Names to classes, models or structures; none where it is left out."""
-        ...
 
 
 @runtime_checkable
 class Identifiable(Protocol):
-    """What `identify` takes: a model class, a model as the start, or a structure."""
+    """A subject of `identify`: a model class, a model as the start, or a structure."""
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """Declare the box for `record`."""
-        ...
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns in which the output is affine, shape (n_sets, n_samples, n_columns + 1).
@@ -145,19 +135,14 @@ class Identifiable(Protocol):
         Output = columns[..., :-1] @ (the parameters named by `SearchSpace.columns`) + columns[..., -1].
         A set that leaves the finite numbers has columns that are not finite.
         """
-        ...
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
         """Build the model from the user's parameters."""
-        ...
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
         """The state at the first sample of a record that repeats itself, by name.
 
-        Raises
-        ------
-        ValueError
-            If it cannot be computed.
+        Raises ValueError if it cannot be computed.
         """
         raise ValueError(f'a {type(self).__name__} has no steady cycle that could be computed: use initial="free"')
 
@@ -174,7 +159,6 @@ class LinearStage(Protocol):
 
     def filtered(self, signals: FloatArray, sample_time: float) -> FloatArray:
         """Outputs from rest, of the shape of the inputs (n_signals, n_samples)."""
-        ...
 
 
 @runtime_checkable
@@ -183,15 +167,12 @@ class UnitGainStructure(Protocol):
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """Declare the box for `record`."""
-        ...
 
     def filtered_sets(self, parameters: Parameters, signals: FloatArray, sample_time: float) -> FloatArray:
         """Outputs (n_sets, n_signals, n_samples) for inputs of this shape, or (1, n_signals, n_samples)."""
-        ...
 
     def free_responses(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns of the initial state, shape (n_sets, n_samples, n_states)."""
-        ...
 
 
 @runtime_checkable
@@ -200,7 +181,6 @@ class LinearStructure(Identifiable, Protocol):
 
     def with_unit_gain(self) -> UnitGainStructure:
         """The structure with the gain at rest one."""
-        ...
 
 
 class DirectFit(NamedTuple):
@@ -221,11 +201,9 @@ class Direct(Protocol):
 
     def fitted(self, u: FloatArray, y: FloatArray) -> DirectFit:
         """The fit to outputs `y` at inputs `u`, both of shape (n,)."""
-        ...
 
     def response(self, u: FloatArray) -> FloatArray:
         """Output at the inputs `u`, shape (n,)."""
-        ...
 
 
 def needs_time(plant: Any) -> TypeGuard[Dynamic]:

@@ -1,4 +1,4 @@
-"""What a family declares about itself, so that `identify` needs to know none.
+"""Search boxes, as families declare them for `identify`, which knows no family.
 
 Identification searches a box of *coordinates* that the family chooses: scaled, free of redundancy,
 of order one. The family turns coordinates into the user's parameters. Parameters in which the output is
@@ -71,7 +71,7 @@ class SearchSpace:
 
 @dataclass(frozen=True)
 class Freedom:
-    """What the user says about the parameters; see `hysim.identify` for the meaning."""
+    """The user's wishes about the parameters; see `hysim.identify` for the meaning."""
 
     fixed: Mapping[str, float] = field(default_factory=dict)
     free: tuple[str, ...] = ()
@@ -96,10 +96,7 @@ class Freedom:
         They are the fixed ones, those that are zero `at_rest`, and the first of each redundant group that
         has none of them; a name in `free` is taken out of the last two.
 
-        Raises
-        ------
-        ValueError
-            If a name is unknown, or both fixed and free.
+        Raises ValueError if a name is unknown, or both fixed and free.
         """
         for argument, names in (("fixed", tuple(self.fixed)), ("free", self.free)):
             for name in names:
@@ -118,10 +115,7 @@ class Freedom:
     def limits(self, defaults: Mapping[str, float], held: Mapping[str, float]) -> dict[str, tuple[float, float]]:
         """The bounds as floats.
 
-        Raises
-        ------
-        ValueError
-            If a name is unknown or held, or a lower bound is not below its upper one.
+        Raises ValueError if a name is unknown or held, or a lower bound is not below its upper one.
         """
         for name, pair in self.bounds.items():
             if name not in defaults or name in held:

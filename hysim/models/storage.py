@@ -39,10 +39,8 @@ def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None
 
     Raises
     ------
-    TypeError
-        If `model` is not a model.
-    ValueError
-        If it holds models in models, more than `load_model` takes.
+    TypeError, ValueError
+        If `model` is not a model, or holds models in models, more than `load_model` takes.
     OSError
         If the file cannot be written.
 
@@ -58,7 +56,7 @@ def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None
 
 
 def to_json(model: Any, *, units: Mapping[str, str] | None = None) -> str:
-    """What `save` writes, as a string."""
+    """The text that `save` writes."""
     if not is_model(model):
         raise TypeError(f"save takes a model of hysim, got {type(model).__name__}")
     document = {"hysim": __version__, **to_document(model), "units": dict(units or {})}
@@ -69,21 +67,8 @@ def to_json(model: Any, *, units: Mapping[str, str] | None = None) -> str:
 def load_model(path: str | Path) -> Any:
     """Read a model that `save` wrote.
 
-    Parameters
-    ----------
-    path : path
-        The file.
-
-    Returns
-    -------
-    model
-
-    Raises
-    ------
-    ValueError
-        If the file does not hold a model; the message names the file and what is wrong.
-    OSError
-        If it cannot be read.
+    Raises ValueError if the file does not hold a model; the message names the file and what is wrong. Raises OSError if
+    it cannot be read.
     """
     return from_json(Path(path).read_bytes(), path)[0]
 

@@ -1,10 +1,4 @@
-"""Models side by side under one input, such as a law with a dashpot beside it.
-
-    y = y_1 + y_2 + ...
-
-Without a part that moves in time a sum is a law: rate-independent, and usable where laws are. Magnetorheological
-dampers are Bouc-Wen's law, a dashpot and a spring (B. F. Spencer et al., J. Eng. Mech. 123, 1997).
-"""
+"""Models side by side under one input, such as a law with a dashpot beside it."""
 
 from functools import reduce
 from typing import Any
@@ -27,17 +21,20 @@ __all__ = ["Sum", "SumStructure"]
 class Sum(Composite):
     """Models side by side, whose outputs are added; ``first + second`` is short for it.
 
+    Magnetorheological dampers are a Bouc-Wen law, a dashpot and a spring (B. F. Spencer et al., J. Eng. Mech. 123,
+    1997).
+
     Parameters
     ----------
     parts : tuple of models
-        Laws, such as `BoucWen` or `Line`, and plants that move in time, such as `Dashpot` or `TransferFunction`.
+        Laws, such as `BoucWen` or `Line`, and plants that depend on time, such as `Dashpot` or `TransferFunction`.
 
     Raises
     ------
     TypeError
         If a part is not a model with a response.
     ValueError
-        If there is none.
+        If the sum is empty.
 
     Examples
     --------
@@ -57,21 +54,14 @@ class Sum(Composite):
 
     @classmethod
     def candidates(cls) -> dict[str, Any]:
-        """What `hysim.compare` tries of this family: nothing, a sum has the parts that it is given."""
+        """None for `hysim.compare`: a sum has the parts that it is given."""
         return {}
 
     @classmethod
     def structure(cls, *parts: Any) -> SumStructure:
-        """What `hysim.identify` and `hysim.compare` take: classes, structures, and models as starts.
+        """Parts for `hysim.identify` and `hysim.compare`: classes, structures, and models as starts.
 
-        Parameters
-        ----------
-        *parts : model classes, structures or models
-            A model that cannot be identified is taken as it is.
-
-        Returns
-        -------
-        SumStructure
+        A model that cannot be identified is taken as it is.
 
         Examples
         --------
@@ -88,57 +78,12 @@ class Sum(Composite):
         return self.parts
 
     def response(self, u: npt.ArrayLike, sample_time: float | None = None) -> FloatArray:
-        """Output at the samples of `u`: the sum of the parts' responses, in their order.
-
-        Parameters
-        ----------
-        u : array, shape (n,)
-            Input, as each part takes it between the samples.
-        sample_time : float, optional
-            Time between two samples [s]; a sum of laws needs none.
-
-        Returns
-        -------
-        array, shape (n,)
-
-        Raises
-        ------
-        SimulationError
-            If a part leaves the finite numbers.
-        ValueError
-            If `u` is not finite or has not one axis, or no time is given where one is needed.
-        """
         inputs = read_only(u, "u", ndim=1)
         return _total([response_of(part, inputs, sample_time) for part in self.parts])
 
     def advance(
         self, u: npt.ArrayLike, state: State | None = None, *, sample_time: float | None = None
     ) -> tuple[FloatArray, State]:
-        """Output at the samples of `u`, continued from `state`, and the state after the last sample.
-
-        Parameters
-        ----------
-        u : array, shape (n,)
-            As in `response`.
-        state : tuple, optional
-            The states of the parts; by default the first sample finds each at its begin.
-        sample_time : float, optional
-            As in `response`, the same for every part of a record [s].
-
-        Returns
-        -------
-        y : array, shape (n,)
-            The same bits as from one uncut input.
-        state : tuple
-            To continue from.
-
-        Raises
-        ------
-        TypeError
-            If a part cannot be continued.
-        SimulationError, ValueError
-            As `response`.
-        """
         inputs = read_only(u, "u", ndim=1)
         states: State = (None,) * len(self.parts) if state is None else state
         if not inputs.size:
@@ -153,13 +98,6 @@ class Sum(Composite):
         return {"y": _total(own), **dict(zip(labels(self.parts), own, strict=True))}
 
     def compiled(self, u0: float = 0.0) -> CompiledLaw:
-        """The sum as compiled loops take it; the state is that of a first sample at the input `u0`.
-
-        Raises
-        ------
-        TypeError
-            If a part is not a law that can be stepped.
-        """
         laws = [compiled_law(part, u0) for part in self.parts]
         return reduce(lambda first, second: compiled_pair(side_by_side, first, second), laws)
 

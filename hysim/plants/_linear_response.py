@@ -29,10 +29,10 @@ def affine_columns(
     hold: str = "zoh",
     sample: str = "start",
 ) -> FloatArray:
-    """What the output is affine in: the numerator, highest power first, the initial state, and zero.
+    """Columns in which the output is affine, (n_sets, n_samples, zeros + n + 2): numerator, initial state, and zero.
 
-    `monic` (n_sets, n) holds the denominators without their leading one, in seconds; a numerator of the degree
-    `zeros` (by default n) makes (n_sets, n_samples, zeros + n + 2). The delay is one number, or one for each set.
+    `monic` (n_sets, n) holds the denominators without their leading one, in seconds; the numerators have the degree
+    `zeros`, by default n, highest power first.
     """
     n_sets, n = monic.shape
     out = np.empty((n_sets, u.size, n + 2 + (n if zeros is None else zeros)))
@@ -78,10 +78,7 @@ class LinearPlants(NamedTuple):
 
     @classmethod
     def of(cls, monic: FloatArray, numerators: FloatArray, delays: FloatArray, sample_time: float) -> Self:
-        """From denominators (n_sets, n), numerators (n_sets, n + 1) and dead times (n_sets,), in seconds.
-
-        The denominators are without their leading one.
-        """
+        """From denominators (n_sets, n), numerators (n_sets, n + 1) and dead times (n_sets,), in seconds."""
         n = monic.shape[1]
         with np.errstate(all="ignore"):
             F, rate, _ = scaled_companion(monic, sample_time)
@@ -108,10 +105,7 @@ class LinearPlants(NamedTuple):
     def continued(
         self, u: FloatArray, state: LinearState, k: int = 0, *, hold: str, sample: str, free: bool = False
     ) -> tuple[FloatArray, LinearState]:
-        """Outputs of the plant `k` for inputs `u` (n_inputs, n_samples), and the state at the last sample.
-
-        With `free` the state of the last input is a free response and its derivatives, of which the first is seen.
-        """
+        """Outputs of the plant `k` for (n_inputs, n_samples), the last a free response with `free`; and the state."""
         before = state.past.shape[1]
         level = np.concatenate([np.zeros((len(u), 1)), state.past, u], axis=1)
         rise = np.zeros_like(level)
@@ -144,10 +138,7 @@ def scaled_companion(monic: FloatArray, sample_time: float) -> tuple[FloatArray,
 def transitions(
     F: FloatArray, spans: FloatArray, g: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """A, B0 and B1 of x' = F x + g v over each of the spans (n_sets, n_pieces); see `kernels.linear`.
-
-    By default g is (0, ..., 0, 1), that of a companion matrix.
-    """
+    """A, B0 and B1 of x' = F x + g v over each of the spans (n_sets, n_pieces); see `kernels.linear`."""
     n = F.shape[-1]
     entry = np.eye(n, 1, 1 - n)[:, 0] if g is None else g
     generators = np.zeros((*spans.shape, n + 2, n + 2))

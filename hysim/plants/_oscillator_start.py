@@ -1,4 +1,4 @@
-"""Where to begin the search for an oscillator's parameters, from its input and output alone.
+"""Starts of the search for an oscillator's parameters, from its input and output alone.
 
 With the displacement y known, the equation of motion is linear in what multiplies known signals,
 
@@ -25,19 +25,10 @@ _APART, _SAME = 0.1, 0.03  # distances in units of the box: of points to be impr
 
 
 def start(motion: Motion, laws: SearchSpace, wanted: int) -> tuple[Linear, list[dict[str, float]]]:
-    """The plant of small motions, and the best sets of mass, damping, stiffness, A, beta, gamma, n.
-
-    `laws` is the box of the laws with A = 1 along `motion.y`. Where no law is found the plant is the nearest linear
-    one. A law that yields and drifts may be near no linear plant: filters of several frequencies are tried then.
-
-    Raises
-    ------
-    ValueError
-        If no plant with a positive mass and stiffness is near.
-    """
+    """The plant of small motions, and the best sets of mass, damping, stiffness, A, beta, gamma, n."""
     nearest = linear_plant(motion)
-    found = _starts(motion, nearest, laws, wanted) if nearest else _starts_from_afar(motion, laws, wanted)
-    sets = [each for _, each in found]
+    starts = _starts(motion, nearest, laws, wanted) if nearest else _starts_from_afar(motion, laws, wanted)
+    sets = [each for _, each in starts]
     if sets:
         return _small_motions(sets[0]), sets
     if nearest is None:

@@ -1,6 +1,4 @@
-"""What a record cannot show of a transfer function that was fitted to it.
-
-A linear plant has memory, and so has hysteresis. Two things are worth a sentence:
+"""Warnings about a transfer function that was fitted to a record: its lag may be hysteresis.
 
 * A curve y = f(u) without memory fits as well. The curve is a polynomial with as many coefficients as the plant,
   on a record whose input levels repeat. It fits as well if the mean difference of both squared residuals is below
@@ -28,15 +26,15 @@ _NOISE = 0.01  # of the input's span
 
 def notes(record: Record, y: FloatArray, n_parameters: int) -> tuple[str, ...]:
     """Phrases on a plant with this output on the record, and so many coefficients."""
-    found = []
+    phrases = []
     if np.unique(record.u).size <= len(record) // 2:
         curve = _static_curve(record, n_parameters)
         if _as_well((record.y - curve) ** 2, (record.y - y) ** 2):
             fit = metrics.fit_percent(record.y, curve)
-            found.append(f"a single-valued curve of u fits {fit:.1f} %: as well as this model within the noise")
+            phrases.append(f"a single-valued curve of u fits {fit:.1f} %: as well as this model within the noise")
     if _one_rate(record):
-        found.append("the record holds one rate only: lag and hysteresis cannot be told apart")
-    return tuple(found)
+        phrases.append("the record holds one rate only: lag and hysteresis cannot be told apart")
+    return tuple(phrases)
 
 
 def _static_curve(record: Record, n_coefficients: int) -> FloatArray:

@@ -42,16 +42,16 @@ def guesses(
     record: Record, poles: int, zeros: int, delays: Iterable[float], *, hold: str, sample: str, at_rest: bool
 ) -> list[Guess]:
     """The plants from which the regressions stay finite: of one delay all, of several the best of each, best first."""
-    found = []
+    results = []
     for delay in delays:
         refined = (
             _refined(record, poles, zeros, delay, cutoff, hold=hold, sample=sample, at_rest=at_rest)
             for cutoff in _CUTOFFS / record.sample_time
         )
-        found.append([guess for guess in refined if guess is not None])
-    if len(found) == 1:
-        return found[0]
-    best = [min(refined, key=_cost) for refined in found if refined]
+        results.append([guess for guess in refined if guess is not None])
+    if len(results) == 1:
+        return results[0]
+    best = [min(refined, key=_cost) for refined in results if refined]
     return sorted(best, key=_cost)[:_MOST]
 
 
@@ -74,7 +74,7 @@ def likely_delays(record: Record, earliest: float, latest: float) -> list[float]
 def _refined(
     record: Record, poles: int, zeros: int, delay: float, cutoff: float, *, hold: str, sample: str, at_rest: bool
 ) -> Guess | None:
-    """What the rounds come to from one cutoff [rad/s]; None where they leave the finite numbers."""
+    """The guess after all rounds from one cutoff [rad/s]; None where they diverge."""
     h = record.sample_time
     roots = np.full(poles, -cutoff, dtype=complex)
     numerator, cost = None, np.inf
@@ -122,3 +122,20 @@ def sections(roots: FloatArray, sample_time: float) -> FloatArray:
         pairs.append((frequency, 0.5 * (slow + fast) / frequency))
     rate = real[-1:] if len(real) % 2 else real[:0]
     return np.log(np.maximum([*np.ravel(pairs), *rate], tiny))
+
+
+def denominators(x: FloatArray, poles: int) -> FloatArray:
+    """Monic denominators (n_sets, poles + 1) of sections with these coordinates, in samples."""
+    one, product = np.ones(len(x)), np.ones((len(x), 1))
+    for k in range(poles // 2):
+        frequency, damping = np.exp(x[:, 2 * k]), np.exp(x[:, 2 * k + 1])
+        product = _times(product, [one, 2.0 * damping * frequency, frequency**2])
+    return _times(product, [one, np.exp(x[:, poles - 1])]) if poles % 2 else product
+
+
+def _times(polynomials: FloatArray, factor: list[FloatArray]) -> FloatArray:
+    """Products of rows of polynomials with one factor for each row."""
+    product = np.zeros((len(polynomials), polynomials.shape[1] + len(factor) - 1))
+    for k, coefficient in enumerate(factor):
+        product[:, k : k + polynomials.shape[1]] += coefficient[:, np.newaxis] * polynomials
+    return product

@@ -33,13 +33,7 @@ class UnitGain:
         return tuple(f"num[{k}]" for k in range(self.structure.zeros))
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The denominator, the delay where it is free, and the numerator's shape; linear in the initial state.
-
-        Raises
-        ------
-        ValueError
-            If a coefficient of the numerator is fixed or bounded, or as of the structure.
-        """
+        """The denominator, the delay where it is free, and the numerator's shape; linear in the initial state."""
         for name in (*freedom.fixed, *freedom.bounds):
             if name.startswith("num["):
                 raise ValueError(

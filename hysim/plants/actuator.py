@@ -1,11 +1,4 @@
-"""The actuator as a chain of stages:  u -> amplifier -> hysteresis -> creep -> vibration -> y -> sensor.
-
-The hysteresis is a law, the amplifier's limits are static, and what is behind the law is linear. A
-voltage that is held between samples moves the law at once to a level that is held too: the linear stages are
-discretised together, and the chain is exact. Behind an amplifier that slews or charges a capacitance the voltage is
-exact at the ends of sub-steps, between which the law's output is taken as linear: second order in the sub-step.
-A stage that is left out passes its input on.
-"""
+"""The actuator as a chain of stages:  u -> amplifier -> hysteresis -> creep -> vibration -> y -> sensor."""
 
 import math
 from dataclasses import replace
@@ -28,14 +21,18 @@ from hysim.plants.transfer_function import TransferFunction
 
 
 def is_law(value: Any) -> bool:
-    """Whether a value answers to an input and can be stepped in a loop, at a sample time if it needs one."""
+    """Whether a value has a response and can be stepped in a loop, at a sample time if it needs one."""
     steps = isinstance(value, Responding) and isinstance(value, Steppable)
     return steps and (not needs_time(value) or isinstance(value, Sampled))
 
 
 @family
 class Actuator:
-    """A hysteretic actuator with its physics.
+    """A hysteretic actuator as a chain of stages: amplifier, hysteresis, creep, vibration, sensor.
+
+    What is behind the law is linear. A voltage that is held between samples moves the law at once to a level that is
+    held too, and the chain is exact. Behind an amplifier that slews or charges a capacitance the voltage is exact at
+    the ends of sub-steps, between which the law's output is taken as linear: second order in the sub-step.
 
     Parameters
     ----------
@@ -43,7 +40,7 @@ class Actuator:
         From the command to the voltage.
     hysteresis : law, optional
         Law from voltage to displacement, such as `BoucWen`. One that depends on the voltage's speed, such as
-        `RateDependentPrandtlIshlinskii`, sees each step as a way that takes the whole sample before it.
+        `RateDependentPrandtlIshlinskii`, takes each step as a stroke of the whole sample before it.
     creep : Creep, optional
         Slow growth of the displacement.
     vibration : TransferFunction, StateSpace or Modes, optional
@@ -97,11 +94,11 @@ class Actuator:
         return amplifier * creep * (1.0 if self.vibration is None else self.vibration.dc_gain)
 
     def voltage(self, u: npt.ArrayLike) -> FloatArray:
-        """Voltage at the law that a command comes to when it is held, in the shape of `u`."""
+        """Voltage at the law after a command has been held, in the shape of `u`."""
         return np.array(u, dtype=float) if self.amplifier is None else self.amplifier.voltage(u)
 
     def level(self, u: npt.ArrayLike) -> FloatArray:
-        """Output of the law for commands of which each is held until nothing slews, shape (n,)."""
+        """Output of the law for commands, each held until the amplifier has settled, shape (n,)."""
         voltage = self.voltage(read_only(u, "u", ndim=1))
         return voltage if self.hysteresis is None else np.array(law_at(self.hysteresis, math.inf).response(voltage))
 
@@ -110,17 +107,15 @@ class Actuator:
     ) -> FloatArray:
         """True displacement at the samples of a command that is held between them.
 
-        Exact, unless the amplifier slews or has a time constant: then second order in the sub-step.
-
         Parameters
         ----------
         u : array, shape (n,)
-            Command. The first sample finds the law at its initial memory and everything at rest, creep included.
+            Command. At its first sample the law has its initial memory and everything is at rest, creep included.
         sample_time : float, optional
             Time between two samples [s]; an actuator that is not `dynamic` needs none.
         substeps : int, optional
-            Of a sample, behind an amplifier that takes time. By default a sub-step is a quarter of its time
-            constant, and there are 4 to 64 in a sample.
+            Sub-steps of a sample behind an amplifier that takes time, by default 4 to 64 of a quarter of its time
+            constant.
 
         Returns
         -------
@@ -129,7 +124,7 @@ class Actuator:
         Raises
         ------
         SimulationError
-            If a stage leaves the finite numbers.
+            If a stage diverges.
         ValueError
             If `u` is not finite or has not one axis, no time is given where one is needed, or the vibration cannot
             rest at the first sample because it integrates.
@@ -147,28 +142,9 @@ class Actuator:
         *,
         substeps: int | None = None,
     ) -> tuple[FloatArray, ChainState]:
-        """As `response`, continued from `state`, and the state after the last sample.
+        """As `response`, continued from `state` (by default rest), and the state after the last sample.
 
-        Parameters
-        ----------
-        u, sample_time
-            As in `response`; the time is the same for every part of a record.
-        state : ChainState, optional
-            By default rest at the first sample.
-        substeps : int, optional
-            As in `response`, the same for every part.
-
-        Returns
-        -------
-        y : array, shape (n,)
-            The same bits as from one uncut command.
-        state : ChainState
-            To continue from.
-
-        Raises
-        ------
-        SimulationError, ValueError
-            As `response`, or if there is neither a state nor a sample.
+        The bits are those of one uncut command. Raises ValueError also if there is neither a state nor a sample.
         """
         inputs = read_only(u, "u", ndim=1)
         chain = self.chain(sample_time, substeps)
@@ -185,22 +161,7 @@ class Actuator:
     def measured(
         self, u: npt.ArrayLike, sample_time: float | None = None, *, substeps: int | None = None
     ) -> FloatArray:
-        """What the sensor gives of `response`: late, noisy, in steps.
-
-        Parameters
-        ----------
-        u, sample_time, substeps
-            As in `response`.
-
-        Returns
-        -------
-        array, shape (n,)
-
-        Raises
-        ------
-        SimulationError, ValueError
-            As `response`.
-        """
+        """Readings (n,) of the sensor for `response`: late, noisy, in steps; arguments and errors as there."""
         if self.sensor is None:
             return self.response(u, sample_time, substeps=substeps)
         return self.sensor.measure(self._late(self.sensor.delay).response(u, sample_time, substeps=substeps))
@@ -208,23 +169,11 @@ class Actuator:
     def signals(
         self, u: npt.ArrayLike, sample_time: float | None = None, *, substeps: int | None = None
     ) -> dict[str, FloatArray]:
-        """What each stage gives at the samples of `u`, by the stage's name.
+        """Output of each stage at the samples of `u`, by name; arguments and errors as of `response`.
 
-        Parameters
-        ----------
-        u, sample_time, substeps
-            As in `response`.
-
-        Returns
-        -------
-        dict
-            ``"y"``, and of the stages that there are ``"amplifier"`` (voltage), ``"hysteresis"``, ``"creep"`` and
-            ``"measurement"``; ``"z"`` of a law with a memory. A stage is seen as a ``response`` that ends with it.
-
-        Raises
-        ------
-        SimulationError, ValueError
-            As `response`.
+        There are ``"y"``, and for the stages that the actuator has ``"amplifier"`` (voltage), ``"hysteresis"``,
+        ``"creep"`` and ``"measurement"``; ``"z"`` for a law with a memory. A stage's signal is the response of a chain
+        that ends with it.
         """
         parts = {"y": self}
         if self.creep is not None:
@@ -233,19 +182,16 @@ class Actuator:
             parts["hysteresis"] = replace(self, creep=None, vibration=None)
         if self.amplifier is not None:
             parts["amplifier"] = replace(self, hysteresis=None, creep=None, vibration=None)
-        found = {name: part.response(u, sample_time, substeps=substeps) for name, part in parts.items()}
+        signals = {name: part.response(u, sample_time, substeps=substeps) for name, part in parts.items()}
         if self.sensor is not None:
-            found["measurement"] = self.measured(u, sample_time, substeps=substeps)
+            signals["measurement"] = self.measured(u, sample_time, substeps=substeps)
         memory = self.memory(u, sample_time, substeps=substeps)
-        return found if memory is None else found | {"z": memory}
+        return signals if memory is None else signals | {"z": memory}
 
     def memory(
         self, u: npt.ArrayLike, sample_time: float | None = None, *, substeps: int | None = None
     ) -> FloatArray | None:
-        """Memory of the law at the samples of `u`, shape (n,); None for a law without one.
-
-        The sample time is needed behind an amplifier that takes time.
-        """
+        """Memory of the law at the samples of `u`, shape (n,); None for a law without one. See `response`."""
         if not isinstance(self.hysteresis, Remembering):
             return None
         inputs = read_only(u, "u", ndim=1)
@@ -274,10 +220,7 @@ class Actuator:
         )
 
     def linear(self, sample_time: float) -> tuple[Stage, float]:
-        """From command to measurement with a law of the slope one, no limits and no slewing; and its dead time [s].
-
-        The sample time gives the unit of the states.
-        """
+        """From command to measurement with a law of the slope one, without limits; and its dead time [s]."""
         delays = [stage.delay for stage in (self.vibration, self.sensor) if stage is not None]
         return linear_chain(self.amplifier, self.creep, self.vibration, sample_time), sum(delays)
 

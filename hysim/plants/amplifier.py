@@ -1,12 +1,4 @@
-"""Amplifiers that drive a piezoelectric stack, which is a capacitor.
-
-    s   = gain u + offset, within the limits        the output's target
-    s'  within +-slew rate                          the output
-    v'  = (s - v) / time constant                   the voltage at the stack, behind the output's resistance
-
-The paper's non-inverting operational amplifier has (2), gain = 1 + Rf / Rin, and (3): a sine of the amplitude V is
-not slewed up to the frequency slew rate / (2 pi V). V is that of the output, which is what slews.
-"""
+"""Amplifiers that drive a piezoelectric stack, which is a capacitor."""
 
 import math
 from typing import NamedTuple
@@ -28,6 +20,12 @@ class CompiledAmplifier(NamedTuple):
 @family
 class Amplifier:
     """From the command to the voltage at the actuator.
+
+    ::
+
+        s   = gain u + offset, within the limits        the output's target
+        s'  within +-slew rate                          the output
+        v'  = (s - v) / time constant                   the voltage at the stack, behind the output's resistance
 
     Parameters
     ----------
@@ -80,25 +78,11 @@ class Amplifier:
         output_resistance: float = 0.0,
         capacitance: float = 0.0,
     ) -> "Amplifier":
-        """An operational amplifier with the gain 1 + Rf / Rin, equation (2).
+        """An operational amplifier with the gain 1 + Rf / Rin, equation (2) of the paper.
 
-        Parameters
-        ----------
-        feedback_resistance, input_resistance : float
-            Rf and Rin [ohm]; Rin positive, Rf not negative.
-        limits : (float, float), optional
-            What its supplies leave for the output [V].
-        slew_rate : float, optional
-            Of the output [V/s].
-        output_resistance : float
-            Between the output and the actuator [ohm], not negative.
-        capacitance : float
-            Of the actuator [F], not negative.
-
-        Raises
-        ------
-        ValueError
-            If a resistance or the capacitance is outside its range, or as the constructor.
+        The feedback and input resistance are Rf and Rin [ohm]; the limits are those of its supplies [V], the slew rate
+        is that of the output [V/s]. The output resistance [ohm] and the actuator's capacitance [F] make the time
+        constant. Raises ValueError if Rin is not positive or another of these negative, or as the constructor.
 
         Examples
         --------
@@ -133,21 +117,9 @@ class Amplifier:
         return 1.0 / (2.0 * math.pi * self.time_constant) if self.time_constant else math.inf
 
     def full_power_bandwidth(self, amplitude: float) -> float:
-        """Highest frequency [Hz] at which a sine is not slewed, equation (3).
+        """Highest frequency [Hz] of a sine that is not slewed, slew rate / (2 pi amplitude), equation (3) of the paper.
 
-        Parameters
-        ----------
-        amplitude : float
-            Of the output, not of the command [V].
-
-        Returns
-        -------
-        float
-
-        Raises
-        ------
-        ValueError
-            If the amplitude is not positive.
+        The amplitude is that of the output, which slews, not of the command [V]; ValueError if it is not positive.
 
         Examples
         --------
@@ -161,7 +133,7 @@ class Amplifier:
         return math.inf if self.slew_rate is None else self.slew_rate / (2.0 * math.pi * amplitude)
 
     def voltage(self, u: npt.ArrayLike) -> FloatArray:
-        """Voltage that a command comes to when it is held, in the shape of `u`."""
+        """Voltage after a command has been held, in the shape of `u`."""
         lowest, highest = self.limits or (-math.inf, math.inf)
         return np.clip(self.gain * read_only(u, "u", finite=False) + self.offset, lowest, highest)
 

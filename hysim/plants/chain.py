@@ -35,10 +35,10 @@ _FEWEST, _MOST = 4, 64  # sub-steps of a sample
 
 
 class ChainState(NamedTuple):
-    """Where an actuator is: the samples so far, and the states of its stages.
+    """Samples so far, and the states of the stages.
 
     `past` holds the law's last outputs, the latest at its end, and `readings` the displacements that the sensor has
-    still to give, the oldest first, and at its end the one seen since the last sample.
+    still to give, the oldest first, and at its end the one within the last sample.
     """
 
     samples: int
@@ -50,7 +50,7 @@ class ChainState(NamedTuple):
 
 
 class Signals(NamedTuple):
-    """What a run gives: at every sample, and at every sub-step the voltage `v` at the law and its output `w`.
+    """Signals of a run at every sample, and at every sub-step the voltage `v` at the law and its output `w`.
 
     `lost` is the first sample that is not finite, or -1.
     """
@@ -65,17 +65,7 @@ class Signals(NamedTuple):
 
 
 class Chain:
-    """The stages of an actuator, sampled.
-
-    Parameters
-    ----------
-    amplifier, hysteresis, creep, vibration, sensor
-        As of `Actuator`.
-    sample_time : float
-        Of the controller, or of the samples of a held voltage [s].
-    substeps : int, optional
-        In a sample, for an amplifier that takes time; by default a quarter of its time constant each, 4 to 64.
-    """
+    """The stages of an `Actuator` at the sample time [s] of a controller or of a held voltage."""
 
     def __init__(
         self,
@@ -116,10 +106,7 @@ class Chain:
     def rest(self, u0: float) -> ChainState:
         """At rest at the command `u0`.
 
-        Raises
-        ------
-        ValueError
-            If u0 is not finite, or a plant that integrates is to rest at an output other than zero.
+        Raises ValueError if u0 is not finite, or a plant that integrates is to rest at an output other than zero.
         """
         if not math.isfinite(u0):
             raise ValueError(f"u0 must be finite, got {u0}")
@@ -206,7 +193,7 @@ class Chain:
 
 
 def linear_stage(creep: Creep | None, vibration: Vibration | None, step: float) -> Stage:
-    """What is behind the law."""
+    """The linear stage behind the law."""
     first = gain(1.0) if creep is None else creep_stage(creep)
     return first if vibration is None else first.then(vibration_stage(vibration, step))
 

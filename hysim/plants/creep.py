@@ -1,11 +1,5 @@
 """Creep of a piezoelectric actuator: Kelvin-Voigt elements side by side, behind a spring.
 
-    y = g_0 v + sum w_i q_i,    tau_i q_i' = v - q_i
-    G(s) = g_0 + sum w_i / (tau_i s + 1)        step response    g_0 + sum w_i (1 - exp(-t / tau_i))
-
-after D. Croft, G. Shed and S. Devasia, J. Dyn. Sys. Meas. Control 123 (2001); w_i = 1 / k_i and tau_i = c_i / k_i of
-their springs and dampers. Under a held v each element has its exact step, q <- q + (1 - exp(-h / tau_i)) (v - q).
-
 Creep is measured as a percentage per decade of time, y(t) = y(t_0) (1 + g log10(t / t_0)). That law has no finite
 state, and no limit at either end: a bank of elements follows it over a band of times, and is at rest outside.
 """
@@ -24,7 +18,14 @@ _TIMES_PER_DECADE = 20  # at which the bank is fitted
 
 @family
 class Creep:
-    """A bank of Kelvin-Voigt elements.
+    """A bank of Kelvin-Voigt elements side by side, behind a spring.
+
+    ::
+
+        y = g_0 v + sum w_i q_i,    tau_i q_i' = v - q_i
+        G(s) = g_0 + sum w_i / (tau_i s + 1)        step response    g_0 + sum w_i (1 - exp(-t / tau_i))
+
+    Source: D. Croft, G. Shed and S. Devasia, J. Dyn. Sys. Meas. Control 123 (2001).
 
     Parameters
     ----------
@@ -79,7 +80,7 @@ class Creep:
         band : (float, float)
             Shortest and longest time at which it shall hold [s].
         per_decade_elements : int
-            Elements in a decade, log-spaced from end to end of the band.
+            Number of log-spaced elements in a decade.
         reference_time : float
             At which the step response is one [s].
 
@@ -125,7 +126,7 @@ class Creep:
 
     @property
     def dc_gain(self) -> float:
-        """What a step comes to in the end."""
+        """Limit of the step response."""
         return self.instant_gain + math.fsum(self.weights)
 
     @property

@@ -1,11 +1,4 @@
-"""Resonances: one mode, or several side by side.
-
-    G(s) = exp(-delay s) sum_i  g_i w_i^2 / (s^2 + 2 zeta_i w_i s + w_i^2)
-
-w is the natural frequency, zeta the damping ratio, g the static gain. In the states q_i and q_i' / w_i
-
-    d/dt (q_i, q_i' / w_i) = w_i [[0, 1], [-1, -2 zeta_i]] (q_i, q_i' / w_i) + (0, w_i v),    y = sum g_i q_i
-"""
+"""Resonances: one mode, or several side by side."""
 
 import numpy as np
 import numpy.typing as npt
@@ -16,27 +9,10 @@ from hysim.plants.transfer_function import TransferFunction
 
 
 def mode(natural_frequency: float, damping_ratio: float, gain: float = 1.0, *, delay: float = 0.0) -> TransferFunction:
-    """One resonance as a transfer function.
+    """One resonance as a transfer function, ``exp(-delay s) gain w^2 / (s^2 + 2 zeta w s + w^2)``.
 
-    Parameters
-    ----------
-    natural_frequency : float
-        Positive [rad/s].
-    damping_ratio : float
-        Not negative.
-    gain : float
-        At rest [unit of y / unit of its input].
-    delay : float
-        Dead time [s].
-
-    Returns
-    -------
-    TransferFunction
-
-    Raises
-    ------
-    ValueError
-        If a number is outside its range.
+    The natural frequency w is positive [rad/s], the damping ratio zeta and the delay [s] are not negative, else
+    ValueError; the gain is that at rest [unit of y / unit of its input].
 
     Examples
     --------
@@ -57,6 +33,11 @@ def mode(natural_frequency: float, damping_ratio: float, gain: float = 1.0, *, d
 @family
 class Modes:
     """Several resonances side by side.
+
+    ::
+
+        G(s) = exp(-delay s) sum_i  g_i w_i^2 / (s^2 + 2 zeta_i w_i s + w_i^2)
+        d/dt (q_i, q_i' / w_i) = w_i [[0, 1], [-1, -2 zeta_i]] (q_i, q_i' / w_i) + (0, w_i v),    y = sum g_i q_i
 
     Parameters
     ----------

@@ -1,13 +1,8 @@
 """A mass on a linear and a hysteretic spring.
 
-    m y'' + c y' + k y + law(y) = u              a force u
-    m y'' + c y' + k y + law(y) = -m u           a base with the acceleration u; y is relative to the base
-
-y is the displacement and the law's own input, a positive force of the spring pulls towards y = 0. The input is
-linear between its samples, or held. A plant with memory inside the equation of motion has no closed form: it is
-integrated (`hysim.kernels.oscillator`), by default with steps that end where y' or z changes sign.
-
-Energy, for the Bouc-Wen law's force p(y) + gain z (A not 0), after Erlicher and Point (2004):
+A plant with memory inside the equation of motion has no closed form: it is integrated (`hysim.kernels.oscillator`), by
+default with steps that end where y' or z changes sign. Energy, for the Bouc-Wen law's force p(y) + gain z (A not 0),
+after Erlicher and Point (2004):
 
     work of the input = stored + lost in damping + lost in hysteresis
     stored            = m y'^2 / 2 + k y^2 / 2 + integral of p dy + gain z^2 / (2 A),  counted from the start
@@ -26,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import expm
 
-from hysim._frozen import FloatArray, items, read_only
+from hysim._frozen import FloatArray, check_whole, items, read_only
 from hysim.errors import SimulationError
 from hysim.kernels import oscillator as kernels
 from hysim.kernels.boucwen import prepare
@@ -44,7 +39,7 @@ _SETTLING_CHUNK = 1 << 13
 
 
 class OscillatorState(NamedTuple):
-    """Where a simulation stands: last input, motion, memory, and the energies so far."""
+    """State of a simulation: last input, motion, memory, and the energies so far."""
 
     u: float
     y: float
@@ -58,6 +53,9 @@ class OscillatorState(NamedTuple):
 @family
 class BoucWenOscillator:
     """Mass on a linear and a Bouc-Wen spring, ``m y'' + c y' + k y + law(y) = u``.
+
+    Under a base's acceleration u the right side is ``-m u``, and y is relative to the base. y is the input of the law,
+    whose positive force pulls towards y = 0.
 
     Parameters
     ----------
@@ -79,7 +77,7 @@ class BoucWenOscillator:
     substeps : int, optional
         Steps between two samples, the one control of accuracy. By default as few as turn the phase of the
         mode, whose stiffness is that of all springs at the start, by at most 0.1 rad each. Twice as many show
-        what is left of the error.
+        the remaining error.
     initial_state : (float, float)
         Displacement [m] and velocity [m/s] at the first sample; empty for rest.
 
@@ -123,16 +121,14 @@ class BoucWenOscillator:
         for name, allowed in options.items():
             if items(self)[name] not in allowed:
                 raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {items(self)[name]!r}")
-        if self.substeps is not None and (isinstance(self.substeps, bool) or not isinstance(self.substeps, int)):
-            raise TypeError(f"substeps must be a whole number or None, got {self.substeps!r}")
-        if self.substeps is not None and self.substeps < 1:
-            raise ValueError(f"substeps must be at least 1, got {self.substeps}")
+        if self.substeps is not None:
+            check_whole(self.substeps, "substeps")
         if len(self.initial_state) not in (0, 2):
             raise ValueError(f"initial_state must be empty or hold 2 numbers, got {len(self.initial_state)}")
 
     @property
     def natural_frequency(self) -> float:
-        """Of small motions about y = 0, z = 0, undamped [rad/s]; that of the size of a negative stiffness."""
+        """Undamped, of small motions about y = z = 0 [rad/s]; for the size of the stiffness where that is negative."""
         return math.sqrt(abs(self.stiffness + self._coefficients[0] + self.law.gain * self.law.A) / self.mass)
 
     @property
@@ -147,7 +143,7 @@ class BoucWenOscillator:
         Parameters
         ----------
         u : array, shape (n,) [N, or m/s^2]
-            Input; the first sample finds the initial state.
+            Input; at its first sample the plant has the initial state.
         sample_time : float
             Time between two samples [s].
 
@@ -158,39 +154,22 @@ class BoucWenOscillator:
         Raises
         ------
         SimulationError
-            If the motion leaves the finite numbers; it names the time.
+            If the motion diverges; it names the time.
         ValueError
             If u is not finite or has not one axis, or the sample time is not positive.
         """
         return self._states(u, sample_time, None, None)[1][:, 0].copy()
 
     def periodic_response(self, u: npt.ArrayLike, sample_time: float, *, tolerance: float = 1e-10) -> FloatArray:
-        """Displacement in the steady state under an input that repeats itself.
+        """Displacement (n,) [m] in the steady state under an input that repeats itself.
 
-        The period is gone through from the initial state again and again, until a state comes back to what it was
-        one period before; what follows is then as it was, too. A motion that settles slowly is found by Newton's
-        method, and used only if it attracts: a deviation must lose more than 1e-5 of its size in a period.
+        The period is repeated from the initial state until a state comes back to its value one period before, to
+        `tolerance` as a share of the largest value. A motion that settles slowly is computed by Newton's method, and
+        used only if it attracts: a deviation must lose more than 1e-5 of its size in a period.
 
-        Parameters
-        ----------
-        u : array, shape (n,) [N, or m/s^2]
-            One period; its last sample is followed by its first.
-        sample_time : float
-            Time between two samples [s].
-        tolerance : float
-            Largest change of a state from period to period, as a share of the largest value met.
-
-        Returns
-        -------
-        array, shape (n,) [m]
-
-        Raises
-        ------
-        SimulationError
-            If the motion leaves the finite numbers, or has not settled within 256 periods and the searches
-            by Newton's method between them.
-        ValueError
-            As `response`, or if u is empty or the tolerance is not positive.
+        `u` (n,) [N, or m/s^2] is one period, whose last sample is followed by its first, every `sample_time` [s].
+        Raises SimulationError if the motion diverges, or has not settled within 256 periods; ValueError as `response`,
+        or if u is empty or the tolerance is not positive.
 
         Examples
         --------
@@ -223,36 +202,23 @@ class BoucWenOscillator:
             for begin in range(0, inputs.size, _SETTLING_CHUNK):
                 piece = slice(begin, begin + _SETTLING_CHUNK)
                 try:
-                    found = self._states(inputs[piece], sample_time, state, None)[1]
+                    states = self._states(inputs[piece], sample_time, state, None)[1]
                 except SimulationError:
                     raise SimulationError("the motion leaves the finite numbers before it is steady") from None
-                state = OscillatorState(float(inputs[piece][-1]), *found[-1].tolist())
-                change = np.abs(found[-1, :3] - motion[piece][-1])
-                motion[piece] = found[:, :3]
-                largest = np.maximum(largest, np.abs(found[-1, :3]))
+                state = OscillatorState(float(inputs[piece][-1]), *states[-1].tolist())
+                change = np.abs(states[-1, :3] - motion[piece][-1])
+                motion[piece] = states[:, :3]
+                largest = np.maximum(largest, np.abs(states[-1, :3]))
                 if np.all(change <= tolerance * largest):
                     return motion[:, 0].copy()
         raise SimulationError(f"the motion has not settled within {ATTEMPTS[-1]} periods")
 
     def signals(self, u: npt.ArrayLike, sample_time: float) -> dict[str, FloatArray]:
-        """Every signal at the samples of `u`, by name.
+        """Every signal (n,) at the samples of `u`, by name; arguments and errors as of `response`.
 
-        Parameters
-        ----------
-        u, sample_time
-            As in `response`.
-
-        Returns
-        -------
-        dict
-            ``"y"`` [m], ``"velocity"`` [m/s], ``"z"``, ``"restoring_force"`` k y + law(y) [N], and the energies
-            since the start [J] ``"input_work"``, ``"damping_loss"``, ``"hysteresis_loss"``, ``"stored"``: the
-            first is the sum of the others, up to the error of the method. Each has shape (n,).
-
-        Raises
-        ------
-        SimulationError, ValueError
-            As `response`.
+        ``"y"`` [m], ``"velocity"`` [m/s], ``"z"``, ``"restoring_force"`` k y + law(y) [N], and the energies since the
+        start [J] ``"input_work"``, ``"damping_loss"``, ``"hysteresis_loss"``, ``"stored"``: the first is the sum of the
+        others, up to the error of the method.
         """
         return self.advance(u, sample_time)[0]
 
@@ -264,28 +230,10 @@ class BoucWenOscillator:
         *,
         progress: Callable[[int, int], None] | None = None,
     ) -> tuple[dict[str, FloatArray], OscillatorState]:
-        """Signals at the samples of `u`, continued from `state`, and the state after the last sample.
+        """As `signals`, continued from `state` (by default the initial one), and the state after the last sample.
 
-        Parameters
-        ----------
-        u, sample_time
-            As in `response`; the input goes on from the state's, one sample before the first.
-        state : OscillatorState, optional
-            By default the initial state, which the first sample then finds.
-        progress : callable, optional
-            Called as ``progress(done, total)`` now and then.
-
-        Returns
-        -------
-        signals : dict
-            As from `signals`; the same bits as from one uncut input.
-        state : OscillatorState
-            To continue from.
-
-        Raises
-        ------
-        SimulationError, ValueError
-            As `response`.
+        The bits are those of one uncut input, which goes on from the state's, one sample before the first.
+        ``progress(done, total)`` is called now and then.
         """
         inputs, states = self._states(u, sample_time, state, progress)
         y, velocity, z, input_work, damping_loss, memory_work = states.T.copy()
@@ -319,10 +267,10 @@ class BoucWenOscillator:
         hold: str = "foh",
         excitation: str = "force",
     ) -> OscillatorStructure:
-        """What `hysim.identify` takes: how the record of an oscillator with a Bouc-Wen law was made.
+        """Description for `hysim.identify` of how the record of an oscillator with a Bouc-Wen law was made.
 
         Its parameters are ``mass, damping, stiffness, A, beta, gamma, n``, all free by default. Under a base's
-        acceleration only the ratios of the first four can be told, and ``mass = 1`` is held.
+        acceleration only the ratios of the first four can be determined, and ``mass = 1`` is held.
 
         Parameters
         ----------
@@ -331,18 +279,18 @@ class BoucWenOscillator:
         oversampling : int
             Steps of the method between two samples of the record.
         decimation : sequence of int
-            Factors of the filters that brought the output from the rate of the steps to that of the record, one
-            after the other: each a 31-tap Hamming low-pass with the cutoff at half of the new rate, without delay.
-            Empty where the output was sampled without filter; otherwise they multiply to `oversampling`.
+            Factors of the filters, one after the other, from the rate of the steps to that of the record: each a 31-tap
+            Hamming low-pass with the cutoff at half of the new rate, without delay. Their product is `oversampling`;
+            empty where the output was sampled without filter.
         initial : {"rest", "periodic"}
             Whether the record begins at rest, or is steady under an input that repeats itself.
         period : int, optional
-            Samples of a period, with ``initial="periodic"``. Every sample of the record is compared with the one
-            period that is simulated, whose input is the mean of the periods.
+            Samples of a period, with ``initial="periodic"``. One period is simulated, with the mean of the periods as
+            input, and compared with every sample of the record.
         hold : {"foh", "zoh", "band-limited"}
             Whether the input between samples is linear, held, or for a periodic one the sum of the lines below
             half the record's rate.
-        excitation : {"force", "base"}
+        excitation : str
             As in the constructor.
 
         Returns
@@ -380,7 +328,7 @@ class BoucWenOscillator:
 
     @property
     def _coefficients(self) -> tuple[float, ...]:
-        """Of y, y^2, ... in the law's output."""
+        """Coefficients of y, y^2, ... in the law's output."""
         law = self.law
         return law.input_coefficients if isinstance(law, PolynomialBoucWen) else (law.feedthrough,)
 
@@ -431,15 +379,15 @@ class BoucWenOscillator:
         law, (slope, *curve) = self.law, self._coefficients
         stiffness, substeps, held = self.stiffness + slope, self._substeps(sample_time), self.hold == "zoh"
         plant = [self.mass, self.damping, stiffness, law.offset, law.gain, law.A, law.beta, law.gamma, law.n]
-        given = substeps, held, np.array(plant), np.array(curve)
+        constants = substeps, held, np.array(plant), np.array(curve)
         if self.method in ("newmark", "runge-kutta"):
-            return partial(kernels.whole_steps, self.method == "newmark", *given, sample_time)
+            return partial(kernels.whole_steps, self.method == "newmark", *constants, sample_time)
         work = np.empty(N_WORK)
         prepare(law.A, law.beta, law.gamma, law.n, 0.0, work)
         if self.method == "split":
-            return partial(kernels.split_path, *given, work, sample_time)
+            return partial(kernels.split_path, *constants, work, sample_time)
         flow = _linear_flow(self.mass, self.damping, stiffness + law.gain * law.A, sample_time / substeps)
-        return partial(kernels.strang_path, *given, flow, work, sample_time)
+        return partial(kernels.strang_path, *constants, flow, work, sample_time)
 
 
 def _linear_flow(mass: float, damping: float, stiffness: float, h: float) -> FloatArray:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray, checked, items
+from hysim._frozen import FloatArray, check_whole, checked, items
 from hysim._parallel import in_chunks
 from hysim.errors import SimulationError
 from hysim.laws.differential import _boucwen_search
@@ -63,11 +63,10 @@ class OscillatorStructure(Identifiable):
         for name, allowed in options.items():
             if items(self)[name] not in allowed:
                 raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {items(self)[name]!r}")
-        for number in (self.oversampling, *self.decimation, self.period or 1):
-            if isinstance(number, bool) or not isinstance(number, int):
-                raise TypeError(f"oversampling, decimation and period must be whole numbers, got {number!r}")
-            if number < 1:
-                raise ValueError(f"oversampling, decimation and period must be at least 1, got {number}")
+        for name, number in {"oversampling": self.oversampling, "period": self.period or 1}.items():
+            check_whole(number, name)
+        for factor in self.decimation:
+            check_whole(factor, "decimation")
         if self.decimation and np.prod(self.decimation) != self.oversampling:
             raise ValueError(
                 f"the stages of decimation must multiply to the oversampling {self.oversampling}, got {self.decimation}"
@@ -78,31 +77,24 @@ class OscillatorStructure(Identifiable):
             raise ValueError('hold="band-limited" needs initial="periodic": an input is interpolated by its spectrum')
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box around the plant of small motions, and where the equation of motion says to begin.
-
-        Raises
-        ------
-        ValueError
-            If the record has no even time, is too short, does not repeat itself, has a constant input, or is not
-            that of a mass on springs; if `initial` is given; or if a name or a bound does not fit.
-        """
+        """The box around the plant of small motions, and where the equation of motion says to begin."""
         if freedom.initial is not None:
             raise ValueError("the structure says how the record begins: BoucWenOscillator.structure(initial=...)")
         motion = self.motion(record)
         redundant = (_SCALED,) if self.excitation == "base" else ()
         held = freedom.held(dict.fromkeys(NAMES, 1.0), redundant=redundant)
         limits = freedom.limits(dict.fromkeys(NAMES, 1.0), held)
-        linear, found = start(motion, _unit_laws(motion.y, held, limits), _STARTS)
-        found = found or [_without_memory(linear)]
-        factor = _factor(found[0], held) if redundant else 1.0
-        found, linear = [_scaled(each, factor) for each in found], Linear(*(factor * value for value in linear))
+        linear, starts = start(motion, _unit_laws(motion.y, held, limits), _STARTS)
+        starts = starts or [_without_memory(linear)]
+        factor = _factor(starts[0], held) if redundant else 1.0
+        starts, linear = [_scaled(each, factor) for each in starts], Linear(*(factor * value for value in linear))
         box = _Box(held, _limits(linear, held, limits), Record(u=motion.y, y=linear.stiffness * motion.y))
-        laws = box.laws(found[0])
+        laws = box.laws(starts[0])
         return SearchSpace(
             coordinates=(*box.plant, *laws.coordinates),
             lower=np.concatenate([box.side(0), laws.lower]),
             upper=np.concatenate([box.side(1), laws.upper]),
-            starts=np.array([box.encode(one) for one in found]),
+            starts=np.array([box.encode(one) for one in starts]),
             names=tuple(name for name in NAMES if name not in held),
             columns=(),
             linear=(),
@@ -144,7 +136,7 @@ class OscillatorStructure(Identifiable):
         )
 
     def motion(self, record: Record) -> Motion:
-        """Force and displacement that the start is found from: of a periodic record, the mean period."""
+        """Force and displacement from which the start is computed; of a periodic record, the mean period."""
         sample_time = record.sample_time
         if np.ptp(record.u) == 0.0:
             raise ValueError("the input is constant: nothing can be identified from it")
@@ -184,7 +176,7 @@ class OscillatorStructure(Identifiable):
         return np.asarray(run(force, step))
 
     def sampled(self, y: FloatArray) -> FloatArray:
-        """What the record keeps of an output at the ends of the steps."""
+        """The record's samples of an output at the ends of the steps."""
         if self.decimation:
             return decimated(y, self.decimation, periodic=self.period is not None)
         return y[:: self.oversampling]
@@ -264,7 +256,7 @@ def _without_memory(linear: Linear) -> dict[str, float]:
 
 
 def _factor(values: Mapping[str, float], held: Mapping[str, float]) -> float:
-    """What the plant of unit mass is multiplied by, so that one of its scaled parameters is what it is held at."""
+    """Factor of the plant of unit mass by which one of its scaled parameters has the value it is held at."""
     known = [held[name] / values[name] for name in _SCALED if name in held and values[name] * held[name] > 0.0]
     return float(known[0]) if known else 1.0
 

@@ -16,17 +16,7 @@ HALF_FILTER = 15
 
 
 def interpolated(period: FloatArray, factor: int) -> FloatArray:
-    """One period at `factor` times the rate; a line at half the old rate is shared by both of its signs.
-
-    Parameters
-    ----------
-    period : array, shape (n,)
-    factor : int
-
-    Returns
-    -------
-    array, shape (factor * n,)
-    """
+    """One period (n,) at `factor` times the rate; a line at half the old rate is shared by both of its signs."""
     if factor == 1:
         return period
     spectrum = np.fft.rfft(period)
@@ -36,20 +26,7 @@ def interpolated(period: FloatArray, factor: int) -> FloatArray:
 
 
 def decimated(y: FloatArray, stages: Sequence[int], *, periodic: bool = False) -> FloatArray:
-    """Every (product of stages)-th sample of `y`, filtered stage by stage.
-
-    Parameters
-    ----------
-    y : array, shape (n,)
-        More than 15 samples at each stage.
-    stages : sequence of int
-    periodic : bool
-        Whether y is one period, or begins and ends.
-
-    Returns
-    -------
-    array, shape (ceil(n / product),)
-    """
+    """Every (product of stages)-th sample of `y`, filtered stage by stage, with more than 15 samples at each."""
     for factor in stages:
         y = _stage(y, factor, periodic)
     return y
@@ -61,8 +38,8 @@ def _stage(y: FloatArray, factor: int, periodic: bool) -> FloatArray:
         before, after = y[-HALF_FILTER:], y[:HALF_FILTER]
     else:
         before, after = 2.0 * y[0] - y[HALF_FILTER:0:-1], 2.0 * y[-1] - y[-2 : -2 - HALF_FILTER : -1]
-    # the first of the kept outputs is number 2 * HALF_FILTER of the convolution: zeros move it onto the grid
+    # the first of the filtered outputs is number 2 * HALF_FILTER of the convolution: zeros move it onto the grid
     lead = np.zeros(-2 * HALF_FILTER % factor)
-    kept = upfirdn(taps, np.concatenate([lead, before, y, after]), down=factor)
+    filtered = upfirdn(taps, np.concatenate([lead, before, y, after]), down=factor)
     first = (lead.size + 2 * HALF_FILTER) // factor
-    return np.asarray(kept[first : first - (-y.size // factor)])
+    return np.asarray(filtered[first : first - (-y.size // factor)])

@@ -27,7 +27,7 @@ _WHOLE = 1e-6  # of a sub-step: a delay this close to a whole number of them is 
 
 
 Vibration = TransferFunction | StateSpace | Modes
-"""What moves behind the law."""
+"""Linear dynamics behind the law."""
 
 
 class Stage(NamedTuple):
@@ -118,31 +118,16 @@ def _companion(plant: TransferFunction, sample_time: float) -> Stage:
 
 
 def sampled(stage: Stage, step: float, delay: float = 0.0, *, creeping: int = 0, linear: bool = False) -> SampledStage:
-    """The exact discrete form of a stage.
+    """The exact discrete form of a stage for sub-steps of the length `step` [s]; its rest may be infinite or nan.
 
-    Parameters
-    ----------
-    stage : Stage
-        What is stepped.
-    step : float
-        Length of a sub-step [s].
-    delay : float
-        Dead time of its input [s].
-    creeping : int
-        Number of states, from the first on, that do not look at others.
-    linear : bool
-        Whether the input is linear along a sub-step; by default it is held.
-
-    Returns
-    -------
-    SampledStage
-        `rest` is infinite or nan for a stage with a pole at zero.
+    The input has a dead time `delay` [s], and is held over a sub-step or `linear` along it. The first `creeping` states
+    do not depend on others.
     """
     lag, part = whole_and_part(delay / step)
-    moved, B, through = _moved(stage, step, part, 1.0, linear)
+    carried, B, through = _transition(stage, step, part, 1.0, linear)
     return SampledStage(
         decline=read_only(np.expm1(np.diag(stage.F)[:creeping] * (stage.rate * step))),
-        A=read_only(moved[creeping:]),
+        A=read_only(carried[creeping:]),
         B=read_only(B),
         output=read_only([0.0, stage.D * through[0], stage.D * through[1], *stage.C]),
         lag=lag,
@@ -153,8 +138,8 @@ def sampled(stage: Stage, step: float, delay: float = 0.0, *, creeping: int = 0,
 def seen_within(stage: Stage, step: float, delay: float, at: float, *, linear: bool = False) -> FloatArray:
     """As `SampledStage.output`, of the displacement at the part `at` of a sub-step, from the states at its begin."""
     _, part = whole_and_part(delay / step)
-    moved, B, through = _moved(stage, step, part, at, linear)
-    return read_only([*(stage.C @ B.T + stage.D * through), *(stage.C @ moved)])
+    carried, B, through = _transition(stage, step, part, at, linear)
+    return read_only([*(stage.C @ B.T + stage.D * through), *(stage.C @ carried)])
 
 
 def whole_and_part(ratio: float) -> tuple[int, float]:
@@ -165,14 +150,10 @@ def whole_and_part(ratio: float) -> tuple[int, float]:
     return math.floor(ratio), ratio % 1.0
 
 
-def _moved(
+def _transition(
     stage: Stage, step: float, part: float, at: float, linear: bool
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The states at the part `at` of a sub-step, as matrices of those at its begin and of the three inputs.
-
-    The inputs are the newer, the older and the oldest one. The older value ends at the part `part`; last comes
-    what the input itself is at the end.
-    """
+    """The states at the part `at` of a sub-step, as matrices of those at its begin and of the three inputs."""
     early, late = min(at, part), max(at - part, 0.0)
     (first, second), begins, ends = (
         stack[0] for stack in transitions(stage.F[np.newaxis], stage.rate * step * np.array([[early, late]]), stage.g)

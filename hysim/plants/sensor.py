@@ -1,20 +1,18 @@
-"""Displacement sensors: what a sampled controller gets to see.
-
-    measurement_k = quantum floor((y(t_k - delay) + noise_k) / quantum + 1/2)
-
-The noise is gaussian and white from sample to sample, a function of the seed and the sample alone.
-"""
+"""Displacement sensors of a sampled controller."""
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, items, read_only
+from hysim._frozen import FloatArray, check_whole, items, read_only
 from hysim.models.model import family
 
 
 @family
 class Sensor:
     """From the true displacement to the measured one.
+
+    ``measurement_k = quantum floor((y(t_k - delay) + noise_k) / quantum + 1/2)``; the noise is gaussian and white from
+    sample to sample, a function of the seed and the sample alone.
 
     Parameters
     ----------
@@ -48,10 +46,7 @@ class Sensor:
         for name in ("quantum", "noise", "delay"):
             if items(self)[name] < 0.0:
                 raise ValueError(f"{name} must not be negative, got {items(self)[name]}")
-        if not isinstance(self.seed, int) or isinstance(self.seed, bool):
-            raise TypeError(f"seed must be an integer, got {self.seed!r}")
-        if self.seed < 0:
-            raise ValueError(f"seed must not be negative, got {self.seed}")
+        check_whole(self.seed, "seed", least=0)
 
     def noise_samples(self, n: int) -> FloatArray:
         """The noise of the first `n` samples; more samples begin with the same."""
@@ -61,6 +56,6 @@ class Sensor:
 
     def measure(self, y: npt.ArrayLike) -> FloatArray:
         """Readings of displacements that are as old as the delay has them, shape (n,)."""
-        seen = read_only(y, "y", finite=False)
-        noisy = seen + self.noise_samples(seen.size)
+        displacement = read_only(y, "y", finite=False)
+        noisy = displacement + self.noise_samples(displacement.size)
         return self.quantum * np.floor(noisy / self.quantum + 0.5) if self.quantum else noisy

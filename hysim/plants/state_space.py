@@ -1,10 +1,4 @@
-"""Linear plants by their matrices.
-
-    x' = A x + B u(t - delay),    y = C x + D u(t - delay)
-
-Systems of python-control, and of any package that writes them alike, are taken by what they show: A, B, C and D, or
-num and den.
-"""
+"""Linear plants by their matrices; those of other packages by A, B, C and D, or num and den."""
 
 import math
 from collections.abc import Sized
@@ -21,6 +15,8 @@ from hysim.plants.transfer_function import TransferFunction
 @family
 class StateSpace:
     """A linear stage with one input and one output.
+
+    ``x' = A x + B u(t - delay)`` and ``y = C x + D u(t - delay)``
 
     Parameters
     ----------
@@ -83,13 +79,7 @@ def resting_states(A: FloatArray, B: FloatArray) -> FloatArray:
 
 
 def linear_plant(system: Any) -> Any:
-    """A system of another package as a plant of hysim; what shows no matrices or polynomials comes back as it is.
-
-    Raises
-    ------
-    ValueError
-        If it has several inputs or outputs, or is discrete.
-    """
+    """A system of another package as a plant of hysim; ValueError if it is discrete or has several signals."""
     by_matrices = all(hasattr(system, name) for name in "ABCD")  # systems of SciPy and python-control share no class
     own = isinstance(system, StateSpace | TransferFunction)
     if own or not (by_matrices or all(hasattr(system, name) for name in ("num", "den"))):

@@ -39,10 +39,7 @@ def attracting_state(period: Period, state: FloatArray, scale: FloatArray, toler
 
     `scale` holds the largest value of each state, and `tolerance` is the largest change in a period in units of it.
 
-    Raises
-    ------
-    SimulationError
-        If the plant goes round the steady motion without coming nearer.
+    Raises SimulationError if the plant goes round the steady motion without coming nearer.
     """
     units = np.where(scale > 0.0, scale, 1.0)
 

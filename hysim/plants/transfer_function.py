@@ -1,16 +1,12 @@
 """Continuous-time transfer functions, simulated and identified from sampled data.
 
-    G(s) = exp(-delay s) (num_0 s^m + ... + num_m) / (den_0 s^n + ... + den_n),   m <= n
+Where the input is held, the output of a sample may be taken at the start of the hold, before that sample's input has
+moved the states, or at its end. System identification tools take the start. A staircase that was read when each step
+had settled belongs to the end: taken as the start, each output must be explained by the step before, and is one sample
+too early for it.
 
-The input between two samples is held (``hold="zoh"``) or linear (``hold="foh"``); under either the response
-is exact, by matrix exponentials. Where the input is held, the output of a sample may be taken at the start
-of the hold (``sample="start"``), before that sample's input has moved the states, or at its end. System
-identification tools take the start. A staircase that was read when each step had settled belongs to the end:
-taken as the start, each output must be explained by the step before, and is one sample too early for it.
-
-With den monic the output is affine in the numerator and in the initial state, which is the free response
-and its derivatives at the begin of the first hold, (y, y', ..., y^(n-1)): the state of the observability
-form. The delay, where it is not known, is searched beside the denominator.
+With den monic the output is affine in the numerator and in the initial state, the state of the observability form. The
+delay, where it is not known, is searched beside the denominator.
 """
 
 from collections.abc import Iterable, Mapping
@@ -27,7 +23,7 @@ from hysim.models.protocols import Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.plants._linear_response import LinearPlants, LinearState, affine_columns
 from hysim.plants._transfer_function_notes import notes
-from hysim.plants._transfer_function_starts import Guess, guesses, likely_delays, sections
+from hysim.plants._transfer_function_starts import Guess, denominators, guesses, likely_delays, sections
 from hysim.plants._unit_gain import UnitGain
 from hysim.records import Record
 
@@ -43,6 +39,10 @@ _SCREENED = 64  # random points beside starts that differ
 @family
 class TransferFunction(Composable):
     """Continuous-time transfer function.
+
+    ::
+
+        G(s) = exp(-delay s) (num_0 s^m + ... + num_m) / (den_0 s^n + ... + den_n),   m <= n
 
     Parameters
     ----------
@@ -115,51 +115,19 @@ class TransferFunction(Composable):
             return float(np.divide(self.num[-1], self.den[-1]))
 
     def response(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
-        """Output at the samples of `u`, exact under the hold.
+        """Output (n,) at the samples of `u` (n,), which is zero before the first of them, exact under the hold.
 
-        Parameters
-        ----------
-        u : array, shape (n,)
-            Input, zero before its first sample.
-        sample_time : float
-            Time between two samples [s].
-
-        Returns
-        -------
-        array, shape (n,)
-
-        Raises
-        ------
-        SimulationError
-            If the output leaves the finite numbers, as an unstable plant's may; it names the sample.
-        ValueError
-            If `u` is not finite or has not one axis, or the sample time is not positive.
+        The samples are `sample_time` apart [s]. Raises SimulationError if the output diverges, as an unstable plant's
+        may, and ValueError if `u` is not finite or has not one axis, or the sample time is not positive.
         """
         return self.advance(u, sample_time)[0]
 
     def advance(
         self, u: npt.ArrayLike, sample_time: float, state: LinearState | None = None
     ) -> tuple[FloatArray, LinearState]:
-        """Output at the samples of `u`, continued from `state`, and the state after the last sample.
+        """As `response`, continued from `state`, by default the initial one, and the state after the last sample.
 
-        Parameters
-        ----------
-        u, sample_time
-            As in `response`; the time is the same for every part of a record.
-        state : LinearState, optional
-            What an earlier call returned; by default the initial state, with no input before.
-
-        Returns
-        -------
-        y : array, shape (n,)
-            The same bits as from one uncut input.
-        state : LinearState
-            To continue from.
-
-        Raises
-        ------
-        SimulationError, ValueError
-            As `response`.
+        The bits are those of one uncut input.
         """
         inputs = read_only(u, "u", ndim=1)
         if not 0.0 < sample_time < np.inf:
@@ -181,7 +149,7 @@ class TransferFunction(Composable):
         return y, end
 
     def filtered(self, signals: FloatArray, sample_time: float) -> FloatArray:
-        """Outputs from rest for several inputs at once, (n_signals, n_samples); what is not finite stays."""
+        """Outputs (n_signals, n_samples) from rest for several inputs at once; they may be infinite or nan."""
         plant = self._plant(sample_time)
         return np.asarray(plant.filtered(signals[np.newaxis], hold=self.hold, sample=self.sample)[0])
 
@@ -196,7 +164,7 @@ class TransferFunction(Composable):
         sample: str = "start",
         initial: str = "rest",
     ) -> "TransferFunctionStructure":
-        """What `hysim.identify` takes: numbers of poles and zeros, and how the record was sampled.
+        """Numbers of poles and zeros for `hysim.identify`, and how the record was sampled.
 
         Parameters
         ----------
@@ -239,7 +207,7 @@ class TransferFunction(Composable):
 
     @classmethod
     def candidates(cls) -> dict[str, "TransferFunctionStructure"]:
-        """What `hysim.compare` tries of this family: two poles and one zero, one mode or a lag with a creep."""
+        """Two poles and one zero for `hysim.compare`: one mode, or a lag with a creep."""
         return {cls.__name__: cls.structure(poles=2, zeros=1)}
 
     @classmethod
@@ -253,28 +221,10 @@ class TransferFunction(Composable):
         sample: str = "start",
         initial: str = "rest",
     ) -> dict[str, "TransferFunctionStructure"]:
-        """Candidates for `hysim.select`: every combination of the numbers and delays.
+        """Candidates for `hysim.select`: a structure for every combination of the numbers and delays, by its name.
 
-        Parameters
-        ----------
-        poles : iterable of int
-            Numbers of poles.
-        zeros : iterable of int, optional
-            Numbers of zeros, of which those below the number of poles are taken; by default all of them.
-        delays : iterable of float or "free"
-            As in `structure` [s].
-        hold, sample, initial : str
-            As in `structure`.
-
-        Returns
-        -------
-        dict
-            Name to structure, ``"2 poles, 1 zero"`` and so on.
-
-        Raises
-        ------
-        ValueError, TypeError
-            As `structure`.
+        `zeros` below the number of poles are taken, by default all of them; the other arguments and the errors are
+        those of `structure`.
 
         Examples
         --------
@@ -283,14 +233,14 @@ class TransferFunction(Composable):
         ['1 pole, 0 zeros, free delay', '2 poles, 0 zeros']
         """
         numbers, late = None if zeros is None else set(zeros), tuple(delays)
-        found = [
+        results = [
             cls.structure(poles=n, zeros=m, delay=delay, hold=hold, sample=sample, initial=initial)
             for n in poles
             for m in range(n)
             if numbers is None or m in numbers
             for delay in late
         ]
-        return {str(structure): structure for structure in found}
+        return {str(structure): structure for structure in results}
 
     def _plant(self, sample_time: float) -> LinearPlants:
         with np.errstate(all="ignore"):
@@ -351,14 +301,7 @@ class TransferFunctionStructure(Identifiable, Composable):
         return ("delay",) if self.delay is None else ()
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box of the sections, and of the delay where it is free.
-
-        Raises
-        ------
-        ValueError
-            If the record has no even time or no input, `initial` or a name is unknown, a coefficient of the
-            denominator is fixed or bounded, or a delay is negative.
-        """
+        """The box of the sections, and of the delay where it is free."""
         sample_time = record.sample_time
         if np.ptp(record.u) == 0.0 and record.u[0] == 0.0:
             raise ValueError("the input is zero throughout: nothing can be identified from it")
@@ -432,17 +375,14 @@ class TransferFunctionStructure(Identifiable, Composable):
     def _starts(
         self, record: Record, lower: FloatArray, upper: FloatArray, delay: float | None, *, at_rest: bool
     ) -> tuple[FloatArray, bool]:
-        """What regressions find on a long record, and whether that is enough; a short one is covered by the search.
-
-        With one delay they have to agree; the best of several delays need not.
-        """
+        """Starts by regression on a long record, and whether they suffice: those of one delay must agree."""
         if len(record) < _LONG:
             return np.empty((0, lower.size)), False
         h = record.sample_time
         delays = likely_delays(record, lower[-1] * h, upper[-1] * h) if delay is None else [delay]
         options = {"hold": self.hold, "sample": self.sample}
-        found = guesses(record, self.poles, self.zeros, delays, at_rest=at_rest, **options)
-        starts = np.array([self._coordinates(each, h)[: lower.size] for each in found]).reshape(-1, lower.size)
+        results = guesses(record, self.poles, self.zeros, delays, at_rest=at_rest, **options)
+        starts = np.array([self._coordinates(each, h)[: lower.size] for each in results]).reshape(-1, lower.size)
         starts = np.clip(starts, lower, upper)
         if delay is None or len(starts) < _MAJORITY:
             return starts, len(starts) >= _MAJORITY
@@ -454,15 +394,10 @@ class TransferFunctionStructure(Identifiable, Composable):
 
     def _searched(self, x: FloatArray, sample_time: float, delay: float | None) -> dict[str, FloatArray]:
         """The denominators, and the delay where it is not the structure's own."""
-        product = np.ones((len(x), 1))
-        for k in range(self.poles // 2):
-            frequency, damping = np.exp(x[:, 2 * k]), np.exp(x[:, 2 * k + 1])
-            product = _times(product, [np.ones(len(x)), 2.0 * damping * frequency, frequency**2])
-        if self.poles % 2:
-            product = _times(product, [np.ones(len(x)), np.exp(x[:, self.poles - 1])])
-        found = {name: product[:, k] / sample_time**k for k, name in enumerate(self.denominator, 1)}
+        columns = denominators(x, self.poles).T
+        results = {name: columns[k] / sample_time**k for k, name in enumerate(self.denominator, 1)}
         late = x[:, -1] * sample_time if delay is None else np.full(len(x), delay)
-        return found | dict.fromkeys(self.free_delay, late)
+        return results | dict.fromkeys(self.free_delay, late)
 
 
 def _check_options(hold: str, sample: str) -> None:
@@ -472,11 +407,3 @@ def _check_options(hold: str, sample: str) -> None:
         raise ValueError(f'sample must be "start" or "end", got {sample!r}')
     if (hold, sample) == ("foh", "end"):
         raise ValueError('sample="end" needs an input that is held, hold="zoh"')
-
-
-def _times(polynomials: FloatArray, factor: list[FloatArray]) -> FloatArray:
-    """Products of rows of polynomials with one factor for each row."""
-    product = np.zeros((len(polynomials), polynomials.shape[1] + len(factor) - 1))
-    for k, coefficient in enumerate(factor):
-        product[:, k : k + polynomials.shape[1]] += coefficient[:, np.newaxis] * polynomials
-    return product

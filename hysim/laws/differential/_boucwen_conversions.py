@@ -208,7 +208,7 @@ def to_opensees_pinching(law: Any) -> Scalars:
 
 
 def _of_opensees_energy(law: Any) -> Scalars:
-    """What the two materials with an energy share."""
+    """Parameters that both materials with an energy have."""
     _no_offset(law, "the material")
     if law.z0 != 0.0:
         raise ValueError(f"the material begins with z = 0, got z0 = {law.z0:g}")

@@ -1,4 +1,4 @@
-"""What can be said of a Bouc-Wen law without an input: its bounds, and so the bounds of its slope.
+"""Bounds of the memory and of the slope of a Bouc-Wen law, whatever its input.
 
     dz/du = A - |z|^n (gamma + beta sign(z du))
 
@@ -18,7 +18,7 @@ from hysim._frozen import FloatArray
 
 
 def saturation(A: float, beta: float, gamma: float, n: float) -> float:
-    """|z| at the end of a long stretch of the input; inf where there is no end."""
+    """``|z|`` at the end of a long stroke of the input; inf where it has no limit."""
     if A == 0.0:
         return 0.0 if beta + gamma > 0.0 and beta - gamma >= 0.0 else math.inf
     c = beta + math.copysign(1.0, A) * gamma

@@ -1,34 +1,70 @@
-"""What all Bouc-Wen laws share: the memory and what follows from it.
+"""The laws whose memory is that of Bouc and Wen: facts, limit cycle and inverse.
 
     dz/du = A - |z|^n (gamma + beta sign(z du))
     y = offset + c1 u + c2 u^2 + ... + gain z
 
-u is the input, z the memory, y the output. The memory is evaluated exactly at the samples of an input
-that is linear between them (`hysim.kernels.boucwen`); it does not depend on time. `A` and `gain` enter
-only as a product. With A > 0 and beta > 0 the loop of y runs clockwise for a positive gain (a restoring
-force) and counterclockwise for a negative one (a piezoelectric displacement).
+`A` and `gain` enter only as a product. With A > 0 and beta > 0 the loop of y runs clockwise for a positive gain (a
+restoring force) and counterclockwise for a negative one (a piezoelectric displacement).
 
 Sources: R. Bouc 1967; Y. K. Wen, J. Eng. Mech. Div. 102 (1976); the classes after Ikhouane and Rodellar 2007.
 """
 
 import math
+from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, read_only
+from hysim.kernels import boucwen as kernels
+from hysim.kernels.charts import N_WORK
 from hysim.laws.differential import _boucwen_facts, boucwen_inverse, limit_cycle
-from hysim.laws.differential._boucwen_step import BoucWenStep
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen_inverse import BoucWenInverse, InverseState
 from hysim.laws.differential.limit_cycle import LimitCycle
-from hysim.models.law import Packed, State, Tables
+from hysim.models.law import Law, Packed, State
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
+from hysim.models.tables import Tables
 from hysim.records import Record
 
 
+class BoucWenStep(Law):
+    """A law that packs the parameters (A, beta, gamma, n, gain, offset, c1, c2, ...) and the memory (u, z)."""
+
+    step = staticmethod(kernels.step)
+    workspace: ClassVar[int] = N_WORK - 2
+
+    @classmethod
+    def prepare(cls, parameters: FloatArray, state: FloatArray) -> None:
+        """Fill in the charts of the exponent."""
+        A, beta, gamma, n = parameters[:4].tolist()
+        if n not in (1.0, 2.0):
+            kernels.prepare(A, beta, gamma, n, 0.0, state)
+
+    @classmethod
+    def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:
+        A, beta, gamma, n = map(float, law.parameters[:4])
+        last_u, z = map(float, law.state[:2])
+        if n == 1.0:
+            lost = kernels.linear_path(A, beta, gamma, last_u, z, u, y)
+        elif n == 2.0:
+            lost = kernels.quadratic_path(A, beta, gamma, last_u, z, u, y)
+        else:
+            lost = kernels.power_path(A, beta, gamma, n, last_u, z, u, law.state, y)
+        if lost < 0:
+            law.state[:2] = u[-1], y[-1]
+            kernels.to_output(law.parameters, 4, u, y)
+        return int(lost)
+
+    @classmethod
+    def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
+        parameters, memory = cls.pack(tables)
+        laws = read_only(np.concatenate([parameters[:, :4], memory[:, 1:]], axis=1), finite=False)
+        with np.errstate(all="ignore"):  # a memory that diverges overflows, and uncompiled kernels would warn of it
+            kernels.batch(laws, read_only(parameters[:, 4:], finite=False), u, y, 0, len(y))
+
+
 class BoucWenLaw(BoucWenStep, MemoryLaw):
-    """The memory of Bouc and Wen; what it shares with other laws is in `hysim.laws.differential._memory_law`."""
+    """A law with the memory of Bouc and Wen, exact at the samples of an input that is linear between them."""
 
     @property
     def admissible(self) -> bool:
@@ -58,34 +94,20 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
 
     @property
     def saturation(self) -> float:
-        """What ``|z|`` tends to on a long way of the input, (A / (beta + gamma))^(1/n) for A > 0; inf if nothing."""
+        """Limit of ``|z|`` on a long stroke of the input, (A / (beta + gamma))^(1/n) for A > 0; inf if it has none."""
         return _boucwen_facts.saturation(self.A, self.beta, self.gamma, self.n)
 
     @property
     def memory_bound(self) -> float:
-        """Bound of ``|z|`` for every input that begins with z0; inf if there is none."""
+        """Bound of ``|z|`` for every input that begins with z0; inf if it has none."""
         return _boucwen_facts.memory_bound(self.A, self.beta, self.gamma, self.n, self.z0, self.stability_class)
 
     def limit_cycle(self, amplitude: float) -> LimitCycle:
-        """Steady loop of the memory between the inputs -amplitude and amplitude.
+        """Steady loop of the memory between the inputs -amplitude and amplitude [unit of u].
 
-        Parameters
-        ----------
-        amplitude : float
-            [unit of u].
-
-        Returns
-        -------
-        LimitCycle
-            Peak, coercive input, width at u = 0 and energy, to rounding; a law with beta > 0 approaches it
-            from every memory inside its bound.
-
-        Raises
-        ------
-        ValueError
-            If the amplitude is not positive, or A = 0.
-        SimulationError
-            If the memory diverges within one stroke.
+        It has the peak, the coercive input, the width at u = 0 and the energy, to rounding; a law with beta > 0
+        approaches it from every memory inside its bound. Raises ValueError if the amplitude is not positive or A = 0,
+        and SimulationError if the memory diverges within one stroke.
 
         Examples
         --------
@@ -97,25 +119,15 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
         return limit_cycle.limit_cycle(self.A, self.beta, self.gamma, self.n, float(amplitude))
 
     def slope_bounds(self, low: float = -np.inf, high: float = np.inf) -> tuple[float, float]:
-        """Bounds of the slope dy/du over every input between `low` and `high` that begins with z0.
+        """Lowest and highest slope dy/du over every input between `low` and `high` [unit of u] that begins with z0.
 
-        Parameters
-        ----------
-        low, high : float
-            Range of the input [unit of u]; a law without polynomial does not depend on it.
-
-        Returns
-        -------
-        (float, float)
-            Infinite where the memory is not bounded and the slope neither. They are approached by inputs
-            that saturate the memory, so that they are sharp for a law without polynomial.
+        They are infinite where neither the memory nor the slope is bounded. Inputs that saturate the memory approach
+        them, so that they are sharp for a law without polynomial; such a law's do not depend on the range of the input.
 
         Examples
         --------
-        A piezoelectric stack by Low and Guo: 1 - 0.56 is left of the slope just after a reversal.
-
         >>> import hysim as hs
-        >>> law = hs.BoucWen(A=0.35, beta=0.02, gamma=0.005, feedthrough=1.0, gain=-1.0)
+        >>> law = hs.BoucWen(A=0.35, beta=0.02, gamma=0.005, feedthrough=1.0, gain=-1.0)  # Low and Guo's stack
         >>> [round(bound, 12) for bound in law.slope_bounds()]
         [0.44, 1.0]
         """
@@ -123,7 +135,7 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
             raise ValueError(f"low must not be above high, got {low} and {high}")
         memory = _boucwen_facts.memory_slopes(self.A, self.beta, self.gamma, self.n, self.memory_bound)
         scaled = sorted(self.gain * slope if self.gain else 0.0 for slope in memory)
-        static = _boucwen_facts.polynomial_range(boucwen_inverse.derivative(self), low, high)
+        static = _boucwen_facts.polynomial_range(self.input_slope, low, high)
         with np.errstate(invalid="ignore"):
             total = np.add(static, scaled)
         lowest, highest = np.where(np.isnan(total), [-np.inf, np.inf], total).tolist()
@@ -132,73 +144,33 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
     def is_invertible(self, low: float = -np.inf, high: float = np.inf) -> bool:
         """Whether the slope keeps its sign for every input between `low` and `high`: its bounds have one sign.
 
-        This is sufficient for an inverse, not necessary: on one record a law may do without, and
-        `inverse_response` looks at the record. For a piezoelectric stack by Low and Guo it reads
-        alpha max(1, 2 beta / (beta + gamma)) < 1. A bound of zero to rounding counts as zero.
+        This is sufficient for an inverse, not necessary: `inverse_response` looks at the one record that it is given.
+        For a piezoelectric stack by Low and Guo it reads alpha max(1, 2 beta / (beta + gamma)) < 1. A bound of zero to
+        rounding counts as zero.
         """
         bounds = self.slope_bounds(low, high)
-        rounding = 1e-14 * (abs(self.gain * self.A) + float(np.abs(boucwen_inverse.coefficients(self)).max()))
+        rounding = 1e-14 * (abs(self.gain * self.A) + float(np.abs(self.input_polynomial).max()))
         return bounds[0] > rounding or bounds[1] < -rounding
 
     def inverse(self) -> BoucWenInverse:
-        """The law's inverse as an object, for loops that run sample by sample.
-
-        Returns
-        -------
-        BoucWenInverse
-            In the direction that the output has at u = 0, z = 0.
-
-        Raises
-        ------
-        ValueError
-            If the slope is zero there.
-        """
+        """The inverse as an object for loops, in the direction of the output at u = z = 0, else ValueError."""
         return boucwen_inverse.inverse(self)
 
-    def inverse_response(
-        self, y: npt.ArrayLike, u0: float | None = None, state: State | InverseState | None = None
-    ) -> FloatArray:
-        """Input that gives the output `y`, linear between the samples.
+    def inverse_begun(self, y: FloatArray, u0: float | None, state: State | InverseState | None) -> CompiledLaw:
+        """In closed form, from the input that gives the first output with the memory at z0."""
+        rest = boucwen_inverse.at_rest(self, float(y[0])) if u0 is None and state is None else (u0, self.z0)
+        begin: Any = rest if state is None else state
+        return boucwen_inverse.inverse(self, float(begin[0])).begun(begin)
 
-        Parameters
-        ----------
-        y : array, shape (n_samples,)
-            Wanted output.
-        u0 : float, optional
-            Input at which the law rests, its memory at z0, before it moves to the first sample. By default
-            it rests at the first sample: the input that gives y[0] with the memory at z0, found from u = 0.
-        state : tuple of float, optional
-            Input and memory (and output) to continue from, in place of u0 and z0.
-
-        Returns
-        -------
-        array, shape (n_samples,)
-            Its `response` is y to rounding.
-
-        Raises
-        ------
-        SimulationError
-            If the slope dy/du does not keep its sign on the way, or the output does not reach a sample; the
-            message names the sample, the input and the slope there.
-        ValueError
-            If y is not finite or has not one axis, its first sample does not tell the first input (give u0),
-            or the slope is zero where the record begins.
-
-        Examples
-        --------
-        >>> import hysim as hs
-        >>> law = hs.BoucWen(A=0.35, beta=0.02, gamma=0.005, feedthrough=1.0, gain=-1.0)
-        >>> law.inverse_response(law.response([0.0, 30.0, 10.0])).round(9).tolist()
-        [0.0, 30.0, 10.0]
-        """
-        return boucwen_inverse.inverse_response(self, y, u0, state)
+    def unreached(self, sample: int, y: float, inverse: CompiledLaw) -> str:
+        """Message with the input and the slope there."""
+        return boucwen_inverse.unreached(sample, y, inverse)
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
-        """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""
         return boucwen_inverse.inverse(self, u0).compiled(u0=u0, limits=limits)
 
     def notes(self, record: Record, model: "BoucWenLaw") -> tuple[str, ...]:
-        """What the identified law promises for other inputs."""
+        """Stability class and passivity of the identified law."""
         if model.admissible and model.stability_class == "I":
             return ("the law is of stability class I and passive",)
         kind = model.stability_class
@@ -211,7 +183,7 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
         return Packed(cls.joined(tables, "A", "beta", "gamma", "n"), cls.initial_memory(tables))
 
     def divergence(self, sample: int, u: float, y: float) -> str:
-        """The sums of parameters that let the memory diverge."""
+        """Message with the sums of parameters that let the memory diverge."""
         loading, unloading = self.beta + self.gamma, self.beta - self.gamma
         return (
             f"the memory diverges at sample {sample} (u = {u:g}): with beta + gamma = {loading:g} and beta - gamma = "

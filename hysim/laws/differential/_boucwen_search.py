@@ -66,15 +66,7 @@ def search_space(
     *,
     alike: tuple[tuple[str, ...], ...] = (),
 ) -> SearchSpace:
-    """Declare the coordinates, their box and the way back to the user's parameters for one record.
-
-    Of each group in `alike` the record can tell only the sum, so that one of it is held.
-
-    Raises
-    ------
-    ValueError
-        If the input is constant, `initial` is unknown, or a name or a bound does not fit.
-    """
+    """Declare the coordinates, their box and the way back to the user's parameters for one record."""
     at_rest = ("z0",) if freedom.starts_at_rest() else ()
     held = freedom.held(defaults, redundant=(*REDUNDANT, *alike), at_rest=at_rest)
     bounds = freedom.limits(defaults, held)

@@ -26,13 +26,7 @@ def search_space(
     record: Record,
     freedom: Freedom,
 ) -> SearchSpace:
-    """Declare the box for the terms, feedthrough, offset and y0 in `defaults`.
-
-    Raises
-    ------
-    ValueError
-        If the input is constant, `initial` is unknown, or a name or a bound does not fit.
-    """
+    """Declare the box for the terms, feedthrough, offset and y0 in `defaults`."""
     if np.ptp(record.u) == 0.0:
         raise ValueError("the input is constant: nothing can be identified from it")
     terms = {name: Term.parse(name) for name in defaults if name not in _OUTPUT}

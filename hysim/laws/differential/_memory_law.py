@@ -15,13 +15,18 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim.laws.differential import _boucwen_search, boucwen_inverse
-from hysim.models.law import Law, Tables
+from hysim.models.law import Law, State
+from hysim.models.protocols import CompiledLaw
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.tables import Tables
 from hysim.records import Record
 
 
 class MemoryLaw(Law):
     """A law with one memory z, and an output that is a polynomial of u plus gain z.
+
+    Its inverse is exact to the rounding of the output's terms, or to 1e-12 of the memory's stroke if stepped by
+    power series.
 
     `polynomial` names the field of the coefficients c1, c2, ..., a tuple or a single number.
     """
@@ -46,7 +51,7 @@ class MemoryLaw(Law):
 
     @classmethod
     def order(cls, tables: Tables) -> npt.NDArray[np.intp] | None:
-        """The order of n: neighbours of equal n share their charts (`hysim.kernels.charts`)."""
+        """Laws of equal n, which share their charts (`hysim.kernels.charts`), beside each other."""
         n = tables["n"][:, 0]
         return None if (np.diff(n) >= 0.0).all() else np.argsort(n, kind="stable")
 
@@ -59,6 +64,17 @@ class MemoryLaw(Law):
     def coefficient_names(self) -> tuple[str, ...]:
         """One name for each coefficient of the polynomial, as in `scalars`."""
         return tuple(name for name in self.scalars if name.partition("[")[0] == self.polynomial)
+
+    @property
+    def input_polynomial(self) -> FloatArray:
+        """(c1, c2, ...)."""
+        return np.array([self.scalars[name] for name in self.coefficient_names])
+
+    @property
+    def input_slope(self) -> FloatArray:
+        """Slope of the polynomial of the input, coefficients in ascending powers."""
+        c = self.input_polynomial
+        return np.asarray(c * np.arange(1.0, c.size + 1.0))
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -77,32 +93,16 @@ class MemoryLaw(Law):
     def tangent(
         self, direction: npt.ArrayLike, z: npt.ArrayLike, u: npt.ArrayLike = 0.0, *others: npt.ArrayLike
     ) -> FloatArray:
-        """Slope dy/du of the output at the memory `z`, for an input at `u` that moves in `direction`.
+        """Slope dy/du [unit of y / unit of u] at the memory `z`, for an input at `u` that moves in `direction`.
 
-        Parameters
-        ----------
-        direction : array
-            Velocity u' or its sign, not zero.
-        z, u : array
-            Memory and input, broadcast against the direction; only a polynomial's slope depends on u.
-        *others : array
-            Further elements of the law's state, in their order.
-
-        Returns
-        -------
-        array
-            [unit of y / unit of u].
-
-        Raises
-        ------
-        ValueError
-            If a direction is zero: the slopes ahead and behind differ.
+        The direction is the velocity u' or its sign; one that is zero has two slopes, and raises ValueError. z, u and
+        the further elements of the law's state, `others` in their order, are broadcast against it.
         """
         velocity, memory = np.asarray(direction, dtype=float), np.asarray(z, dtype=float)
         if not np.all(velocity):
             raise ValueError("direction must not be zero: an input that stands still has two slopes")
         inputs = np.asarray(u, dtype=float)
-        static = np.polynomial.polynomial.polyval(inputs, boucwen_inverse.derivative(self))
+        static = np.polynomial.polynomial.polyval(inputs, self.input_slope)
         further = (np.asarray(other, dtype=float) for other in others)
         return np.asarray(static + self.gain * self._memory_slope(np.sign(velocity), memory, inputs, *further))
 
@@ -111,7 +111,6 @@ class MemoryLaw(Law):
         """Slope dz/du for an input at `u` that moves in `direction`, 1 or -1."""
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box that `hysim.identify` searches, in the coordinates of `hysim.laws.differential._boucwen_search`."""
         return _boucwen_search.search_space(
             self.scalars, self.columns, record, freedom, alike=self.alike(record, freedom)
         )
@@ -120,9 +119,16 @@ class MemoryLaw(Law):
         """Groups of parameters of which one is held on this record."""
         return ()
 
-    def _one_pass(self, parameters: Parameters, u: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        """As `Law._one_pass`, by the faster rows that a family may have."""
+    def inverse_begun(self, y: FloatArray, u0: float | None, state: State | None) -> CompiledLaw:
+        """By a search on the step, from the input that gives the first output with the memory at z0."""
+        if state is None:
+            first = boucwen_inverse.at_rest(self, float(y[0]))[0] if u0 is None else float(u0)
+            state = self.start(first, self.packed[1])
+        u, z, *_ = state
+        powers = [abs(c * u**k) for k, c in enumerate(self.input_polynomial.tolist(), 1)]
+        return self.search_inverse(state, terms=float(abs(self.offset) + sum(powers) + abs(self.gain * z)))
 
+    def _one_pass(self, parameters: Parameters, u: FloatArray) -> Callable[[FloatArray], FloatArray]:
         def passed(z: FloatArray) -> FloatArray:
             sets = {**parameters, **self.memory_only, "z0": np.nan_to_num(z[:, 0], posinf=0.0, neginf=0.0)}
             end = self.outputs_of(sets, u).reduced("final", None, None)[:, np.newaxis]

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
-from hysim.models.law import Tables
+from hysim.models.tables import Tables
 
 _NEGLIGIBLE = 300.0  # in powers of two: a term that is smaller than another one by this factor gives no units
 _LARGEST_POWER = 500.0  # of w^n; beyond it a memory counts as diverged (`hysim.kernels.baber_noori`)

@@ -1,20 +1,4 @@
-"""The Bouc-Wen law of Baber and Noori, which wears off with the energy that it has taken, and pinches.
-
-    dz/du = h (A - delta_a e - (1 + delta_nu e) |z|^n (gamma + beta sgn(z u'))) / (1 + delta_eta e),    de/du = z
-    h     = 1 - zeta1 exp(-(z sgn(u') - q z_u)^2 / zeta2^2),    z_u = (1 / ((1 + delta_nu e) (beta + gamma)))^(1/n)
-    zeta1 = zeta_s (1 - exp(-p e)),    zeta2 = (psi + delta_psi e) (lambda_ + zeta1)
-    y     = offset + c1 u + c2 u^2 + ... + gain z
-
-u is the displacement, y the force, z the memory, and e the work done on it. delta_nu takes strength away, delta_eta
-stiffness, delta_a both; h flattens a way about z = q z_u, the more the more has been worn, as cracks and slack do.
-gain e is the energy that the hysteretic spring has taken [unit of y unit of u]; the rates are those per unit of e,
-not per gain e as in some codes, so that the output stays affine in gain. Along a monotone stretch of the input the
-equations are solved by power series to 1e-12 of the range (`hysim.kernels.baber_noori`). A law that neither wears off
-nor pinches is the Bouc-Wen law to the bit.
-
-Sources: T. T. Baber and Y. K. Wen, J. Eng. Mech. Div. 107 (1981); T. T. Baber and M. N. Noori, J. Eng. Mech. 111
-(1985); G. C. Foliente, J. Struct. Eng. 121 (1995), for the form of the pinching.
-"""
+"""The Bouc-Wen law of Baber and Noori, which degrades with the energy that it has taken, and pinches."""
 
 from typing import ClassVar, Self
 
@@ -24,11 +8,12 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray
 from hysim.kernels import baber_noori as kernels
 from hysim.laws.differential import _boucwen_conversions, _power_units
-from hysim.laws.differential._asymmetric import SteppedLaw
+from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.models.holding import Holding
-from hysim.models.law import Packed, Tables
+from hysim.models.law import Packed
 from hysim.models.model import family
 from hysim.models.search_space import Freedom, Parameters
+from hysim.models.tables import Tables
 from hysim.records import Record
 
 _PINCHING = ("zeta_s", "q", "p", "psi", "delta_psi", "lambda_")
@@ -36,34 +21,38 @@ _OWN = ("delta_a", "delta_nu", "delta_eta", *_PINCHING)
 
 
 @family
-class BoucWenBaberNoori(SteppedLaw):
+class BoucWenBaberNoori(MemoryLaw):
     """Bouc-Wen law with degradation and pinching, after Baber and Noori (1985) and Foliente (1995).
 
-    ``dz/du = h (A(e) - nu(e) |z|^n (gamma + beta sgn(z u'))) / eta(e)`` with ``de/du = z``, and
-    ``y = offset + sum c_k u^k + gain z``
+    ::
+
+        dz/du = h (A - delta_a e - (1 + delta_nu e) |z|^n (gamma + beta sgn(z u'))) / (1 + delta_eta e),    de/du = z
+        h     = 1 - zeta1 exp(-(z sgn(u') - q z_u)^2 / zeta2^2),    z_u = (1 / ((1 + delta_nu e) (beta + gamma)))^(1/n)
+        zeta1 = zeta_s (1 - exp(-p e)),    zeta2 = (psi + delta_psi e) (lambda_ + zeta1)
+        y     = offset + c1 u + c2 u^2 + ... + gain z
+
+    u is the displacement, y the force, z the memory, and gain e the energy that the hysteretic spring has taken. The
+    rates are those per unit of e, not per gain e as in some codes, so that the output stays affine in gain.
 
     Parameters
     ----------
     A, beta, gamma, n : float
         As in `BoucWen`, of the law as it is new.
     delta_a, delta_nu, delta_eta : float
-        Rates of A - delta_a e, nu = 1 + delta_nu e and eta = 1 + delta_eta e [1 / (unit of z unit of u); delta_a
-        that times the unit of A].
+        Rates at which slope, strength and stiffness are lost [1 / (unit of z unit of u); delta_a that times the unit
+        of A].
     zeta_s : float
         Largest depth of the pinching, below 1 for a slope that stays positive; 0 for none.
     q : float
-        Where a way is flattest, in units of z_u.
+        Where a branch is flattest, in units of z_u.
     p : float
         Rate at which the pinching deepens with e [1 / (unit of z unit of u)].
     psi, delta_psi : float
         Width of the pinching, and its growth with e [unit of z, and 1 / unit of u].
     lambda_ : float
         Part of the width that does not depend on the depth.
-    gain, offset, z0 : float
-        As in `BoucWen`.
-    input_coefficients : sequence of float
-        (c1, c2, ...) [unit of y / (unit of u)^k]; c1 is the feedthrough. Their number is the degree that
-        `identify` fits.
+    gain, offset, z0, input_coefficients
+        As in `PolynomialBoucWen`.
 
     Raises
     ------
@@ -73,17 +62,16 @@ class BoucWenBaberNoori(SteppedLaw):
 
     Notes
     -----
-    Good to 1e-12 of the range, and not called exact unless nothing wears off or pinches. Other than all other laws
-    here it is never in a steady cycle as long as it wears off. `identify` holds delta_a, which A and the other rates
-    can nearly do without, and takes a law that pinches as the start, or ``free=("zeta_s",)``, to search the pinching.
+    Solved by power series along monotone strokes, good to 1e-12 of the range; a law that neither degrades nor pinches
+    is the Bouc-Wen law to the bit. A law that degrades is never in a steady cycle. `identify` holds delta_a, which A
+    and the other rates can nearly do without, and needs a law that pinches as the start, or ``free=("zeta_s",)``, to
+    search the pinching. Sources: T. T. Baber and Y. K. Wen, J. Eng. Mech. Div. 107 (1981); T. T. Baber and M. N. Noori,
+    J. Eng. Mech. 111 (1985); G. C. Foliente, J. Struct. Eng. 121 (1995), for the form of the pinching.
 
     Examples
     --------
     >>> import hysim as hs
-    >>> new = hs.BoucWenBaberNoori(beta=0.5, gamma=0.5)
     >>> worn = hs.BoucWenBaberNoori(beta=0.5, gamma=0.5, delta_nu=0.2, delta_eta=0.1)
-    >>> new.response([0.0, 2.0, -2.0, 2.0]).round(6).tolist()
-    [0.0, 0.864665, -0.956515, 0.952332]
     >>> worn.response([0.0, 2.0, -2.0, 2.0]).round(6).tolist()
     [0.0, 0.780431, -0.69475, 0.588304]
     """
@@ -111,7 +99,7 @@ class BoucWenBaberNoori(SteppedLaw):
 
     @classmethod
     def check(cls, tables: Tables) -> None:
-        """Refuse what `MemoryLaw` refuses, and a pinching law in which a width or the yield memory is not positive."""
+        """Refuse also a law that pinches in which a width or the yield memory is not positive."""
         super().check(tables)
         pinches = tables["zeta_s"] != 0.0
         sums = {"beta + gamma": tables["beta"] + tables["gamma"], "psi": tables["psi"], "lambda_": tables["lambda_"]}
@@ -135,7 +123,7 @@ class BoucWenBaberNoori(SteppedLaw):
 
     @classmethod
     def candidates(cls) -> dict[str, Holding]:
-        """What `hysim.compare` tries of this family: the law with n = 1, which few records tell from another n."""
+        """Only the law with n = 1 is tried by `hysim.compare`: few records tell it from another n."""
         return {f"{cls.__name__} with n = 1": Holding(cls(), {"n": 1.0})}
 
     @classmethod
@@ -154,25 +142,15 @@ class BoucWenBaberNoori(SteppedLaw):
     ) -> Self:
         """The material ``uniaxialMaterial BoucWen`` of OpenSees, which degrades.
 
-        Parameters
-        ----------
-        alpha, ko : float
-            Ratio of the stiffness after yielding to the one before it, and that one.
-        n, gamma, beta, Ao : float
-            ``z' = u' (Ao - deltaA e - nu |z|^n (gamma + beta sign(u' z))) / eta``.
-        deltaA, deltaNu, deltaEta : float
-            Rates per unit of their energy, ``e' = (1 - alpha) ko u' z``.
-
-        Returns
-        -------
-        BoucWenBaberNoori
+        alpha is the ratio of the stiffness after yielding to the one before it, ko; n, gamma, beta and Ao are those of
+        ``z' = u' (Ao - deltaA e - nu |z|^n (gamma + beta sign(u' z))) / eta``; deltaA, deltaNu and deltaEta are rates
+        per unit of their energy, ``e' = (1 - alpha) ko u' z``.
 
         Examples
         --------
         >>> import hysim as hs
-        >>> law = hs.BoucWenBaberNoori.from_opensees(
-        ...     alpha=0.1, ko=20.0, n=1.0, gamma=0.5, beta=0.5, deltaNu=0.01, deltaEta=0.02
-        ... )
+        >>> material = {"alpha": 0.1, "ko": 20.0, "n": 1.0, "gamma": 0.5, "beta": 0.5}
+        >>> law = hs.BoucWenBaberNoori.from_opensees(**material, deltaNu=0.01, deltaEta=0.02)
         >>> law.gain, round(law.delta_nu, 12), round(law.delta_eta, 12)
         (18.0, 0.18, 0.36)
         """
@@ -182,10 +160,8 @@ class BoucWenBaberNoori(SteppedLaw):
     def to_opensees(self) -> dict[str, float]:
         """The arguments of `from_opensees`, with Ao = A.
 
-        Raises
-        ------
-        ValueError
-            If the law pinches, has an offset, an initial memory, more than one input coefficient, or no stiffness.
+        Raises ValueError if the law pinches, has an offset, an initial memory, more than one input coefficient, or no
+        stiffness.
         """
         return _boucwen_conversions.to_opensees_degrading(self)
 
@@ -208,16 +184,8 @@ class BoucWenBaberNoori(SteppedLaw):
     ) -> Self:
         """The material ``uniaxialMaterial BWBN`` of OpenSees, which pinches and does not degrade.
 
-        Parameters
-        ----------
-        alpha, ko, n, gamma, beta, Ao : float
-            As in `from_opensees`.
-        q, zetas, p, Shi, deltaShi, lamda : float
-            The pinching in the order of the command, ``lambda`` for lamda; p and deltaShi per unit of their energy.
-
-        Returns
-        -------
-        BoucWenBaberNoori
+        The first six parameters are those of `from_opensees`, the others the pinching in the order of the command, with
+        ``lambda`` for lamda; p and deltaShi are per unit of their energy.
         """
         rates = {"p": p, "delta_psi": deltaShi}
         energy = _boucwen_conversions.from_opensees_energy(alpha, ko, n, gamma, beta, Ao, rates)
@@ -226,23 +194,13 @@ class BoucWenBaberNoori(SteppedLaw):
     def to_opensees_bwbn(self) -> dict[str, float]:
         """The arguments of `from_opensees_bwbn`, with Ao = A.
 
-        Raises
-        ------
-        ValueError
-            If the law degrades, has an offset, an initial memory, more than one input coefficient, or no stiffness.
+        Raises ValueError if the law degrades, has an offset, an initial memory, more than one input coefficient, or no
+        stiffness.
         """
         return _boucwen_conversions.to_opensees_pinching(self)
 
     def energy(self, u: npt.ArrayLike) -> FloatArray:
-        """Work e done on the memory at the samples of `u`, shape (n_samples,) [unit of z unit of u].
-
-        Raises
-        ------
-        SimulationError
-            If the memory diverges; the message names the sample.
-        ValueError
-            If u is not finite or has not one axis.
-        """
+        """Work e done on the memory at the samples of `u`, shape (n_samples,) [unit of z unit of u]; see `response`."""
         return self.remembered(u)[:, 1]
 
     def alike(self, record: Record, freedom: Freedom) -> tuple[tuple[str, ...], ...]:
@@ -251,13 +209,7 @@ class BoucWenBaberNoori(SteppedLaw):
         return tuple((name,) for name in ("delta_a", *(() if pinches else _PINCHING)))
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
-        """Memory z0 with which a record that repeats itself ends as it began, of a law that does not wear off.
-
-        Raises
-        ------
-        ValueError
-            If it wears off or pinches: it then has no steady cycle.
-        """
+        """Initial memory of a steady cycle; ValueError for a law that degrades or pinches, which has none."""
         values = {**self.scalars, **parameters}
         if any(np.any(values[name]) for name in ("delta_a", "delta_nu", "delta_eta", "zeta_s")):
             raise ValueError('a law that wears off has no steady cycle: use initial="free"')

@@ -1,11 +1,4 @@
-"""The symmetric Bouc-Wen law, and the parameters that other people give it.
-
-    dz/du = A - |z|^n (gamma + beta sign(z du))
-    y = offset + feedthrough u + gain z
-
-What follows from the equations is in `hysim.laws.differential._boucwen_law`, the conversions in
-`hysim.laws.differential._boucwen_conversions`.
-"""
+"""The symmetric Bouc-Wen law, and the parameters that other authors and codes give it."""
 
 from typing import ClassVar, Self
 
@@ -16,7 +9,7 @@ from hysim.models.model import family
 
 @family
 class BoucWen(BoucWenLaw):
-    """Symmetric Bouc-Wen law, ``y = offset + feedthrough u + gain z``.
+    """Symmetric Bouc-Wen law, ``dz/du = A - |z|^n (gamma + beta sign(z du))``, ``y = offset + feedthrough u + gain z``.
 
     Parameters
     ----------
@@ -69,19 +62,9 @@ class BoucWen(BoucWenLaw):
     def from_low_guo(cls, *, alpha: float, beta: float, gamma: float, d: float = 1.0, h0: float = 0.0) -> Self:
         """The law of a piezoelectric stack by Low and Guo (1995), ``x = d u - h``.
 
-        Parameters
-        ----------
-        alpha, beta, gamma : float
-            ``h' = alpha d u' - beta |u'| h - gamma u' |h|``; alpha has no unit, the others [1 / unit of u].
-        d : float
-            Displacement per input without hysteresis [unit of x / unit of u].
-        h0 : float
-            Initial h [unit of x].
-
-        Returns
-        -------
-        BoucWen
-            Whose memory is h: A = alpha d, feedthrough = d, gain = -1, n = 1.
+        ``h' = alpha d u' - beta |u'| h - gamma u' |h|``: alpha has no unit, beta and gamma have [1 / unit of u], d is
+        the displacement per input without hysteresis [unit of x / unit of u], h0 the initial h [unit of x]. The memory
+        of the law is h: A = alpha d, feedthrough = d, gain = -1, n = 1.
 
         Examples
         --------
@@ -95,10 +78,7 @@ class BoucWen(BoucWenLaw):
     def to_low_guo(self) -> dict[str, float]:
         """The arguments of `from_low_guo`; there is one set only.
 
-        Raises
-        ------
-        ValueError
-            If n is not 1, there is an offset, or feedthrough or gain is zero.
+        Raises ValueError if n is not 1, there is an offset, or feedthrough or gain is zero.
         """
         return conversions.to_low_guo(self)
 
@@ -117,27 +97,9 @@ class BoucWen(BoucWenLaw):
     ) -> Self:
         """The restoring force by Wen (1976), ``F = alpha k u + (1 - alpha) k D z``.
 
-        Parameters
-        ----------
-        alpha : float
-            Ratio of the stiffness after yielding to the one before it, for A = 1.
-        k : float
-            Stiffness [unit of F / unit of u].
-        A, beta, gamma, n : float
-            ``D z' = A u' - beta |u'| |z|^(n-1) z - gamma u' |z|^n``.
-        D : float
-            Yield displacement [unit of u], with a z that has no unit; 1 where z is a displacement.
-        z0 : float
-            Initial memory.
-
-        Returns
-        -------
-        BoucWen
-
-        Raises
-        ------
-        ValueError
-            If D is zero.
+        ``D z' = A u' - beta |u'| |z|^(n-1) z - gamma u' |z|^n``: alpha is the ratio of the stiffness after yielding to
+        the one before it for A = 1, k the stiffness [unit of F / unit of u], D the yield displacement [unit of u] with
+        a z that has no unit, and 1 where z is a displacement; not zero, else ValueError.
 
         Examples
         --------
@@ -151,10 +113,7 @@ class BoucWen(BoucWenLaw):
     def to_wen(self) -> dict[str, float]:
         """The arguments of `from_wen`, of all sets with this response the one with A = D = 1.
 
-        Raises
-        ------
-        ValueError
-            If there is an offset, A = 0, or no stiffness at z = 0.
+        Raises ValueError if there is an offset, A = 0, or no stiffness at z = 0.
         """
         return conversions.to_wen(self)
 
@@ -162,29 +121,15 @@ class BoucWen(BoucWenLaw):
     def from_normalized(cls, *, k_x: float, k_w: float, rho: float, sigma: float, n: float, w0: float = 0.0) -> Self:
         """The normalised law of Ikhouane and Rodellar (2007), ``F = k_x u + k_w w``.
 
-        Parameters
-        ----------
-        k_x, k_w : float
-            Weights of the input and of the memory.
-        rho, sigma, n : float
-            ``w' = rho (u' - sigma |u'| |w|^(n-1) w + (sigma - 1) u' |w|^n)``; w saturates at 1.
-        w0 : float
-            Initial memory.
-
-        Returns
-        -------
-        BoucWen
-            Whose memory is w: A = rho, beta = rho sigma, gamma = rho (1 - sigma).
+        ``w' = rho (u' - sigma |u'| |w|^(n-1) w + (sigma - 1) u' |w|^n)``: w, which begins at w0, saturates at 1. The
+        memory of the law is w: A = rho, beta = rho sigma, gamma = rho (1 - sigma).
         """
         return cls(**conversions.from_normalized(k_x, k_w, rho, sigma, n, w0))
 
     def to_normalized(self) -> dict[str, float]:
         """The arguments of `from_normalized`; there is one set only.
 
-        Raises
-        ------
-        ValueError
-            If beta + gamma <= 0 or A <= 0, for which nothing saturates at 1, or there is an offset.
+        Raises ValueError if beta + gamma <= 0 or A <= 0, for which nothing saturates at 1, or there is an offset.
         """
         return conversions.to_normalized(self)
 
@@ -194,19 +139,9 @@ class BoucWen(BoucWenLaw):
     ) -> Self:
         """The force of the system-identification benchmark of Noel and Schoukens (2016), ``y = z``.
 
-        Parameters
-        ----------
-        alpha : float
-            Stiffness of the memory [unit of z / unit of u].
-        beta, gamma, delta, nu : float
-            ``z' = alpha u' - beta (gamma |u'| |z|^(nu-1) z + delta u' |z|^nu)``. Our beta is their beta
-            gamma, our gamma their beta delta. Mass, damping and stiffness belong to the oscillator.
-        z0 : float
-            Initial memory.
-
-        Returns
-        -------
-        BoucWen
+        ``z' = alpha u' - beta (gamma |u'| |z|^(nu-1) z + delta u' |z|^nu)``: alpha is the stiffness of the memory
+        [unit of z / unit of u]. Our beta is their beta gamma, our gamma their beta delta. Mass, damping and stiffness
+        belong to the oscillator.
 
         Examples
         --------
@@ -220,10 +155,7 @@ class BoucWen(BoucWenLaw):
     def to_noel_schoukens(self) -> dict[str, float]:
         """The arguments of `from_noel_schoukens`, of all sets with this response the one with beta = 1.
 
-        Raises
-        ------
-        ValueError
-            If there is a feedthrough or an offset, or the gain is zero.
+        Raises ValueError if there is a feedthrough or an offset, or the gain is zero.
         """
         return conversions.to_noel_schoukens(self)
 
@@ -243,23 +175,8 @@ class BoucWen(BoucWenLaw):
     ) -> Self:
         """The material ``uniaxialMaterial BoucWen`` of OpenSees, ``alpha ko u + (1 - alpha) ko z``.
 
-        Parameters
-        ----------
-        alpha, ko : float
-            Ratio of the stiffness after yielding to the one before it, and that one.
-        n, gamma, beta, Ao : float
-            ``z' = u' (Ao - |z|^n (gamma + beta sign(u' z)))``.
-        deltaA, deltaNu, deltaEta : float
-            Rates of degradation: a law without it takes zeros only.
-
-        Returns
-        -------
-        BoucWen
-
-        Raises
-        ------
-        ValueError
-            If the material degrades.
+        ``z' = u' (Ao - |z|^n (gamma + beta sign(u' z)))``: alpha is the ratio of the stiffness after yielding to the
+        one before it, ko. The rates of degradation deltaA, deltaNu and deltaEta must be zero, else ValueError.
         """
         degradation = {"deltaA": deltaA, "deltaNu": deltaNu, "deltaEta": deltaEta}
         return cls(**conversions.from_opensees(alpha, ko, n, gamma, beta, Ao, degradation))
@@ -267,10 +184,7 @@ class BoucWen(BoucWenLaw):
     def to_opensees(self) -> dict[str, float]:
         """The arguments of `from_opensees`, of all sets with this response the one with Ao = 1.
 
-        Raises
-        ------
-        ValueError
-            If there is an offset or an initial memory, A = 0, or no stiffness at z = 0.
+        Raises ValueError if there is an offset or an initial memory, A = 0, or no stiffness at z = 0.
         """
         return conversions.to_opensees(self)
 
@@ -288,25 +202,9 @@ class BoucWen(BoucWenLaw):
     ) -> Self:
         """The material ``uniaxialMaterial BoucWenOriginal`` of OpenSees, ``alphaL E u + (1 - alphaL) fy z``.
 
-        Parameters
-        ----------
-        E, fy : float
-            Stiffness before yielding and yield force, positive.
-        alphaL : float
-            Ratio of the stiffness of the linear spring to E.
-        alphaNL : float
-            That of the spring with the power mu: a law without it takes zero only.
-        eta, beta, gamma : float
-            ``z' = u' (1 - |z|^eta (gamma + beta sign(z u'))) E / fy``; z has no unit.
-
-        Returns
-        -------
-        BoucWen
-
-        Raises
-        ------
-        ValueError
-            If E or fy is not positive, or alphaNL is not zero.
+        ``z' = u' (1 - |z|^eta (gamma + beta sign(z u'))) E / fy``: E is the stiffness before yielding and fy the yield
+        force, both positive, alphaL the ratio of the stiffness of the linear spring to E. alphaNL, that of the spring
+        with the power mu, must be zero. Other values raise ValueError.
 
         Examples
         --------
@@ -320,10 +218,7 @@ class BoucWen(BoucWenLaw):
     def to_opensees_original(self) -> dict[str, float]:
         """The arguments of `from_opensees_original`, of all sets with this response the one with beta + gamma = 1.
 
-        Raises
-        ------
-        ValueError
-            If there is an offset or an initial memory, A = 0, no stiffness at z = 0, or nothing yields.
+        Raises ValueError if there is an offset or an initial memory, A = 0, no stiffness at z = 0, or nothing yields.
         """
         return conversions.to_opensees_original(self)
 
@@ -333,33 +228,12 @@ class BoucWen(BoucWenLaw):
     ) -> Self:
         """The material ``BoucWen`` of suanPan, whose gamma is 1 - beta.
 
-        Parameters
-        ----------
-        elastic_modulus, yield_stress : float
-            Positive; z is driven by the strain in units of yield_stress / elastic_modulus, and yields at 1.
-        hardening : float
-            Ratio of the stiffness after yielding to the one before it.
-        beta, n : float
-            ``z' = u' (1 - |z|^n (1 - beta + beta sign(z u'))) elastic_modulus / yield_stress``.
-
-        Returns
-        -------
-        BoucWen
-
-        Raises
-        ------
-        ValueError
-            If elastic_modulus or yield_stress is not positive.
+        ``z' = u' (1 - |z|^n (1 - beta + beta sign(z u'))) elastic_modulus / yield_stress``: both are positive, else
+        ValueError; hardening is the ratio of the stiffness after yielding to the one before it.
         """
         shape = {"eta": n, "beta": beta, "gamma": 1.0 - beta}
         return cls(**conversions.from_opensees_original(elastic_modulus, yield_stress, hardening, 0.0, **shape))
 
     def to_suanpan(self) -> dict[str, float]:
-        """The arguments of `from_suanpan`; there is one set only.
-
-        Raises
-        ------
-        ValueError
-            As `to_opensees_original`.
-        """
+        """The arguments of `from_suanpan`; there is one set only. Raises ValueError as `to_opensees_original`."""
         return conversions.to_suanpan(self)

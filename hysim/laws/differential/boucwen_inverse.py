@@ -1,61 +1,29 @@
 """The inverse of a Bouc-Wen law: the input that gives a wanted output.
 
-    offset + P(u) + gain z(u) = y,    segment by segment from the last sample to the next
+    offset + P(u) + gain z(u) = y,    stroke by stroke from the last sample to the next
 
-It exists where the output is monotone, that is, where dy/du = P'(u) + gain dz/du keeps one sign along the
-way, and on the way back from each sample. `hysim.kernels.boucwen_inverse` finds it to rounding. The state is
-that of the law, and the last output, so that an output that stands still leaves the input where it is, to
-the bit.
-
-Where the memory is bounded, so is the slope, and a law whose bounds have one sign has an inverse for every
-output that it can reach. For a piezoelectric stack, y = d (u - h) with the memory h of Low and Guo, this is
-their alpha max(1, 2 beta / (beta + gamma)) < 1.
+It exists where dy/du = P'(u) + gain dz/du keeps one sign on the way, and on the way back from each sample;
+`hysim.kernels.boucwen_inverse` computes it to rounding. The state is that of the law and the last output, so that an
+output that stands still leaves the input where it is, to the bit.
 """
 
-import math
-from collections.abc import Mapping
-from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen, read_only
-from hysim._parallel import in_pieces
 from hysim.errors import SimulationError
+from hysim.kernels import boucwen
 from hysim.kernels import boucwen_inverse as kernels
-from hysim.kernels.stepping import drive
-from hysim.models.protocols import CompiledLaw
+from hysim.kernels.charts import N_WORK
+from hysim.kernels.inverses import N_LIMITS
+from hysim.models.inverse_search import inverse_response
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 
 LawState = tuple[float, ...]
 InverseState = tuple[float, float, float]
 """Last input, memory and last output."""
-
-
-class MonotoneLaw(Protocol):
-    """What a law must have to be inverted; both Bouc-Wen laws do."""
-
-    A: float
-    beta: float
-    gamma: float
-    n: float
-    gain: float
-    offset: float
-    z0: float
-
-    @property
-    def coefficient_names(self) -> tuple[str, ...]:
-        """One name for each coefficient of the input."""
-        ...
-
-    @property
-    def scalars(self) -> Mapping[str, float]:
-        """Numbers by name."""
-        ...
-
-    def compiled(self, u0: float = 0.0) -> CompiledLaw:
-        """The forward step."""
-        ...
 
 
 @frozen
@@ -92,29 +60,12 @@ class BoucWenInverse:
     def advance(
         self, y: npt.ArrayLike, state: LawState | InverseState | None = None
     ) -> tuple[FloatArray, InverseState | None]:
-        """Input at the samples of `y`, continued from `state`, and the state after the last sample.
+        """Input at the samples of `y`, a number or (n_samples,) [unit of y], and the state after the last sample.
 
-        Parameters
-        ----------
-        y : float or array, shape (n_samples,)
-            Wanted output [unit of y].
-        state : (float, float) or (float, float, float), optional
-            Input and memory at the last sample so far, and its output; by default the first sample finds the
-            memory at z0.
-
-        Returns
-        -------
-        u : array of the shape of y
-            Input [unit of u]; the same bits as from one uncut output.
-        state : (float, float, float)
-            To continue from.
-
-        Raises
-        ------
-        SimulationError
-            If the output is not monotone in the input, or does not reach a sample; it names the place.
-        ValueError
-            If y is not finite, or its first sample does not tell the first input.
+        It continues from `state`, input and memory at the last sample so far and its output where known, with the same
+        bits as from one uncut output; by default the first sample meets the memory at z0. Raises SimulationError if the
+        output is not monotone in the input or does not reach a sample, and ValueError if y is not finite or its first
+        sample does not determine the first input.
         """
         outputs = read_only(y, "y")
         if outputs.ndim > 1:
@@ -122,118 +73,76 @@ class BoucWenInverse:
         samples = outputs.reshape(-1)
         if state is None and not samples.size:
             return outputs, None
-        start = self._rest(samples[0]) if state is None else state
-        compiled = self._compiled(start)
-        u = np.empty(samples.size)
-        with np.errstate(all="ignore"):  # a bracket may reach where the memory overflows
-            failed = in_pieces(
-                lambda k: drive(compiled.step, compiled.parameters, compiled.state, samples[k], u[k]), u.size
-            )
-        if failed >= 0:
-            raise SimulationError(self._failure(failed, samples[failed], *compiled.state[2:4]))
+        start = at_rest(self.law, samples[0]) if state is None else state
+        compiled = self.begun(start)
+        u = inverse_response(compiled, samples, unreached)
         last_u, last_y, z = compiled.state[[0, 1, kernels.N_OWN + 1]].tolist()
         return u.reshape(outputs.shape), (last_u, z, last_y)
 
-    def compiled(
-        self, y0: float | None = None, *, u0: float | None = None, limits: tuple[float, float] = (-math.inf, math.inf)
-    ) -> CompiledLaw:
-        """The inverse as compiled loops take it, ``u = step(parameters, state, y)``; see `hysim.kernels.inverses`.
+    def compiled(self, y0: float | None = None, *, u0: float | None = None, limits: Limits = UNLIMITED) -> CompiledLaw:
+        """The inverse as compiled loops take it, ``u = step(parameters, state, y)``, nan where no input has the output.
 
-        Parameters
-        ----------
-        y0 : float, optional
-            Output at which the law rests before the first sample, its memory at z0.
-        u0 : float, optional
-            Or the input at which it rests; by default zero.
-        limits : (float, float)
-            Lowest and highest input to which its copy of the law moves.
-
-        Returns
-        -------
-        CompiledLaw
-            Its step returns nan where there is no inverse.
+        The law rests, its memory at z0, at the output `y0` or the input `u0`, by default zero. Its copy of the law
+        moves between the `limits` of the input.
         """
         if y0 is not None and u0 is None:
-            return self._compiled(self._rest(float(y0)), limits)
-        return self._compiled((float(u0 or 0.0), self.law.z0), limits)
+            return self.begun(at_rest(self.law, float(y0)), limits)
+        return self.begun((float(u0 or 0.0), self.law.z0), limits)
 
-    def _compiled(
-        self, state: LawState | InverseState, limits: tuple[float, float] = (-math.inf, math.inf)
-    ) -> CompiledLaw:
+    def begun(self, state: LawState | InverseState, limits: Limits = UNLIMITED) -> CompiledLaw:
+        """The inverse in a state, as compiled loops take it."""
         law = self.law
         u, z, *known = (float(value) for value in state)
         forward = law.compiled(u)
         forward.state[1] = z
         last_y = known[0] if known else forward.step(forward.parameters, forward.state, u)
-        c = coefficients(law)
-        head = [1.0 if self.increasing else -1.0, law.A, law.beta, law.gamma, law.n, law.gain, law.offset, c.size]
-        return CompiledLaw(
-            kernels.step,
-            read_only(np.concatenate([limits, head, c, forward.parameters]), finite=False),
-            np.concatenate([[u, last_y, np.nan, np.nan], forward.state]),
-        )
-
-    def _rest(self, y: float) -> InverseState:
-        """State at an output with the memory at z0: the root of the polynomial on its branch through u = 0."""
-        slope = coefficients(self.law)[0]
-        if slope == 0.0:
-            raise ValueError(
-                "the first output does not tell the first input, as the law has no slope beside its memory: give u0"
-            )
-        static = replace(self.law, A=0.0, beta=0.0, gamma=0.0)
-        compiled = BoucWenInverse(law=static, increasing=bool(slope > 0.0)).compiled(u0=0.0)
-        u = compiled.step(compiled.parameters, compiled.state, y)
-        if not np.isfinite(u):
-            raise SimulationError(
-                f"no input gives the first output {y:g} with the memory at z0: the polynomial turns at "
-                f"u = {compiled.state[2]:g}; give u0 to begin on another branch"
-            )
-        return float(u), self.law.z0, float(y)
-
-    def _failure(self, sample: int, y: float, u: float, slope: float) -> str:
-        wanted = "positive" if self.increasing else "negative"
-        if slope > 0.0 if self.increasing else slope < 0.0:
-            return f"the output does not reach sample {sample} (y = {y:g}): at u = {u:g} its slope is {slope:g}"
-        return (
-            f"the law has no inverse at sample {sample} (y = {y:g}): at u = {u:g} its slope is {slope:g}, not {wanted}"
-        )
+        shape = [law.A, law.beta, law.gamma, law.n, law.gain, law.offset]
+        return _stepped(self.increasing, shape, law.input_polynomial, forward, [u, last_y], limits)
 
 
-def inverse(law: MonotoneLaw, u: float = 0.0) -> BoucWenInverse:
-    """The inverse with the direction that the law has at the input `u` and z = 0.
-
-    Raises
-    ------
-    ValueError
-        If its slope is zero there.
-    """
-    slope = float(np.polynomial.polynomial.polyval(u, derivative(law))) + law.gain * law.A
+def inverse(law: Any, u: float = 0.0) -> BoucWenInverse:
+    """The inverse with the direction that the law has at the input `u` and z = 0; ValueError if its slope is zero."""
+    slope = float(np.polynomial.polynomial.polyval(u, law.input_slope)) + law.gain * law.A
     if slope == 0.0:
         raise ValueError(f"the law has no inverse: its slope is zero at u = {u:g}, z = 0")
     return BoucWenInverse(law=law, increasing=slope > 0.0)
 
 
-def inverse_response(
-    law: MonotoneLaw, y: npt.ArrayLike, u0: float | None, state: LawState | InverseState | None
-) -> FloatArray:
-    """Inputs for the outputs `y`; see `BoucWen.inverse_response`."""
-    outputs = read_only(y, "y", ndim=1)
-    if state is not None and u0 is not None:
-        raise ValueError("give u0 or state, not both: the state has its own input")
-    if not outputs.size:
-        return outputs
-    if state is None:
-        state = BoucWenInverse(law=law)._rest(float(outputs[0])) if u0 is None else (float(u0), law.z0)
-    return inverse(law, float(state[0])).advance(outputs, state)[0]
+def at_rest(law: Any, y: float) -> InverseState:
+    """State at an output with the memory at z0: the root of the polynomial on its branch through u = 0."""
+    c = law.input_polynomial
+    if c[0] == 0.0:
+        raise ValueError(
+            "the first output does not tell the first input, as the law has no slope beside its memory: give u0"
+        )
+    shape = [0.0, 0.0, 0.0, 1.0, law.gain, law.offset]
+    forward = CompiledLaw(boucwen.step, read_only([*shape, *c]), np.append([0.0, law.z0], np.zeros(N_WORK - 2)))
+    last_y = forward.step(forward.parameters, forward.state, 0.0)
+    static = _stepped(bool(c[0] > 0.0), shape, c, forward, [0.0, last_y], UNLIMITED)
+    u = static.step(static.parameters, static.state, y)
+    if not np.isfinite(u):
+        raise SimulationError(
+            f"no input gives the first output {y:g} with the memory at z0: the polynomial turns at "
+            f"u = {static.state[2]:g}; give u0 to begin on another branch"
+        )
+    return float(u), law.z0, float(y)
 
 
-def coefficients(law: MonotoneLaw) -> FloatArray:
-    """(c1, c2, ...) of the input's polynomial."""
-    scalars = law.scalars
-    return np.array([scalars[name] for name in law.coefficient_names])
+def unreached(sample: int, y: float, inverse: CompiledLaw) -> str:
+    """Message for an output that has no input, with the slope where the search ended."""
+    direction, (u, slope) = inverse.parameters[N_LIMITS], inverse.state[2:4]
+    if direction * slope > 0.0:
+        return f"the output does not reach sample {sample} (y = {y:g}): at u = {u:g} its slope is {slope:g}"
+    wanted = "positive" if direction > 0.0 else "negative"
+    return f"the law has no inverse at sample {sample} (y = {y:g}): at u = {u:g} its slope is {slope:g}, not {wanted}"
 
 
-def derivative(law: MonotoneLaw) -> FloatArray:
-    """Coefficients of P' in ascending powers."""
-    c = coefficients(law)
-    return np.asarray(c * np.arange(1.0, c.size + 1.0))
+def _stepped(
+    increasing: bool, shape: list[float], c: FloatArray, forward: CompiledLaw, place: list[float], limits: Limits
+) -> CompiledLaw:
+    head = [1.0 if increasing else -1.0, *shape, c.size]
+    return CompiledLaw(
+        kernels.step,
+        read_only(np.concatenate([limits, head, c, forward.parameters]), finite=False),
+        np.concatenate([[*place, np.nan, np.nan], forward.state]),
+    )

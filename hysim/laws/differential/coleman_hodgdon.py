@@ -1,35 +1,24 @@
-"""The Duhem law of Coleman and Hodgdon in its backlash-like form.
-
-    y' = alpha |u'| (c u + offset - y) + B u'
-
-u is the input, y the output. Whatever the direction, y is drawn to the line offset + c u, and runs beside it at the
-distance |B - c| / alpha in the end. Measured from that line the law is Dahl's,
-
-    y = offset + c u + z,    z' = (B - c) u' - alpha |u'| z
-
-so that along a monotone stretch of the input, with L its length and s its direction, it has the closed form
-
-    z = z_0 exp(-alpha L) + s (B - c) (1 - exp(-alpha L)) / alpha
-
-Everything is evaluated by the exact Bouc-Wen kernels with n = 1, A = B - c, beta = alpha and gamma = 0. The loop runs
-counterclockwise where B < c, as a piezoelectric displacement does.
-
-Sources: B. D. Coleman and M. L. Hodgdon, Int. J. Eng. Sci. 24 (1986); C.-Y. Su, Y. Stepanenko, J. Svoboda and
-T. P. Leung, IEEE Trans. Autom. Control 45 (2000), for the backlash-like form.
-"""
+"""The Duhem law of Coleman and Hodgdon in its backlash-like form."""
 
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.laws.differential._as_bouc_wen import AsBoucWen
-from hysim.models.law import Tables
+from hysim.laws.differential._equivalent_boucwen import EquivalentBoucWen
 from hysim.models.model import family
 from hysim.models.parameters import Parameter
+from hysim.models.tables import Tables
 
 
 @family
-class ColemanHodgdon(AsBoucWen):
+class ColemanHodgdon(EquivalentBoucWen):
     """Backlash-like Duhem law, ``y' = alpha |u'| (c u + offset - y) + B u'``.
+
+    Whatever the direction, y is drawn to the line offset + c u, and in the end runs beside it at the distance
+    ``|B - c| / alpha``. Above that line the law is Dahl's, ``y = offset + c u + z`` with
+    ``z' = (B - c) u' - alpha |u'| z``, and is evaluated exactly as the Bouc-Wen law with n = 1, A = B - c, beta = alpha
+    and gamma = 0. The loop runs counterclockwise where B < c, as a piezoelectric displacement does. Sources: B. D.
+    Coleman and M. L. Hodgdon, Int. J. Eng. Sci. 24 (1986); C.-Y. Su et al., IEEE Trans. Autom. Control 45 (2000), for
+    the backlash-like form.
 
     Parameters
     ----------
@@ -42,7 +31,7 @@ class ColemanHodgdon(AsBoucWen):
     offset : float
         Height of the line at u = 0 [unit of y].
     z0 : float
-        What the output is above the line at the first sample [unit of y].
+        Output above the line at the first sample [unit of y].
 
     Raises
     ------
@@ -78,7 +67,7 @@ class ColemanHodgdon(AsBoucWen):
 
     @classmethod
     def equivalent(cls, tables: Tables) -> dict[str, FloatArray]:
-        """The law with A = B - c and beta = alpha, whose memory is the height of the output above the line."""
+        """The law with A = B - c and beta = alpha, whose memory is the output above the line."""
         memory = {"A": tables["B"] - tables["c"], "beta": tables["alpha"], "gamma": np.zeros_like(tables["alpha"])}
         return {**memory, "feedthrough": tables["c"], "offset": tables["offset"], "z0": tables["z0"]}
 

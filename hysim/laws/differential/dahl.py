@@ -1,28 +1,23 @@
-"""Dahl's friction law, which is the Bouc-Wen law with n = 1 and gamma = 0, under the names of its field.
-
-    F' = sigma (u' - |u'| F / F_c),    y = offset + F
-
-u is the displacement, F the friction force, sigma the stiffness at F = 0, F_c the Coulomb force to which F
-tends. (Dahl's exponent is 1.) Everything is evaluated by the exact Bouc-Wen kernels with A = sigma and
-beta = sigma / F_c.
-
-Source: P. R. Dahl, A solid friction model, Aerospace Corporation 1968.
-"""
+"""Dahl's friction law."""
 
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.laws.differential._as_bouc_wen import AsBoucWen
-from hysim.models.law import Tables
+from hysim.laws.differential._equivalent_boucwen import EquivalentBoucWen
 from hysim.models.model import family
 from hysim.models.parameters import Parameter
+from hysim.models.tables import Tables
 
 _STARTS = ((0.03, 0.5), (0.1, 0.5), (0.3, 0.7), (1.0, 1.5))  # coulomb / stiffness in spans of u, coulomb in spans of y
 
 
 @family
-class Dahl(AsBoucWen):
+class Dahl(EquivalentBoucWen):
     """Dahl friction, ``F' = stiffness (u' - |u'| F / coulomb)`` and ``y = offset + F``.
+
+    u is the displacement and F the friction force; Dahl's exponent is 1. It is the Bouc-Wen law with A = stiffness,
+    beta = stiffness / coulomb, n = 1 and gamma = 0. Source: P. R. Dahl, A solid friction model, Aerospace Corporation
+    1968.
 
     Parameters
     ----------

@@ -1,21 +1,4 @@
-"""The polynomial Duhem law: one slope where the input rises, another where it falls.
-
-    y = offset + feedthrough u + z,    z' = u' p(u, z) + |u'| q(u, z)
-    p = sum (p_ij + p_abs_ij |z|) u^i z^j,    q = sum (q_ij + q_abs_ij |z|) u^i z^j
-    dz/du = p + q  where u rises,             dz/du = p - q  where u falls
-
-u is the input, z the memory, y the output. The law does not depend on time. It has hysteresis exactly if q is
-not zero. Without feedthrough and offset the memory is the output: the law is one of u and y. The memory is
-evaluated at the samples of an input that is linear between them by power series (`hysim.kernels.duhem`), to 1e-12
-of the range. Special cases:
-
-    Coleman-Hodgdon    p = b,                q = a (c u - y)
-    Dahl               p = r,                q = -(r / F) y
-    Bouc-Wen, n = 1    p = A - gamma |z|,    q = -beta z
-    Bouc-Wen, n = 2    p = A - gamma z^2,    q = -beta |z| z
-
-Sources: P. Duhem 1897; B. D. Coleman and M. L. Hodgdon, Int. J. Eng. Sci. 24 (1986).
-"""
+"""The polynomial Duhem law: one slope where the input rises, another where it falls."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import field
@@ -24,17 +7,25 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
+from hysim._frozen import FloatArray, check_whole, read_only
 from hysim.kernels import duhem as kernels
-from hysim.laws.differential import _duhem_search, duhem_structure
+from hysim.laws.differential import _duhem_search
 from hysim.laws.differential.duhem_runs import branches, free_runs, outputs
 from hysim.laws.differential.duhem_structure import DuhemStructure
-from hysim.laws.differential.terms import Polynomials, Term, equation, latex, polynomials, terms_of
-from hysim.models import inverse_search
-from hysim.models.law import Law, Packed, State, Tables
+from hysim.laws.differential.terms import (
+    Polynomials,
+    Term,
+    duhem_terms,
+    equation,
+    latex,
+    polynomials,
+    terms_of,
+)
+from hysim.models.law import Law, Packed, State
 from hysim.models.model import family
 from hysim.models.protocols import CompiledLaw
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.tables import Tables
 from hysim.records import Record
 
 _BOUND = 1e3
@@ -48,6 +39,18 @@ def _none() -> FloatArray:
 @family
 class Duhem(Law):
     """Polynomial Duhem law, ``y = offset + feedthrough u + z`` with ``z' = u' p(u, z) + |u'| q(u, z)``.
+
+    ::
+
+        p = sum (p_ij + p_abs_ij |z|) u^i z^j,    q = sum (q_ij + q_abs_ij |z|) u^i z^j
+        Coleman-Hodgdon    p = b,                q = a (c u - y)
+        Dahl               p = r,                q = -(r / F) y
+        Bouc-Wen, n = 1    p = A - gamma |z|,    q = -beta z
+        Bouc-Wen, n = 2    p = A - gamma z^2,    q = -beta |z| z
+
+    dz/du is p + q where u rises and p - q where it falls: the law has hysteresis exactly if q is not zero. Without
+    feedthrough and offset the memory z is the output. It is computed by power series to 1e-12 of the range. Sources: P.
+    Duhem 1897; B. D. Coleman and M. L. Hodgdon, Int. J. Eng. Sci. 24 (1986).
 
     Parameters
     ----------
@@ -67,6 +70,11 @@ class Duhem(Law):
     ValueError
         If an array is empty, has not two axes, or a number is not finite.
 
+    Notes
+    -----
+    Without u0 and state the `inverse_response` begins at rest at u = 0, the output at y0: the law that comes from there
+    has the wanted output to 1e-12 of its range, and so has its `response` if that begins at y0.
+
     Examples
     --------
     >>> import hysim as hs
@@ -75,9 +83,6 @@ class Duhem(Law):
     "y' = u' (1) + |u'| (-1 y)"
     >>> law.response([0.0, 1.0, -1.0]).round(6).tolist()
     [0.0, 0.632121, -0.779117]
-    >>> law = hs.Duhem.from_terms({"u'": 1.0, "u' |z|": -0.3, "|u'| z": -0.6}, feedthrough=40.0)  # Bouc-Wen's
-    >>> law.equation
-    "z' = u' (1 - 0.3 |z|) + |u'| (-0.6 z), y = 40 u + z"
     """
 
     p: FloatArray
@@ -101,22 +106,10 @@ class Duhem(Law):
     def from_terms(
         cls, terms: Mapping[str, float], *, feedthrough: float = 0.0, offset: float = 0.0, y0: float = 0.0
     ) -> Self:
-        """The law with these coefficients.
+        """The law with these coefficients, by names such as ``"u'"``, ``"u' u^2"``, ``"|u'| u y"`` or ``"|u'| |z| z"``.
 
-        Parameters
-        ----------
-        terms : mapping
-            Names such as ``"u'"``, ``"u' u^2"``, ``"|u'| u y"``, ``"u' |z|"``, ``"|u'| |z| z"`` to coefficients;
-            the memory is called y or z.
-        feedthrough, offset : float
-            Slope of the output beside the memory, and what is added to both.
-        y0 : float
-            Output at the first sample.
-
-        Raises
-        ------
-        ValueError
-            If a name is not in the vocabulary, or two name the same term.
+        The memory is called y or z; feedthrough, offset and y0 are those of the constructor. Raises ValueError if a
+        name is not in the vocabulary, or two name the same term.
         """
         parsed = [Term.parse(name) for name in terms]
         for term, name in zip(parsed, terms, strict=True):
@@ -138,23 +131,9 @@ class Duhem(Law):
     ) -> Self:
         """The law by its two slopes, ``z' = f1(u, z) u'`` where u rises and ``z' = f2(u, z) u'`` where it falls.
 
-        Parameters
-        ----------
-        ascending, descending : array, shape (rows, columns)
-            Element [i, j] of f1 and of f2 multiplies ``u^i z^j`` [unit of y^(1-j) / unit of u^(i+1)]. The shapes may
-            differ.
-        feedthrough, offset, y0 : float
-            As in the constructor.
-
-        Returns
-        -------
-        Duhem
-            With p = (f1 + f2) / 2 and q = (f1 - f2) / 2.
-
-        Raises
-        ------
-        ValueError
-            If an array is empty, has not two axes, or a number is not finite.
+        Element [i, j] of `ascending` (f1) and `descending` (f2) multiplies ``u^i z^j``
+        [unit of y^(1-j) / unit of u^(i+1)]; the shapes may differ. Then p = (f1 + f2) / 2 and q = (f1 - f2) / 2. Errors
+        are those of the constructor.
 
         Examples
         --------
@@ -172,46 +151,31 @@ class Duhem(Law):
 
     @classmethod
     def candidates(cls) -> dict[str, DuhemStructure]:
-        """What `hysim.compare` tries of this family: polynomials of the first and of the second degree."""
+        """Polynomials of the first and of the second degree, for `hysim.compare`."""
         return {f"Duhem of degree {degree}": cls.structure(degree=degree) for degree in (1, 2)}
 
     @classmethod
     def structure(cls, *, degree: int | None = None, terms: Sequence[str] | None = None) -> DuhemStructure:
-        """What `hysim.identify` takes: the terms of a law between u and y, without their coefficients.
+        """Terms of a law between u and y for `hysim.identify`, whose search begins at a regression on the record.
 
-        The search begins at a regression on the record, so that no start is needed.
-
-        Parameters
-        ----------
-        degree : int, optional
-            Every monomial of u and y up to this degree, with u' and with ``|u'|``: (degree + 1)(degree + 2) terms.
-        terms : sequence of str, optional
-            Or the names of the terms, as in `from_terms`, without ``|z|``.
-
-        Returns
-        -------
-        DuhemStructure
-
-        Raises
-        ------
-        ValueError, TypeError
-            If not one of the two is given, the degree is not a whole number of at least zero, or a name is not in the
-            vocabulary.
+        Give either `degree`, for every monomial of u and y up to it, with u' and with ``|u'|``, (degree + 1)(degree +
+        2) terms; or `terms`, names as in `from_terms` without ``|z|``. Raises ValueError or TypeError if not one of the
+        two is given, the degree is not a whole number of at least zero, or a name is not in the vocabulary.
 
         Examples
         --------
         >>> import hysim as hs
         >>> law = hs.Duhem.from_terms({"u'": 0.345, "|u'| u": 3.1635, "|u'| y": -1.0})
         >>> u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=60)
-        >>> structure = hs.Duhem.structure(terms=["u'", "|u'| u", "|u'| y"])
-        >>> fit = hs.identify(structure, hs.Record(u=u, y=law.response(u)))
+        >>> fit = hs.identify(hs.Duhem.structure(terms=["u'", "|u'| u", "|u'| y"]), hs.Record(u=u, y=law.response(u)))
         >>> round(fit.estimates["|u'| u"], 6)
         3.1635
         """
         if degree is not None and terms is None:
-            return duhem_structure.of_degree(degree, cls(p=_none(), q=_none()))
+            check_whole(degree, "degree", least=0)
+            return DuhemStructure(family=cls(p=_none(), q=_none()), terms=duhem_terms(degree))
         if terms is not None and degree is None:
-            return duhem_structure.of_terms(tuple(terms), cls(p=_none(), q=_none()))
+            return DuhemStructure(family=cls(p=_none(), q=_none()), terms=tuple(sorted(set(map(Term.parse, terms)))))
         raise ValueError("give degree or terms, one of the two")
 
     @property
@@ -233,25 +197,7 @@ class Duhem(Law):
         return latex(self.equation)
 
     def tangent(self, direction: npt.ArrayLike, z: npt.ArrayLike, u: npt.ArrayLike = 0.0) -> FloatArray:
-        """Slope dy/du of the output at the memory `z`, for an input at `u` that moves in `direction`.
-
-        Parameters
-        ----------
-        direction : array
-            Velocity u' or its sign, not zero.
-        z, u : array
-            Memory and input, broadcast against the direction.
-
-        Returns
-        -------
-        array
-            [unit of y / unit of u].
-
-        Raises
-        ------
-        ValueError
-            If a direction is zero: the slope ahead and the one behind differ.
-        """
+        """Slope dy/du at the memory `z`, for an input at `u` that moves in `direction`; see `hysim.BoucWen.tangent`."""
         velocity = np.asarray(direction, dtype=float)
         if not np.all(velocity):
             raise ValueError("direction must not be zero: an input that stands still has two slopes")
@@ -260,46 +206,11 @@ class Duhem(Law):
         size = np.abs(memory)
         return np.asarray(self.feedthrough + (p + size * p_abs) + np.sign(velocity) * (q + size * q_abs))
 
-    def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
-        """Input that gives the output `y`, linear between the samples.
-
-        Parameters
-        ----------
-        y : array, shape (n_samples,)
-            Wanted output.
-        u0 : float, optional
-            Input at which the law rests, its output at y0, before it moves to the first sample; by default zero.
-        state : (float, float), optional
-            Input and memory to continue from, in place of u0 and y0.
-
-        Returns
-        -------
-        array, shape (n_samples,)
-            The law that comes from u0 through these inputs has the output y, to 1e-12 of its range; so has its
-            `response` if y begins at y0.
-
-        Raises
-        ------
-        SimulationError
-            If the output does not reach a sample, or does not rise (or fall) all the way there; it names the sample.
-        ValueError
-            If y is not finite or has not one axis, both u0 and state are given, or the slope is zero where the
-            record begins.
-
-        Examples
-        --------
-        >>> import hysim as hs
-        >>> law = hs.Duhem.from_terms({"u'": 1.0, "u' |z|": -0.3, "|u'| z": -0.6}, feedthrough=2.0)
-        >>> law.inverse_response(law.response([0.0, 1.0, 0.2])).round(9).tolist()
-        [0.0, 1.0, 0.2]
-        """
-        if state is not None and u0 is not None:
-            raise ValueError("give u0 or state, not both: the state has its own input")
-        outputs = read_only(y, "y", ndim=1)
-        start = state or self.start(float(u0 or 0.0), np.empty(0))
-        terms = abs(self.offset) + abs(self.feedthrough * start[0]) + abs(start[1])
-        forward = self._begun(np.array([start[0]]), start)[0]
-        return inverse_search.inverse_response(inverse_search.inverse_step(forward, start[0], terms=terms), outputs)
+    def inverse_begun(self, y: FloatArray, u0: float | None, state: State | None) -> CompiledLaw:
+        """By a search on the step; by default from rest at u = 0, the output at y0."""
+        begin = state or self.start(float(u0 or 0.0), np.empty(0))
+        terms = abs(self.offset) + abs(self.feedthrough * begin[0]) + abs(begin[1])
+        return self.search_inverse(begin, terms=terms)
 
     @property
     def workspace(self) -> int:  # type: ignore[override]
@@ -325,7 +236,6 @@ class Duhem(Law):
 
     @classmethod
     def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:
-        """As `Law.path`, without the checks of a single step."""
         offset, feedthrough, *shape = law.parameters[:5]
         slopes = law.parameters[5:].reshape([int(length) for length in shape])
         lost = int(kernels.path(slopes, law.state[0], law.state[1], u, kernels.LARGEST, y))
@@ -336,25 +246,19 @@ class Duhem(Law):
 
     @classmethod
     def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
-        """As `Law.rows`, the slopes of all laws side by side."""
         laws = branches(Polynomials(*(tables[name] for name in Polynomials._fields)))
         offset, feedthrough, y0 = (tables[name][:, 0] for name in ("offset", "feedthrough", "y0"))
         y[:] = outputs(laws, feedthrough, y0 - offset, u, kernels.LARGEST, 1) + offset[:, np.newaxis]
 
     def divergence(self, sample: int, u: float, y: float) -> str:
-        """The law's equation."""
+        """Message with the law's equation."""
         return f"{super().divergence(sample, u, y)}: {self.equation}"
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box that `identify` searches; see `hysim.laws.differential._duhem_search`."""
         return _duhem_search.search_space(self.scalars, record, freedom)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """The output itself, shape (n_sets, n_samples, 1): it is affine in none of the parameters.
-
-        A law whose memory goes 1000 times as far as the record counts as one that escapes: following it costs
-        much and can only lose.
-        """
+        """The output itself, shape (n_sets, n_samples, 1): it is affine in none of the parameters."""
         values = {**self.scalars, **parameters}
         names = [name for name in values if name not in _OUTPUT]
         columns = np.broadcast_arrays(*(np.atleast_1d(values[name]) for name in (*names, *_OUTPUT)))

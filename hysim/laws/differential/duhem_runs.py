@@ -27,27 +27,10 @@ def free_runs(
     *,
     workers: int | None = None,
 ) -> FloatArray:
-    """Outputs of many laws of the same terms.
+    """Outputs (n_sets, n_samples) of many laws from `coefficients` (n_sets, n_terms); inf where one diverges.
 
-    Parameters
-    ----------
-    terms : sequence of Term, length n_terms
-        The structure.
-    coefficients : array, shape (n_sets, n_terms)
-        One law a row.
-    feedthrough, y0 : float or array, shape (n_sets,)
-        Slope of the output beside the memory, and the output at the first sample.
-    u : array, shape (1, n_samples) or (n_sets, n_samples)
-        Inputs, read-only as a record has them.
-    bound : float
-        A law whose memory goes beyond it escapes.
-    workers : int, optional
-        Number of threads; by default one for each core. The result does not depend on it.
-
-    Returns
-    -------
-    array, shape (n_sets, n_samples)
-        A law that escapes is a row of inf.
+    `feedthrough` and `y0` are one number or (n_sets,), the inputs `u` (1 or n_sets, n_samples) and read-only. A law
+    whose memory goes beyond the `bound` counts as diverging. The result does not depend on the number of `workers`.
     """
     laws = branches(polynomials(terms, np.atleast_2d(coefficients)))
     return outputs(laws, np.asarray(feedthrough), np.asarray(y0), u, bound, workers)

@@ -17,7 +17,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.laws.differential import _duhem_search
-from hysim.laws.differential.terms import Term, duhem_terms
+from hysim.laws.differential.terms import Term
 from hysim.models.composable import Composable
 from hysim.models.protocols import Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
@@ -33,22 +33,22 @@ class DuhemStructure(Identifiable, Composable):
     family: Identifiable
     terms: tuple[Term, ...]
 
-    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box of `Duhem.search_space` around the regression on this record.
+    def __post_init__(self) -> None:
+        if not self.terms:
+            raise ValueError("terms must name at least one term")
+        if barred := [term.name for term in self.terms if term.absolute]:
+            raise ValueError(f"{barred[0]!r} needs a memory of its own: begin the search from a law, Duhem.from_terms")
 
-        Raises
-        ------
-        ValueError
-            If the input is constant, `initial` is unknown, or a name or a bound does not fit.
-        """
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """The box of `Duhem.search_space` around the regression on this record."""
         names = [term.name for term in self.terms]
         degrees = sorted({term.degree for term in self.terms}, reverse=True)
         level = {"feedthrough": 0.0, "offset": 0.0, "y0": float(record.y[0]) if len(record) else 0.0}
-        found = [{**dict.fromkeys(names, 0.0), **self._regression(record, degree), **level} for degree in degrees]
-        found.sort(key=lambda values: self._distance(values, record))
-        space = _duhem_search.search_space(found[0], record, freedom)
+        candidates = [{**dict.fromkeys(names, 0.0), **self._regression(record, degree), **level} for degree in degrees]
+        candidates.sort(key=lambda values: self._distance(values, record))
+        space = _duhem_search.search_space(candidates[0], record, freedom)
         unit = {name: values[0] for name, values in space.parameters(np.ones(space.lower.size)).items()}
-        starts = np.array([[values[name] / unit[name] for name in space.coordinates] for values in found])
+        starts = np.array([[values[name] / unit[name] for name in space.coordinates] for values in candidates])
         return replace(space, starts=np.clip(starts, space.lower, space.upper), screened=0)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
@@ -79,34 +79,3 @@ class DuhemStructure(Identifiable, Composable):
         norms[norms == 0.0] = 1.0
         solution = np.linalg.lstsq(table / norms, record.y, rcond=_RANK)[0] / norms
         return {term.name: float(value) for term, value in zip(terms, solution, strict=False)}
-
-
-def of_degree(degree: int, family: Identifiable) -> DuhemStructure:
-    """Every monomial of u and y up to `degree`, with u' and with ``|u'|``.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If the degree is not a whole number of at least zero.
-    """
-    if isinstance(degree, bool) or not isinstance(degree, int):
-        raise TypeError(f"degree must be a whole number, got {degree!r}")
-    if degree < 0:
-        raise ValueError(f"degree must not be negative, got {degree}")
-    return DuhemStructure(family=family, terms=duhem_terms(degree))
-
-
-def of_terms(names: tuple[str, ...], family: Identifiable) -> DuhemStructure:
-    """The terms with these names.
-
-    Raises
-    ------
-    ValueError
-        If there is none, a name is not in the vocabulary, or holds ``|z|``.
-    """
-    terms = tuple(sorted({Term.parse(name) for name in names}))
-    if not terms:
-        raise ValueError("terms must name at least one term")
-    if barred := [term.name for term in terms if term.absolute]:
-        raise ValueError(f"{barred[0]!r} needs a memory of its own: begin the search from a law, Duhem.from_terms")
-    return DuhemStructure(family=family, terms=terms)

@@ -1,15 +1,4 @@
-"""The generalised Bouc-Wen law of Song and Der Kiureghian.
-
-    dz/du = A - |z|^n psi
-    psi = gamma + beta sgn(u' z) + b2 sgn(u' u) + b3 sgn(z u) + b4 sgn(u') + b5 sgn(z) + b6 sgn(u)
-    y = offset + c1 u + c2 u^2 + ... + gain z
-
-psi is one number in each of the six sectors that the signs of u', z and u make of a loop in the (u, z) plane,
-so each sector can be bent by itself. It is evaluated exactly for every n (`hysim.kernels.generalized`).
-
-Source: J. Song and A. Der Kiureghian, J. Eng. Mech. 132 (2006). Their beta_1 is our beta. Their psi has no
-constant gamma; with it the Bouc-Wen law is the special case b2 = ... = b6 = 0.
-"""
+"""The generalised Bouc-Wen law of Song and Der Kiureghian."""
 
 from typing import ClassVar
 
@@ -17,20 +6,23 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.kernels import generalized as kernels
-from hysim.laws.differential._asymmetric import SteppedLaw
-from hysim.models.law import Packed, Tables
+from hysim.laws.differential._memory_law import MemoryLaw
+from hysim.models.law import Packed
 from hysim.models.model import family
 from hysim.models.search_space import Freedom
+from hysim.models.tables import Tables
 from hysim.records import Record
 
 _SECTORS = ("b2", "b3", "b4", "b5", "b6")
 _ONE_SIDED = (("b6", "gamma"), ("b3", "b5"), ("b2", "b4"))
-"""Where u keeps its sign, the terms of a pair are the same to a sign."""
+"""Pairs of terms that are the same to a sign as long as u keeps its sign."""
 
 
 @family
-class GeneralizedBoucWen(SteppedLaw):
+class GeneralizedBoucWen(MemoryLaw):
     """Bouc-Wen law with a shape for each sector of the loop, after Song and Der Kiureghian (2006).
+
+    A loop in the (u, z) plane has six sectors by the signs of u', z and u; psi is one number in each.
 
     ``dz/du = A - |z|^n psi`` with ``psi = gamma + beta sgn(u' z) + b2 sgn(u' u) + b3 sgn(z u) + b4 sgn(u') +
     b5 sgn(z) + b6 sgn(u)``, and ``y = offset + sum c_k u^k + gain z``
@@ -42,11 +34,8 @@ class GeneralizedBoucWen(SteppedLaw):
     b2, b3, b4, b5, b6 : float
         Their beta_2 to beta_6 [unit of z^(1-n) / unit of u]. The loop is symmetric about its centre if b4, b5
         and b6 are zero.
-    gain, offset, z0 : float
-        As in `BoucWen`.
-    input_coefficients : sequence of float
-        (c1, c2, ...) [unit of y / (unit of u)^k]; c1 is the feedthrough. Their number is the degree that
-        `identify` fits.
+    gain, offset, z0, input_coefficients
+        As in `PolynomialBoucWen`.
 
     Raises
     ------
@@ -57,7 +46,7 @@ class GeneralizedBoucWen(SteppedLaw):
     -----
     Exact for every n. On an input that keeps its sign only the sums gamma + b6, b3 + b5 and b2 + b4 can be told
     (differences for a negative one): `identify` then holds b6, b3 and b2. No class of stability is known for the
-    general case.
+    general case. Source: J. Song and A. Der Kiureghian, J. Eng. Mech. 132 (2006).
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The steady loop of a Bouc-Wen memory under an input that goes to and fro between -X and X.
+"""The steady loop of a Bouc-Wen memory under an input between -X and X.
 
     dz/du = A - |z|^n (gamma + beta sign(z du)),    s = beta + gamma,  d = gamma - beta,  A > 0
 
@@ -64,12 +64,8 @@ class LimitCycle:
 def limit_cycle(A: float, beta: float, gamma: float, n: float, amplitude: float) -> LimitCycle:
     """Compute the steady loop, good to 1e-13 of each quantity where |beta| is above 1e-3 |gamma|.
 
-    Raises
-    ------
-    ValueError
-        If the amplitude is not positive, or A = 0: such a memory dies out.
-    SimulationError
-        If the memory diverges within one stroke.
+    Raises ValueError if the amplitude is not positive, or A = 0: such a memory dies out, and SimulationError if the
+    memory diverges within one stroke.
     """
     if not 0.0 < amplitude < math.inf:
         raise ValueError(f"amplitude must be positive and finite, got {amplitude}")

@@ -1,12 +1,4 @@
-"""The Bouc-Wen law beside a polynomial of the input, for asymmetric loops.
-
-    dz/du = A - |z|^n (gamma + beta sign(z du))
-    y = offset + c1 u + c2 u^2 + ... + gain z
-
-What follows from the equations is in `hysim.laws.differential._boucwen_law`.
-
-Source: the polynomial input for asymmetric piezoelectric loops after Wang, Chen and Bai 2015.
-"""
+"""The Bouc-Wen law beside a polynomial of the input, for asymmetric loops."""
 
 from hysim.laws.differential._boucwen_law import BoucWenLaw
 from hysim.models.model import family
@@ -15,6 +7,8 @@ from hysim.models.model import family
 @family
 class PolynomialBoucWen(BoucWenLaw):
     """Bouc-Wen law beside a polynomial of the input, ``y = offset + sum c_k u^k + gain z``.
+
+    The memory is that of `BoucWen`. Source: Wang, Chen and Bai 2015, for asymmetric piezoelectric loops.
 
     Parameters
     ----------

@@ -43,10 +43,7 @@ class Term(NamedTuple):
     def parse(cls, name: str) -> Self:
         """The term of a name such as ``"|u'| u y^2"`` or ``"|u'| |z| z"``; the memory is called y or z.
 
-        Raises
-        ------
-        ValueError
-            If the name is not that of a term of a polynomial law.
+        Raises ValueError if the name is not that of a term of a polynomial law.
         """
         match = _NAME.fullmatch(name)
         if match is not None:
@@ -128,10 +125,7 @@ def bouc_wen_exponent(terms: Iterable[Term]) -> float | None:
 def duhem_terms(degree: int) -> tuple[Term, ...]:
     """All terms u' u^i y^j and ``|u'| u^i y^j`` with i + j <= degree, in the one order.
 
-    Raises
-    ------
-    ValueError
-        If `degree` is no whole number from 0 up.
+    Raises ValueError if `degree` is no whole number from 0 up.
     """
     powers = [(total, j) for total in range(_whole(degree) + 1) for j in range(total + 1)]
     return tuple(Term(rectified, total, j) for rectified in (False, True) for total, j in powers)
@@ -140,10 +134,7 @@ def duhem_terms(degree: int) -> tuple[Term, ...]:
 def memory_terms(degree: int) -> tuple[Term, ...]:
     """All terms u' and ``|u'|`` times z^j, or ``|z|`` z^(j-1), with j <= degree, in the one order.
 
-    Raises
-    ------
-    ValueError
-        If `degree` is no whole number from 0 up.
+    Raises ValueError if `degree` is no whole number from 0 up.
     """
     powers = [(0, True)] + [(power, even) for power in range(1, _whole(degree) + 1) for even in (False, True)]
     return tuple(sorted(power_term(rate, power, even=even) for rate in (False, True) for power, even in powers))
@@ -152,15 +143,12 @@ def memory_terms(degree: int) -> tuple[Term, ...]:
 def named_terms(names: Iterable[str]) -> tuple[Term, ...]:
     """The terms of these names, in the one order.
 
-    Raises
-    ------
-    ValueError
-        If there is none, or one is unknown or given twice.
+    Raises ValueError if there is none, or one is unknown or given twice.
     """
-    given = [names] if isinstance(names, str) else list(names)
-    terms = tuple(sorted({Term.parse(name) for name in given}))
-    if len(terms) < len(given) or not terms:
-        raise ValueError(f"a library is a list of different terms, got {given}")
+    listed = [names] if isinstance(names, str) else list(names)
+    terms = tuple(sorted({Term.parse(name) for name in listed}))
+    if len(terms) < len(listed) or not terms:
+        raise ValueError(f"a library is a list of different terms, got {listed}")
     return terms
 
 
@@ -171,10 +159,7 @@ def symmetric(terms: Iterable[Term], symmetry: str | None) -> tuple[Term, ...]:
     and of ``|u'|`` those that are odd; an even one has of u' those that are odd in u and of ``|u'|`` those that are
     even.
 
-    Raises
-    ------
-    ValueError
-        If `symmetry` is not None, "odd" or "even".
+    Raises ValueError if `symmetry` is not None, "odd" or "even".
     """
     if symmetry is None:
         return tuple(terms)
@@ -220,12 +205,12 @@ def polynomials(terms: Sequence[Term], coefficients: FloatArray) -> Polynomials:
 
 def terms_of(polynomials: Polynomials) -> dict[Term, float]:
     """The coefficients of one law that are not zero, in the one order."""
-    found = {}
+    coefficients = {}
     for k, part in enumerate(polynomials):
         rectified, absolute = bool(k % 2), k >= 2
         for i, j in np.argwhere(part).tolist():
-            found[Term(rectified, i + j + absolute, j, absolute)] = float(part[i, j])
-    return {term: found[term] for term in sorted(found)}
+            coefficients[Term(rectified, i + j + absolute, j, absolute)] = float(part[i, j])
+    return {term: coefficients[term] for term in sorted(coefficients)}
 
 
 def coefficient_units(u: FloatArray, y: FloatArray, terms: Iterable[Term]) -> FloatArray:
@@ -278,7 +263,7 @@ _TYPESETTING = (
 
 
 def latex(text: str) -> str:
-    """What `equation` wrote, for LaTeX."""
+    """The text of `equation` for LaTeX."""
     for pattern, replacement in _TYPESETTING:
         text = re.sub(pattern, replacement, text)
     return text

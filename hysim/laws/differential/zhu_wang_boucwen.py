@@ -1,18 +1,9 @@
 """The asymmetric Bouc-Wen law of Zhu and Wang.
 
-    dz/du = A - |z|^n (gamma + beta sgn(z du)) + delta u sgn(du)
-    y = offset + c1 u + c2 u^2 + ... + gain z
-
-The last term steepens the way up and flattens the way down where delta u > 0, and the other way round where
-delta u < 0. It is odd: reflected in (u, z) = (0, 0) the law is the same, so that a loop about u = 0 stays point
-symmetric, and one on the voltages of a piezoelectric actuator, which are not centred, does not. n = 1 is
-evaluated in closed form, other n by power series to 1e-12 of the range (`hysim.kernels.zhu_wang`).
-
 Source: W. Zhu and D.-H. Wang, Sensors and Actuators A 181 (2012), whose paper we know from others' accounts: these
-write the rate z' with the term ``delta u sgn(u')``, which has no factor of the speed and so makes the loop
-depend on it. The form here is the term of dz/du, that is, ``delta u |u'|`` in z'. With the factor ``|u'|`` the
-printed term would be ``delta u u'``, in dz/du a term delta u without sign: the law for an input
-u + delta u^2 / (2 A) in the first term alone.
+write the rate z' with the term ``delta u sgn(u')``, which has no factor of the speed and so makes the loop depend on
+it. The form here is the term of dz/du, that is, ``delta u |u'|`` in z'. With the factor ``|u'|`` the printed term would
+be ``delta u u'``: the law for an input u + delta u^2 / (2 A) in the first term alone.
 """
 
 from typing import ClassVar
@@ -22,29 +13,31 @@ import numpy as np
 from hysim._frozen import FloatArray
 from hysim.kernels import zhu_wang as kernels
 from hysim.laws.differential import _power_units
-from hysim.laws.differential._asymmetric import SteppedLaw
-from hysim.models.law import Packed, Tables
+from hysim.laws.differential._memory_law import MemoryLaw
+from hysim.models.law import Packed
 from hysim.models.model import family
+from hysim.models.tables import Tables
 
 
 @family
-class ZhuWangBoucWen(SteppedLaw):
+class ZhuWangBoucWen(MemoryLaw):
     """Bouc-Wen law with the term ``delta u sgn(du)``, after Zhu and Wang (2012).
 
     ``dz/du = A - |z|^n (gamma + beta sgn(z du)) + delta u sgn(du)``, ``y = offset + sum c_k u^k + gain z``
+
+    The last term steepens the rising branch and flattens the falling one where delta u > 0, and the other way round
+    where delta u < 0. It is odd: a loop about u = 0 stays point symmetric, one on the voltages of a piezoelectric
+    actuator does not.
 
     Parameters
     ----------
     A, beta, gamma, n : float
         As in `BoucWen`.
     delta : float
-        What the slope of z gains on the way up, and loses on the way down, for each unit of u
-        [unit of z / (unit of u)^2]; zero is the Bouc-Wen law. An input that is shifted has another loop.
-    gain, offset, z0 : float
-        As in `BoucWen`.
-    input_coefficients : sequence of float
-        (c1, c2, ...) [unit of y / (unit of u)^k]; c1 is the feedthrough. Their number is the degree that
-        `identify` fits.
+        What the slope of z gains where the input rises, and loses where it falls, for each unit of u
+        [unit of z / (unit of u)^2]; zero is the Bouc-Wen law.
+    gain, offset, z0, input_coefficients
+        As in `PolynomialBoucWen`.
 
     Raises
     ------

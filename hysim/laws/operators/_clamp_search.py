@@ -1,38 +1,34 @@
-"""What is searched of a law of plays or stops.
+"""The search for the parameters of a law of plays or stops.
 
-The output is affine in the weights, the feedthrough and the offset. A bank has its thresholds given: where a
-record says nothing else, they are spread evenly over half the span of the input, the way that a cycle can move.
-A threshold that the user frees is searched between the middles of the gaps to its neighbours, so that their
-order stays. The threshold of a single element is searched on all of that way.
+The output is affine in the weights, the feedthrough and the offset. A bank has its thresholds given, by default evenly
+over half the span of the input. A threshold that the user frees is searched between the middles of the gaps to its
+neighbours, so that their order stays.
 
-One-signed weights (the default) are those of the classical operator, of one density: all elements past the
-threshold zero turn the loop the way in which the record's own runs. Least squares without it fit noise by
-weights of alternating sign, and such a law may have no inverse.
+One-signed weights (the default) are those of the classical operator, of one density: all elements past the threshold
+zero turn the loop in the sense of the record's own. Without it least squares fit noise by weights of alternating sign,
+and such a law may have no inverse.
 
-A law whose plays are pushed by more than the input (`Pushing`) adds what is searched of that.
+The memory of many plays is as many unknowns, which no record determines. With ``initial="rest"``, the default of a
+bank, the plays stand at zero before the first sample. With ``"free"`` the memory is that of a single former turning
+point, the stroke from rest at zero to `turn`:
 
-The memory of many plays is as many unknowns, which no record can tell. With ``initial="rest"``, the default of
-a bank, the plays stand at zero before the first sample. With ``"free"`` the memory is the one that a single
-former turning point leaves behind:
+    z_i = sign(turn) max(|turn| - r_i, 0)
 
-    z_i = sign(turn) max(|turn| - r_i, 0)        the way from rest at zero to `turn`, then to the first sample
-
-It holds every record that begins at rest or at a turning point of its cycle, or in a cycle about zero;
-any other steady cycle is ``"periodic"``: the positions that the record itself leaves behind. A single element
-has its z0, searched where the first input allows it to be.
+It holds for every record that begins at rest or at a turning point of its cycle, or in a cycle about zero; any other
+steady cycle is ``"periodic"``: the positions that the record itself leaves behind.
 """
 
 import itertools
 from collections.abc import Mapping
 from dataclasses import fields, replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray, checked
+from hysim._frozen import FloatArray, check_whole, checked
 from hysim.laws.operators._clamps import check_elements, positions
 from hysim.models.composable import Composable
-from hysim.models.parameters import Coordinate, space_of
+from hysim.models.parameters import Coordinate, space_of, spans
 from hysim.models.protocols import Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
@@ -50,44 +46,24 @@ class Axis(NamedTuple):
     scale: float
 
 
-class Pushing(Protocol):
-    """How a law's plays are pushed, as far as its parameters are to be identified."""
+@checked
+class Pushing:
+    """The search for the way in which the input pushes plays; here it pushes them itself."""
 
     def axes(self, record: Record) -> dict[str, Axis]:
-        """What is searched beside thresholds and turning point, by name."""
-        ...
+        """Coordinates beside thresholds and turning point, by name."""
+        return {}
 
     def derived(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
-        """What the law has in place of the coordinates, by name, (n_sets,) each."""
-        ...
+        """Parameters of the law in place of the coordinates, by name, (n_sets,) each."""
+        return {}
 
     def positions(self, parameters: Parameters, thresholds: FloatArray, z0: FloatArray, record: Record) -> FloatArray:
         """Positions (n_sets, n_samples, n_plays) for thresholds and initial positions (n_sets, n_plays)."""
-        ...
-
-    def arguments(self, parameters: Mapping[str, float]) -> dict[str, Any]:
-        """The constructor's arguments beside those of every bank."""
-        ...
-
-
-@checked
-class ByTheInput:
-    """Plays and stops that the input itself pushes."""
-
-    def axes(self, record: Record) -> dict[str, Axis]:
-        """Nothing."""
-        return {}
-
-    def derived(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
-        """Nothing."""
-        return {}
-
-    def positions(self, parameters: Parameters, thresholds: FloatArray, z0: FloatArray, record: Record) -> FloatArray:
-        """Positions (n_sets, n_samples, n_plays)."""
         return positions(thresholds, z0, record.u)
 
     def arguments(self, parameters: Mapping[str, float]) -> dict[str, Any]:
-        """Nothing."""
+        """The constructor's arguments beside those of every bank."""
         return {}
 
 
@@ -99,24 +75,15 @@ class ClampStructure(Identifiable, Composable):
     thresholds: tuple[float, ...] = ()
     plays: int = 10
     one_signed: bool = True
-    pushing: Pushing = ByTheInput()
+    pushing: Pushing = Pushing()
 
     def __post_init__(self) -> None:
-        if isinstance(self.plays, bool) or not isinstance(self.plays, int):
-            raise TypeError(f"plays must be an int, got {self.plays!r}")
-        if self.plays < 1:
-            raise ValueError(f"plays must be at least 1, got {self.plays}")
+        check_whole(self.plays, "plays")
         check_elements(self.law, *[np.atleast_2d(self.thresholds)] * 3)
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """Thresholds and memory as coordinates where they are free; the rest is linear.
-
-        Raises
-        ------
-        ValueError
-            If the input is constant, `initial` is unknown, or a name or a bound does not fit.
-        """
-        half = half_span(record)
+        """Thresholds and memory as coordinates where they are free; the rest is linear."""
+        half = spans(record)["h"]
         thresholds = self._thresholds(half)
         names, columns = self._names("thresholds", thresholds.size), self._columns(thresholds.size)
         first, axes = float(record.u[0]), self.pushing.axes(record)
@@ -126,8 +93,8 @@ class ClampStructure(Identifiable, Composable):
             **dict.fromkeys(columns, 0.0),
             TURN: first,
         }
-        given = freedom.held(defaults, at_rest=(TURN,) if freedom.starts_at_rest("rest") else ())
-        held = {name: defaults[name] for name in names if name not in freedom.free} | given
+        chosen = freedom.held(defaults, at_rest=(TURN,) if freedom.starts_at_rest("rest") else ())
+        held = {name: defaults[name] for name in names if name not in freedom.free} | chosen
         limits = freedom.limits(defaults, held)
         gaps = zip(names, _gaps(thresholds), strict=True)
         box = [
@@ -168,10 +135,7 @@ class ClampStructure(Identifiable, Composable):
         return np.concatenate([elements, *static, ones, np.zeros_like(ones)], axis=-1)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        """The parameters with the positions of the steady cycle of which `record` is one period or more.
-
-        One run through the record wipes out what was before it.
-        """
+        """The parameters with the positions after one run through the record, which erases what was before it."""
         thresholds, z0 = self._elements(parameters)
         z = self.pushing.positions(parameters, thresholds, z0, record)[:, -1]
         shape = np.broadcast_shapes(*map(np.shape, parameters.values()))
@@ -188,7 +152,7 @@ class ClampStructure(Identifiable, Composable):
         return law(**tuples, **others, **self.pushing.arguments(parameters))
 
     def _thresholds(self, half: float) -> FloatArray:
-        """Those given, or in even steps: from zero for plays; for stops, which are nothing there, up to the end."""
+        """The structure's own, or even steps: from zero for plays, up to the end for stops, which vanish at zero."""
         if self.thresholds:
             return np.array(self.thresholds)
         steps = np.arange(self.plays) + float(self.law.stops)
@@ -220,20 +184,6 @@ class ClampStructure(Identifiable, Composable):
             return {}
         side = (0.0, np.inf) if self.law.stops == runs_clockwise(record) else (-np.inf, 0.0)
         return {name: side for name, threshold in thresholds.items() if threshold > 0.0}
-
-
-def half_span(record: Record) -> float:
-    """Half the span of the input: the largest threshold of which a cycle can tell.
-
-    Raises
-    ------
-    ValueError
-        If the input is constant.
-    """
-    span = float(np.ptp(record.u))
-    if span == 0.0:
-        raise ValueError("the input is constant: nothing can be identified from it")
-    return 0.5 * span
 
 
 def _after(turn: Any, thresholds: FloatArray) -> FloatArray:

@@ -4,9 +4,8 @@
     y      = offset + feedthrough u + sum_i w_i z_i              plays
     y      = offset + feedthrough u + sum_i w_i (u - z_i)        stops
 
-The positions z_i are the memory. z0 is where they stand before the first sample, which pushes them like any
-other; the default, zero, is a memory at rest at u = 0. With c = feedthrough + sum w_i for stops, a stop is a
-play of the negative weight beside c u, so that every law is
+The positions z_i are the memory; z0 is where they stand before the first sample, which pushes them like any other. A
+stop is a play of the negative weight beside a line, so that with c = feedthrough + sum w_i for stops every law is
 
     y = offset + c u + sum_i v_i z_i,    v_i = w_i or -w_i
 """
@@ -19,17 +18,18 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, items, read_only
 from hysim.kernels import clamps as kernels
 from hysim.laws.differential.limit_cycle import LimitCycle
-from hysim.models.law import Law, Packed, Tables
+from hysim.models.law import Law, Packed
 from hysim.models.protocols import CompiledLaw
+from hysim.models.tables import Tables
 
 
 class Bank(Law):
     """Plays or stops; a law says what its thresholds and weights are called, and adds its fields."""
 
-    thresholds_name: ClassVar[str]
-    weights_name: ClassVar[str]
-    stops: ClassVar[bool]
-    bank: ClassVar[bool]  # whether thresholds, weights and z0 are tuples
+    thresholds_name: ClassVar[str] = "thresholds"
+    weights_name: ClassVar[str] = "weights"
+    stops: ClassVar[bool] = False
+    bank: ClassVar[bool] = True  # whether thresholds, weights and z0 are tuples
     ordered: ClassVar[bool] = False  # whether the thresholds must increase
     offset: float
     z0: Any
@@ -85,7 +85,6 @@ class ClampLaw(Bank):
 
     @classmethod
     def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:
-        """As `Law.path`, the plays of a sample side by side."""
         output, elements = np.split(law.parameters, [kernels.N_OUTPUT])
         thresholds, weights = np.split(elements, 2)
         kernels.path(thresholds, weights, output, law.state[1:], np.empty(weights.size), u, y)
@@ -94,32 +93,15 @@ class ClampLaw(Bank):
 
     @classmethod
     def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
-        """As `Law.rows`, the plays of a sample side by side."""
         output = cls.pack(tables).parameters[:, : kernels.N_OUTPUT]
         thresholds, weights = (read_only(tables[name]) for name in (cls.thresholds_name, cls.weights_name))
         kernels.batch(thresholds, weights, read_only(output), read_only(tables["z0"]), u, y)
 
     def tangent(self, direction: npt.ArrayLike, z: npt.ArrayLike, u: npt.ArrayLike) -> FloatArray:
-        """Slope dy/du at the positions `z`, for an input at `u` that moves in `direction`.
+        """Slope dy/du [unit of y / unit of u] at the positions `z`, for an input at `u` that moves in `direction`.
 
-        Parameters
-        ----------
-        direction : array
-            Velocity u' or its sign, not zero.
-        z : array, shape (..., n_plays)
-            Positions as `memory` gives them; without the last axis for a single play or stop.
-        u : array
-            Input, broadcast against the direction.
-
-        Returns
-        -------
-        array
-            [unit of y / unit of u], of the shape of the direction and the input.
-
-        Raises
-        ------
-        ValueError
-            If a direction is zero: the slope ahead and the one behind differ.
+        The direction is the velocity u' or its sign, ValueError if zero; u is broadcast against it. z has the shape
+        (..., n_plays) of `memory`, without the last axis for a single play or stop.
         """
         velocity, inputs = (np.asarray(values, dtype=float)[..., np.newaxis] for values in (direction, u))
         if not np.all(velocity):
@@ -133,37 +115,24 @@ class ClampLaw(Bank):
     def slope_bounds(self) -> tuple[float, float]:
         """Lowest and highest slope dy/du over every input.
 
-        After a reversal the plays are pushed one after the other in the order of their thresholds, so that
-        the slopes are c, c + v_0, c + v_0 + v_1, ...; of these, the first is never seen where a threshold is
-        zero.
+        After a reversal the plays are pushed one after the other in the order of their thresholds: the slopes are c, c
+        + v_0, c + v_0 + v_1, ..., the first of them only where no threshold is zero.
         """
         slope, thresholds, weights = self.as_plays
         slopes = slope + np.concatenate([[0.0], np.cumsum(weights)])
-        seen = slopes[np.count_nonzero(thresholds == 0.0) :]
-        return float(seen.min()), float(seen.max())
+        reached = slopes[np.count_nonzero(thresholds == 0.0) :]
+        return float(reached.min()), float(reached.max())
 
     def limit_cycle(self, amplitude: float) -> LimitCycle:
-        """Steady loop between the inputs -amplitude and amplitude, about the offset.
+        """Steady loop of y - offset between the inputs -X and X, the `amplitude` [unit of u].
 
-        A play of threshold r < X goes to and fro between -(X - r) and X - r. So with the amplitude X ::
+        ::
 
             peak      = c X + sum v (X - r)         mid_width = 2 |sum v min(r, X - r)|
             energy    = -4 sum v r (X - r)          over the plays with r < X
 
-        Parameters
-        ----------
-        amplitude : float
-            [unit of u].
-
-        Returns
-        -------
-        LimitCycle
-            Of y - offset; the energy is positive for a loop that runs clockwise.
-
-        Raises
-        ------
-        ValueError
-            If the amplitude is not positive and finite.
+        The energy is positive for a loop that runs clockwise. Raises ValueError if the amplitude is not positive and
+        finite.
 
         Examples
         --------
@@ -204,11 +173,7 @@ def check_elements(cls: type[Bank], thresholds: FloatArray, weights: FloatArray,
 
 
 def end_positions(thresholds: FloatArray, z0: FloatArray, u: FloatArray) -> FloatArray:
-    """Positions (n_sets, n_plays) at the end of the input `u`, from those before its first sample.
-
-    A play that has been carried along forgets where it stood. Else it has been pushed by the largest and by
-    the smallest input, in either order, to the same place.
-    """
+    """Positions (n_sets, n_plays) at the end of the input `u`, from those before its first sample."""
     z = z0.copy()
     for value in _turning_values(u):
         z = np.minimum(np.maximum(z, value - thresholds), value + thresholds)
@@ -233,6 +198,6 @@ def _turning_values(u: FloatArray) -> FloatArray:
 
 
 def _first_zero(u: FloatArray, y: FloatArray) -> float:
-    """Where a polyline through points of falling `u`, whose ends are opposite, crosses zero first."""
+    """First zero of a polyline through points of falling `u`, whose ends are opposite."""
     k = int(np.argmax(np.sign(y[:-1]) * np.sign(y[1:]) <= 0.0))
     return float(u[k] - y[k] * (u[k + 1] - u[k]) / (y[k + 1] - y[k])) if y[k] else float(u[k])

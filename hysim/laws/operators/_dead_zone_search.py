@@ -1,11 +1,11 @@
-"""What is searched of the modified Prandtl-Ishlinskii law.
+"""The search for the parameters of the modified Prandtl-Ishlinskii law.
 
     y = offset + S(sum_i w_i z_i),    S(x) = x + sum_j c_j S_(d_j)(x)
 
 With given weights of the plays the output is affine in those of the dead zones, which are solved for. The plays'
 weights are searched; the search begins with the plain law's least squares, and with a law's own weights where there
-is one. Plays have their thresholds given, as for the plain law, and so have the dead zones: where a record says nothing
-else, they are spread evenly inside the range of x that the plain law has on it. The weight of the dead zone zero is
+is one. The thresholds of plays and dead zones are given,
+by default evenly inside the range that the plain law's x has on the record. The weight of the dead zone zero is
 one, because a factor on x could be taken for one on S. At the first sample the plays stand at zero, or where a periodic
 record leaves them.
 """
@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hysim._frozen import FloatArray, checked
+from hysim._frozen import FloatArray, check_whole, checked
 from hysim.laws.operators._clamp_search import ClampStructure
 from hysim.laws.operators._play_sums import check_dead_zones, dead_zone
 from hysim.models.composable import Composable
@@ -38,21 +38,12 @@ class DeadZoneStructure(Identifiable, Composable):
     weights: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        if isinstance(self.count, bool) or not isinstance(self.count, int):
-            raise TypeError(f"dead_zones must be an int, or thresholds, got {self.count!r}")
-        if self.count < 0:
-            raise ValueError(f"dead_zones must not be negative, got {self.count}")
+        check_whole(self.count, "dead_zones", least=0)
         if self.dead_zones:
             check_dead_zones(*[np.atleast_2d(self.dead_zones)] * 2)
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The plays' weights as coordinates; the dead zones' weights and the offset are linear.
-
-        Raises
-        ------
-        ValueError
-            If the input is constant, `initial` is neither "rest" nor "periodic", or a name or a bound does not fit.
-        """
+        """The plays' weights as coordinates; the dead zones' weights and the offset are linear."""
         if not freedom.starts_at_rest("rest"):
             raise ValueError('the memory of plays before dead zones is not searched: use initial="rest" or "periodic"')
         own = self.plays.search_space(record)
@@ -108,7 +99,7 @@ class DeadZoneStructure(Identifiable, Composable):
         return weights, columns[:, :-1] @ weights
 
     def _zones(self, x: FloatArray) -> FloatArray:
-        """Those given, or zero and even steps inside the range of x."""
+        """The structure's own, or zero and even steps inside the range of x."""
         if self.dead_zones:
             return np.array(self.dead_zones)
         inside = np.linspace(float(x.min()), float(x.max()), self.count + 2)[1:-1]

@@ -1,21 +1,20 @@
-"""What the extended Prandtl-Ishlinskii laws share: the rows of numbers that `hysim.kernels.play_sums` takes."""
+"""The parts that the extended Prandtl-Ishlinskii laws share: numbers as `hysim.kernels.play_sums` takes them."""
 
 import math
+from abc import abstractmethod
 from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim._parallel import in_pieces
-from hysim.errors import SimulationError
 from hysim.kernels import play_sums as kernels
-from hysim.kernels.stepping import drive
 from hysim.laws.operators._clamps import Bank
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.by_structure import ByStructure
-from hysim.models.law import State, Tables
+from hysim.models.law import State
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
+from hysim.models.tables import Tables
 
 _WIDTH = 3  # place of the width behind the limits and the offset
 IDENTITY = (0.0, 0.0, 0.0, 0.0, 1.0)
@@ -26,10 +25,6 @@ class ExtendedPlays(ByStructure, Bank):
     """A sum of plays behind envelopes, with wider thresholds or in front of dead zones."""
 
     step = staticmethod(kernels.step)
-    thresholds_name: ClassVar[str] = "thresholds"
-    weights_name: ClassVar[str] = "weights"
-    stops: ClassVar[bool] = False
-    bank: ClassVar[bool] = True
     ordered: ClassVar[bool] = True
 
     thresholds: tuple[float, ...]
@@ -40,19 +35,34 @@ class ExtendedPlays(ByStructure, Bank):
         """The sum of plays without the extension and the offset."""
         return PrandtlIshlinskii(thresholds=self.thresholds, weights=self.weights, z0=self.z0)
 
-    def input_of(self, y: npt.ArrayLike, u0: float | None, state: State | None) -> FloatArray:
-        """Input that gives the output `y`, (n_samples,), of a law without dead zones that is monotone in the input."""
-        wanted = read_only(y, "y", ndim=1)
-        if state is not None and u0 is not None:
-            raise ValueError("give u0 or state, not both: the state has its own input")
-        if state is None:
-            first = self._first_input(float(wanted[0])) if u0 is None and wanted.size else u0
-            state = self.advance([first or 0.0])[1]
-        u, inverse = np.empty(wanted.size), self.inverse_from(state)
-        lost = in_pieces(lambda k: drive(inverse.step, inverse.parameters, inverse.state, wanted[k], u[k]), u.size)
-        if lost >= 0:
-            raise SimulationError(f"no input gives the output at sample {lost} (y = {wanted[lost]:g})")
-        return u
+    @abstractmethod
+    def refusal(self) -> str | None:
+        """Why the law has no inverse; None where it has one."""
+
+    def is_invertible(self) -> bool:
+        """Whether the law has an inverse for every output that it reaches."""
+        return self.refusal() is None
+
+    def check_invertible(self) -> None:
+        """Raise a ValueError if the law is not invertible, or z0 holds positions that no input leads to."""
+        if (refusal := self.refusal()) is not None:
+            raise ValueError(refusal)
+        if self.plays.refusal() is None:
+            self.plays.inverse()  # refuses these positions
+
+    def inverse_begun(self, y: FloatArray, u0: float | None, state: State | None) -> CompiledLaw:
+        """In closed form, from the first sample or from rest."""
+        self.check_invertible()
+        first = self._first_input(float(y[0])) if u0 is None and state is None else u0
+        return self.inverse_from(self.advance([first or 0.0])[1] if state is None else state)
+
+    def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
+        self.check_invertible()
+        return self.inverse_from(self.advance([u0])[1], limits)
+
+    def unreached(self, sample: int, y: float, inverse: CompiledLaw) -> str:
+        """Message for an output that no input gives."""
+        return f"no input gives the output at sample {sample} (y = {y:g})"
 
     def _first_input(self, y: float) -> float:
         """The first input that finds the plays at z0 and gives `y`, whatever its speed would be."""

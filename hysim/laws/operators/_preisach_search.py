@@ -1,8 +1,8 @@
-"""What is searched of a law of relays.
+"""The search for the parameters of a law of relays.
 
 The output is affine in the weights and the offset. The levels are given: where the user says nothing else, they
-divide the span of the input evenly. One-signed weights (the default) turn the loop the way in which the record's own
-runs; those of the diagonal, which turn none, are free.
+divide the span of the input evenly. One-signed weights (the default) turn the loop in the sense of the record's own;
+those of the diagonal, which turn none, are free.
 
 With ``initial="rest"``, the default, all relays are down before the first sample. With ``"free"`` the memory is that
 of a single former turning point: all down, up to `turn`, then to the first sample. ``"periodic"`` is the memory that
@@ -20,12 +20,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, checked, read_only
-from hysim.laws.operators._clamp_search import TURN, half_span, runs_clockwise
-from hysim.laws.operators._relays import RelayLaw, check_relays
-from hysim.models.by_structure import ByStructure
+from hysim._frozen import FloatArray, check_whole, checked
+from hysim.laws.operators._clamp_search import TURN, runs_clockwise
 from hysim.models.composable import Composable
-from hysim.models.parameters import Coordinate, space_of
+from hysim.models.law import Law
+from hysim.models.parameters import Coordinate, space_of, spans
 from hysim.models.protocols import Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
@@ -38,28 +37,19 @@ _RANK = 1e-9  # of a column's length: what is left of one that others make up fo
 class PreisachStructure(Identifiable, Composable):
     """A bank of relays to be identified; see `Preisach.structure`."""
 
-    law: type[RelayLaw]
+    law: type[Law]
     levels: tuple[float, ...] = ()
     intervals: int = 4
     one_signed: bool = True
 
     def __post_init__(self) -> None:
-        if isinstance(self.intervals, bool) or not isinstance(self.intervals, int):
-            raise TypeError(f"intervals must be an int, got {self.intervals!r}")
-        if self.intervals < 1:
-            raise ValueError(f"intervals must be at least 1, got {self.intervals}")
+        check_whole(self.intervals, "intervals")
         levels = np.array(self.levels)
         check_relays(levels[np.newaxis], np.zeros((1, _n_weights(levels))))
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The memory as a coordinate where it is free; the rest is linear.
-
-        Raises
-        ------
-        ValueError
-            If the input is constant, `initial` is unknown, or a name or a bound does not fit.
-        """
-        scale = half_span(record)
+        """The memory as a coordinate where it is free; the rest is linear."""
+        scale = spans(record)["h"]
         levels = self._levels(record)
         places = {f"levels[{k}]": value for k, value in enumerate(levels.tolist())}
         columns = (*(f"weights[{k}]" for k in range(_n_weights(levels))), "offset")
@@ -71,8 +61,8 @@ class PreisachStructure(Identifiable, Composable):
         resting = {TURN: lowest} if freedom.starts_at_rest("rest") and TURN not in freedom.free else {}
         turns = freedom.fixed.get(TURN, lowest if resting else np.linspace(lowest, highest, _STARTS))
         untold = self._untold(record, {**places, TURN: turns}, signs)
-        given = freedom.held(defaults)
-        held = {**places, **resting, **{name: 0.0 for name in untold if name not in freedom.free}, **given}
+        chosen = freedom.held(defaults)
+        held = {**places, **resting, **{name: 0.0 for name in untold if name not in freedom.free}, **chosen}
         limits = freedom.limits(defaults, held)
         turn = Coordinate(TURN, *limits.get(TURN, (lowest, highest)), scale)
         points = [
@@ -91,23 +81,20 @@ class PreisachStructure(Identifiable, Composable):
         return np.concatenate([outputs, ones, np.zeros_like(ones)], axis=-1)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        """The parameters with the memory of the steady cycle of which `record` is one period or more.
-
-        One run through the record wipes out what was before it, unless that went beyond the record's inputs.
-        """
+        """The parameters with the memory after one run through the record, which erases what was before it."""
         shape = np.broadcast_shapes(*map(np.shape, parameters.values()))
         levels = _table("levels", parameters)[0]
         extremes = self._law(levels, np.zeros(_n_weights(levels))).advance(record.u)[1][1:]
         return {**parameters} | {f"z0[{k}]": np.full(shape, value)[()] for k, value in enumerate(extremes)}
 
-    def assemble(self, parameters: Mapping[str, float]) -> RelayLaw:
+    def assemble(self, parameters: Mapping[str, float]) -> Any:
         """The law with these parameters, one number for each name."""
         levels, weights = (_table(name, parameters)[0] for name in ("levels", "weights"))
         past = [value for value in _memory(parameters)[0].tolist() if value > levels[0]]
         return self._law(levels, weights, offset=parameters["offset"], z0=tuple(past))
 
-    def notes(self, record: Record, law: RelayLaw) -> tuple[str, ...]:
-        """How many of the weights the record tells apart, where these are not all."""
+    def notes(self, record: Record, law: Any) -> tuple[str, ...]:
+        """Number of the weights that the record does not determine."""
         places = {f"levels[{k}]": value for k, value in enumerate(law.levels)}
         columns = self.regressors({**places, TURN: law.levels[0]}, record)[0, :, :-1]
         untold = columns.shape[1] - int(np.linalg.matrix_rank(columns))
@@ -115,7 +102,7 @@ class PreisachStructure(Identifiable, Composable):
         return (told,) if untold else ()
 
     def _levels(self, record: Record) -> FloatArray:
-        """Those given, or even steps over the span of the input."""
+        """The structure's own, or even steps over the span of the input."""
         if self.levels:
             return np.array(self.levels)
         return np.linspace(record.u.min(), record.u.max(), self.intervals + 1)
@@ -132,12 +119,12 @@ class PreisachStructure(Identifiable, Composable):
         if np.linalg.matrix_rank(relays) == relays.shape[1]:
             return ()
         used = _support(relays, goal[:, 0], [signs.get(f"weights[{k}]", (-np.inf, np.inf)) for k in range(rows.size)])
-        kept = _independent(relays, [rows.size, *nearest[used[nearest]], *nearest[~used[nearest]]])
-        return tuple(f"weights[{k}]" for k in range(rows.size) if k not in kept)
+        independent = _independent(relays, [rows.size, *nearest[used[nearest]], *nearest[~used[nearest]]])
+        return tuple(f"weights[{k}]" for k in range(rows.size) if k not in independent)
 
-    def _law(self, levels: FloatArray, weights: FloatArray, **others: Any) -> RelayLaw:
+    def _law(self, levels: FloatArray, weights: FloatArray, **others: Any) -> Any:
         law: Any = self.law
-        return law(levels=tuple(levels), weights=tuple(weights), **others)  # type: ignore[no-any-return]
+        return law(levels=tuple(levels), weights=tuple(weights), **others)
 
     def _signs(self, record: Record, n: int) -> dict[str, tuple[float, float]]:
         """Bounds at zero of the weights off the diagonal."""
@@ -148,46 +135,15 @@ class PreisachStructure(Identifiable, Composable):
         return {f"weights[{k}]": side for k in np.flatnonzero(rows > columns).tolist()}
 
 
-class SearchedRelays(ByStructure, RelayLaw):
-    """A law of relays that `hysim.identify` takes."""
-
-    def as_structure(self) -> PreisachStructure:
-        """The structure with the levels of this law."""
-        return PreisachStructure(law=type(self), levels=self.levels)
-
-    @classmethod
-    def structure(cls, *, intervals: int = 4, levels: npt.ArrayLike = (), one_signed: bool = True) -> PreisachStructure:
-        """What `hysim.identify` takes: where the levels are.
-
-        Parameters
-        ----------
-        intervals : int
-            Their number N, of equal length over the span of the input. There are N (N + 1) / 2 weights; one loop
-            between two inputs tells 2 N - 1 combinations of them.
-        levels : sequence of float, optional
-            The N + 1 levels themselves [unit of u].
-        one_signed : bool
-            Whether all weights off the diagonal have the sign of the record's loop (positive for a counterclockwise
-            one). Else they are free, and may be of alternating signs on noisy records.
-
-        Returns
-        -------
-        PreisachStructure
-
-        Raises
-        ------
-        ValueError, TypeError
-            If the number is not a positive int, or the levels are not finite or do not increase.
-
-        Examples
-        --------
-        >>> import hysim as hs
-        >>> fit = hs.identify(hs.Preisach.structure(intervals=3), hs.datasets.table1())
-        >>> fit.n_parameters
-        6
-        """
-        given = tuple(read_only(levels, "levels", ndim=1).tolist())
-        return PreisachStructure(law=cls, levels=given, intervals=intervals, one_signed=one_signed)
+def check_relays(levels: FloatArray, weights: FloatArray) -> None:
+    """Refuse tables (n_sets, n_levels) and (n_sets, n_weights) that are no relays."""
+    n = max(levels.shape[1] - 1, 0)
+    if levels.shape[1] == 1 or weights.shape[1] != n * (n + 1) // 2:
+        raise ValueError(
+            f"levels and weights must be N + 1 and N (N + 1) / 2 numbers, got {levels.shape[1]} and {weights.shape[1]}"
+        )
+    if not (np.diff(levels) > 0.0).all():
+        raise ValueError(f"levels must increase, got {levels[0].tolist() if len(levels) == 1 else levels}")
 
 
 def _n_weights(levels: FloatArray) -> int:
@@ -214,18 +170,18 @@ def _support(columns: FloatArray, goal: FloatArray, bounds: list[tuple[float, fl
     sides += [(len(bounds), 1.0), (len(bounds), -1.0)]
     places, signs = np.array([k for k, _ in sides]), np.array([sign for _, sign in sides])
     size = np.linalg.norm(columns, axis=0)[places]
-    found, _ = nnls(signs * columns[:, places] / np.where(size > 0.0, size, 1.0), goal)
-    return np.isin(np.arange(len(bounds)), places[found > 0.0])
+    solution, _ = nnls(signs * columns[:, places] / np.where(size > 0.0, size, 1.0), goal)
+    return np.isin(np.arange(len(bounds)), places[solution > 0.0])
 
 
 def _independent(columns: FloatArray, order: list[int]) -> set[int]:
     """The columns that are no combination of those before them in the order."""
     basis = np.empty((len(columns), 0))
-    kept: set[int] = set()
+    independent: set[int] = set()
     for k in order:
         rest = columns[:, k] - basis @ (basis.T @ columns[:, k])
         rest -= basis @ (basis.T @ rest)
         size = float(np.linalg.norm(rest))
         if size > _RANK * float(np.linalg.norm(columns[:, k])):
-            basis, kept = np.column_stack([basis, rest / size]), kept | {int(k)}
-    return kept
+            basis, independent = np.column_stack([basis, rest / size]), independent | {int(k)}
+    return independent

@@ -1,4 +1,4 @@
-"""What the laws of relays share.
+"""Laws of relays.
 
 A relay R_ab is up (1) once the input has reached a, and down (-1) once it has reached b < a. The relays stand on
 the pairs of N intervals between N + 1 levels L_0 < ... < L_N, an upper one i and a lower one j <= i, with the weights
@@ -21,14 +21,17 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, read_only
 from hysim._parallel import in_pieces
 from hysim.kernels import preisach as kernels
-from hysim.models.law import Law, State, Tables
+from hysim.laws.operators._preisach_search import PreisachStructure, check_relays
+from hysim.models.by_structure import ByStructure
+from hysim.models.law import Law, State
 from hysim.models.protocols import CompiledLaw
+from hysim.models.tables import Tables
 
 _ROOM = 1000  # extremes that a compiled loop remembers
 _NOTHING = np.array([[0.0, 1.0]]), np.array([[0.0]])  # levels and weights of a law without any
 
 
-class RelayLaw(Law):
+class RelayLaw(ByStructure, Law):
     """A bank of weighted relays; a law says whether they are spread over their intervals, and adds its fields."""
 
     spread: ClassVar[bool]
@@ -50,7 +53,7 @@ class RelayLaw(Law):
         return read_only(everett_of(np.array([self.weights]))[0])
 
     def advance(self, u: npt.ArrayLike, state: State | None = None) -> tuple[FloatArray, State]:
-        """As `Law.advance`; the state is the last input and the dominant extremes, the oldest first."""
+        """Output and state as of `Law.advance`: the last input and the dominant extremes, the oldest first."""
         inputs = read_only(u, "u", ndim=1)
         past = self.z0 if state is None else state[1:]
         parameters, x, outputs, d = self._staircase(past, inputs.size)
@@ -66,22 +69,10 @@ class RelayLaw(Law):
         return y, (float(inputs[-1]) if y.size else before, *x[1 : d + 1].tolist())
 
     def staircase(self, u: npt.ArrayLike) -> FloatArray:
-        """The line in the plane of the relays' thresholds that the input leaves: those below it are up.
+        """The line in the plane of the relays' thresholds that an input (n_samples,) leaves; those below it are up.
 
-        Parameters
-        ----------
-        u : array, shape (n_samples,)
-            Input.
-
-        Returns
-        -------
-        array, shape (n_corners, 2)
-            Corners (a, b) [unit of u], from the largest input on the edge b = L_0 to the last one on the diagonal.
-
-        Raises
-        ------
-        ValueError
-            If u is not finite or has not one axis.
+        The result (n_corners, 2) holds its corners (a, b) [unit of u], from the largest input on the edge b = L_0 to
+        the last one on the diagonal. Raises ValueError if u is not finite or has not one axis.
 
         Examples
         --------
@@ -94,22 +85,43 @@ class RelayLaw(Law):
         corners = [(max(pair), min(pair)) for pair in zip(extremes[1:], extremes, strict=False)]
         return np.array([*corners, (extremes[-1], extremes[-1])])
 
-    memory = None  # type: ignore[assignment]  # a staircase of any length, see `staircase`
+    memory = remembered = None  # type: ignore[assignment]  # a staircase of any length, see `staircase`
 
     def compiled(self, u0: float = 0.0) -> CompiledLaw:
-        """As `Law.compiled`; the state is the last input, the place of the last extreme, extremes and outputs there."""
+        """As `Law.compiled`; the state holds the place of the last extreme, extremes, and outputs there."""
         state = np.zeros(2 + 2 * _ROOM)
         parameters, x, y, d = self._staircase((*self.z0, u0), 0)
-        kept = min(d + 1, _ROOM)
-        state[0], state[1] = u0, kept - 1
-        state[2 : 2 + kept], state[2 + _ROOM : 2 + _ROOM + kept] = x[:kept], y[:kept]
+        size = min(d + 1, _ROOM)
+        state[0], state[1] = u0, size - 1
+        state[2 : 2 + size], state[2 + _ROOM : 2 + _ROOM + size] = x[:size], y[:size]
         return CompiledLaw(kernels.step, parameters, state)
 
     @classmethod
     def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
-        """As `Law.rows`, with room for as many extremes as there are samples."""
         parameters = cls._rows(tables["levels"], tables["weights"], tables["offset"][:, 0])
         kernels.batch(read_only(parameters), read_only(tables["z0"]), u, y)
+
+    def as_structure(self) -> PreisachStructure:
+        """The structure with the levels of this law."""
+        return PreisachStructure(law=type(self), levels=self.levels)
+
+    @classmethod
+    def structure(cls, *, intervals: int = 4, levels: npt.ArrayLike = (), one_signed: bool = True) -> PreisachStructure:
+        """Levels for `hysim.identify`: equal `intervals` of the span of the input, or the `levels` [unit of u].
+
+        N intervals have N (N + 1) / 2 weights; one loop between two inputs determines 2 N - 1 combinations of them.
+        With `one_signed` all weights off the diagonal have the sign of the record's loop, positive for a
+        counterclockwise one; else they are free, and may be of alternating signs on noisy records. Raises ValueError or
+        TypeError if the number is not a positive int, or the levels are not finite or do not increase.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> hs.identify(hs.Preisach.structure(intervals=3), hs.datasets.table1()).n_parameters
+        6
+        """
+        places = tuple(read_only(levels, "levels", ndim=1).tolist())
+        return PreisachStructure(law=cls, levels=places, intervals=intervals, one_signed=one_signed)
 
     def _staircase(self, past: State, n_samples: int) -> tuple[FloatArray, FloatArray, FloatArray, int]:
         """Parameters, extremes and outputs as kernels take them after the inputs `past`, and the last place."""
@@ -131,17 +143,6 @@ class RelayLaw(Law):
         rows[:, kernels.HEAD : kernels.HEAD + n] = levels
         rows[:, kernels.HEAD + n :] = (everett - everett.transpose(0, 2, 1)).reshape(len(everett), n * n)
         return rows
-
-
-def check_relays(levels: FloatArray, weights: FloatArray) -> None:
-    """Refuse tables (n_sets, n_levels) and (n_sets, n_weights) that are no relays."""
-    n = max(levels.shape[1] - 1, 0)
-    if levels.shape[1] == 1 or weights.shape[1] != n * (n + 1) // 2:
-        raise ValueError(
-            f"levels and weights must be N + 1 and N (N + 1) / 2 numbers, got {levels.shape[1]} and {weights.shape[1]}"
-        )
-    if not (np.diff(levels) > 0.0).all():
-        raise ValueError(f"levels must increase, got {levels[0].tolist() if len(levels) == 1 else levels}")
 
 
 def everett_of(weights: FloatArray) -> FloatArray:

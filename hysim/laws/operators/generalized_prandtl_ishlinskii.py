@@ -1,34 +1,21 @@
-"""The generalised Prandtl-Ishlinskii law: plays that the input pushes through envelope functions.
+"""The generalised Prandtl-Ishlinskii law: plays that the input pushes through envelope functions."""
 
-    z_i(k) = max(gamma_left(u_k) - r_i, min(gamma_right(u_k) + r_i, z_i(k-1)))
-    y      = offset + sum_i w_i z_i
-    gamma(u) = a_0 tanh(a_1 u + a_2) + a_3 + a_4 u,    increasing
-
-u is the input, z_i the memory, y the output. An input that rises pushes the plays along the left envelope, one
-that falls along the right one; the tanh lets the loop saturate, and two different envelopes make the rising
-branch another curve than the falling one. With one envelope the law is the plain one behind gamma, with
-the inverse u = gamma^-1(H^-1[y]). With two, the output stands still in the gap between them after a reversal, so
-that many inputs give it: the inverse takes the nearest. Both are found by Newton's method on the output itself,
-which is monotone along each stretch.
-
-Sources: M. Al Janaideh, S. Rakheja and C.-Y. Su, IEEE/ASME Trans. Mechatronics 16 (2011), for the law and its
-inverse, with the envelopes a_0 tanh(a_1 u + a_2) + a_3 and a_4 u + a_3; the sum of the two is ours.
-"""
-
-import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, checked, read_only
-from hysim.laws.operators._clamp_search import Axis, ClampStructure, half_span
+from hysim.laws.operators._clamp_search import Axis, ClampStructure, Pushing
 from hysim.laws.operators._play_sums import IDENTITY, ExtendedPlays, kernel_rows, positions_of
-from hysim.models.law import Packed, State, Tables
+from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
+from hysim.models.law import Packed
 from hysim.models.model import family
-from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
+from hysim.models.parameters import spans
 from hysim.models.search_space import Parameters
+from hysim.models.tables import Tables
 from hysim.records import Record
 
 _BENDS = (0.02, 3.0)  # of the envelope between the ends of the input: nearly straight, nearly a step
@@ -38,7 +25,15 @@ _STARTS: tuple[tuple[float, ...], ...] = ((0.3, 1.0), (0.0, -1.0, 1.0), (0.2,))
 
 @family
 class GeneralizedPrandtlIshlinskii(ExtendedPlays):
-    """Generalised Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i`` over plays behind envelopes.
+    """Generalised Prandtl-Ishlinskii law: plays that the input pushes through envelope functions.
+
+    ::
+
+        z_i(k) = max(gamma_left(u_k) - r_i, min(gamma_right(u_k) + r_i, z_i(k-1)))
+        y      = offset + sum_i w_i z_i,    gamma(u) = a_0 tanh(a_1 u + a_2) + a_3 + a_4 u,    increasing
+
+    A rising input pushes the plays along the left envelope, a falling one along the right one; the tanh lets the loop
+    saturate, and two different envelopes make the rising branch another curve than the falling one.
 
     Parameters
     ----------
@@ -49,12 +44,10 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
     left : sequence of float, length 5
         a_0 ... a_4 of the envelope along which a rising input pushes; by default gamma(u) = u.
     right : sequence of float, length 5 or 0
-        Those of a falling one; empty for the same. The play of the threshold r is one where
-        gamma_left - gamma_right is at most 2 r; else it follows the left envelope.
-    offset : float
-        Output at z = 0 [unit of y].
-    z0 : float or sequence of float, length n_plays
-        Positions before the first sample, which pushes them [unit of gamma].
+        Those of a falling one; empty for the same. Where gamma_left - gamma_right exceeds 2 r, the play of the
+        threshold r follows the left envelope.
+    offset, z0
+        As in `PrandtlIshlinskii` [unit of y, unit of gamma].
 
     Raises
     ------
@@ -62,12 +55,16 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
         If lengths differ, a number is not finite, thresholds are negative or do not increase, or an envelope
         does not increase.
 
+    Notes
+    -----
+    Sources: M. Al Janaideh, S. Rakheja and C.-Y. Su, IEEE/ASME Trans. Mechatronics 16 (2011), for the law and its
+    inverse, with the envelopes a_0 tanh(a_1 u + a_2) + a_3 and a_4 u + a_3; the sum of the two is ours.
+
     Examples
     --------
     >>> import hysim as hs
-    >>> law = hs.GeneralizedPrandtlIshlinskii(
-    ...     thresholds=(0.0, 0.5), weights=(1.0, 1.0), left=(1.0, 2.0, 0.0, 0.0, 0.0)
-    ... )
+    >>> envelope = (1.0, 2.0, 0.0, 0.0, 0.0)
+    >>> law = hs.GeneralizedPrandtlIshlinskii(thresholds=(0.0, 0.5), weights=(1.0, 1.0), left=envelope)
     >>> law.response([0.0, 1.0, 0.5, -1.0]).round(6).tolist()
     [0.0, 1.428055, 1.225622, -1.428055]
     >>> law.inverse_response(law.response([0.0, 1.0, 0.5, -1.0])).round(6).tolist()
@@ -98,35 +95,19 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
         left: npt.ArrayLike = (),
         right: npt.ArrayLike = (),
     ) -> ClampStructure:
-        """What `hysim.identify` takes: where the plays are, and what is known of the envelopes.
+        """Plays and envelopes for `hysim.identify`; `plays`, `thresholds` and `one_signed` as of `PrandtlIshlinskii`.
 
-        The envelopes that are searched take the ends of the record's input to themselves, so that thresholds mean
-        there what they mean for `PrandtlIshlinskii`: ``bend`` is how far the tanh is gone through on half the way
-        (none for a straight envelope), ``skew`` where its middle is.
-
-        Parameters
-        ----------
-        plays, thresholds, one_signed
-            As of `PrandtlIshlinskii.structure`.
-        envelopes : {1, 2}
-            Whether one envelope is searched, or the right one has a ``lead`` in skew before the left one.
-        left, right : sequence of float, length 5, optional
-            Envelopes that are known, and not searched.
-
-        Returns
-        -------
-        ClampStructure
-
-        Raises
-        ------
-        ValueError, TypeError
-            As `PrandtlIshlinskii.structure`, if `envelopes` is not 1 or 2, or an envelope does not increase.
+        One envelope is searched, or with ``envelopes=2`` also the ``lead`` in skew of the right one before the left
+        one. It takes the ends of the record's input to themselves, so that thresholds mean what they mean for
+        `PrandtlIshlinskii`: ``bend`` is the part of the tanh passed on half the stroke (none for a straight envelope),
+        ``skew`` the place of its middle. Envelopes `left` and `right` that are given, 5 coefficients each, are not
+        searched. Raises ValueError or TypeError as `PrandtlIshlinskii.structure`, if `envelopes` is not 1 or 2, or an
+        envelope does not increase.
 
         Examples
         --------
         >>> import hysim as hs
-        >>> fit = hs.identify(hs.GeneralizedPrandtlIshlinskii.structure(plays=4), hs.datasets.table1())
-        >>> fit.n_parameters
+        >>> hs.identify(hs.GeneralizedPrandtlIshlinskii.structure(plays=4), hs.datasets.table1()).n_parameters
         7
         """
         if envelopes not in (1, 2):
@@ -134,59 +115,9 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
         known = tuple(tuple(read_only(side, "envelopes", ndim=1).tolist()) for side in (left, right))
         if known[0]:
             _envelopes(*(np.atleast_2d(side) for side in known))
-        return ClampStructure(
-            law=cls, thresholds=tuple(read_only(thresholds, "thresholds", ndim=1).tolist()), plays=plays,
-            one_signed=one_signed, pushing=Envelopes(left=known[0], right=known[1], count=envelopes),
-        )  # fmt: skip
-
-    def is_invertible(self) -> bool:
-        """Whether `inverse_response` gives an input for every output that the envelopes reach.
-
-        With one envelope where the plain law of the same plays is invertible, with two where the weights have one
-        sign.
-        """
-        return self._refusal() is None
-
-    def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
-        """Input that gives the output `y`, monotone between the samples; the nearest where there are several.
-
-        Parameters
-        ----------
-        y : array, shape (n_samples,)
-            Wanted output.
-        u0 : float, optional
-            Input at which the law rests before it moves to the first sample; by default the first sample
-            finds the plays at z0.
-        state : tuple of float, optional
-            Input and positions to continue from, in place of u0 and z0.
-
-        Returns
-        -------
-        array, shape (n_samples,)
-            Its `response` is y to rounding.
-
-        Raises
-        ------
-        SimulationError
-            If the envelopes end before an output is reached; it names the sample.
-        ValueError
-            If the law is not invertible, z0 holds positions that no input leads to, or y is not finite or has
-            not one axis.
-        """
-        self.check_invertible()
-        return self.input_of(y, u0, state)
-
-    def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
-        """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""
-        self.check_invertible()
-        return self.inverse_from(self.advance([u0])[1], limits)
-
-    def check_invertible(self) -> None:
-        """Raise a ValueError if the law is not invertible, or z0 holds positions that no input leads to."""
-        if (refusal := self._refusal()) is not None:
-            raise ValueError(refusal)
-        if self._has_one_envelope():
-            self.plays.inverse()  # refuses these positions
+        pushing = Envelopes(left=known[0], right=known[1], count=envelopes)
+        plain = PrandtlIshlinskii.structure(plays=plays, thresholds=thresholds, one_signed=one_signed)
+        return replace(plain, law=cls, pushing=pushing)
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
@@ -203,7 +134,12 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
     def _has_one_envelope(self) -> bool:
         return self.right in ((), self.left)
 
-    def _refusal(self) -> str | None:
+    def refusal(self) -> str | None:
+        """Why the law has no inverse; None where it has one.
+
+        With one envelope it has one where the plain law of the same plays is invertible, with two where the weights
+        have one sign. In the gap between two envelopes the output stands still, and the nearest of its inputs is taken.
+        """
         if self._has_one_envelope():
             return self.plays.refusal()
         if any(self.weights) and min(self.weights) * max(self.weights) >= 0.0:
@@ -212,8 +148,8 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
 
 
 @checked
-class Envelopes:
-    """What is searched of envelopes: nothing where the left one is known."""
+class Envelopes(Pushing):
+    """The search for envelopes, unless the left one is known."""
 
     left: tuple[float, ...] = ()
     right: tuple[float, ...] = ()
@@ -224,8 +160,8 @@ class Envelopes:
         if self.left:
             return {}
         bends, skews, leads = _STARTS
-        found = {"bend": Axis(*_BENDS, bends, 1.0), "skew": Axis(*_SKEWS, skews, 1.0)}
-        return found | ({"lead": Axis(0.0, _SKEWS[1], leads, 1.0)} if self.count == 2 else {})
+        axes = {"bend": Axis(*_BENDS, bends, 1.0), "skew": Axis(*_SKEWS, skews, 1.0)}
+        return axes | ({"lead": Axis(0.0, _SKEWS[1], leads, 1.0)} if self.count == 2 else {})
 
     def derived(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
         """Coefficients ``left[0]`` ... ``left[4]``, and those of the right envelope where there are two."""
@@ -259,7 +195,7 @@ class Envelopes:
 
 def _between_the_ends(bend: FloatArray, phase: FloatArray, record: Record) -> list[FloatArray]:
     """Coefficients of the envelope of this shape that takes the lowest and the highest input to themselves."""
-    half, middle = half_span(record), 0.5 * float(record.u.max() + record.u.min())
+    half, middle = spans(record)["h"], 0.5 * float(record.u.max() + record.u.min())
     low, high = np.tanh(phase - bend), np.tanh(phase + bend)
     height = 2.0 * half / (high - low)
     level = middle - 0.5 * height * (high + low)

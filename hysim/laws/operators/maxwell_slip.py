@@ -1,13 +1,4 @@
-"""The Maxwell-slip law: springs side by side, each of which slips at an elongation of its own.
-
-    F = offset + feedthrough u + sum_i k_i (u - z_i),    z_i = min(max(z_i, u - d_i), u + d_i)
-
-u is the displacement, z_i the block to which spring i is fixed, F the force, k_i a stiffness, d_i the
-elongation at which the block begins to slide. An element holds at most the force f_i = k_i d_i. It is a sum of stops,
-and so a Prandtl-Ishlinskii law. The loop of a positive stiffness runs clockwise: the law takes energy.
-
-Sources: M. Goldfarb and N. Celanovic, IEEE Control Systems 17 (1997); W. D. Iwan, J. Appl. Mech. 33 (1966).
-"""
+"""The Maxwell-slip law: springs side by side, each of which slips at an elongation of its own."""
 
 from typing import ClassVar, Self
 
@@ -24,7 +15,14 @@ from hysim.models.model import family
 
 @family
 class MaxwellSlip(ByStructure, ClampLaw):
-    """Maxwell-slip law, ``F = offset + feedthrough u + sum k_i (u - z_i)``.
+    """Maxwell-slip law: springs side by side, each of which slips at an elongation of its own.
+
+    ::
+
+        F = offset + feedthrough u + sum_i k_i (u - z_i),    z_i = min(max(z_i, u - d_i), u + d_i)
+
+    u is the displacement, z_i the block to which spring i is fixed, F the force. An element holds at most the force k_i
+    d_i. The law is a sum of stops; the loop of a positive stiffness runs clockwise.
 
     Parameters
     ----------
@@ -46,6 +44,8 @@ class MaxwellSlip(ByStructure, ClampLaw):
 
     Notes
     -----
+    Sources: M. Goldfarb and N. Celanovic, IEEE Control Systems 17 (1997); W. D. Iwan, J. Appl. Mech. 33 (1966).
+
     A law without elements, the default, is a line; as a start of `hysim.identify` it leaves the elements to
     the record, as ``MaxwellSlip.structure()`` does.
 
@@ -62,7 +62,6 @@ class MaxwellSlip(ByStructure, ClampLaw):
     thresholds_name: ClassVar[str] = "slips"
     weights_name: ClassVar[str] = "stiffness"
     stops: ClassVar[bool] = True
-    bank: ClassVar[bool] = True
 
     stiffness: tuple[float, ...] = ()
     slips: tuple[float, ...] = ()
@@ -74,26 +73,10 @@ class MaxwellSlip(ByStructure, ClampLaw):
     def from_limits(
         cls, *, stiffness: npt.ArrayLike, limits: npt.ArrayLike, feedthrough: float = 0.0, offset: float = 0.0
     ) -> Self:
-        """The law by the force at which each element slips.
+        """The law by the force at which each element slips, f_i = k_i d_i, with blocks that begin at zero.
 
-        Parameters
-        ----------
-        stiffness : sequence of float, length n_elements
-            k_i, not zero [unit of y / unit of u].
-        limits : sequence of float, length n_elements
-            f_i = k_i d_i, of the sign of k_i [unit of y].
-        feedthrough, offset : float
-            As in the constructor.
-
-        Returns
-        -------
-        MaxwellSlip
-            With blocks at zero before the first sample.
-
-        Raises
-        ------
-        ValueError
-            If lengths differ, a stiffness is zero, or a limit has the other sign.
+        `stiffness` k_i, not zero [unit of y / unit of u], and `limits` f_i, of the sign of k_i [unit of y], have the
+        length n_elements, else ValueError; feedthrough and offset are those of the constructor.
         """
         k, f = (read_only(values, name, ndim=1) for values, name in ((stiffness, "stiffness"), (limits, "limits")))
         if k.size != f.size:
@@ -104,28 +87,14 @@ class MaxwellSlip(ByStructure, ClampLaw):
 
     @classmethod
     def structure(cls, *, elements: int = 10, slips: npt.ArrayLike = (), one_signed: bool = True) -> ClampStructure:
-        """What `hysim.identify` takes: where the elements slip.
+        """Elements for `hysim.identify`: their number, slipping in even steps up to half the input's span, or `slips`.
 
-        Parameters
-        ----------
-        elements : int
-            Their number, with elongations in even steps up to less than half the span of the input.
-        slips : sequence of float, optional
-            The elongations themselves [unit of u].
-        one_signed : bool
-            Whether every stiffness has the sign of the record's loop (positive for a clockwise one).
-
-        Returns
-        -------
-        ClampStructure
-
-        Raises
-        ------
-        ValueError, TypeError
-            If the number is not a positive int, or an elongation is not a finite number.
+        With `one_signed` every stiffness has the sign of the record's loop, positive for a clockwise one. Raises
+        ValueError or TypeError if the number is not a positive int, or an elongation is not a finite number
+        [unit of u].
         """
-        given = tuple(read_only(slips, "slips", ndim=1).tolist())
-        return ClampStructure(law=cls, thresholds=given, plays=elements, one_signed=one_signed)
+        places = tuple(read_only(slips, "slips", ndim=1).tolist())
+        return ClampStructure(law=cls, thresholds=places, plays=elements, one_signed=one_signed)
 
     @property
     def limits(self) -> tuple[float, ...]:
@@ -134,16 +103,13 @@ class MaxwellSlip(ByStructure, ClampLaw):
 
     @property
     def saturation(self) -> float:
-        """What the elements together tend to on a long way upwards, the sum of their limits [unit of y]."""
+        """Limit of the force of the elements on a long rising stroke, the sum of their limits [unit of y]."""
         return sum(self.limits)
 
     def to_prandtl_ishlinskii(self) -> PrandtlIshlinskii:
         """The same law as a sum of plays: weights -k_i beside their sum at the threshold zero.
 
-        Raises
-        ------
-        ValueError
-            If elements that slip at one elongation begin at different positions: no play stands at both.
+        Raises ValueError if elements that slip at one elongation begin at different positions: no play stands at both.
         """
         slope, slips, weights = self.as_plays
         thresholds, element = np.unique(np.concatenate([[0.0], slips]), return_inverse=True)

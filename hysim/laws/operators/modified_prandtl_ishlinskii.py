@@ -1,21 +1,12 @@
 """The modified Prandtl-Ishlinskii law: plays, and behind them dead zones, for loops that are not odd.
 
-    x = sum_i w_i z_i,    z_i(k) = min(max(z_i(k-1), u_k - r_i), u_k + r_i)
-    y = offset + S(x),    S(x) = sum_j c_j S_(d_j)(x)
-    S_d(x) = max(x - d, 0) for d > 0,    min(x - d, 0) for d < 0,    x for d = 0
-
-u is the input, z_i the memory, y the output. S is a broken line through zero, of the slope c_0 about zero and
-c_0 + c_1 + ... + c_j beyond the j-th threshold on either side. Where these sums have one sign it has an inverse
-of its own kind, each side by the formulas of the plays,
+S is a broken line through zero, of the slope c_0 about zero and c_0 + c_1 + ... + c_j beyond the j-th threshold on
+either side. Where these sums have one sign it has an inverse of its own kind, each side by the formulas of the plays,
 
     c'_0 = 1 / c_0,    c'_j = -c_j / (s_j s_(j-1)),    d'_j = sum_(i<=j) c_i (d_j - d_i)
-
-and the law's is that of the plays behind it, u = H^-1[S^-1(y - offset)].
-
-Source: K. Kuhnen, Modeling, identification and compensation of complex hysteretic nonlinearities: a modified
-Prandtl-Ishlinskii approach, European J. Control 9 (2003).
 """
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -25,13 +16,24 @@ from hysim._frozen import FloatArray, read_only
 from hysim.laws.operators._dead_zone_search import DeadZoneStructure
 from hysim.laws.operators._play_sums import ExtendedPlays, check_dead_zones, dead_zone, kernel_rows
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii, wrong_sum
-from hysim.models.law import Packed, State, Tables
+from hysim.models.inverse_search import inverse_step
+from hysim.models.law import Packed, State
 from hysim.models.model import family
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
+from hysim.models.tables import Tables
 
 
 @family
 class ModifiedPrandtlIshlinskii(ExtendedPlays):
-    """Modified Prandtl-Ishlinskii law, ``y = offset + sum c_j S_j(sum w_i z_i)``: plays, then dead zones.
+    """Modified Prandtl-Ishlinskii law: plays, and behind them dead zones, for loops that are not odd.
+
+    ::
+
+        x = sum_i w_i z_i,    z_i(k) = min(max(z_i(k-1), u_k - r_i), u_k + r_i)
+        y = offset + S(x),    S(x) = sum_j c_j S_(d_j)(x)
+        S_d(x) = max(x - d, 0) for d > 0,    min(x - d, 0) for d < 0,    x for d = 0
+
+    Source: K. Kuhnen, European J. Control 9 (2003).
 
     Parameters
     ----------
@@ -87,30 +89,17 @@ class ModifiedPrandtlIshlinskii(ExtendedPlays):
         one_signed: bool = True,
         dead_zones: int | npt.ArrayLike = 5,
     ) -> DeadZoneStructure:
-        """What `hysim.identify` takes: where the plays and the dead zones are.
+        """Plays and dead zones for `hysim.identify`; `plays`, `thresholds` and `one_signed` as of `PrandtlIshlinskii`.
 
-        Parameters
-        ----------
-        plays, thresholds, one_signed
-            As of `PrandtlIshlinskii.structure`.
-        dead_zones : int or sequence of float
-            Their number beside that of threshold zero, whose weight is held at one, with thresholds in even steps
-            inside the range that the plays alone would give; or the thresholds themselves [unit of x].
-
-        Returns
-        -------
-        DeadZoneStructure
-
-        Raises
-        ------
-        ValueError, TypeError
-            As `PrandtlIshlinskii.structure`, or if dead zones do not increase.
+        `dead_zones` is their number beside that of threshold zero, whose weight is held at one, with thresholds in even
+        steps inside the range that the plays alone would give; or the thresholds themselves [unit of x]. Raises
+        ValueError or TypeError as `PrandtlIshlinskii.structure`, or if dead zones do not increase.
 
         Examples
         --------
         >>> import hysim as hs
-        >>> fit = hs.identify(hs.ModifiedPrandtlIshlinskii.structure(plays=4, dead_zones=2), hs.datasets.table1())
-        >>> fit.n_parameters
+        >>> structure = hs.ModifiedPrandtlIshlinskii.structure(plays=4, dead_zones=2)
+        >>> hs.identify(structure, hs.datasets.table1()).n_parameters
         7
         """
         counted = isinstance(dead_zones, int)
@@ -121,35 +110,13 @@ class ModifiedPrandtlIshlinskii(ExtendedPlays):
             dead_zones=() if counted else tuple(read_only(dead_zones, "dead_zones", ndim=1).tolist()),
         )
 
-    def is_invertible(self) -> bool:
-        """Whether r_0 = 0, one dead zone has the threshold zero, and the sums of both weights have one sign each."""
-        return self.plays.is_invertible() and self._refusal() is None
-
     def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
-        """Input that gives the output `y`, monotone between the samples: the inverse of S, then that of the plays.
+        """Input that gives the output `y`, monotone between the samples; see `hysim.Law.inverse_response`.
 
-        Parameters
-        ----------
-        y : array, shape (n_samples,)
-            Wanted output.
-        u0 : float, optional
-            Input at which the law rests before it moves to the first sample; by default the first sample
-            finds the plays at z0.
-        state : tuple of float, optional
-            Input and positions to continue from, in place of u0 and z0.
-
-        Returns
-        -------
-        array, shape (n_samples,)
-            Its `response` is y to rounding.
-
-        Raises
-        ------
-        ValueError
-            If the law is not invertible (it says which weight is in the way), z0 holds positions that no input
-            leads to, or y is not finite or has not one axis.
+        It is the inverse of S, then that of the plays, and exact to rounding. Raises ValueError also if z0 holds
+        positions that no input leads to; one for a law that is not invertible names the weight.
         """
-        if (refusal := self._refusal()) is not None:
+        if (refusal := self.refusal()) is not None:
             raise ValueError(refusal)
         wanted = read_only(y, "y", ndim=1) - self.offset
         slope = self.dead_zone_weights[self.dead_zones.index(0.0)]
@@ -179,7 +146,11 @@ class ModifiedPrandtlIshlinskii(ExtendedPlays):
         thresholds, weights = zip(*((d, c) for d, c in ranked if d >= 0.0), strict=True)
         return PrandtlIshlinskii(thresholds=tuple(np.abs(thresholds).tolist()), weights=weights)
 
-    def _refusal(self) -> str | None:
+    def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
+        return inverse_step(self.compiled(u0), u0, limits=limits)
+
+    def refusal(self) -> str | None:
+        """Why the law has no inverse: r_0 > 0, no dead zone of threshold zero, or weights whose sums change sign."""
         if 0.0 not in self.dead_zones:
             return "the law has no inverse: without a dead zone of threshold zero its output stands still about x = 0"
         for side in (1.0, -1.0):
@@ -190,4 +161,4 @@ class ModifiedPrandtlIshlinskii(ExtendedPlays):
                     f"but with the weight {zones.weights[wrong]:g} of the dead zone "
                     f"{side * zones.thresholds[wrong]:g} they come to {sum(zones.weights[: wrong + 1]):g}"
                 )
-        return None
+        return self.plays.refusal()

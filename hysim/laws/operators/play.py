@@ -1,13 +1,5 @@
 """The play and the stop, of which the other rate-independent operators are built.
 
-    z_k = min(max(z_(k-1), u_k - r), u_k + r)
-    y   = offset + gain z             Play: backlash of half width r; its loop runs counterclockwise
-    y   = offset + gain (u - z)       Stop: a spring that slips at the elongation r; clockwise
-
-u is the input, z the position that it pushes, r the threshold. Both are exact at the samples of an input that
-is monotone between them, and do not depend on time. The stop is an elastic-perfectly plastic element; z is
-then the place to which its spring is fixed.
-
 Sources: M. A. Krasnosel'skii and A. V. Pokrovskii, Systems with Hysteresis, 1989.
 """
 
@@ -49,7 +41,9 @@ class _Element(ClampLaw):
 
 @family
 class Play(_Element):
-    """Play (backlash) of half width r, ``y = offset + gain z``.
+    """Play (backlash) of half width r, ``y = offset + gain z`` with ``z_k = min(max(z_(k-1), u_k - r), u_k + r)``.
+
+    Exact at the samples of an input that is monotone between them. The loop runs counterclockwise.
 
     Parameters
     ----------
@@ -74,7 +68,6 @@ class Play(_Element):
     [0.0, 1.5, 1.5, 0.5]
     """
 
-    stops: ClassVar[bool] = False
     threshold: float = 1.0
     gain: float = 1.0
     offset: float = 0.0
@@ -83,7 +76,9 @@ class Play(_Element):
 
 @family
 class Stop(_Element):
-    """Stop (elastic-perfectly plastic element), ``y = offset + gain (u - z)``.
+    """Stop (elastic-perfectly plastic element), ``y = offset + gain (u - z)`` with the z of `Play`.
+
+    A spring, fixed at z, that slips at the elongation r. The loop runs clockwise.
 
     Parameters
     ----------
@@ -116,5 +111,5 @@ class Stop(_Element):
 
     @property
     def saturation(self) -> float:
-        """What y - offset tends to on a long way upwards: gain r; its negative on the way down."""
+        """Limit of y - offset on a long rising stroke, gain r; its negative where the input falls."""
         return self.gain * self.threshold

@@ -1,21 +1,14 @@
 """The Prandtl-Ishlinskii law: a weighted sum of plays, and its exact inverse.
 
-    z_i(k) = min(max(z_i(k-1), u_k - r_i), u_k + r_i),    0 <= r_0 < r_1 < ...
-    y      = offset + sum_i w_i z_i
-
-u is the input, z_i the memory, y the output. Positive weights give the counterclockwise loops of
-piezoelectric stacks, negative ones beside a large w_0 the clockwise ones of a force. The slope after a
-reversal grows through the sums s_i = w_0 + ... + w_i. Where r_0 = 0 and all s_i have one sign the output is
-monotone in the input, and the inverse is a law of the same kind (with s_-1 = 0, and the sum for i = 0 left out)
+The slope after a reversal grows through the sums s_i = w_0 + ... + w_i. Where r_0 = 0 and all s_i have one sign the
+output is monotone in the input, and the inverse is a law of the same kind (with s_-1 = 0, and the sum for i = 0 left
+out)
 
     w'_0 = 1 / w_0,    w'_i = -w_i / (s_i s_(i-1))
     r'_i = |sum_(j<=i) w_j (r_i - r_j)|
     z'_i = sum_(j<=i) w_j z_i + sum_(j>i) w_j z_j
 
 An offset c moves the inverse's own input: u = sum w'_i (z'_i - c), where z'_i begins c further on.
-
-Sources: K. Kuhnen, European J. Control 9 (2003), for the inverse; P. Krejci and K. Kuhnen, IEE Proc. Control
-Theory Appl. 148 (2001).
 """
 
 import math
@@ -40,6 +33,10 @@ _CONSISTENT = 1e-9  # of the largest threshold: what rounding may add to the dis
 @family
 class PrandtlIshlinskii(ByStructure, ClampLaw):
     """Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i`` over plays of the thresholds r_i.
+
+    ``z_i(k) = min(max(z_i(k-1), u_k - r_i), u_k + r_i)``. Positive weights give the counterclockwise loops of
+    piezoelectric stacks, negative ones beside a large w_0 the clockwise ones of a force. Sources: K. Kuhnen, European
+    J. Control 9 (2003), for the inverse; P. Krejci and K. Kuhnen, IEE Proc. Control Theory Appl. 148 (2001).
 
     Parameters
     ----------
@@ -72,10 +69,6 @@ class PrandtlIshlinskii(ByStructure, ClampLaw):
     [0.0, 1.0, 0.5, -1.0]
     """
 
-    thresholds_name: ClassVar[str] = "thresholds"
-    weights_name: ClassVar[str] = "weights"
-    stops: ClassVar[bool] = False
-    bank: ClassVar[bool] = True
     ordered: ClassVar[bool] = True
 
     thresholds: tuple[float, ...] = ()
@@ -85,7 +78,7 @@ class PrandtlIshlinskii(ByStructure, ClampLaw):
 
     @classmethod
     def structure(cls, *, plays: int = 10, thresholds: npt.ArrayLike = (), one_signed: bool = True) -> ClampStructure:
-        """What `hysim.identify` takes: where the plays are.
+        """Plays for `hysim.identify`: how many, or where.
 
         Parameters
         ----------
@@ -113,10 +106,8 @@ class PrandtlIshlinskii(ByStructure, ClampLaw):
         >>> fit.n_parameters, round(fit.fit_percent, 1)
         (5, 93.5)
         """
-        return ClampStructure(
-            law=cls, thresholds=tuple(read_only(thresholds, "thresholds", ndim=1).tolist()), plays=plays,
-            one_signed=one_signed,
-        )  # fmt: skip
+        places = tuple(read_only(thresholds, "thresholds", ndim=1).tolist())
+        return ClampStructure(law=cls, thresholds=places, plays=plays, one_signed=one_signed)
 
     def is_one_signed(self) -> bool:
         """Whether all weights past the threshold zero have one sign."""
@@ -139,7 +130,6 @@ class PrandtlIshlinskii(ByStructure, ClampLaw):
         )
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
-        """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""
         y0 = float(self.response([u0])[0])
         forward, inverse = self.compiled(u0), self.inverse().compiled(y0)
         return CompiledLaw(
@@ -149,23 +139,14 @@ class PrandtlIshlinskii(ByStructure, ClampLaw):
         )
 
     def inverse(self) -> "PrandtlIshlinskii":
-        """The law that gives the input for a wanted output, exactly.
+        """The law that gives the input for a wanted output, exactly; it begins as this law begins.
 
-        Returns
-        -------
-        PrandtlIshlinskii
-            Its first sample finds it as this law's first sample finds this one.
-
-        Raises
-        ------
-        ValueError
-            If the law is not invertible, or z0 holds positions that no input leads to.
+        Raises ValueError if the law is not invertible, or z0 holds positions that no input leads to.
 
         Examples
         --------
         >>> import hysim as hs
-        >>> law = hs.PrandtlIshlinskii(thresholds=(0.0, 0.5), weights=(1.0, 1.0))
-        >>> law.inverse()
+        >>> hs.PrandtlIshlinskii(thresholds=(0.0, 0.5), weights=(1.0, 1.0)).inverse()
         PrandtlIshlinskii(thresholds=(0.0, 0.5), weights=(1.0, -0.5), offset=0.0, z0=(0.0, 0.0))
         """
         if (refusal := self.refusal()) is not None:
@@ -184,27 +165,9 @@ class PrandtlIshlinskii(ByStructure, ClampLaw):
         )
 
     def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
-        """Input that gives the output `y`, monotone between the samples.
+        """Input that gives the output `y`, monotone between the samples; see `hysim.Law.inverse_response`.
 
-        Parameters
-        ----------
-        y : array, shape (n_samples,)
-            Wanted output.
-        u0 : float, optional
-            Input at which the law rests before it moves to the first sample; by default the first sample
-            finds the plays at z0.
-        state : tuple of float, optional
-            Input and positions to continue from, in place of u0 and z0.
-
-        Returns
-        -------
-        array, shape (n_samples,)
-            Its `response` is y to rounding.
-
-        Raises
-        ------
-        ValueError
-            If y is not finite or has not one axis, or as `inverse`.
+        It is that of `inverse`, exact to rounding, with the errors of `inverse`.
         """
         if state is not None and u0 is not None:
             raise ValueError("give u0 or state, not both: the state has its own input")
@@ -225,13 +188,7 @@ def wrong_sum(weights: npt.ArrayLike) -> int | None:
 
 
 def _consistent(r: FloatArray, z: FloatArray) -> FloatArray:
-    """The positions with that of threshold zero, which the first sample sets anyway, within reach of the others.
-
-    Raises
-    ------
-    ValueError
-        If two others are further apart than their thresholds, where no input takes them.
-    """
+    """The positions with that of threshold zero, which the first sample sets anyway, within reach of the others."""
     slack = _CONSISTENT * r[-1]
     apart = np.abs(z[1:, np.newaxis] - z[1:]) - np.abs(r[1:, np.newaxis] - r[1:])
     if (apart > slack).any():

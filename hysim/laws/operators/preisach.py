@@ -2,20 +2,15 @@
 
     y = offset + sum over a > b of w(a, b) R_ab[u],    R_ab = 1 once u has reached a, -1 once it has reached b
 
-u is the input and y the output. Half of what the output changes by between the turning points a > b is the Everett
-function, the weight of the relays that switch on the way,
+Half of what the output changes by between the turning points a > b is the Everett function, the weight of the relays
+that switch on the way,
 
     E(a, b) = integral of w over b < b' < a' < a,    y = y_0 + 2 (E(x_1, x_0) - E(x_1, x_2) + E(x_3, x_2) - ...)
 
-along the dominant extremes x_k of the input; a larger one wipes out smaller ones. Two laws hold the same table of
-weights over pairs of intervals between levels. `PreisachRelays` has one relay for each, at the upper end of the one
-and the lower end of the other: its output jumps. `Preisach` spreads the weight evenly over the pair of two intervals,
-and along the diagonal a = b that of one interval with itself. E is then bilinear between the levels, and the output
-piecewise linear in the input, with the slope of the diagonal's weight at once after a reversal. Where the
-input stops at levels only, the two laws agree.
-
-The inverse runs the same recursion on the outputs: as E is monotone, the dominant extremes of the output are those
-of the input. Each stretch ends on a piece on which y is linear, so that it is exact.
+along the dominant extremes x_k of the input; a larger one wipes out smaller ones. The two laws hold the same table of
+weights over pairs of intervals between levels, and agree where the input stops at levels only. The inverse runs the
+same recursion on the outputs: as E is monotone, the dominant extremes of the output are those of the input. Each stroke
+ends on a piece on which y is linear, so that it is exact.
 
 Sources: F. Preisach, Z. Phys. 94 (1935); D. H. Everett, Trans. Faraday Soc. 51 (1955); I. D. Mayergoyz,
 Mathematical Models of Hysteresis, 1991, for first-order reversal curves and the interpolation of E.
@@ -31,12 +26,8 @@ import numpy.typing as npt
 
 from hysim._cycles import TOLERANCE
 from hysim._frozen import FloatArray, read_only
-from hysim._parallel import in_pieces
-from hysim.errors import SimulationError
 from hysim.kernels import preisach as kernels
-from hysim.kernels.stepping import drive
-from hysim.laws.operators._preisach_search import SearchedRelays
-from hysim.laws.operators._relays import everett_of, weights_of
+from hysim.laws.operators._relays import RelayLaw, everett_of, weights_of
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.law import State
 from hysim.models.model import family
@@ -52,8 +43,8 @@ _ROOM = 1000  # extremes that the inverse keeps in a loop
 
 
 @family
-class PreisachRelays(SearchedRelays):
-    """Preisach law of single relays, ``y = offset + sum w_ij R_ij``.
+class PreisachRelays(RelayLaw):
+    """Preisach law of single relays, ``y = offset + sum w_ij R_ij``: its output jumps.
 
     Parameters
     ----------
@@ -89,8 +80,12 @@ class PreisachRelays(SearchedRelays):
 
 
 @family
-class Preisach(SearchedRelays):
+class Preisach(RelayLaw):
     """Preisach law of a density that is even between levels; its output is continuous.
+
+    Each weight of `PreisachRelays` is spread evenly over its pair of intervals, along the diagonal over one interval
+    with itself. The output is piecewise linear in the input, with the slope of the diagonal's weight just after a
+    reversal.
 
     Parameters
     ----------
@@ -133,26 +128,11 @@ class Preisach(SearchedRelays):
 
     @classmethod
     def from_everett(cls, levels: npt.ArrayLike, everett: npt.ArrayLike, *, offset: float = 0.0) -> Self:
-        """The law whose Everett function is known at the pairs of levels.
+        """The law with the Everett function [unit of y] at the pairs of levels (n_levels,) [unit of u].
 
-        Parameters
-        ----------
-        levels : sequence of float, length n_levels
-            [unit of u]
-        everett : array, shape (n_levels, n_levels)
-            Element [m, n], m > n, is half of what the output loses from the turning point at level m down to
-            level n [unit of y]. The others are not read.
-        offset : float
-            [unit of y]
-
-        Returns
-        -------
-        Preisach
-
-        Raises
-        ------
-        ValueError
-            If the shape is not that of the levels, or as in the constructor.
+        Element [m, n] of `everett` (n_levels, n_levels), m > n, is half of what the output loses from the turning point
+        at level m down to level n; the others are not read. Raises ValueError if the shape does not fit, or as the
+        constructor.
         """
         grid, table = read_only(levels, "levels", ndim=1), read_only(everett, "everett", ndim=2, finite=False)
         if table.shape != (grid.size, grid.size):
@@ -161,25 +141,10 @@ class Preisach(SearchedRelays):
 
     @classmethod
     def from_density(cls, levels: npt.ArrayLike, density: Density, *, offset: float = 0.0) -> Self:
-        """The law with the weights of a density w(a, b), integrated over each pair of intervals.
+        """The law with the weights of a density w(a, b), integrated over each pair of intervals between the levels.
 
-        Parameters
-        ----------
-        levels : sequence of float, length n_levels
-            [unit of u]
-        density : callable
-            ``density(a, b)`` at arrays of upper and lower thresholds [unit of y / unit of u^2].
-        offset : float
-            [unit of y]
-
-        Returns
-        -------
-        Preisach
-
-        Raises
-        ------
-        ValueError
-            As in the constructor, or if the density is not finite.
+        ``density(a, b)`` takes arrays of upper and lower thresholds [unit of y / unit of u^2]; the levels (n_levels,)
+        are in [unit of u]. Raises ValueError if it is not finite, or as the constructor.
 
         Examples
         --------
@@ -203,26 +168,11 @@ class Preisach(SearchedRelays):
 
     @classmethod
     def from_plays(cls, levels: npt.ArrayLike, law: PrandtlIshlinskii) -> Self:
-        """The law that has a Prandtl-Ishlinskii law's Everett function at the pairs of levels.
+        """The law with the Everett function of a Prandtl-Ishlinskii law at the pairs of levels (n_levels,) [unit of u].
 
         A play of threshold r is a line of relays with a - b = 2 r. Where the input stops at the levels only, the two
-        laws agree once the plays have been pushed from the lowest level or below; elsewhere E is interpolated.
-
-        Parameters
-        ----------
-        levels : sequence of float, length n_levels
-            [unit of u]
-        law : PrandtlIshlinskii
-            Its z0 is not read.
-
-        Returns
-        -------
-        Preisach
-
-        Raises
-        ------
-        ValueError
-            As in the constructor.
+        laws agree once the plays have been pushed from the lowest level or below; elsewhere E is interpolated. The
+        law's z0 is not read. Errors are those of the constructor.
 
         Examples
         --------
@@ -241,43 +191,36 @@ class Preisach(SearchedRelays):
 
     @classmethod
     def from_reversal_curves(cls, record: Record, *, tolerance: float = TOLERANCE) -> Self:
-        """The law whose Everett function is read from first-order reversal curves.
-
-        ::
-
-            E(a, b) = (y_a - y_ab) / 2
+        """The law whose Everett function is read from first-order reversal curves, ``E(a, b) = (y_a - y_ab) / 2``.
 
         y_a is the output where the input turns at a on its way up from the lowest one, and y_ab where it is back at b.
 
         Parameters
         ----------
         record : Record
-            Ways up from the lowest input to rising turning points, each followed by the way down to the lowest
-            input, such as `hysim.signals.reversal_curves` has. The turning points become the levels.
+            Strokes from the lowest input up to rising turning points, each followed by one back down, such as
+            `hysim.signals.reversal_curves` has. The turning points become the levels.
         tolerance : float
             Retreats of the input up to this fraction of its span are ignored: noise.
 
         Returns
         -------
         Preisach
+            Noise of the standard deviation s leaves some s in each weight, of either sign; ``hs.identify`` on the same
+            record and levels fits all samples at once with weights of one sign.
 
         Raises
         ------
         ValueError
             If the input does not turn, or a curve does not begin and end at the lowest input.
 
-        Notes
-        -----
-        Noise of the standard deviation s leaves some s in each weight, of either sign. ``hs.identify`` on the same
-        record and levels fits all samples at once with weights of one sign.
-
         Examples
         --------
         >>> import hysim as hs
         >>> law = hs.Preisach(levels=(0.0, 1.0, 2.0), weights=(1.0, 0.5, 1.0), offset=3.0)
         >>> u = hs.signals.reversal_curves(0.0, 2.0, curves=2, samples_per_step=5)
-        >>> found = hs.Preisach.from_reversal_curves(hs.Record(u=u, y=law.response(u)))
-        >>> [round(weight, 12) for weight in found.weights], round(found.offset, 12)
+        >>> curves = hs.Preisach.from_reversal_curves(hs.Record(u=u, y=law.response(u)))
+        >>> [round(weight, 12) for weight in curves.weights], round(curves.offset, 12)
         ([1.0, 0.5, 1.0], 3.0)
         """
         low, slack = float(record.u.min()), tolerance * float(np.ptp(record.u))
@@ -300,9 +243,8 @@ class Preisach(SearchedRelays):
     def slope_bounds(self) -> tuple[float, float]:
         """Lowest and highest slope dy/du over every input between the levels.
 
-        Where the input rises in the interval i, the relays w_ij, w_i(j+1), ..., w_ii go up, where j is that of the last
-        minimum; where it falls in the interval j, w_jj, w_(j+1)j, ..., w_ij go down, where i is that of the last
-        maximum.
+        Where the input rises in the interval i, the relays w_ij, w_i(j+1), ..., w_ii go up, with j that of the last
+        minimum; where it falls in the interval j, w_jj, w_(j+1)j, ..., w_ij go down, with i that of the last maximum.
         """
         if not self.levels:
             return 0.0, 0.0
@@ -318,58 +260,24 @@ class Preisach(SearchedRelays):
         low, high = self.slope_bounds()
         return low * high > 0.0
 
-    def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
-        """Input that gives the output `y`, monotone between the samples.
-
-        Parameters
-        ----------
-        y : array, shape (n_samples,)
-            Wanted output.
-        u0 : float, optional
-            Input at which the law rests before it moves to the first sample; by default the first sample
-            finds the relays as z0 left them.
-        state : tuple of float, optional
-            Input and extremes to continue from, in place of u0 and z0.
-
-        Returns
-        -------
-        array, shape (n_samples,)
-            Its `response` is y to rounding.
-
-        Raises
-        ------
-        ValueError
-            If y is not finite or has not one axis, both u0 and state are given, or the slope vanishes or
-            changes its sign.
-        SimulationError
-            If a sample is beyond the saturation; the message names it.
-        """
-        if state is not None and u0 is not None:
-            raise ValueError("give u0 or state, not both: the state has its own input")
-        wanted = read_only(y, "y", ndim=1)
+    def inverse_begun(self, y: FloatArray, u0: float | None, state: State | None) -> CompiledLaw:
+        """In closed form, after the inputs before the first sample."""
         past = state[1:] if state is not None else self.z0 if u0 is None else (*self.z0, u0)
-        u, inverse = np.empty(wanted.size), self.inverse_from(past, room=wanted.size)
-        lost = in_pieces(lambda k: drive(inverse.step, inverse.parameters, inverse.state, wanted[k], u[k]), u.size)
-        if lost >= 0:
-            bound = abs(float(self.everett[-1, 0]))
-            raise SimulationError(
-                f"the law has no inverse at sample {lost} (y = {wanted[lost]:g}): it saturates at "
-                f"{self.offset - bound:g} and {self.offset + bound:g}"
-            )
-        return u
+        return self.inverse_from(past, room=y.size)
+
+    def unreached(self, sample: int, y: float, inverse: CompiledLaw) -> str:
+        """Message with the outputs between which the law saturates."""
+        bound = abs(float(self.everett[-1, 0]))
+        return (
+            f"the law has no inverse at sample {sample} (y = {y:g}): it saturates at {self.offset - bound:g} and "
+            f"{self.offset + bound:g}"
+        )
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
-        """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""
         return self.inverse_from((*self.z0, u0), limits, room=_ROOM)
 
     def inverse_from(self, past: State, limits: Limits = UNLIMITED, *, room: int = 0) -> CompiledLaw:
-        """The inverse after the inputs `past`, as `hysim.kernels.inverses` has it, with room for so many more extremes.
-
-        Raises
-        ------
-        ValueError
-            If the slope vanishes or changes its sign.
-        """
+        """The inverse after the inputs `past`, with room for more extremes; see `hysim.kernels.inverses`."""
         slowest, fastest = self.slope_bounds()
         if not slowest * fastest > 0.0:
             raise ValueError(

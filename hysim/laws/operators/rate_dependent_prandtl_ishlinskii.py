@@ -1,30 +1,19 @@
 """The rate-dependent Prandtl-Ishlinskii law: plays whose thresholds grow with the speed of the input.
 
-    rho_i(k) = r_i + beta |u'_k| for r_i > 0,  0 for r_0 = 0        u'_k = (u_k - u_(k-1)) / sample_time
-    z_i(k)   = max(u_k - rho_i(k), min(u_k + rho_i(k), z_i(k-1)))
-    y        = offset + sum_i w_i z_i
-
-u is the input, z_i the memory, y the output. The input moves evenly from one sample to the next; at the first
-sample it stands still. Where the speed is known beforehand, the thresholds are functions of time, and the inverse is
-a law of the same kind at the same speed, with the weights and thresholds of the plain law's inverse and
-
-    beta' = |w_0| beta
-
-because the distances of the thresholds past the first do not change in time. Where the speed is that of the input
-which is sought, each sample is one equation for it. With b = beta / sample_time and the sums s_i = w_0 + ... + w_i it
-has one solution, and its error does not grow from sample to sample, where all
+Where the speed is known beforehand, the thresholds are functions of time, and the inverse is a law of the same kind at
+the same speed, with the weights and thresholds of the plain law's inverse and beta' = |w_0| beta, because the distances
+of the thresholds past the first do not change in time. Where the speed is that of the unknown input, each sample is one
+equation for it. With b = beta / sample_time and the sums s_i = w_0 + ... + w_i it has one solution, and its error does
+not grow from sample to sample, where all
 
     s_i - 2 b |s_i - s_0|    (times the sign of s_0)
 
-are positive: samples must be further apart than about 2 beta. Closer ones follow the analytic inverse only.
-
-Sources: M. Al Janaideh and P. Krejci, IEEE/ASME Trans. Mechatronics 18 (2013), for the law and the analytic inverse;
-M. Al Janaideh, P. Krejci and G. A. Monteiro, Applications of Mathematics (2023). The condition on samples is ours.
+are positive: samples must be further apart than about 2 beta. The condition on samples is ours.
 """
 
 import math
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -32,16 +21,18 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, checked, read_only
 from hysim.kernels import play_sums as kernels
-from hysim.laws.operators._clamp_search import Axis, ClampStructure, half_span
+from hysim.laws.operators._clamp_search import Axis, ClampStructure, Pushing
 from hysim.laws.operators._play_sums import ExtendedPlays, kernel_rows, positions_of
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.batch import Reduction
 from hysim.models.by_structure import ByStructure
 from hysim.models.composable import Composable
-from hysim.models.law import Packed, State, Tables
+from hysim.models.law import Packed, State
 from hysim.models.model import family
+from hysim.models.parameters import spans
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.search_space import Parameters
+from hysim.models.tables import Tables
 from hysim.records import Record
 
 _LARGEST = 1.0  # of the widening at the record's highest speed, in half spans
@@ -50,7 +41,7 @@ _STARTS = (0.0, 0.1, 0.3)
 
 @checked
 class PlaysAtSampleTime(ExtendedPlays):
-    """The law at one sample time, thresholds ``r_i + width |u_k - u_(k-1)|``: a law by its step."""
+    """The law at one sample time, with thresholds ``r_i + width |u_k - u_(k-1)|``."""
 
     thresholds: tuple[float, ...] = ()
     weights: tuple[float, ...] = ()
@@ -67,6 +58,22 @@ class PlaysAtSampleTime(ExtendedPlays):
         """The structure with the thresholds of this law."""
         return ClampStructure(law=PrandtlIshlinskii, thresholds=self.thresholds)
 
+    def refusal(self) -> str | None:
+        """Why the law has no inverse at its sample time; None where it has one."""
+        if (refusal := self.plays.refusal()) is not None:
+            return refusal
+        sums = np.cumsum(self.weights)
+        with np.errstate(divide="ignore"):
+            limits = np.abs(sums) / (2.0 * np.abs(sums - sums[0]))
+        i = int(np.argmin(limits))
+        if self.width < limits[i]:
+            return None
+        return (
+            f"the law has no stable inverse at this sample time: beta / sample_time is {self.width:g}, but the sums of "
+            f"weights s_i = w_0 + ... + w_i ask for less than |s_i| / (2 |s_i - s_0|), {limits[i]:g} for i = {i}; "
+            "give the speed, or take longer samples"
+        )
+
     def response_at(self, u: npt.ArrayLike, widening: FloatArray) -> FloatArray:
         """Output at the samples of `u` of plays whose thresholds are wider by `widening`, shape (n_samples,)."""
         inputs = read_only(u, "u", ndim=1)
@@ -79,6 +86,15 @@ class PlaysAtSampleTime(ExtendedPlays):
 @family
 class RateDependentPrandtlIshlinskii(ByStructure, Composable):
     """Rate-dependent Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i``, thresholds ``r_i + beta |u'|``.
+
+    ::
+
+        rho_i(k) = r_i + beta |u'_k| for r_i > 0,  0 for r_0 = 0        u'_k = (u_k - u_(k-1)) / sample_time
+        z_i(k)   = max(u_k - rho_i(k), min(u_k + rho_i(k), z_i(k-1)))
+
+    The input moves evenly from one sample to the next; at the first sample it stands still. Sources: M. Al Janaideh and
+    P. Krejci, IEEE/ASME Trans. Mechatronics 18 (2013), for the law and the analytic inverse; M. Al Janaideh, P. Krejci
+    and G. A. Monteiro, Applications of Mathematics (2023).
 
     Parameters
     ----------
@@ -125,7 +141,7 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "z0", self.plays.z0)
-        _check_beta(np.array(self.beta))
+        _width(np.array(self.beta), 1.0)
 
     @property
     def plays(self) -> PrandtlIshlinskii:
@@ -134,39 +150,16 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
 
     @classmethod
     def structure(cls, *, plays: int = 10, thresholds: npt.ArrayLike = (), one_signed: bool = True) -> ClampStructure:
-        """What `hysim.identify` takes: where the plays are; beta is searched.
-
-        Parameters
-        ----------
-        plays, thresholds, one_signed
-            As of `PrandtlIshlinskii.structure`.
-
-        Returns
-        -------
-        ClampStructure
-
-        Raises
-        ------
-        ValueError, TypeError
-            As `PrandtlIshlinskii.structure`.
-        """
-        given = tuple(read_only(thresholds, "thresholds", ndim=1).tolist())
-        return ClampStructure(law=cls, thresholds=given, plays=plays, one_signed=one_signed, pushing=Widening())
+        """Plays for `hysim.identify`, as of `PrandtlIshlinskii.structure`; beta is searched."""
+        plain = PrandtlIshlinskii.structure(plays=plays, thresholds=thresholds, one_signed=one_signed)
+        return replace(plain, law=cls, pushing=Widening())
 
     def at(self, sample_time: float) -> PlaysAtSampleTime:
-        """The law at one sample time [s], as loops step it.
-
-        Raises
-        ------
-        ValueError
-            If the sample time is not positive.
-        """
-        if not sample_time > 0.0:
-            raise ValueError(f"sample_time must be positive, got {sample_time}")
+        """The law at one sample time [s], as loops step it. Raises ValueError if the sample time is not positive."""
         return PlaysAtSampleTime(
             thresholds=self.thresholds,
             weights=self.weights,
-            width=self.beta / sample_time,
+            width=float(_width(np.array(self.beta), sample_time)),
             offset=self.offset,
             z0=self.z0,
         )
@@ -206,33 +199,15 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
         return {"y": law.response(u), "z": law.memory(u)}
 
     def advance(self, u: npt.ArrayLike, sample_time: float, state: State | None = None) -> tuple[FloatArray, State]:
-        """Output continued from `state`, and the state after the last sample.
+        """Output continued from `state`, input and positions at the last sample so far, and the state at the end.
 
-        Parameters
-        ----------
-        u : array, shape (n_samples,)
-            Input, moving evenly between its samples and from the state's input to the first of them.
-        sample_time : float
-            Time between two samples [s].
-        state : tuple of float, optional
-            Input and positions at the last sample so far; by default ``(u[0], *z0)``.
-
-        Returns
-        -------
-        y : array, shape (n_samples,)
-            The same bits as from one uncut input.
-        state : tuple of float
-            To continue from.
-
-        Raises
-        ------
-        ValueError
-            As `response`, or if the state does not hold one position for each play.
+        The bits are those of one uncut input, which moves evenly from the state's input to its first sample; arguments
+        and errors are those of `response`. By default the state is ``(u[0], *z0)``.
         """
         return self.at(sample_time).advance(u, state)
 
     def compiled(self, u0: float = 0.0, *, sample_time: float) -> CompiledLaw:
-        """The law as compiled loops take it; the state is that of a first sample at the input `u0`."""
+        """The law as compiled loops take it, after a first sample at the input `u0`."""
         return self.at(sample_time).compiled(u0)
 
     @classmethod
@@ -246,55 +221,22 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
         target: npt.ArrayLike | None = None,
         workers: int | None = None,
     ) -> FloatArray:
-        """Outputs of many laws at once, on all cores, or one number of each.
-
-        Parameters
-        ----------
-        parameters : mapping
-            As of `PrandtlIshlinskii.responses`, and ``beta``.
-        u : array, shape (n_samples,) or (n_sets, n_samples)
-            One input for all sets, or one for each.
-        sample_time : float
-            Time between two samples [s].
-        reduce, target, workers
-            As there.
-
-        Returns
-        -------
-        array, shape (n_sets, n_samples), or (n_sets,) with `reduce`
-            Each row the same bits as `response`.
-
-        Raises
-        ------
-        TypeError, ValueError
-            As there, or if the sample time is not positive.
-        """
-        if not sample_time > 0.0:
-            raise ValueError(f"sample_time must be positive, got {sample_time}")
+        """Outputs of many laws at one sample time [s]; else as `PrandtlIshlinskii.responses`, with ``beta``."""
+        width = _width(np.asarray(parameters.get("beta", cls.beta), dtype=float), sample_time)
         known = [field.name for field in fields(cls)]
         if wrong := [name for name in parameters if name not in known]:
             raise TypeError(f"unknown parameter {wrong[0]!r}: {cls.__name__} has {', '.join(known)}")
-        beta = np.asarray(parameters.get("beta", cls.beta), dtype=float)
-        _check_beta(beta)
-        sets = {name: value for name, value in parameters.items() if name != "beta"} | {"width": beta / sample_time}
+        sets = {name: value for name, value in parameters.items() if name != "beta"} | {"width": width}
         return PlaysAtSampleTime.responses(sets, u, reduce=reduce, target=target, workers=workers)
 
     def is_invertible(self, sample_time: float | None = None) -> bool:
         """Whether there is an `inverse`, for a known speed; with a sample time, an `inverse_response` without one."""
-        return self.plays.is_invertible() and (sample_time is None or self._refusal(sample_time) is None)
+        return self.plays.is_invertible() and (sample_time is None or self.at(sample_time).is_invertible())
 
     def inverse(self) -> "RateDependentPrandtlIshlinskii":
         """The law that gives the input for a wanted output, exactly, at the same speed of the input.
 
-        Returns
-        -------
-        RateDependentPrandtlIshlinskii
-            To be used as ``inverse.response(y, sample_time, speed=...)``.
-
-        Raises
-        ------
-        ValueError
-            As `PrandtlIshlinskii.inverse`.
+        Use it as ``inverse.response(y, sample_time, speed=...)``. Errors are those of `PrandtlIshlinskii.inverse`.
 
         Examples
         --------
@@ -322,51 +264,21 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
         *,
         speed: npt.ArrayLike | None = None,
     ) -> FloatArray:
-        """Input that gives the output `y`.
+        """Input that gives the output `y` every `sample_time` [s], to rounding; see `hysim.Law.inverse_response`.
 
-        Parameters
-        ----------
-        y : array, shape (n_samples,)
-            Wanted output.
-        sample_time : float
-            Time between two samples [s].
-        u0 : float, optional
-            Input at which the law rests before it moves to the first sample; by default the first sample
-            finds the plays at z0, at rest.
-        state : tuple of float, optional
-            Input and positions to continue from, in place of u0 and z0.
-        speed : array, shape (n_samples,), optional
-            ``|u'|`` of the input, where it is known beforehand, as from the reference: the analytic inverse.
-
-        Returns
-        -------
-        array, shape (n_samples,)
-            Its `response` (at that speed, where one is given) is y to rounding.
-
-        Raises
-        ------
-        ValueError
-            If the law is not invertible, the sample time is too short for it, z0 holds positions that no input leads
-            to, a speed is given beside u0 or state, or an array does not fit.
+        With ``speed``, ``|u'|`` of the input (n_samples,) where it is known beforehand, it is the analytic inverse.
+        Raises ValueError if the law is not invertible, the sample time is too short for it, z0 holds positions that no
+        input leads to, a speed is given beside u0 or state, or an array does not fit.
         """
         if speed is not None:
             if u0 is not None or state is not None:
                 raise ValueError("a speed goes with the z0 of the law: replace that in place of u0 or state")
             return self.inverse().response(y, sample_time, speed=speed)
-        self.check_invertible(sample_time)
-        return self.at(sample_time).input_of(y, u0, state)
+        return self.at(sample_time).inverse_response(y, u0, state)
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
-        """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""
-        self.check_invertible(sample_time)
-        steps = self.at(sample_time)
-        return steps.inverse_from(steps.advance([u0])[1], limits)
-
-    def check_invertible(self, sample_time: float) -> None:
-        """Raise a ValueError if the law is not invertible at this sample time, or no input leads to z0."""
-        if (refusal := self._refusal(sample_time)) is not None:
-            raise ValueError(refusal)
-        self.plays.inverse()  # refuses such positions
+        """The inverse at a sample time [s], stepped; see `hysim.Law.compiled_inverse`."""
+        return self.at(sample_time).compiled_inverse(u0, limits)
 
     def as_structure(self) -> ClampStructure:
         """The structure with the thresholds and beta of this law."""
@@ -375,38 +287,19 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
             law=type(self), thresholds=self.thresholds, one_signed=one_signed, pushing=Widening(beta=self.beta)
         )
 
-    def _refusal(self, sample_time: float) -> str | None:
-        if (refusal := self.plays.refusal()) is not None:
-            return refusal
-        b, sums = self.beta / sample_time, np.cumsum(self.weights)
-        with np.errstate(divide="ignore"):
-            limits = np.abs(sums) / (2.0 * np.abs(sums - sums[0]))
-        i = int(np.argmin(limits))
-        if b < limits[i]:
-            return None
-        return (
-            f"the law has no stable inverse at the sample time {sample_time:g}: beta / sample_time is {b:g}, but the "
-            f"sums of weights s_i = w_0 + ... + w_i ask for less than |s_i| / (2 |s_i - s_0|), {limits[i]:g} for "
-            f"i = {i}; give the speed, or take longer samples"
-        )
-
 
 @checked
-class Widening:
-    """What is searched of thresholds that grow with the speed: beta, from a law's own or from none."""
+class Widening(Pushing):
+    """The search for beta, from a law's own or from none."""
 
     beta: float | None = None
 
     def axes(self, record: Record) -> dict[str, Axis]:
         """Beta, up to half a span of the input at its highest speed."""
-        half = half_span(record)
+        half = spans(record)["h"]
         scale = half / (float(np.abs(np.diff(record.u)).max()) / record.sample_time)
         own = () if self.beta is None else (self.beta,)
         return {"beta": Axis(0.0, _LARGEST * scale, (*own, *(scale * start for start in _STARTS)), scale)}
-
-    def derived(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
-        """Nothing."""
-        return {}
 
     def positions(self, parameters: Parameters, thresholds: FloatArray, z0: FloatArray, record: Record) -> FloatArray:
         """Positions (n_sets, n_samples, n_plays)."""
@@ -419,14 +312,18 @@ class Widening:
 
 
 def _as_speed(speed: npt.ArrayLike, u: npt.ArrayLike) -> FloatArray:
-    given = read_only(speed, "speed", ndim=1)
-    if given.size != np.size(u):
-        raise ValueError(f"speed must have {np.size(u)} samples as the signal has, got {given.size}")
-    if (given < 0.0).any():
-        raise ValueError(f"speed must not be negative, got {given.min():g}")
-    return given
+    speeds = read_only(speed, "speed", ndim=1)
+    if speeds.size != np.size(u):
+        raise ValueError(f"speed must have {np.size(u)} samples as the signal has, got {speeds.size}")
+    if (speeds < 0.0).any():
+        raise ValueError(f"speed must not be negative, got {speeds.min():g}")
+    return speeds
 
 
-def _check_beta(beta: FloatArray) -> None:
+def _width(beta: FloatArray, sample_time: float) -> FloatArray:
+    """Growth of the thresholds with the step of the input."""
     if (beta < 0.0).any():
         raise ValueError(f"beta must not be negative, got {beta.min():g}")
+    if not sample_time > 0.0:
+        raise ValueError(f"sample_time must be positive, got {sample_time}")
+    return np.asarray(beta / sample_time)

@@ -1,4 +1,4 @@
-"""Laws that are Bouc-Wen's with n = 1 and gamma = 0 under other names: everything is evaluated as that law."""
+"""Laws that are Bouc-Wen laws with n = 1 and gamma = 0 under other names: everything is evaluated as such a law."""
 
 import math
 from abc import abstractmethod
@@ -7,15 +7,16 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
-from hysim.laws.differential._boucwen_step import BoucWenStep
+from hysim.laws.differential._boucwen_law import BoucWenStep
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.laws.differential.boucwen_inverse import BoucWenInverse, InverseState
 from hysim.laws.differential.limit_cycle import LimitCycle
-from hysim.models.law import Packed, State, Tables
+from hysim.models.law import Packed, State
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
+from hysim.models.tables import Tables
 
 
-class AsBoucWen(BoucWenStep):
+class EquivalentBoucWen(BoucWenStep):
     """A law that says which Bouc-Wen law it is."""
 
     @classmethod
@@ -25,14 +26,14 @@ class AsBoucWen(BoucWenStep):
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
-        """As the Bouc-Wen law is packed."""
+        """The constants and the memory of the Bouc-Wen law."""
         parameters = cls.equivalent(tables)
         plain = {name: np.full_like(parameters["A"], value) for name, value in BoucWen.defaults().items()}
         return BoucWen.pack({**plain, **parameters})
 
     @property
     def bouc_wen(self) -> BoucWen:
-        """The same law as Bouc-Wen's."""
+        """The `BoucWen` law with the same output."""
         return BoucWen(**{name: float(table[0, 0]) for name, table in self.equivalent(self.tables).items()})
 
     def tangent(self, direction: npt.ArrayLike, z: npt.ArrayLike) -> FloatArray:
@@ -47,11 +48,13 @@ class AsBoucWen(BoucWenStep):
         """The law's inverse as an object, where its slope keeps its sign; see `hysim.BoucWen.inverse`."""
         return self.bouc_wen.inverse()
 
-    def inverse_response(
-        self, y: npt.ArrayLike, u0: float | None = None, state: State | InverseState | None = None
-    ) -> FloatArray:
-        """Input that gives the output `y` from the input `u0`; see `hysim.BoucWen.inverse_response`."""
-        return self.bouc_wen.inverse_response(y, u0, state)
+    def inverse_begun(self, y: FloatArray, u0: float | None, state: State | InverseState | None) -> CompiledLaw:
+        """The inverse of the Bouc-Wen law."""
+        return self.bouc_wen.inverse_begun(y, u0, state)
+
+    def unreached(self, sample: int, y: float, inverse: CompiledLaw) -> str:
+        """Message with the input and the slope there."""
+        return self.bouc_wen.unreached(sample, y, inverse)
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
         """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""

@@ -1,0 +1,79 @@
+"""The numbers of laws: one name for each, and tables of every field over sets of laws."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, read_only
+from hysim.models.search_space import Parameters
+
+Tables = Mapping[str, FloatArray]
+"""Every field over sets: (n_sets, 1) for a number, (n_sets, length) for a tuple, (n_sets, rows, columns)."""
+
+
+def scalars_of(values: Mapping[str, Any]) -> dict[str, float]:
+    """One number for each name, those of a tuple as ``name[k]``."""
+    numbers: dict[str, float] = {}
+    for name, value in values.items():
+        if isinstance(value, tuple):
+            numbers |= {f"{name}[{k}]": each for k, each in enumerate(value)}
+        else:
+            numbers[name] = value
+    return numbers
+
+
+def arguments_of(scalars: Mapping[str, float]) -> dict[str, Any]:
+    """The constructor's arguments, those named ``name[k]`` as one tuple."""
+    arguments: dict[str, Any] = {}
+    for name, value in scalars.items():
+        whole, bracket, _ = name.partition("[")
+        number = float(np.asarray(value).item())
+        arguments[whole] = (*arguments.get(whole, ()), number) if bracket else number
+    return arguments
+
+
+def tables_of(
+    family: str, defaults: Mapping[str, Any], parameters: Parameters, u: npt.ArrayLike
+) -> tuple[dict[str, FloatArray], FloatArray]:
+    """Every field over sets, (n_sets, ...), and the inputs (1 or n_sets, n_samples).
+
+    A parameter is a field, or an element ``name[k]`` of a tuple.
+
+    Raises TypeError if a name is unknown, and ValueError if a value has too many axes, or lengths do not fit.
+    """
+    inputs = np.atleast_2d(read_only(u, "u"))
+    if inputs.ndim != 2:
+        raise ValueError(f"u must have 1 axis or 2, got shape {inputs.shape}")
+    whole = {**defaults, **{name: value for name, value in parameters.items() if "[" not in name}}
+    elements = {name: value for name, value in parameters.items() if "[" in name}
+    for name in (*whole, *(name.partition("[")[0] for name in elements)):
+        if name not in defaults:
+            raise TypeError(f"unknown parameter {name!r}: {family} has {', '.join(defaults)}")
+    tables = {name: _table(name, value, np.ndim(defaults[name])) for name, value in whole.items()}
+    columns = {name: _table(name, value, 0) for name, value in elements.items()}
+    lengths = {name: len(table) for name, table in {**tables, **columns, "u": inputs}.items() if len(table) != 1}
+    if len(set(lengths.values())) > 1:
+        raise ValueError(f"parameters and inputs must have one length or length 1, got {lengths}")
+    n_sets = next(iter(lengths.values()), 1)
+    tables = {name: np.broadcast_to(table, (n_sets, *table.shape[1:])) for name, table in tables.items()}
+    for name, column in columns.items():
+        field, _, place = name.partition("[")
+        tables[field] = np.where(np.arange(tables[field].shape[1]) == int(place[:-1]), column, tables[field])
+    return tables, inputs
+
+
+def table_of_one(value: Any) -> FloatArray:
+    """A number (1, 1), or a field with axes of its own behind one of length 1."""
+    return np.array([[value]]) if isinstance(value, float) else np.array([value], dtype=float)
+
+
+def _table(name: str, values: npt.ArrayLike, ndim: int) -> FloatArray:
+    """Values over sets, of a number (n_sets, 1), of a field with `ndim` axes (n_sets, ...)."""
+    array = read_only(values, name)
+    if array.ndim > ndim + 1:
+        raise ValueError(f"{name} has too many axes: got shape {array.shape}")
+    if array.ndim == ndim:
+        array = array[np.newaxis]
+    return array[:, np.newaxis] if ndim == 0 else array
