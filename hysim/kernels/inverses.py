@@ -101,7 +101,8 @@ def _rise(
     step: Step, parameters: FloatArray, state: FloatArray, trial: FloatArray, u: float, side: float, level: float
 ) -> float:
     """Output at `u` less `level`, counted positive on one side of it; the state does not change."""
-    trial[:] = state
+    for k in range(state.size):  # `trial[:] = state` would compile the text of an error, for seconds
+        trial[k] = state[k]
     return side * (step(parameters, trial, u) - level)
 
 

@@ -154,14 +154,16 @@ def outputs(
     n_inputs, n_samples = out.shape
     now, moved = np.empty(x.shape[1]), np.empty(x.shape[1])
     for i in range(n_inputs):
-        now[:] = x[i]
+        for row in range(now.size):
+            now[row] = x[i, row]
         for k in range(n_samples):
             older, newer = max(0, first + k - 1 - lag), max(0, first + k - lag)
             cut = level[i, older] + (1.0 - part) * rise[i, older]
             end = level[i, newer] + (1.0 - part) * rise[i, newer]
             if not at_end:
                 out[i, k] = _seen(C[i], D[i], now, cut if part > 0.0 else level[i, newer])
-            x[i] = now
+            for row in range(now.size):
+                x[i, row] = now[row]
             if part > 0.0:
                 _advance(A[0], B0[0], B1[0], cut, level[i, older] + rise[i, older], now, moved)
             _advance(A[1], B0[1], B1[1], level[i, newer], end, now, moved)
