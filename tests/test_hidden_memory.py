@@ -6,7 +6,7 @@ from scipy.linalg import expm
 
 import hysim as hs
 from hysim.discovery._hidden_memory import cases, memory_arrays
-from hysim.kernels import hidden
+from hysim.kernels import memory_terms
 from hysim.laws.differential.terms import RELAXATION, bouc_wen_terms
 
 PLANT = {"mass": 2.0, "damping": 0.4, "stiffness": 3.0}
@@ -20,7 +20,7 @@ def test_the_memory_along_a_path_is_that_of_the_law_and_its_slopes_are_derivativ
     def run(coefficients: list[float], relaxation: float = 0.0) -> np.ndarray:
         found = np.zeros((5, path.size))
         polynomial = memory_arrays(dict(zip(terms, coefficients, strict=True)), 1).polynomial
-        assert hidden.along(np.diff(path), 1e-3, polynomial, relaxation, units, found[0], found[1:])
+        assert memory_terms.along(np.diff(path), 1e-3, polynomial, relaxation, units, found[0], found[1:])
         return found
 
     found = run([1.0, -0.6, -0.3])
@@ -39,7 +39,7 @@ def motion(coefficients, force, h, degree=1):
     polynomial, extra, power, relaxation = memory_arrays(coefficients, degree)
     plant = np.array([*PLANT.values(), relaxation, power])
     state, y = np.zeros(3), np.zeros(force.size)
-    assert hidden.motion(plant, polynomial, extra, force, h, state, y[1:])
+    assert memory_terms.motion(plant, polynomial, extra, force, h, state, y[1:])
     return y, state
 
 

@@ -10,7 +10,7 @@ import pytest
 
 import hysim as hs
 from hysim.discovery._oscillator_response import Oscillator, Response
-from hysim.kernels import hidden
+from hysim.kernels import memory_terms
 from hysim.laws.differential.terms import bouc_wen_terms
 from hysim.plants import steady_state
 
@@ -96,13 +96,13 @@ def test_a_fixed_point_that_does_not_attract_is_not_used():
 
 @needs_compiled
 def test_the_search_settles_a_lightly_damped_plant_too(monkeypatch):
-    runs, motion = [], hidden.motion
+    runs, motion = [], memory_terms.motion
 
     def counted(*given):
         runs.append(1)
         return motion(*given)
 
-    monkeypatch.setattr(hidden, "motion", counted)
+    monkeypatch.setattr(memory_terms, "motion", counted)
     structure = hs.BoucWenOscillator.structure(initial="periodic", period=100, oversampling=4)
     plant = replace(oscillator(5e-4, "hysteretic"), substeps=4)
     record = hs.Record(u=U, y=plant.periodic_response(U, STEP), t=STEP * np.arange(100))

@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline
 from hysim._frozen import FloatArray
 from hysim.discovery._term_regression import BLOCKS, FLOOR, TermRegression, term_regression
 from hysim.identification.marquardt import Schedule, SumOfSquares, descend
-from hysim.kernels import hidden as kernels
+from hysim.kernels import memory_terms as kernels
 from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_terms
 from hysim.plants.equation_of_motion import Filter, Linear, Motion, filtering
 from hysim.plants.resampling import interpolated
@@ -51,7 +51,7 @@ class _Along(NamedTuple):
 
 
 class MemoryArrays(NamedTuple):
-    """A law as `hysim.kernels.hidden` takes it: polynomials in z by direction and side, and one more power."""
+    """A law as `hysim.kernels.memory_terms` takes it: polynomials in z by direction and side, and one more power."""
 
     polynomial: FloatArray
     extra: FloatArray

@@ -22,7 +22,7 @@ from hysim.discovery._oscillator_models import State
 from hysim.discovery._term_regression import BLOCKS, FLOOR, TermRegression, term_regression
 from hysim.errors import SimulationError
 from hysim.identification.marquardt import SumOfSquares, descend
-from hysim.kernels import hidden as kernels
+from hysim.kernels import memory_terms as kernels
 from hysim.laws.differential.terms import Term
 from hysim.plants.oscillator_structure import OscillatorStructure
 from hysim.plants.steady_state import ATTEMPTS, attracting_state

@@ -24,8 +24,7 @@ import numpy as np
 from hysim._frozen import FloatArray
 from hysim.kernels._compile import borrowed, inlined, inner, kernel
 from hysim.kernels.charts import N_WORK, in_chart, power_flow, prepare_exponent
-from hysim.kernels.elementary import linear_advance, quadratic_advance
-from hysim.kernels.lanes import N_LANES, N_ROWS, fellows, linear_rows
+from hysim.kernels.elementary import N_AT_ONCE, N_ROWS, count_linear, linear_advance, linear_rows, quadratic_advance
 
 # The first places of a law's workspace: last u and z, for `step`; then w*, 1/w* and |a|/w* loading, and unloading.
 _LOADING, _UNLOADING = 2, 5
@@ -178,15 +177,15 @@ def batch(parameters: FloatArray, output: FloatArray, u: FloatArray, out: FloatA
     """
     if u.shape[1] == 0:
         return
-    work, lanes = np.empty(N_WORK), np.empty((N_ROWS, N_LANES))
+    work, several = np.empty(N_WORK), np.empty((N_ROWS, N_AT_ONCE))
     last_n, side_by_side = 0.0, start
     for i in range(start, stop):
         A, beta, gamma, n, z0 = parameters[i]
         row = u[min(i, u.shape[0] - 1)]
         if n == 1.0 and u.shape[0] == 1:
             if i >= side_by_side:
-                count = fellows(parameters, i, stop)
-                linear_rows(parameters, i, count, row, lanes, out)
+                count = count_linear(parameters, i, stop)
+                linear_rows(parameters, i, count, row, several, out)
                 side_by_side = i + count
             escaped = -1 if math.isfinite(out[i, row.size - 1]) else row.size
         elif n == 1.0:

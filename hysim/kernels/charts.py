@@ -27,14 +27,14 @@ import math
 
 from hysim._frozen import FloatArray
 from hysim.kernels._compile import inlined, inner
-from hysim.kernels.polynomials import N_TERMS, sum8, sum16
+from hysim.kernels.elementary import N_TERMS, sum8, sum16
 
 _N_CELLS = 64
 _REACH = 0.125  # half width of a cell over the distance at which its series end
 _SATURATION = 0.1  # half width of the chart of saturation
 _ZERO = 1.0 / 64.0  # w^n at the end of the chart near zero
 _NEGLIGIBLE = 2.0**-54
-_NOT_NEGATIVE = 0xFFFF  # as in `hysim.kernels.polynomials`
+_NOT_NEGATIVE = 0xFFFF  # as in `hysim.kernels.elementary`
 _LARGEST_EXPONENT = 700.0
 
 # The workspace of a law. Its first places are the caller's; then the cell of the last visit for each sigma; four

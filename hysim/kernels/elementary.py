@@ -8,14 +8,50 @@ In the frame that points along the input (H = z sign(du), L = |du|) each side of
 (tan for A k < 0). T does not depend on H, so that the samples of a path wait for each other for a few
 operations only. Near L = 0 it is a power series, elsewhere one exponential; both are good to 2e-16.
 Where H changes its sign, the rest of the way is gone from H = 0 with the other k. An escape is `inf`.
+
+The polynomials of 16 terms that the closed forms and the series of other laws take are summed by a tree of 9
+dependent operations, where Horner's rule is a chain of 30.
+
+Many laws of n = 1 on one input all go the same way by the same length. The short flow is then straight arithmetic,
+the same for every law, of which a processor does several at once. The few laws for which it does not hold are stepped
+again, one by one: those with A = 0, those whose way is too long for the series, and those that cross z = 0. The
+operations are those of a single path in the same order, and so are the bits.
 """
 
 import math
 from fractions import Fraction
 
-from hysim._frozen import read_only
-from hysim.kernels._compile import inlined, inner
-from hysim.kernels.polynomials import N_TERMS, sum16
+from numba import float64, int64, types
+
+from hysim._frozen import FloatArray, read_only
+from hysim.kernels._compile import inlined, inner, signed_inlined
+
+N_TERMS = 16
+_COEFFICIENTS = types.Array(float64, 1, "C", readonly=True)
+_NOT_NEGATIVE = 0xFFFF  # says to the compiler that no index counts from the end: a third of the time otherwise
+
+
+@signed_inlined(float64(_COEFFICIENTS, int64, float64))
+def sum16(c: FloatArray, first: int, x: float) -> float:
+    """The polynomial with the coefficients ``c[first : first + 16]``."""
+    k = first & _NOT_NEGATIVE
+    x2 = x * x
+    x4 = x2 * x2
+    a = (c[k] + c[k + 1] * x) + (c[k + 2] + c[k + 3] * x) * x2
+    b = (c[k + 4] + c[k + 5] * x) + (c[k + 6] + c[k + 7] * x) * x2
+    d = (c[k + 8] + c[k + 9] * x) + (c[k + 10] + c[k + 11] * x) * x2
+    e = (c[k + 12] + c[k + 13] * x) + (c[k + 14] + c[k + 15] * x) * x2
+    return float((a + b * x4) + (d + e * x4) * (x4 * x4))
+
+
+@signed_inlined(float64(_COEFFICIENTS, int64, float64))
+def sum8(c: FloatArray, first: int, x: float) -> float:
+    """The polynomial of eight terms with the coefficients ``c[first : first + 8]``."""
+    k = first & _NOT_NEGATIVE
+    x2 = x * x
+    a = (c[k] + c[k + 1] * x) + (c[k + 2] + c[k + 3] * x) * x2
+    b = (c[k + 4] + c[k + 5] * x) + (c[k + 6] + c[k + 7] * x) * x2
+    return float(a + b * (x2 * x2))
 
 
 def _tangent_series() -> list[float]:
@@ -155,3 +191,66 @@ def quadratic_travel(along: float, A: float, k: float) -> float:
     if A * k < 0.0:
         return math.atan(q) / r
     return math.atanh(q) / r if q < 1.0 else math.inf
+
+
+# ---------------------------------------------------------------------------------- many laws of n = 1 on one input
+
+N_AT_ONCE = 64
+N_ROWS = 5
+_A, _LOADING, _UNLOADING, _MEMORY, _ANEW = range(N_ROWS)
+
+
+@inlined
+def count_linear(parameters: FloatArray, start: int, stop: int) -> int:
+    """How many laws from `start` on, N_AT_ONCE at most, have n = 1."""
+    end = min(stop, start + N_AT_ONCE)
+    i = start
+    while i < end and parameters[i, 3] == 1.0:
+        i += 1
+    return i - start
+
+
+@inner
+def linear_rows(
+    parameters: FloatArray, start: int, count: int, u: FloatArray, several: FloatArray, out: FloatArray
+) -> None:
+    """Memories of `count` laws from `start` on at the samples of `u` into their rows; `several` is (N_ROWS, N_AT_ONCE).
+
+    A law that escapes has a last memory that is not finite.
+    """
+    A, loading, unloading, z = several[_A], several[_LOADING], several[_UNLOADING], several[_MEMORY]
+    for j in range(count):
+        law = parameters[start + j]
+        A[j], loading[j], unloading[j], z[j] = law[0], law[1] + law[2], law[1] - law[2], law[4]
+    last_u = u[0]
+    for k in range(u.size):
+        du = u[k] - last_u
+        if du != 0.0:
+            advance_all(A, loading, unloading, z, several[_ANEW], count, du)
+        last_u = u[k]
+        for j in range(count):
+            out[start + j, k] = z[j]
+
+
+@inlined
+def advance_all(
+    A: FloatArray, loading: FloatArray, unloading: FloatArray, z: FloatArray, anew: FloatArray, count: int, du: float
+) -> None:
+    """Move the memories `z` of all laws by `du`; `anew` takes those of laws that cannot take the short flow."""
+    length, direction = abs(du), math.copysign(1.0, du)
+    n_anew = 0
+    for j in range(count):
+        before, slope, along = z[j], A[j], direction * z[j]
+        rises, falls = loading[j], unloading[j]
+        k = rises if (along > 0.0) | ((along == 0.0) & (slope > 0.0)) else falls
+        is_long = abs(k * length) > DECAY_REACH
+        after = short_flow(along, slope, k, 0.0 if is_long else length)
+        crosses = ((along > 0.0) & (after < 0.0)) | ((along < 0.0) & (after > 0.0))
+        fails = (crosses | is_long | (slope == 0.0)) & (abs(before) < math.inf)
+        n_anew += 1 if fails else 0
+        anew[j] = before if fails else math.nan
+        z[j] = direction * after
+    if n_anew > 0:
+        for j in range(count):
+            if not math.isnan(anew[j]):
+                z[j] = linear_advance(anew[j], du, A[j], loading[j], unloading[j])

@@ -29,6 +29,15 @@ stages are one block of numbers, `plant`, with one state. Its parts follow each 
     state        two of the amplifier; x twice, the second time as room for the next one; the ring of the law's last
                  d + 3 outputs; the ring of displacements that the sensor has still to show, and the last one that
                  was taken within a sub-step
+
+The amplifier's voltage s slews towards its target and charges the load, voltage v, through a resistance:
+
+    s' = +-slew until s is the target,        v' = (s - v) / tau
+
+With e = 1 - exp(-t / tau) both pieces of s have closed forms:
+
+    ramp from s0 to s1 in the time t     v + (s0 - v) e + (s1 - s0) (1 - tau e / t)
+    constant s1                          v + (s1 - v) e
 """
 
 import math
@@ -37,7 +46,6 @@ from numba import float64, int64, types
 
 from hysim._frozen import FloatArray
 from hysim.kernels._compile import borrowed, inlined, signed_kernel
-from hysim.kernels.amplifier import charge
 from hysim.kernels.controllers import CONTROLLER
 from hysim.kernels.stepping import CONSTANTS, STEP, VECTOR, Step
 
@@ -46,6 +54,31 @@ INPUTS = types.Array(float64, 2, "C", readonly=True)
 
 N_AMPLIFIER = 6
 N_HEAD = N_AMPLIFIER + 7
+
+
+@inlined
+def charge(parameters: FloatArray, voltages: FloatArray, target: float) -> float:
+    """The voltage v at the end of a sub-step; `voltages` is (s, v) and moves along.
+
+    `parameters` begins with (slew per sub-step, sub-step / tau); infinite ones act at once.
+    """
+    reach, rate = parameters[0], parameters[1]
+    begin, v = voltages[0], voltages[1]
+    way = target - begin
+    if abs(way) > reach:
+        end, ramp = begin + math.copysign(reach, way), 1.0
+    else:
+        end, ramp = target, abs(way) / reach
+    voltages[0] = end
+    if rate == math.inf:
+        v = end
+    else:
+        if ramp * rate > 0.0:
+            decayed = -math.expm1(-ramp * rate)
+            v += (begin - v) * decayed + (end - begin) * (1.0 - decayed / (ramp * rate))
+        v += (end - v) * -math.expm1(-(1.0 - ramp) * rate)
+    voltages[1] = v
+    return float(v)
 
 
 @inlined

@@ -29,9 +29,8 @@ from hysim._frozen import FloatArray, read_only
 from hysim.kernels import boucwen
 from hysim.kernels._compile import kernel
 from hysim.kernels.duhem import MAX_STEPS, newton
-from hysim.kernels.elementary import linear_flow
-from hysim.kernels.polynomials import N_TERMS as N_RAMP
-from hysim.kernels.polynomials import sum16
+from hysim.kernels.elementary import N_TERMS as N_RAMP
+from hysim.kernels.elementary import linear_flow, sum16
 from hysim.kernels.remainder import N_TERMS, ROUNDING, fraction, radius
 
 N_HEAD = 2

@@ -58,7 +58,7 @@ def needed_time(part: Any, sample_time: float | None) -> float:
 
 
 def compiled_pair(join: Callable[[Step, Step], Step], first: CompiledLaw, second: CompiledLaw) -> CompiledLaw:
-    """Two laws as one, joined by a function of `hysim.kernels.composed`."""
+    """Two laws as one, joined by a function of `hysim.kernels.stepping`."""
     sizes = [float(first.parameters.size), float(first.state.size)]
     return CompiledLaw(
         _joined(join, first.step, second.step),

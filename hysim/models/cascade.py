@@ -6,7 +6,7 @@ from typing import Any
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim.kernels.composed import one_behind_the_other
+from hysim.kernels.stepping import one_behind_the_other
 from hysim.models._cascade_search import CascadeStructure
 from hysim.models._composite import Composite, State, continued
 from hysim.models._parts import check_parts, compiled_law, compiled_pair, labels, response_of

@@ -7,8 +7,7 @@ from typing import Any
 
 from numba.core.dispatcher import Dispatcher
 
-from hysim.kernels.custom import compile_step
-from hysim.kernels.stepping import Step
+from hysim.kernels.stepping import Step, compile_step
 
 
 def compiled_step(function: Callable[[Any, Any, float], float]) -> Step:

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim.kernels.composed import side_by_side
+from hysim.kernels.stepping import side_by_side
 from hysim.models._composite import Composite, State, continued
 from hysim.models._parts import check_parts, compiled_law, compiled_pair, labels, response_of
 from hysim.models._sum_search import SumStructure
