@@ -1,4 +1,4 @@
-"""What sparse regression finds in the 52 points of Table 1, beside Bouc-Wen laws, and how far the points tell it.
+"""What does sparse regression find in the 52 points of Table 1, and how much of it do the points really show?
 
 The discovered law and Bouc-Wen laws are judged by the same numbers: fit in free run, BIC, loop width; and each with its
 memory free at the first point and at rest there. Records are then drawn anew from the law, with normal noise of its
