@@ -576,12 +576,17 @@ def pid_hysteresis(result: Result) -> list[str]:
             [f"{percent(row['hysteresis_reduction_percent'])} at {row['frequency_hz']:g} Hz" for row in cells]
         )
 
+    ended = column(result["rows"], "search_finished")
+    search = (
+        f"The search for the gains ended by its tolerance in {sum(ended)} of {len(ended)} rows."
+        if ended
+        else "The search for the gains was cut off after a fixed number of trials, and they may not be the best ones."
+    )
     least = min(column(where(result["rows"], max_sensitivity=2.0), "lag_share_percent"))
     return [
         f"On law, creep and mode a PID within a maximum sensitivity of 2 takes {by_rate(usual)} away; within "
         f"{robust[0]['max_sensitivity']:g}, {by_rate(robust)} (a negative reduction is a wider loop).",
-        f"At 2, at least {percent(least, 0)} of the width that is left would be there without hysteresis: lag. The "
-        "gains are those of a search with a fixed number of trials, and may not be the best ones.",
+        f"At 2, at least {percent(least, 0)} of the width that is left would be there without hysteresis: lag. {search}",
     ]
 
 
