@@ -223,11 +223,11 @@ def wear_and_pinching(result: Result) -> list[str]:
 
 def benchmark_bouc_wen(result: Result) -> list[str]:
     """The public benchmark, told and not told how it was made."""
-    lines, white_box = result["summary"], result["white_box"]
+    lines, white_box, asked = result["summary"], result["white_box"], result["asked"]
     own = [
         f"{line['method'].removeprefix('hysim, ')}: {error_of(line['multisine'])} m and {error_of(line['sweep'])} m, "
-        f"the parameters within what was asked in {line['parameters_reached']:.0f} of {line['seeds']:.0f} seeds (an "
-        f"unbiased method has a chance of {line['chance']:.2f} in each)"
+        f"both within what was asked in {line['tests_reached']:.0f} of {line['seeds']:.0f} seeds, and all parameters "
+        f"in {line['parameters_reached']:.0f} (an unbiased method has a chance of {line['chance']:.2f} in each)"
         for line in lines
     ]
     black = min(result["published"], key=lambda row: row["multisine"])
@@ -235,7 +235,8 @@ def benchmark_bouc_wen(result: Result) -> list[str]:
     name = max(white_box["error_percent"], key=white_box["error_percent"].__getitem__)
     known = lines[0]
     return [
-        f"Largest test errors on multisine and sweep over the seeds. {'; '.join(own)}.",
+        f"Largest test errors on multisine and sweep over the seeds. {'; '.join(own)}. Asked were "
+        f"{error_of(asked['rmse'])} m and {span(asked['error_percent'].values(), 2)} % of each parameter.",
         "hysim is told the form of the true equation and, unless a row says otherwise, the recipe of the records. "
         f"The best published errors, {error_of(black['multisine'])} m ({black['method']}) and "
         f"{error_of(sweep['sweep'])} m ({sweep['method']}), are of black boxes, which are told neither.",
@@ -586,7 +587,8 @@ def pid_hysteresis(result: Result) -> list[str]:
     return [
         f"On law, creep and mode a PID within a maximum sensitivity of 2 takes {by_rate(usual)} away; within "
         f"{robust[0]['max_sensitivity']:g}, {by_rate(robust)} (a negative reduction is a wider loop).",
-        f"At 2, at least {percent(least, 0)} of the width that is left would be there without hysteresis: lag. {search}",
+        f"At 2, at least {percent(least, 0)} of the width that is left would be there without hysteresis: lag. "
+        f"{search}",
     ]
 
 
@@ -787,17 +789,17 @@ def virtual_rig(result: Result) -> list[str]:
     off = max(abs(line[width][end]) for line in (fine, dim) for end in ("least", "most"))
     best = result["true_law_reduction_percent"]
     repeated = whole[key]["least"] == whole[key]["most"]
-    times = f"the same in all {whole['tables']} runs" if repeated else f"{percent(whole[key]['least'])} at worst"
+    spread = "one result, repeated in every run" if repeated else f"{percent(whole[key]['least'])} at worst"
     return [
         f"A known actuator under a simulated microscope, {fine['tables']} times. From parts of a pixel the loop's "
         f"width comes back within {number(off, 2)} %, and the inverse of the identified law takes "
         f"{percent(min(fine[key]['least'], dim[key]['least']))} of the true hysteresis away at worst, as that of the "
-        f"true law ({percent(best)}). From whole pixels it takes {percent(whole[key]['median'])}, {times}: without "
-        "noise rounding alone repeats itself.",
+        f"true law ({percent(best)}). From whole pixels it takes {percent(whole[key]['median'])}, {spread}.",
         f"Where the microscope shakes as well, the median is {percent(shaken[key]['median'])}, the best "
-        f"{percent(shaken[key]['most'])} and the worst {percent(shaken[key]['least'], 0)}: a loop many times wider. "
-        f"The width is then {shaken[width]['least']:.0f} to {shaken[width]['most']:+.0f} % off, within its interval "
-        f"in {shaken['width_covers']} of {shaken['tables']} runs. Family and form of the true law are told.",
+        f"{percent(shaken[key]['most'])} and the worst {percent(shaken[key]['least'], 0)}, a loop "
+        f"{number(1.0 - 0.01 * shaken[key]['least'], 2)} times as wide as without a controller. The width is then "
+        f"{shaken[width]['least']:.0f} to {shaken[width]['most']:+.0f} % off, within its interval in "
+        f"{shaken['width_covers']} of {shaken['tables']} runs. Family and form of the true law are told.",
     ]
 
 
