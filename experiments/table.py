@@ -121,8 +121,8 @@ def differences(name: str, written: str, computed: str) -> Iterator[str]:
         if kind == "equal":
             continue
         place = ", ".join(dict.fromkeys(places[line] for line in after[c:d])) or "text"
-        sentences = [re.split(r"(?<=[.?:;]) ", " ".join(lines)) for lines in (before[a:b], after[c:d])]
-        for line in difflib.ndiff(*sentences):
+        old, new = (re.split(r"(?<=[.?:;]) ", " ".join(lines)) for lines in (before[a:b], after[c:d]))
+        for line in difflib.ndiff(old, new):
             if line.startswith(("- ", "+ ")):
                 yield f"{name}, {place}: {'written ' if line[0] == '-' else 'computed'}: {line[2:]}"
 

@@ -99,6 +99,12 @@ def test_a_difference_is_named_with_its_experiment():
     assert "173 of 180" in lines[1]
 
 
+def test_every_link_of_the_page_leads_to_a_file():
+    links = re.findall(r"\]\(([^)]+)\)", table.PAGE.read_text(encoding="utf-8"))
+    assert len(links) == 3 * len(FINDINGS)
+    assert [link for link in links if not (EXPERIMENTS / link).exists()] == []
+
+
 def test_a_changed_page_is_an_exit_code(monkeypatch, tmp_path, capsys):
     assert table.main(["--check"]) == 0
     assert table.main(["--help-me"]) == 2
