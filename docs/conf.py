@@ -8,9 +8,11 @@ import hysim
 
 HERE = Path(__file__).parent
 RESULTS = HERE.parent / "experiments" / "results"
-sys.path.insert(0, str(HERE))
+sys.path[:0] = [str(HERE), str(HERE.parent / "experiments")]
 
+from findings import lag_of_equation_1, preisach  # noqa: E402  from experiments
 from front_door import families, write_reference  # noqa: E402  from beside this file
+from table import answer  # noqa: E402  from experiments
 
 project = "hysim"
 version = release = hysim.__version__
@@ -110,6 +112,8 @@ myst_substitutions = {
     "ratios": ratios(),
     "benchmark": benchmark(),
     "benchmark_errors": benchmark_errors(),
+    "found_in_lag_of_equation_1": answer(lag_of_equation_1),
+    "found_in_preisach": answer(preisach),
     "benchmark_figure": shown(
         {
             "benchmark_bouc_wen": "Root mean square error on the clean test data "

@@ -1,9 +1,9 @@
-"""What sparse regression finds in the 52 points of Table 1, beside Bouc-Wen laws, and how far the points tell it.
+"""What does sparse regression find in the 52 points of Table 1, and how much of it do the points really show?
 
 The discovered law and Bouc-Wen laws are judged by the same numbers: fit in free run, BIC, loop width; and each with its
-memory free at the first point and at rest there. Records are then drawn anew from the law, with normal noise of its
-residual and the camera's rounding, to see which of its terms are found again. Errors at points that the whole search
-has not seen are experiment 33's.
+memory free at the first point and at rest there. Twenty records are then drawn anew from the law, with normal noise of
+its residual and the camera's rounding, to see which of its terms `discover` finds again with the library of u and y.
+Errors at points that the whole search has not seen are experiment 33's.
 """
 
 import sys

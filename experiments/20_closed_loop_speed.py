@@ -4,7 +4,9 @@ The plant is that of the compensation matrix, a law of Table 1, creep, a mode of
 20 kHz, without noise, and so all-discrete: python-control refuses a sampled controller on a continuous plant. The
 controller is a PI, a state space for python-control. It runs the loop in two forms: with the plant as `hs.to_control`
 gives it, and as one writes it with python-control alone, where the law is a Python function with the exact step of
-n = 1, and creep, mode and delay are one discretised state space. Both peers run a shorter record; the times are for a
+n = 1, and creep, mode and delay are one discretised state space. How much of that time is spent on joining blocks is
+shown by the same loop written by hand as one function: compiled by numba inside a single block of python-control, as a
+plain Python loop, and compiled by numba as a whole. The peers in Python run a shorter record; the times are for a
 sample, medians of repeats in turns, and the outputs are compared. Beside them stands `close_loop` for 10 s with the
 controllers of the matrix and its noisy sensor, as a user calls it: every loop is run twice, for what the noise does.
 """
@@ -20,6 +22,7 @@ from pathlib import Path
 from types import ModuleType
 
 import control
+import numba
 import numpy as np
 
 import hysim as hs
@@ -31,7 +34,13 @@ from results_folder import write_results
 RESULTS = Path(__file__).parent / "results" / "closed_loop_speed"
 H = 1.0 / 20e3  # s
 PI = hs.PID(kp=0.3, ki=1000.0)
-PEERS = ("python-control, plant by to_control", "python-control alone")
+PEERS = (
+    "python-control, plant by to_control",
+    "python-control alone",
+    "python-control, one compiled block",
+    "plain Python loop",
+    "loop compiled by numba",
+)
 
 Row = dict[str, float | str | None]
 
@@ -45,27 +54,28 @@ def matrix() -> ModuleType:
     return module
 
 
-def memory_after(law: hs.PolynomialBoucWen, z: float, du: float) -> float:
-    """The memory of n = 1 after a way: with s = z sign(du), ds/d|u| = A - |s| (gamma + beta sign(s))."""
+@numba.extending.register_jitable  # a plain function in Python, inlined where numba compiles its caller
+def memory_after(A: float, beta: float, gamma: float, z: float, du: float) -> float:
+    """The memory of n = 1 after a step du: with s = z sign(du), ds/d|u| = A - |s| (gamma + beta sign(s))."""
     direction, left = math.copysign(1.0, du), abs(du)
-    s, slower, faster = direction * z, law.gamma - law.beta, law.gamma + law.beta
+    s, slower, faster = direction * z, gamma - beta, gamma + beta
     if s < 0.0:
-        crossing = -math.log1p(slower * s / law.A) / slower if law.A + slower * s > 0.0 else math.inf
+        crossing = -math.log1p(slower * s / A) / slower if A + slower * s > 0.0 else math.inf
         if left <= crossing:
-            return direction * (s * math.exp(slower * left) + law.A * math.expm1(slower * left) / slower)
+            return direction * (s * math.exp(slower * left) + A * math.expm1(slower * left) / slower)
         s, left = 0.0, left - crossing
-    return direction * (s * math.exp(-faster * left) - law.A * math.expm1(-faster * left) / faster)
+    return direction * (s * math.exp(-faster * left) - A * math.expm1(-faster * left) / faster)
 
 
 def law_block(law: hs.PolynomialBoucWen) -> control.NonlinearIOSystem:
     """The law with its last input and its memory as states; the output follows the input at once."""
-    first, second = law.input_coefficients
+    (first, second), shape = law.input_coefficients, (law.A, law.beta, law.gamma)
 
     def update(t, x, u, params):
-        return np.array([u[0], memory_after(law, x[1], u[0] - x[0])])
+        return np.array([u[0], memory_after(*shape, x[1], u[0] - x[0])])
 
     def output(t, x, u, params):
-        z = memory_after(law, x[1], u[0] - x[0])
+        z = memory_after(*shape, x[1], u[0] - x[0])
         return np.array([law.offset + (first + second * u[0]) * u[0] + law.gain * z])
 
     return control.nlsys(update, output, inputs="u", outputs="w", states=["v", "z"], dt=H, name="law")
@@ -81,6 +91,53 @@ def linear_block(plant: hs.Actuator) -> control.StateSpace:
     A = np.block([[sampled.A, np.zeros((n, 1))], [sampled.C, 0.0]])
     B, C = np.append(sampled.B, [[0.0]], axis=0), np.eye(1, n + 1, n)
     return control.ss(A, B, C, 0.0, H, inputs="w", outputs="y", name="linear")
+
+
+def by_hand(r, start, shape, gains, coefficients, A, B, C, controller):
+    """Outputs along a reference and the state after it: the plant's, then u and z of the law, then the controller's."""
+    n = B.size
+    x, v, z, w = start[:n], start[n], start[n + 1], start[n + 2]
+    y = np.empty(len(r))
+    for k in range(len(r)):
+        y[k] = C @ x
+        error = r[k] - float(y[k])
+        u = controller[0] * error + controller[1] * w
+        z = memory_after(shape[0], shape[1], shape[2], z, u - v)
+        v, w = u, w + error
+        x = A @ x + B * (gains[0] + (coefficients[0] + coefficients[1] * u) * u + gains[1] * z)
+    after = np.empty(n + 3)
+    after[:n] = x
+    after[n], after[n + 1], after[n + 2] = v, z, w
+    return y, after
+
+
+compiled = numba.njit(by_hand, cache=True)
+
+
+def constants_by_hand(plant: hs.Actuator) -> tuple[np.ndarray, tuple]:
+    """Where the loop that is written by hand rests, and its constants."""
+    law, linear = plant.hysteresis, linear_block(plant)
+    A, B, C = (np.ascontiguousarray(part) for part in (linear.A, linear.B[:, 0], linear.C[0]))
+    resting = np.linalg.solve(np.eye(B.size) - A, B * law.response([0.0])[0])
+    shape, gains = (law.A, law.beta, law.gamma), (law.offset, law.gain)
+    controller = (PI.kp, PI.ki * H)
+    start = np.concatenate([resting, [0.0, law.z0, 0.0]])
+    return start, (shape, gains, tuple(law.input_coefficients), A, B, C, controller)
+
+
+def one_block(plant: hs.Actuator) -> tuple[control.NonlinearIOSystem, np.ndarray]:
+    """The whole loop as a single block of python-control, and where it rests."""
+    start, constants = constants_by_hand(plant)
+    n, C = start.size - 3, constants[5]
+    block = control.nlsys(
+        lambda t, x, u, params: compiled(u, x, *constants)[1],
+        lambda t, x, u, params: np.array([C @ x[:n]]),
+        inputs="r",
+        outputs="y",
+        states=start.size,
+        dt=H,
+    )
+    return block, start
 
 
 def written_alone(plant: hs.Actuator) -> tuple[control.InterconnectedSystem, np.ndarray]:
@@ -119,16 +176,22 @@ def in_turns(works: list[Callable[[], object]], repeats: int) -> np.ndarray:
 def loops(plant: hs.Actuator, samples: int, fewer: int, repeats: int) -> list[Row]:
     """One loop by hysim on a long record, and by the peers on a shorter one."""
     whole, part = reference(samples), reference(fewer)
-    systems = [(joined(hs.to_control(plant, H)), 0.0), written_alone(plant)]
+    systems = [(joined(hs.to_control(plant, H)), 0.0), written_alone(plant), one_block(plant)]
+    start, constants = constants_by_hand(plant)
+    numbers = part.tolist()  # floats of Python, on which a plain loop is fastest
     own = hs.close_loop(plant, PI, H * np.arange(fewer), part).measurement
 
     def inside(system: control.InterconnectedSystem, start: np.ndarray | float) -> np.ndarray:
         return control.input_output_response(system, H * np.arange(fewer), part, start).outputs
 
-    errors = [0.0, *(float(np.abs(inside(*system) - own).max()) for system in systems)]
+    outputs = [own, *(inside(*system) for system in systems)]
+    outputs += [by_hand(numbers, start, *constants)[0], compiled(part, start, *constants)[0]]
+    errors = [float(np.abs(output - own).max()) for output in outputs]
     works = [lambda: hs.close_loop(plant, PI, H * np.arange(samples), whole)]
     works += [lambda system=system: inside(*system) for system in systems]
-    each = 1e6 * in_turns(works, repeats) / [samples, fewer, fewer]
+    works += [lambda: by_hand(numbers, start, *constants), lambda: compiled(whole, start, *constants)]
+    lengths = [samples, *[fewer] * (len(PEERS) - 1), samples]
+    each = 1e6 * in_turns(works, repeats) / lengths
     return [
         {
             "kind": "loop",
@@ -138,7 +201,7 @@ def loops(plant: hs.Actuator, samples: int, fewer: int, repeats: int) -> list[Ro
             **spread("times_hysim", each[:, k] / each[:, 0]),
             "largest_difference_um": error,
         }
-        for k, (name, n, error) in enumerate(zip(("hysim", *PEERS), (samples, fewer, fewer), errors, strict=True))
+        for k, (name, n, error) in enumerate(zip(("hysim", *PEERS), lengths, errors, strict=True))
     ]
 
 

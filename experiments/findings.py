@@ -1,0 +1,845 @@
+"""What each experiment found, in one to three sentences that are computed from its stored result.
+
+Each function has the name of a folder of `experiments/results`. It takes the content of `result.json` and returns
+sentences. No number stands in a sentence that is not read from the result. A claim that rests on a comparison is
+made by `require`, which raises `ValueError` where the result no longer supports it, so that a sentence cannot outlive
+its numbers. Each says the bad end beside the median or the best, the best peer beside hysim, and what a method was
+told that a user would not know.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from statistics import median
+from typing import Any
+
+Result = Mapping[str, Any]
+Row = Mapping[str, Any]
+Finding = Callable[[Result], list[str]]
+
+
+# Reading a result ----------------------------------------------------------------------------------------------------
+
+
+def where(rows: Iterable[Row], **values: object) -> list[Row]:
+    """The rows that have all of these values; `ValueError` if there is none."""
+    matching = [row for row in rows if all(row[name] == value for name, value in values.items())]
+    if not matching:
+        raise ValueError(f"no row has {values}")
+    return matching
+
+
+def the(rows: Iterable[Row], **values: object) -> Row:
+    """The one row that has all of these values; `ValueError` if there are none or several."""
+    (row,) = where(rows, **values)
+    return row
+
+
+def column(rows: Iterable[Row], name: str) -> list[float]:
+    """One column, without empty cells."""
+    return [row[name] for row in rows if row.get(name) is not None]
+
+
+def require(condition: bool, claim: str) -> None:
+    """Raise `ValueError` where a result no longer supports a claim that its sentence makes."""
+    if not condition:
+        raise ValueError(f"the result no longer supports: {claim}")
+
+
+# Writing numbers -----------------------------------------------------------------------------------------------------
+
+
+def number(value: float, digits: int = 3) -> str:
+    """A number to some significant digits, without an exponent between 0.001 and a million."""
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    if value != 0.0 and not -3 <= int(exponent) < 6:
+        return f"{mantissa}e{int(exponent)}"
+    whole, _, decimals = f"{float(f'{mantissa}e{exponent}'):_.{max(0, digits - 1 - int(exponent))}f}".partition(".")
+    return whole.replace("_", " ") + (f".{decimals}" if decimals.strip("0") else "")
+
+
+def span(values: Iterable[float], digits: int = 3, unit: str = "") -> str:
+    """The least and the largest of some numbers, or the one that both are."""
+    collected = list(values)
+    ends = dict.fromkeys((number(min(collected), digits), number(max(collected), digits)))
+    return " to ".join(ends) + unit
+
+
+def count(value: int) -> str:
+    """A whole number with a space between thousands."""
+    return f"{value:_}".replace("_", " ")
+
+
+def percent(value: float, decimals: int = 1) -> str:
+    """A percentage to a fixed number of decimals."""
+    return f"{value:.{decimals}f} %"
+
+
+def error_of(value: float) -> str:
+    """An error to two significant digits."""
+    return number(value, 2)
+
+
+def listed(parts: Sequence[str]) -> str:
+    """Words joined by commas and an "and"."""
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+# Evaluation and speed ------------------------------------------------------------------------------------------------
+
+
+def exact_step(result: Result) -> list[str]:
+    """Errors and times of the exact step beside integrators in Python."""
+    rows = result["rows"]
+    methods = [name for name in dict.fromkeys(row["method"] for row in rows) if name != "hysim"]
+    own = where(rows, method="hysim")
+
+    def beside(name: str) -> str:
+        peers = where(rows, method=name)
+        return f"{span(column(peers, 'time_ratio'))} times as long at errors of {span(column(peers, 'error'), 2)}"
+
+    fastest = min(methods, key=lambda name: max(column(where(rows, method=name), "time_ratio")))
+    closest = min(methods, key=lambda name: max(column(where(rows, method=name), "error")))
+    (lsoda,) = (name for name in methods if "LSODA" in name)
+    require(min(column(rows, "time_ratio")) == 1.0, "no integrator is faster")
+    return [
+        f"On {count(result['samples'])} samples, with n = {listed([format(n, 'g') for n in column(own, 'n')])}, the "
+        f"largest error of the law is {error_of(max(column(own, 'error')))} of the memory's range.",
+        f"The fastest of the integrators, {fastest}, takes {beside(fastest)}; the most accurate, {closest}, "
+        f"{beside(closest)}; {lsoda}, {beside(lsoda)}.",
+        "All of these call a right-hand side in Python; compiled ones are in experiment 03.",
+    ]
+
+
+_IN_C = (("exact step in C", ""), ("Runge-Kutta 4 in C", "1 step a sample"))
+
+
+def work_precision(result: Result) -> list[str]:
+    """Time against error beside other packages and C, driven and as an oscillator."""
+    driven = where(result["rows"], problem="driven, n = 1")
+    own = the(driven, method="hysim memory")
+    in_c = {name: the(driven, method=name, setting=setting) for name, setting in _IN_C}
+    packages = [row for row in driven if row["tool"] not in ("hysim", "C", "C, Runge-Kutta 4")]
+    close = [row for row in packages if row["error"] <= 1e-3]
+    fastest = min(close, key=lambda row: row["times_hysim"])
+
+    def driven_by(method: str) -> Row:
+        return the(driven, method=method, setting="rtol 1e-06")
+
+    compiled, plain = driven_by("solve_ivp LSODA, compiled"), driven_by("solve_ivp LSODA, Python")
+    smooth, odeint = driven_by("solve_ivp LSODA, compiled, smooth input"), driven_by("odeint, compiled")
+    gain = "hardly changes that" if abs(compiled["times_hysim"] / plain["times_hysim"] - 1.0) < 0.1 else "changes that"
+
+    def long(row: Row) -> str:
+        return f"{number(row['times_hysim'])} times as long at an error of {error_of(row['error'])}"
+
+    oscillator = [row for row in where(result["rows"], problem="oscillator") if row["error"] <= 1e-6]
+    others = [row for row in oscillator if not row["method"].startswith("hysim") and row["method"] != "split in C"]
+    peers = sorted(others, key=lambda row: row["times_hysim"])
+    first, second = peers[0], next(row for row in peers if row["tool"] != peers[0]["tool"])
+    (scheme,) = (row for row in result["ratios"] if row["what"] == "oscillator: hysim over the same scheme in C")
+    asked = [row for row in result["ratios"] if "reached" in row]
+    missed = [f"{row['what']} ({number(row['median'])})" for row in asked if not row["reached"]]
+    return [
+        f"At n = 1 the law is {error_of(own['error'])} of the range wrong. Of the packages with an error of at most "
+        f"1e-3 the fastest is {fastest['method']} ({fastest['setting']}), {long(fastest)}; `odeint` at a relative "
+        f"tolerance of 1e-6 takes {long(odeint)}, LSODA {long(compiled)} on the piecewise linear input and "
+        f"{long(smooth)} on one without corners (a right-hand side in Python {gain}: "
+        f"{number(plain['times_hysim'])}). In C, the same exact step takes "
+        f"{number(in_c['exact step in C']['times_hysim'])} times as long, and Runge-Kutta of order 4 "
+        f"{long(in_c['Runge-Kutta 4 in C'])}.",
+        f"On the oscillator, at errors of at most 1e-6 of the rms, the fastest packages are {first['method']} "
+        f"({first['setting']}, {number(first['times_hysim'])} times as long) and {second['method']} "
+        f"({second['setting']}, {number(second['times_hysim'])}); hysim takes {number(scheme['median'])} times as "
+        "long as its own scheme in C.",
+        f"Of {len(asked)} ratios that were asked for, {len(missed)} are not reached"
+        + (f": {'; '.join(missed)}." if missed else "."),
+    ]
+
+
+def batch(result: Result) -> list[str]:
+    """Samples a second of many laws."""
+    rows = where(result["rows"], kind="rows")
+    names = {
+        "1": "n = 1",
+        "2": "n = 2",
+        "1.5": "n = 1.5",
+        "64 values": "64 values of n",
+        "all differ": "all n different",
+    }
+    speeds = [f"{number(row['million_samples_per_second'])} for {names[row['n']]}" for row in rows]
+    slopes = result["slopes"].values()
+    require(max(slopes) < 1.05, "the cost grows at most in proportion")
+    return [
+        f"{count(rows[0]['sets'])} laws on {rows[0]['samples']} samples, on all cores, in million samples a second: "
+        f"{listed(speeds)}. That is {span(column(rows, 'times_exp'), 2)} times the time of `np.exp` on as many "
+        "numbers.",
+        f"The cost grows at most in proportion to samples and laws (powers of {span(slopes, 2)}).",
+    ]
+
+
+def cold_start(result: Result) -> list[str]:
+    """The first call, compiled and from the cache."""
+    rows = result["rows"]
+    empty, full = (column(rows, name) for name in ("empty", "full"))
+    slowest = max(rows, key=lambda row: row["empty"])
+    return [
+        f"Of {len(rows)} functions the first call on an empty cache takes {number(median(empty))} s of processor "
+        f"time in the median and {number(max(empty))} s at worst (`{slowest['function']}`); in later processes "
+        f"{number(median(full), 2)} s and {number(max(full), 2)} s. Imports are not counted.",
+    ]
+
+
+def more_samples(result: Result) -> list[str]:
+    """The invariant that more samples on a branch change nothing."""
+    rows = result["rows"]
+    families = list(dict.fromkeys(row["family"] for row in rows))
+    ends = ("escaped", "undecided", "refused", "partly_refused")
+    left_out = {row["family"]: sum(row[end] for end in ends) / row["cases"] for row in rows}
+    worst = max(rows, key=lambda row: sum(row[end] for end in ends) / row["cases"])
+    share = 100.0 * max(left_out[name] for name in left_out)
+    share = max(share, 100.0 * sum(worst[end] for end in ends) / worst["cases"])
+    return [
+        f"In {count(result['cases_per_family'])} random hostile cases of each of {len(families)} families, in paths, "
+        f"batches, compiled steps and inverses, {count(result['cases'])} comparisons, {result['violations']} violate "
+        f"the invariant; the largest difference is {number(max(column(rows, 'worst')), 2)} of what is allowed.",
+        f"At worst, for `{worst['family']}`, {percent(share)} of the cases are compared in part only or not at all, "
+        "since a law diverges in all samplings or a step is refused.",
+    ]
+
+
+def wear_and_pinching(result: Result) -> list[str]:
+    """Backward Euler beside the series."""
+    rows = where(result["rows"], law="worn and pinched")
+    euler = [f"{number(row['backward_euler_percent'], 2)} % wrong at {row['steps']} steps a cycle" for row in rows]
+    return [
+        f"On a spring that wears off and pinches, backward Euler, as OpenSees takes it, is {listed(euler)}.",
+        "The series differ from themselves with half the steps by at most "
+        f"{error_of(max(column(result['rows'], 'series_percent')))} % of the memory's range. Euler's step is "
+        "repeated here, not run in OpenSees.",
+    ]
+
+
+# Identification ------------------------------------------------------------------------------------------------------
+
+
+def benchmark_bouc_wen(result: Result) -> list[str]:
+    """The public benchmark, told and not told how it was made."""
+    lines, white_box, asked = result["summary"], result["white_box"], result["asked"]
+    own = [
+        f"{line['method'].removeprefix('hysim, ')}: {error_of(line['multisine'])} m and {error_of(line['sweep'])} m, "
+        f"both within what was asked in {line['tests_reached']:.0f} of {line['seeds']:.0f} seeds, and all parameters "
+        f"in {line['parameters_reached']:.0f} (an unbiased method has a chance of {line['chance']:.2f} in each)"
+        for line in lines
+    ]
+    black = min(result["published"], key=lambda row: row["multisine"])
+    sweep = min((row for row in result["published"] if "sweep" in row), key=lambda row: row["sweep"])
+    name = max(white_box["error_percent"], key=white_box["error_percent"].__getitem__)
+    known = lines[0]
+    return [
+        f"Largest test errors on multisine and sweep over the seeds. {'; '.join(own)}. Asked were "
+        f"{error_of(asked['rmse'])} m and {span(asked['error_percent'].values(), 2)} % of each parameter.",
+        "hysim is told the form of the true equation and, unless a row says otherwise, the recipe of the records. "
+        f"The best published errors, {error_of(black['multisine'])} m ({black['method']}) and "
+        f"{error_of(sweep['sweep'])} m ({sweep['method']}), are of black boxes, which are told neither.",
+        f"A published fit of the same equation ({white_box['method']}) is up to "
+        f"{number(white_box['error_percent'][name])} % off in the parameters ({name}; hysim "
+        f"{number(known[f'{name}_error_percent'], 2)} % with n known).",
+    ]
+
+
+def transfer_functions(result: Result) -> list[str]:
+    """A stiff plant beside the bound of Cramer and Rao."""
+    noisy = [row for row in result["rows"] if row["snr"] is not None]
+    parts = []
+    for row in noisy:
+        fits = result["fits"][f"{row['snr']:g}"]
+        gap = abs(row["median_fit"] - row["bound_median_fit"])
+        require(gap < 0.25 * (100.0 - row["bound_median_fit"]), "the median fit is near the bound")
+        parts.append(
+            f"At SNR {row['snr']:g} the median fit to the clean output is {percent(row['median_fit'], 2)}, where the "
+            f"bound of Cramer and Rao allows {percent(row['bound_median_fit'], 2)}, and the worst of {row['draws']} "
+            f"draws {percent(min(fits), 2)}; {row['blocks_as_asked']} of {row['blocks']} blocks of draws have a "
+            f"median of the {row['asked_fit']:g} % that was asked for."
+        )
+    return [*parts, "The numbers of poles and zeros are told."]
+
+
+def table1_models(result: Result) -> list[str]:
+    """Which model the 52 points prefer."""
+    rows = result["rows"]
+    best = the(rows, model=result["preferred"])
+    least = min((row for row in rows if row["loo_rmse"] is not None), key=lambda row: row["loo_rmse"])
+    require(best["bic"] == min(column(rows, "bic")), "the preferred model has the lowest BIC")
+    plain, line = the(rows, model="bouc-wen"), the(rows, model="line")
+
+    def said(row: Row) -> str:
+        return (
+            f"{percent(row['fit_percent'], 2)} with {row['parameters']} parameters, leave-one-out rmse "
+            f"{1e3 * row['loo_rmse']:.1f} nm"
+        )
+
+    return [
+        f"By BIC {best['model']}: {said(best)}, largest residual {best['largest_residual_pixels']:.2f} pixels. The "
+        f"least leave-one-out rmse has {least['model']}: {said(least)}. The plain Bouc-Wen law has {said(plain)}; a "
+        f"line {said(line)}.",
+        f"{len(result['close']) - 1} other variants of {len(rows)} models have a BIC within 6 of the lowest and are "
+        "hardly told from it. All were tried on the same points; experiment 33 repeats the search without the point "
+        "that it predicts.",
+    ]
+
+
+def recovery(result: Result) -> list[str]:
+    """Coverage of 95 % intervals."""
+    rows = where(result["rows"], records=400)
+
+    def held(kind: str, noisy: bool) -> str:
+        cells = [row for row in where(rows, kind=kind) if (row["noise_in_quanta"] > 0.0) == noisy]
+        return span(column(cells, "coverage_percent"), 3, " %")
+
+    levels = sorted({row["noise_in_quanta"] for row in rows} - {0.0})
+    missing = min(rows, key=lambda row: row["with_interval"])
+    return [
+        f"Over the parameters, profile intervals at 95 % hold the truth in {held('profile', True)} of 400 records "
+        f"with noise of {listed([f'{level:g}' for level in levels])} quanta, and in {held('profile', False)} with "
+        f"rounding alone, where they are too wide; the linear ones of least squares in {held('linear', True)} and "
+        f"{held('linear', False)}.",
+        f"At worst {missing['records'] - missing['with_interval']} of {missing['records']} records have no interval, "
+        f"with noise of {missing['noise_in_quanta']:g} quanta. Family, quantum and input are told; the noise is not.",
+    ]
+
+
+def all_families(result: Result) -> list[str]:
+    """Every family on the 52 points."""
+    rows = result["rows"]
+    best = the(rows, model=result["winner"])
+    undecided = [the(rows, model=name) for name in result["undecided"]]
+    last = max(undecided, key=lambda row: row["loo_rmse"])
+    return [
+        f"{result['winner']} with {best['parameters']} parameters predicts left-out points best, to "
+        f"{1e3 * best['loo_rmse']:.1f} nm; by BIC it would be {result['preferred_by_bic']}.",
+        f"By signed ranks {len(undecided)} of the {len(rows) - 1} others cannot be told from it on these points, up "
+        f"to {last['model']} with {1e3 * last['loo_rmse']:.1f} nm: so few points decide little. Each family has one "
+        "form here; experiment 08 varies that of the Bouc-Wen laws.",
+    ]
+
+
+_NESTED = (("Bouc-Wen", "free"), ("linear plant, 4 poles", "rest"), ("line", ""))
+
+
+def nested_table1(result: Result) -> list[str]:
+    """Left-out errors with the whole search repeated."""
+    rows = [row for row in result["rows"] if not row["terms_kept"]]
+    found = the(rows, model="discovered", start="auto")
+    best = min(rows, key=lambda row: row["left_out_rmse_um"])
+    near = [row for row in rows if row["behind_in_stderr"] < 1.0]
+    families = listed(list(dict.fromkeys(row["model"].split(",")[0] for row in near)))
+
+    def off(row: Row) -> str:
+        return f"{1e3 * row['left_out_rmse_um']:.1f} nm (at worst {1e3 * row['largest_left_out_um']:.0f} nm)"
+
+    others = [the(rows, model=name, start=start) for name, start in _NESTED]
+    named = [f"{row['model']} {off(row)}" for row in others]
+    return [
+        f"Left out one at a time, the least error has {best['model']} ({best['start']}), {off(best)}. The discovered "
+        f"law, with the same terms in {found['same_structure']} of {found['folds']} searches, is off by "
+        f"{off(found)}; {listed(named)}.",
+        f"{len(near)} of {len(rows)} rows ({families}) lie within one standard error of the least: the points do not "
+        "tell which of these predicts better.",
+    ]
+
+
+# Discovery -----------------------------------------------------------------------------------------------------------
+
+
+def sindy_recovery(result: Result) -> list[str]:
+    """How often the true structure is found, beside PySINDy."""
+    own, peer = (
+        {row["condition"]: row for row in where(result["rows"], method=method)} for method in ("hysim", "PySINDy")
+    )
+    levels = ("noise 0%", "noise 1%", "noise 5%", "noise 10%")
+    short = [name for name in own if ", noise" in name and not name.endswith("noise 0%")]
+    seeds = result["seeds"]
+
+    def counts(rows: Mapping[str, Row], names: Iterable[str]) -> str:
+        return listed([str(rows[name]["exact"]) for name in names])
+
+    total = seeds * len(short)
+    exact, exact_peer = (sum(rows[name]["exact"] for name in short) for rows in (own, peer))
+    unlikely = sum(seeds - own[name]["as_likely"] for name in short)
+    behind = [name for name in own if own[name]["exact"] < peer[name]["exact"]]
+    losses = [f"{name} ({peer[name]['exact']} beside {own[name]['exact']})" for name in behind]
+    errors = [number(own[name]["worst_error_percent"], 2) for name in levels]
+    worst = max((own[name] for name in own if own[name]["worst_error_percent"]), key=lambda r: r["worst_error_percent"])
+    hidden = "y = 40 u + 60 z"
+    return [
+        f"With the memory measured the structure is exact in {counts(own, levels)} of {seeds} seeds at 0, 1, 5 and "
+        f"10 % noise (PySINDy: {counts(peer, levels)}), no coefficient more than {listed(errors)} % off; with the "
+        f"memory hidden in {hidden}, in {own[hidden]['exact']} (PySINDy: {peer[hidden]['exact']}). PySINDy finds it "
+        f"more often under these conditions: {', '.join(losses) or 'none'}.",
+        f"On short records of two rates with noise it is exact in {exact} of {total} (PySINDy: {exact_peer}); in "
+        f"{unlikely} of the {total - exact} others the truth's BIC is more than 2 above that of the law that was "
+        f"chosen. The worst coefficient is {number(worst['worst_error_percent'], 2)} % off ({worst['condition']}).",
+        "The library, of ten terms, holds the true ones. PySINDy comes with its defaults, and is given the true "
+        "velocity where `discover` is not.",
+    ]
+
+
+def sindy_table1(result: Result) -> list[str]:
+    """Sparse regression on the 52 points."""
+    own, rows = the(result["rows"], model="discovered"), result["rows"]
+    laws = [row for row in rows if not row["model"].startswith("discovered")]
+    fit, bic = max(laws, key=lambda row: row["fit_percent"]), min(laws, key=lambda row: row["bic"])
+    *often, seldom = sorted((result["found_again"][term] for term in result["terms"]), reverse=True)
+    require(own["bic"] < bic["bic"], "the discovered law has the lowest BIC")
+    return [
+        f"A law of {len(result['terms'])} terms and {own['n_parameters']} parameters fits "
+        f"{percent(own['fit_percent'], 2)} (BIC {own['bic']:.1f}). The best fit of the Bouc-Wen laws beside it is "
+        f"{percent(fit['fit_percent'], 2)} ({fit['model']}, {fit['n_parameters']} parameters), their lowest BIC "
+        f"{bic['bic']:.1f} ({bic['model']}).",
+        f"Records drawn anew from the law give back {len(often)} of its terms in at least {100 * min(often):.0f} % "
+        "of the "
+        f'draws, and the last one in {100 * seldom:.0f} %. The verdict is "{result["verdict"]}".',
+    ]
+
+
+def sindy_benchmark(result: Result) -> list[str]:
+    """The benchmark's law from input and output alone."""
+    rows = result["rows"]
+
+    def said(case: str) -> str:
+        cells = where(rows, case=case)
+        worst = max(max(row["multisine"], row["sweep"]) for row in cells)
+        return (
+            f"the three right terms and no other in {sum(row['right_terms'] for row in cells)} of {len(cells)} "
+            f"seeds, no coefficient more than {number(max(column(cells, 'worst_percent')), 2)} % off, test errors of "
+            f"at most {error_of(worst)} m"
+        )
+
+    peers = column(where(rows, case="plain PySINDy, m, c, k given"), "worst_percent")
+    clean = the(rows, case="plain PySINDy, m, c, k given, clean")["worst_percent"]
+    library = the(rows, case="benchmark", seed=1)["library"]
+    return [
+        f"Of {library} terms, told how the records were made: {said('benchmark')}. Not told: "
+        f"{said('benchmark, recipe not told')}. That the plant is a mass on a spring with memory is told in both.",
+        "PySINDy's regression with the true mass, damping and stiffness, and the threshold that suits it best, is "
+        f"{span(peers, 2)} % off, and {number(clean, 2)} % on clean data.",
+    ]
+
+
+def sindy_lag_trap(result: Result) -> list[str]:
+    """A lag that looks like hysteresis under one rate."""
+    rows = result["rows"]
+    single = [row for row in rows if len(row["frequencies_hz"].split()) == 1]
+    double = {row["plant"]: row["verdict"] for row in rows if len(row["frequencies_hz"].split()) == 2}
+    require({row["verdict"] for row in single} == {"cannot be told from one rate"}, "one rate does not tell")
+    require(double["published lag"] == "linear lag", "two rates show the lag")
+    published, lag = result["published_widths"], result["lag_widths"]
+    return [
+        f"A published sparse model of a piezo loop is a linear lag: its loop is {100 * published[1]:.1f} % of the "
+        f"stroke wide at 1 Hz and {100 * published[0]:.1f} % at 0.1 Hz, which a pole and a zero give exactly, and "
+        f"{100 * published[2]:.1f} % at 10 Hz, where they give {100 * lag[2]:.1f} %.",
+        f'Under one rate all {len(single)} records, lag and Bouc-Wen law, are called "{single[0]["verdict"]}"; under '
+        f"two "
+        f'the lag is called "{double["published lag"]}" and the law "{double["Bouc-Wen"]}".',
+    ]
+
+
+_WRONG = (
+    ("called hysteresis", "a curve or a linear system is called hysteresis"),
+    ("hysteresis lost", "hysteresis is not found"),
+    ("cannot tell at two rates", "two rates are called one"),
+)
+
+
+def adversarial_records(result: Result) -> list[str]:
+    """Verdicts on records that are made to mislead."""
+    sets = result["sets"]
+    seen, held_back = sets["seen"], sets["held back"]
+    wrong = [f"{words} in {sum(part[kind] for part in sets.values())}" for kind, words in _WRONG]
+    return [
+        f"Of {seen['records']} records that were looked at while the limits were chosen {seen['right']} are right, "
+        f"of {held_back['records']} that were held back {held_back['right']}: {listed(wrong)}.",
+        f"The median record takes {max(part['median_cpu_seconds'] for part in sets.values()):.1f} s of processor "
+        f"time, the slowest {max(part['largest_cpu_seconds'] for part in sets.values()):.1f} s. The second set has "
+        "other numbers, but the same kinds of record.",
+    ]
+
+
+# Control -------------------------------------------------------------------------------------------------------------
+
+
+def lag_of_equation_1(result: Result) -> list[str]:
+    """What a PID takes of the lag of equation (1), against robustness."""
+    rows = sorted(result["rows"], key=lambda row: row["bound"])
+    worst = "least_of_the_searches_percent"  # in results of several searches for each bound
+    several = all(worst in row for row in rows)
+    reached = [
+        f"{row['bound']:g}: {percent(row['lag_reduction_percent'], 0)}"
+        + (f" ({percent(row[worst], 0)})" if several else "")
+        for row in rows
+    ]
+    enough = [row["bound"] for row in rows if row["lag_reduction_percent"] >= 90.0]
+    require(not enough or min(enough) > 2.0, "90 % need more than the usual bound")
+    needed = f"need a bound of {min(enough):g}" if enough else f"are not reached at {rows[-1]['bound']:g}"
+    return [
+        "The paper's equation (1) has lag and no hysteresis. The best PID of a global search takes away, by the "
+        "bound on the maximum sensitivity (commonly at most "
+        f"2){', in brackets the worst search' if several else ''}: {', '.join(reached)}.",
+        f"The paper's 90 % {needed}. The plant is known exactly, nothing disturbs it, and the figures hold for this "
+        "triangle and sampling.",
+    ]
+
+
+_DAMPED = "model-following, damped"
+
+
+def compensation_matrix(result: Result) -> list[str]:
+    """What each part of a controller adds."""
+    rows = {row["controller"]: row for row in result["rows"]}
+    held, with_n, normalised = result["parameters_within_5_percent"]
+    names = "PID", "inverse + creep inverse", "model-following"
+
+    def off(draws: Row) -> str:
+        return (
+            f"{percent(draws['median'])} in the median, {percent(draws['fifth_percentile'])} in the 5th percentile "
+            f"and {percent(draws['worst_corner'])} at the worst corner"
+        )
+
+    widths = [f"{name} {percent(rows[name]['hysteresis_reduction_percent'])}" for name in names]
+    key, worst = "residual_rms_reduction_percent", "worst_residual_rms_reduction_percent"
+    shaken = [f"{name} {percent(rows[name][key])} and {percent(rows[name][worst])}" for name in (*names, _DAMPED)]
+    return [
+        "Where the controller knows the actuator exactly, the hysteresis reduction of a triangle of 1 Hz is "
+        f"{listed(widths)}.",
+        "Of the residual vibration after a step, with the mode as the controller believes and with a mode 10 % off, "
+        f"{'; '.join(shaken)} are taken away (a negative reduction is more vibration).",
+        f"With all parameters of law and creep within 5 % but the exponent, the inverse alone keeps {off(held)}; "
+        f"with n drawn too {off(with_n)}; in the law's normalised form {off(normalised)}.",
+    ]
+
+
+def robustness(result: Result) -> list[str]:
+    """Controllers on actuators that are not quite those that they were made for."""
+    rows = result["rows"]
+    best = the(rows, controller="robust, EI", exponent="held")
+    simple = [the(rows, controller=name) for name in ("PID", "inverse + creep inverse", "model-following")]
+
+    def ends(row: Row, name: str) -> str:
+        return f"{percent(row[f'{name}_p50'])} in the median and {percent(row[f'{name}_p5'])} in the 5th percentile"
+
+    kept = "hysteresis_reduction_percent"
+    others = [f"{row['controller']} {percent(row[f'{kept}_p50'])} and {percent(row[f'{kept}_p5'])}" for row in simple]
+    return [
+        f"With law, creep and mode each within {result['spread_percent']:g} % of what the controller knows, "
+        f"model-following with damping, a broad notch and an extra-insensitive shaper takes away {ends(best, kept)} "
+        f"of {best['draws']} draws of the hysteresis, and of the residual vibration "
+        f"{ends(best, 'residual_rms_reduction_percent_known_ahead')} for a step known ahead, "
+        f"{ends(best, 'residual_rms_reduction_percent')} for one that is not. {best['unstable']} draws are unstable.",
+        f"Simpler ones take away of the hysteresis, in the median and the 5th percentile of {simple[0]['draws']} "
+        f"draws: {'; '.join(others)}. The gains of the robust rows were chosen by hand on other draws.",
+    ]
+
+
+def pixel_sensor(result: Result) -> list[str]:
+    """Control through whole pixels."""
+    rows = {row["controller"]: row for row in result["rows"]}
+    best, pid = rows["inverse + creep inverse"], rows["PID"]
+    true, measured = "hysteresis_reduction_percent", "measured_hysteresis_reduction_percent"
+    fed_back = [row for row in result["rows"] if "PID" in row["controller"] or "follow" in row["controller"]]
+    require(best[true] == max(row[true] for row in result["rows"]), "no feedback on pixels beats the inverse")
+    return [
+        f"Through whole pixels of {result['pixel_um']:g} um the inverse of law and creep, without feedback and with "
+        f"the law known exactly, takes {percent(best[true])} of the true hysteresis away, and the pixels show "
+        f"{percent(best[measured])}.",
+        f"Feedback on pixels makes it worse: {span([row[true] for row in fed_back if row is not pid], 3, ' %')} with "
+        f"the inverse, {percent(pid[true])} with a fast PID alone (a negative reduction is a wider loop). The camera "
+        "is taken to be as fast as the controller.",
+    ]
+
+
+def rate_sweep(result: Result) -> list[str]:
+    """Up to which rate compensation holds."""
+    rows, key = result["rows"], "hysteresis_reduction_percent"
+    rates = (1.0, 10.0, 100.0)
+
+    def at(name: str) -> str:
+        return listed([percent(the(rows, controller=name, frequency_hz=rate)[key]) for rate in rates])
+
+    follow = where(rows, controller="model-following")
+    worst = min(follow, key=lambda row: row[key])
+    return [
+        f"At {listed([f'{rate:g}' for rate in rates])} Hz model-following takes {at('model-following')} of the width "
+        f"away, the inverse of law and creep {at('inverse + creep inverse')}, a PID {at('PID')}; at worst, at "
+        f"{worst['frequency_hz']:g} Hz, model-following takes {percent(worst[key])}.",
+        "Every controller knows the actuator exactly; experiment 15 says what becomes of that when it does not.",
+    ]
+
+
+def pid_hysteresis(result: Result) -> list[str]:
+    """What a PID leaves."""
+    rows = where(result["rows"], plant="law, creep, mode")
+    usual = where(rows, max_sensitivity=2.0)
+    robust = where(rows, max_sensitivity=min(column(rows, "max_sensitivity")))
+
+    def by_rate(cells: Iterable[Row]) -> str:
+        return listed(
+            [f"{percent(row['hysteresis_reduction_percent'])} at {row['frequency_hz']:g} Hz" for row in cells]
+        )
+
+    ended = column(result["rows"], "search_finished")
+    search = (
+        f"The search for the gains ended by its tolerance in {sum(ended)} of {len(ended)} rows."
+        if ended
+        else "The search for the gains was cut off after a fixed number of trials, and they may not be the best ones."
+    )
+    least = min(column(where(result["rows"], max_sensitivity=2.0), "lag_share_percent"))
+    return [
+        f"On law, creep and mode a PID within a maximum sensitivity of 2 takes {by_rate(usual)} away; within "
+        f"{robust[0]['max_sensitivity']:g}, {by_rate(robust)} (a negative reduction is a wider loop).",
+        f"At 2, at least {percent(least, 0)} of the width that is left would be there without hysteresis: lag. "
+        f"{search}",
+    ]
+
+
+def vibration(result: Result) -> list[str]:
+    """Vibration after a step, by its size."""
+    key = "residual_rms_reduction_percent"
+    steps = where(result["rows"], plant="Table 1", controller="model-following")
+    robust = where(result["rows"], plant="Table 1", controller="robust, EI")
+    sizes = [f"{percent(row[key])} after {row['step_um']:g} um" for row in steps]
+    limited = [f"{row['step_um']:g} um" for row in steps if row["limited_samples"]]
+    four, six = (where(result["rows"], plant=name, controller="PID") for name in ("(4)", "(6)"))
+    names = "overshoot_reduction_percent", key, "settling_time_reduction_percent"
+    figures = [listed([span(column(rows, name), 3) for name in names]) for rows in (four, six)]
+    return [
+        f"On Table 1's actuator, known exactly, model-following takes of the residual vibration {listed(sizes)} "
+        f"away; the voltage is limited at {listed(limited)}. The robust controller of experiment 15 takes "
+        f"{span(column(robust, key), 3)} %.",
+        f"Overshoot, residual and settling time on the paper's plant (4) are reduced by {figures[0]} % by PID, on "
+        f"(6) by {figures[1]} %: plants that are known exactly, without noise.",
+    ]
+
+
+def closed_loop_speed(result: Result) -> list[str]:
+    """One loop here and elsewhere."""
+    own, *peers = where(result["rows"], kind="loop")
+    by_name = {row["name"]: row["times_hysim"] for row in peers}
+    blocks = by_name["python-control alone"] / by_name["python-control, one compiled block"]
+    require(blocks > 2.0, "most of python-control's time is spent on joining blocks")
+    times = [
+        f"{row['name']} {number(row['times_hysim'])} times ({number(row['times_hysim_q1'])} to "
+        f"{number(row['times_hysim_q3'])})"
+        for row in sorted(peers, key=lambda row: row["times_hysim"])
+    ]
+    controllers = column(where(result["rows"], kind="controller"), "microseconds_per_sample")
+    return [
+        f"A sample takes {number(own['microseconds_per_sample'], 2)} us in `close_loop`; elsewhere the same "
+        f"displacements, to {error_of(max(column(peers, 'largest_difference_um')))} um, take as many times as long "
+        f"(median and quartiles): {'; '.join(times)}.",
+        f"Joined from blocks the loop is {number(blocks, 2)} times as slow in python-control as in one block: most "
+        "of the difference to hysim is the cost of joining blocks, not of the law.",
+        f"10 s at 20 kHz with the controllers of experiment 14 take {number(0.2 * median(controllers), 2)} s in the "
+        f"median and {number(0.2 * max(controllers), 2)} s at worst.",
+    ]
+
+
+# Other families ------------------------------------------------------------------------------------------------------
+
+
+def extended_plays(result: Result) -> list[str]:
+    """What extensions do to a Prandtl-Ishlinskii loop."""
+    rows = {row["law"]: row for row in result["rows"]}
+    plain, dead, two = (rows[name] for name in ("plain", "dead zones", "two envelopes"))
+    fast, slow = rows["speed 0.1"], rows["speed 0.05"]
+    return [
+        f"Dead zones make the loop uneven by {percent(100 * dead['odd_within'], 0)} of the stroke, two envelopes by "
+        f"{percent(100 * two['odd_within'], 0)}; the width in the middle, {number(plain['mid_width'])} in the plain "
+        f"law, becomes {number(two['mid_width'])} with two envelopes, and {number(slow['mid_width'])} and "
+        f"{number(fast['mid_width'])} as the speed doubles.",
+        f"Each inverse undoes its law to {error_of(max(column(result['rows'], 'inverse_error')))} of the stroke at "
+        "worst.",
+    ]
+
+
+def preisach(result: Result) -> list[str]:
+    """Preisach laws from reversal curves."""
+    few, many = min(result["rows"], key=_curves), max(result["rows"], key=_curves)
+    return [
+        f"On a random input that it has not seen, a law from {few['curves']} to {many['curves']} reversal curves "
+        f"with {100 * result['noise']:g} % of noise is {number(few['read_error_percent'], 2)} to "
+        f"{number(many['read_error_percent'], 2)} % wrong where the table is read from them, and "
+        f"{number(few['fitted_error_percent'], 2)} to {number(many['fitted_error_percent'], 2)} % where it is fitted.",
+        "The truth is a bank of relays with a smooth density: a case that suits both.",
+    ]
+
+
+def _curves(row: Row) -> float:
+    return float(row["curves"])
+
+
+def dashpot(result: Result) -> list[str]:
+    """A damper with and without its dashpot."""
+    names = dict.fromkeys(row["model"] for row in result["rows"])
+    worst = {name: max(column(where(result["rows"], model=name), "error_percent")) for name in names}
+    rates = column(result["rows"], "rate_hz")
+    errors = [f"{name} at most {number(value, 2)} %" for name, value in worst.items()]
+    return [
+        f"Identified at {result['fitted_at_hz']:g} Hz with {100 * result['noise']:g} % of noise and asked for the "
+        f"force at {min(rates):g} to {max(rates):g} Hz, the models are off by: {', '.join(errors)} of the range.",
+        "The last one has the form of the truth, which is told.",
+    ]
+
+
+# Studies and files ---------------------------------------------------------------------------------------------------
+
+
+def sweep_study(result: Result) -> list[str]:
+    """On which parameter a loop depends most."""
+    parts = []
+    for measure in ("width", "area"):
+        ranked = sorted(where(result["rows"], measure=measure), key=lambda row: -abs(row["rank_correlation"]))
+        first, *others = [f"{row['parameter']} ({row['rank_correlation']:.2f})" for row in ranked]
+        parts.append(f"the {measure} on {first}, less on {listed(others)}")
+    return [f"By rank correlation over {count(result['n_tasks'])} laws: {'; '.join(parts)}."]
+
+
+def kill_and_resume(result: Result) -> list[str]:
+    """A study that is killed and resumed."""
+    rows = result["rows"]
+    again = max(column(rows, "computed_twice"))
+    require(all(row["in_time"] for row in rows), "every kill came while the study ran")
+    return [
+        f"A study of {result['n_tasks']} tasks is killed at {len(rows)} random moments and resumed. "
+        f"{result['columns_that_differ']} columns of its table differ from the uninterrupted one's, but for the "
+        "seconds.",
+        f"In all, {again:.0f} tasks that were on their way were computed again.",
+    ]
+
+
+def scaling(result: Result) -> list[str]:
+    """What a sweep costs beside its tasks."""
+    rows = where(result["rows"], workers=2)
+
+    def shared(kind: str) -> str:
+        values = {row["executor"]: row["efficiency_percent"] for row in where(rows, kind=kind)}
+        return listed([f"{name} {percent(value, 0)}" for name, value in values.items()])
+
+    short = the(rows, kind="microsecond", executor="threads", tasks=100_000)
+    one, other = (the(rows, kind=f"laws on Table 1, n = {n}") for n in ("1", "1.5"))
+    limit = result["workers_at_saturation"]
+    return [
+        f"The efficiency of two workers is, on tasks of 10 ms in a kernel, {shared('10 ms in a kernel')}; on tasks "
+        f"of 10 ms with large arrays, {shared('10 ms with arrays')}; on fits, {shared('fit')}.",
+        f"A task of less than a microsecond costs {number(short['overhead_microseconds'], 2)} us on threads; a "
+        f"million laws on the paper's points take {number(one['seconds'], 2)} s with n = 1 and "
+        f"{number(other['seconds'], 2)} s with n = 1.5.",
+        f"A model that is fitted to these rows lets a dask cluster saturate at {number(limit['0.01 s'], 2)} workers "
+        f"with tasks of 10 ms and at {number(limit['1 s'], 2)} with tasks of 1 s; it is not tried on a larger "
+        "cluster.",
+    ]
+
+
+def fuzz(result: Result) -> list[str]:
+    """Damaged inputs to the command line."""
+    kinds = listed(list(dict.fromkeys(f"{row['damaged']}" for row in result["rows"])))
+    require(
+        result["inputs"] == sum(result[end] for end in ("exit 0", "exit 1", "exit 2")), "every run ends in 0, 1 or 2"
+    )
+    return [
+        f"Of {count(result['inputs'])} damaged inputs ({kinds}), each handed to a command, {result['broken']} end in "
+        f"a traceback, in more than one line of error or with a file half written; {count(result['exit 0'])} are "
+        f"accepted, {count(result['exit 1'] + result['exit 2'])} refused.",
+    ]
+
+
+# Camera --------------------------------------------------------------------------------------------------------------
+
+
+def registration(result: Result) -> list[str]:
+    """Displacement from frames, beside scikit-image."""
+    rows = result["rows"]
+    pictures = len({row["picture"] for row in rows})
+
+    def at(method: str, snr: int, name: str = "rms_px") -> list[float]:
+        return column(where(rows, method=method, snr_db=snr), name)
+
+    others = [name for name in dict.fromkeys(row["method"] for row in rows) if name not in ("hysim", "whole pixels")]
+    peer = min(others, key=lambda name: max(at(name, 30)))
+    levels = sorted({row["snr_db"] for row in rows}, reverse=True)
+
+    def ends(method: str) -> str:
+        return listed(
+            [
+                f"{number(median(at(method, snr)), 2)} and {number(max(at(method, snr)), 2)} at {snr} dB"
+                for snr in levels
+            ]
+        )
+
+    bias = max(value for snr in levels if snr >= 20 for value in at("hysim", snr, "largest_bias_px"))
+    honest = column(where(rows, method="hysim"), "error_over_standard_error")
+    speed = result["speed_and_memory"]
+    memory = column(speed, "peak_mib")
+    return [
+        f"On {pictures} kinds of picture that were not used while developing, the error in pixels rms, median and "
+        f"worst, is {ends('hysim')}; {peer}, the better setting of scikit-image, has {ends(peer)}; whole pixels have "
+        f"{number(max(at('whole pixels', 30)), 2)}.",
+        f"The bias is at most {number(bias, 2)} pixels at 20 dB and better; the error is {span(honest, 2)} times its "
+        f"own standard error. {min(column(speed, 'frames_per_second')):.0f} frames of 512 x 512 pixels a second of "
+        f"one core, with {span(memory)} MiB for {speed[0]['frames']} and {speed[-1]['frames']} frames.",
+    ]
+
+
+def virtual_rig(result: Result) -> list[str]:
+    """What the camera of Table 1 costs."""
+    lines = {line["measured"]: line for line in result["summary"]}
+    fine, dim = lines["parts of a pixel"], lines["parts of a pixel, 20 dB"]
+    whole, shaken = lines["whole pixels"], lines["whole pixels, shaken"]
+    key, width = "hysteresis_reduction_percent", "width_error_percent"
+    off = max(abs(line[width][end]) for line in (fine, dim) for end in ("least", "most"))
+    best = result["true_law_reduction_percent"]
+    repeated = whole[key]["least"] == whole[key]["most"]
+    spread = "one result, repeated in every run" if repeated else f"{percent(whole[key]['least'])} at worst"
+    return [
+        f"A known actuator under a simulated microscope, {fine['tables']} times. From parts of a pixel the loop's "
+        f"width comes back within {number(off, 2)} %, and the inverse of the identified law takes "
+        f"{percent(min(fine[key]['least'], dim[key]['least']))} of the true hysteresis away at worst, as that of the "
+        f"true law ({percent(best)}). From whole pixels it takes {percent(whole[key]['median'])}, {spread}.",
+        f"Where the microscope shakes as well, the median is {percent(shaken[key]['median'])}, the best "
+        f"{percent(shaken[key]['most'])} and the worst {percent(shaken[key]['least'], 0)}, a loop "
+        f"{number(1.0 - 0.01 * shaken[key]['least'], 2)} times as wide as without a controller. The width is then "
+        f"{shaken[width]['least']:.0f} to {shaken[width]['most']:+.0f} % off, within its interval in "
+        f"{shaken['width_covers']} of {shaken['tables']} runs. Family and form of the true law are told.",
+    ]
+
+
+GROUPS: dict[str, tuple[Finding, ...]] = {
+    "Evaluation and speed": (exact_step, work_precision, batch, cold_start, more_samples, wear_and_pinching),
+    "Identification": (
+        benchmark_bouc_wen,
+        transfer_functions,
+        table1_models,
+        recovery,
+        all_families,
+        nested_table1,
+    ),
+    "Discovery": (sindy_recovery, sindy_table1, sindy_benchmark, sindy_lag_trap, adversarial_records),
+    "Control": (
+        lag_of_equation_1,
+        compensation_matrix,
+        robustness,
+        pixel_sensor,
+        rate_sweep,
+        pid_hysteresis,
+        vibration,
+        closed_loop_speed,
+    ),
+    "Other families": (extended_plays, preisach, dashpot),
+    "Studies and files": (sweep_study, kill_and_resume, scaling, fuzz),
+    "Camera": (registration, virtual_rig),
+}
+HIGHLIGHTS: tuple[Finding, ...] = (
+    closed_loop_speed,
+    recovery,
+    sindy_recovery,
+    robustness,
+    virtual_rig,
+)  # what the README quotes
