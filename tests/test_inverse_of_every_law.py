@@ -132,7 +132,7 @@ def test_what_has_no_inverse_is_refused(law, error, message):
 def test_a_rate_too_high_for_an_inverse_is_refused():
     law = LAWS["RateDependentPrandtlIshlinskii"]
     t = 1e-3 * np.arange(5)
-    with pytest.raises(ValueError, match=r"no stable inverse at the sample time 0\.001"):
+    with pytest.raises(ValueError, match=r"no stable inverse at this sample time"):
         hs.close_loop(law, hs.InverseFeedforward(law=law), t, t)
 
 
