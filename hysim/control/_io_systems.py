@@ -19,7 +19,6 @@ from hysim.control._feedforward import InverseFeedforward
 from hysim.control._tracking import TrackingController
 from hysim.errors import SimulationError
 from hysim.kernels import boucwen_inverse
-from hysim.kernels.charts import N_WORK
 from hysim.laws.differential.boucwen_inverse import BoucWenInverse
 from hysim.models.protocols import CompiledController, Continuable, Remembering
 from hysim.plants.actuator import Actuator
@@ -145,4 +144,8 @@ def _scratch(controller: Any, sample_time: float) -> int:
     forward = controller.feedforward if isinstance(controller, TrackingController) else controller
     if not isinstance(forward, InverseFeedforward):
         return 0
-    return N_WORK - 2 if forward.block(sample_time, 0.0).inverse is boucwen_inverse.step else 0
+    block = forward.block(sample_time, 0.0)
+    if block.inverse is not boucwen_inverse.step:
+        return 0
+    creeping = 0 if forward.creep is None else len(forward.creep.weights)
+    return block.state.size - creeping - boucwen_inverse.N_OWN - 2  # behind the law's input and memory

@@ -167,39 +167,82 @@ def power_path(
     return -1
 
 
-@kernel
 def batch(parameters: FloatArray, output: FloatArray, u: FloatArray, out: FloatArray, start: int, stop: int) -> None:
     """Outputs of the laws `start` to `stop - 1`.
 
     `parameters` is (n_sets, 5) with columns A, beta, gamma, n, z0; `output` is (n_sets, 2 + degree) with
     columns gain, offset, c1, c2, ...; `u` is (1, n_samples) or (n_sets, n_samples); `out` is
-    (n_sets, n_samples). A law that escapes is a row of inf. Neighbours of equal n share their charts.
+    (n_sets, n_samples). A law that diverges is a row of inf. Neighbours of equal n share their charts.
     """
+    n = parameters[start:stop, 3]
+    linear, quadratic = n == 1.0, n == 2.0
     if u.shape[1] == 0:
         return
-    work, several = np.empty(N_WORK), np.empty((N_ROWS, N_AT_ONCE))
-    last_n, side_by_side = 0.0, start
+    if linear.any():  # a kernel for each kind of exponent: none is compiled that no law needs
+        linear_batch(parameters, output, u, out, start, stop)
+    if quadratic.any():
+        quadratic_batch(parameters, output, u, out, start, stop)
+    if not (linear | quadratic).all():
+        power_batch(parameters, output, u, out, start, stop)
+
+
+@kernel
+def linear_batch(
+    parameters: FloatArray, output: FloatArray, u: FloatArray, out: FloatArray, start: int, stop: int
+) -> None:
+    """As `batch`, for the laws of n = 1; those on one input go side by side."""
+    several, side_by_side = np.empty((N_ROWS, N_AT_ONCE)), start
     for i in range(start, stop):
         A, beta, gamma, n, z0 = parameters[i]
-        row = u[min(i, u.shape[0] - 1)]
-        if n == 1.0 and u.shape[0] == 1:
-            if i >= side_by_side:
+        if n == 1.0:
+            row = u[min(i, u.shape[0] - 1)]
+            lost = -1
+            if u.shape[0] > 1:
+                lost = linear_path(A, beta, gamma, row[0], z0, row, out[i])
+            elif i >= side_by_side:
                 count = count_linear(parameters, i, stop)
                 linear_rows(parameters, i, count, row, several, out)
                 side_by_side = i + count
-            escaped = -1 if math.isfinite(out[i, row.size - 1]) else row.size
-        elif n == 1.0:
-            escaped = linear_path(A, beta, gamma, row[0], z0, row, out[i])
-        elif n == 2.0:
-            escaped = quadratic_path(A, beta, gamma, row[0], z0, row, out[i])
-        else:
+            finish(lost < 0 and math.isfinite(out[i, row.size - 1]), output[i], row, out[i])
+
+
+@kernel
+def quadratic_batch(
+    parameters: FloatArray, output: FloatArray, u: FloatArray, out: FloatArray, start: int, stop: int
+) -> None:
+    """As `batch`, for the laws of n = 2."""
+    for i in range(start, stop):
+        A, beta, gamma, n, z0 = parameters[i]
+        if n == 2.0:
+            row = u[min(i, u.shape[0] - 1)]
+            lost = quadratic_path(A, beta, gamma, row[0], z0, row, out[i])
+            finish(lost < 0, output[i], row, out[i])
+
+
+@kernel
+def power_batch(
+    parameters: FloatArray, output: FloatArray, u: FloatArray, out: FloatArray, start: int, stop: int
+) -> None:
+    """As `batch`, for the laws of other n."""
+    work, last_n = np.empty(N_WORK), 0.0
+    for i in range(start, stop):
+        A, beta, gamma, n, z0 = parameters[i]
+        if n != 1.0 and n != 2.0:
+            row = u[min(i, u.shape[0] - 1)]
             prepare(A, beta, gamma, n, last_n, work)
             last_n = n
-            escaped = power_path(A, beta, gamma, n, row[0], z0, row, work, out[i])
-        if escaped >= 0:
-            out[i] = math.inf
-            continue
-        to_output(output[i], 0, row, out[i])
+            lost = power_path(A, beta, gamma, n, row[0], z0, row, work, out[i])
+            finish(lost < 0, output[i], row, out[i])
+
+
+@inlined
+def finish(is_finite: bool, output: FloatArray, u: FloatArray, out: FloatArray) -> None:
+    """Outputs in place of the memories of a law, inf where it has diverged."""
+    if is_finite:
+        to_output(output, 0, u, out)
+    else:
+        for k in range(u.size):
+            out[k] = math.inf
 
 
 @kernel
@@ -235,6 +278,28 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     z = state[1]
     if math.isfinite(z):  # an escape remains one
         z = advance(z, u - state[0], A, beta, gamma, n, borrowed(state))
+    state[0], state[1] = u, z
+    return float(parameters[5] + polynomial(u, parameters, 6) + parameters[4] * z)
+
+
+@kernel
+def linear_step(parameters: FloatArray, state: FloatArray, u: float) -> float:
+    """As `step` for n = 1, without a workspace."""
+    z, du = state[1], u - state[0]
+    if math.isfinite(z) and du != 0.0:
+        A, beta, gamma = parameters[0], parameters[1], parameters[2]
+        z = linear_advance(z, du, A, beta + gamma, beta - gamma)
+    state[0], state[1] = u, z
+    return float(parameters[5] + polynomial(u, parameters, 6) + parameters[4] * z)
+
+
+@kernel
+def quadratic_step(parameters: FloatArray, state: FloatArray, u: float) -> float:
+    """As `step` for n = 2, without a workspace."""
+    z, du = state[1], u - state[0]
+    if math.isfinite(z) and du != 0.0:
+        A, beta, gamma = parameters[0], parameters[1], parameters[2]
+        z = quadratic_advance(z, du, A, beta + gamma, beta - gamma)
     state[0], state[1] = u, z
     return float(parameters[5] + polynomial(u, parameters, 6) + parameters[4] * z)
 

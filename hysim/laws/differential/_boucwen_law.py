@@ -17,6 +17,7 @@ import numpy as np
 from hysim._frozen import FloatArray, read_only
 from hysim.kernels import boucwen as kernels
 from hysim.kernels.charts import N_WORK
+from hysim.kernels.stepping import Step
 from hysim.laws.differential import _boucwen_facts, boucwen_inverse, limit_cycle
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen_inverse import BoucWenInverse, InverseState
@@ -65,6 +66,16 @@ class BoucWenStep(Law):
 
 class BoucWenLaw(BoucWenStep, MemoryLaw):
     """A law with the memory of Bouc and Wen, exact at the samples of an input that is linear between them."""
+
+    @property
+    def step(self) -> Step:  # type: ignore[override]
+        """The kernel for the exponent: a loop compiles no other."""
+        return kernels.linear_step if self.n == 1.0 else kernels.quadratic_step if self.n == 2.0 else kernels.step
+
+    @property
+    def workspace(self) -> int:  # type: ignore[override]
+        """Places for the charts of the exponent."""
+        return 0 if self.n in (1.0, 2.0) else super().workspace
 
     @property
     def admissible(self) -> bool:

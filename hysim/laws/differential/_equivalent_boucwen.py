@@ -2,11 +2,13 @@
 
 import math
 from abc import abstractmethod
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
+from hysim.kernels import boucwen as kernels
 from hysim.laws.differential._boucwen_law import BoucWenStep
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.laws.differential.boucwen_inverse import BoucWenInverse, InverseState
@@ -18,6 +20,9 @@ from hysim.models.tables import Tables
 
 class EquivalentBoucWen(BoucWenStep):
     """A law that says which Bouc-Wen law it is."""
+
+    step = staticmethod(kernels.linear_step)
+    workspace: ClassVar[int] = 0
 
     @classmethod
     @abstractmethod
