@@ -6,7 +6,7 @@ import pytest
 from scipy.integrate import simpson, solve_ivp
 
 import hysim as hs
-from hysim.kernels.baber_noori import escapes
+from hysim.kernels.baber_noori import diverges
 from hysim.kernels.baber_noori_series import N_ROWS, begin
 from hysim.kernels.remainder import N_TERMS
 
@@ -223,7 +223,7 @@ def test_a_memory_that_grows_fast_and_does_escape_is_said_to():
 def escapes_within(w, left, parameters, series):
     """Inner kernels have no entry from Python."""
     begin(w, 0.0, False, parameters, series)
-    return escapes(w, 0.0, left, parameters, series)
+    return diverges(w, 0.0, left, parameters, series)
 
 
 @pytest.mark.parametrize(

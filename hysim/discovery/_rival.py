@@ -51,7 +51,7 @@ class Rival:
         return [self.offset + plant.response(record.u, record.sample_time) for plant, record in pairs]
 
     def refitted(self, records: Sequence[Record], weights: Sequence[FloatArray]) -> "Rival":
-        """The same orders fitted again, from here, to the samples whose weights are not zero."""
+        """Fit of the same orders to the samples whose weights are not zero, which begins here."""
         plant = self.plants[0]
         if self.is_line:
             return _line(records, weights)

@@ -70,7 +70,7 @@ def thinning(record: Record, most: int) -> npt.NDArray[np.intp]:
 
 
 def thinned(free_run: FreeRun) -> FreeRun:
-    """The same problem on about SEARCHED samples."""
+    """This problem on about SEARCHED samples."""
     samples = [thinning(record, SEARCHED // len(free_run.records)) for record in free_run.records]
     records = tuple(
         Record(u=r.u[included], y=r.y[included]) for r, included in zip(free_run.records, samples, strict=True)

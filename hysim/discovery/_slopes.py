@@ -38,7 +38,7 @@ _WINDOWS = 400
 _OVERLAP = 4
 
 Feature = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
-"""Of input, memory and direction at n points, the value of one term or of several, (n,) or (n, n_terms)."""
+"""Value of one term (n,) or of several (n, n_terms), from input, memory and direction at n points."""
 
 
 @dataclass(frozen=True)

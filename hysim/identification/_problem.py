@@ -67,11 +67,11 @@ class Problem:
 
     @cached_property
     def cuts(self) -> list[int]:
-        """Where each record begins, and the number of samples."""
+        """First sample of each record, and the number of samples."""
         return [0, *np.cumsum([len(part.record) for part in self.parts]).tolist()]
 
     def thinned(self, samples: int) -> "Problem | None":
-        """The same problem on about so many samples of each record: all reversals, and others evenly between them.
+        """This problem on about so many samples of each record: all reversals, and others evenly between them.
 
         It is None where that saves less than half, or where the family depends on time. A rate-independent law passes
         through the same memories at the samples that remain, except for reversals of less than 1 % of the span.

@@ -1,4 +1,4 @@
-"""The same search on other data, from the optima of the whole record: samples left out, and records drawn anew."""
+"""Searches on other data, with samples left out or records drawn anew, from the optima of the whole record."""
 
 from collections.abc import Sequence
 

@@ -75,7 +75,7 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
         A, beta, gamma, n = common[0], common[1], common[2], common[3]
         boucwen.prepare(A, beta, gamma, n, state[_EXPONENT], plain)
         state[_EXPONENT], state[_READY] = n, 1.0
-    if u != last and math.isfinite(z):  # an escape remains one
+    if u != last and math.isfinite(z):  # a memory that has diverged remains so
         direction = 1.0 if u > last else -1.0
         series = state[_SERIES:_EXPONENT].reshape((N_ROWS, N_TERMS + 1))
         of_z, of_u = parameters[_SCALE], parameters[_SCALE + 1]
@@ -124,7 +124,7 @@ def advance(w: float, e: float, length: float, parameters: FloatArray, series: F
         if fraction < 1.0:
             if t * fraction <= ROUNDING * length and abs(1.0 + parameters[2] * e) <= _VANISHED:
                 return math.nan, e
-            if escapes(w, e, left, parameters, series):
+            if diverges(w, e, left, parameters, series):
                 return math.copysign(math.inf, w), e
         served = t * fraction
         if whole:  # else the series keeps away from zero, or is nearly a line
@@ -147,7 +147,7 @@ def advance(w: float, e: float, length: float, parameters: FloatArray, series: F
 
 
 @inner
-def escapes(w: float, e: float, left: float, parameters: FloatArray, series: FloatArray) -> bool:
+def diverges(w: float, e: float, left: float, parameters: FloatArray, series: FloatArray) -> bool:
     """Whether w is sure to reach infinity within the length `left`; after `begin`.
 
     It is if dw/dL is at least a quarter of the term of ``|w|^n`` from here on, and n > 1: then w^(1 - n) comes to zero

@@ -276,10 +276,9 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """
     A, beta, gamma, n = parameters[0], parameters[1], parameters[2], parameters[3]
     z = state[1]
-    if math.isfinite(z):  # an escape remains one
+    if math.isfinite(z):  # a memory that has diverged remains so
         z = advance(z, u - state[0], A, beta, gamma, n, borrowed(state))
-    state[0], state[1] = u, z
-    return float(parameters[5] + polynomial(u, parameters, 6) + parameters[4] * z)
+    return moved_to(u, z, parameters, state)
 
 
 @kernel
@@ -289,8 +288,7 @@ def linear_step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     if math.isfinite(z) and du != 0.0:
         A, beta, gamma = parameters[0], parameters[1], parameters[2]
         z = linear_advance(z, du, A, beta + gamma, beta - gamma)
-    state[0], state[1] = u, z
-    return float(parameters[5] + polynomial(u, parameters, 6) + parameters[4] * z)
+    return moved_to(u, z, parameters, state)
 
 
 @kernel
@@ -300,6 +298,12 @@ def quadratic_step(parameters: FloatArray, state: FloatArray, u: float) -> float
     if math.isfinite(z) and du != 0.0:
         A, beta, gamma = parameters[0], parameters[1], parameters[2]
         z = quadratic_advance(z, du, A, beta + gamma, beta - gamma)
+    return moved_to(u, z, parameters, state)
+
+
+@inlined
+def moved_to(u: float, z: float, parameters: FloatArray, state: FloatArray) -> float:
+    """Put input and memory into the state, and return the output there."""
     state[0], state[1] = u, z
     return float(parameters[5] + polynomial(u, parameters, 6) + parameters[4] * z)
 

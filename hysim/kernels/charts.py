@@ -161,8 +161,8 @@ def in_chart(
 ) -> tuple[float, float, float]:
     """From w over `length` in T within one chart, or up to its end: the change of w, the length left over, the end.
 
-    `side` is 0 for sigma = 1 and 1 for sigma = -1. An escape is a change of inf. The end has the rounding of its own
-    size, and lies on the side of the balance on which the way began.
+    `side` is 0 for sigma = 1 and 1 for sigma = -1. The change is inf for a memory that
+    diverges. The end has the rounding of its own size, and lies on the side of the balance on which the way began.
     """
     if w < work[_W_ZERO] or (w == work[_W_ZERO] and not forwards):
         return near_zero(w, forwards, side, n, length, work)
@@ -276,7 +276,7 @@ def walk(
 
 @inlined
 def visit(i: int, side: int, n: float, work: FloatArray) -> int:
-    """Where the cell `i` begins; it is made if this is the first visit."""
+    """Begin of the cell `i`, which is made at the first visit."""
     cell = (_CELLS + (side * _N_CELLS + i) * _CELL) & _NOT_NEGATIVE
     if work[cell + _CENTRE] == 0.0:
         edge = _EDGES + side * (_N_CELLS + 1) + i

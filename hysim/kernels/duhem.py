@@ -14,7 +14,7 @@ each solved by the power series of its flow about the present point. With u = u0
 The order follows what is left out: the series ends where the bound of that, from the sizes of the coefficients on a
 complex disc (`hysim.kernels.remainder`), has become rounding. Where N_TERMS do not reach that, the step is cut to the
 length at which they do, at no further cost because t_k goes with h^k. There is no closed form and the law is not
-called exact: it is good to 1e-12 of the range. A law that escapes is returned as `inf`; one so stiff that it needs
+called exact: it is good to 1e-12 of the range. A law that diverges is returned as `inf`; one so stiff that it needs
 more than MAX_STEPS as `nan`.
 
 In a law with |z| a step ends where its series crosses zero, and the memory is then zero to the bit. A step is
@@ -275,7 +275,7 @@ def batch(
     """Memories of the laws `start` to `stop - 1`.
 
     `laws` is (n_sets, 2 or 4, rows, columns), `z0` is (n_sets,), `u` is (1, n_samples) or (n_sets, n_samples),
-    `out` is (n_sets, n_samples). A law that escapes is a row of inf.
+    `out` is (n_sets, n_samples). A law that diverges is a row of inf.
     """
     if u.shape[1] == 0:
         return
@@ -300,7 +300,7 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     local = state[2 : 2 + size].reshape((rows, columns))
     powers = state[2 + size : state_size(rows, columns)].reshape((max(2, columns), N_TERMS + 1))
     z = state[1]
-    if math.isfinite(z):  # an escape remains one
+    if math.isfinite(z):  # a memory that has diverged remains so
         z = advance(state[0], z, u - state[0], law, LARGEST, local, powers)
     state[0], state[1] = u, z
     return float(parameters[0] + (parameters[1] * u + z))

@@ -7,7 +7,7 @@ In the frame that points along the input (H = z sign(du), L = |du|) each side of
 
 (tan for A k < 0). T does not depend on H, so that the samples of a path wait for each other for a few
 operations only. Near L = 0 it is a power series, elsewhere one exponential; both are good to 2e-16.
-Where H changes its sign, the rest of the way is gone from H = 0 with the other k. An escape is `inf`.
+Where H changes its sign, the rest of the way is gone from H = 0 with the other k. A memory that diverges is `inf`.
 
 The polynomials of 16 terms that the closed forms and the series of other laws take are summed by a tree of 9
 dependent operations, where Horner's rule is a chain of 30.
@@ -216,7 +216,7 @@ def linear_rows(
 ) -> None:
     """Memories of `count` laws from `start` on at the samples of `u` into their rows; `several` is (N_ROWS, N_AT_ONCE).
 
-    A law that escapes has a last memory that is not finite.
+    A law that diverges has a last memory that is not finite.
     """
     A, loading, unloading, z = several[_A], several[_LOADING], several[_UNLOADING], several[_MEMORY]
     for j in range(count):

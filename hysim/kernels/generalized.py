@@ -44,7 +44,7 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
         below, above = direction * size, (direction + 1) * size
         if parameters[below + 1] != parameters[above + 1] or parameters[below + 2] != parameters[above + 2]:
             y = along(parameters, state, 0.0, direction + (1 if last > 0.0 else 0))
-            if not math.isfinite(state[1]):  # an escape remains one
+            if not math.isfinite(state[1]):  # a memory that has diverged remains so
                 return y
             last = 0.0
     return along(parameters, state, u, direction + (1 if last + u > 0.0 else 0))

@@ -31,13 +31,13 @@ _DOUBLINGS = 1100  # more than there are between the smallest number and the lar
 _HALVINGS = 200
 _ATTEMPTS = 64  # branches that are tried, each ended where the output has turned on the last
 _RESOLVED = 1e-13
-"""Of the largest output so far: shorter branches rise in steps of rounding, and are not searched for a turn."""
+"""Part of the largest output so far: shorter branches rise in steps of rounding, and are not searched for a turn."""
 _NEAR, _NEARER, _NEAREST = 1e-10, 0.125, 1e-13
-"""Of the largest output so far: distances behind its beginning at which the output is evaluated, the farthest first."""
+"""Parts of the largest output so far: distances behind a branch at which it is evaluated, the farthest first."""
 _ROUNDINGS = 64.0 * 2.0**-53
 _CLEAR = 256.0  # roundings by which an output has to rise to show it
 _AHEAD = 2.0**-26
-"""Of a branch: distance beyond its end at which the output is evaluated; a turn is missed by its square, a rounding."""
+"""Part of a branch: distance beyond its end at which the output is evaluated; a turn is missed by its square."""
 _SMALLEST = 2.0**-1022
 _SEARCH = float64(STEP, CONSTANTS, VECTOR, float64)
 

@@ -1,4 +1,4 @@
-"""What laws remember: after each sample of one law, and after the last sample of many."""
+"""Memories of laws: of one after each sample, and of many after the last one."""
 
 import math
 

@@ -44,7 +44,7 @@ def along(
     """Memory (n + 1,) after each of `steps` (n,) of y, from `z[0]`, and dz/d(coefficient) (n_terms + 1, n + 1).
 
     `law` is P, shape (2, 2, degree + 1), `terms` are those of its terms for the coefficient 1; the last sensitivity
-    is that to r. `h` is the time of a step. False if z escapes.
+    is that to r. `h` is the time of a step. False if z diverges.
     """
     last = len(terms)
     for i in range(steps.size):
@@ -70,7 +70,7 @@ def motion(
 ) -> bool:
     """Displacement (n - 1,) after each step of h under the force (n,), linear in each; `state` (y, y', z) moves along.
 
-    `plant` is (m, c, k, r, n). False if the motion escapes.
+    `plant` is (m, c, k, r, n). False if the motion diverges.
     """
     m, c, k, r, power = plant[0], plant[1], plant[2], plant[3], plant[4]
     Y, V, Z = state[0], state[1], state[2]

@@ -110,7 +110,7 @@ def sign_change(f0: float, d0: float, f1: float, d1: float, length: float) -> fl
 
 @kernel
 def dip(v0: float, a0: float, v1: float, a1: float, length: float) -> float:
-    """Where the cubic through the velocities dips below zero between ends of one sign, or `length`."""
+    """Place at which the cubic through the velocities dips below zero between ends of one sign, or `length`."""
     if not (a0 * v0 < 0.0 and a1 * v1 > 0.0 and v0 * v1 > 0.0):
         return length
     b, c, d = length * a0, 3.0 * (v1 - v0) - length * (2.0 * a0 + a1), 2.0 * (v0 - v1) + length * (a0 + a1)

@@ -20,7 +20,7 @@ other n   the power series of the flow about the present point, w = sum t_k x^k 
           next correction is rounding beside the scale of the stretch, on the way up and on the way down.
           This is good to 1e-12 of the range, and not called exact.
 
-A law that escapes is returned as `inf`; one so stiff that it needs more than MAX_STEPS as `nan`.
+A law that diverges is returned as `inf`; one so stiff that it needs more than MAX_STEPS as `nan`.
 """
 
 import math
@@ -58,7 +58,7 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     those of the law for z and u times their scales, powers of two; all others, and the state, are in the user's units.
     """
     last, z, of_z, of_u = state[0], state[1], parameters[_SCALE], parameters[_SCALE + 1]
-    if u != last and math.isfinite(z):  # an escape remains one
+    if u != last and math.isfinite(z):  # a memory that has diverged remains so
         z = advance(last * of_u, z * of_z, (u - last) * of_u, parameters, state[N_HEAD:]) / of_z
     state[0], state[1] = u, z
     gain, offset = parameters[_OUTPUT], parameters[_OUTPUT + 1]
@@ -167,7 +167,7 @@ def power_side(
             if landing <= left and landing <= near(-forcing - d * landing, d, abs(c), n, negligible):
                 return 0.0, done + landing + c * moment(-forcing - d * landing, d, n, landing) / (forcing + d * landing)
         power = w**n
-        if escapes(w, abs(a) + abs(d) * length, c * power, n, left):
+        if diverges(w, abs(a) + abs(d) * length, c * power, n, left):
             return math.inf, length
         slope = forcing - c * power
         if slope == 0.0 and d == 0.0:
@@ -262,14 +262,14 @@ def summed(terms: FloatArray, x: float) -> float:
 
 
 @kernel
-def escapes(w: float, forcing: float, bend: float, n: float, length: float) -> bool:
+def diverges(w: float, forcing: float, bend: float, n: float, length: float) -> bool:
     """Whether w is sure to reach infinity: -c w^n, which only grows, is twice any forcing, and half of it is enough."""
     return bool(n > 1.0 and -bend > 2.0 * forcing and 2.0 * w < (1.0 - n) * bend * length)
 
 
 @kernel
 def scale(w: float, a: float, d: float, c: float, n: float, length: float) -> float:
-    """What w comes to on a stretch, to its order: as far as the forcing takes it, or to where the decay stops it."""
+    """Order of w at the end of a branch: as far as the forcing takes it, or to where the decay stops it."""
     forcing = abs(a) + abs(d) * length
     reached = forcing * length
     return max(w, min(reached, (forcing / abs(c)) ** (1.0 / n)) if c != 0.0 else reached)

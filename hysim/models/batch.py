@@ -31,7 +31,7 @@ class Batch(NamedTuple):
     """Laws by what computes them, and their inputs (1 or n_sets, n_samples).
 
     `compute(sets, u, y)` fills `y`, shape (n, n_samples), with the outputs of n sets for the inputs `u`, shape
-    (1 or n, n_samples); a law that escapes is a row of inf. `order`, shape (n_sets,), is the order in which
+    (1 or n, n_samples); a law that diverges is a row of inf. `order`, shape (n_sets,), is the order in which
     neighbours share work; None is that of the sets.
     """
 
@@ -45,7 +45,7 @@ class Batch(NamedTuple):
         return self.rows(workers) if reduce is None else self.reduced(reduce, target, workers)
 
     def rows(self, workers: int | None) -> FloatArray:
-        """Outputs, shape (n_sets, n_samples); inf where a law escapes."""
+        """Outputs, shape (n_sets, n_samples); inf where a law diverges."""
         y = np.empty((self.n_sets, self.u.shape[1]))
 
         def work(start: int, stop: int) -> None:
@@ -58,7 +58,7 @@ class Batch(NamedTuple):
         return y
 
     def reduced(self, reduce: Reduction, target: npt.ArrayLike | None, workers: int | None) -> FloatArray:
-        """One number for each set, shape (n_sets,); inf where a law escapes."""
+        """One number for each set, shape (n_sets,); inf where a law diverges."""
         measure = self._measure(reduce, target)
         result = np.empty(self.n_sets)
 

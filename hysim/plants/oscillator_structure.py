@@ -105,7 +105,7 @@ class OscillatorStructure(Identifiable):
         )
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """The output itself, shape (n_sets, n_samples, 1), sets on threads; inf for a set that escapes."""
+        """The output itself, shape (n_sets, n_samples, 1), sets on threads; inf for a set that diverges."""
         force, step = self.fine_input(record.u), record.sample_time / self.oversampling
         sets = np.stack(np.broadcast_arrays(*(np.atleast_1d(parameters[name]) for name in NAMES)), axis=1)
         outputs = np.full((len(sets), len(record), 1), np.inf)

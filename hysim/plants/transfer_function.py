@@ -256,7 +256,7 @@ class TransferFunctionStructure(Identifiable, Composable):
     The search runs over second-order sections s^2 + 2 zeta omega s + omega^2 (and one of first order for an
     odd number of poles) on log scales, which are stable by construction: omega from 0.1 rad over the whole
     record to the Nyquist rate, zeta from 0.001 to 30, so that real poles may lie at both ends. Resonances
-    above the Nyquist rate are left out: samples cannot tell them from those below, and they fit noise.
+    above the Nyquist rate are left out: samples look the same as for those below, and they fit noise.
     A free delay, which is None here, is searched in samples from 0 to a quarter of the record.
     """
 

@@ -163,7 +163,7 @@ def _numbers(name: str, value: Any) -> FloatArray:
 
 
 def _plain(column: FloatArray) -> FloatArray:
-    """The same values, every nan with the same bits."""
+    """These values, every nan with the same bits."""
     return np.where(np.isnan(column), np.nan, column)
 
 

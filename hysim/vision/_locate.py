@@ -26,7 +26,7 @@ _OVERLAP = 0.5  # of the region's length, the least
 
 @dataclass(frozen=True)
 class Location:
-    """Where the region's content is in a frame, in rows and columns [pixel]; nan where it is not location.
+    """Where the region's content is in a frame, in rows and columns [pixel]; nan where it was not found.
 
     `quality` is the correlation, `sharpness` the curvature of its peak over that of the reference with itself, and
     `overlap` the part of the region's length that both have.
@@ -137,7 +137,7 @@ def _jump(reference: Reference, view: _View) -> FloatArray:
 
 
 def _step(reference: Reference, view: _View, shift: FloatArray) -> Location:
-    """Where one step from the shift leads."""
+    """The shift after one step."""
     grid, template = reference.grid, view.template
     down, right = grid.phases(shift - view.origin)
     steep = np.stack([right, 1j * grid.right * right], axis=1).astype(np.complex64)

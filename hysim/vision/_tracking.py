@@ -1,4 +1,4 @@
-"""Where the region is, frame after frame.
+"""Place of the region, frame after frame.
 
 A running reference is taken renewed from the last good frame when the picture has changed or moved away. The error of
 that frame's own place then adds to those of the frames after it.

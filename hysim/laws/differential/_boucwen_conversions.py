@@ -163,7 +163,7 @@ def to_opensees_original(law: Any) -> Scalars:
 
 
 def to_suanpan(law: Any) -> Scalars:
-    """The same member; there gamma is not written."""
+    """Conversion of the member of this name, whose gamma is not written."""
     same = to_opensees_original(law)
     names = {"elastic_modulus": "E", "yield_stress": "fy", "hardening": "alphaL", "beta": "beta", "n": "eta"}
     return {name: same[theirs] for name, theirs in names.items()}

@@ -47,7 +47,7 @@ def outputs(
     y = np.empty((n_sets, u.shape[1]))
 
     def work(start: int, stop: int) -> None:
-        with np.errstate(all="ignore"):  # an escape overflows, and uncompiled kernels would warn of it
+        with np.errstate(all="ignore"):  # a memory that diverges overflows, and uncompiled kernels would warn of it
             kernels.batch(laws, z0, u, bound, y, start, stop)
 
     in_chunks(work, n_sets, workers=workers, minimum=1 + _SAMPLES_PER_THREAD // max(1, u.shape[1]))

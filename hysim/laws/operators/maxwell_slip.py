@@ -107,7 +107,7 @@ class MaxwellSlip(ByStructure, ClampLaw):
         return sum(self.limits)
 
     def to_prandtl_ishlinskii(self) -> PrandtlIshlinskii:
-        """The same law as a sum of plays: weights -k_i beside their sum at the threshold zero.
+        """This law as a sum of plays: weights -k_i beside their sum at the threshold zero.
 
         Raises ValueError if elements that slip at one elongation begin at different positions: no play stands at both.
         """
