@@ -105,7 +105,7 @@ def figure13(cases: Sequence[SquareCase]) -> plot.Figure:
     axes = [canvas.add_subplot(len(cases), 1, k + 1) for k in range(len(cases))]
     for ax, case in zip(axes, cases, strict=True):
         closed = case.assessment.closed
-        begin = closed.t[-1] - 2.0 * case.period
+        begin = closed.t[-1] - 2.0 * (case.period or 0.0)
         shown = _thinned(closed.t >= begin)
         series = {"reference": closed.reference, "with PID": closed.y, "without": case.assessment.open_y}
         plot.traces({name: (closed.t[shown] - begin, y[shown]) for name, y in series.items()}, ax, units=_SAMPLES)

@@ -7,7 +7,7 @@ from typing import Any
 from hysim._frozen import frozen
 from hysim._parallel import awaited, second_process
 from hysim.paper.approximations import Approximation, approximations
-from hysim.paper.claims import Claim, claims
+from hysim.paper.claims import Claim, claims, evidence
 from hysim.paper.dwell import DwellWidth, dwell_widths
 from hysim.paper.equations import EQUATION_1, EQUATION_4, EQUATION_6, Characteristics, characteristics
 from hysim.paper.loops import DYNAMICS_7, Loops, control_measures, loops
@@ -85,7 +85,7 @@ def find(*, quick: bool = False, progress: Progress | None = None) -> Findings:
             Actuator(hysteresis=law),
             Actuator(hysteresis=law, vibration=DYNAMICS_7),
         ),
-        claims=claims(models, control_measures(closed)),
+        claims=claims(evidence(models, reidentification, control_measures(closed))),
         approximations=approximations(),
         equations={name: characteristics(model) for name, model in _transfer_functions().items()},
     )

@@ -235,6 +235,7 @@ def _bouc_wen(study: Study) -> str:
 
 def _discovered(study: Study, drawn: Drawn) -> str:
     law, row = study.discovery, study.comparison["sindy"]
+    starts = law.initial_states[0] or {"y": 0.0}
     return (
         paragraph(
             "PySINDy regresses the slope of each branch on terms u′ uⁱ yʲ and |u′| uⁱ yʲ; the structures along its "
@@ -243,7 +244,7 @@ def _discovered(study: Study, drawn: Drawn) -> str:
             "and with it free. Of those that the BIC cannot tell from the best, the one of fewest numbers is kept: "
             f"{len(law.coefficients)} terms and {law.n_parameters} parameters, {row.fit_percent:.2f} % in free run."
         )
-        + equation(law.equation)
+        + equation("\n".join([law.equation, *(f"{name}(0) = {value:.6g} µm" for name, value in starts.items())]))
         + table(["term", "coefficient"], [[term, f"{value:.6g}"] for term, value in law.coefficients.items()])
         + paragraph(
             f"Verdict: {law.verdict}. On a record at one rate a lag and a hysteresis can give the same loop; only a "

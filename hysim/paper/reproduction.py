@@ -31,7 +31,7 @@ from hysim.paper.report import report_page
 from hysim.paper.study import Progress, model_measures
 from hysim.plot import Figure, to_svg
 
-_CLAIM = ("id", "where", "statement", "printed", "recomputed", "unit", "verdict", "method", "note")
+_CLAIM = ("id", "where", "statement", "printed", "recomputed", "unit", "verdict", "method", "conditions", "note")
 
 
 @frozen

@@ -1,0 +1,295 @@
+"""The PIDs of the claims about control, by one global search over all gains, weights and the filter.
+
+The paper prints no gains, so that a claim about a loop asks whether a controller exists. It is looked for by
+differential evolution (R. Storn and K. Price, 1997) from a fixed seed, and then by the simplex of J. A. Nelder and
+R. Mead (1965), over six numbers, in the box `BOX`:
+
+    log10 |kp G(0)|,  log10 Ti,  log10 Td,  log10 (derivative filter / Td),  setpoint weight,  derivative weight
+
+with Ti = kp / ki and Td = kd / kp. A controller whose loop is unstable, or exceeds the bounds on the maximum
+sensitivity, is never simulated: its cost grows with its distance from the bounds alone. All others run in the sampled
+loop with their limits. The bounds hold at the least and at the largest slope of a law, and with one sample more of
+delay, in which a computer would work.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import differential_evolution, minimize
+
+from hysim import signals
+from hysim._frozen import FloatArray, frozen
+from hysim.control import PID, LinearLoop, as_actuator
+from hysim.control._loop import RestingPlant
+from hysim.datasets import PIXEL
+from hysim.metrics import step_metrics
+from hysim.plants.actuator import Actuator
+from hysim.plants.sensor import Sensor
+
+Limits = tuple[float, float] | None
+
+MAX_SENSITIVITY = 2.0
+"""Largest maximum sensitivity of a loop that counts, as is commonly asked."""
+WITH_DELAY = 1.25
+"""How much larger it may be with one sample more of delay."""
+BOX = ((-3.0, 3.0), (-2.0, 2.0), (-3.0, 2.0), (-4.0, 1.0), (0.0, 1.0), (0.0, 1.0))
+"""Bounds of the search; times are in the plant's own unit."""
+
+_GENERATIONS = 24
+_POPULATION = 6  # for each of the six numbers
+_POLISH = 250
+_UNSTABLE = 1e6  # cost of a loop that is not stable
+_BEYOND = 1e3  # of one that exceeds a bound
+_REFINED = 1.005  # about the ratio of the largest sensitivity to that on the grid of frequencies
+
+
+@frozen
+class Task:
+    """A loop to be closed, and its cost.
+
+    Parameters
+    ----------
+    plant : Actuator
+    sample_time : float
+        [the plant's unit of time]
+    reference : array, shape (n,)
+        [um]
+    limits : tuple or None
+        Lowest and highest voltage [V].
+    cost : callable
+        Of the displacement, shape (n,): the smaller, the better.
+    slopes : tuple of float
+        Least and largest slope of the law [um/V]; 1 without one.
+    """
+
+    plant: Actuator
+    sample_time: float
+    reference: FloatArray
+    limits: Limits
+    cost: Callable[[FloatArray], float]
+    slopes: tuple[float, ...] = (1.0,)
+
+
+@frozen
+class Found:
+    """The best controller of a search.
+
+    Parameters
+    ----------
+    controller : PID
+    max_sensitivity, with_delay : float
+        The largest ``|1 / (1 + L)|``, and that with one sample more of delay.
+    bound : float
+        Bound on the first.
+    controllers, simulations : int
+        Number of controllers judged, and of those simulated.
+    """
+
+    controller: PID
+    max_sensitivity: float
+    with_delay: float
+    bound: float
+    controllers: int
+    simulations: int
+
+    @property
+    def searched(self) -> str:
+        """What was searched, in words."""
+        return (
+            f"Searched: {self.controllers} PIDs, kp G(0) 0.001 to 1000, Ti 0.01 to 100, Td 0.001 to 100, filter 0.0001 "
+            f"to 10 Td, both weights 0 to 1, maximum sensitivity at most {self.bound:g}, and "
+            f"{WITH_DELAY * self.bound:g} with one sample more of delay."
+        )
+
+
+class Robustness:
+    """Largest sensitivities of a plant's loops, without and with one sample more of delay."""
+
+    def __init__(self, plant: Any, sample_time: float, slopes: tuple[float, ...] = (1.0,)) -> None:
+        actuator = as_actuator(plant)
+        sensor = actuator.sensor or Sensor()
+        delayed = replace(actuator, sensor=replace(sensor, delay=sensor.delay + sample_time))
+        self.h, self.slopes = sample_time, slopes
+        self.loops = [LinearLoop(actuator, sample_time), LinearLoop(delayed, sample_time)]
+
+    def of(self, controller: PID) -> tuple[float, float]:
+        """Both, within 0.1 %; infinite if a loop is unstable."""
+        first, second = (max(loop.max_sensitivity(controller, slope) for slope in self.slopes) for loop in self.loops)
+        return first, second
+
+    def excess(self, controller: PID, bound: float) -> float:
+        """Part by which a bound is exceeded; 0 within the bounds."""
+        first, second = self.of(controller)
+        return max(0.0, min(max(first, second / WITH_DELAY) / bound - 1.0, _UNSTABLE))
+
+    def roughly(self, controller: PID, bound: float) -> float:
+        """The same on a grid of frequencies, four times as fast."""
+        worst = 0.0
+        for loop, most in zip(self.loops, (bound, WITH_DELAY * bound), strict=True):
+            response = loop.response(controller)
+            for slope in self.slopes:
+                ratio = _REFINED / most / float(np.abs(1.0 + slope * response).min())
+                worst = max(worst, ratio if ratio > 1.0 or loop.is_stable(controller, slope) else _UNSTABLE)
+            if worst > 1.0:
+                return worst - 1.0
+        return 0.0
+
+
+def search(
+    task: Task,
+    *,
+    bound: float = MAX_SENSITIVITY,
+    generations: int = _GENERATIONS,
+    polish: int = _POLISH,
+    seed: int = 1,
+) -> Found:
+    """The controller of the least cost.
+
+    Parameters
+    ----------
+    task : Task
+        From `step_task` or `triangle_task`.
+    bound : float
+        On the maximum sensitivity.
+    generations, polish : int
+        Of the differential evolution, and controllers that the simplex may try.
+    seed : int
+        Of its random numbers.
+    """
+    tried = _Tried(task, bound)
+    start = differential_evolution(
+        tried.cost, BOX, maxiter=generations, popsize=_POPULATION, seed=seed, tol=0.0, polish=False
+    )
+    low, high = np.array(BOX).T
+    simplex = np.clip(start.x + 0.03 * (high - low) * np.vstack([np.zeros(len(BOX)), np.eye(len(BOX))]), low, high)
+    options = {"maxfev": polish, "xatol": 1e-5, "fatol": 1e-9, "initial_simplex": simplex}
+    tried.is_exact = True
+    end = minimize(tried.cost, start.x, method="Nelder-Mead", bounds=BOX, options=options)
+    controller = tried.controller(end.x if end.fun < start.fun else start.x)
+    sensitivity, with_delay = tried.robustness.of(controller)
+    return Found(
+        controller=controller,
+        max_sensitivity=sensitivity,
+        with_delay=with_delay,
+        bound=bound,
+        controllers=tried.controllers,
+        simulations=tried.simulations,
+    )
+
+
+class _Tried:
+    """The cost of a point of the box, and how many were tried."""
+
+    def __init__(self, task: Task, bound: float) -> None:
+        self.task, self.bound = task, bound
+        self.resting = RestingPlant(task.plant, task.sample_time)
+        self.robustness = Robustness(task.plant, task.sample_time, task.slopes)
+        law = task.plant.hysteresis
+        self.gain = task.plant.dc_gain * (1.0 if law is None else float(np.mean(task.slopes)))
+        self.controllers = self.simulations = 0
+        self.is_exact = False
+
+    def controller(self, x: FloatArray) -> PID:
+        size, Ti, Td, ratio = 10.0 ** x[:4]
+        return PID.standard(
+            float(size / self.gain),
+            Ti=float(Ti),
+            Td=float(Td),
+            derivative_filter=float(ratio * Td),
+            limits=self.task.limits,
+            setpoint_weight=float(x[4]),
+            derivative_weight=float(x[5]),
+        )
+
+    def cost(self, x: FloatArray) -> float:
+        self.controllers += 1
+        controller = self.controller(x)
+        judge = self.robustness.excess if self.is_exact else self.robustness.roughly
+        excess = judge(controller, self.bound)
+        if excess > 0.0:
+            return _BEYOND + min(excess, _UNSTABLE)
+        self.simulations += 1
+        signals = self.resting.attempt(controller, self.task.reference)
+        return self.task.cost(signals.y) if signals.lost < 0 else _UNSTABLE
+
+
+def step_task(plant: Any, *, step: float, limits: Limits, duration: float, sample_time: float) -> Task:
+    """A step from rest; its cost is the largest of three ratios of closed to open loop, in percent.
+
+    They are those of `hysim.metrics.vibration_reduction`: overshoot, rms of the residual and settling time.
+    """
+    actuator = as_actuator(plant)
+    n = round(duration / sample_time) + 1
+    t = sample_time * np.arange(n)
+    opened = RestingPlant(actuator, sample_time).driven(np.full(n, step / actuator.dc_gain))
+    before = step_metrics(t, opened)
+    slowest = float(np.min(np.abs(actuator.vibration.poles.real)))  # type: ignore[union-attr]
+    begin = round(before.t98 / sample_time) + 1
+    window = slice(begin, begin + round(2.0 * math.log(50.0) / slowest / sample_time))
+    tail, settled = slice(n - n // 10, None), 0.02
+
+    def ratios(y: FloatArray) -> tuple[float, float, float]:
+        error = y / y[tail].mean() - 1.0
+        outside = np.flatnonzero(np.abs(error) > settled)
+        last = int(outside[-1]) if outside.size else 0
+        if last + 1 >= n:
+            return math.inf, math.inf, math.inf
+        change = abs(error[last + 1] - error[last])
+        settling = sample_time * (last + (abs(error[last]) - settled) / max(change, 1e-300))
+        return max(0.0, float(error.max())), float(np.sqrt(np.mean(error[window] ** 2))), settling
+
+    open_ratios = ratios(opened)
+
+    def cost(y: FloatArray) -> float:
+        off = abs(float(y[tail].mean()) / step - 1.0)
+        if not off < settled:
+            return 200.0 + min(100.0 * off, 500.0)
+        return 100.0 * max(closed / max(own, 1e-12) for closed, own in zip(ratios(y), open_ratios, strict=True))
+
+    return Task(plant=actuator, sample_time=sample_time, reference=np.full(n, step), limits=limits, cost=cost)
+
+
+def triangle_task(
+    plant: Any, *, low: float, high: float, period: float, limits: Limits, sample_time: float, cycles: int
+) -> Task:
+    """A triangle; its cost is the width of the last cycle's loop over its stroke, and how far it is from closed."""
+    actuator = as_actuator(plant)
+    samples = round(period / sample_time)
+    reference = signals.triangle(low, high, cycles=cycles, samples_per_cycle=samples)
+    half = samples // 2
+
+    def cost(y: FloatArray) -> float:
+        last = y[-samples - 1 :]
+        width = float(np.abs(last[: half + 1] - last[half:][::-1]).max())
+        return (width + abs(float(last[-1] - last[0]))) / max(float(np.ptp(last)), 1e-12)
+
+    return Task(
+        plant=actuator,
+        sample_time=sample_time,
+        reference=reference,
+        limits=limits,
+        cost=cost,
+        slopes=law_slopes(actuator, high),
+    )
+
+
+def law_slopes(actuator: Actuator, stroke: float) -> tuple[float, ...]:
+    """Least and largest slope of the law over a steady cycle of about this stroke [um/V]; 1 without a law."""
+    law = actuator.hysteresis
+    if law is None:
+        return (1.0,)
+    rising = np.linspace(0.0, stroke / float(law.response(np.array([0.0, 1.0]))[1]), 401)
+    for _ in range(2):  # the voltage's span that gives the stroke
+        u = np.tile(np.append(rising, rising[-2:0:-1]), 3)
+        y = np.asarray(law.response(u))[-800:]
+        rising = rising * (stroke / float(np.ptp(y)))
+    local = np.diff(y) / np.diff(u[-800:])
+    return float(local.min()), float(local.max())
+
+
+def volts_per_pixel(controller: PID, sample_time: float) -> float:
+    """Jump of the command when the measurement moves by one pixel of the camera [V]."""
+    return PIXEL * (abs(controller.kp) + abs(controller.kd) / (controller.derivative_filter + sample_time))
