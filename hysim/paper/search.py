@@ -13,7 +13,7 @@ delay, in which a computer would work.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -63,6 +63,8 @@ class Task:
         Of the displacement, shape (n,): the smaller, the better.
     slopes : tuple of float
         Least and largest slope of the law [um/V]; 1 without one.
+    with_delay : bool
+        Whether the loop has to bear one sample more of delay; a camera's frame of delay is in the plant.
     """
 
     plant: Actuator
@@ -71,6 +73,7 @@ class Task:
     limits: Limits
     cost: Callable[[FloatArray], float]
     slopes: tuple[float, ...] = (1.0,)
+    with_delay: bool = True
 
 
 @frozen
@@ -106,29 +109,32 @@ class Found:
 
 
 class Robustness:
-    """Largest sensitivities of a plant's loops, without and with one sample more of delay."""
+    """Largest sensitivities of a plant's loops, without and with one sample more of delay, unless that is no matter."""
 
-    def __init__(self, plant: Any, sample_time: float, slopes: tuple[float, ...] = (1.0,)) -> None:
+    def __init__(
+        self, plant: Any, sample_time: float, slopes: tuple[float, ...] = (1.0,), *, with_delay: bool = True
+    ) -> None:
         actuator = as_actuator(plant)
         sensor = actuator.sensor or Sensor()
         delayed = replace(actuator, sensor=replace(sensor, delay=sensor.delay + sample_time))
         self.h, self.slopes = sample_time, slopes
-        self.loops = [LinearLoop(actuator, sample_time), LinearLoop(delayed, sample_time)]
+        self.loops = [LinearLoop(each, sample_time) for each in (actuator, delayed)[: 1 + with_delay]]
 
     def of(self, controller: PID) -> tuple[float, float]:
         """Both, within 0.1 %; infinite if a loop is unstable."""
-        first, second = (max(loop.max_sensitivity(controller, slope) for slope in self.slopes) for loop in self.loops)
-        return first, second
+        each = [max(loop.max_sensitivity(controller, slope) for slope in self.slopes) for loop in self.loops]
+        return each[0], each[-1]
 
     def excess(self, controller: PID, bound: float) -> float:
         """Part by which a bound is exceeded; 0 within the bounds."""
         first, second = self.of(controller)
-        return max(0.0, min(max(first, second / WITH_DELAY) / bound - 1.0, _UNSTABLE))
+        spare = WITH_DELAY if len(self.loops) > 1 else 1.0
+        return max(0.0, min(max(first, second / spare) / bound - 1.0, _UNSTABLE))
 
     def roughly(self, controller: PID, bound: float) -> float:
         """The same on a grid of frequencies, four times as fast."""
         worst = 0.0
-        for loop, most in zip(self.loops, (bound, WITH_DELAY * bound), strict=True):
+        for loop, most in zip(self.loops, (bound, WITH_DELAY * bound), strict=False):
             response = loop.response(controller)
             for slope in self.slopes:
                 ratio = _REFINED / most / float(np.abs(1.0 + slope * response).min())
@@ -163,21 +169,14 @@ def search(
     start = differential_evolution(
         tried.cost, BOX, maxiter=generations, popsize=_POPULATION, seed=seed, tol=0.0, polish=False
     )
-    low, high = np.array(BOX).T
-    simplex = np.clip(start.x + 0.03 * (high - low) * np.vstack([np.zeros(len(BOX)), np.eye(len(BOX))]), low, high)
-    options = {"maxfev": polish, "xatol": 1e-5, "fatol": 1e-9, "initial_simplex": simplex}
+    return tried.descended(start.x, polish)
+
+
+def search_near(task: Task, starts: Sequence[PID], *, polish: int, bound: float = MAX_SENSITIVITY) -> Found:
+    """The controller of the least cost near the best of some others, by the simplex alone."""
+    tried = _Tried(task, bound)
     tried.is_exact = True
-    end = minimize(tried.cost, start.x, method="Nelder-Mead", bounds=BOX, options=options)
-    controller = tried.controller(end.x if end.fun < start.fun else start.x)
-    sensitivity, with_delay = tried.robustness.of(controller)
-    return Found(
-        controller=controller,
-        max_sensitivity=sensitivity,
-        with_delay=with_delay,
-        bound=bound,
-        controllers=tried.controllers,
-        simulations=tried.simulations,
-    )
+    return tried.descended(min((tried.point(start) for start in starts), key=tried.cost), polish)
 
 
 class _Tried:
@@ -186,7 +185,7 @@ class _Tried:
     def __init__(self, task: Task, bound: float) -> None:
         self.task, self.bound = task, bound
         self.resting = RestingPlant(task.plant, task.sample_time)
-        self.robustness = Robustness(task.plant, task.sample_time, task.slopes)
+        self.robustness = Robustness(task.plant, task.sample_time, task.slopes, with_delay=task.with_delay)
         law = task.plant.hysteresis
         self.gain = task.plant.dc_gain * (1.0 if law is None else float(np.mean(task.slopes)))
         self.controllers = self.simulations = 0
@@ -202,6 +201,33 @@ class _Tried:
             limits=self.task.limits,
             setpoint_weight=float(x[4]),
             derivative_weight=float(x[5]),
+        )
+
+    def point(self, pid: PID) -> FloatArray:
+        """The point of a controller, or the nearest to it in the box."""
+        kp = pid.kp or math.copysign(1e-9, self.gain)
+        times = (kp / pid.ki if pid.ki else math.inf, pid.kd / kp, pid.derivative_filter / max(pid.kd / kp, 1e-9))
+        x = [*np.log10(np.maximum([kp * self.gain, *times], 1e-9)), pid.setpoint_weight, pid.derivative_weight]
+        low, high = np.array(BOX).T
+        return np.clip(x, low, high)
+
+    def descended(self, start: FloatArray, polish: int) -> Found:
+        """The best controller that the simplex finds from a point."""
+        low, high = np.array(BOX).T
+        step = 0.03 * (high - low) * np.where(start > 0.5 * (low + high), -1.0, 1.0)
+        simplex = np.clip(start + np.vstack([np.zeros(len(BOX)), np.diag(step)]), low, high)
+        options = {"maxfev": polish, "xatol": 1e-5, "fatol": 1e-9, "initial_simplex": simplex}
+        self.is_exact = True
+        end = minimize(self.cost, start, method="Nelder-Mead", bounds=BOX, options=options)
+        controller = self.controller(end.x if end.fun < self.cost(start) else start)
+        sensitivity, with_delay = self.robustness.of(controller)
+        return Found(
+            controller=controller,
+            max_sensitivity=sensitivity,
+            with_delay=with_delay,
+            bound=self.bound,
+            controllers=self.controllers,
+            simulations=self.simulations,
         )
 
     def cost(self, x: FloatArray) -> float:
@@ -234,9 +260,7 @@ def step_task(plant: Any, *, step: float, limits: Limits, duration: float, sampl
     def ratios(y: FloatArray) -> tuple[float, float, float]:
         error = y / y[tail].mean() - 1.0
         outside = np.flatnonzero(np.abs(error) > settled)
-        last = int(outside[-1]) if outside.size else 0
-        if last + 1 >= n:
-            return math.inf, math.inf, math.inf
+        last = min(int(outside[-1]), n - 2) if outside.size else 0
         change = abs(error[last + 1] - error[last])
         settling = sample_time * (last + (abs(error[last]) - settled) / max(change, 1e-300))
         return max(0.0, float(error.max())), float(np.sqrt(np.mean(error[window] ** 2))), settling
@@ -253,18 +277,21 @@ def step_task(plant: Any, *, step: float, limits: Limits, duration: float, sampl
 
 
 def triangle_task(
-    plant: Any, *, low: float, high: float, period: float, limits: Limits, sample_time: float, cycles: int
+    plant: Any, *, low: float, high: float, period: float, limits: Limits, sample_time: float, cycles: int, skip: float = 0.0
 ) -> Task:
-    """A triangle; its cost is the width of the last cycle's loop over its stroke, and how far it is from closed."""
+    """A triangle; its cost is the width of the last cycle's loop over its stroke, and how far it is from closed.
+
+    `skip` is a time after the start of the cycle, and before its end, that does not count.
+    """
     actuator = as_actuator(plant)
     samples = round(period / sample_time)
     reference = signals.triangle(low, high, cycles=cycles, samples_per_cycle=samples)
-    half = samples // 2
+    half, begin = samples // 2, round(skip / sample_time)
 
     def cost(y: FloatArray) -> float:
         last = y[-samples - 1 :]
-        width = float(np.abs(last[: half + 1] - last[half:][::-1]).max())
-        return (width + abs(float(last[-1] - last[0]))) / max(float(np.ptp(last)), 1e-12)
+        apart = np.abs(last[: half + 1] - last[half:][::-1])[begin:]
+        return float(apart.max() + apart[0]) / max(float(np.ptp(last)), 1e-12)
 
     return Task(
         plant=actuator,
