@@ -5,6 +5,8 @@ from typing import Any
 
 from hysim.metrics import VibrationReduction, reduction_percent
 from hysim.paper import markup
+from hysim.paper.camera import CameraLoop
+from hysim.paper.camera_chapter import camera_section
 from hysim.paper.loops import (
     ABOUT_34_V,
     SUPPLY,
@@ -16,14 +18,22 @@ from hysim.paper.loops import (
     limited_percent,
     tracking_rms,
 )
+from hysim.paper.periods import PeriodCurve
 from hysim.paper.search import volts_per_pixel
 
 _PLANTS = {"bouc-wen+eq7": "Bouc-Wen and (7)", "eq1": "(1)", "eq4": "(4)", "eq6": "(6)"}
 
 
-def control_chapter(loops: Loops, drawn: markup.Drawn) -> str:
-    """The loops behind the two headline numbers."""
-    return _hysteresis(loops, drawn) + _vibration(loops.steps, drawn) + _squares(loops.squares, drawn)
+def control_chapter(
+    loops: Loops, cameras: Sequence[CameraLoop], periods: Sequence[PeriodCurve], drawn: markup.Drawn
+) -> str:
+    """The loops behind the two headline numbers, with an ideal sensor and with a camera."""
+    return (
+        _hysteresis(loops, drawn)
+        + _vibration(loops.steps, drawn)
+        + camera_section(cameras, periods, drawn)
+        + markup.folded("Square waves", _squares(loops.squares, drawn))
+    )
 
 
 def definitions() -> list[str]:

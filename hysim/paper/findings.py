@@ -7,10 +7,12 @@ from typing import Any
 from hysim._frozen import frozen
 from hysim._parallel import awaited, second_process
 from hysim.paper.approximations import Approximation, approximations
+from hysim.paper.camera import CameraLoop, camera_loops
 from hysim.paper.claims import Claim, claims, evidence
 from hysim.paper.dwell import DwellWidth, dwell_widths
 from hysim.paper.equations import EQUATION_1, EQUATION_4, EQUATION_6, Characteristics, characteristics
 from hysim.paper.loops import DYNAMICS_7, Loops, control_measures, loops
+from hysim.paper.periods import PeriodCurve, period_curves
 from hysim.paper.reidentification import Reidentification, reidentify
 from hysim.paper.state_space import EQUATIONS_7_8, EQUATIONS_13_14
 from hysim.paper.study import Progress, Study, asymmetric_law, study
@@ -30,6 +32,10 @@ class Findings:
         Equations (1) and (4) identified anew.
     loops : Loops
         The closed loops.
+    cameras : tuple of CameraLoop
+        Those that a camera closes.
+    periods : tuple of PeriodCurve
+        Reduction of the hysteresis against the period of the triangle.
     dwell : tuple of DwellWidth
         Loop width against dwell.
     claims : tuple of Claim
@@ -43,6 +49,8 @@ class Findings:
     study: Study
     reidentification: Reidentification
     loops: Loops
+    cameras: tuple[CameraLoop, ...]
+    periods: tuple[PeriodCurve, ...]
     dwell: tuple[DwellWidth, ...]
     claims: tuple[Claim, ...]
     approximations: tuple[Approximation, ...]
@@ -67,18 +75,20 @@ def find(*, quick: bool = False, progress: Progress | None = None) -> Findings:
             if name == "tf-identified":
                 begun["reidentification"] = beside.submit(reidentify, fit)
             if name == "bouc-wen-asymmetric":
-                begun["loops"] = beside.submit(loops, fit.model)
+                begun["loops"] = beside.submit(_closed, fit.model)
 
         steps = _Steps(progress)
         models = study(quick=quick, progress=steps.inner, finished=begin, asymmetric=lambda _: awaited(asymmetric))
         steps.next("closed loops")
-        reidentification, closed = awaited(begun["reidentification"]), awaited(begun["loops"])
+        reidentification, (closed, cameras, periods) = awaited(begun["reidentification"]), awaited(begun["loops"])
     steps.next("claims")
     law = models.fits["bouc-wen"].model
     return Findings(
         study=models,
         reidentification=reidentification,
         loops=closed,
+        cameras=cameras,
+        periods=periods,
         dwell=dwell_widths(
             models.comparison.record.u,
             EQUATION_1,
@@ -89,6 +99,13 @@ def find(*, quick: bool = False, progress: Progress | None = None) -> Findings:
         approximations=approximations(),
         equations={name: characteristics(model) for name, model in _transfer_functions().items()},
     )
+
+
+def _closed(law: Any) -> tuple[Loops, tuple[CameraLoop, ...], tuple[PeriodCurve, ...]]:
+    """Every loop, those with a camera, and the curves of periods."""
+    closed = loops(law)
+    cameras = camera_loops(law, closed.hysteresis[0])
+    return closed, cameras, period_curves(law, closed.hysteresis[0], cameras)
 
 
 def _transfer_functions() -> dict[str, TransferFunction]:

@@ -43,7 +43,7 @@ _POPULATION = 6  # for each of the six numbers
 _POLISH = 250
 _UNSTABLE = 1e6  # cost of a loop that is not stable
 _BEYOND = 1e3  # of one that exceeds a bound
-_REFINED = 1.005  # about the ratio of the largest sensitivity to that on the grid of frequencies
+_REFINED = 1.01  # ratio of the largest sensitivity to that on the grid of frequencies, at most
 
 
 @frozen
@@ -149,7 +149,10 @@ def search(
     *,
     bound: float = MAX_SENSITIVITY,
     generations: int = _GENERATIONS,
+    population: int = _POPULATION,
     polish: int = _POLISH,
+    starts: Sequence[PID] = (),
+    exact: bool = True,
     seed: int = 1,
 ) -> Found:
     """The controller of the least cost.
@@ -160,23 +163,26 @@ def search(
         From `step_task` or `triangle_task`.
     bound : float
         On the maximum sensitivity.
-    generations, polish : int
-        Of the differential evolution, and controllers that the simplex may try.
+    generations, population, polish : int
+        Of the differential evolution, 0 to leave it out; its members for each of six numbers; and controllers that
+        the simplex may try.
+    starts : sequence of PID
+        Controllers of which the best begins the search.
+    exact : bool
+        Whether the simplex goes to the bound itself, or keeps 1 % below it, which is four times as fast.
     seed : int
-        Of its random numbers.
+        Of the random numbers.
     """
     tried = _Tried(task, bound)
-    start = differential_evolution(
-        tried.cost, BOX, maxiter=generations, popsize=_POPULATION, seed=seed, tol=0.0, polish=False
-    )
-    return tried.descended(start.x, polish)
-
-
-def search_near(task: Task, starts: Sequence[PID], *, polish: int, bound: float = MAX_SENSITIVITY) -> Found:
-    """The controller of the least cost near the best of some others, by the simplex alone."""
-    tried = _Tried(task, bound)
-    tried.is_exact = True
-    return tried.descended(min((tried.point(start) for start in starts), key=tried.cost), polish)
+    start = min((tried.point(pid) for pid in starts), key=tried.cost) if starts else None
+    if generations:
+        start = differential_evolution(
+            tried.cost, BOX, maxiter=generations, popsize=population, seed=seed, tol=0.0, polish=False, x0=start
+        ).x
+    if start is None:
+        raise ValueError("a search without generations needs controllers to start from")
+    tried.is_exact = exact
+    return tried.descended(start, polish)
 
 
 class _Tried:
@@ -217,7 +223,6 @@ class _Tried:
         step = 0.03 * (high - low) * np.where(start > 0.5 * (low + high), -1.0, 1.0)
         simplex = np.clip(start + np.vstack([np.zeros(len(BOX)), np.diag(step)]), low, high)
         options = {"maxfev": polish, "xatol": 1e-5, "fatol": 1e-9, "initial_simplex": simplex}
-        self.is_exact = True
         end = minimize(self.cost, start, method="Nelder-Mead", bounds=BOX, options=options)
         controller = self.controller(end.x if end.fun < self.cost(start) else start)
         sensitivity, with_delay = self.robustness.of(controller)
@@ -277,11 +282,21 @@ def step_task(plant: Any, *, step: float, limits: Limits, duration: float, sampl
 
 
 def triangle_task(
-    plant: Any, *, low: float, high: float, period: float, limits: Limits, sample_time: float, cycles: int, skip: float = 0.0
+    plant: Any,
+    *,
+    low: float,
+    high: float,
+    period: float,
+    limits: Limits,
+    sample_time: float,
+    cycles: int,
+    skip: float = 0.0,
+    tracking: float = 0.0,
 ) -> Task:
     """A triangle; its cost is the width of the last cycle's loop over its stroke, and how far it is from closed.
 
-    `skip` is a time after the start of the cycle, and before its end, that does not count.
+    `skip` is a time after the start of the cycle, and before its end, that does not count; `tracking` is the weight of
+    the rms error.
     """
     actuator = as_actuator(plant)
     samples = round(period / sample_time)
@@ -291,7 +306,8 @@ def triangle_task(
     def cost(y: FloatArray) -> float:
         last = y[-samples - 1 :]
         apart = np.abs(last[: half + 1] - last[half:][::-1])[begin:]
-        return float(apart.max() + apart[0]) / max(float(np.ptp(last)), 1e-12)
+        error = tracking * float(np.sqrt(np.mean((reference[-samples - 1 :] - last)[begin:] ** 2))) if tracking else 0.0
+        return float(apart.max() + apart[0] + error) / max(float(np.ptp(last)), 1e-12)
 
     return Task(
         plant=actuator,
