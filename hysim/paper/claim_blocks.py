@@ -22,7 +22,8 @@ _OPEN = ("not found",)
 def counts(claims: Sequence[Claim]) -> str:
     """The number of claims with each verdict, in words."""
     numbers = Counter(claim.verdict for claim in claims)
-    return ", ".join(f"{numbers[verdict]} {verdict}" for verdict in reversed(VERDICTS))
+    plural = {"agrees": "agree", "differs": "differ"}
+    return ", ".join(f"{numbers[verdict]} {plural.get(verdict, verdict)}" for verdict in reversed(VERDICTS))
 
 
 def claims_chapter(claims: Sequence[Claim]) -> str:

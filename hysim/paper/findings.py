@@ -75,12 +75,14 @@ def find(*, quick: bool = False, progress: Progress | None = None) -> Findings:
             if name == "tf-identified":
                 begun["reidentification"] = beside.submit(reidentify, fit)
             if name == "bouc-wen-asymmetric":
-                begun["loops"] = beside.submit(_closed, fit.model)
+                begun["loops"] = beside.submit(loops, fit.model)
 
         steps = _Steps(progress)
         models = study(quick=quick, progress=steps.inner, finished=begin, asymmetric=lambda _: awaited(asymmetric))
         steps.next("closed loops")
-        reidentification, (closed, cameras, periods) = awaited(begun["reidentification"]), awaited(begun["loops"])
+        asymmetric_model = models.fits["bouc-wen-asymmetric"].model
+        cameras = camera_loops(asymmetric_model)
+        reidentification, closed = awaited(begun["reidentification"]), awaited(begun["loops"])
     steps.next("claims")
     law = models.fits["bouc-wen"].model
     return Findings(
@@ -88,7 +90,7 @@ def find(*, quick: bool = False, progress: Progress | None = None) -> Findings:
         reidentification=reidentification,
         loops=closed,
         cameras=cameras,
-        periods=periods,
+        periods=period_curves(asymmetric_model, closed.hysteresis[0], cameras),
         dwell=dwell_widths(
             models.comparison.record.u,
             EQUATION_1,
@@ -99,13 +101,6 @@ def find(*, quick: bool = False, progress: Progress | None = None) -> Findings:
         approximations=approximations(),
         equations={name: characteristics(model) for name, model in _transfer_functions().items()},
     )
-
-
-def _closed(law: Any) -> tuple[Loops, tuple[CameraLoop, ...], tuple[PeriodCurve, ...]]:
-    """Every loop, those with a camera, and the curves of periods."""
-    closed = loops(law)
-    cameras = camera_loops(law, closed.hysteresis[0])
-    return closed, cameras, period_curves(law, closed.hysteresis[0], cameras)
 
 
 def _transfer_functions() -> dict[str, TransferFunction]:

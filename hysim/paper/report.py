@@ -77,10 +77,7 @@ def _lead(findings: Findings, drawn: Drawn) -> str:
             f"Table 1, the linear model that the paper prints, and a Bouc-Wen law with {law.n_parameters} parameters.",
         )
         + paragraph(_answers(findings))
-        + paragraph(
-            f"Of the paper's {len(findings.claims)} claims that can be put as numbers or criteria: "
-            f"{counts(findings.claims)}."
-        )
+        + paragraph(f"The paper's {len(findings.claims)} claims: {counts(findings.claims)}.")
         + paragraph(
             f"The measured loop is {loop.max_width:.3f} µm wide at {loop.max_width_at:g} V. The linear model that the "
             f"paper prints fits the points to {linear.fit_percent:.2f} %, and no curve that gives one displacement for "

@@ -43,7 +43,7 @@ _POPULATION = 6  # for each of the six numbers
 _POLISH = 250
 _UNSTABLE = 1e6  # cost of a loop that is not stable
 _BEYOND = 1e3  # of one that exceeds a bound
-_REFINED = 1.01  # ratio of the largest sensitivity to that on the grid of frequencies, at most
+_REFINED = {True: 1.002, False: 1.01}  # margin for what lies between the grid's frequencies, with and without `exact`
 
 
 @frozen
@@ -131,13 +131,13 @@ class Robustness:
         spare = WITH_DELAY if len(self.loops) > 1 else 1.0
         return max(0.0, min(max(first, second / spare) / bound - 1.0, _UNSTABLE))
 
-    def roughly(self, controller: PID, bound: float) -> float:
+    def roughly(self, controller: PID, bound: float, margin: float) -> float:
         """The same on a grid of frequencies, four times as fast."""
         worst = 0.0
         for loop, most in zip(self.loops, (bound, WITH_DELAY * bound), strict=False):
             response = loop.response(controller)
             for slope in self.slopes:
-                ratio = _REFINED / most / float(np.abs(1.0 + slope * response).min())
+                ratio = margin / most / float(np.abs(1.0 + slope * response).min())
                 worst = max(worst, ratio if ratio > 1.0 or loop.is_stable(controller, slope) else _UNSTABLE)
             if worst > 1.0:
                 return worst - 1.0
@@ -173,7 +173,7 @@ def search(
     seed : int
         Of the random numbers.
     """
-    tried = _Tried(task, bound)
+    tried = _Tried(task, bound, exact)
     start = min((tried.point(pid) for pid in starts), key=tried.cost) if starts else None
     if generations:
         start = differential_evolution(
@@ -181,21 +181,21 @@ def search(
         ).x
     if start is None:
         raise ValueError("a search without generations needs controllers to start from")
-    tried.is_exact = exact
+    tried.is_polished = True
     return tried.descended(start, polish)
 
 
 class _Tried:
     """The cost of a point of the box, and how many were tried."""
 
-    def __init__(self, task: Task, bound: float) -> None:
+    def __init__(self, task: Task, bound: float, exact: bool) -> None:
         self.task, self.bound = task, bound
         self.resting = RestingPlant(task.plant, task.sample_time)
         self.robustness = Robustness(task.plant, task.sample_time, task.slopes, with_delay=task.with_delay)
         law = task.plant.hysteresis
         self.gain = task.plant.dc_gain * (1.0 if law is None else float(np.mean(task.slopes)))
         self.controllers = self.simulations = 0
-        self.is_exact = False
+        self.exact, self.is_polished = exact, False
 
     def controller(self, x: FloatArray) -> PID:
         size, Ti, Td, ratio = 10.0 ** x[:4]
@@ -215,7 +215,7 @@ class _Tried:
         times = (kp / pid.ki if pid.ki else math.inf, pid.kd / kp, pid.derivative_filter / max(pid.kd / kp, 1e-9))
         x = [*np.log10(np.maximum([kp * self.gain, *times], 1e-9)), pid.setpoint_weight, pid.derivative_weight]
         low, high = np.array(BOX).T
-        return np.clip(x, low, high)
+        return np.asarray(np.clip(x, low, high))
 
     def descended(self, start: FloatArray, polish: int) -> Found:
         """The best controller that the simplex finds from a point."""
@@ -238,8 +238,10 @@ class _Tried:
     def cost(self, x: FloatArray) -> float:
         self.controllers += 1
         controller = self.controller(x)
-        judge = self.robustness.excess if self.is_exact else self.robustness.roughly
-        excess = judge(controller, self.bound)
+        if self.is_polished and self.exact:
+            excess = self.robustness.excess(controller, self.bound)
+        else:
+            excess = self.robustness.roughly(controller, self.bound, _REFINED[self.exact])
         if excess > 0.0:
             return _BEYOND + min(excess, _UNSTABLE)
         self.simulations += 1
