@@ -49,7 +49,7 @@ SQUARE_PERIODS = {4.0: "Table 2", 40.65: "10 s of .246 s a sample", 10.0: "the u
 DYNAMICS_7 = TransferFunction(num=EQUATION_7.den[-1:], den=EQUATION_7.den)
 """Equation (7), its static gain made one."""
 
-_LAG = (40, 500, 3)
+_LAG = (40, 600, 3)
 """Generations, polish and seed for the lag of (1), which has many local optima: seeds differ by some percents."""
 
 

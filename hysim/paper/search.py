@@ -41,6 +41,7 @@ BOX = ((-3.0, 3.0), (-2.0, 2.0), (-3.0, 2.0), (-4.0, 1.0), (0.0, 1.0), (0.0, 1.0
 _GENERATIONS = 24
 _POPULATION = 6  # for each of the six numbers
 _POLISH = 250
+_SIMPLEXES = (0.03, 0.01)  # sizes, of the box
 _UNSTABLE = 1e6  # cost of a loop that is not stable
 _BEYOND = 1e3  # of one that exceeds a bound
 _REFINED = {True: 1.002, False: 1.01}  # margin for what lies between the grid's frequencies, with and without `exact`
@@ -218,13 +219,17 @@ class _Tried:
         return np.asarray(np.clip(x, low, high))
 
     def descended(self, start: FloatArray, polish: int) -> Found:
-        """The best controller that the simplex finds from a point."""
+        """The best controller that the simplex finds from a point; it begins anew once, on a smaller scale."""
         low, high = np.array(BOX).T
-        step = 0.03 * (high - low) * np.where(start > 0.5 * (low + high), -1.0, 1.0)
-        simplex = np.clip(start + np.vstack([np.zeros(len(BOX)), np.diag(step)]), low, high)
-        options = {"maxfev": polish, "xatol": 1e-5, "fatol": 1e-9, "initial_simplex": simplex}
-        end = minimize(self.cost, start, method="Nelder-Mead", bounds=BOX, options=options)
-        controller = self.controller(end.x if end.fun < self.cost(start) else start)
+        best, least = start, self.cost(start)
+        for scale in _SIMPLEXES:
+            step = scale * (high - low) * np.where(best > 0.5 * (low + high), -1.0, 1.0)
+            simplex = np.clip(best + np.vstack([np.zeros(len(BOX)), np.diag(step)]), low, high)
+            options = {"maxfev": polish // 2, "xatol": 1e-5, "fatol": 1e-9, "initial_simplex": simplex}
+            end = minimize(self.cost, best, method="Nelder-Mead", bounds=BOX, options=options)
+            if end.fun < least:
+                best, least = end.x, end.fun
+        controller = self.controller(best)
         sensitivity, with_delay = self.robustness.of(controller)
         return Found(
             controller=controller,
