@@ -23,13 +23,14 @@ def camera_section(cameras: Sequence[CameraLoop], curves: Sequence[PeriodCurve],
         markup.heading("The camera in the loop")
         + markup.paragraph(answer(cameras))
         + markup.paragraph(
-            "The loops above read the displacement without error. The paper has a camera: a frame at a time, read one "
-            f"frame late, in whole pixels of {PIXEL:g} µm, of an image that shakes by 0.31 pixel (rms). The "
-            "controller runs once a frame, searched for each camera in the loop with that noise; no loop has a maximum "
-            "sensitivity above 2, the frame of delay included. Another noise than the search's is measured. Hysteresis: the "
-            "mean width of the last five of ten cycles of 52 s, 0.1 to 2.5 µm, 0 to 125 V. Vibration: a step of "
-            "−1 µm within ±16 V, the least of the three reductions, the median of five noises; a dash where the loop does not "
-            "settle within 2 %. The searches are short: a longer one may find somewhat more."
+            "The loops above read the displacement without error. The paper has a camera: a frame at a time, "
+            f"read one frame late, in whole pixels of {PIXEL:g} µm, of an image that shakes by 0.31 pixel (rms). "
+            "The controller runs once a frame, searched for each camera in the loop with that noise; no loop "
+            "has a maximum sensitivity above 2, the frame of delay included. Another noise than the search's is "
+            "measured. Hysteresis: the mean width of the last five of ten cycles of 52 s, 0.1 to 2.5 µm, 0 to "
+            "125 V. Vibration: a step of −1 µm within ±16 V, the least of the three reductions, the median of "
+            "five noises; a dash where the loop does not settle within 2 %. The searches are short: a longer "
+            "one may find somewhat more."
         )
         + markup.figure(
             drawn["camera"],
