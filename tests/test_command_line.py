@@ -107,7 +107,7 @@ def test_the_search_finds_the_known_controllers_or_better(summary):
     measures = ("overshoot_reduction_percent", "residual_rms_reduction_percent", "settling_time_reduction_percent")
     least = {(row["plant"], str(row["limits"])): min(row[name] for name in measures) for row in steps}
     assert least["eq4", "[-16.0, 16.0]"] >= 98.22
-    assert least["eq4", "[0.0, 125.0]"] >= 96.8
+    assert least["eq4", "[0.0, 125.0]"] >= 96.835  # 96.84 to its digits; no search has found 96.86
     assert least["eq6", "[-16.0, 16.0]"] >= 97.5
     assert (
         next(row["lag_reduction_percent"] for row in summary["control"]["hysteresis"] if row["plant"] == "eq1") >= 33.9
