@@ -24,6 +24,7 @@ from hysim import signals
 from hysim._frozen import FloatArray, frozen
 from hysim.control import PID, LinearLoop, as_actuator
 from hysim.control._loop import RestingPlant
+from hysim.control._open_loop import secant_gain, slopes
 from hysim.datasets import PIXEL
 from hysim.metrics import step_metrics
 from hysim.plants.actuator import Actuator
@@ -322,22 +323,15 @@ def triangle_task(
         reference=reference,
         limits=limits,
         cost=cost,
-        slopes=law_slopes(actuator, high),
+        slopes=slopes_along(actuator, reference[-samples - 1 :]),
     )
 
 
-def law_slopes(actuator: Actuator, stroke: float) -> tuple[float, ...]:
-    """Least and largest slope of the law over a steady cycle of about this stroke [um/V]; 1 without a law."""
-    law = actuator.hysteresis
-    if law is None:
+def slopes_along(actuator: Actuator, cycle: FloatArray) -> tuple[float, ...]:
+    """Least and largest slope of the law along a cycle of the reference [um/V]; 1 without a law."""
+    if actuator.hysteresis is None:
         return (1.0,)
-    rising = np.linspace(0.0, stroke / float(law.response(np.array([0.0, 1.0]))[1]), 401)
-    for _ in range(2):  # the voltage's span that gives the stroke
-        u = np.tile(np.append(rising, rising[-2:0:-1]), 3)
-        y = np.asarray(law.response(u))[-800:]
-        rising = rising * (stroke / float(np.ptp(y)))
-    local = np.diff(y) / np.diff(u[-800:])
-    return float(local.min()), float(local.max())
+    return tuple(sorted(slopes(actuator, cycle / secant_gain(actuator, cycle))))
 
 
 def volts_per_pixel(controller: PID, sample_time: float) -> float:
