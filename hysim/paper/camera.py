@@ -20,8 +20,7 @@ import numpy as np
 
 from hysim import signals
 from hysim._frozen import FloatArray, frozen
-from hysim.control import PID, as_actuator, open_loop
-from hysim.control._loop import RestingPlant
+from hysim.control import PID, RestingPlant, as_actuator, open_loop
 from hysim.datasets import PIXEL
 from hysim.metrics import VibrationReduction, reduction_percent, rmse, vibration_reduction
 from hysim.paper.equations import EQUATION_4

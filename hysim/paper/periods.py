@@ -11,8 +11,7 @@ import numpy as np
 
 from hysim import signals
 from hysim._frozen import frozen
-from hysim.control import PID, open_loop
-from hysim.control._loop import RestingPlant
+from hysim.control import PID, RestingPlant, open_loop
 from hysim.metrics import loop_metrics, reduction_percent
 from hysim.paper.camera import LOW, CameraLoop
 from hysim.paper.loops import HIGH, SAMPLE_TIME, HysteresisCase, law_plant

@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 from hysim.identification import Identification
 from hysim.metrics import loop_metrics
-from hysim.paper.camera_chapter import needed
-from hysim.paper.claim_blocks import claims_chapter, counts
-from hysim.paper.control_chapters import control_chapter, definitions
+from hysim.paper.chapters.camera import needed
+from hysim.paper.chapters.claims import claims_chapter, counts
+from hysim.paper.chapters.control import control_chapter, definitions
+from hysim.paper.chapters.linear import dwell_chapter, identification_section
 from hysim.paper.equations import EQUATION_1, EQUATION_7
 from hysim.paper.findings import Findings
-from hysim.paper.linear_sections import dwell_chapter, identification_section
 from hysim.paper.markup import Drawn, complex_number, equation, figure, folded, heading, number, paragraph, ratio, table
 from hysim.paper.nested import nested_errors, of_discovered
 from hysim.paper.study import Study, cross_validated

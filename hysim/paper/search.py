@@ -22,9 +22,7 @@ from scipy.optimize import differential_evolution, minimize
 
 from hysim import signals
 from hysim._frozen import FloatArray, frozen
-from hysim.control import PID, LinearLoop, as_actuator
-from hysim.control._loop import RestingPlant
-from hysim.control._open_loop import secant_gain, slopes
+from hysim.control import PID, LinearLoop, RestingPlant, as_actuator, secant_gain, slopes
 from hysim.datasets import PIXEL
 from hysim.metrics import step_metrics
 from hysim.plants.actuator import Actuator

@@ -6,7 +6,7 @@ from typing import Any
 from hysim.metrics import VibrationReduction, reduction_percent
 from hysim.paper import markup
 from hysim.paper.camera import CameraLoop
-from hysim.paper.camera_chapter import camera_section
+from hysim.paper.chapters.camera import camera_section
 from hysim.paper.loops import (
     ABOUT_34_V,
     SUPPLY,
