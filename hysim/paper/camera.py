@@ -38,7 +38,7 @@ NOISES = 5  # of a step
 LOW = 0.1  # of the triangle [um]
 
 _Effort = tuple[int, int, int]
-_FIRST: _Effort = (12, 6, 120)  # generations, population and polish of an ideal sensor's search
+_FIRST: _Effort = (30, 6, 250)  # generations, population and polish of an ideal sensor's search
 _NEXT: _Effort = (8, 4, 70)  # of the others', from their neighbours
 _FAST: _Effort = (0, 4, 45)  # of the camera of 1000 Hz, whose simulations take long
 _SKIPPED = 2.0  # of the one cycle that a search simulates [s]

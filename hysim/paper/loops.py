@@ -201,7 +201,7 @@ def _vibration(name: str, plant: TransferFunction) -> tuple[tuple[StepCase, ...]
         for limits in (ABOUT_34_V, SUPPLY)
     )
     about, supply = search(next(tasks)), (_longer_search(next(tasks), seed=2) if name == "eq4" else search(next(tasks)))
-    cases = ((-1.0, SUPPLY, supply), (-1.0, ABOUT_34_V, about), (1.0, ABOUT_34_V, about), (-1.0, None, supply))
+    cases = ((-1.0, SUPPLY, supply), (-1.0, ABOUT_34_V, about), (1.0, ABOUT_34_V, about), (-1.0, None, about))
     return (
         tuple(_step(name, plant, found, size, limits, DURATION, UNIT_STEP) for size, limits, found in cases),
         tuple(_square(name, plant, about, period) for period in SQUARE_PERIODS),
