@@ -41,7 +41,7 @@ _Effort = tuple[int, int, int]
 _FIRST: _Effort = (30, 6, 250)  # generations, population and polish of an ideal sensor's search
 _NEXT: _Effort = (8, 4, 70)  # of the others', from their neighbours
 _FAST: _Effort = (0, 4, 45)  # of the camera of 1000 Hz, whose simulations take long
-_SKIPPED = 2.0  # of the one cycle that a search simulates [s]
+_SHORT, _SKIPPED = 0.005, 2.0  # frames that leave time for one cycle only, and its begin that does not count [s]
 _SCALES = (1.0, 0.4)  # gains of the starts over those of a neighbour
 _RECORD = 160.0  # of a step [samples of Table 2]
 _SEED = 1  # of the noise that is measured; the search has 0
@@ -166,8 +166,9 @@ class _Triangle(_Cameras):
         self.open_width = _width(self.open_y, samples)
 
     def task(self, plant: Actuator, frame: float) -> Task:
+        cycles, skip = (1, _SKIPPED) if frame < _SHORT else (2, 0.0)
         task = triangle_task(
-            plant, low=LOW, high=HIGH, period=PERIOD, limits=SUPPLY, sample_time=frame, cycles=1, skip=_SKIPPED,
+            plant, low=LOW, high=HIGH, period=PERIOD, limits=SUPPLY, sample_time=frame, cycles=cycles, skip=skip,
             tracking=1.0,
         )  # fmt: skip
         return replace(task, with_delay=False)
