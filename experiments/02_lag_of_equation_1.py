@@ -20,20 +20,22 @@ from hysim.paper.search import search, triangle_task
 from hysim.plot import Figure, figure, house_style, save_svg
 
 RESULTS = Path(__file__).parent / "results" / "lag_of_equation_1"
-SEEDS = (1, 2)
+SEEDS = (1, 2, 3)
 
 
 def row(bound: float, effort: dict[str, int], seeds: tuple[int, ...], before: list[hs.PID]) -> dict[str, Any]:
     """One line of the table: the best of several searches, all of them judged by ten cycles.
 
-    Each begins with the controllers of the smaller bounds too, and the best one is added to them.
+    One of them descends from the controllers of the smaller bounds, and the best of all is added to these.
     """
     triangle: dict[str, Any] = {"low": 0.0, "high": HIGH, "period": PERIOD, "sample_time": SAMPLE_TIME}
     task = triangle_task(EQUATION_1, limits=SUPPLY, cycles=3, **triangle)
-    searches = [search(task, bound=bound, seed=seed, starts=before, **effort) for seed in seeds]
+    searches = [search(task, bound=bound, seed=seed, **effort) for seed in seeds]
+    if before:
+        searches.append(search(task, bound=bound, generations=0, polish=effort["polish"], starts=before))
     assessed = [hs.control.assess_hysteresis(EQUATION_1, found.controller, **triangle) for found in searches]
     reductions = [each.lag_reduction_percent for each in assessed]
-    best = max(range(len(seeds)), key=lambda k: reductions[k])
+    best = max(range(len(searches)), key=lambda k: reductions[k])
     found, pid = searches[best], searches[best].controller
     before.append(pid)
     return {
@@ -56,7 +58,7 @@ def row(bound: float, effort: dict[str, int], seeds: tuple[int, ...], before: li
 def main(smoke: bool = False) -> list[dict[str, Any]]:
     """Search for every bound; print the table and write it, the figure and the numbers."""
     bounds = (2.0, 50.0) if smoke else (1.4, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0)
-    effort = {"generations": 2, "polish": 10} if smoke else {"generations": 150, "population": 12, "polish": 1000}
+    effort = {"generations": 2, "polish": 10} if smoke else {"generations": 60, "polish": 800}
     before: list[hs.PID] = []
     rows = [row(bound, effort, SEEDS[:1] if smoke else SEEDS, before) for bound in bounds]
     for line in rows:

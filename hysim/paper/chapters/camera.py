@@ -1,5 +1,6 @@
 """The report's section on the camera in the loop, and the sentence that answers the paper."""
 
+import math
 from collections.abc import Sequence
 
 from hysim.datasets import PIXEL
@@ -53,13 +54,12 @@ def camera_section(cameras: Sequence[CameraLoop], curves: Sequence[PeriodCurve],
 
 
 def needed(plant: str, cameras: Sequence[CameraLoop]) -> str:
-    """The coarsest sensor tried that reaches a headline figure, in a sentence."""
+    """The slowest and coarsest sensor tried that reaches a headline figure, in a sentence."""
     name, least = TARGETS[plant]
     rows = [each for each in cameras if each.plant == plant]
     quantum, shake = SENSORS[-1]
-    own = max(
-        (each.true_reduction_percent for each in rows if _is(each, quantum, shake)), default=0.0
-    )  # a nan is never larger
+    own = [each for each in rows if _is(each, quantum, shake) and math.isfinite(each.true_reduction_percent)]
+    best = max(own, key=lambda each: each.true_reduction_percent, default=None)
     enough = [each for each in rows if each.true_reduction_percent >= least and each.quantum > 0.0]
     if not enough:
         ideal = [each.frame_rate for each in rows if each.true_reduction_percent >= least]
@@ -69,11 +69,19 @@ def needed(plant: str, cameras: Sequence[CameraLoop]) -> str:
         worst = max(
             (each for each in enough if each.frame_rate == slowest), key=lambda each: (each.shake, each.quantum)
         )
-        what = (
-            f"readings in steps of {worst.quantum:.4f} µm ({worst.quantum / PIXEL:g} pixel) with at most "
-            f"{worst.shake:g} pixel of shake, {slowest:g} times a second"
+        shaking = (
+            f"of an image that shakes by {worst.shake:g} pixel" if worst.shake else "of an image that does not shake"
         )
-    return f"{name} needs {what}; the paper's own camera reaches at most {own:.0f} % at any frame rate tried."
+        what = (
+            f"readings in steps of {worst.quantum:.4f} µm ({worst.quantum / PIXEL:g} pixel), "
+            f"{slowest:g} times a second, {shaking}"
+        )
+    camera = (
+        f"reach {best.true_reduction_percent:.0f} % at best, at {best.frame_rate:g} frames a second"
+        if best
+        else "let no loop settle"
+    )
+    return f"{name} needs {what}; the paper's own pixels and shake {camera}."
 
 
 def _is(each: CameraLoop, quantum: float, shake: float) -> bool:
