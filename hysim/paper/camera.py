@@ -39,8 +39,8 @@ LOW = 0.1  # of the triangle [um]
 
 _Effort = tuple[int, int, int]
 _FIRST: _Effort = (30, 6, 250)  # generations, population and polish of an ideal sensor's search
-_NEXT: _Effort = (8, 4, 70)  # of the others', from their neighbours
-_FAST: _Effort = (0, 4, 45)  # of the camera of 1000 Hz, whose simulations take long
+_NEXT: _Effort = (5, 4, 50)  # of the others', from their neighbours
+_FAST: _Effort = (0, 4, 30)  # of the camera of 1000 Hz, whose simulations take long
 _SHORT, _SKIPPED = 0.005, 2.0  # frames that leave time for one cycle only, and its begin that does not count [s]
 _SCALES = (1.0, 0.4)  # gains of the starts over those of a neighbour
 _RECORD = 160.0  # of a step [samples of Table 2]
