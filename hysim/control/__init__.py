@@ -15,9 +15,12 @@ from hysim.control._feedforward import InverseFeedforward as InverseFeedforward
 from hysim.control._filters import DampingLoop as DampingLoop
 from hysim.control._filters import Notch as Notch
 from hysim.control._loop import ClosedLoop as ClosedLoop
+from hysim.control._loop import RestingPlant as RestingPlant
 from hysim.control._loop import as_actuator as as_actuator
 from hysim.control._loop import close_loop as close_loop
 from hysim.control._margins import LinearLoop as LinearLoop
+from hysim.control._open_loop import secant_gain as secant_gain
+from hysim.control._open_loop import slopes as slopes
 from hysim.control._pid import PID as PID
 from hysim.control._shaping import ModeInverse as ModeInverse
 from hysim.control._shaping import Shaper as Shaper

@@ -8,7 +8,8 @@ from hysim.metrics import rmse
 from hysim.paper.equations import EQUATION_1, in_time_unit
 from hysim.plants.transfer_function import TransferFunction
 
-_DWELLS = np.geomspace(0.1, 50.0, 400)
+DWELLS = np.geomspace(0.1, 50.0, 400)
+"""Dwells that are tried [s], to 2 %."""
 
 
 @frozen
@@ -40,11 +41,11 @@ def printed_model() -> PrintedModel:
     and 50 s to 2 %.
     """
     record = table1()
-    residuals = np.array([record.y - EQUATION_1.response(record.u, dwell) for dwell in _DWELLS])
+    residuals = np.array([record.y - EQUATION_1.response(record.u, dwell) for dwell in DWELLS])
     best = int(np.argmin(np.sum(residuals**2, axis=1)))
     without = np.sum(residuals**2, axis=1, keepdims=True) - residuals**2
     left_out = residuals[without.argmin(axis=0), np.arange(len(record))]
-    dwell = float(_DWELLS[best])
+    dwell = float(DWELLS[best])
     return PrintedModel(
         model=in_time_unit(EQUATION_1, dwell), dwell=dwell, cv_rmse=rmse(left_out, np.zeros_like(left_out))
     )

@@ -1,6 +1,7 @@
 """The report's figures: the paper's, regenerated, and the models and loops in pictures."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -8,10 +9,13 @@ import numpy.typing as npt
 from hysim import plot
 from hysim._frozen import FloatArray
 from hysim.comparison import Comparison
+from hysim.datasets import PIXEL
 from hysim.discovery import Discovery
 from hysim.metrics import LoopMetrics, loop_metrics
+from hysim.paper.camera import CameraLoop
 from hysim.paper.dwell import DwellWidth
 from hysim.paper.loops import PERIOD, HysteresisCase, SquareCase, StepCase
+from hysim.paper.periods import PERIODS, PeriodCurve
 from hysim.records import Record
 
 _MARK = "#B34700"
@@ -36,6 +40,15 @@ def figure4(record: Record) -> plot.Figure:
     measured = loop_metrics(record.u, record.y)
     _mark_widest(ax, measured)
     _name_branches(ax, measured)
+    return canvas
+
+
+@plot.house_style()
+def opening(comparison: Comparison) -> plot.Figure:
+    """Table 1 with the printed linear model and the asymmetric Bouc-Wen law."""
+    canvas = plot.figure(height=3.6)
+    chosen = replace(comparison, rows=tuple(comparison[name] for name in ("eq1-printed", "bouc-wen-asymmetric")))
+    plot.loops(chosen, plot.panels(canvas, 2, columns=2, sharey=True))
     return canvas
 
 
@@ -105,7 +118,7 @@ def figure13(cases: Sequence[SquareCase]) -> plot.Figure:
     axes = [canvas.add_subplot(len(cases), 1, k + 1) for k in range(len(cases))]
     for ax, case in zip(axes, cases, strict=True):
         closed = case.assessment.closed
-        begin = closed.t[-1] - 2.0 * case.period
+        begin = closed.t[-1] - 2.0 * (case.period or 0.0)
         shown = _thinned(closed.t >= begin)
         series = {"reference": closed.reference, "with PID": closed.y, "without": case.assessment.open_y}
         plot.traces({name: (closed.t[shown] - begin, y[shown]) for name, y in series.items()}, ax, units=_SAMPLES)
@@ -147,6 +160,46 @@ def dwell_figure(widths: Sequence[DwellWidth]) -> plot.Figure:
     ax = plot.traces({name: (dwells, np.array(values)) for name, values in series.items()}, canvas.add_subplot())
     ax.set(xscale="log", xlabel="Dwell [s]", ylabel="Largest loop width [µm]", xticks=dwells)
     ax.set_xticks(dwells, [f"{dwell:g}" for dwell in dwells])
+    ax.minorticks_off()
+    return canvas
+
+
+@plot.house_style()
+def camera_figure(cameras: Sequence[CameraLoop]) -> plot.Figure:
+    """True reduction against the frame rate, a curve for each sensor; the hysteresis above, the vibration below."""
+    canvas = plot.figure(height=6.4)
+    for ax, (plant, target, name) in zip(
+        plot.panels(canvas, 2),
+        (("bouc-wen+eq7", 90.0, "Hysteresis"), ("eq4", 97.0, "Vibration")),
+        strict=True,
+    ):
+        series: dict[str, tuple[list[float], list[float]]] = {}
+        for each in (each for each in cameras if each.plant == plant):
+            rates, values = series.setdefault(f"{each.quantum / PIXEL:g} px, shake {each.shake:g}", ([], []))
+            rates.append(each.frame_rate)
+            values.append(float(np.nan_to_num(max(each.true_reduction_percent, 0.0))))
+        plot.traces({key: (np.array(x), np.array(y)) for key, (x, y) in series.items()}, ax)
+        ax.axhline(target, color=_MARK, linestyle="--", linewidth=1.0)
+        rates = [each.frame_rate for each in cameras if each.plant == plant]
+        ax.set(xscale="log", ylim=(0.0, 102.0), xlabel="Frames a second", ylabel=f"{name}: reduction [%]")
+        ax.set_xticks(sorted(set(rates)), [f"{rate:g}" for rate in sorted(set(rates))])
+        ax.minorticks_off()
+        if plant == "eq4" and (legend := ax.get_legend()):
+            legend.remove()
+    return canvas
+
+
+@plot.house_style()
+def periods_figure(curves: Sequence[PeriodCurve]) -> plot.Figure:
+    """Reduction against the period of the triangle, a curve for each controller."""
+    canvas = plot.figure(height=3.8)
+    ax = canvas.add_subplot()
+    names = ["10 ms", *(f"camera of {1.0 / curve.sample_time:g} Hz" for curve in curves[1:])]
+    series = {name: (np.array(PERIODS), np.array(curve.reductions)) for name, curve in zip(names, curves, strict=True)}
+    plot.traces(series, ax)
+    ax.axhline(90.0, color=_MARK, linestyle="--", linewidth=1.0)
+    ax.set(xscale="log", xlabel="Period of the triangle [s]", ylabel="Reduction [%]")
+    ax.set_xticks(PERIODS, [f"{period:g}" for period in PERIODS])
     ax.minorticks_off()
     return canvas
 

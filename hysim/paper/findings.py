@@ -7,10 +7,12 @@ from typing import Any
 from hysim._frozen import frozen
 from hysim._parallel import awaited, second_process
 from hysim.paper.approximations import Approximation, approximations
-from hysim.paper.claims import Claim, claims
+from hysim.paper.camera import CameraLoop, camera_loops
+from hysim.paper.claims import Claim, claims, evidence
 from hysim.paper.dwell import DwellWidth, dwell_widths
 from hysim.paper.equations import EQUATION_1, EQUATION_4, EQUATION_6, Characteristics, characteristics
 from hysim.paper.loops import DYNAMICS_7, Loops, control_measures, loops
+from hysim.paper.periods import PeriodCurve, period_curves
 from hysim.paper.reidentification import Reidentification, reidentify
 from hysim.paper.state_space import EQUATIONS_7_8, EQUATIONS_13_14
 from hysim.paper.study import Progress, Study, asymmetric_law, study
@@ -30,6 +32,10 @@ class Findings:
         Equations (1) and (4) identified anew.
     loops : Loops
         The closed loops.
+    cameras : tuple of CameraLoop
+        Those that a camera closes.
+    periods : tuple of PeriodCurve
+        Reduction of the hysteresis against the period of the triangle.
     dwell : tuple of DwellWidth
         Loop width against dwell.
     claims : tuple of Claim
@@ -43,6 +49,8 @@ class Findings:
     study: Study
     reidentification: Reidentification
     loops: Loops
+    cameras: tuple[CameraLoop, ...]
+    periods: tuple[PeriodCurve, ...]
     dwell: tuple[DwellWidth, ...]
     claims: tuple[Claim, ...]
     approximations: tuple[Approximation, ...]
@@ -72,6 +80,8 @@ def find(*, quick: bool = False, progress: Progress | None = None) -> Findings:
         steps = _Steps(progress)
         models = study(quick=quick, progress=steps.inner, finished=begin, asymmetric=lambda _: awaited(asymmetric))
         steps.next("closed loops")
+        asymmetric_model = models.fits["bouc-wen-asymmetric"].model
+        cameras = camera_loops(asymmetric_model)
         reidentification, closed = awaited(begun["reidentification"]), awaited(begun["loops"])
     steps.next("claims")
     law = models.fits["bouc-wen"].model
@@ -79,13 +89,15 @@ def find(*, quick: bool = False, progress: Progress | None = None) -> Findings:
         study=models,
         reidentification=reidentification,
         loops=closed,
+        cameras=cameras,
+        periods=period_curves(asymmetric_model, closed.hysteresis[0], cameras),
         dwell=dwell_widths(
             models.comparison.record.u,
             EQUATION_1,
             Actuator(hysteresis=law),
             Actuator(hysteresis=law, vibration=DYNAMICS_7),
         ),
-        claims=claims(models, control_measures(closed)),
+        claims=claims(evidence(models, reidentification, control_measures(closed))),
         approximations=approximations(),
         equations={name: characteristics(model) for name, model in _transfer_functions().items()},
     )

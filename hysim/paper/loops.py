@@ -1,46 +1,44 @@
 """The closed loops behind the paper's 90 % and 97 %, on its linear models and on one that has memory.
 
-Hysteresis: a triangle of 52 s. The plants are equation (1), whose loop is lag, and the identified Bouc-Wen
-law followed by the dynamics of (7) at a static gain of one.
+Hysteresis: a triangle of 52 s. The plants are equation (1), whose loop is lag, and the identified Bouc-Wen law followed
+by the dynamics of (7) at a static gain of one.
 
-Vibration: steps and square waves on (4) and (6), in their own unit of time, which is the sample. They are
-models of deviations, with a negative gain: a step of -1 um takes positive voltages, one of either sign takes
-voltages about the middle, 34 V, of Table 2's 18 and 50 V.
+Vibration: steps and square waves on (4) and (6), in their own unit of time, which is the sample. They are models of
+deviations, with a negative gain: a step of -1 um takes positive voltages, one of either sign takes voltages about the
+middle, 34 V, of Table 2's 18 and 50 V.
 
-The paper prints no gains. They come from `hysim.tune`, but for one PID: `FAST_ON_EQUATION_1`.
+The paper prints no gains: they come from `hysim.paper.search`, one search for each plant and each pair of limits.
 """
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from hysim._frozen import frozen
+from hysim._frozen import FloatArray, frozen
 from hysim.control import (
     PID,
     HysteresisAssessment,
-    LinearLoop,
     SquareWaveAssessment,
     StepAssessment,
-    Tuning,
     assess_hysteresis,
     assess_square_wave,
     assess_step,
-    tune,
 )
-from hysim.metrics import VibrationReduction
+from hysim.metrics import VibrationReduction, loop_metrics, reduction_percent
 from hysim.paper.equations import EQUATION_1, EQUATION_4, EQUATION_6, EQUATION_7
+from hysim.paper.search import Found, Limits, Task, search, step_task, triangle_task, volts_per_pixel
 from hysim.plants.actuator import Actuator
 from hysim.plants.transfer_function import TransferFunction
-from hysim.signals import triangle
 
-Limits = tuple[float, float] | None
 Row = dict[str, Any]
+Assessment = TypeVar("Assessment")
 
 PERIOD = 52.0  # of the triangle [s]: Table 1's staircase at one second a step
 SAMPLE_TIME = 0.01  # of the hysteresis loops [s]
 SUPPLY = (0.0, 125.0)  # Table 1's voltages [V]
+HIGH = 2.5  # of the triangle [um]
 
 UNIT_STEP = 0.025  # sample time of the vibration loops, in samples of Table 2
 ABOUT_34_V = (-16.0, 16.0)  # Table 2's voltages about their middle [V]
@@ -48,83 +46,73 @@ DURATION = 400.0  # of a step's record, in samples of Table 2
 SQUARE_PERIODS = {4.0: "Table 2", 40.65: "10 s of .246 s a sample", 10.0: "the unit read as the second"}
 """Periods in samples of Table 2, and which reading of the paper each is."""
 
-FAST_ON_EQUATION_1 = PID.standard(
-    34.0,
-    Ti=0.0361,
-    Td=5.86,
-    derivative_filter=0.003,
-    limits=SUPPLY,
-    setpoint_weight=0.852,
-    derivative_weight=0.258,
-)
-"""From the global search of experiments/02_lag_of_equation_1.py: what a PID can do when robustness is given up."""
-
 DYNAMICS_7 = TransferFunction(num=EQUATION_7.den[-1:], den=EQUATION_7.den)
 """Equation (7), its static gain made one."""
 
 
 @frozen
-class HysteresisCase:
-    """One triangle on one plant."""
+class Case(Generic[Assessment]):
+    """One reference on one plant.
+
+    Parameters
+    ----------
+    plant, reference : str
+        Their names.
+    period : float or None
+        Of the reference [the plant's unit of time]; None for a step.
+    found : Found
+        The search that gave the controller.
+    limits : tuple or None
+        Under which the loop ran [V].
+    assessment : HysteresisAssessment, StepAssessment or SquareWaveAssessment
+        Its figures.
+    """
 
     plant: str
     reference: str
+    period: float | None
+    found: Found
     limits: tuple[float, ...] | None
-    max_sensitivity: float
-    loops_tried: int
-    assessment: HysteresisAssessment
+    assessment: Assessment
 
 
-@frozen
-class StepCase:
-    """One step on one plant."""
-
-    plant: str
-    reference: str
-    limits: tuple[float, ...] | None
-    max_sensitivity: float
-    loops_tried: int
-    assessment: StepAssessment
-
-
-@frozen
-class SquareCase:
-    """One square wave on one plant."""
-
-    plant: str
-    reference: str
-    period: float
-    limits: tuple[float, ...] | None
-    max_sensitivity: float
-    loops_tried: int
-    assessment: SquareWaveAssessment
+HysteresisCase = Case[HysteresisAssessment]
+StepCase = Case[StepAssessment]
+SquareCase = Case[SquareWaveAssessment]
 
 
 @frozen
 class Loops:
-    """Every loop that was closed."""
+    """Every loop that was closed.
+
+    Parameters
+    ----------
+    hysteresis, steps, squares : tuple of Case
+    law_width : float
+        Largest width of the law's loop, alone and quasi-static, over the triangle of the first case [um].
+    """
 
     hysteresis: tuple[HysteresisCase, ...]
     steps: tuple[StepCase, ...]
     squares: tuple[SquareCase, ...]
+    law_width: float
 
 
 def loops(law: Any) -> Loops:
-    """Tune and close every loop.
+    """Search the controllers, and close every loop.
 
     Parameters
     ----------
     law : law
         The hysteresis, from voltage [V] to displacement [um], bounded over repeated cycles.
     """
-    vibration = {name: (plant, _vibration_tuning(plant)) for name, plant in _VIBRATING.items()}
+    hysteresis = (*_on_the_law(law), *_on_equation_1())
+    steps, squares = zip(*(_vibration(name, plant) for name, plant in _VIBRATING.items()), strict=True)
     return Loops(
-        hysteresis=(*_on_the_law(law), *_on_equation_1()),
-        steps=(
-            *(case for name, (plant, tuned) in vibration.items() for case in _steps(name, plant, tuned)),
-            _step_on_equation_1(),
-        ),
-        squares=tuple(case for name, (plant, tuned) in vibration.items() for case in _squares(name, plant, tuned)),
+        hysteresis=hysteresis,
+        steps=(*sum(steps, ()), _step_on_equation_1()),
+        squares=sum(squares, ()),
+        law_width=_width_of_law(law, hysteresis[0].assessment),
     )
 
 
@@ -132,144 +120,147 @@ def control_measures(loops: Loops) -> dict[str, list[Row]]:
     """The entries about control in `summary.json`: a row for each loop, under "hysteresis" and "vibration"."""
     return {
         "hysteresis": [
-            _head(case, case.assessment.closed.conditions) | _hysteresis_row(case.assessment)
+            _head(case, case.assessment.closed) | _hysteresis_row(case.assessment, case.plant, loops.law_width)
             for case in loops.hysteresis
         ],
         "vibration": [
-            *(
-                _head(case, case.assessment.closed.conditions) | _step_row(case.assessment.reduction)
-                for case in loops.steps
-            ),
-            *(_head(case, case.assessment.closed.conditions) | _square_row(case.assessment) for case in loops.squares),
+            *(_head(case, case.assessment.closed) | _step_row(case.assessment) for case in loops.steps),
+            *(_head(case, case.assessment.closed) | _square_row(case.assessment, case) for case in loops.squares),
         ],
     }
 
 
 def words(pid: PID) -> str:
-    """A PID in the paper's standard form."""
+    """All numbers of a PID."""
     return (
-        f"PID Kp {pid.kp:.4g} V/um, Ti {pid.kp / pid.ki:.3g}, Td {pid.kd / pid.kp:.3g}, "
-        f"derivative filter {pid.derivative_filter:.2g}, setpoint weight {pid.setpoint_weight:.2g}"
+        f"PID kp {pid.kp:.5g} V/um, ki {pid.ki:.5g}, kd {pid.kd:.5g}, derivative filter {pid.derivative_filter:.3g}, "
+        f"setpoint weight {pid.setpoint_weight:.3g}, derivative weight {pid.derivative_weight:.3g}"
     )
+
+
+def law_plant(law: Any) -> Actuator:
+    """The plant of the hysteresis loops: a law, and the dynamics of (7) behind it."""
+    return Actuator(hysteresis=law, vibration=DYNAMICS_7)
+
+
+def limited_percent(closed: Any) -> float:
+    """Share of the samples at which the command is at a limit [%]."""
+    return 100.0 * float(closed.conditions["limited_samples"]) / float(closed.t.size)
+
+
+def tracking_rms(assessment: StepAssessment) -> float:
+    """Rms of reference minus displacement over a step's record [um]."""
+    return float(np.sqrt(np.mean(_error(assessment.closed) ** 2)))
 
 
 _VIBRATING: Mapping[str, TransferFunction] = {"eq4": EQUATION_4, "eq6": EQUATION_6}
 
 
 def _on_the_law(law: Any) -> list[HysteresisCase]:
-    plant = Actuator(hysteresis=law, vibration=DYNAMICS_7)
-    tuned = _triangle_tuning(plant)
-    return [
-        _triangle("bouc-wen+eq7", plant, tuned, low, limits)
-        for low, limits in ((0.1, SUPPLY), (0.0, SUPPLY), (0.0, None))
-    ]
+    """Within the supply only: beyond the measured voltages a polynomial law means nothing."""
+    plant = law_plant(law)
+    task = triangle_task(plant, low=0.1, high=HIGH, period=PERIOD, limits=SUPPLY, sample_time=SAMPLE_TIME, cycles=2)
+    found = search(task)
+    return [_triangle("bouc-wen+eq7", plant, found, low, SUPPLY) for low in (0.1, 0.0)]
 
 
 def _on_equation_1() -> list[HysteresisCase]:
     plant = Actuator(vibration=EQUATION_1)
-    tuned = _triangle_tuning(plant)
-    fast = LinearLoop(plant, SAMPLE_TIME).max_sensitivity(FAST_ON_EQUATION_1)
-    return [
-        *(_triangle("eq1", plant, tuned, 0.0, limits) for limits in (SUPPLY, None)),
-        _followed("eq1", plant, FAST_ON_EQUATION_1, 0.0, fast),
-    ]
+    task = triangle_task(plant, low=0.0, high=HIGH, period=PERIOD, limits=SUPPLY, sample_time=SAMPLE_TIME, cycles=3)
+    found = _longer_search(task, seed=3)
+    return [_triangle("eq1", plant, found, 0.0, limits) for limits in (SUPPLY, None)]
 
 
-def _triangle_tuning(plant: Actuator) -> Tuning:
-    samples = round(PERIOD / SAMPLE_TIME)
-    reference = triangle(0.1, 2.5, cycles=1, samples_per_cycle=samples)
-    t = SAMPLE_TIME * np.arange(reference.size)
-    return tune(
-        plant,
-        t,
-        reference,
-        objective="rms",
-        limits=SUPPLY,
-        transient=0.2 * PERIOD,
-    )
+def _longer_search(task: Task, seed: int) -> Found:
+    """Where seeds differ: by some percent on (1), by hundredths for steps of (4) within the supply."""
+    return search(task, generations=40, polish=600, seed=seed)
 
 
-def _triangle(name: str, plant: Actuator, tuned: Tuning, low: float, limits: Limits) -> HysteresisCase:
-    pid = replace(tuned.controller, limits=limits)
-    return _followed(name, plant, pid, low, tuned.max_sensitivity, len(tuned.trials))
-
-
-def _followed(
-    name: str, plant: Actuator, pid: PID, low: float, max_sensitivity: float, loops_tried: int = 0
-) -> HysteresisCase:
-    return HysteresisCase(
+def _triangle(name: str, plant: Actuator, found: Found, low: float, limits: Limits) -> HysteresisCase:
+    pid = replace(found.controller, limits=limits)
+    return Case(
         plant=name,
-        reference=f"triangle {low:g} to 2.5 um, {PERIOD:g} s, 10 cycles",
-        limits=pid.limits,
-        max_sensitivity=max_sensitivity,
-        loops_tried=loops_tried,
-        assessment=assess_hysteresis(plant, pid, low=low, high=2.5, period=PERIOD, sample_time=SAMPLE_TIME),
+        reference=f"triangle {low:g} to {HIGH:g} um, {PERIOD:g} s, 10 cycles",
+        period=PERIOD,
+        found=found,
+        limits=limits,
+        assessment=assess_hysteresis(plant, pid, low=low, high=HIGH, period=PERIOD, sample_time=SAMPLE_TIME),
     )
 
 
-def _vibration_tuning(plant: TransferFunction) -> Tuning:
-    """One PID for both kinds of limits; a low bound on the sensitivity keeps its voltages small."""
-    t = UNIT_STEP * np.arange(round(60.0 / UNIT_STEP))
-    return tune(plant, t, -np.ones(t.size), limits=[ABOUT_34_V, SUPPLY], max_sensitivity=1.4)
+def _width_of_law(law: Any, assessment: HysteresisAssessment) -> float:
+    """Width of the law alone along the open loop's voltage; without dynamics each sample is its own answer."""
+    samples = round(PERIOD / SAMPLE_TIME) + 1
+    return loop_metrics(assessment.open_u[-samples:], law.response(assessment.open_u)[-samples:]).max_width
 
 
-def _steps(name: str, plant: TransferFunction, tuned: Tuning) -> list[StepCase]:
-    cases = ((-1.0, SUPPLY), (-1.0, ABOUT_34_V), (1.0, ABOUT_34_V), (-1.0, None))
-    return [_step(name, plant, tuned, size, limits, DURATION, UNIT_STEP) for size, limits in cases]
+def _vibration(name: str, plant: TransferFunction) -> tuple[tuple[StepCase, ...], tuple[SquareCase, ...]]:
+    """A search for each pair of limits; the larger voltages also show what the limits cost."""
+    tasks = (
+        step_task(plant, step=-1.0, limits=limits, duration=0.5 * DURATION, sample_time=UNIT_STEP)
+        for limits in (ABOUT_34_V, SUPPLY)
+    )
+    about, supply = search(next(tasks)), (_longer_search(next(tasks), seed=2) if name == "eq4" else search(next(tasks)))
+    cases = ((-1.0, SUPPLY, supply), (-1.0, ABOUT_34_V, about), (1.0, ABOUT_34_V, about), (-1.0, None, about))
+    return (
+        tuple(_step(name, plant, found, size, limits, DURATION, UNIT_STEP) for size, limits, found in cases),
+        tuple(_square(name, plant, about, period) for period in SQUARE_PERIODS),
+    )
 
 
 def _step_on_equation_1() -> StepCase:
-    t = SAMPLE_TIME * np.arange(round(20.0 / SAMPLE_TIME))
-    tuned = tune(EQUATION_1, t, np.ones(t.size), limits=SUPPLY, max_sensitivity=1.4)
-    return _step("eq1", EQUATION_1, tuned, 1.0, SUPPLY, 60.0, SAMPLE_TIME)
+    task = step_task(EQUATION_1, step=1.0, limits=SUPPLY, duration=40.0, sample_time=SAMPLE_TIME)
+    return _step("eq1", EQUATION_1, _longer_search(task, seed=3), 1.0, SUPPLY, 60.0, SAMPLE_TIME)
 
 
 def _step(
-    name: str, plant: TransferFunction, tuned: Tuning, size: float, limits: Limits, duration: float, sample_time: float
+    name: str, plant: TransferFunction, found: Found, size: float, limits: Limits, duration: float, sample_time: float
 ) -> StepCase:
-    pid = replace(tuned.controller, limits=limits)
-    return StepCase(
+    pid = replace(found.controller, limits=limits)
+    return Case(
         plant=name,
         reference=f"step {size:+g} um",
+        period=None,
+        found=found,
         limits=limits,
-        max_sensitivity=tuned.max_sensitivity,
-        loops_tried=len(tuned.trials),
         assessment=assess_step(plant, pid, step=size, duration=duration, sample_time=sample_time),
     )
 
 
-def _squares(name: str, plant: TransferFunction, tuned: Tuning) -> list[SquareCase]:
-    pid = replace(tuned.controller, limits=ABOUT_34_V)
-    return [
-        SquareCase(
-            plant=name,
-            reference=f"square wave -0.5 to 0.5 um, period {period:g} samples",
+def _square(name: str, plant: TransferFunction, found: Found, period: float) -> SquareCase:
+    return Case(
+        plant=name,
+        reference=f"square wave -0.5 to 0.5 um, period {period:g} samples",
+        period=period,
+        found=found,
+        limits=ABOUT_34_V,
+        assessment=assess_square_wave(
+            plant,
+            found.controller,
+            low=-0.5,
+            high=0.5,
             period=period,
-            limits=ABOUT_34_V,
-            max_sensitivity=tuned.max_sensitivity,
-            loops_tried=len(tuned.trials),
-            assessment=assess_square_wave(
-                plant,
-                pid,
-                low=-0.5,
-                high=0.5,
-                period=period,
-                sample_time=UNIT_STEP,
-                periods=round(DURATION / period),
-            ),
-        )
-        for period in SQUARE_PERIODS
-    ]
+            sample_time=UNIT_STEP,
+            periods=round(DURATION / period),
+        ),
+    )
 
 
-def _head(case: HysteresisCase | StepCase | SquareCase, conditions: Mapping[str, Any]) -> Row:
-    """Under which the loop ran, in plain values."""
+def _head(case: Case[Any], closed: Any) -> Row:
+    """Conditions under which the loop ran, in plain values."""
+    conditions = closed.conditions
     pid = conditions["controller"]
     return {
         "plant": case.plant,
         "reference": case.reference,
+        "period": case.period,
         "controller": words(pid),
         "limits": list(case.limits) if case.limits else "unlimited",
+        "saturated_percent": limited_percent(closed),
+        "volts_per_pixel": volts_per_pixel(pid, conditions["sample_time"]),
+        "max_sensitivity": case.found.max_sensitivity,
+        "max_sensitivity_with_delay": case.found.with_delay,
+        "searched": case.found.searched,
         "conditions": {
             "gains": {
                 "kp": pid.kp,
@@ -279,7 +270,7 @@ def _head(case: HysteresisCase | StepCase | SquareCase, conditions: Mapping[str,
                 "setpoint_weight": pid.setpoint_weight,
                 "derivative_weight": pid.derivative_weight,
             },
-            "max_sensitivity": case.max_sensitivity,
+            "max_sensitivity": case.found.max_sensitivity,
             "time_unit": "s" if case.plant in ("eq1", "bouc-wen+eq7") else "sample of Table 2",
             **{key: conditions[key] for key in ("sample_time", "delay", "sensor_quantum", "noise", "seed")},
             "lowest_u_V": conditions["lowest_u"],
@@ -288,12 +279,15 @@ def _head(case: HysteresisCase | StepCase | SquareCase, conditions: Mapping[str,
     }
 
 
-def _hysteresis_row(assessment: HysteresisAssessment) -> Row:
+def _hysteresis_row(assessment: HysteresisAssessment, plant: str, law_width: float) -> Row:
+    has_law = plant != "eq1"
     return {
         "hysteresis_reduction_percent": assessment.hysteresis_reduction_percent,
         "lag_reduction_percent": assessment.lag_reduction_percent,
+        "law_width_reduction_percent": reduction_percent(law_width, assessment.closed_width) if has_law else None,
         "open_max_width_um": assessment.open_width,
         "closed_max_width_um": assessment.closed_width,
+        "law_width_um": law_width if has_law else None,
         "open_lag_width_um": assessment.open_lag_width,
         "lag_width_um": assessment.lag_width,
         "tracking_rms_um": assessment.tracking_rms,
@@ -302,27 +296,47 @@ def _hysteresis_row(assessment: HysteresisAssessment) -> Row:
     }
 
 
-def _step_row(assessment: VibrationReduction | None) -> Row:
-    if assessment is None:
-        names = ("overshoot_reduction_percent", "residual_rms_reduction_percent", "settling_time_reduction_percent")
-        return dict.fromkeys((*names, "t98_open", "t98_closed"))
+def _step_row(assessment: StepAssessment) -> Row:
+    closed = assessment.closed
+    tail = slice(-(closed.y.size // 10), None)
+    step = closed.reference[-1] - closed.y[0]
     return {
-        "overshoot_reduction_percent": assessment.overshoot_reduction_percent,
-        "residual_rms_reduction_percent": assessment.residual_rms_reduction_percent,
-        "settling_time_reduction_percent": assessment.settling_time_reduction_percent,
-        "t98_open": assessment.open.t98,
-        "t98_closed": assessment.closed.t98,
-        "overshoot_open_percent": assessment.open.overshoot,
-        "overshoot_closed_percent": assessment.closed.overshoot,
-        "settling_time_open": assessment.open.settling_time,
-        "settling_time_closed": assessment.closed.settling_time,
+        **_figures(assessment.reduction),
+        "steady_error_percent": 100.0 * float(np.abs(_error(closed)[tail]).max() / abs(step)),
+        "tracking_rms_um": tracking_rms(assessment),
     }
 
 
-def _square_row(assessment: SquareWaveAssessment) -> Row:
-    return _step_row(assessment.reduction) | {
+def _square_row(assessment: SquareWaveAssessment, case: SquareCase) -> Row:
+    closed = assessment.closed
+    half = round(0.5 * (case.period or 0.0) / UNIT_STEP)
+    ends = _error(closed)[[-half - 1, -1]]
+    return {
+        **_figures(assessment.reduction),
+        "steady_error_percent": 100.0 * float(np.abs(ends).max() / np.ptp(closed.reference)),
         "tracking_rms_open_um": assessment.open_tracking_rms,
         "tracking_rms_um": assessment.tracking_rms,
         "peak_excess_open_percent": assessment.open_peak_excess_percent,
         "peak_excess_percent": assessment.peak_excess_percent,
+    }
+
+
+def _error(closed: Any) -> FloatArray:
+    return np.asarray(closed.reference - closed.y)
+
+
+def _figures(reduction: VibrationReduction | None) -> Row:
+    if reduction is None:
+        names = ("overshoot_reduction_percent", "residual_rms_reduction_percent", "settling_time_reduction_percent")
+        return dict.fromkeys((*names, "t98_open", "t98_closed"))
+    return {
+        "overshoot_reduction_percent": reduction.overshoot_reduction_percent,
+        "residual_rms_reduction_percent": reduction.residual_rms_reduction_percent,
+        "settling_time_reduction_percent": reduction.settling_time_reduction_percent,
+        "t98_open": reduction.open.t98,
+        "t98_closed": reduction.closed.t98,
+        "overshoot_open_percent": reduction.open.overshoot,
+        "overshoot_closed_percent": reduction.closed.overshoot,
+        "settling_time_open": reduction.open.settling_time,
+        "settling_time_closed": reduction.closed.settling_time,
     }

@@ -56,6 +56,12 @@ def heading(text: str) -> str:
     return f"<h3>{escape(text)}</h3>"
 
 
+def folded(summary: str, body: str, *, is_open: bool = False) -> str:
+    """Markup that opens at a click on its summary, without a script."""
+    opening = "<details open>" if is_open else "<details>"
+    return f"{opening}<summary>{escape(summary)}</summary>\n{body}\n</details>\n"
+
+
 def block(kind: str, anchor: str, lines: Sequence[tuple[str, str]]) -> str:
     """Lines of text, each of its own class, in one block; empty ones are left out."""
     body = "".join(f'<div class="{escape(name)}">{escape(text)}</div>' for name, text in lines if text)

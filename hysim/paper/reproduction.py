@@ -22,15 +22,17 @@ from hysim.comparison import Comparison
 from hysim.datasets import table2
 from hysim.discovery import Discovery
 from hysim.paper import figures
+from hysim.paper.camera import camera_measures
 from hysim.paper.dwell import dwell_measures
 from hysim.paper.equations import EQUATION_1, EQUATION_4, EQUATION_6, EQUATION_7, step_response
 from hysim.paper.findings import Findings, find
 from hysim.paper.loops import control_measures
+from hysim.paper.periods import period_rows
 from hysim.paper.report import report_page
 from hysim.paper.study import Progress, model_measures
 from hysim.plot import Figure, to_svg
 
-_CLAIM = ("id", "where", "statement", "printed", "recomputed", "unit", "verdict", "method", "note")
+_CLAIM = ("id", "where", "statement", "printed", "recomputed", "unit", "verdict", "method", "conditions", "note")
 
 
 @frozen
@@ -109,6 +111,7 @@ def _model_drawings(comparison: Comparison, discovery: Discovery) -> dict[str, s
         {
             "figure3": figures.input_and_output(comparison.record),
             "figure4": figures.figure4(comparison.record),
+            "opening": figures.opening(comparison),
             "loops": figures.model_loops(comparison),
             "widths": figures.model_widths(comparison),
             "residuals": figures.model_residuals(comparison),
@@ -132,6 +135,8 @@ def _paper_drawings(computed: Findings) -> dict[str, str]:
             "figure14": figures.step_figure(step_on["eq4"], 60.0, seconds=False),
             "hysteresis": figures.hysteresis_figure(loops.hysteresis[0]),
             "dwell": figures.dwell_figure(computed.dwell),
+            "camera": figures.camera_figure(computed.cameras),
+            "periods": figures.periods_figure(computed.periods),
         }
     )
 
@@ -154,7 +159,7 @@ def _summary(computed: Findings) -> dict[str, Any]:
         },
         "models": model_measures(computed.study),
         "claims": [{key: vars(claim)[key] for key in _CLAIM} for claim in computed.claims],
-        "control": control_measures(computed.loops),
+        "control": {**control_measures(computed.loops), "camera": camera_measures(computed.cameras)},
         "dwell": [dwell_measures(width) for width in computed.dwell],
     }
 
@@ -172,7 +177,7 @@ def _tables(computed: Findings, summary: dict[str, Any]) -> dict[str, str]:
         parameters += [[name, key, value, fit.stderr.get(key)] for key, value in fit.estimates.items()]
     terms = {**study.discovery.coefficients, **study.discovery.initial_states[0]}
     parameters += [["sindy", term, value, None] for term, value in terms.items()]
-    control = [row for rows in summary["control"].values() for row in rows]
+    control = [row for name in ("hysteresis", "vibration") for row in summary["control"][name]]
     named = {
         "models": _by_columns([{"model": name, **row} for name, row in summary["models"].items()]),
         "outputs": outputs,
@@ -180,6 +185,8 @@ def _tables(computed: Findings, summary: dict[str, Any]) -> dict[str, str]:
         "parameters": parameters,
         "claims": _by_columns(summary["claims"]),
         "control": _by_columns([{key: value for key, value in row.items() if key != "conditions"} for row in control]),
+        "camera": _by_columns(summary["control"]["camera"]),
+        "periods": _by_columns(period_rows(computed.periods)),
         "dwell": _by_columns(summary["dwell"]),
     }
     return {f"tables/{name}.csv": _csv(table) for name, table in named.items()}

@@ -1,0 +1,337 @@
+"""The PIDs of the claims about control, by one global search over all gains, weights and the filter.
+
+The paper prints no gains, so that a claim about a loop asks whether a controller exists. It is looked for by
+differential evolution (R. Storn and K. Price, 1997) from a fixed seed, and then by the simplex of J. A. Nelder and
+R. Mead (1965), over six numbers, in the box `BOX`:
+
+    log10 |kp G(0)|,  log10 Ti,  log10 Td,  log10 (derivative filter / Td),  setpoint weight,  derivative weight
+
+with Ti = kp / ki and Td = kd / kp. A controller whose loop is unstable, or exceeds the bounds on the maximum
+sensitivity, is never simulated: its cost grows with its distance from the bounds alone. All others run in the sampled
+loop with their limits. The bounds hold at the least and at the largest slope of a law, and with one sample more of
+delay, in which a computer would work.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import differential_evolution, minimize
+
+from hysim import signals
+from hysim._frozen import FloatArray, frozen
+from hysim.control import PID, LinearLoop, RestingPlant, as_actuator, secant_gain, slopes
+from hysim.datasets import PIXEL
+from hysim.metrics import step_metrics
+from hysim.plants.actuator import Actuator
+from hysim.plants.sensor import Sensor
+
+Limits = tuple[float, float] | None
+
+MAX_SENSITIVITY = 2.0
+"""Largest maximum sensitivity of a loop that counts, as is commonly asked."""
+WITH_DELAY = 1.25
+"""How much larger it may be with one sample more of delay."""
+BOX = ((-3.0, 3.0), (-2.0, 2.0), (-3.0, 2.0), (-4.0, 1.0), (0.0, 1.0), (0.0, 1.0))
+"""Bounds of the search; times are in the plant's own unit."""
+
+_GENERATIONS = 24
+_POPULATION = 6  # for each of the six numbers
+_POLISH = 250
+_SIMPLEXES = (0.03, 0.01)  # sizes, of the box
+_UNSTABLE = 1e6  # cost of a loop that is not stable
+_BEYOND = 1e3  # of one that exceeds a bound
+_REFINED = {True: 1.002, False: 1.01}  # margin for what lies between the grid's frequencies, with and without `exact`
+
+
+@frozen
+class Task:
+    """A loop to be closed, and its cost.
+
+    Parameters
+    ----------
+    plant : Actuator
+    sample_time : float
+        [the plant's unit of time]
+    reference : array, shape (n,)
+        [um]
+    limits : tuple or None
+        Lowest and highest voltage [V].
+    cost : callable
+        Of the displacement, shape (n,): the smaller, the better.
+    slopes : tuple of float
+        Least and largest slope of the law [um/V]; 1 without one.
+    with_delay : bool
+        Whether the loop has to bear one sample more of delay; a camera's frame of delay is in the plant.
+    """
+
+    plant: Actuator
+    sample_time: float
+    reference: FloatArray
+    limits: Limits
+    cost: Callable[[FloatArray], float]
+    slopes: tuple[float, ...] = (1.0,)
+    with_delay: bool = True
+
+
+@frozen
+class Found:
+    """The best controller of a search.
+
+    Parameters
+    ----------
+    controller : PID
+    max_sensitivity, with_delay : float
+        The largest ``|1 / (1 + L)|``, and that with one sample more of delay.
+    bound : float
+        Bound on the first.
+    controllers, simulations : int
+        Number of controllers judged, and of those simulated.
+    """
+
+    controller: PID
+    max_sensitivity: float
+    with_delay: float
+    bound: float
+    controllers: int
+    simulations: int
+
+    @property
+    def searched(self) -> str:
+        """What was searched, in words."""
+        return (
+            f"Searched: {self.controllers} PIDs, kp G(0) 0.001 to 1000, Ti 0.01 to 100, Td 0.001 to 100, filter 0.0001 "
+            f"to 10 Td, both weights 0 to 1, maximum sensitivity at most {self.bound:g}, and "
+            f"{WITH_DELAY * self.bound:g} with one sample more of delay."
+        )
+
+
+class Robustness:
+    """Largest sensitivities of a plant's loops, without and with one sample more of delay, unless that is no matter."""
+
+    def __init__(
+        self, plant: Any, sample_time: float, slopes: tuple[float, ...] = (1.0,), *, with_delay: bool = True
+    ) -> None:
+        actuator = as_actuator(plant)
+        sensor = actuator.sensor or Sensor()
+        delayed = replace(actuator, sensor=replace(sensor, delay=sensor.delay + sample_time))
+        self.h, self.slopes = sample_time, slopes
+        self.loops = [LinearLoop(each, sample_time) for each in (actuator, delayed)[: 1 + with_delay]]
+
+    def of(self, controller: PID) -> tuple[float, float]:
+        """Both, within 0.1 %; infinite if a loop is unstable."""
+        each = [max(loop.max_sensitivity(controller, slope) for slope in self.slopes) for loop in self.loops]
+        return each[0], each[-1]
+
+    def excess(self, controller: PID, bound: float) -> float:
+        """Part by which a bound is exceeded; 0 within the bounds."""
+        first, second = self.of(controller)
+        spare = WITH_DELAY if len(self.loops) > 1 else 1.0
+        return max(0.0, min(max(first, second / spare) / bound - 1.0, _UNSTABLE))
+
+    def roughly(self, controller: PID, bound: float, margin: float) -> float:
+        """The same on a grid of frequencies, four times as fast."""
+        worst = 0.0
+        for loop, most in zip(self.loops, (bound, WITH_DELAY * bound), strict=False):
+            response = loop.response(controller)
+            for slope in self.slopes:
+                ratio = margin / most / float(np.abs(1.0 + slope * response).min())
+                worst = max(worst, ratio if ratio > 1.0 or loop.is_stable(controller, slope) else _UNSTABLE)
+            if worst > 1.0:
+                return worst - 1.0
+        return 0.0
+
+
+def search(
+    task: Task,
+    *,
+    bound: float = MAX_SENSITIVITY,
+    generations: int = _GENERATIONS,
+    population: int = _POPULATION,
+    polish: int = _POLISH,
+    starts: Sequence[PID] = (),
+    exact: bool = True,
+    seed: int = 1,
+) -> Found:
+    """The controller of the least cost.
+
+    Parameters
+    ----------
+    task : Task
+        From `step_task` or `triangle_task`.
+    bound : float
+        On the maximum sensitivity.
+    generations, population, polish : int
+        Of the differential evolution, 0 to leave it out; its members for each of six numbers; and controllers that
+        the simplex may try.
+    starts : sequence of PID
+        Controllers of which the best begins the search.
+    exact : bool
+        Whether the simplex goes to the bound itself, or keeps 1 % below it, which is four times as fast.
+    seed : int
+        Of the random numbers.
+    """
+    tried = _Tried(task, bound, exact)
+    start = min((tried.point(pid) for pid in starts), key=tried.cost) if starts else None
+    if generations:
+        start = differential_evolution(
+            tried.cost, BOX, maxiter=generations, popsize=population, seed=seed, tol=0.0, polish=False, x0=start
+        ).x
+    if start is None:
+        raise ValueError("a search without generations needs controllers to start from")
+    tried.is_polished = True
+    return tried.descended(start, polish)
+
+
+class _Tried:
+    """The cost of a point of the box, and how many were tried."""
+
+    def __init__(self, task: Task, bound: float, exact: bool) -> None:
+        self.task, self.bound = task, bound
+        self.resting = RestingPlant(task.plant, task.sample_time)
+        self.robustness = Robustness(task.plant, task.sample_time, task.slopes, with_delay=task.with_delay)
+        law = task.plant.hysteresis
+        self.gain = task.plant.dc_gain * (1.0 if law is None else float(np.mean(task.slopes)))
+        self.controllers = self.simulations = 0
+        self.exact, self.is_polished = exact, False
+
+    def controller(self, x: FloatArray) -> PID:
+        size, Ti, Td, ratio = 10.0 ** x[:4]
+        return PID.standard(
+            float(size / self.gain),
+            Ti=float(Ti),
+            Td=float(Td),
+            derivative_filter=float(ratio * Td),
+            limits=self.task.limits,
+            setpoint_weight=float(x[4]),
+            derivative_weight=float(x[5]),
+        )
+
+    def point(self, pid: PID) -> FloatArray:
+        """The point of a controller, or the nearest to it in the box."""
+        kp = pid.kp or math.copysign(1e-9, self.gain)
+        times = (kp / pid.ki if pid.ki else math.inf, pid.kd / kp, pid.derivative_filter / max(pid.kd / kp, 1e-9))
+        x = [*np.log10(np.maximum([kp * self.gain, *times], 1e-9)), pid.setpoint_weight, pid.derivative_weight]
+        low, high = np.array(BOX).T
+        return np.asarray(np.clip(x, low, high))
+
+    def descended(self, start: FloatArray, polish: int) -> Found:
+        """The best controller that the simplex finds from a point; it begins anew once, on a smaller scale."""
+        low, high = np.array(BOX).T
+        best, least = start, self.cost(start)
+        for scale in _SIMPLEXES:
+            step = scale * (high - low) * np.where(best > 0.5 * (low + high), -1.0, 1.0)
+            simplex = np.clip(best + np.vstack([np.zeros(len(BOX)), np.diag(step)]), low, high)
+            options = {"maxfev": polish // 2, "xatol": 1e-5, "fatol": 1e-9, "initial_simplex": simplex}
+            end = minimize(self.cost, best, method="Nelder-Mead", bounds=BOX, options=options)
+            if end.fun < least:
+                best, least = end.x, end.fun
+        controller = self.controller(best)
+        sensitivity, with_delay = self.robustness.of(controller)
+        return Found(
+            controller=controller,
+            max_sensitivity=sensitivity,
+            with_delay=with_delay,
+            bound=self.bound,
+            controllers=self.controllers,
+            simulations=self.simulations,
+        )
+
+    def cost(self, x: FloatArray) -> float:
+        self.controllers += 1
+        controller = self.controller(x)
+        if self.is_polished and self.exact:
+            excess = self.robustness.excess(controller, self.bound)
+        else:
+            excess = self.robustness.roughly(controller, self.bound, _REFINED[self.exact])
+        if excess > 0.0:
+            return _BEYOND + min(excess, _UNSTABLE)
+        self.simulations += 1
+        signals = self.resting.attempt(controller, self.task.reference)
+        return self.task.cost(signals.y) if signals.lost < 0 else _UNSTABLE
+
+
+def step_task(plant: Any, *, step: float, limits: Limits, duration: float, sample_time: float) -> Task:
+    """A step from rest; its cost is the largest of three ratios of closed to open loop, in percent.
+
+    They are those of `hysim.metrics.vibration_reduction`: overshoot, rms of the residual and settling time.
+    """
+    actuator = as_actuator(plant)
+    n = round(duration / sample_time) + 1
+    t = sample_time * np.arange(n)
+    opened = RestingPlant(actuator, sample_time).driven(np.full(n, step / actuator.dc_gain))
+    before = step_metrics(t, opened)
+    slowest = float(np.min(np.abs(actuator.vibration.poles.real)))  # type: ignore[union-attr]
+    begin = round(before.t98 / sample_time) + 1
+    window = slice(begin, begin + round(2.0 * math.log(50.0) / slowest / sample_time))
+    tail, settled = slice(n - n // 10, None), 0.02
+
+    def ratios(y: FloatArray) -> tuple[float, float, float]:
+        error = y / y[tail].mean() - 1.0
+        outside = np.flatnonzero(np.abs(error) > settled)
+        last = min(int(outside[-1]), n - 2) if outside.size else 0
+        change = abs(error[last + 1] - error[last])
+        settling = sample_time * (last + (abs(error[last]) - settled) / max(change, 1e-300))
+        return max(0.0, float(error.max())), float(np.sqrt(np.mean(error[window] ** 2))), settling
+
+    open_ratios = ratios(opened)
+
+    def cost(y: FloatArray) -> float:
+        off = abs(float(y[tail].mean()) / step - 1.0)
+        if not off < settled:
+            return 200.0 + min(100.0 * off, 500.0)
+        return 100.0 * max(closed / max(own, 1e-12) for closed, own in zip(ratios(y), open_ratios, strict=True))
+
+    return Task(plant=actuator, sample_time=sample_time, reference=np.full(n, step), limits=limits, cost=cost)
+
+
+def triangle_task(
+    plant: Any,
+    *,
+    low: float,
+    high: float,
+    period: float,
+    limits: Limits,
+    sample_time: float,
+    cycles: int,
+    skip: float = 0.0,
+    tracking: float = 0.0,
+) -> Task:
+    """A triangle; its cost is the width of the last cycle's loop over its stroke, and how far it is from closed.
+
+    `skip` is a time after the start of the cycle, and before its end, that does not count; `tracking` is the weight of
+    the rms error.
+    """
+    actuator = as_actuator(plant)
+    samples = round(period / sample_time)
+    reference = signals.triangle(low, high, cycles=cycles, samples_per_cycle=samples)
+    half, begin = samples // 2, round(skip / sample_time)
+
+    def cost(y: FloatArray) -> float:
+        last = y[-samples - 1 :]
+        apart = np.abs(last[: half + 1] - last[half:][::-1])[begin:]
+        error = tracking * float(np.sqrt(np.mean((reference[-samples - 1 :] - last)[begin:] ** 2))) if tracking else 0.0
+        return float(apart.max() + apart[0] + error) / max(float(np.ptp(last)), 1e-12)
+
+    return Task(
+        plant=actuator,
+        sample_time=sample_time,
+        reference=reference,
+        limits=limits,
+        cost=cost,
+        slopes=slopes_along(actuator, reference[-samples - 1 :]),
+    )
+
+
+def slopes_along(actuator: Actuator, cycle: FloatArray) -> tuple[float, ...]:
+    """Least and largest slope of the law along a cycle of the reference [um/V]; 1 without a law."""
+    if actuator.hysteresis is None:
+        return (1.0,)
+    return tuple(sorted(slopes(actuator, cycle / secant_gain(actuator, cycle))))
+
+
+def volts_per_pixel(controller: PID, sample_time: float) -> float:
+    """Jump of the command when the measurement moves by one pixel of the camera [V]."""
+    return PIXEL * (abs(controller.kp) + abs(controller.kd) / (controller.derivative_filter + sample_time))
