@@ -161,7 +161,6 @@ class Record:
         -------
         tuple of Record
 
-
         Examples
         --------
         >>> import hysim as hs

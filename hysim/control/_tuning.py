@@ -37,10 +37,12 @@ class Tuning:
 
     Parameters
     ----------
-    controller, objective, max_sensitivity, voltage_noise
-        As in the best `Trial`. The noise also moves the memory of a law, which `close_loop` has in its conditions.
+    controller, objective, max_sensitivity
+        As in the best `Trial`.
     gain_margin, phase_margin : float
         Factor and angle [degrees] by which the loop may change before it is unstable: the smallest of all plants.
+    voltage_noise : float
+        As in the best `Trial`. The noise also moves the memory of a law, which `close_loop` has in its conditions.
     trade_off : tuple of Trial
         Trials within the bound on the noise that no other beats in both objective and sensitivity, most robust first.
     trials : tuple of Trial

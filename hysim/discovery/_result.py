@@ -188,7 +188,7 @@ class OscillatorDiscovery(_Discovered):
     model, models
         BoucWenOscillator, or TransferFunction of a lag, from the initial state of the first record; and one for each
         record. Without a memory A = 0; None and empty where hysim has no model of the law, as `warnings` says.
-    coefficients, stderr, equation, left_out, regressed, inclusion, message, warnings
+    coefficients, stderr, equation
         As in `Discovery`; `stderr` has the free parts of the plant and ``"n"`` too, where they were free. Of a Bouc-Wen
         law with n = 1 A is the coefficient of ``"u'"``, -beta that of ``"|u'| z"`` and -gamma that of ``"u' |z|"``.
     verdict : str
@@ -201,8 +201,12 @@ class OscillatorDiscovery(_Discovered):
         compared; ``"condition"`` of the regression on all terms.
     n_parameters : int
         Number of fitted parameters of the plant and the law.
+    left_out, regressed, inclusion
+        As in `Discovery`.
     path_n_terms, path_fit_percent, path_bic : array, shape (n_structures,)
         Sizes of the compared structures, their fit on held-out samples [%], and BIC: for a Pareto figure.
+    message, warnings
+        As in `Discovery`.
     parameters : mapping
         ``"mass"``, ``"damping"`` and ``"stiffness"`` of the plant, and ``"n"`` where it was free. Without a memory the
         stiffness is that of all springs.
