@@ -112,7 +112,7 @@ ASKED_AT_ENOUGH = {
 
 
 def ratios(rows: list[Row]) -> Iterator[Ratio]:
-    """The quotients that issue 4 asks for, and their neighbours, of those peers that are here."""
+    """The quotients with a target, and their neighbours, of those peers that are here."""
     found = {(row["problem"], row["method"], row["setting"]): row for row in rows}
     for *key, asked in ASKED:
         if tuple(key) in found:

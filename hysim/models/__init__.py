@@ -1,4 +1,4 @@
-"""Laws, plants and chain stages: frozen specifications, one family a file."""
+"""Roles of models, the abstract law, parameters and search spaces, sums and cascades, and JSON files."""
 
 from hysim.models import cascade, composable, sum
 
