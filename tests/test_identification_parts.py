@@ -5,7 +5,7 @@ import pytest
 
 import hysim as hs
 from hysim.identification import Candidate
-from hysim.identification._problem import problem
+from hysim.identification._problem import Problem, problem
 from hysim.identification._searched import _phrases
 from hysim.identification._uncertainty import _named, uncertainty
 from hysim.identification.folds import left_out
@@ -55,3 +55,39 @@ def test_other_optima_are_counted(n_rivals, words):
     known = uncertainty(whole, theta, np.ones(whole.y.size))
     rival = Candidate(model=hs.Dahl(), estimates={}, fit_percent=90.0, rmse=0.1)
     assert words in _phrases(True, whole, known, [rival] * n_rivals, {})
+
+
+def long_record():
+    """20 cycles of growing amplitude that begin between two reversals, with 0.5 % of noise."""
+    phase = np.linspace(0.9, 40.0 * np.pi, 3001)
+    u = np.linspace(0.5, 1.0, phase.size) * np.sin(phase)
+    y = hs.BoucWen(beta=1.4, gamma=-0.6, feedthrough=0.7, gain=-0.5).response(u)
+    return hs.Record(u=u, y=y + 0.005 * np.random.default_rng(3).standard_normal(u.size), t=0.01 * np.arange(u.size))
+
+
+def test_a_search_on_a_thinned_record_ends_in_the_optimum_of_the_search_on_all_samples(monkeypatch):
+    thinned = hs.identify(hs.BoucWen, long_record(), fixed={"n": 1.0})
+    monkeypatch.setattr(Problem, "thinned", lambda *_: None)
+    whole = hs.identify(hs.BoucWen, long_record(), fixed={"n": 1.0})
+    assert thinned.rmse == pytest.approx(whole.rmse, rel=1e-9)
+    assert thinned.residual.size == 3001
+    for name in whole.free_names:  # each descent ends where a step gains 2e-8 of the sum of squares
+        assert thinned.estimates[name] == pytest.approx(whole.estimates[name], abs=0.01 * whole.stderr[name])
+
+
+def test_a_thinned_record_keeps_ends_and_reversals_and_the_outputs_of_a_law():
+    record = long_record()
+    whole = problem(hs.BoucWen(), [record], Freedom(), None)
+    short = whole.thinned(250)
+    u = short.parts[0].record.u
+    assert 250 <= u.size <= 250 + record.reversals(tolerance=0.01).size
+    assert set(record.u[[0, -1, *record.reversals(tolerance=0.01)]]) <= set(u)
+    x = 0.5 * (whole.space.lower + whole.space.upper)[np.newaxis]
+    places = np.searchsorted(record.t, record.t[np.isin(record.u, u)])
+    np.testing.assert_allclose(short.split(x)[0][0], whole.split(x)[0][0, places], atol=1e-12)  # rounding
+
+
+def test_a_record_is_not_thinned_for_a_model_that_depends_on_time_or_where_it_would_stay_long():
+    record = long_record()
+    assert problem(hs.TransferFunction.structure(poles=1, zeros=0), [record], Freedom(), None).thinned(250) is None
+    assert problem(hs.BoucWen(), [record[:400]], Freedom(), None).thinned(250) is None
