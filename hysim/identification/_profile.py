@@ -4,7 +4,7 @@
 
 The interval of a parameter p holds the values with D(v) <= N ln(1 + t^2 / (N - d)), t the quantile of Student's
 distribution with N - d degrees of freedom, which is exact for a linear model and normal noise. Its ends are found by
-the secant method on sqrt(D), all ends of all parameters at once; an interval that reaches a side of the box ends
+the secant method on sqrt(D), all ends of all parameters at once; an interval that reaches a search bound ends
 there. Other optima inside the interval count too.
 """
 

@@ -5,7 +5,7 @@ model's output (1/sigma^2 for normal noise), and G = d(the user's parameters)/d(
 
     cov = N / (N - d) G (J^T W J)^-1 G^T.
 
-A coordinate at a side of its box counts as known if it has an effect; it and a direction without effect have no
+A coordinate at its search bound counts as known if it has an effect; it and a direction without effect have no
 standard error. The condition number is that of W^(1/2) J with columns of length one.
 """
 

@@ -109,7 +109,7 @@ def camera_measures(loops: Sequence[CameraLoop]) -> list[dict[str, Any]]:
 
 
 class _Cameras:
-    """What both references have in common: a controller for every camera, searched near those of its neighbours."""
+    """Base of both references: a controller for every camera, searched near those of its neighbours."""
 
     name: str
     unit: float  # of time [s]

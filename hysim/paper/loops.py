@@ -172,7 +172,7 @@ def _on_equation_1() -> list[HysteresisCase]:
 
 
 def _longer_search(task: Task, seed: int) -> Found:
-    """Where seeds differ: by some percent on (1), by hundredths for steps of (4) within the supply."""
+    """Search from one of several seeds, whose results differ by some percent on (1), by hundredths for steps of (4)."""
     return search(task, generations=40, polish=600, seed=seed)
 
 

@@ -287,7 +287,7 @@ def printed_choices() -> tuple[PrintedFit, ...]:
 def aliased_fit() -> float:
     """Fit [%] to Table 1 of four poles and a zero whose poles lie beyond the Nyquist rate; from rest, start of hold.
 
-    Samples cannot tell such poles from slower ones, so that `identify` leaves them out.
+    At the samples such poles look like slower ones, so that `identify` leaves them out.
     """
     record = table1()
     structure = TransferFunction.structure(poles=4, zeros=1, sample="start")

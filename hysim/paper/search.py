@@ -100,7 +100,7 @@ class Found:
 
     @property
     def searched(self) -> str:
-        """What was searched, in words."""
+        """Extent of the search, in words."""
         return (
             f"Searched: {self.controllers} PIDs, kp G(0) 0.001 to 1000, Ti 0.01 to 100, Td 0.001 to 100, filter 0.0001 "
             f"to 10 Td, both weights 0 to 1, maximum sensitivity at most {self.bound:g}, and "
@@ -132,7 +132,7 @@ class Robustness:
         return max(0.0, min(max(first, second / spare) / bound - 1.0, _UNSTABLE))
 
     def roughly(self, controller: PID, bound: float, margin: float) -> float:
-        """The same on a grid of frequencies, four times as fast."""
+        """Both sensitivities on a grid of frequencies, four times as fast."""
         worst = 0.0
         for loop, most in zip(self.loops, (bound, WITH_DELAY * bound), strict=False):
             response = loop.response(controller)

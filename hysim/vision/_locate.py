@@ -26,7 +26,7 @@ _OVERLAP = 0.5  # of the region's length, the least
 
 @dataclass(frozen=True)
 class Location:
-    """Where the region's content is in a frame, in rows and columns [pixel]; nan where it was not found.
+    """Place of the region's content in a frame, in rows and columns [pixel]; nan where it was not found.
 
     `quality` is the correlation, `sharpness` the curvature of its peak over that of the reference with itself, and
     `overlap` the part of the region's length that both have.

@@ -1,4 +1,4 @@
-"""What the claims are computed from: the two tables, the models of Table 1, the closed loops."""
+"""Inputs of the claims: the two tables, the models of Table 1, the closed loops."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -78,7 +78,7 @@ class Claim:
 
 
 class Value(NamedTuple):
-    """What a claim's function returns.
+    """Result of a claim's function.
 
     Parameters
     ----------
