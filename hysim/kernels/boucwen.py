@@ -24,11 +24,24 @@ import numpy as np
 from hysim._frozen import FloatArray
 from hysim.kernels._compile import borrowed, inlined, inner, kernel
 from hysim.kernels.charts import N_WORK, in_chart, power_flow, prepare_exponent
-from hysim.kernels.elementary import N_AT_ONCE, N_ROWS, count_linear, linear_advance, linear_rows, quadratic_advance
+from hysim.kernels.elementary import (
+    DECAY_REACH,
+    N_AT_ONCE,
+    N_ROWS,
+    TANGENT_REACH,
+    count_linear,
+    linear_advance,
+    linear_rows,
+    quadratic_advance,
+    quadratic_flow,
+    short_flow,
+    short_tangent,
+)
 
 # The first places of a law's workspace: last u and z, for `step`; then w*, 1/w* and |a|/w* loading, and unloading.
 _LOADING, _UNLOADING = 2, 5
 _EXTREME = 690.0  # of |log w*|, beyond which one of the two terms counts as vanished, and of |log(A/c)| for a power
+_N_ALIKE = 2  # steps in one direction after another, from which on a run is tried: in noise it ends where it begins
 
 
 # ---------------------------------------------------------------------------------- scalar functions
@@ -119,28 +132,99 @@ def prepare_side(A: float, c: float, n: float, side: int, work: FloatArray) -> N
 def linear_path(A: float, beta: float, gamma: float, last_u: float, z: float, u: FloatArray, out: FloatArray) -> int:
     """Memory of n = 1 at the samples of `u` from (last_u, z) into `out`: the first sample that is not finite, or -1."""
     loading, unloading = beta + gamma, beta - gamma
-    for k in range(u.size):
+    k = n_alike = 0
+    last_du = 0.0
+    while k < u.size:
         du = u[k] - last_u
         z = z if du == 0.0 else linear_advance(z, du, A, loading, unloading)
         last_u = u[k]
         out[k] = z
         if not math.isfinite(z):
             return k
+        k += 1
+        n_alike = n_alike + 1 if du * last_du >= 0.0 else 0
+        last_du = du
+        if n_alike == _N_ALIKE:
+            n_alike = 0
+            k = linear_run(A, loading, unloading, du, u, out, k)
+            last_u, z = u[k - 1], out[k - 1]
     return -1
+
+
+@inlined
+def linear_run(A: float, loading: float, unloading: float, du: float, u: FloatArray, out: FloatArray, k: int) -> int:
+    """Go on from sample k - 1 while the input moves as by `du` and z keeps its sign: the first sample not reached.
+
+    The rate is the same for the whole run, so that a sample does not wait for the sign of the one before.
+    """
+    direction, last_u = math.copysign(1.0, du), u[k - 1]
+    along = direction * out[k - 1]
+    side = math.copysign(1.0, along)
+    rate = loading if along > 0.0 else unloading
+    if A == 0.0 or along == 0.0:
+        return k
+    while k < u.size:
+        length = direction * (u[k] - last_u)
+        if length != 0.0:
+            if not (length > 0.0 and abs(rate * length) <= DECAY_REACH):
+                break
+            along = short_flow(along, A, rate, length)
+            if not 0.0 < side * along < math.inf:
+                break
+            last_u = u[k]
+        out[k] = direction * along
+        k += 1
+    return k
 
 
 @kernel
 def quadratic_path(A: float, beta: float, gamma: float, last_u: float, z: float, u: FloatArray, out: FloatArray) -> int:
     """As `linear_path`, for n = 2."""
     loading, unloading = beta + gamma, beta - gamma
-    for k in range(u.size):
+    k = n_alike = 0
+    last_du = 0.0
+    while k < u.size:
         du = u[k] - last_u
         z = z if du == 0.0 else quadratic_advance(z, du, A, loading, unloading)
         last_u = u[k]
         out[k] = z
         if not math.isfinite(z):
             return k
+        k += 1
+        n_alike = n_alike + 1 if du * last_du >= 0.0 else 0
+        last_du = du
+        if n_alike == _N_ALIKE:
+            n_alike = 0
+            k = quadratic_run(A, loading, -unloading, du, u, out, k)
+            last_u, z = u[k - 1], out[k - 1]
     return -1
+
+
+@inlined
+def quadratic_run(A: float, loading: float, unloading: float, du: float, u: FloatArray, out: FloatArray, k: int) -> int:
+    """As `linear_run`, for n = 2."""
+    direction, last_u = math.copysign(1.0, du), u[k - 1]
+    along = direction * out[k - 1]
+    side = math.copysign(1.0, along)
+    rate = loading if along > 0.0 else unloading
+    if along == 0.0:
+        return k
+    while k < u.size:
+        length = direction * (u[k] - last_u)
+        if length != 0.0:
+            y = A * rate * length * length
+            if not (length > 0.0 and abs(y) <= TANGENT_REACH):
+                break
+            tangent = short_tangent(y, length)
+            if side * (along + A * tangent) <= 0.0:
+                break
+            along = quadratic_flow(along, A, rate, tangent)
+            if not 0.0 < side * along < math.inf:
+                break
+            last_u = u[k]
+        out[k] = direction * along
+        k += 1
+    return k
 
 
 @kernel

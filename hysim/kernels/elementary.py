@@ -65,7 +65,7 @@ def _tangent_series() -> list[float]:
 _DECAY = read_only([(-1.0) ** k / math.factorial(k + 1) for k in range(N_TERMS)])  # of (1 - exp(-x)) / x
 _TANGENT = read_only(_tangent_series())
 DECAY_REACH = 0.75  # the terms left out are below 3e-17 here
-_TANGENT_REACH = 0.2  # and below 5e-18 here
+TANGENT_REACH = 0.2  # and below 5e-18 here
 _LARGEST_EXPONENT = 709.0
 _SMALL = 2.0**-54
 _FAR = 4.0  # times the balance, or more: from there on a decay is not taken as a change
@@ -154,14 +154,20 @@ def quadratic_advance(z: float, du: float, A: float, loading: float, unloading: 
 def quadratic_tangent(A: float, k: float, length: float) -> float:
     """tanh(r L) / r, or tan(r L) / r, which is `inf` from its pole on."""
     y = A * k * length * length
-    if abs(y) <= _TANGENT_REACH:
-        return length * sum16(_TANGENT, 0, y)
+    if abs(y) <= TANGENT_REACH:
+        return short_tangent(y, length)
     r = math.sqrt(abs(A * k))
     x = r * length
     if y > 0.0:
         decay = math.exp(-2.0 * x)
         return (1.0 - decay) / ((1.0 + decay) * r)
     return math.tan(x) / r if x < 0.5 * math.pi else math.inf
+
+
+@inlined
+def short_tangent(y: float, length: float) -> float:
+    """As `quadratic_tangent`, for ``|y| = |A k| length^2`` up to TANGENT_REACH."""
+    return length * sum16(_TANGENT, 0, y)
 
 
 @inlined

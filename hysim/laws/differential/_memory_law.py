@@ -8,7 +8,8 @@ u is the input, z the memory, y the output; time has no part in it.
 
 from abc import abstractmethod
 from collections.abc import Callable
-from typing import ClassVar
+from functools import cached_property
+from typing import ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -88,7 +89,11 @@ class MemoryLaw(Law):
 
     def memory(self, u: npt.ArrayLike) -> FloatArray:
         """Memory z at the samples of `u`, shape (n_samples,); parameters and errors as in `response`."""
-        return self.assemble(self.memory_only).response(u)
+        return self._memory_as_output.response(u)
+
+    @cached_property
+    def _memory_as_output(self) -> Self:
+        return self.assemble(self.memory_only)
 
     def tangent(
         self, direction: npt.ArrayLike, z: npt.ArrayLike, u: npt.ArrayLike = 0.0, *others: npt.ArrayLike
