@@ -216,7 +216,7 @@ def quadratic_run(A: float, loading: float, unloading: float, du: float, u: Floa
             if not (length > 0.0 and abs(y) <= TANGENT_REACH):
                 break
             tangent = short_tangent(y, length)
-            if side * (along + A * tangent) <= 0.0:
+            if side * (along + A * tangent) <= 0.0:  # as `quadratic_advance` decides, to the last bit
                 break
             along = quadratic_flow(along, A, rate, tangent)
             if not 0.0 < side * along < math.inf:
