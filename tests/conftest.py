@@ -1,6 +1,7 @@
 """Settings of the whole test suite."""
 
 import contextlib
+import gc
 import hashlib
 import importlib
 import os
@@ -64,6 +65,15 @@ def pytest_collection(session):
             for file in sorted((ROOT / "tests").glob("test_*.py"), reverse=True):
                 with contextlib.suppress(Exception, pytest.skip.Exception):  # the collection reports them
                     importlib.import_module(file.stem)
+
+
+def pytest_collection_finish():
+    """Take what is loaded out of the collector's sight: each full collection would go through all kernels and tests.
+
+    The reader of films asks for one at the end of each file, and took seconds for it.
+    """
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_collection_modifyitems(items):
