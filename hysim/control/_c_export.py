@@ -341,7 +341,7 @@ def _law(draft: _Draft, inverse: Step) -> None:
         draft.places["level"] = 0.0
         draft.functions.append(pieces.LINE)
         return
-    if inverse is not boucwen_inverse.step:
+    if inverse not in (boucwen_inverse.step, boucwen_inverse.elementary_step):
         raise ValueError("the law has no inverse in C: it must be a Bouc-Wen law with n = 1, or a line")
     rising, A, beta, gamma, n, gain, offset, degree = draft.parameters.take(boucwen_inverse.N_HEAD).tolist()
     if n != 1.0:

@@ -38,6 +38,11 @@ def inlined(function: F) -> F:
     return _compiled(function, (), forceinline=True, **_NO_ENTRY)
 
 
+def pasted(function: F) -> F:
+    """As `inlined`, copied into its callers before these are compiled: it has no code of its own to make and link."""
+    return _compiled(function, (), inline="always", **_NO_ENTRY)
+
+
 def signed_kernel(*signatures: Any) -> Callable[[F], F]:
     """Compile a function for these signatures at once: what a typed function pointer needs."""
     return lambda function: _compiled(function, list(signatures))
@@ -73,7 +78,7 @@ def signed_inlined(*signatures: Any) -> Callable[[F], F]:
     return lambda function: _compiled(function, list(signatures), forceinline=True, **_NO_ENTRY)
 
 
-def _compiled(function: F, signatures: Sequence[Any] = (), **others: bool) -> F:
+def _compiled(function: F, signatures: Sequence[Any] = (), **others: Any) -> F:
     compiler: Any = numba.njit
     compiled: Any = compiler(nogil=True, error_model="numpy", **others)(function)
     is_compiled = isinstance(compiled, Dispatcher)  # and not the function, where numba is told to compile nothing

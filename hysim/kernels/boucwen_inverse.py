@@ -13,14 +13,16 @@ direction too, or the output would not determine the direction of the input. On 
 changes monotonically; with a linear P the ends of the stretch and the crossing of z = 0 therefore decide.
 With a polynomial a bound on P'' decides where it can, and a few points in between where it cannot.
 
-Layers: scalar functions, then `step` in the form in which loops take it; a path is `stepping.drive`.
+Layers: scalar functions, then `step` and `elementary_step` in the form in which loops take them; a path is
+`stepping.drive`. The scalar functions take `charts`, 1, or None for n = 1 and 2: they then move the law by its closed
+forms, and numba leaves out the charts of other exponents, which take most of the time to compile.
 """
 
 import math
 
 from hysim._frozen import FloatArray
 from hysim.kernels import boucwen
-from hysim.kernels._compile import borrowed, inner, kernel
+from hysim.kernels._compile import borrowed, inner, kernel, pasted
 from hysim.kernels.elementary import power
 from hysim.kernels.inverses import N_LIMITS, N_PLACE, within_limits
 
@@ -79,11 +81,14 @@ def rounding(y: float, u: float, z: float, parameters: FloatArray) -> float:
     return float(_EPSILON * (abs(y) + terms) + _SMALLEST)
 
 
-@inner
-def forward(u: float, z: float, target: float, parameters: FloatArray, memory: FloatArray) -> float:
+@pasted
+def forward(u: float, z: float, target: float, parameters: FloatArray, memory: FloatArray, charts: int | None) -> float:
     """Output after the input has moved from `u` to `target`; `memory` is then the law's state there."""
     memory[0], memory[1] = u, z
-    return boucwen.step(parameters[N_HEAD + int(parameters[7]) :], memory, target)
+    law = parameters[N_HEAD + int(parameters[7]) :]
+    if charts is not None:
+        return boucwen.step(law, memory, target)
+    return boucwen.linear_step(law, memory, target) if law[3] == 1.0 else boucwen.quadratic_step(law, memory, target)
 
 
 @inner
@@ -102,8 +107,10 @@ def lowest_slope(u: float, z: float, end: float, z_end: float, direction: float,
     return float(memory + 0.5 * (at_ends - bend))
 
 
-@inner
-def monotone(u: float, z: float, direction: float, parameters: FloatArray, state: FloatArray) -> bool:
+@pasted
+def monotone(
+    u: float, z: float, direction: float, parameters: FloatArray, state: FloatArray, charts: int | None
+) -> bool:
     """Whether the slope is positive from (u, z) to where the law's state stands; else `state` gets the place."""
     memory = state[N_OWN:]
     end, z_end = memory[0], memory[1]
@@ -111,7 +118,7 @@ def monotone(u: float, z: float, direction: float, parameters: FloatArray, state
         return True
     for k in range(_POINTS + 1):
         point = u + (end - u) * (k / _POINTS)
-        forward(u, z, point, parameters, memory)
+        forward(u, z, point, parameters, memory, charts)
         steepness = slope(point, memory[1], direction, parameters)
         if not steepness > 0.0:
             state[2], state[3] = point, parameters[0] * steepness
@@ -120,9 +127,16 @@ def monotone(u: float, z: float, direction: float, parameters: FloatArray, state
     return bool(parameters[7] > 1.0)
 
 
-@inner
+@pasted
 def solve(
-    u: float, z: float, y: float, direction: float, gap: float, parameters: FloatArray, state: FloatArray
+    u: float,
+    z: float,
+    y: float,
+    direction: float,
+    gap: float,
+    parameters: FloatArray,
+    state: FloatArray,
+    charts: int | None,
 ) -> bool:
     """Move the law's state in `direction` from (u, z), `gap` short of `y`, to where the output is `y`.
 
@@ -141,7 +155,7 @@ def solve(
     for _ in range(MAX_STEPS):
         if math.isinf(target):
             return False
-        error = upward * (forward(u, z, target, parameters, memory) - y)
+        error = upward * (forward(u, z, target, parameters, memory, charts) - y)
         steepness = slope(target, memory[1], direction, parameters)
         noise = max(at_start, rounding(y, target, memory[1], parameters))
         if abs(error) <= noise < math.inf:
@@ -167,6 +181,31 @@ def solve(
     return False
 
 
+@pasted
+def inverse(parameters: FloatArray, state: FloatArray, y: float, charts: int | None) -> float:
+    """`step` or `elementary_step`."""
+    parameters, state = borrowed(parameters), borrowed(state)
+    if y == state[1] and parameters[0] <= state[0] <= parameters[1]:
+        return float(state[0])
+    own, memory = parameters[N_LIMITS:], state[N_OWN:]
+    u, z = memory[0], memory[1]
+    upward = 1.0 if y > state[1] else -1.0
+    coefficients = own[N_HEAD : N_HEAD + int(own[7])]
+    gap = upward * (y - (own[6] + boucwen.polynomial(u, coefficients, 0) + own[5] * z))
+    direction, wanted = own[0] * upward, u
+    if not gap <= 0.0:
+        exists = solve(u, z, y, direction, gap, own, state, charts) and monotone(u, z, direction, own, state, charts)
+        wanted = memory[0] if exists else math.nan
+    end = within_limits(parameters, wanted, direction)
+    if end == wanted:
+        state[0], state[1] = wanted, y
+    elif math.isnan(end):
+        memory[0], memory[1] = u, z
+    else:
+        state[0], state[1] = end, forward(u, z, end, own, memory, charts)
+    return float(wanted)
+
+
 # ---------------------------------------------------------------------------------- one sample at a time
 
 
@@ -178,23 +217,10 @@ def step(parameters: FloatArray, state: FloatArray, y: float) -> float:
     c2, ..., parameters of `boucwen.step`). `state` is (u, y, input and slope at the place that has no inverse, state
     of `boucwen.step`).
     """
-    parameters, state = borrowed(parameters), borrowed(state)
-    if y == state[1] and parameters[0] <= state[0] <= parameters[1]:
-        return float(state[0])
-    own, memory = parameters[N_LIMITS:], state[N_OWN:]
-    u, z = memory[0], memory[1]
-    upward = 1.0 if y > state[1] else -1.0
-    coefficients = own[N_HEAD : N_HEAD + int(own[7])]
-    gap = upward * (y - (own[6] + boucwen.polynomial(u, coefficients, 0) + own[5] * z))
-    direction, wanted = own[0] * upward, u
-    if not gap <= 0.0:
-        exists = solve(u, z, y, direction, gap, own, state) and monotone(u, z, direction, own, state)
-        wanted = memory[0] if exists else math.nan
-    end = within_limits(parameters, wanted, direction)
-    if end == wanted:
-        state[0], state[1] = wanted, y
-    elif math.isnan(end):
-        memory[0], memory[1] = u, z
-    else:
-        state[0], state[1] = end, forward(u, z, end, own, memory)
-    return float(wanted)
+    return inverse(parameters, state, y, 1)
+
+
+@kernel
+def elementary_step(parameters: FloatArray, state: FloatArray, y: float) -> float:
+    """As `step` for n = 1 and 2, with the state of `boucwen.linear_step` in place of that of `boucwen.step`."""
+    return inverse(parameters, state, y, None)

@@ -115,8 +115,10 @@ def at_rest(law: Any, y: float) -> InverseState:
         raise ValueError(
             "the first output does not tell the first input, as the law has no slope beside its memory: give u0"
         )
-    shape = [0.0, 0.0, 0.0, 1.0, law.gain, law.offset]
-    forward = CompiledLaw(boucwen.step, read_only([*shape, *c]), np.append([0.0, law.z0], np.zeros(N_WORK - 2)))
+    # a memory that stands still, with the kernel that the law's own inverse takes
+    step, n, room = (boucwen.step, law.n, N_WORK) if law.step is boucwen.step else (boucwen.linear_step, 1.0, 2)
+    shape = [0.0, 0.0, 0.0, n, law.gain, law.offset]
+    forward = CompiledLaw(step, read_only([*shape, *c]), np.append([0.0, law.z0], np.zeros(room - 2)))
     last_y = forward.step(forward.parameters, forward.state, 0.0)
     static = _stepped(bool(c[0] > 0.0), shape, c, forward, [0.0, last_y], UNLIMITED)
     u = static.step(static.parameters, static.state, y)
@@ -142,7 +144,7 @@ def _stepped(
 ) -> CompiledLaw:
     head = [1.0 if increasing else -1.0, *shape, c.size]
     return CompiledLaw(
-        kernels.step,
+        kernels.step if forward.step is boucwen.step else kernels.elementary_step,
         read_only(np.concatenate([limits, head, c, forward.parameters]), finite=False),
         np.concatenate([[*place, np.nan, np.nan], forward.state]),
     )
