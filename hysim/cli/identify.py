@@ -48,7 +48,7 @@ COMMAND = Command(
 --fix NAME=VALUE...  parameter that is not free: n=1 [unit of the parameter]
 --free NAME...  parameter that is free, where it is fixed by default
 --bounds NAME=LOW:HIGH...  bounds of a parameter: beta=0:2 [unit of the parameter]
---initial free|rest|periodic  state at the first sample (default: the family's)
+--initial free|rest|still|periodic  state at the first sample (default: chosen by the BIC, or free)
 --noise gaussian|quantised|robust  noise of the output; quantised needs --resolution [default: gaussian]
 --intervals linear|profile|bootstrap  method of the 95 % intervals [default: linear]
 --cross-validate loo|cycles|K  leave out one sample at a time, one cycle, or one of K blocks

@@ -11,8 +11,9 @@ import numpy.typing as npt
 from hysim._blas import one_blas_thread
 from hysim._parallel import Progress, at_most
 from hysim.identification import _direct as direct
+from hysim.identification._assumptions import decided
 from hysim.identification._noise import Gaussian, Noise, Quantised, Robust
-from hysim.identification._problem import Problem, problem
+from hysim.identification._problem import Problem
 from hysim.identification._resampling import left_out_errors, rms_of_known
 from hysim.identification._result import Identification
 from hysim.identification._search import PERFECT, optima
@@ -56,9 +57,10 @@ def identify(
         since only the product of A and gain is determined.
     bounds : mapping, optional
         Name to (lower, upper), in place of the family's own box.
-    initial : {"free", "rest", "periodic"}, or one of them for each record, optional
-        Whether the state at the first sample is identified, is rest, or is that of a steady cycle; by default free for
-        a memory, and as the structure says for a transfer function.
+    initial : {"free", "rest", "still", "periodic"}, or one of them for each record, optional
+        Whether the state at the first sample is identified, is rest at zero, is that of an input which stood still at
+        its first value, or is what the cycle leaves behind with which the record begins. By default a single memory is
+        free; for sums of plays, stops or relays and for transfer functions the BIC decides, and `message` says how.
     noise : {"gaussian", "quantised", "robust"}
         Normal noise; normal noise before a sensor that rounds to multiples of `Record.resolution`; or Student's t with
         4 degrees of freedom, for records with outliers.
@@ -109,11 +111,13 @@ def identify(
             doubt = swapped_columns(records)
         else:
             family = _family(model_or_class)
-            least_squares = problem(family, records, options, initial)
-            fit = _searched(least_squares, noise, intervals, left_out(cross_validate, records), seed, progress)
+            choice = decided(family, records, options, initial)
+            fit = _searched(choice.problem, noise, intervals, left_out(cross_validate, records), seed, progress)
+            if choice.sentence:
+                fit = replace(fit, message=f"{fit.message}; {choice.sentence}")
             doubt = swapped_columns(records)
             if not doubt and not needs_time(fit.model):
-                doubt = swapped_for(family, records, options, initial, 1.0 - fit.fit_percent / 100.0)
+                doubt = swapped_for(choice.problem.family, records, options, initial, 1.0 - fit.fit_percent / 100.0)
         return replace(fit, warnings=(*fit.warnings, doubt)) if doubt else fit
 
 

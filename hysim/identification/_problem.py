@@ -18,8 +18,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
+from hysim._repeats import repeated_cycle
 from hysim.models.protocols import Identifiable
-from hysim.models.search_space import Freedom, Parameters, SearchSpace
+from hysim.models.search_space import STATES, STATES_IN_WORDS, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
 _CHUNK = 200_000  # samples that are evaluated at once, to bound the memory
@@ -27,8 +28,6 @@ _LARGEST = 1e150  # beyond it squares overflow: such a set counts as one that ha
 _RANK = 1e-11  # singular values of the normalised columns below this are taken as zero
 _TURN = 0.01  # of the span: smaller reversals are noise, or change little
 _DIFFERENCE = 1e-6  # step of a central difference in units of the box: truncation and rounding both ~1e-10
-
-STATES = ("free", "rest", "periodic")
 
 
 @dataclass(frozen=True)
@@ -38,7 +37,7 @@ class Part:
     record: Record
     coordinates: npt.NDArray[np.intp]  # -1 for a coordinate of the state that this record does not have
     linear: npt.NDArray[np.intp]
-    periodic: bool
+    before: Record | None  # what ran ahead of the first sample, where the state is what it leaves behind
     names: Mapping[str, str]  # the family's names of the state to those of the problem
 
 
@@ -127,8 +126,8 @@ class Problem:
         for k, part in enumerate(self.parts):
             samples = slice(self.cuts[k], self.cuts[k + 1])
             parameters = self.parameters(x, k)
-            missing = [~np.isfinite(parameters[name]) for name in self.own.state if part.periodic]
-            parameters |= {name: np.nan_to_num(parameters[name]) for name in self.own.state if part.periodic}
+            missing = [~np.isfinite(parameters[name]) for name in self.own.state if part.before]
+            parameters |= {name: np.nan_to_num(parameters[name]) for name in self.own.state if part.before}
             with np.errstate(over="ignore", invalid="ignore"):
                 regressors = self.family.regressors(parameters, part.record)
                 if regressors.shape[-1] != len(self.own.columns) + 1:
@@ -136,7 +135,7 @@ class Problem:
                 fixed_part[:, samples] = regressors[..., -1]
                 for place, name in enumerate(self.own.columns):
                     if name in self.own.held:
-                        steady = part.periodic and name in self.own.state
+                        steady = part.before is not None and name in self.own.state
                         value = parameters[name][:, np.newaxis] if steady else self.own.held[name]
                         fixed_part[:, samples] += value * regressors[..., place]
             for diverged in missing:  # there is no steady cycle
@@ -151,7 +150,7 @@ class Problem:
         """The family's parameters, (n_sets,) each, for the record `k`; those that are linear are left out."""
         part = self.parts[k]
         parameters = self._decoded(x, part)
-        return _steady(self.family, parameters, part.record) if part.periodic and self.own.state else parameters
+        return _steady(self.family, parameters, part.before) if part.before and self.own.state else parameters
 
     def _decoded(self, x: FloatArray, part: Part) -> dict[str, FloatArray]:
         present = part.coordinates >= 0
@@ -237,8 +236,15 @@ def problem(
     own = family.search_space(widest, replace(freedom, initial=shared))
     if len(records) == 1:
         every = np.arange(len(own.coordinates)), np.arange(len(own.linear))
-        return Problem(family, own, own, (Part(records[0], *every, kinds[0] == "periodic", {}),))
+        return Problem(family, own, own, (Part(records[0], *every, _before(records[0], kinds[0]), {}),))
     return _together(family, own, records, kinds)
+
+
+def _before(record: Record, kind: str | None) -> Record | None:
+    """What ran ahead of the first sample: the cycle that the record repeats, by default all of it, or no motion."""
+    if kind == "still":
+        return replace(record[:2], u=np.repeat(record.u[:1], 2))
+    return record[: repeated_cycle(record.u)] if kind == "periodic" else None
 
 
 def _kinds(initial: str | Sequence[str] | None, n: int) -> list[str | None]:
@@ -247,7 +253,7 @@ def _kinds(initial: str | Sequence[str] | None, n: int) -> list[str | None]:
         raise ValueError(f"initial must be one word, or one for each of the {n} records, got {initial!r}")
     for kind in kinds:
         if kind not in (STATES if initial is not None else (None,)):
-            raise ValueError(f'initial must be "free", "rest" or "periodic", got {kind!r}')
+            raise ValueError(f"initial must be {STATES_IN_WORDS}, got {kind!r}")
     return kinds
 
 
@@ -271,7 +277,7 @@ def _together(
             record=record,
             coordinates=np.array([_place(order, k, place) for place in range(len(own.coordinates))], dtype=np.intp),
             linear=np.array([_place(linear, k, name) for name in own.linear], dtype=np.intp),
-            periodic=kinds[k] == "periodic",
+            before=_before(record, kinds[k]),
             names={name: f"{name}[{k}]" for name in states} if k in with_own else {},
         )
         for k, record in enumerate(records)
