@@ -428,10 +428,10 @@ def even_step(t: FloatArray) -> float:
     digit = last_digit(t)
     if (error <= _EVEN * step).all() or (digit <= _COARSEST * step and (error <= _ROUNDED * digit).all()):
         return step
+    usual = f"{float(np.median(steps)):.4g}"
     raise ValueError(
         f"the time must be evenly spaced, got steps from {steps.min()} to {steps.max()}: pass "
-        f"record.resample({float(np.median(steps)):.4g}), or t = step * np.arange(n) if only the time stamps are wrong; "
-        f"on the command line --sample-time {float(np.median(steps)):.4g}"
+        f"record.resample({usual}), or t = {usual} * np.arange(n) if only the time stamps are wrong; on the command line --sample-time {usual}"
     )
 
 
