@@ -431,7 +431,8 @@ def even_step(t: FloatArray) -> float:
     usual = f"{float(np.median(steps)):.4g}"
     raise ValueError(
         f"the time must be evenly spaced, got steps from {steps.min()} to {steps.max()}: pass "
-        f"record.resample({usual}), or t = {usual} * np.arange(n) if only the time stamps are wrong; on the command line --sample-time {usual}"
+        f"record.resample({usual}), or t = {usual} * np.arange(n) if only the time stamps are wrong; on the command "
+        f"line --sample-time {usual}"
     )
 
 

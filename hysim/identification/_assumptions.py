@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hysim._frozen import FloatArray
+from hysim._input_noise import input_noise, quiet_path
 from hysim._repeats import repeated_cycle
 from hysim.errors import SimulationError
 from hysim.identification._problem import Problem, problem
@@ -56,11 +57,47 @@ class _Trial(NamedTuple):
     bic: float
 
 
-def decided(family: Any, records: Sequence[Record], freedom: Freedom, initial: str | Sequence[str] | None) -> Decision:
+def quiet_where_better(
+    family: Any, records: Sequence[Record], freedom: Freedom, initial: str | Sequence[str] | None
+) -> tuple[Sequence[Record], str]:
+    """The records, and a sentence where their inputs turn by noise and the family fits better along quiet paths."""
+    noises = [input_noise(record.u) for record in records]
+    if not any(noises):
+        return records, ""
+    quiet = [
+        replace(record, u=quiet_path(record.u, noise)) if noise else record
+        for record, noise in zip(records, noises, strict=True)
+    ]
+    try:
+        problem(family, [replace(record, t=None) for record in records], freedom, initial)
+        as_measured, along_path = (
+            brief_optimum(problem(family, each, freedom, initial))[1] for each in (records, quiet)
+        )
+    except (ValueError, ArithmeticError, SimulationError):  # a family that depends on time filters noise itself
+        return records, ""
+    if not along_path < as_measured:
+        return records, ""
+    turns = ", ".join(
+        f"{record.reversals().size} of {raw.reversals().size}" for record, raw in zip(quiet, records, strict=True)
+    )
+    size = ", ".join(f"{noise:.2g}" for noise in noises)
+    return quiet, (
+        f"the input has noise of about {size} rms: only the {turns} reversals above it are used, and the input is "
+        "monotone between them"
+    )
+
+
+def decided(
+    family: Any,
+    records: Sequence[Record],
+    freedom: Freedom,
+    initial: str | Sequence[str] | None,
+    weights: Sequence[FloatArray] | None = None,
+) -> Decision:
     """The problem of a family on these records; `initial` and `freedom` are the user's, and are kept."""
     given: Any = family
     if not isinstance(family, Undecided):
-        return Decision(problem(given, records, freedom, initial), initial, "")
+        return Decision(problem(given, records, freedom, initial).weighted(weights), initial, "")
     states: list[str | Sequence[str] | None] = [initial]
     if initial is None:
         plain = problem(given, records, freedom, None)
@@ -68,12 +105,12 @@ def decided(family: Any, records: Sequence[Record], freedom: Freedom, initial: s
         states = [None] if told else [*_possible(family, records)] or [None]
     variants = family.variants() or (Variant(family, ""),)
     if len(states) == len(variants) == 1:
-        return Decision(problem(variants[0].family, records, freedom, states[0]), states[0], "")
+        return Decision(problem(variants[0].family, records, freedom, states[0]).weighted(weights), states[0], "")
     trials: dict[tuple[int, int], _Trial] = {}
 
     def trial(state: int, variant: int) -> _Trial:
         if (state, variant) not in trials:
-            trials[state, variant] = _tried(variants[variant], records, freedom, states[state])
+            trials[state, variant] = _tried(variants[variant], records, freedom, states[state], weights)
         return trials[state, variant]
 
     widest = len(variants) - 1
@@ -98,9 +135,13 @@ def _possible(family: Undecided, records: Sequence[Record]) -> list[str]:
 
 
 def _tried(
-    variant: Variant, records: Sequence[Record], freedom: Freedom, initial: str | Sequence[str] | None
+    variant: Variant,
+    records: Sequence[Record],
+    freedom: Freedom,
+    initial: str | Sequence[str] | None,
+    weights: Sequence[FloatArray] | None,
 ) -> _Trial:
-    attempt = problem(variant.family, records, freedom, initial)
+    attempt = problem(variant.family, records, freedom, initial).weighted(weights)
     try:
         x, cost = brief_optimum(attempt)
         bic = _bic(attempt, x, cost)
@@ -110,7 +151,7 @@ def _tried(
 
 
 def _bic(attempt: Problem, x: FloatArray, cost: float) -> float:
-    n, d = attempt.y.size, len(attempt.space.names)
+    n, d = attempt.n_samples, len(attempt.space.names)
     if not math.isfinite(cost) or n <= d:
         return math.inf
     if attempt.space.bounds:

@@ -57,7 +57,7 @@ class Descent:
     ) -> Reached:
         """Descend from `theta` (n_sets, n_theta) until a step lowers the loss by less than `tolerance`."""
         targets, weights = (np.broadcast_to(each, (len(theta), each.shape[1])) for each in (self.targets, self.weights))
-        sets = _Sets(self, targets, weights, constraint)
+        sets = _Sets(self, targets, weights * self.problem.weights, constraint)
         theta = np.clip(theta, *self.box())
         if constraint is not None:
             theta = self.restored(theta, constraint, self.pivots(theta, constraint)[0])

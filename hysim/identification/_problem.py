@@ -39,6 +39,7 @@ class Part:
     linear: npt.NDArray[np.intp]
     before: Record | None  # what ran ahead of the first sample, where the state is what it leaves behind
     names: Mapping[str, str]  # the family's names of the state to those of the problem
+    weights: FloatArray | None = None  # (n_samples,), those of all records with a mean of one; None for equal ones
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,18 @@ class Problem:
         return np.concatenate([part.record.y for part in self.parts])
 
     @cached_property
+    def weights(self) -> FloatArray:
+        """Weight of each sample in the sum of squares (n_samples,), zero for one that is left out."""
+        return np.concatenate(
+            [np.ones(len(part.record)) if part.weights is None else part.weights for part in self.parts]
+        )
+
+    @property
+    def n_samples(self) -> int:
+        """Number of samples that are not left out."""
+        return int(np.count_nonzero(self.weights))
+
+    @cached_property
     def scale(self) -> float:
         """Size of the outputs [unit of y]."""
         return float(np.abs(self.y).max()) or 1.0
@@ -75,7 +88,7 @@ class Problem:
         It is None where that saves less than half, or where the family depends on time. A rate-independent law passes
         through the same memories at the samples that remain, except for reversals of less than 1 % of the span.
         """
-        parts = tuple(replace(part, record=_thinned(part.record, samples)) for part in self.parts)
+        parts = tuple(_thinned(part, samples) for part in self.parts)
         short = replace(self, parts=parts)
         if 2 * sum(len(part.record) for part in parts) > self.y.size:
             return None
@@ -84,6 +97,15 @@ class Problem:
         except ValueError:  # the records have no time any more
             return None
         return short
+
+    def weighted(self, weights: Sequence[FloatArray] | None) -> "Problem":
+        """This problem with a weight for each sample of each record."""
+        if weights is None:
+            return self
+        every = np.concatenate(weights)
+        scale = np.count_nonzero(every) / float(every.sum())
+        parts = (replace(part, weights=scale * own) for part, own in zip(self.parts, weights, strict=True))
+        return replace(self, parts=tuple(parts))
 
     def completed(self, x: FloatArray) -> FloatArray:
         """Theta (n_sets, n_theta): the coordinates `x` and the best linear parameters."""
@@ -102,9 +124,15 @@ class Problem:
         return self.regression(columns, self.y - fixed_part)
 
     def regression(self, columns: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Linear parameters (n_sets, n_linear) and residuals (n_sets, n_samples), inf for a set that diverges."""
+        """Linear parameters (n_sets, n_linear) and residuals (n_sets, n_samples), inf for a set that diverges.
+
+        Residuals are multiplied by the roots of the weights.
+        """
         broken = ~((np.abs(columns) < _LARGEST).all(axis=(1, 2)) & (np.abs(target) < _LARGEST).all(axis=1))
         columns[broken], target[broken] = 0.0, 0.0
+        if any(part.weights is not None for part in self.parts):
+            root = np.sqrt(self.weights)
+            columns, target = columns * root[:, np.newaxis], target * root
         linear = self._regress(columns, target)
         residual = target - (columns @ linear[..., np.newaxis])[..., 0]
         residual[broken] = np.inf
@@ -219,11 +247,13 @@ class Problem:
         return lower, upper
 
 
-def _thinned(record: Record, samples: int) -> Record:
+def _thinned(part: Part, samples: int) -> Part:
     """Ends, reversals and about `samples` others, without the times."""
+    record = part.record
     evenly = np.linspace(0, len(record) - 1, min(samples, len(record))).round().astype(np.intp)
     chosen = np.union1d(evenly, record.reversals(tolerance=_TURN))
-    return Record(u=record.u[chosen], y=record.y[chosen], units=record.units, resolution=record.resolution)
+    short = Record(u=record.u[chosen], y=record.y[chosen], units=record.units, resolution=record.resolution)
+    return replace(part, record=short, weights=None if part.weights is None else part.weights[chosen])
 
 
 def problem(

@@ -39,7 +39,7 @@ class Uncertainty:
 
 def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> Uncertainty:
     """Covariance at `theta` (n_theta,) for the curvature of the loss (n_samples,)."""
-    space, n_samples = problem.space, problem.y.size
+    space, n_samples, curvature = problem.space, problem.n_samples, curvature * problem.weights
     n_names = len(space.names)
     if n_samples <= n_names:
         return _unknown(problem, theta, f"no standard errors: {n_samples} samples for {n_names} parameters")
