@@ -30,7 +30,9 @@ def run(options: argparse.Namespace) -> int:
         cross_validate=options.cross_validate or "auto",
         test=test,
         seed=options.seed,
-        progress=outputs.progress(),
+        progress=(shown := outputs.progress()),
+        max_evaluations=options.max_evaluations,
+        announce=outputs.announce if shown else None,
     )
     timings = options.timings
     files: outputs.Files = {
@@ -104,6 +106,7 @@ COMMAND = Command(
     samples, then 10)
 either --test FILE  another record with the same columns, for the test only
 or --test-cycles N  keep the last N cycles for the test
+--max-evaluations N  most parameter sets that the search of each model simulates; a fit that ends by it is partial
 {SEED}
 --timings  add the seconds of each fit to the tables
 --csv PATH  write the table; - writes it to the standard output, so too with the next two options

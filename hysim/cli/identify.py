@@ -21,7 +21,7 @@ def run(options: argparse.Namespace) -> int:
         free=tuple(options.free),
         bounds=dict(options.bounds),
         progress=outputs.progress(),
-        **outputs.fields_of(options, ("initial", "noise", "intervals", "cross_validate", "seed")),
+        **outputs.fields_of(options, ("initial", "noise", "intervals", "cross_validate", "max_evaluations", "seed")),
     )
     names = (
         "estimates", "stderr", "intervals", "interval_method", "free_names", "n_parameters", "noise", "sigma",
@@ -52,6 +52,7 @@ COMMAND = Command(
 --noise gaussian|quantised|robust  noise of the output; quantised needs --resolution [default: gaussian]
 --intervals linear|profile|bootstrap  method of the 95 % intervals [default: linear]
 --cross-validate loo|cycles|K  leave out one sample at a time, one cycle, or one of K blocks
+--max-evaluations N  most parameter sets that the search simulates; a fit that ends by it is partial
 {SEED}
 {MODEL_OUT}
 --plot LOOP.svg  draw the record and the model

@@ -93,8 +93,21 @@ def decided(
     freedom: Freedom,
     initial: str | Sequence[str] | None,
     weights: Sequence[FloatArray] | None = None,
+    max_evaluations: int | None = None,
 ) -> Decision:
     """The problem of a family on these records; `initial` and `freedom` are the user's, and are kept."""
+    choice = _decided(family, records, freedom, initial, weights, max_evaluations)
+    return choice._replace(problem=choice.problem.limited(max_evaluations))
+
+
+def _decided(
+    family: Any,
+    records: Sequence[Record],
+    freedom: Freedom,
+    initial: str | Sequence[str] | None,
+    weights: Sequence[FloatArray] | None,
+    max_evaluations: int | None,
+) -> Decision:
     given: Any = family
     if not isinstance(family, Undecided):
         return Decision(problem(given, records, freedom, initial).weighted(weights), initial, "")
@@ -107,10 +120,11 @@ def decided(
     if len(states) == len(variants) == 1:
         return Decision(problem(variants[0].family, records, freedom, states[0]).weighted(weights), states[0], "")
     trials: dict[tuple[int, int], _Trial] = {}
+    brief = None if max_evaluations is None else max_evaluations / (2 * (len(states) + len(variants)))
 
     def trial(state: int, variant: int) -> _Trial:
         if (state, variant) not in trials:
-            trials[state, variant] = _tried(variants[variant], records, freedom, states[state], weights)
+            trials[state, variant] = _tried(variants[variant], records, freedom, states[state], weights, brief)
         return trials[state, variant]
 
     widest = len(variants) - 1
@@ -140,8 +154,9 @@ def _tried(
     freedom: Freedom,
     initial: str | Sequence[str] | None,
     weights: Sequence[FloatArray] | None,
+    max_evaluations: float | None,
 ) -> _Trial:
-    attempt = problem(variant.family, records, freedom, initial).weighted(weights)
+    attempt = problem(variant.family, records, freedom, initial).weighted(weights).limited(max_evaluations)
     try:
         x, cost = brief_optimum(attempt)
         bic = _bic(attempt, x, cost)

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._blas import one_blas_thread
-from hysim._frozen import FloatArray, read_only
+from hysim._frozen import FloatArray, check_count, read_only
 from hysim._parallel import Progress, at_most
 from hysim.identification import _direct as direct
 from hysim.identification._assumptions import decided, quiet_where_better
@@ -38,6 +38,7 @@ def identify(
     intervals: str = "linear",
     cross_validate: str | int | None = None,
     weights: npt.ArrayLike | Sequence[npt.ArrayLike] | None = None,
+    max_evaluations: int | None = None,
     seed: int = 0,
     workers: int | None = None,
     progress: Progress | None = None,
@@ -74,6 +75,9 @@ def identify(
     weights : array, shape (n,), or one for each record, optional
         Weight of each sample in the sum of squares, not negative; 0 leaves a sample out. Only their ratios count, and
         the input of every sample is kept.
+    max_evaluations : int, optional
+        Number of parameter sets on the whole record that the search may simulate, about. A search that ends by it is
+        partial: `success` is False, and `message` says so.
     seed : int
         Seed of the starts and of random draws. The optimum does not depend on it.
     workers : int, optional
@@ -110,6 +114,8 @@ def identify(
     if not isinstance(seed, (int, np.integer)) or seed < 0:
         raise ValueError(f"seed must be an integer from 0 on, got {seed!r}")
     shares = _weights(weights, records)
+    if max_evaluations is not None:
+        check_count("max_evaluations", max_evaluations)
     with at_most(workers), one_blas_thread():
         if isinstance(model_or_class, Direct):
             direct.refuse(model_or_class, options, noise, intervals, shares)
@@ -118,11 +124,17 @@ def identify(
         else:
             family = _family(model_or_class)
             paths, noisy = quiet_where_better(family, records, options, initial)
-            choice = decided(family, paths, options, initial, shares)
+            choice = decided(family, paths, options, initial, shares, max_evaluations)
             fit = _searched(choice.problem, noise, intervals, left_out(cross_validate, records), seed, progress)
             fit = replace(fit, message="; ".join(filter(None, (fit.message, choice.sentence, noisy))))
             doubt = swapped_columns(records)
-            if not doubt and not needs_time(fit.model):
+            budget = choice.problem.budget
+            if budget is not None and (budget.cut or not fit.success):
+                stopped = (
+                    f"partial: the search stopped at max_evaluations={max_evaluations}, better parameters may exist"
+                )
+                fit = replace(fit, success=False, message=f"{stopped}; {fit.message}")
+            elif not doubt and not needs_time(fit.model):
                 doubt = swapped_for(choice.problem.family, records, options, initial, 1.0 - fit.fit_percent / 100.0)
         return replace(fit, warnings=(*fit.warnings, doubt)) if doubt else fit
 

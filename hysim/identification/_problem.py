@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim._repeats import repeated_cycle
+from hysim.identification._budget import Budget
 from hysim.models.protocols import Identifiable
 from hysim.models.search_space import STATES, STATES_IN_WORDS, Freedom, Parameters, SearchSpace
 from hysim.records import Record
@@ -50,6 +51,7 @@ class Problem:
     space: SearchSpace
     own: SearchSpace
     parts: tuple[Part, ...]
+    budget: Budget | None = None
 
     @property
     def n_x(self) -> int:
@@ -98,6 +100,12 @@ class Problem:
             return None
         return short
 
+    def limited(self, max_evaluations: float | None) -> "Problem":
+        """This problem with a budget of so many sets on the whole records."""
+        if max_evaluations is None:
+            return self
+        return replace(self, budget=Budget(max_evaluations * self.y.size))
+
     def weighted(self, weights: Sequence[FloatArray] | None) -> "Problem":
         """This problem with a weight for each sample of each record."""
         if weights is None:
@@ -113,7 +121,10 @@ class Problem:
         return np.concatenate([x, np.concatenate(linear)], axis=1)
 
     def costs(self, x: FloatArray) -> FloatArray:
-        return np.concatenate([np.sum(self._solve(x[part])[1] ** 2, axis=1) for part in self._chunks(len(x))])
+        """Sums of squares (n_sets,); those beyond the budget are infinite."""
+        n_sets = len(x) if self.budget is None else self.budget.sets(len(x), self.y.size)
+        known = [np.sum(self._solve(x[:n_sets][part])[1] ** 2, axis=1) for part in self._chunks(n_sets)]
+        return np.concatenate([*known, np.full(len(x) - n_sets, np.inf)])
 
     def _chunks(self, n_sets: int) -> list[slice]:
         size = max(1, _CHUNK // self.y.size)
@@ -148,6 +159,8 @@ class Problem:
 
     def split(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Columns (n_sets, n_samples, n_linear) of the free linear parameters, and the output without them."""
+        if self.budget is not None:
+            self.budget.take(len(x), self.y.size)
         n_linear = len(self.space.linear)
         columns = np.zeros((len(x), self.y.size, n_linear))
         fixed_part = np.empty((len(x), self.y.size))

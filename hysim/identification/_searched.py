@@ -68,6 +68,8 @@ class Search:
                 continue
             box = replace(space, lower=lower, upper=upper, starts=np.clip(space.starts, lower, upper), regions={})
             inside = replace(self, problem=replace(self.problem, space=box))
+            if self.problem.budget is not None and self.problem.budget.cut:
+                continue
             if squares := optima(inside.problem, seed=self.seed):
                 candidates[name] = inside.candidate(inside.likely(squares)[0].theta)
         return candidates
