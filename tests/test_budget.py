@@ -53,6 +53,7 @@ def test_a_comparison_marks_partial_results_and_says_which_runs():
     assert not table["bouc-wen"].success
     assert "partial" in table["bouc-wen"].message
     assert table["line"].success
+    assert "bouc-wen (partial)" in table.to_text()
     names.clear()
     chosen = hs.select([hs.BoucWen, hs.Line], RECORD, max_evaluations=200, announce=names.append)
     assert names == ["BoucWen", "Line"]

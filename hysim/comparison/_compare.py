@@ -5,7 +5,6 @@ simulated in free run and judged by the measures of `hysim.metrics`: the fit of 
 """
 
 import math
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Protocol, runtime_checkable
@@ -160,11 +159,11 @@ class _Protocol:
 
     def row(self, name: str, subject: Any) -> ComparisonRow | str:
         """The row of one subject, or the reason why there is none."""
-        begin, seconds = time.perf_counter(), math.nan
+        identified_here = _is_family(subject)
         if self.announce is not None:
             self.announce(name)
         try:
-            if _is_family(subject):
+            if identified_here:
                 subject = identify(
                     subject,
                     self.record,
@@ -172,14 +171,12 @@ class _Protocol:
                     max_evaluations=self.max_evaluations,
                     seed=self.seed,
                 )
-                seconds = time.perf_counter() - begin
-            return self._measured_row(name, subject, seconds)
+            return self._measured_row(name, subject, identified_here)
         except _FAILURES as error:
             return " ".join(str(error).split())
 
-    def _measured_row(self, name: str, subject: Any, seconds: float) -> ComparisonRow:
+    def _measured_row(self, name: str, subject: Any, identified_here: bool) -> ComparisonRow:
         record, measured, model = self.record, self.measured, _model_of(subject)
-        identified_here = math.isfinite(seconds)
         y = simulate(model, record.t, record.u).y
         loop, residual, rmse = _loop(model, record, y), record.y - y, metrics.rmse(record.y, y)
         fitted: dict[str, Any] = {"n_parameters": 0, "cv_rmse": rmse, "cv_residual": residual}
@@ -212,7 +209,6 @@ class _Protocol:
             loop=loop,
             test_fit_percent=test_fit,
             test_rmse=test_rmse,
-            seconds=seconds,
             **fitted,
         )
 
