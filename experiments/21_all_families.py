@@ -40,7 +40,6 @@ def rows_of(table: hs.Comparison) -> list[Row]:
             "rate_independent": row.is_rate_independent,
             "typical_ratio": typical.get(row.name, 1.0),
             "probability": table.probabilities.get(row.name),
-            "seconds": row.seconds,
         }
         for row in table.ranked()
     ]

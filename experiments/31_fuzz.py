@@ -74,7 +74,7 @@ COMMANDS = ("metrics",) * 6 + ("simulate",) * 6 + ("identify", "discover", "comp
     "plot", "sweep", "sweep", "reproduce", "",
 )  # fmt: skip
 NO_REPRODUCTION = ("--out loop.csv/in/the/way", "--out loop.csv", "--out", "--quick again", "--jsn", "loop.csv")
-LEFT_OUT = ("--help", "--version", "--processes", "--dask", "--intervals", "--timings", "--quick")
+LEFT_OUT = ("--help", "--version", "--processes", "--dask", "--intervals", "--quick")
 PATHS = ("out.json", "out.svg", "out.png", "out.pdf", "out.csv", "out.c", "none/out.json", "-", ".", "", "a\0b")
 WORDS = (
     "", "0", "1", "3", "-1", "2.5", "0.1", "nan", "inf", "1e999", "x", "u", "t", "y", "0,1", "1,0", "1,2", "3,0.5", ",",

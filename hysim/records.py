@@ -4,6 +4,7 @@ The sample axis is axis 0. A record never changes; a slice of it keeps its units
 """
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from itertools import pairwise
@@ -24,6 +25,11 @@ T = TypeVar("T", float, FloatArray)
 
 _MOST_SAMPLES = 100_000_000  # of a resampled record: 2.4 GB
 _ROUNDING = 1e-9  # of a number of steps
+_SAME_STEP = 1e-6  # of a step
+_EVEN = 1e-4  # of a step: largest error of an even time
+_COARSEST = 0.1  # of a step: largest last digit of times that may have been rounded
+_ROUNDED = 0.75  # of the last digit: half of it, and as much of the line's own
+_MOST_DIGITS = 8  # of a time that was written down
 
 
 @printed
@@ -119,7 +125,10 @@ class Record:
 
     @property
     def sample_time(self) -> float:
-        """Constant step of the time [``units["t"]``]; ValueError if the record has no time, or uneven steps."""
+        """Constant step of the time [``units["t"]``]; ValueError if the record has no time, or uneven steps.
+
+        Time stamps that are even but for the rounding of their digits are even.
+        """
         if self.t is None:
             raise ValueError("the record has no time: give t, or use a rate-independent law")
         return even_step(self.t)
@@ -398,21 +407,43 @@ def check_increasing(t: FloatArray) -> None:
 def even_step(t: FloatArray) -> float:
     """The constant step of increasing times, shape (n_samples,).
 
+    Times are even if they lie within 1e-4 of a step from multiples of one, or as near to them as the rounding of their
+    digits allows, where the last digit is at most a tenth of a step.
+
     Raises
     ------
     ValueError
-        If there are fewer than 2 samples, times do not increase, or steps differ by more than 1e-6 of their mean.
+        If there are fewer than 2 samples, times do not increase, or are not even.
     """
     if t.size < 2:
         raise ValueError(f"t must hold at least 2 samples, got {t.size}")
     check_increasing(t)
     steps = np.diff(t)
     mean = float(steps.mean())
-    if np.ptp(steps) > 1e-6 * mean:
-        raise ValueError(
-            f"the time must be evenly spaced, got steps from {steps.min()} to {steps.max()}: resample first"
-        )
-    return mean
+    if np.ptp(steps) <= _SAME_STEP * mean:
+        return mean
+    number = np.arange(t.size) - 0.5 * (t.size - 1)
+    step = float(number @ t) / float(number @ number)
+    error = np.abs(t - t.mean() - step * number)
+    digit = last_digit(t)
+    if (error <= _EVEN * step).all() or (digit <= _COARSEST * step and (error <= _ROUNDED * digit).all()):
+        return step
+    usual = f"{float(np.median(steps)):.4g}"
+    raise ValueError(
+        f"the time must be evenly spaced, got steps from {steps.min()} to {steps.max()}: pass "
+        f"record.resample({usual}), or t = {usual} * np.arange(n) if only the time stamps are wrong; on the command "
+        f"line --sample-time {usual}"
+    )
+
+
+def last_digit(values: FloatArray) -> float:
+    """The place of the last digit of numbers that were written down, such as 0.001; 0 where there is none."""
+    size = float(np.abs(values).max())
+    for place in range(_MOST_DIGITS):
+        digit = 10.0 ** (math.floor(math.log10(size)) - place) if size else 0.0
+        if digit and np.abs(values / digit - np.round(values / digit)).max() <= _SAME_STEP:
+            return digit
+    return 0.0
 
 
 def _scaled(values: T, power: int) -> T:

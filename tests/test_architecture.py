@@ -15,7 +15,12 @@ RANKS = (
     ("_names", "_release"),
     ("_frozen", "_atomic", "_blas", "_printing", "_versions", "errors"),  # they know nothing of hysteresis
     ("_cycles", "_resolution", "_prefixes"),  # the turning points of an input, the quantum of a sensor, units
-    ("_drift", "_excursions"),  # the drift between cycles, and cycles about a level of the input
+    (
+        "_drift",
+        "_excursions",
+        "_repeats",
+        "_input_noise",
+    ),  # drift between cycles, cycles about a level, and those that are repeated
     ("signals", "records", "metrics", "kernels", "_parallel"),
     ("datasets", "files", "models", "vision"),
     ("laws",),

@@ -252,7 +252,7 @@ def test_at_rest_the_law_starts_at_zero():
     record = hs.Record(u=PATH, y=GENERAL.response(PATH))
     held = {"feedthrough": 0.0, "offset": 0.0, "y0": 0.0}
     assert GENERAL.search_space(record, Freedom(initial="rest")).held == held
-    with pytest.raises(ValueError, match='initial must be "free", "rest" or "periodic"'):
+    with pytest.raises(ValueError, match='initial must be "free", "rest", "still" or "periodic"'):
         GENERAL.search_space(record, Freedom(initial="warm"))
     with pytest.raises(ValueError, match="no steady cycle"):
         hs.identify(GENERAL, record, initial="periodic")

@@ -184,7 +184,7 @@ def test_a_constant_output_parameter_that_cannot_be_told_is_nan():
         ({"free": ("alpha",)}, ValueError, "free names 'alpha'"),
         ({"bounds": {"beta": (1.0, 0.0)}}, ValueError, "lower < upper"),
         ({"bounds": {"A": (0.0, 1.0)}}, ValueError, "not free"),
-        ({"initial": "warm"}, ValueError, '"free", "rest" or "periodic"'),
+        ({"initial": "warm"}, ValueError, '"free", "rest", "still" or "periodic"'),
         ({"cross_validate": "lots"}, ValueError, "loo"),
         ({"cross_validate": 1}, ValueError, "from 2 to 52"),
         ({"fixed": {"n": 1.0}, "free": ("n",)}, ValueError, "both fixed and free"),

@@ -8,7 +8,7 @@ import pytest
 
 import hysim as hs
 from hysim.models.search_space import Freedom
-from hysim.plants.resampling import decimated, interpolated
+from hysim.plants.resampling import decimated, interpolated, interpolated_record
 
 COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
 needs_compiled = pytest.mark.skipif(not COMPILED, reason="millions of steps, which only compiled code does in time")
@@ -180,7 +180,7 @@ def test_decimation_is_the_filter_at_every_rth_sample():
         ({"oversampling": 20, "decimation": (2, 5)}, ValueError, "must multiply to the oversampling 20"),
         ({"initial": "periodic"}, ValueError, "takes a period in samples"),
         ({"period": 100}, ValueError, "takes a period in samples"),
-        ({"hold": "band-limited"}, ValueError, "interpolated by its spectrum"),
+        ({"hold": "band-limited", "period": 8}, ValueError, "takes a period in samples"),
     ],
 )
 def test_a_structure_that_does_not_fit_is_refused(given, error, message):
@@ -210,6 +210,31 @@ def test_a_record_that_cannot_be_identified_is_refused(rec, given, message):
 def test_a_force_taken_for_an_acceleration_is_refused():
     with pytest.raises(ValueError, match=r"not that of a mass on springs: .*check the sign of u and y"):
         hs.identify(structure(excitation="base"), from_rest())
+
+
+@needs_compiled
+def test_a_band_limited_record_from_rest_is_not_linear_between_its_samples():
+    rng, n, fine = np.random.default_rng(0), 400, 20
+    t = STEP / fine * np.arange(n * fine)
+    force = sum(np.sin(2.0 * np.pi * f * t + phase) for f, phase in rng.uniform([5, 0], [150, 6], (60, 2)))
+    begin = np.minimum(t / 0.05, 1.0)
+    force *= 40.0 / force.std() * begin**2 * (3.0 - 2.0 * begin)
+    y = plant(substeps=1).response(force, STEP / fine)
+    rec = record(force[::fine], y[::fine])
+    linear, limited = (
+        worst(hs.identify(structure(hold=hold, oversampling=20), rec, fixed={"n": 1.0}))
+        for hold in ("foh", "band-limited")
+    )
+    assert limited < 1e-4
+    assert linear > 50.0 * limited
+
+
+def test_a_record_is_continued_beyond_its_ends_before_it_is_interpolated():
+    t = np.arange(240) / 24.0
+    fine = np.sin(t) + 0.3 * np.cos(2.3 * t + 1.0)
+    assert interpolated_record(fine[::6], 6) == pytest.approx(fine[: 39 * 6 + 1], abs=1e-3)
+    assert np.array_equal(interpolated_record(fine, 1), fine)
+    assert np.isfinite(interpolated_record(np.zeros(5), 3)).all()
 
 
 def test_the_structure_knows_how_the_record_begins():

@@ -281,3 +281,41 @@ def test_pandas_columns_with_any_index_are_arrays():
     for times in (dates, dates.to_numpy(), dates.diff()):
         with pytest.raises(TypeError, match="t must be numbers, got dates or times: give seconds"):
             hs.Record(u=[0, 1], y=[0, 1], t=times)
+
+
+@pytest.mark.parametrize(
+    ("step", "decimals"), [(1.0 / 3.0, 4), (1.0 / 3.0, 2), (1.0 / 750.0, 4), (1.0 / 6400.0, 6), (0.7, 1)], ids=str
+)
+@pytest.mark.parametrize("begin", [0.0, 12.345])
+def test_times_rounded_to_their_digits_are_even(step, decimals, begin):
+    t = np.round(begin + step * np.arange(600), decimals)
+    assert hs.Record(u=t, y=t, t=t).sample_time == pytest.approx(step, rel=1e-4)
+
+
+def test_times_with_a_small_jitter_are_even():
+    t = 0.01 * (np.arange(300) + 5e-5 * np.random.default_rng(0).uniform(-1.0, 1.0, 300))
+    assert hs.Record(u=t, y=t, t=t).sample_time == pytest.approx(0.01, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "t",
+    [
+        np.round(np.arange(40) / 3.0, 0).cumsum() + np.arange(40.0),
+        np.append(np.arange(20.0), 20.02 + np.arange(20.0)),
+        np.round(0.01 * (np.arange(300) + 0.2 * np.sin(np.arange(300))), 4),
+    ],
+    ids=["growing steps", "a gap", "jitter beyond the digits"],
+)
+def test_times_that_are_not_even_say_what_to_pass(t):
+    with pytest.raises(ValueError, match=r"evenly spaced, .*: pass record.resample\(.*--sample-time"):
+        _ = hs.Record(u=t, y=t, t=t).sample_time
+
+
+def test_a_lag_takes_part_in_a_comparison_with_rounded_times():
+    t = np.round(np.arange(150) / 3.0, 4)
+    u = hs.signals.triangle(0.0, 1.0, cycles=3, samples_per_cycle=50)[:150]
+    y = hs.TransferFunction(num=(1.0,), den=(2.0, 1.0)).response(u, 1.0 / 3.0)
+    table = hs.compare(
+        {"lag": hs.TransferFunction.structure(poles=1, zeros=0)}, hs.Record(t=t, u=u, y=y), cross_validate=None
+    )
+    assert table["lag"].fit_percent > 99.99

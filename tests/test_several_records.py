@@ -57,7 +57,7 @@ def test_initial_must_fit_the_records():
     for initial in (("free",), ("free",) * 3, []):
         with pytest.raises(ValueError, match="one for each of the 2 records"):
             hs.identify(LAW, [record(), record()], initial=initial)
-    with pytest.raises(ValueError, match='"free", "rest" or "periodic", got \'warm\''):
+    with pytest.raises(ValueError, match='"free", "rest", "still" or "periodic", got \'warm\''):
         hs.identify(LAW, [record(), record()], initial=("free", "warm"))
     with pytest.raises(ValueError, match="got 3"):
         hs.identify(LAW, record(), initial=3)

@@ -221,7 +221,7 @@ def test_what_is_free_follows_the_structure_and_the_arguments():
     one = structure.search_space(record, Freedom(free=("x0[1]",), fixed={"num[1]": 2.0}, bounds={"num[0]": (0.0, 1.0)}))
     assert one.linear == ("num[0]", "x0[1]")
     assert dict(one.bounds) == {"num[0]": (0.0, 1.0)}
-    with pytest.raises(ValueError, match='"free", "rest" or "periodic"'):
+    with pytest.raises(ValueError, match='"free", "rest", "still" or "periodic"'):
         structure.search_space(record, Freedom(initial="warm"))
 
 
@@ -349,7 +349,9 @@ def test_a_fit_to_table_1_says_what_the_record_cannot_show():
 
 def test_a_record_that_shows_the_dynamics_has_no_note():
     record, _, _ = rao_garnier(1.0, 0)
-    assert hs.identify(hs.TransferFunction.structure(poles=2, zeros=1), record).message == "converged"
+    assert hs.identify(hs.TransferFunction.structure(poles=2, zeros=1), record).message == (
+        "converged; assumed rest at zero before the first sample (no other assumption has a clearly lower BIC)"
+    )
 
 
 def test_two_rates_or_steps_that_settle_show_a_lag():

@@ -30,17 +30,18 @@ def run(options: argparse.Namespace) -> int:
         cross_validate=options.cross_validate or "auto",
         test=test,
         seed=options.seed,
-        progress=outputs.progress(),
+        progress=(shown := outputs.progress()),
+        max_evaluations=options.max_evaluations,
+        announce=outputs.announce if shown else None,
     )
-    timings = options.timings
     files: outputs.Files = {
         options.out: lambda: _best(table, record),
-        options.csv: lambda: table.to_csv(timings=timings),
-        options.markdown: lambda: table.to_markdown(timings=timings) + "\n",
-        options.latex: lambda: table.to_latex(timings=timings) + "\n",
+        options.csv: lambda: table.to_csv(),
+        options.markdown: lambda: table.to_markdown() + "\n",
+        options.latex: lambda: table.to_latex() + "\n",
         options.plot: lambda: _picture(table),
     }
-    outputs.write(options, files, lambda: table.to_text(timings=timings), lambda: _document(table, timings))
+    outputs.write(options, files, lambda: table.to_text(), lambda: _document(table))
     return 0
 
 
@@ -68,7 +69,7 @@ def _best(table: "Comparison", record: "Record") -> str:
     return to_json(ranked[0].model, units=record.units)
 
 
-def _document(table: "Comparison", timings: bool) -> dict[str, Any]:
+def _document(table: "Comparison") -> dict[str, Any]:
     contrasts = {each.name: outputs.fields_of(each, _CONTRASTED) for each in table.contrasts}
     rows = [outputs.scalars(row) | contrasts.get(row.name, dict.fromkeys(_CONTRASTED)) for row in table.rows]
     return {
@@ -78,7 +79,7 @@ def _document(table: "Comparison", timings: bool) -> dict[str, Any]:
         "undecided": table.undecided,
         "verdict": table.verdict,
         "warnings": table.warnings,
-        "rows": [{name: value for name, value in row.items() if timings or name != "seconds"} for row in rows],
+        "rows": rows,
         "failed": table.failed,
     }
 
@@ -104,8 +105,8 @@ COMMAND = Command(
     samples, then 10)
 either --test FILE  another record with the same columns, for the test only
 or --test-cycles N  keep the last N cycles for the test
+--max-evaluations N  most parameter sets that the search of each model simulates; a fit that ends by it is partial
 {SEED}
---timings  add the seconds of each fit to the tables
 --csv PATH  write the table; - writes it to the standard output, so too with the next two options
 --markdown PATH  write the table in Markdown
 --latex PATH  write the table in LaTeX

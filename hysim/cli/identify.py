@@ -21,7 +21,7 @@ def run(options: argparse.Namespace) -> int:
         free=tuple(options.free),
         bounds=dict(options.bounds),
         progress=outputs.progress(),
-        **outputs.fields_of(options, ("initial", "noise", "intervals", "cross_validate", "seed")),
+        **outputs.fields_of(options, ("initial", "noise", "intervals", "cross_validate", "max_evaluations", "seed")),
     )
     names = (
         "estimates", "stderr", "intervals", "interval_method", "free_names", "n_parameters", "noise", "sigma",
@@ -48,10 +48,11 @@ COMMAND = Command(
 --fix NAME=VALUE...  parameter that is not free: n=1 [unit of the parameter]
 --free NAME...  parameter that is free, where it is fixed by default
 --bounds NAME=LOW:HIGH...  bounds of a parameter: beta=0:2 [unit of the parameter]
---initial free|rest|periodic  state at the first sample (default: the family's)
+--initial free|rest|still|periodic  state at the first sample (default: chosen by the BIC, or free)
 --noise gaussian|quantised|robust  noise of the output; quantised needs --resolution [default: gaussian]
 --intervals linear|profile|bootstrap  method of the 95 % intervals [default: linear]
 --cross-validate loo|cycles|K  leave out one sample at a time, one cycle, or one of K blocks
+--max-evaluations N  most parameter sets that the search simulates; a fit that ends by it is partial
 {SEED}
 {MODEL_OUT}
 --plot LOOP.svg  draw the record and the model

@@ -20,13 +20,22 @@ OPTIONS = f"""
 transfer function:
 --poles N  number of poles
 --zeros N  number of zeros, at most that of the poles
---hold zoh|foh  input between samples: held (zoh) or linear (foh)
 --sample start|end  whether an output was read at the start or at the end of the hold
+
+transfer function and oscillator:
+--hold zoh|foh|band-limited  input between samples: held (zoh), linear (foh), or of an oscillator the sum of the lines
+    below half the record's rate
+
+oscillator: the model bouc-wen-oscillator
+--oversampling N  steps of the simulation between two samples
+--period N  samples of a period, with --initial periodic
+--excitation force|base  whether the input is a force, or the acceleration of the base
 """
 """The choice of a family and the options of its structure."""
 
 _SHORT = {"zhu-wang": "ZhuWangBoucWen", "baber-noori": "BoucWenBaberNoori"}
-_STRUCTURE = ("poles", "zeros", "hold", "sample")
+_OF_TRANSFER_FUNCTION = ("poles", "zeros", "hold", "sample")
+_OF_OSCILLATOR = ("hold", "oversampling", "period", "excitation")
 _NEEDED = ("poles", "zeros")
 
 
@@ -102,10 +111,15 @@ def to_identify(options: argparse.Namespace) -> Any:
     A ValueError is raised if there is no such model, an option belongs to another one, or one that this model needs is
     missing.
     """
-    structure = {name: vars(options)[name] for name in _STRUCTURE if vars(options)[name] is not None}
+    own = {"transfer-function": _OF_TRANSFER_FUNCTION, "bouc-wen-oscillator": _OF_OSCILLATOR}.get(options.model, ())
+    every = dict.fromkeys((*_OF_TRANSFER_FUNCTION, *_OF_OSCILLATOR))
+    structure = {name: vars(options)[name] for name in every if vars(options)[name] is not None}
+    if foreign := [name for name in structure if name not in own]:
+        raise ValueError(f"--{foreign[0]} is no option of the model {options.model}")
+    if options.model == "bouc-wen-oscillator":
+        begin, options.initial = options.initial, None  # its structure says how the record begins
+        return hysim.BoucWenOscillator.structure(**structure, **({} if begin is None else {"initial": begin}))
     if options.model != "transfer-function":
-        if structure:
-            raise ValueError(f"--{next(iter(structure))} is no option of the model {options.model}")
         return model_or_family(options.model)
     if missing := [name for name in _NEEDED if name not in structure]:
         raise ValueError(f"the model transfer-function needs --{missing[0]}")

@@ -184,6 +184,11 @@ def loop_of_model(record: "Record", model: Any) -> "Figure":
     return loop(record, Curve(run.u, run.y, run.t, type(model).__name__, run.units))
 
 
+def announce(name: str) -> None:
+    """The model whose turn begins, on the standard error behind the tasks done."""
+    print(f"\r\x1b[K{name} ...", end="", file=sys.stderr, flush=True)
+
+
 def progress() -> Callable[[int, int], None] | None:
     """Tasks done, their rate and the remaining time, on the standard error if that is a terminal.
 

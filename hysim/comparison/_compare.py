@@ -5,8 +5,7 @@ simulated in free run and judged by the measures of `hysim.metrics`: the fit of 
 """
 
 import math
-import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Protocol, runtime_checkable
 
@@ -39,9 +38,11 @@ def compare(
     *,
     cross_validate: str | int | None = "auto",
     test: Record | int | None = None,
+    max_evaluations: int | None = None,
     seed: int = 0,
     workers: int | None = None,
     progress: Progress | None = None,
+    announce: Callable[[str], None] | None = None,
 ) -> Comparison:
     """Compare models on a record.
 
@@ -59,12 +60,17 @@ def compare(
     test : Record or int, optional
         Data for no fit: another record, on which models that were identified here get a new initial state; or a number
         of last complete cycles of this one, on which the free run continues.
+    max_evaluations : int, optional
+        Most parameter sets that the search of each model simulates; see `identify`. `ComparisonRow.success` is False
+        for a model whose search ended by it, and `ComparisonRow.message` says so.
     seed : int
         Seed of the random starts of the searches.
     workers : int, optional
         Number of threads; by default one for each core. The result does not depend on it.
     progress : callable, optional
         Called as ``progress(done, total)`` after each model.
+    announce : callable, optional
+        Called as ``announce(name)`` when a model's turn begins, on the thread that works on it.
 
     Returns
     -------
@@ -93,7 +99,7 @@ def compare(
     training = trial.training if trial else record
     if cross_validate == "auto":
         cross_validate = "loo" if len(training) <= _SHORT else _BLOCKS
-    protocol = _Protocol(training, _last_loop(training), cross_validate, seed, trial)
+    protocol = _Protocol(training, _last_loop(training), cross_validate, seed, trial, max_evaluations, announce)
     names = list(subjects)
     results = map_on_threads(
         lambda k: protocol.row(names[k], subjects[names[k]]), len(names), workers=workers, progress=progress
@@ -148,21 +154,29 @@ class _Protocol:
     cross_validate: str | int | None
     seed: int
     trial: _Trial | None
+    max_evaluations: int | None
+    announce: Callable[[str], None] | None
 
     def row(self, name: str, subject: Any) -> ComparisonRow | str:
         """The row of one subject, or the reason why there is none."""
-        begin, seconds = time.perf_counter(), math.nan
+        identified_here = _is_family(subject)
+        if self.announce is not None:
+            self.announce(name)
         try:
-            if _is_family(subject):
-                subject = identify(subject, self.record, cross_validate=self.cross_validate, seed=self.seed)
-                seconds = time.perf_counter() - begin
-            return self._measured_row(name, subject, seconds)
+            if identified_here:
+                subject = identify(
+                    subject,
+                    self.record,
+                    cross_validate=self.cross_validate,
+                    max_evaluations=self.max_evaluations,
+                    seed=self.seed,
+                )
+            return self._measured_row(name, subject, identified_here)
         except _FAILURES as error:
             return " ".join(str(error).split())
 
-    def _measured_row(self, name: str, subject: Any, seconds: float) -> ComparisonRow:
+    def _measured_row(self, name: str, subject: Any, identified_here: bool) -> ComparisonRow:
         record, measured, model = self.record, self.measured, _model_of(subject)
-        identified_here = math.isfinite(seconds)
         y = simulate(model, record.t, record.u).y
         loop, residual, rmse = _loop(model, record, y), record.y - y, metrics.rmse(record.y, y)
         fitted: dict[str, Any] = {"n_parameters": 0, "cv_rmse": rmse, "cv_residual": residual}
@@ -195,7 +209,6 @@ class _Protocol:
             loop=loop,
             test_fit_percent=test_fit,
             test_rmse=test_rmse,
-            seconds=seconds,
             **fitted,
         )
 

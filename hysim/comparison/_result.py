@@ -61,8 +61,6 @@ class ComparisonRow:
         Message of the identification; empty for a model that was not identified here.
     warnings : tuple of str
         Warnings of the identification.
-    seconds : float
-        Duration of the identification, nan without one; not part of the equality of rows [s].
     """
 
     name: str
@@ -91,7 +89,6 @@ class ComparisonRow:
     success: bool = True
     message: str = ""
     warnings: tuple[str, ...] = ()
-    seconds: float = field(default=float("nan"), compare=False)
 
     def __str__(self) -> str:
         fit = "fit not defined" if math.isnan(self.fit_percent) else f"fit {self.fit_percent:.2f} %"

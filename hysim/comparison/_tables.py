@@ -22,7 +22,7 @@ class Column(NamedTuple):
     short: bool = True
 
 
-def columns(comparison: Any, *, timings: bool) -> list[Column]:
+def columns(comparison: Any) -> list[Column]:
     """The columns that this comparison can fill."""
     units = comparison.record.units
     u, y = (f" [{units[name]}]" if name in units else "" for name in ("u", "y"))
@@ -54,7 +54,6 @@ def columns(comparison: Any, *, timings: bool) -> list[Column]:
         Column("FPE", "fpe", 6, short=False),
         Column("rate independent", "is_rate_independent"),
         Column("rate deviation", "rate_deviation", 9, short=False),
-        *([Column("time [s]", "seconds", 1)] if timings else []),
         Column("converged", "success", short=False),
         Column("message", "message", short=False),
         Column("warnings", "warnings", short=False),
@@ -75,10 +74,9 @@ def rows(comparison: Any) -> list[dict[str, Any]]:
     return values
 
 
-def to_text(comparison: Any, *, timings: bool = True) -> str:
-    """The table for a terminal, and the verdict below it; `timings` adds the seconds of each fit."""
-    timings = timings and any(row.seconds == row.seconds for row in comparison.rows)
-    lines = aligned(_short(comparison, timings))
+def to_text(comparison: Any) -> str:
+    """The table for a terminal, and the verdict below it."""
+    lines = aligned(_short(comparison))
     notes = [f"not compared: {name}: {reason}" for name, reason in comparison.failed.items()] + [comparison.verdict]
     wrapped = [line for note in notes if note for line in folded(note, _WIDE, indent="  ")]
     warnings = [line for each in comparison.warnings for line in folded(each, _WIDE, "  ", "    ")]
@@ -93,7 +91,7 @@ def to_words(comparison: Any) -> str:
     unknown = [row.name for row in comparison.rows if math.isnan(row.cv_rmse)]
     by_name = {row["name"]: row for row in rows(comparison)}
     names = ("name", "n_parameters", "fit_percent", "rmse", "cv_rmse", "rmse_ratio", "max_width")
-    selected = [column for column in columns(comparison, timings=False) if column.name in names]
+    selected = [column for column in columns(comparison) if column.name in names]
     ordered = [by_name[name] for name in best + unknown]
     table = [["", *(column.heading for column in selected[1:])]]
     table += [[_printed(row[column.name], column.digits) for column in selected] for row in ordered[:_PRINTED]]
@@ -111,7 +109,7 @@ def to_words(comparison: Any) -> str:
 
 def to_html(comparison: Any) -> str:
     """The short table for a notebook, and the verdict."""
-    header, *body = ([html.escape(cell) for cell in cells] for cells in _short(comparison, timings=False))
+    header, *body = ([html.escape(cell) for cell in cells] for cells in _short(comparison))
     head = "".join(f"<th>{cell}</th>" for cell in header)
     lines = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>" for cells in body)
     listed = "".join(f"<li>{html.escape(each)}</li>" for each in comparison.warnings)
@@ -120,17 +118,17 @@ def to_html(comparison: Any) -> str:
     return f"<table><thead><tr>{head}</tr></thead><tbody>{lines}</tbody></table>{verdict}{warnings}"
 
 
-def to_markdown(comparison: Any, *, timings: bool = False) -> str:
-    """The table in Markdown; `timings` adds the seconds of each fit."""
-    header, *body = _short(comparison, timings)
+def to_markdown(comparison: Any) -> str:
+    """The table in Markdown."""
+    header, *body = _short(comparison)
     body += [[name, reason, *[""] * (len(header) - 2)] for name, reason in comparison.failed.items()]
     lines = [header, ["---", *("---:" for _ in header[1:])], *body]
     return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |" for cells in lines)
 
 
-def to_latex(comparison: Any, *, timings: bool = False) -> str:
-    """The table as a plain LaTeX tabular, which needs no package; `timings` adds the seconds of each fit."""
-    (header, *body), failed = _short(comparison, timings), comparison.failed.items()
+def to_latex(comparison: Any) -> str:
+    """The table as a plain LaTeX tabular, which needs no package."""
+    (header, *body), failed = _short(comparison), comparison.failed.items()
     spans = rf"\multicolumn{{{len(header) - 1}}}{{l}}"
     lines = [" & ".join(map(_escaped, cells)) for cells in body]
     lines += [rf"{_escaped(name)} & {spans}{{{_escaped(reason)}}}" for name, reason in failed]
@@ -138,28 +136,30 @@ def to_latex(comparison: Any, *, timings: bool = False) -> str:
     return "\n".join([*head, r"\hline", *(rf"{line} \\" for line in lines), r"\hline", r"\end{tabular}"])
 
 
-def to_csv(comparison: Any, *, timings: bool = False) -> str:
-    """Every measure as comma-separated values with all digits, nan as an empty cell; `timings` adds the seconds."""
-    table = to_columns(comparison, timings=timings)
+def to_csv(comparison: Any) -> str:
+    """Every measure as comma-separated values with all digits, nan as an empty cell."""
+    table = to_columns(comparison)
     return csv_text([table, *(map(_exact, row) for row in zip(*table.values(), strict=True))])
 
 
-def to_columns(comparison: Any, *, timings: bool) -> dict[str, list[Value | None]]:
+def to_columns(comparison: Any) -> dict[str, list[Value | None]]:
     """Heading to values; a model that could not be compared has its name and message only."""
     failed = [{"name": name, "success": False, "message": reason} for name, reason in comparison.failed.items()]
     every = [*rows(comparison), *failed]
-    return {column.heading: [row.get(column.name) for row in every] for column in columns(comparison, timings=timings)}
+    return {column.heading: [row.get(column.name) for row in every] for column in columns(comparison)}
 
 
-def to_frame(comparison: Any, *, timings: bool = False) -> Any:
-    """Every measure as a DataFrame of pandas, which must be installed, one row a model; `timings` adds the seconds."""
-    return optional("pandas", "to_frame", "tables").DataFrame(to_columns(comparison, timings=timings))
+def to_frame(comparison: Any) -> Any:
+    """Every measure as a DataFrame of pandas, which must be installed, one row a model."""
+    return optional("pandas", "to_frame", "tables").DataFrame(to_columns(comparison))
 
 
-def _short(comparison: Any, timings: bool) -> list[list[str]]:
+def _short(comparison: Any) -> list[list[str]]:
     """Headings and printed cells of the short columns, one row a model."""
-    selected = [column for column in columns(comparison, timings=timings) if column.short]
+    selected = [column for column in columns(comparison) if column.short]
     body = [[_printed(row[column.name], column.digits) for column in selected] for row in rows(comparison)]
+    for cells, row in zip(body, comparison.rows, strict=True):
+        cells[0] += "" if row.success else " (partial)"
     return [[column.heading for column in selected], *body]
 
 

@@ -21,6 +21,7 @@ from hysim.identification._problem import Problem
 from hysim.identification.marquardt import Flags, Sets, bounded_steps, descend
 
 N_STEPS = 60
+_TRIALS = 3  # sets that a step tries, for the budget
 _RESTORING = 12
 _ON_CONSTRAINT = 1e-11  # relative error of the constrained value
 _LARGEST = 1e150  # beyond it squares overflow
@@ -57,10 +58,12 @@ class Descent:
     ) -> Reached:
         """Descend from `theta` (n_sets, n_theta) until a step lowers the loss by less than `tolerance`."""
         targets, weights = (np.broadcast_to(each, (len(theta), each.shape[1])) for each in (self.targets, self.weights))
-        sets = _Sets(self, targets, weights, constraint)
+        sets = _Sets(self, targets, weights * self.problem.weights, constraint)
         theta = np.clip(theta, *self.box())
         if constraint is not None:
             theta = self.restored(theta, constraint, self.pivots(theta, constraint)[0])
+        if (budget := self.problem.budget) is not None:
+            steps = budget.steps(steps, len(theta) * (self.problem.n_x + _TRIALS), self.problem.y.size)
         reached = descend(sets, theta, tolerance=tolerance, steps=steps)
         return Reached(reached.x, reached.loss, reached.evaluated[2][:, 0], reached.at_rest)
 

@@ -20,10 +20,12 @@ from hysim.models.search_space import Freedom
 from hysim.records import Record
 
 
-def refuse(family: Direct, freedom: Freedom, noise: str, intervals: str) -> None:
+def refuse(family: Direct, freedom: Freedom, noise: str, intervals: str, weights: Sequence[FloatArray] | None) -> None:
     name = family.__name__ if isinstance(family, type) else type(family).__name__
     if freedom.fixed or freedom.free or freedom.bounds:
         raise ValueError(f"{name} has no parameters by name: leave out fixed=, free= and bounds=")
+    if weights is not None:
+        raise ValueError(f"{name} is fitted without weights: leave out weights=, and cut samples off the record")
     if noise != "gaussian":
         raise ValueError(f'{name} is fitted by least squares: noise must be "gaussian", got {noise!r}')
     if intervals != "linear":

@@ -9,10 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._blas import one_blas_thread
+from hysim._frozen import FloatArray, check_count, read_only
 from hysim._parallel import Progress, at_most
 from hysim.identification import _direct as direct
+from hysim.identification._assumptions import decided, quiet_where_better
 from hysim.identification._noise import Gaussian, Noise, Quantised, Robust
-from hysim.identification._problem import Problem, problem
+from hysim.identification._problem import Problem
 from hysim.identification._resampling import left_out_errors, rms_of_known
 from hysim.identification._result import Identification
 from hysim.identification._search import PERFECT, optima
@@ -35,6 +37,8 @@ def identify(
     noise: str = "gaussian",
     intervals: str = "linear",
     cross_validate: str | int | None = None,
+    weights: npt.ArrayLike | Sequence[npt.ArrayLike] | None = None,
+    max_evaluations: int | None = None,
     seed: int = 0,
     workers: int | None = None,
     progress: Progress | None = None,
@@ -56,9 +60,10 @@ def identify(
         since only the product of A and gain is determined.
     bounds : mapping, optional
         Name to (lower, upper), in place of the family's own box.
-    initial : {"free", "rest", "periodic"}, or one of them for each record, optional
-        Whether the state at the first sample is identified, is rest, or is that of a steady cycle; by default free for
-        a memory, and as the structure says for a transfer function.
+    initial : {"free", "rest", "still", "periodic"}, or one of them for each record, optional
+        Whether the state at the first sample is identified, is rest at zero, is that of an input which stood still at
+        its first value, or is what the cycle leaves behind with which the record begins. By default a single memory is
+        free; for sums of plays, stops or relays and for transfer functions the BIC decides, and `message` says how.
     noise : {"gaussian", "quantised", "robust"}
         Normal noise; normal noise before a sensor that rounds to multiples of `Record.resolution`; or Student's t with
         4 degrees of freedom, for records with outliers.
@@ -67,6 +72,12 @@ def identify(
     cross_validate : {None, "loo", "cycles", "records"} or int, optional
         What is left out at a time: an output sample, a cycle of the input (not the first), a record, or one of that
         many blocks of samples; the input is kept. Fills `Identification.cv_rmse` and `Identification.cv_residual`.
+    weights : array, shape (n,), or one for each record, optional
+        Weight of each sample in the sum of squares, not negative; 0 leaves a sample out. Only their ratios count, and
+        the input of every sample is kept.
+    max_evaluations : int, optional
+        Number of parameter sets on the whole record that the search may simulate, about. A search that ends by it is
+        partial: `success` is False, and `message` says so.
     seed : int
         Seed of the starts and of random draws. The optimum does not depend on it.
     workers : int, optional
@@ -82,7 +93,7 @@ def identify(
     ------
     ValueError
         If a name or an option is unknown, nothing is free, the record is too short for the parameters, its input
-        is constant, or it has no resolution for quantised noise.
+        is constant, it has no resolution for quantised noise, or weights are negative or of another length.
     TypeError
         If the first argument is not something that can be identified.
 
@@ -102,18 +113,29 @@ def identify(
         raise ValueError(f'noise must be "gaussian", "quantised" or "robust", got {noise!r}')
     if not isinstance(seed, (int, np.integer)) or seed < 0:
         raise ValueError(f"seed must be an integer from 0 on, got {seed!r}")
+    shares = _weights(weights, records)
+    if max_evaluations is not None:
+        check_count("max_evaluations", max_evaluations)
     with at_most(workers), one_blas_thread():
         if isinstance(model_or_class, Direct):
-            direct.refuse(model_or_class, options, noise, intervals)
+            direct.refuse(model_or_class, options, noise, intervals, shares)
             fit = direct.identified(model_or_class, records, left_out(cross_validate, records), seed)
             doubt = swapped_columns(records)
         else:
             family = _family(model_or_class)
-            least_squares = problem(family, records, options, initial)
-            fit = _searched(least_squares, noise, intervals, left_out(cross_validate, records), seed, progress)
+            paths, noisy = quiet_where_better(family, records, options, initial)
+            choice = decided(family, paths, options, initial, shares, max_evaluations)
+            fit = _searched(choice.problem, noise, intervals, left_out(cross_validate, records), seed, progress)
+            fit = replace(fit, message="; ".join(filter(None, (fit.message, choice.sentence, noisy))))
             doubt = swapped_columns(records)
-            if not doubt and not needs_time(fit.model):
-                doubt = swapped_for(family, records, options, initial, 1.0 - fit.fit_percent / 100.0)
+            budget = choice.problem.budget
+            if budget is not None and (budget.cut or not fit.success):
+                stopped = (
+                    f"partial: the search stopped at max_evaluations={max_evaluations}, better parameters may exist"
+                )
+                fit = replace(fit, success=False, message=f"{stopped}; {fit.message}")
+            elif not doubt and not needs_time(fit.model):
+                doubt = swapped_for(choice.problem.family, records, options, initial, 1.0 - fit.fit_percent / 100.0)
         return replace(fit, warnings=(*fit.warnings, doubt)) if doubt else fit
 
 
@@ -125,7 +147,7 @@ def _searched(
     seed: int,
     progress: Progress | None,
 ) -> Identification:
-    n_samples, n_names = problem.y.size, len(problem.space.names)
+    n_samples, n_names = problem.n_samples, len(problem.space.names)
     if not n_names:
         raise ValueError("every parameter is fixed: leave at least one free")
     if n_samples < n_names:
@@ -140,6 +162,23 @@ def _searched(
     result, likely = search.described(search.likely(squares), intervals, squares[0].x)
     errors = left_out_errors(problem, density, np.array([optimum.theta for optimum in likely]), folds)
     return replace(result, regions=search.regions(likely[0]), cv_residual=errors, cv_rmse=rms_of_known(errors))
+
+
+def _weights(weights: Any, records: Sequence[Record]) -> list[FloatArray] | None:
+    """One array of weights for each record."""
+    if weights is None:
+        return None
+    single = len(records) == 1 and np.ndim(weights[0]) == 0
+    shares = [read_only(each, "weights", ndim=1) for each in ([weights] if single else weights)]
+    if [each.size for each in shares] != [len(record) for record in records]:
+        raise ValueError(
+            f"weights must hold one number for each sample, {', '.join(str(len(record)) for record in records)}; "
+            f"got {', '.join(str(each.size) for each in shares)}"
+        )
+    every = np.concatenate(shares)
+    if (every < 0.0).any() or not every.any():
+        raise ValueError(f"weights must not be negative, and not all zero, got {every.min():g}")
+    return shares
 
 
 def _freedom(fixed: Mapping[str, float], free: Sequence[str], bounds: Mapping[str, tuple[float, float]]) -> Freedom:

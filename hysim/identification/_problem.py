@@ -18,8 +18,10 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
+from hysim._repeats import repeated_cycle
+from hysim.identification._budget import Budget
 from hysim.models.protocols import Identifiable
-from hysim.models.search_space import Freedom, Parameters, SearchSpace
+from hysim.models.search_space import STATES, STATES_IN_WORDS, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
 _CHUNK = 200_000  # samples that are evaluated at once, to bound the memory
@@ -27,8 +29,6 @@ _LARGEST = 1e150  # beyond it squares overflow: such a set counts as one that ha
 _RANK = 1e-11  # singular values of the normalised columns below this are taken as zero
 _TURN = 0.01  # of the span: smaller reversals are noise, or change little
 _DIFFERENCE = 1e-6  # step of a central difference in units of the box: truncation and rounding both ~1e-10
-
-STATES = ("free", "rest", "periodic")
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,9 @@ class Part:
     record: Record
     coordinates: npt.NDArray[np.intp]  # -1 for a coordinate of the state that this record does not have
     linear: npt.NDArray[np.intp]
-    periodic: bool
+    before: Record | None  # what ran ahead of the first sample, where the state is what it leaves behind
     names: Mapping[str, str]  # the family's names of the state to those of the problem
+    weights: FloatArray | None = None  # (n_samples,), those of all records with a mean of one; None for equal ones
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,7 @@ class Problem:
     space: SearchSpace
     own: SearchSpace
     parts: tuple[Part, ...]
+    budget: Budget | None = None
 
     @property
     def n_x(self) -> int:
@@ -59,6 +61,18 @@ class Problem:
     @cached_property
     def y(self) -> FloatArray:
         return np.concatenate([part.record.y for part in self.parts])
+
+    @cached_property
+    def weights(self) -> FloatArray:
+        """Weight of each sample in the sum of squares (n_samples,), zero for one that is left out."""
+        return np.concatenate(
+            [np.ones(len(part.record)) if part.weights is None else part.weights for part in self.parts]
+        )
+
+    @property
+    def n_samples(self) -> int:
+        """Number of samples that are not left out."""
+        return int(np.count_nonzero(self.weights))
 
     @cached_property
     def scale(self) -> float:
@@ -76,7 +90,7 @@ class Problem:
         It is None where that saves less than half, or where the family depends on time. A rate-independent law passes
         through the same memories at the samples that remain, except for reversals of less than 1 % of the span.
         """
-        parts = tuple(replace(part, record=_thinned(part.record, samples)) for part in self.parts)
+        parts = tuple(_thinned(part, samples) for part in self.parts)
         short = replace(self, parts=parts)
         if 2 * sum(len(part.record) for part in parts) > self.y.size:
             return None
@@ -86,13 +100,31 @@ class Problem:
             return None
         return short
 
+    def limited(self, max_evaluations: float | None) -> "Problem":
+        """This problem with a budget of so many sets on the whole records."""
+        if max_evaluations is None:
+            return self
+        return replace(self, budget=Budget(max_evaluations * self.y.size))
+
+    def weighted(self, weights: Sequence[FloatArray] | None) -> "Problem":
+        """This problem with a weight for each sample of each record."""
+        if weights is None:
+            return self
+        every = np.concatenate(weights)
+        scale = np.count_nonzero(every) / float(every.sum())
+        parts = (replace(part, weights=scale * own) for part, own in zip(self.parts, weights, strict=True))
+        return replace(self, parts=tuple(parts))
+
     def completed(self, x: FloatArray) -> FloatArray:
         """Theta (n_sets, n_theta): the coordinates `x` and the best linear parameters."""
         linear = [self._solve(x[part])[0] for part in self._chunks(len(x))]
         return np.concatenate([x, np.concatenate(linear)], axis=1)
 
     def costs(self, x: FloatArray) -> FloatArray:
-        return np.concatenate([np.sum(self._solve(x[part])[1] ** 2, axis=1) for part in self._chunks(len(x))])
+        """Sums of squares (n_sets,); those beyond the budget are infinite."""
+        n_sets = len(x) if self.budget is None else self.budget.sets(len(x), self.y.size)
+        known = [np.sum(self._solve(x[:n_sets][part])[1] ** 2, axis=1) for part in self._chunks(n_sets)]
+        return np.concatenate([*known, np.full(len(x) - n_sets, np.inf)])
 
     def _chunks(self, n_sets: int) -> list[slice]:
         size = max(1, _CHUNK // self.y.size)
@@ -103,9 +135,15 @@ class Problem:
         return self.regression(columns, self.y - fixed_part)
 
     def regression(self, columns: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Linear parameters (n_sets, n_linear) and residuals (n_sets, n_samples), inf for a set that diverges."""
+        """Linear parameters (n_sets, n_linear) and residuals (n_sets, n_samples), inf for a set that diverges.
+
+        Residuals are multiplied by the roots of the weights.
+        """
         broken = ~((np.abs(columns) < _LARGEST).all(axis=(1, 2)) & (np.abs(target) < _LARGEST).all(axis=1))
         columns[broken], target[broken] = 0.0, 0.0
+        if any(part.weights is not None for part in self.parts):
+            root = np.sqrt(self.weights)
+            columns, target = columns * root[:, np.newaxis], target * root
         linear = self._regress(columns, target)
         residual = target - (columns @ linear[..., np.newaxis])[..., 0]
         residual[broken] = np.inf
@@ -121,14 +159,16 @@ class Problem:
 
     def split(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Columns (n_sets, n_samples, n_linear) of the free linear parameters, and the output without them."""
+        if self.budget is not None:
+            self.budget.take(len(x), self.y.size)
         n_linear = len(self.space.linear)
         columns = np.zeros((len(x), self.y.size, n_linear))
         fixed_part = np.empty((len(x), self.y.size))
         for k, part in enumerate(self.parts):
             samples = slice(self.cuts[k], self.cuts[k + 1])
             parameters = self.parameters(x, k)
-            missing = [~np.isfinite(parameters[name]) for name in self.own.state if part.periodic]
-            parameters |= {name: np.nan_to_num(parameters[name]) for name in self.own.state if part.periodic}
+            missing = [~np.isfinite(parameters[name]) for name in self.own.state if part.before]
+            parameters |= {name: np.nan_to_num(parameters[name]) for name in self.own.state if part.before}
             with np.errstate(over="ignore", invalid="ignore"):
                 regressors = self.family.regressors(parameters, part.record)
                 if regressors.shape[-1] != len(self.own.columns) + 1:
@@ -136,7 +176,7 @@ class Problem:
                 fixed_part[:, samples] = regressors[..., -1]
                 for place, name in enumerate(self.own.columns):
                     if name in self.own.held:
-                        steady = part.periodic and name in self.own.state
+                        steady = part.before is not None and name in self.own.state
                         value = parameters[name][:, np.newaxis] if steady else self.own.held[name]
                         fixed_part[:, samples] += value * regressors[..., place]
             for diverged in missing:  # there is no steady cycle
@@ -151,7 +191,7 @@ class Problem:
         """The family's parameters, (n_sets,) each, for the record `k`; those that are linear are left out."""
         part = self.parts[k]
         parameters = self._decoded(x, part)
-        return _steady(self.family, parameters, part.record) if part.periodic and self.own.state else parameters
+        return _steady(self.family, parameters, part.before) if part.before and self.own.state else parameters
 
     def _decoded(self, x: FloatArray, part: Part) -> dict[str, FloatArray]:
         present = part.coordinates >= 0
@@ -220,11 +260,13 @@ class Problem:
         return lower, upper
 
 
-def _thinned(record: Record, samples: int) -> Record:
+def _thinned(part: Part, samples: int) -> Part:
     """Ends, reversals and about `samples` others, without the times."""
+    record = part.record
     evenly = np.linspace(0, len(record) - 1, min(samples, len(record))).round().astype(np.intp)
     chosen = np.union1d(evenly, record.reversals(tolerance=_TURN))
-    return Record(u=record.u[chosen], y=record.y[chosen], units=record.units, resolution=record.resolution)
+    short = Record(u=record.u[chosen], y=record.y[chosen], units=record.units, resolution=record.resolution)
+    return replace(part, record=short, weights=None if part.weights is None else part.weights[chosen])
 
 
 def problem(
@@ -237,8 +279,15 @@ def problem(
     own = family.search_space(widest, replace(freedom, initial=shared))
     if len(records) == 1:
         every = np.arange(len(own.coordinates)), np.arange(len(own.linear))
-        return Problem(family, own, own, (Part(records[0], *every, kinds[0] == "periodic", {}),))
+        return Problem(family, own, own, (Part(records[0], *every, _before(records[0], kinds[0]), {}),))
     return _together(family, own, records, kinds)
+
+
+def _before(record: Record, kind: str | None) -> Record | None:
+    """What ran ahead of the first sample: the cycle that the record repeats, by default all of it, or no motion."""
+    if kind == "still":
+        return replace(record[:2], u=np.repeat(record.u[:1], 2))
+    return record[: repeated_cycle(record.u)] if kind == "periodic" else None
 
 
 def _kinds(initial: str | Sequence[str] | None, n: int) -> list[str | None]:
@@ -247,7 +296,7 @@ def _kinds(initial: str | Sequence[str] | None, n: int) -> list[str | None]:
         raise ValueError(f"initial must be one word, or one for each of the {n} records, got {initial!r}")
     for kind in kinds:
         if kind not in (STATES if initial is not None else (None,)):
-            raise ValueError(f'initial must be "free", "rest" or "periodic", got {kind!r}')
+            raise ValueError(f"initial must be {STATES_IN_WORDS}, got {kind!r}")
     return kinds
 
 
@@ -271,7 +320,7 @@ def _together(
             record=record,
             coordinates=np.array([_place(order, k, place) for place in range(len(own.coordinates))], dtype=np.intp),
             linear=np.array([_place(linear, k, name) for name in own.linear], dtype=np.intp),
-            periodic=kinds[k] == "periodic",
+            before=_before(record, kinds[k]),
             names={name: f"{name}[{k}]" for name in states} if k in with_own else {},
         )
         for k, record in enumerate(records)

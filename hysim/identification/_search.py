@@ -66,16 +66,24 @@ def optima(problem: Problem, *, seed: int, progress: Progress | None = None) -> 
 
 def brief_cost(problem: Problem) -> float:
     """Sum of squares that a short search reaches; inf if every parameter set diverges."""
+    return brief_optimum(problem)[1]
+
+
+def brief_optimum(problem: Problem) -> tuple[FloatArray, float]:
+    """Coordinates (n_x,) at which a short search ends, and the sum of squares there; inf if every set diverges."""
     space = problem.space
     if not space.coordinates:
-        return float(problem.costs(np.empty((1, 0)))[0])
+        return np.empty(0), float(problem.costs(np.empty((1, 0)))[0])
     if problem.y.size > _LONG and (short := problem.thinned(_SHORT)) is not None:
-        return brief_cost(short) * problem.y.size / short.y.size
+        x, cost = brief_optimum(short)
+        return x, cost * problem.y.size / short.y.size
     screened = N_BRIEF_SCREENED if space.screened is None else min(space.screened, N_BRIEF_SCREENED)
     best = _starts(problem, screened, 0, N_BRIEF_DESCENDING)
     if not len(best):
-        return math.inf
-    return float(problem.costs(_descended(problem, best, exact=False).theta[:, : problem.n_x]).min())
+        return 0.5 * (space.lower + space.upper), math.inf
+    ends = _descended(problem, best, exact=False).theta[:, : problem.n_x]
+    costs = problem.costs(ends)
+    return ends[np.argmin(costs)], float(costs.min())
 
 
 def polish(problem: Problem, starts: FloatArray) -> list[Optimum]:

@@ -68,21 +68,23 @@ class Search:
                 continue
             box = replace(space, lower=lower, upper=upper, starts=np.clip(space.starts, lower, upper), regions={})
             inside = replace(self, problem=replace(self.problem, space=box))
+            if self.problem.budget is not None and self.problem.budget.cut:
+                continue
             if squares := optima(inside.problem, seed=self.seed):
                 candidates[name] = inside.candidate(inside.likely(squares)[0].theta)
         return candidates
 
     def candidate(self, theta: FloatArray) -> Candidate:
         problem = self.problem
-        parameters, residual = problem.estimates(theta), self.residual(theta)
+        parameters, residual, kept = problem.estimates(theta), self.residual(theta), problem.weights > 0.0
         own = () if len(problem.parts) == 1 else [name for name in problem.own.state if name not in problem.own.held]
         shared = {name: value for name, value in parameters.items() if name not in own}
         named = problem.named(theta[np.newaxis])[0].tolist()
         return Candidate(
             model=problem.family.assemble(parameters),
             estimates=shared | dict(zip(problem.space.names, named, strict=True)),
-            fit_percent=metrics.fit_percent(problem.y, problem.y - residual),
-            rmse=metrics.rmse(residual, 0.0 * residual),
+            fit_percent=metrics.fit_percent(problem.y[kept], (problem.y - residual)[kept]),
+            rmse=metrics.rmse(residual[kept], 0.0 * residual[kept]),
         )
 
     def residual(self, theta: FloatArray) -> FloatArray:
@@ -112,7 +114,7 @@ class Search:
         return uncertainty(self.problem, best.theta, self.noise.terms(residual, sigma).curvature[0])
 
     def _profiles(self, likely: list[LocalOptimum], known: Uncertainty) -> tuple[dict[str, Profile], FloatArray | None]:
-        n_samples, n_names = self.problem.y.size, len(self.problem.space.names)
+        n_samples, n_names = self.problem.n_samples, len(self.problem.space.names)
         if n_samples <= n_names:
             return {}, None
         limit = threshold(n_samples, n_names, LEVEL)
@@ -127,7 +129,11 @@ class Search:
 
         best, problem, names = likely[0], self.problem, self.problem.space.names
         residual, chosen = self.residual(best.theta), self.candidate(best.theta)
-        measures = fit_measures(problem.y, residual, len(names))
+        kept = problem.weights > 0.0
+        share = np.sqrt(problem.weights[kept])
+        measures = fit_measures(problem.y[kept], residual[kept], len(names))
+        by_weight = fit_measures(problem.y[kept], share * residual[kept], len(names))
+        measures |= {"fpe": by_weight["fpe"], "aic": by_weight["aic"], "bic": by_weight["bic"]}
         limit = float(chi2.ppf(LEVEL, len(names))) if names else 0.0
         rivals = tuple(self.candidate(each.theta) for each in likely[1:] if 2.0 * (each.loss - best.loss) < limit)
         stderr = dict(zip(names, np.sqrt(np.diag(known.covariance)).tolist(), strict=True))

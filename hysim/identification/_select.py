@@ -53,7 +53,7 @@ class Selection:
         criterion = CRITERIA[self.criterion]
         rows = [
             [
-                name,
+                name if fit.success else f"{name} (partial)",
                 str(fit.n_parameters),
                 "-" if math.isnan(fit.fit_percent) else f"{fit.fit_percent:.2f}",
                 f"{fit.rmse:.4g}",
@@ -73,9 +73,11 @@ def select(
     initial: str | Sequence[str] | None = None,
     noise: str = "gaussian",
     cross_validate: str | int | None = None,
+    max_evaluations: int | None = None,
     seed: int = 0,
     workers: int | None = None,
     progress: Progress | None = None,
+    announce: Callable[[str], None] | None = None,
 ) -> Selection:
     """Identify several candidates, and rank them.
 
@@ -89,10 +91,12 @@ def select(
     criterion : {"bic", "aic", "fpe", "cv_rmse"}
         Criterion of the ranking; the last needs `cross_validate`. Without noise the residual is rounding, and the
         others mean nothing.
-    initial, noise, cross_validate, seed, workers
-        As in `identify`, the same for all.
+    initial, noise, cross_validate, max_evaluations, seed, workers
+        As in `identify`, the same for all. A fit that ends by `max_evaluations` is marked as partial.
     progress : callable, optional
         Called as ``progress(done, total)`` after each candidate.
+    announce : callable, optional
+        Called as ``announce(name)`` before each candidate.
 
     Returns
     -------
@@ -119,12 +123,15 @@ def select(
     named, report = _named(candidates), progress or (lambda done, total: None)
     fits: dict[str, Identification] = {}
     for name, candidate in named.items():
+        if announce is not None:
+            announce(name)
         fits[name] = identify(
             candidate,
             record_or_records,
             initial=initial,
             noise=noise,
             cross_validate=cross_validate,
+            max_evaluations=max_evaluations,
             seed=seed,
             workers=workers,
         )

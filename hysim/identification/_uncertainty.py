@@ -9,6 +9,7 @@ A coordinate at its search bound counts as known if it has an effect; it and a d
 standard error. The condition number is that of W^(1/2) J with columns of length one.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,7 @@ from hysim.identification._problem import Problem
 
 _SINGULAR = 1e-7  # below this share of the largest, a direction of the scaled Jacobian is not identifiable
 _AT_SIDE = 1e-6  # in units of the box
+_MOST_NAMES = 4  # in a sentence
 _TAKES_PART = 0.05  # share of a parameter in a direction, of the largest share in it, to be named
 
 
@@ -37,7 +39,7 @@ class Uncertainty:
 
 def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> Uncertainty:
     """Covariance at `theta` (n_theta,) for the curvature of the loss (n_samples,)."""
-    space, n_samples = problem.space, problem.y.size
+    space, n_samples, curvature = problem.space, problem.n_samples, curvature * problem.weights
     n_names = len(space.names)
     if n_samples <= n_names:
         return _unknown(problem, theta, f"no standard errors: {n_samples} samples for {n_names} parameters")
@@ -49,7 +51,7 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
     at_side = (x - space.lower < _AT_SIDE * width) | (space.upper - x < _AT_SIDE * width)
     at_bound = np.logical_or(*(linear == bound for bound in problem.linear_box()))
     ended = zip((*space.coordinates, *space.linear), np.concatenate([at_side, at_bound]), strict=True)
-    reasons = [f"{name} reached its search bound: widen it with bounds=" for name, side in ended if side]
+    reasons = _bounds_in_words([name for name, side in ended if side])
     reach = np.linalg.norm(slopes[:, : x.size], axis=0) * width
     has_effect = reach > _SINGULAR * reach.max(initial=0.0)
     known = np.concatenate([at_side & has_effect, np.zeros(linear.size, dtype=bool)])
@@ -115,4 +117,17 @@ def _in_words(names: tuple[str, ...], groups: tuple[tuple[str, ...], ...]) -> st
     for group in groups:
         if set(group) <= set(names):
             return f"the data determine only the product of {' and '.join(group)}: fix one of them"
-    return f"the data do not determine {', '.join(names)} separately"
+    return f"the data do not determine {_shortened(names)} separately"
+
+
+def _bounds_in_words(names: Sequence[str]) -> list[str]:
+    if len(names) > _MOST_NAMES:
+        return [f"{_shortened(names)} reached their search bounds: widen them with bounds="]
+    return [f"{name} reached its search bound: widen it with bounds=" for name in names]
+
+
+def _shortened(names: Sequence[str]) -> str:
+    """The names, of many the first ones."""
+    if len(names) <= _MOST_NAMES:
+        return ", ".join(names)
+    return f"{', '.join(names[: _MOST_NAMES - 1])} and {len(names) - _MOST_NAMES + 1} others"

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from hysim._frozen import FloatArray
-from hysim.models.protocols import Identifiable
+from hysim.models.protocols import Identifiable, Undecided, Variant
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
@@ -36,3 +36,13 @@ class ByStructure(ABC):
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
         """Remarks on the identified model."""
         return self.as_structure().notes(record, model)
+
+    def assumed_states(self, record: Record) -> tuple[str, ...]:
+        """Values of `initial` that the record decides."""
+        structure = self.as_structure()
+        return structure.assumed_states(record) if isinstance(structure, Undecided) else ()
+
+    def variants(self) -> tuple[Variant, ...]:
+        """Further choices that the record decides."""
+        structure = self.as_structure()
+        return structure.variants() if isinstance(structure, Undecided) else ()

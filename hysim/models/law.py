@@ -17,6 +17,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
+from hysim._cycles import TOLERANCE
 from hysim._frozen import FloatArray, items, read_only
 from hysim._parallel import in_pieces
 from hysim.errors import SimulationError
@@ -28,12 +29,15 @@ from hysim.models.inverse_search import inverse_at_rest, inverse_response, inver
 from hysim.models.parameters import Parameter, declared_space
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
-from hysim.models.steady_cycle import fixed_point
+from hysim.models.steady_cycle import PassOf, fixed_point
 from hysim.models.tables import Tables, arguments_of, scalars_of, table_of_one, tables_of
 from hysim.records import Record
 
 State = tuple[float, ...]
 """Last input, and what the law remembers."""
+
+_AHEAD = 4  # runs through the turning points before the search for a steady memory
+_FEW = 0.5  # of the samples: more turning points are those of noise
 
 
 class Packed(NamedTuple):
@@ -379,17 +383,32 @@ class Law(Composable, ABC):
         ValueError if an affine parameter moves the memory: it is not known yet where the others are searched.
         """
         names, u = self.initial_names, np.append(record.u, record.u[0])
-        passed = self._one_pass(parameters, u)
-        others = [name for name in self.columns if name not in names]
+        corners = u[_corners(record)]
+        self._check_memory_is_its_own(parameters, corners)
+
+        def through(path: FloatArray) -> PassOf:
+            return lambda sets: self._one_pass(_of_sets(parameters, sets), path)
+
+        n_sets = max(map(np.size, parameters.values()), default=1)
+        few, before = 2 * corners.size < u.size, np.zeros((n_sets, len(names)))
+        if few:
+            before = np.nan_to_num(through(np.tile(corners, _AHEAD))(np.arange(n_sets))(before))
+        steady = fixed_point(through(u), before, through(corners) if few else None)
+        return dict(zip(names, steady.T, strict=True))
+
+    def _check_memory_is_its_own(self, parameters: Parameters, u: FloatArray) -> None:
+        """Raise a ValueError if an affine parameter moves the memory along the input `u`."""
+        others = [name for name in self.columns if name not in self.initial_names]
         affine = {name: self.scalars[name] + k for k, name in enumerate(others, 1)}
-        before = np.zeros((max(map(np.size, parameters.values()), default=1), len(names)))
-        z = passed(before)
-        if affine and not np.array_equal(z, self._one_pass({**parameters, **affine}, u)(before), equal_nan=True):
+        before = np.zeros((1, len(self.initial_names)))
+        first = _of_sets(parameters, np.array([0]))
+        if affine and not np.array_equal(
+            self._one_pass(first, u)(before), self._one_pass({**first, **affine}, u)(before), equal_nan=True
+        ):
             raise ValueError(
                 f"a {type(self).__name__} has no steady cycle that could be computed, since {' or '.join(affine)} "
                 'moves its memory: use initial="free"'
             )
-        return dict(zip(names, fixed_point(passed, before, z).T, strict=True))
 
     def _one_pass(self, parameters: Parameters, u: FloatArray) -> Callable[[FloatArray], FloatArray]:
         """A function from the memory before the input `u` to that after it, (n_sets, n_memory)."""
@@ -466,6 +485,18 @@ class Law(Composable, ABC):
             lost = in_pieces(lambda k: self.path(law, u[k], y[k]), u.size)
         if lost >= 0:
             raise SimulationError(self.divergence(lost, u[lost], y[lost]))
+
+
+def _of_sets(parameters: Parameters, sets: npt.NDArray[np.intp]) -> dict[str, Any]:
+    """The parameters of some sets; a single value is that of all."""
+    return {name: value if np.size(value) == 1 else np.asarray(value)[sets] for name, value in parameters.items()}
+
+
+def _corners(record: Record) -> npt.NDArray[np.intp]:
+    """First sample, turning points, and the place behind the last sample."""
+    turns = record.reversals()
+    turns = turns if turns.size < _FEW * len(record) else record.reversals(TOLERANCE)
+    return np.array([0, *turns.tolist(), len(record)])
 
 
 def _batch(

@@ -151,6 +151,28 @@ class Identifiable(Protocol):
         return ()
 
 
+class Variant(NamedTuple):
+    """A choice that a family leaves to the record: the family with it, and the choice in words.
+
+    One that is not `offered` is searched only as the start of those behind it, which contain it.
+    """
+
+    family: Any
+    words: str
+    offered: bool = True
+
+
+@runtime_checkable
+class Undecided(Protocol):
+    """A family that leaves to the record what a user does not say; `hysim.identify` decides by the BIC."""
+
+    def assumed_states(self, record: Record) -> tuple[str, ...]:
+        """Values of `initial`, the simplest first; none where the family's default holds for every record."""
+
+    def variants(self) -> tuple[Variant, ...]:
+        """Further choices, the simplest first; the last one contains all others. None where nothing is left open."""
+
+
 @runtime_checkable
 class LinearStage(Protocol):
     """A linear plant through which many inputs pass at once."""

@@ -15,6 +15,12 @@ Parameters = Mapping[str, Any]
 """User's names to floats or to arrays of shape (n_sets,)."""
 
 
+STATES = ("free", "rest", "still", "periodic")
+"""Values of `initial` of `hysim.identify`."""
+
+STATES_IN_WORDS = '"free", "rest", "still" or "periodic"'
+
+
 @frozen
 class SearchSpace:
     """The box in which a family's parameters are searched on one record.
@@ -80,8 +86,8 @@ class Freedom:
 
     def starts_at_rest(self, default: str = "free") -> bool:
         """Whether the initial state is not free, where the user says nothing by the family's default."""
-        if self.initial not in (None, "free", "rest", "periodic"):
-            raise ValueError(f'initial must be "free", "rest" or "periodic", got {self.initial!r}')
+        if self.initial not in (None, *STATES):
+            raise ValueError(f"initial must be {STATES_IN_WORDS}, got {self.initial!r}")
         return (self.initial or default) != "free"
 
     def held(

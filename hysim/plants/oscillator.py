@@ -288,8 +288,8 @@ class BoucWenOscillator:
             Samples of a period, with ``initial="periodic"``. One period is simulated, with the mean of the periods as
             input, and compared with every sample of the record.
         hold : {"foh", "zoh", "band-limited"}
-            Whether the input between samples is linear, held, or for a periodic one the sum of the lines below
-            half the record's rate.
+            Whether the input between samples is linear, held, or the sum of the lines below half the record's rate, for
+            which more steps pay: ``oversampling=20``.
         excitation : str
             As in the constructor.
 

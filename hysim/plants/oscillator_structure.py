@@ -23,7 +23,7 @@ from hysim.models.protocols import Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.plants._oscillator_start import start
 from hysim.plants.equation_of_motion import METHODS, Linear, Motion
-from hysim.plants.resampling import HALF_FILTER, decimated, interpolated
+from hysim.plants.resampling import HALF_FILTER, decimated, interpolated, interpolated_record
 from hysim.records import Record
 
 NAMES = ("mass", "damping", "stiffness", "A", "beta", "gamma", "n")
@@ -73,8 +73,6 @@ class OscillatorStructure(Identifiable):
             )
         if (self.initial == "periodic") != (self.period is not None):
             raise ValueError('initial="periodic" takes a period in samples, and nothing else does')
-        if self.hold == "band-limited" and self.period is None:
-            raise ValueError('hold="band-limited" needs initial="periodic": an input is interpolated by its spectrum')
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box around the plant of small motions, and where the equation of motion says to begin."""
@@ -165,7 +163,7 @@ class OscillatorStructure(Identifiable):
         """Inputs at the ends of the steps: of one period, or of the whole record."""
         u, factor = self._mean_period(u), self.oversampling
         if self.hold == "band-limited":
-            return interpolated(u, factor)
+            return interpolated(u, factor) if self.period else interpolated_record(u, factor)
         if self.hold == "zoh":
             return np.repeat(u, factor) if self.period else np.repeat(u, factor)[: 1 - factor or None]
         places = np.arange(u.size * factor if self.period else (u.size - 1) * factor + 1) / factor

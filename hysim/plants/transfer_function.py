@@ -19,7 +19,7 @@ from hysim._frozen import FloatArray, checked, read_only
 from hysim.errors import SimulationError
 from hysim.models.composable import Composable
 from hysim.models.model import family
-from hysim.models.protocols import Identifiable
+from hysim.models.protocols import Identifiable, Variant
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.plants._linear_response import LinearPlants, LinearState, affine_columns
 from hysim.plants._transfer_function_notes import notes
@@ -30,6 +30,7 @@ from hysim.records import Record
 FREQUENCY = (0.1, np.pi)  # box of a section's frequency: rad over the whole record, rad per sample
 DAMPING = (1e-3, 30.0)  # box of its damping ratio; two real poles above 1
 LATEST = 0.25  # of the record: the largest delay that is searched
+_AT_ZERO = 0.01  # of the output's span: an output that begins at zero
 _LONG = 1000  # samples from which the starts from the record are relied upon
 _AGREED = 0.02  # of the box: starts from different cutoffs this close to their median are one optimum
 _MAJORITY = 3  # of them are enough to search no further
@@ -162,7 +163,7 @@ class TransferFunction(Composable):
         delay: float | str = 0.0,
         hold: str = "zoh",
         sample: str = "start",
-        initial: str = "rest",
+        initial: str | None = None,
     ) -> "TransferFunctionStructure":
         """Numbers of poles and zeros for `hysim.identify`, and how the record was sampled.
 
@@ -175,8 +176,8 @@ class TransferFunction(Composable):
             ``bounds={"delay": (lower, upper)}`` says otherwise; it need not be a whole number of samples.
         hold, sample : str
             As in the constructor.
-        initial : {"rest", "free"}
-            Whether the initial state is zero, or identified.
+        initial : {"rest", "free"}, optional
+            Whether the initial state is zero, or identified; by default the one with the lower BIC on the record.
 
         Returns
         -------
@@ -219,7 +220,7 @@ class TransferFunction(Composable):
         delays: Iterable[float | str] = (0.0,),
         hold: str = "zoh",
         sample: str = "start",
-        initial: str = "rest",
+        initial: str | None = None,
     ) -> dict[str, "TransferFunctionStructure"]:
         """Candidates for `hysim.select`: a structure for every combination of the numbers and delays, by its name.
 
@@ -265,11 +266,11 @@ class TransferFunctionStructure(Identifiable, Composable):
     delay: float | None = 0.0
     hold: str = "zoh"
     sample: str = "start"
-    initial: str = "rest"
+    initial: str | None = None
 
     def __post_init__(self) -> None:
         _check_options(self.hold, self.sample)
-        if self.initial not in ("rest", "free"):
+        if self.initial not in ("rest", "free", None):
             raise ValueError(f'initial must be "rest" or "free", got {self.initial!r}')
         if not all(isinstance(number, int) for number in (self.poles, self.zeros)):
             raise TypeError(f"numbers of poles and zeros must be int, got {self!r}")
@@ -310,7 +311,7 @@ class TransferFunctionStructure(Identifiable, Composable):
         for name in (*freedom.fixed, *freedom.bounds):
             if name in self.denominator:
                 raise ValueError(f"{name!r} cannot be fixed or bounded: the denominator is searched by its sections")
-        at_rest = self.columns[self.zeros + 1 :] if freedom.starts_at_rest(self.initial) else ()
+        at_rest = self.columns[self.zeros + 1 :] if freedom.starts_at_rest(self.initial or "rest") else ()
         held = freedom.held(defaults, at_rest=at_rest)
         limits = freedom.limits(defaults, held)
         known_delay = held.get("delay", self.delay)
@@ -350,6 +351,18 @@ class TransferFunctionStructure(Identifiable, Composable):
         delay = parameters["delay"] if self.delay is None else self.delay
         options = {"hold": self.hold, "sample": self.sample}
         return affine_columns(monic, record.u, record.sample_time, delay, zeros=self.zeros, **options)
+
+    def assumed_states(self, record: Record) -> tuple[str, ...]:
+        """Rest where input and output begin at zero, else what the record says; none where the structure says it."""
+        if self.initial is not None:
+            return ()
+        slack = _AT_ZERO * float(np.ptp(record.y))
+        begins_at_zero = record.u[0] == 0.0 and abs(record.y[0]) <= slack
+        return ("rest",) if begins_at_zero else ("rest", "free")
+
+    def variants(self) -> tuple[Variant, ...]:
+        """None."""
+        return ()
 
     def with_unit_gain(self) -> UnitGain:
         """The structure with the gain at rest one, beside a stage that carries the gain."""

@@ -133,6 +133,9 @@ class MemoryLaw(Law):
         powers = [abs(c * u**k) for k, c in enumerate(self.input_polynomial.tolist(), 1)]
         return self.search_inverse(state, terms=float(abs(self.offset) + sum(powers) + abs(self.gain * z)))
 
+    def _check_memory_is_its_own(self, parameters: Parameters, u: FloatArray) -> None:
+        """It is: the polynomial and the gain stand behind it."""
+
     def _one_pass(self, parameters: Parameters, u: FloatArray) -> Callable[[FloatArray], FloatArray]:
         def passed(z: FloatArray) -> FloatArray:
             sets = {**parameters, **self.memory_only, "z0": np.nan_to_num(z[:, 0], posinf=0.0, neginf=0.0)}

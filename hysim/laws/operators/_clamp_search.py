@@ -4,18 +4,18 @@ The output is affine in the weights, the feedthrough and the offset. A bank has 
 over half the span of the input. A threshold that the user frees is searched between the middles of the gaps to its
 neighbours, so that their order stays.
 
-One-signed weights (the default) are those of the classical operator, of one density: all elements past the threshold
-zero turn the loop in the sense of the record's own. Without it least squares fit noise by weights of alternating sign,
-and such a law may have no inverse.
+One-signed weights are those of the classical operator, of one density: all elements past the threshold zero turn the
+loop in one sense. Without it least squares fit noise by weights of alternating sign, and such a law may have no
+inverse; a loop that crosses itself or bends the other way needs both signs. By default the record decides.
 
-The memory of many plays is as many unknowns, which no record determines. With ``initial="rest"``, the default of a
-bank, the plays stand at zero before the first sample. With ``"free"`` the memory is that of a single former turning
-point, the stroke from rest at zero to `turn`:
+The memory of many plays is as many unknowns, which no record determines. With ``initial="rest"`` the plays stand at
+zero before the first sample, with ``"still"`` at the first input. With ``"free"`` the memory is that of a single former
+turning point, the stroke from rest at zero to `turn`:
 
     z_i = sign(turn) max(|turn| - r_i, 0)
 
 It holds for every record that begins at rest or at a turning point of its cycle, or in a cycle about zero; any other
-steady cycle is ``"periodic"``: the positions that the record itself leaves behind.
+steady cycle is ``"periodic"``: the positions that the cycle leaves behind. By default the record decides.
 """
 
 import itertools
@@ -29,11 +29,12 @@ from hysim._frozen import FloatArray, check_whole, checked
 from hysim.laws.operators._clamps import check_elements, positions
 from hysim.models.composable import Composable
 from hysim.models.parameters import Coordinate, space_of, spans
-from hysim.models.protocols import Identifiable
+from hysim.models.protocols import Identifiable, Variant
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
 TURN = "turn"
+BANK_STATES = ("rest", "still", "periodic", "free")
 _LEVELS = 9  # of the former turning point, from which the search begins
 
 
@@ -74,7 +75,8 @@ class ClampStructure(Identifiable, Composable):
     law: Any
     thresholds: tuple[float, ...] = ()
     plays: int = 10
-    one_signed: bool = True
+    one_signed: bool | None = None
+    against: bool = False  # whether weights of one sign turn against the loop of the record
     pushing: Pushing = Pushing()
 
     def __post_init__(self) -> None:
@@ -135,9 +137,15 @@ class ClampStructure(Identifiable, Composable):
         return np.concatenate([elements, *static, ones, np.zeros_like(ones)], axis=-1)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        """The parameters with the positions after one run through the record, which erases what was before it."""
+        """The parameters with the positions after one run through the record, which erases what was before it.
+
+        Where the input stands still the plays stand at it.
+        """
         thresholds, z0 = self._elements(parameters)
-        z = self.pushing.positions(parameters, thresholds, z0, record)[:, -1]
+        if np.ptp(record.u) == 0.0:  # all within their thresholds: in the middle
+            z = np.full_like(thresholds, record.u[0])
+        else:
+            z = self.pushing.positions(parameters, thresholds, z0, record)[:, -1]
         shape = np.broadcast_shapes(*map(np.shape, parameters.values()))
         columns = (column.reshape(shape)[()] for column in z.T)
         return {**parameters} | dict(zip(self._names("z0", z.shape[1]), columns, strict=True))
@@ -150,6 +158,14 @@ class ClampStructure(Identifiable, Composable):
         others = {name: parameters[name] for name in ("feedthrough", "offset") if name in parameters}
         tuples = {law.thresholds_name: thresholds[0], law.weights_name: weights, "z0": z0[0]}
         return law(**tuples, **others, **self.pushing.arguments(parameters))
+
+    def assumed_states(self, record: Record) -> tuple[str, ...]:
+        """At rest at zero or at the first input, after the cycle, or after one former turning point."""
+        return BANK_STATES
+
+    def variants(self) -> tuple[Variant, ...]:
+        """Weights of one sign, of that of the record's loop or the other, or of both."""
+        return variants_of_sign(self, self.one_signed)
 
     def _thresholds(self, half: float) -> FloatArray:
         """The structure's own, or even steps: from zero for plays, up to the end for stops, which vanish at zero."""
@@ -180,9 +196,10 @@ class ClampStructure(Identifiable, Composable):
 
     def _signs(self, record: Record, thresholds: Mapping[str, float]) -> dict[str, tuple[float, float]]:
         """Bounds at zero of the weights that turn the loop."""
-        if not self.one_signed:
+        if self.one_signed is False:
             return {}
-        side = (0.0, np.inf) if self.law.stops == runs_clockwise(record) else (-np.inf, 0.0)
+        positive = (self.law.stops == runs_clockwise(record)) != self.against
+        side = (0.0, np.inf) if positive else (-np.inf, 0.0)
         return {name: side for name, threshold in thresholds.items() if threshold > 0.0}
 
 
@@ -201,6 +218,15 @@ def _gaps(thresholds: FloatArray) -> list[tuple[float, float]]:
     gaps = np.empty((thresholds.size, 2))
     gaps[order] = np.stack([edges[:-1], edges[1:]], axis=1)
     return [(lower, upper) for lower, upper in gaps.tolist()]
+
+
+def variants_of_sign(structure: Any, one_signed: bool | None) -> tuple[Variant, ...]:
+    """The choices of sign for a structure with the fields `one_signed` and `against`, where it leaves them open."""
+    if one_signed:
+        return ()
+    along = Variant(replace(structure, one_signed=True), "weights of one sign", one_signed is None)
+    against = Variant(replace(structure, one_signed=True, against=True), along.words, along.offered)
+    return along, against, Variant(replace(structure, one_signed=False), "weights of both signs")
 
 
 def runs_clockwise(record: Record) -> bool:

@@ -6,11 +6,12 @@ With given weights of the plays the output is affine in those of the dead zones,
 weights are searched; the search begins with the plain law's least squares, and with a law's own weights where there
 is one. The thresholds of plays and dead zones are given,
 by default evenly inside the range that the plain law's x has on the record. The weight of the dead zone zero is
-one, because a factor on x could be taken for one on S. At the first sample the plays stand at zero, or where a periodic
-record leaves them.
+one, because a factor on x could be taken for one on S. At the first sample the plays stand at zero, at the first input,
+or where the cycle of the record leaves them; by default the record decides.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,11 +21,11 @@ from hysim.laws.operators._clamp_search import ClampStructure
 from hysim.laws.operators._play_sums import check_dead_zones, dead_zone
 from hysim.models.composable import Composable
 from hysim.models.parameters import Coordinate, space_of
-from hysim.models.protocols import Identifiable
+from hysim.models.protocols import Identifiable, Variant
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
-_LARGEST = 4.0  # of a weight, in slopes of the record
+_LARGEST = 4.0  # of a weight, in slopes of the record, unless the plain law has a larger one
 
 
 @checked
@@ -46,7 +47,7 @@ class DeadZoneStructure(Identifiable, Composable):
         """The plays' weights as coordinates; the dead zones' weights and the offset are linear."""
         if not freedom.starts_at_rest("rest"):
             raise ValueError('the memory of plays before dead zones is not searched: use initial="rest" or "periodic"')
-        own = self.plays.search_space(record)
+        own = self.plays.search_space(record, Freedom(initial=freedom.initial))
         weights, (start, x) = own.columns[:-1], self._plain(own, record)
         zones = self._zones(x)
         columns = (*(f"dead_zone_weights[{j}]" for j in range(zones.size)), "offset")
@@ -56,10 +57,8 @@ class DeadZoneStructure(Identifiable, Composable):
         limits = freedom.limits(defaults, held)
         starts = [defaults, *([dict(zip(weights, self.weights, strict=True))] if self.weights else [])]
         slope = float(np.ptp(record.y)) / float(np.ptp(record.u)) or 1.0
-        sides = {
-            name: np.clip(own.bounds.get(name, (-np.inf, np.inf)), -_LARGEST * slope, _LARGEST * slope)
-            for name in weights
-        }
+        largest = max(_LARGEST * abs(slope), 2.0 * float(np.abs(start).max()))  # a steep start is inside
+        sides = {name: np.clip(own.bounds.get(name, (-np.inf, np.inf)), -largest, largest) for name in weights}
         box = [Coordinate(name, float(pair[0]), float(pair[1]), slope) for name, pair in sides.items()]
         held = dict(own.held) | {f"dead_zones[{j}]": d for j, d in enumerate(zones.tolist())} | held
         return space_of(box, columns, defaults, held, limits, starts, state=own.state, screened=0)
@@ -88,6 +87,14 @@ class DeadZoneStructure(Identifiable, Composable):
             offset=plain.offset,
             z0=plain.z0,
         )
+
+    def assumed_states(self, record: Record) -> tuple[str, ...]:
+        """At rest at zero or at the first input, or after the cycle."""
+        return tuple(state for state in self.plays.assumed_states(record) if state != "free")
+
+    def variants(self) -> tuple[Variant, ...]:
+        """The choices of the plays."""
+        return tuple(each._replace(family=replace(self, plays=each.family)) for each in self.plays.variants())
 
     def _plain(self, own: SearchSpace, record: Record) -> tuple[FloatArray, FloatArray]:
         """Weights of the plain law that fits best, and its output without the offset."""

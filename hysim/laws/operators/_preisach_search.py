@@ -1,12 +1,12 @@
 """The search for the parameters of a law of relays.
 
 The output is affine in the weights and the offset. The levels are given: where the user says nothing else, they
-divide the span of the input evenly. One-signed weights (the default) turn the loop in the sense of the record's own;
-those of the diagonal, which turn none, are free.
+divide the span of the input evenly. One-signed weights turn the loop in one sense; those of the diagonal, which turn
+none, are free. By default the record decides whether they have one sign.
 
-With ``initial="rest"``, the default, all relays are down before the first sample. With ``"free"`` the memory is that
-of a single former turning point: all down, up to `turn`, then to the first sample. ``"periodic"`` is the memory that
-the record itself leaves behind.
+With ``initial="rest"`` all relays are down before the first sample. With ``"free"`` the memory is that of a single
+former turning point: all down, up to `turn`, then to the first sample. ``"periodic"`` is the memory that the cycle of
+the record leaves behind. By default the record decides.
 
 A record tells as many combinations of weights as their columns have rank: one loop between two inputs 2 N - 1 of the
 N (N + 1) / 2. As many weights are free, and the others are held at zero: free are those of a best fit that has no
@@ -21,11 +21,11 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, check_whole, checked
-from hysim.laws.operators._clamp_search import TURN, runs_clockwise
+from hysim.laws.operators._clamp_search import TURN, runs_clockwise, variants_of_sign
 from hysim.models.composable import Composable
 from hysim.models.law import Law
 from hysim.models.parameters import Coordinate, space_of, spans
-from hysim.models.protocols import Identifiable
+from hysim.models.protocols import Identifiable, Variant
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
@@ -40,7 +40,8 @@ class PreisachStructure(Identifiable, Composable):
     law: type[Law]
     levels: tuple[float, ...] = ()
     intervals: int = 4
-    one_signed: bool = True
+    one_signed: bool | None = None
+    against: bool = False  # whether weights of one sign turn against the loop of the record
 
     def __post_init__(self) -> None:
         check_whole(self.intervals, "intervals")
@@ -101,6 +102,14 @@ class PreisachStructure(Identifiable, Composable):
         told = f"this record does not tell {untold} of the {len(law.weights)} weights from the others"
         return (told,) if untold else ()
 
+    def assumed_states(self, record: Record) -> tuple[str, ...]:
+        """All relays down, after the cycle, or after one former turning point."""
+        return "rest", "periodic", "free"
+
+    def variants(self) -> tuple[Variant, ...]:
+        """Weights of one sign, of that of the record's loop or the other, or of both."""
+        return variants_of_sign(self, self.one_signed)
+
     def _levels(self, record: Record) -> FloatArray:
         """The structure's own, or even steps over the span of the input."""
         if self.levels:
@@ -128,9 +137,9 @@ class PreisachStructure(Identifiable, Composable):
 
     def _signs(self, record: Record, n: int) -> dict[str, tuple[float, float]]:
         """Bounds at zero of the weights off the diagonal."""
-        if not self.one_signed:
+        if self.one_signed is False:
             return {}
-        side = (-np.inf, 0.0) if runs_clockwise(record) else (0.0, np.inf)
+        side = (-np.inf, 0.0) if runs_clockwise(record) != self.against else (0.0, np.inf)
         rows, columns = np.tril_indices(n)
         return {f"weights[{k}]": side for k in np.flatnonzero(rows > columns).tolist()}
 

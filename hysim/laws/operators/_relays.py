@@ -106,13 +106,16 @@ class RelayLaw(ByStructure, Law):
         return PreisachStructure(law=type(self), levels=self.levels)
 
     @classmethod
-    def structure(cls, *, intervals: int = 4, levels: npt.ArrayLike = (), one_signed: bool = True) -> PreisachStructure:
+    def structure(
+        cls, *, intervals: int = 4, levels: npt.ArrayLike = (), one_signed: bool | None = None
+    ) -> PreisachStructure:
         """Levels for `hysim.identify`: equal `intervals` of the span of the input, or the `levels` [unit of u].
 
         N intervals have N (N + 1) / 2 weights; one loop between two inputs determines 2 N - 1 combinations of them.
         With `one_signed` all weights off the diagonal have the sign of the record's loop, positive for a
-        counterclockwise one; else they are free, and may be of alternating signs on noisy records. Raises ValueError or
-        TypeError if the number is not a positive int, or the levels are not finite or do not increase.
+        counterclockwise one; else they are free, and may be of alternating signs on noisy records. By default the BIC
+        decides. Raises ValueError or TypeError if the number is not a positive int, or the levels are not finite or do
+        not increase.
 
         Examples
         --------

@@ -90,7 +90,7 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
         *,
         plays: int = 10,
         thresholds: npt.ArrayLike = (),
-        one_signed: bool = True,
+        one_signed: bool | None = None,
         envelopes: int = 1,
         left: npt.ArrayLike = (),
         right: npt.ArrayLike = (),
@@ -128,7 +128,7 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
     def as_structure(self) -> ClampStructure:
         """The structure with the thresholds and envelopes of this law, or with free ones where it has none."""
         left, right = (self.left, self.right) if self.thresholds else ((), ())
-        one_signed = self.plays.is_one_signed()
+        one_signed = None if self.plays.is_one_signed() else False
         return self.structure(thresholds=self.thresholds, one_signed=one_signed, left=left, right=right)
 
     def _has_one_envelope(self) -> bool:

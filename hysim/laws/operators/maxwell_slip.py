@@ -86,12 +86,14 @@ class MaxwellSlip(ByStructure, ClampLaw):
         return cls(stiffness=tuple(k.tolist()), slips=tuple((f / k).tolist()), feedthrough=feedthrough, offset=offset)
 
     @classmethod
-    def structure(cls, *, elements: int = 10, slips: npt.ArrayLike = (), one_signed: bool = True) -> ClampStructure:
+    def structure(
+        cls, *, elements: int = 10, slips: npt.ArrayLike = (), one_signed: bool | None = None
+    ) -> ClampStructure:
         """Elements for `hysim.identify`: their number, slipping in even steps up to half the input's span, or `slips`.
 
-        With `one_signed` every stiffness has the sign of the record's loop, positive for a clockwise one. Raises
-        ValueError or TypeError if the number is not a positive int, or an elongation is not a finite number
-        [unit of u].
+        With `one_signed` every stiffness has the sign of the record's loop, positive for a clockwise one; by default
+        the BIC decides. Raises ValueError or TypeError if the number is not a positive int, or an elongation is not a
+        finite number [unit of u].
         """
         places = tuple(read_only(slips, "slips", ndim=1).tolist())
         return ClampStructure(law=cls, thresholds=places, plays=elements, one_signed=one_signed)
@@ -128,4 +130,4 @@ class MaxwellSlip(ByStructure, ClampLaw):
     def as_structure(self) -> ClampStructure:
         """The structure with the thresholds of this law, or with those by default where it has none."""
         one_signed = all(k >= 0.0 for k in self.stiffness) or all(k <= 0.0 for k in self.stiffness)
-        return ClampStructure(law=type(self), thresholds=self.slips, one_signed=one_signed)
+        return ClampStructure(law=type(self), thresholds=self.slips, one_signed=None if one_signed else False)

@@ -86,7 +86,7 @@ class ModifiedPrandtlIshlinskii(ExtendedPlays):
         *,
         plays: int = 10,
         thresholds: npt.ArrayLike = (),
-        one_signed: bool = True,
+        one_signed: bool | None = None,
         dead_zones: int | npt.ArrayLike = 5,
     ) -> DeadZoneStructure:
         """Plays and dead zones for `hysim.identify`; `plays`, `thresholds` and `one_signed` as of `PrandtlIshlinskii`.
@@ -135,7 +135,8 @@ class ModifiedPrandtlIshlinskii(ExtendedPlays):
 
     def as_structure(self) -> DeadZoneStructure:
         """The structure with the thresholds of this law, or with those by default where it has none."""
-        plays = replace(PrandtlIshlinskii.structure(thresholds=self.thresholds), one_signed=self.plays.is_one_signed())
+        one_signed = None if self.plays.is_one_signed() else False
+        plays = replace(PrandtlIshlinskii.structure(thresholds=self.thresholds), one_signed=one_signed)
         own = self.dead_zones if self.thresholds else ()
         count = 0 if own else 5
         return DeadZoneStructure(law=type(self), plays=plays, dead_zones=own, count=count, weights=self.weights)

@@ -77,7 +77,9 @@ class PrandtlIshlinskii(ByStructure, ClampLaw):
     z0: tuple[float, ...] = (0.0,)
 
     @classmethod
-    def structure(cls, *, plays: int = 10, thresholds: npt.ArrayLike = (), one_signed: bool = True) -> ClampStructure:
+    def structure(
+        cls, *, plays: int = 10, thresholds: npt.ArrayLike = (), one_signed: bool | None = None
+    ) -> ClampStructure:
         """Plays for `hysim.identify`: how many, or where.
 
         Parameters
@@ -86,9 +88,10 @@ class PrandtlIshlinskii(ByStructure, ClampLaw):
             Their number, with thresholds from zero in even steps over half the span of the input.
         thresholds : sequence of float, optional
             The thresholds themselves [unit of u].
-        one_signed : bool
+        one_signed : bool, optional
             Whether all weights past the threshold zero have the sign of the record's loop (positive for a
-            counterclockwise one). Else they are free, and may be of alternating signs on noisy records.
+            counterclockwise one). Else they are free, and may be of alternating signs on noisy records. By default
+            the one with the lower BIC on the record.
 
         Returns
         -------
@@ -177,7 +180,9 @@ class PrandtlIshlinskii(ByStructure, ClampLaw):
 
     def as_structure(self) -> ClampStructure:
         """The structure with the thresholds of this law, or with those by default where it has none."""
-        return ClampStructure(law=type(self), thresholds=self.thresholds, one_signed=self.is_one_signed())
+        return ClampStructure(
+            law=type(self), thresholds=self.thresholds, one_signed=None if self.is_one_signed() else False
+        )
 
 
 def wrong_sum(weights: npt.ArrayLike) -> int | None:

@@ -149,7 +149,9 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
         return PrandtlIshlinskii(thresholds=self.thresholds, weights=self.weights, z0=self.z0)
 
     @classmethod
-    def structure(cls, *, plays: int = 10, thresholds: npt.ArrayLike = (), one_signed: bool = True) -> ClampStructure:
+    def structure(
+        cls, *, plays: int = 10, thresholds: npt.ArrayLike = (), one_signed: bool | None = None
+    ) -> ClampStructure:
         """Plays for `hysim.identify`, as of `PrandtlIshlinskii.structure`; beta is searched."""
         plain = PrandtlIshlinskii.structure(plays=plays, thresholds=thresholds, one_signed=one_signed)
         return replace(plain, law=cls, pushing=Widening())
@@ -282,7 +284,7 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
 
     def as_structure(self) -> ClampStructure:
         """The structure with the thresholds and beta of this law."""
-        one_signed = self.plays.is_one_signed()
+        one_signed = None if self.plays.is_one_signed() else False
         return ClampStructure(
             law=type(self), thresholds=self.thresholds, one_signed=one_signed, pushing=Widening(beta=self.beta)
         )

@@ -1,0 +1,216 @@
+"""Choices that a family leaves to the record: the state at the first sample, and others such as signs of weights.
+
+Each combination is searched briefly, and has the criterion
+
+    BIC = N ln(V) + d ln(N),        V = mean squared residual,
+
+with d the free parameters that are not at a bound. First the state is chosen with the widest of the other choices,
+which contains them all; then these. A choice replaces a simpler one if its BIC is lower by more than 10, "very strong"
+evidence (R. E. Kass and A. E. Raftery, J. Am. Stat. Assoc. 90, 1995): residuals of a model that is not exact are
+correlated, so that smaller differences are met by chance. A choice that contains another begins, beside its own starts,
+where the search of the other ended, so that it never fits worse.
+"""
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim._input_noise import input_noise, quiet_path
+from hysim._repeats import repeated_cycle
+from hysim.errors import SimulationError
+from hysim.identification._problem import Problem, problem
+from hysim.identification._search import brief_optimum
+from hysim.models.protocols import Undecided, Variant
+from hysim.models.search_space import Freedom
+from hysim.records import Record
+
+_STRONG = 10.0  # difference of two BIC
+_ROUNDING = 1e-10  # of the output's size: smaller residuals are those of a perfect fit
+_AT_BOUND = 1e-9  # of the largest linear parameter
+
+_STATES = {
+    "rest": "rest at zero before the first sample",
+    "still": "an input that stood still at its first value before the record",
+    "free": "a state at the first sample that is identified",
+    "periodic": "a cycle of {} samples, which the input repeats, before the first sample",
+}
+
+
+class Decision(NamedTuple):
+    """The problem to be searched, the value of `initial` that it has, and a sentence on what was chosen and why."""
+
+    problem: Problem
+    initial: str | Sequence[str] | None
+    sentence: str
+
+
+class _Trial(NamedTuple):
+    problem: Problem
+    initial: str | Sequence[str] | None
+    variant: Variant
+    x: FloatArray
+    bic: float
+
+
+def quiet_where_better(
+    family: Any, records: Sequence[Record], freedom: Freedom, initial: str | Sequence[str] | None
+) -> tuple[Sequence[Record], str]:
+    """The records, and a sentence where their inputs turn by noise and the family fits better along quiet paths."""
+    noises = [input_noise(record.u) for record in records]
+    if not any(noises):
+        return records, ""
+    quiet = [
+        replace(record, u=quiet_path(record.u, noise)) if noise else record
+        for record, noise in zip(records, noises, strict=True)
+    ]
+    try:
+        problem(family, [replace(record, t=None) for record in records], freedom, initial)
+        as_measured, along_path = (
+            brief_optimum(problem(family, each, freedom, initial))[1] for each in (records, quiet)
+        )
+    except (ValueError, ArithmeticError, SimulationError):  # a family that depends on time filters noise itself
+        return records, ""
+    if not along_path < as_measured:
+        return records, ""
+    turns = ", ".join(
+        f"{record.reversals().size} of {raw.reversals().size}" for record, raw in zip(quiet, records, strict=True)
+    )
+    size = ", ".join(f"{noise:.2g}" for noise in noises)
+    return quiet, (
+        f"the input has noise of about {size} rms: only the {turns} reversals above it are used, and the input is "
+        "monotone between them"
+    )
+
+
+def decided(
+    family: Any,
+    records: Sequence[Record],
+    freedom: Freedom,
+    initial: str | Sequence[str] | None,
+    weights: Sequence[FloatArray] | None = None,
+    max_evaluations: int | None = None,
+) -> Decision:
+    """The problem of a family on these records; `initial` and `freedom` are the user's, and are kept."""
+    choice = _decided(family, records, freedom, initial, weights, max_evaluations)
+    return choice._replace(problem=choice.problem.limited(max_evaluations))
+
+
+def _decided(
+    family: Any,
+    records: Sequence[Record],
+    freedom: Freedom,
+    initial: str | Sequence[str] | None,
+    weights: Sequence[FloatArray] | None,
+    max_evaluations: int | None,
+) -> Decision:
+    given: Any = family
+    if not isinstance(family, Undecided):
+        return Decision(problem(given, records, freedom, initial).weighted(weights), initial, "")
+    states: list[str | Sequence[str] | None] = [initial]
+    if initial is None:
+        plain = problem(given, records, freedom, None)
+        told = {*freedom.fixed, *freedom.free, *freedom.bounds} & set(plain.own.state)
+        states = [None] if told else [*_possible(family, records)] or [None]
+    variants = family.variants() or (Variant(family, ""),)
+    if len(states) == len(variants) == 1:
+        return Decision(problem(variants[0].family, records, freedom, states[0]).weighted(weights), states[0], "")
+    trials: dict[tuple[int, int], _Trial] = {}
+    brief = None if max_evaluations is None else max_evaluations / (2 * (len(states) + len(variants)))
+
+    def trial(state: int, variant: int) -> _Trial:
+        if (state, variant) not in trials:
+            trials[state, variant] = _tried(variants[variant], records, freedom, states[state], weights, brief)
+        return trials[state, variant]
+
+    widest = len(variants) - 1
+    state = _best(range(len(states)), lambda k: trial(k, widest).bic)
+    for k in range(len(variants)):
+        trial(state, k)
+    chosen = _best([k for k, each in enumerate(variants) if each.offered], lambda k: trial(state, k).bic)
+    best = trial(state, chosen)
+    others = [each for key, each in trials.items() if key != (state, chosen) and each.variant.offered]
+    return Decision(_with_starts(best, trials.values()), best.initial, _sentence(best, others, records))
+
+
+def _possible(family: Undecided, records: Sequence[Record]) -> list[str]:
+    """The states that these records can have, in the order of the first of them."""
+    named = [family.assumed_states(record) for record in records]
+    return [
+        state
+        for state in dict.fromkeys(itertools.chain(*named))
+        if not (state == "periodic" and any(repeated_cycle(record.u) is None for record in records))
+        and not (state == "still" and all(record.u[0] == 0.0 for record in records))
+    ]
+
+
+def _tried(
+    variant: Variant,
+    records: Sequence[Record],
+    freedom: Freedom,
+    initial: str | Sequence[str] | None,
+    weights: Sequence[FloatArray] | None,
+    max_evaluations: float | None,
+) -> _Trial:
+    attempt = problem(variant.family, records, freedom, initial).weighted(weights).limited(max_evaluations)
+    try:
+        x, cost = brief_optimum(attempt)
+        bic = _bic(attempt, x, cost)
+    except (ArithmeticError, SimulationError):
+        x, bic = np.empty(0), math.inf
+    return _Trial(attempt, initial, variant, x, bic)
+
+
+def _bic(attempt: Problem, x: FloatArray, cost: float) -> float:
+    n, d = attempt.n_samples, len(attempt.space.names)
+    if not math.isfinite(cost) or n <= d:
+        return math.inf
+    if attempt.space.bounds:
+        linear = attempt.completed(x[np.newaxis])[0, attempt.n_x :]
+        near = _AT_BOUND * float(np.abs(linear).max(initial=0.0))
+        d -= int(np.sum(np.minimum(*np.abs(linear - attempt.linear_box())) <= near))
+    variance = max(cost / n, (_ROUNDING * attempt.scale) ** 2)
+    return n * math.log(variance) + d * math.log(n)
+
+
+def _best(choices: Sequence[int], bic: Callable[[int], float]) -> int:
+    """The first choice, or a later one that is clearly better than it and all before."""
+    best = choices[0]
+    for k in choices[1:]:
+        if bic(k) < bic(best) - _STRONG:
+            best = k
+    return best
+
+
+def _with_starts(best: _Trial, trials: Any) -> Problem:
+    space = best.problem.space
+    alike = [each.x for each in trials if each.problem.space.coordinates == space.coordinates and each.x.size]
+    if not alike:
+        return best.problem
+    starts = np.clip(np.array(alike), space.lower, space.upper)
+    return replace(best.problem, space=replace(space, starts=np.concatenate([space.starts, starts])))
+
+
+def _sentence(best: _Trial, others: Sequence[_Trial], records: Sequence[Record]) -> str:
+    """What was assumed, and by how much the next best other state and the next best other choice are worse."""
+    states = [each.bic for each in others if each.initial != best.initial]
+    choices = [each.bic for each in others if each.initial == best.initial and each.variant.words != best.variant.words]
+    words = []
+    if states and isinstance(best.initial, str):
+        cycles = ", ".join(f"{repeated_cycle(record.u)}" for record in records)
+        words.append(_STATES[best.initial].format(cycles) + _by(min(states) - best.bic))
+    if choices:
+        words.append(best.variant.words + _by(min(choices) - best.bic))
+    return f"assumed {' and '.join(words)}" if words else ""
+
+
+def _by(gain: float) -> str:
+    if math.isnan(gain):
+        return ""
+    return (
+        f" (else the BIC is {gain:.0f} higher)" if gain > _STRONG else " (no other assumption has a clearly lower BIC)"
+    )

@@ -1,0 +1,92 @@
+"""A measured input turns at every sample; and samples count by their weights."""
+
+import numpy as np
+import pytest
+
+import hysim as hs
+from hysim._input_noise import input_noise, quiet_path
+
+CYCLES = hs.signals.triangle(-1.0, 1.0, cycles=3, samples_per_cycle=200)
+SINE = np.sin(2.0 * np.pi * np.arange(800) / 250.0)
+LAW = hs.BoucWen(beta=1.5, gamma=0.5, n=1.0, gain=2.0, feedthrough=0.5)
+
+
+def noise(size, n=CYCLES.size, seed=0):
+    return size * np.random.default_rng(seed).standard_normal(n)
+
+
+@pytest.mark.parametrize("u", [CYCLES, SINE], ids=["triangle", "sine"])
+@pytest.mark.parametrize("size", [0.01, 0.03])
+def test_the_noise_of_an_input_is_estimated(u, size):
+    measured = u + noise(size, u.size)
+    assert input_noise(measured) == pytest.approx(size, rel=0.2)
+    path = quiet_path(measured, input_noise(measured))
+    assert hs.Record(u=path, y=path).reversals().size == hs.Record(u=u, y=u).reversals().size
+    assert np.std(path - u) < np.std(measured - u)
+
+
+@pytest.mark.parametrize(
+    "u",
+    [CYCLES, SINE, np.sin(2.2 * np.arange(500)), np.sin(0.0005 * np.arange(1000.0) ** 2), noise(1.0), np.zeros(50),
+     np.repeat(np.arange(30.0), 4), CYCLES[::20]],
+    ids=["triangle", "sine", "fast sine", "chirp", "white", "constant", "staircase", "few samples"],
+)  # fmt: skip
+def test_a_signal_is_not_taken_for_noise(u):
+    assert input_noise(u) == 0.0
+
+
+def test_a_law_is_found_behind_a_noisy_input():
+    record = hs.Record(u=CYCLES + noise(0.02), y=LAW.response(CYCLES) + noise(1e-3, seed=1))
+    fit = hs.identify(hs.BoucWen, record, fixed={"n": 1.0})
+    assert "rms: only the 5 of 271 reversals above it are used" in fit.message
+    assert fit.rmse < 0.03
+    true = {"beta": 1.5, "gain": 2.0}
+    quiet = max(abs(fit.estimates[name] / value - 1.0) for name, value in true.items())
+    assert quiet < 0.1  # 0.4 along the input as measured, and an rmse of 0.046
+    assert "noise" not in hs.identify(hs.BoucWen, hs.Record(u=CYCLES, y=record.y), fixed={"n": 1.0}).message
+
+
+def test_a_cycle_is_found_in_a_noisy_input():
+    plays = hs.PrandtlIshlinskii(thresholds=(0.0, 0.3), weights=(1.0, 1.0))
+    u = 3.0 + CYCLES
+    record = hs.Record(u=(u + noise(0.02))[130:580], y=plays.response(u)[130:580])
+    assert "which the input repeats" in hs.identify(hs.PrandtlIshlinskii, record, initial=None).message
+
+
+@pytest.mark.parametrize("family", [hs.BoucWen, hs.PrandtlIshlinskii, hs.Line], ids=lambda each: each.__name__)
+def test_a_sample_of_weight_zero_has_no_say(family):
+    u = CYCLES[::5]
+    y = LAW.response(u) + noise(1e-3, u.size)
+    weights = np.ones(u.size)
+    weights[20:60:3] = 0.0
+    spoilt = np.where(weights, y, 50.0)
+    fits = [hs.identify(family, hs.Record(u=u, y=each), weights=weights) for each in (y, spoilt)]
+    for name, value in fits[0].estimates.items():
+        assert fits[1].estimates[name] == pytest.approx(value, rel=1e-4, abs=1e-4), name
+        assert fits[1].stderr.get(name, 0.0) == pytest.approx(fits[0].stderr.get(name, 0.0), rel=1e-2, nan_ok=True)
+    assert fits[0].rmse == pytest.approx(fits[1].rmse, rel=1e-6)
+    assert fits[0].residual.size == u.size
+
+
+def test_a_weight_of_two_is_a_sample_twice():
+    u = np.linspace(0.0, 1.0, 12)
+    y = 2.0 * u + noise(0.1, 12)
+    twice = hs.identify(hs.Line, hs.Record(u=np.append(u, u[-1:]), y=np.append(y, y[-1:])))
+    weighted = hs.identify(hs.Line, hs.Record(u=u, y=y), weights=np.append(np.ones(11), 2.0))
+    assert weighted.estimates["slope"] == pytest.approx(twice.estimates["slope"], rel=1e-12)
+    equal = hs.identify(hs.Line, hs.Record(u=u, y=y), weights=np.full(12, 7.0))
+    plain = hs.identify(hs.Line, hs.Record(u=u, y=y))
+    assert equal.stderr == pytest.approx(plain.stderr, rel=1e-12)
+    assert equal.bic == pytest.approx(plain.bic, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("weights", "message"),
+    [(np.ones(3), "one number for each sample, 12; got 3"), (-np.ones(12), "not be negative"), (np.zeros(12), "all")],
+)
+def test_wrong_weights_are_named(weights, message):
+    u = np.linspace(0.0, 1.0, 12)
+    with pytest.raises(ValueError, match=message):
+        hs.identify(hs.Line, hs.Record(u=u, y=u), weights=weights)
+    with pytest.raises(ValueError, match="fitted without weights"):
+        hs.identify(hs.SingleValued, hs.Record(u=u, y=u), weights=np.ones(12))
