@@ -23,7 +23,8 @@ from hysim._frozen import FloatArray
 from hysim._input_noise import input_noise, quiet_path
 from hysim._repeats import repeated_cycle
 from hysim.errors import SimulationError
-from hysim.identification._problem import Problem, problem
+from hysim.identification._budget import Budget
+from hysim.identification._problem import Problem, problem, problems
 from hysim.identification._search import brief_optimum
 from hysim.models.protocols import Undecided, Variant
 from hysim.models.search_space import Freedom
@@ -42,9 +43,12 @@ _STATES = {
 
 
 class Decision(NamedTuple):
-    """The problem to be searched, the value of `initial` that it has, and a sentence on what was chosen and why."""
+    """The problems to be searched, the value of `initial` that they have, and a sentence on what was chosen and why.
 
-    problem: Problem
+    There are several, the simplest first, where the family's search has stages.
+    """
+
+    problems: Sequence[Problem]
     initial: str | Sequence[str] | None
     sentence: str
 
@@ -95,9 +99,10 @@ def decided(
     weights: Sequence[FloatArray] | None = None,
     max_evaluations: int | None = None,
 ) -> Decision:
-    """The problem of a family on these records; `initial` and `freedom` are the user's, and are kept."""
+    """The problems of a family on these records; `initial` and `freedom` are the user's, and are kept."""
     choice = _decided(family, records, freedom, initial, weights, max_evaluations)
-    return choice._replace(problem=choice.problem.limited(max_evaluations))
+    budget = _budget(max_evaluations, records)
+    return choice._replace(problems=[each.within(budget) for each in choice.problems])
 
 
 def _decided(
@@ -110,7 +115,8 @@ def _decided(
 ) -> Decision:
     given: Any = family
     if not isinstance(family, Undecided):
-        return Decision(problem(given, records, freedom, initial).weighted(weights), initial, "")
+        every = problems(given, records, freedom, initial)
+        return Decision([each.weighted(weights) for each in every], initial, "")
     states: list[str | Sequence[str] | None] = [initial]
     if initial is None:
         plain = problem(given, records, freedom, None)
@@ -118,7 +124,8 @@ def _decided(
         states = [None] if told else [*_possible(family, records)] or [None]
     variants = family.variants() or (Variant(family, ""),)
     if len(states) == len(variants) == 1:
-        return Decision(problem(variants[0].family, records, freedom, states[0]).weighted(weights), states[0], "")
+        only = problem(variants[0].family, records, freedom, states[0]).weighted(weights)
+        return Decision([only], states[0], "")
     trials: dict[tuple[int, int], _Trial] = {}
     brief = None if max_evaluations is None else max_evaluations / (2 * (len(states) + len(variants)))
 
@@ -134,7 +141,12 @@ def _decided(
     chosen = _best([k for k, each in enumerate(variants) if each.offered], lambda k: trial(state, k).bic)
     best = trial(state, chosen)
     others = [each for key, each in trials.items() if key != (state, chosen) and each.variant.offered]
-    return Decision(_with_starts(best, trials.values()), best.initial, _sentence(best, others, records))
+    return Decision([_with_starts(best, trials.values())], best.initial, _sentence(best, others, records))
+
+
+def _budget(max_evaluations: float | None, records: Sequence[Record]) -> Budget | None:
+    """A budget of so many sets on the whole records."""
+    return None if max_evaluations is None else Budget(max_evaluations * sum(map(len, records)))
 
 
 def _possible(family: Undecided, records: Sequence[Record]) -> list[str]:
@@ -156,7 +168,8 @@ def _tried(
     weights: Sequence[FloatArray] | None,
     max_evaluations: float | None,
 ) -> _Trial:
-    attempt = problem(variant.family, records, freedom, initial).weighted(weights).limited(max_evaluations)
+    attempt = problem(variant.family, records, freedom, initial).weighted(weights)
+    attempt = attempt.within(_budget(max_evaluations, records))
     try:
         x, cost = brief_optimum(attempt)
         bic = _bic(attempt, x, cost)

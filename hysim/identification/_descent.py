@@ -45,13 +45,17 @@ class Reached(NamedTuple):
 
 @dataclass(frozen=True)
 class Descent:
-    """Outputs `targets` to be met with `weights`, (n_sets or 1, n_samples); `projected` solves for b at each step."""
+    """Outputs `targets` to be met with `weights`, (n_sets or 1, n_samples); `projected` solves for b at each step.
+
+    `nearly`, if given, is a problem with the same box from which slopes are taken.
+    """
 
     problem: Problem
     noise: Noise
     targets: FloatArray
     weights: FloatArray
     projected: bool = False
+    nearly: Problem | None = None  # where slopes cost less, with nearly the same outputs
 
     def run(
         self, theta: FloatArray, *, constraint: Constraint | None = None, tolerance: float = 1e-5, steps: int = N_STEPS
@@ -78,7 +82,9 @@ class Descent:
         ends, steps = self.problem.beside(theta[:, :n_x])
         there = np.repeat(theta, n_x, axis=0)
         there[:, :n_x] = ends.reshape(-1, n_x)
-        displaced = self.problem.model(there).reshape(n_sets, n_x, -1)
+        if self.nearly is not None:
+            outputs = self.nearly.model(theta)
+        displaced = (self.nearly or self.problem).model(there).reshape(n_sets, n_x, -1)
         with np.errstate(over="ignore", invalid="ignore"):
             by_x = (displaced - outputs[:, np.newaxis]) / steps[..., np.newaxis]
         by_x[~np.isfinite(by_x)] = 0.0

@@ -17,7 +17,7 @@ from hysim.identification._noise import Gaussian, Noise, Quantised, Robust
 from hysim.identification._problem import Problem
 from hysim.identification._resampling import left_out_errors, rms_of_known
 from hysim.identification._result import Identification
-from hysim.identification._search import PERFECT, optima
+from hysim.identification._search import PERFECT, chosen, stages_in_words
 from hysim.identification._searched import Search
 from hysim.identification.folds import left_out
 from hysim.identification.swapped import swapped_columns, swapped_for
@@ -125,41 +125,44 @@ def identify(
             family = _family(model_or_class)
             paths, noisy = quiet_where_better(family, records, options, initial)
             choice = decided(family, paths, options, initial, shares, max_evaluations)
-            fit = _searched(choice.problem, noise, intervals, left_out(cross_validate, records), seed, progress)
+            fit = _searched(choice.problems, noise, intervals, left_out(cross_validate, records), seed, progress)
             fit = replace(fit, message="; ".join(filter(None, (fit.message, choice.sentence, noisy))))
             doubt = swapped_columns(records)
-            budget = choice.problem.budget
+            budget = choice.problems[0].budget
             if budget is not None and (budget.cut or not fit.success):
                 stopped = (
                     f"partial: the search stopped at max_evaluations={max_evaluations}, better parameters may exist"
                 )
                 fit = replace(fit, success=False, message=f"{stopped}; {fit.message}")
             elif not doubt and not needs_time(fit.model):
-                doubt = swapped_for(choice.problem.family, records, options, initial, 1.0 - fit.fit_percent / 100.0)
+                doubt = swapped_for(choice.problems[0].family, records, options, initial, 1.0 - fit.fit_percent / 100.0)
         return replace(fit, warnings=(*fit.warnings, doubt)) if doubt else fit
 
 
 def _searched(
-    problem: Problem,
+    problems: Sequence[Problem],
     noise: str,
     intervals: str,
     folds: Sequence[npt.NDArray[np.intp]],
     seed: int,
     progress: Progress | None,
 ) -> Identification:
+    problem = problems[0]
     n_samples, n_names = problem.n_samples, len(problem.space.names)
     if not n_names:
         raise ValueError("every parameter is fixed: leave at least one free")
     if n_samples < n_names:
         raise ValueError(f"{n_names} parameters cannot be estimated from {n_samples} samples; fix some of them")
     density = _density(noise, problem)
-    squares = optima(problem, seed=seed, progress=progress)
+    problem, squares = chosen(problems, seed=seed, progress=progress)
     if not squares:
         raise ValueError("every parameter set tried diverged: check the units, or pass bounds=")
     if isinstance(density, Quantised):
-        density = density.at_least(squares[0].cost, n_samples - n_names)
+        density = density.at_least(squares[0].cost, n_samples - len(problem.space.names))
     search = Search(problem, density, seed)
     result, likely = search.described(search.likely(squares), intervals, squares[0].x)
+    if remark := stages_in_words(problems, problem):
+        result = replace(result, message=f"{result.message}; {remark}")
     errors = left_out_errors(problem, density, np.array([optimum.theta for optimum in likely]), folds)
     return replace(result, regions=search.regions(likely[0]), cv_residual=errors, cv_rmse=rms_of_known(errors))
 

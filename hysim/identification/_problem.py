@@ -9,7 +9,7 @@ parameters but the state at the first sample, which each has as ``z0[0]``, ``z0[
 many x at once.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -20,8 +20,9 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray
 from hysim._repeats import repeated_cycle
 from hysim.identification._budget import Budget
-from hysim.models.protocols import Identifiable
+from hysim.models.protocols import Identifiable, Staged
 from hysim.models.search_space import STATES, STATES_IN_WORDS, Freedom, Parameters, SearchSpace
+from hysim.models.stages import BASE, Stage
 from hysim.records import Record
 
 _CHUNK = 200_000  # samples that are evaluated at once, to bound the memory
@@ -52,6 +53,9 @@ class Problem:
     own: SearchSpace
     parts: tuple[Part, ...]
     budget: Budget | None = None
+    simpler: "Problem | None" = None  # whose optimum starts the search
+    enlarged: Callable[[Mapping[str, float]], dict[str, float]] = dict  # its parameters to those of this family
+    stage: Stage | None = None  # what this problem frees, and the simpler one does not
 
     @property
     def n_x(self) -> int:
@@ -91,7 +95,7 @@ class Problem:
         through the same memories at the samples that remain, except for reversals of less than 1 % of the span.
         """
         parts = tuple(_thinned(part, samples) for part in self.parts)
-        short = replace(self, parts=parts)
+        short = replace(self, parts=parts, simpler=self.simpler and self.simpler.thinned(samples))
         if 2 * sum(len(part.record) for part in parts) > self.y.size:
             return None
         try:
@@ -100,11 +104,9 @@ class Problem:
             return None
         return short
 
-    def limited(self, max_evaluations: float | None) -> "Problem":
-        """This problem with a budget of so many sets on the whole records."""
-        if max_evaluations is None:
-            return self
-        return replace(self, budget=Budget(max_evaluations * self.y.size))
+    def within(self, budget: Budget | None) -> "Problem":
+        """This problem with a budget, which it shares with the simpler one."""
+        return replace(self, budget=budget, simpler=self.simpler and self.simpler.within(budget))
 
     def weighted(self, weights: Sequence[FloatArray] | None) -> "Problem":
         """This problem with a weight for each sample of each record."""
@@ -113,7 +115,28 @@ class Problem:
         every = np.concatenate(weights)
         scale = np.count_nonzero(every) / float(every.sum())
         parts = (replace(part, weights=scale * own) for part, own in zip(self.parts, weights, strict=True))
-        return replace(self, parts=tuple(parts))
+        return replace(self, parts=tuple(parts), simpler=self.simpler and self.simpler.weighted(weights))
+
+    def begun(self, x: FloatArray) -> FloatArray:
+        """Coordinates (n_sets, n_x) of the models with the outputs of the `simpler` problem's at its `x`, or of none.
+
+        Those outside the box are brought to its side.
+        """
+        encoded = self.own.encoded
+        if self.simpler is None or encoded is None:
+            return np.empty((0, self.n_x))
+        begun = np.clip(np.zeros((len(x), self.n_x)), self.space.lower, self.space.upper)
+        for start, theta in zip(begun, self.simpler.completed(x), strict=True):
+            for k, part in enumerate(self.parts):
+                present = part.coordinates >= 0
+                values = encoded(self.enlarged(self.simpler.estimates(theta, k)))
+                start[part.coordinates[present]] = values[present]
+        return np.asarray(np.clip(begun, self.space.lower, self.space.upper))
+
+    def rough(self) -> "Problem":
+        """This problem with nearly the same outputs, cheaper to compute."""
+        family = self.family.rough() if isinstance(self.family, Staged) else self.family
+        return self if family is self.family else replace(self, family=family)
 
     def completed(self, x: FloatArray) -> FloatArray:
         """Theta (n_sets, n_theta): the coordinates `x` and the best linear parameters."""
@@ -273,6 +296,41 @@ def problem(
     family: Identifiable, records: Sequence[Record], freedom: Freedom, initial: str | Sequence[str] | None
 ) -> Problem:
     """Put the records of one family together; a ValueError says why `initial` or `freedom` does not fit."""
+    alone = _alone(family, records, freedom, initial)
+    simple = family.simpler() if isinstance(family, Staged) else None
+    if simple is None or alone.own.encoded is None:
+        return alone
+    simpler = problem(simple.family, records, simple.reduced(freedom), initial)
+    return replace(alone, simpler=simpler, enlarged=simple.enlarged)
+
+
+def problems(
+    family: Identifiable, records: Sequence[Record], freedom: Freedom, initial: str | Sequence[str] | None
+) -> list[Problem]:
+    """The problems of a search in stages, the simplest first, among which a criterion may choose; else one problem."""
+    stages = [each for each in family.stages if each.is_open(freedom)] if isinstance(family, Staged) else []
+    if not isinstance(family, Staged) or not stages:
+        return [problem(family, records, freedom, initial)]
+    simplest = problem(family, records, _at_stage(stages, 0, freedom, family.scalars), initial)
+    chain, first = [replace(simplest, stage=None if simplest.simpler is None else BASE)], 0
+    for k, stage in enumerate(stages, 1):
+        larger = _alone(family, records, _at_stage(stages, k, freedom, family.scalars), initial)
+        chain.append(replace(larger, simpler=chain[-1], stage=stage))
+        first = k if stage.is_asked_for(freedom, family.scalars) else first
+    return chain[first:]
+
+
+def _at_stage(stages: Sequence[Stage], k: int, freedom: Freedom, values: Mapping[str, float]) -> Freedom:
+    for stage in stages[:k]:
+        freedom = stage.opened(freedom, values)
+    for stage in stages[k:]:
+        freedom = stage.closed(freedom, values)
+    return freedom
+
+
+def _alone(
+    family: Identifiable, records: Sequence[Record], freedom: Freedom, initial: str | Sequence[str] | None
+) -> Problem:
     kinds = _kinds(initial, len(records))
     shared = None if kinds[0] is None else "free" if "free" in kinds else "rest"
     widest = max(records, key=lambda record: (float(np.ptp(record.u)), len(record)))  # it scales the box

@@ -5,6 +5,7 @@ projected Levenberg-Marquardt steps in one batch. The best distinct optima desce
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,12 +16,15 @@ from hysim.identification._descent import Descent, Reached
 from hysim.identification._noise import Gaussian
 from hysim.identification._problem import Problem
 from hysim.models.search_space import SearchSpace
+from hysim.models.stages import Stage
 
 N_SCREENED = 4096
 N_DESCENDING = 64
 N_STEPS = 40
 N_POLISHED = 8
 N_POLISHING = 200
+N_NESTED = 3  # optima of a simpler family that are starts
+N_STAGED = 3  # points of a stage that are polished
 N_POLISHED_WHOLE = 3  # optima of a thinned record that descend on all samples
 N_BRIEF_SCREENED = 512
 N_BRIEF_DESCENDING = 12
@@ -30,29 +34,89 @@ _APART = 0.05  # distance of two starts, in units of the box, under which the be
 _SAME = 0.01  # likewise of two points after the descent
 _GAIN = 1e-5  # share of the sum of squares: a descent that gains less rests
 _TOLERANCE = 2e-8  # likewise of a polish
+_ROUGH = 0.1  # share of the cost by which the rough law's may differ: beyond, it does not say what stays
 PERFECT = 1e-14  # smallest sigma, in units of the output's size
 
 
 class Optimum(NamedTuple):
-    """Local optimum: coordinates (n_x,), sum of squares, and whether the polish converged."""
+    """Local optimum: coordinates (n_x,), sum of squares, and whether the polish converged.
+
+    One that `is_simpler` is the optimum of the simpler problem, where a stage seems to have no use.
+    """
 
     x: FloatArray
     cost: float
     converged: bool
+    is_simpler: bool = False
 
 
-def optima(problem: Problem, *, seed: int, progress: Progress | None = None) -> list[Optimum]:
-    """Distinct local optima, best first; empty if every parameter set diverges."""
+def chosen(
+    problems: Sequence[Problem], *, seed: int, progress: Progress | None = None
+) -> tuple[Problem, list[Optimum]]:
+    """The problem of the lowest Bayesian information criterion among several, each larger than the one before it.
+
+    Also its optima, as `optima` returns them. Problems with more parameters than samples take no part.
+    """
+    best: tuple[float, Problem, list[Optimum]] = (math.inf, problems[0], [])
+    known: list[Optimum] | None = None
+    for problem in problems:
+        n_samples, n_names = problem.n_samples, len(problem.space.names)
+        if n_names > n_samples and problem is not problems[0]:
+            break
+        known = optima(problem, seed=seed, progress=progress, known=known, may_end=problem is not problems[0])
+        if known:
+            cost = max(known[0].cost, n_samples * (PERFECT * problem.scale) ** 2)
+            criterion = n_samples * math.log(cost / n_samples) + n_names * math.log(n_samples)
+            best = min(best, (criterion, problem, known), key=lambda each: each[0])
+    return best[1:]
+
+
+def stages_in_words(problems: Sequence[Problem], best: Problem) -> str:
+    """Which stages the criterion keeps, where it has the choice."""
+    stages = [problem.stage.word for problem in problems if problem.stage is not None and problem.stage.word]
+    if len(problems) < 2 or not stages:
+        return ""
+    after = next(k for k, problem in enumerate(problems) if problem is best)
+    n_kept = len(stages) - (len(problems) - 1 - after)
+    kept, others = stages[:n_kept], stages[n_kept:]
+    words = [f"keeps {' and '.join(kept)}"] if kept else []
+    words += [f"leaves out {' and '.join(others)}"] if others else []
+    return f"the BIC {' and '.join(words)}"
+
+
+def optima(
+    problem: Problem,
+    *,
+    seed: int,
+    progress: Progress | None = None,
+    known: Sequence[Optimum] | None = None,
+    may_end: bool = False,
+) -> list[Optimum]:
+    """Distinct local optima, best first; empty if every parameter set diverges.
+
+    `known` are those of the simpler problem, which is searched without them. If it `may_end`, a stage that will not
+    lower the Bayesian information criterion is not searched to its end.
+    """
     space = problem.space
     if not space.coordinates:
         return polish(problem, np.empty((1, 0)))
     if problem.y.size > _LONG and (short := problem.thinned(_SHORT)) is not None:
-        likely = optima(short, seed=seed, progress=progress)[:N_POLISHED_WHOLE]
+        likely = optima(short, seed=seed, progress=progress, known=known, may_end=may_end)[:N_POLISHED_WHOLE]
+        if likely and likely[0].is_simpler:
+            return _as_they_are(problem, np.array([each.x for each in likely]))
         return _distinct(polish(problem, np.array([each.x for each in likely]))) if likely else []
+    if known is None and problem.simpler is not None:
+        known = optima(problem.simpler, seed=seed)
+    begun = problem.begun(np.array([each.x for each in known[:N_NESTED]])) if known else np.empty((0, problem.n_x))
+    if problem.stage is not None:
+        points = _staged(problem, problem.stage, begun, seed)
+        if may_end and len(begun) and not _may_stay(problem, begun, points):
+            return _as_they_are(problem, begun)
+        return _distinct(polish(problem, points))
     share = min(1.0, _LONG / problem.y.size)
     screened = max(256, round(N_SCREENED * share)) if space.screened is None else space.screened
     n_starts = max(16, round(N_DESCENDING * share))
-    starts = _starts(problem, screened, seed, n_starts, len(space.starts))
+    starts = _starts(problem, screened, seed, n_starts, np.concatenate([space.starts, begun]))
     if not len(starts):
         return []
     reached = _descended(problem, starts, exact=False)
@@ -65,7 +129,12 @@ def optima(problem: Problem, *, seed: int, progress: Progress | None = None) -> 
 
 
 def brief_cost(problem: Problem) -> float:
-    """Sum of squares that a short search reaches; inf if every parameter set diverges."""
+    """Sum of squares that a short search reaches; inf if every parameter set diverges.
+
+    A search in stages ends before the first of them.
+    """
+    while problem.stage is not None and problem.simpler is not None:
+        problem = problem.simpler
     return brief_optimum(problem)[1]
 
 
@@ -78,7 +147,7 @@ def brief_optimum(problem: Problem) -> tuple[FloatArray, float]:
         x, cost = brief_optimum(short)
         return x, cost * problem.y.size / short.y.size
     screened = N_BRIEF_SCREENED if space.screened is None else min(space.screened, N_BRIEF_SCREENED)
-    best = _starts(problem, screened, 0, N_BRIEF_DESCENDING)
+    best = _starts(problem, screened, 0, N_BRIEF_DESCENDING, space.starts, are_kept=False)
     if not len(best):
         return 0.5 * (space.lower + space.upper), math.inf
     ends = _descended(problem, best, exact=False).theta[:, : problem.n_x]
@@ -87,6 +156,8 @@ def brief_optimum(problem: Problem) -> tuple[FloatArray, float]:
 
 
 def polish(problem: Problem, starts: FloatArray) -> list[Optimum]:
+    if (rough := problem.rough()) is not problem and len(starts):
+        starts = _descended(problem, starts, exact=True, nearly=rough).theta[:, : starts.shape[1]]
     reached = _descended(problem, starts, exact=True)
     x = reached.theta[:, : starts.shape[1]]
     costs = problem.costs(x)
@@ -95,15 +166,52 @@ def polish(problem: Problem, starts: FloatArray) -> list[Optimum]:
     ]
 
 
-def _descended(problem: Problem, starts: FloatArray, *, exact: bool) -> Reached:
+def _staged(problem: Problem, stage: Stage, begun: FloatArray, seed: int) -> FloatArray:
+    """Points (n_sets, n_x) to polish: random ones in what the stage frees, beside the `begun`, after its rounds."""
+    space, rough = problem.space, problem.rough()
+    drawn = _uniform(space, stage.drawn, seed)
+    around = begun if len(begun) else space.starts
+    freed = np.array([name in stage.names for name in space.coordinates])
+    beside = np.where(freed, drawn, around[np.arange(len(drawn)) % len(around)])
+    points = np.concatenate([space.starts, begun, beside])
+    cost = rough.costs(points)
+    for n_best, steps in stage.rounds:
+        points = _apart(space, points, cost, _SAME, n_best)
+        reached = _descended(rough, points, exact=False, steps=steps)
+        points, cost = reached.theta[:, : problem.n_x], reached.loss
+    return _apart(space, points, cost, _SAME, N_STAGED)
+
+
+def _as_they_are(problem: Problem, x: FloatArray) -> list[Optimum]:
+    return _distinct([Optimum(each, float(cost), True, True) for each, cost in zip(x, problem.costs(x), strict=True)])
+
+
+def _may_stay(problem: Problem, begun: FloatArray, points: FloatArray) -> bool:
+    """Whether the stage may lower the BIC, by rough costs at the `begun` points and after its rounds."""
+    rough = problem.rough()
+    before, after = (float(rough.costs(each).min()) for each in (begun, points))
+    if not (0.0 < after < math.inf and 0.0 < before < math.inf):
+        return True
+    sizes = problem.costs(begun)
+    n, freed = problem.n_samples, len(problem.space.names) - len(problem.simpler.space.names) if problem.simpler else 0
+    is_rough = abs(before - sizes.min()) > _ROUGH * sizes.min()
+    return is_rough or n * (math.log(before) - math.log(after)) > 0.5 * freed * math.log(n)
+
+
+def _descended(
+    problem: Problem, starts: FloatArray, *, exact: bool, steps: int = N_STEPS, nearly: Problem | None = None
+) -> Reached:
     noise, everything = Gaussian(floor=PERFECT * problem.scale), np.ones((1, problem.y.size))
-    descent = Descent(problem, noise, problem.y[np.newaxis], everything, projected=not problem.space.bounds)
-    gain, steps = (_TOLERANCE, N_POLISHING) if exact else (_GAIN, N_STEPS)
-    return descent.run(problem.completed(starts), tolerance=0.5 * problem.y.size * gain, steps=steps)
+    descent = Descent(problem, noise, problem.y[np.newaxis], everything, not problem.space.bounds, nearly)
+    gain, most = (_TOLERANCE, N_POLISHING) if exact else (_GAIN, steps)
+    return descent.run(problem.completed(starts), tolerance=0.5 * problem.y.size * gain, steps=most)
 
 
-def _starts(problem: Problem, screened: int, seed: int, most: int, n_given: int = 0) -> FloatArray:
-    candidates = np.concatenate([problem.space.starts, _uniform(problem.space, screened, seed)])
+def _starts(
+    problem: Problem, screened: int, seed: int, most: int, given: FloatArray, *, are_kept: bool = True
+) -> FloatArray:
+    candidates = np.concatenate([given, _uniform(problem.space, screened, seed)])
+    n_given = len(given) if are_kept else 0
     return _apart(problem.space, candidates, problem.costs(candidates), _APART, most, n_given)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from hysim import metrics
 from hysim._frozen import FloatArray
 from hysim.errors import SimulationError
-from hysim.identification._problem import problem
+from hysim.identification._problem import problems
 from hysim.identification._search import brief_cost
 from hysim.identification.sentences import SWAPPED
 from hysim.models.protocols import Identifiable
@@ -72,7 +72,7 @@ def swapped_for(
         return ""
     reverse = replace(record, u=record.y, y=record.u, resolution=None, units={})[:: -(-len(record) // _MOST_SAMPLES)]
     try:
-        reversed_problem = problem(family, [reverse], freedom, initial)
+        reversed_problem = problems(family, [reverse], freedom, initial)[0]
         if len(reversed_problem.space.names) >= len(reverse):
             return ""
         cost = brief_cost(reversed_problem)

@@ -203,3 +203,94 @@ def short_way(w: float, forcing: float, near: float, n: float, left: float) -> f
         return left
     theta = min(1.0, max(0.3, (abs(w) / near) ** (-(n + 1.0) / 12.0)))
     return float(min(left, theta * way / abs(forcing)))
+
+
+# ------------------------------------------------------------------------- a few parts in a thousand, for a search
+
+_MOST_ROUGH = 4_000
+_STRIDE = 0.25  # of the yield memory, that w moves in one rough step
+_ACROSS = 0.4  # likewise of the width of the bell
+_NEAR_ZERO = 0.05  # of the yield memory: below, a rough step may cross zero
+
+
+@kernel
+def rough_step(parameters: FloatArray, state: FloatArray, u: float) -> float:
+    """As `step`, in place of the power series by exponential Rosenbrock steps of order 3 (Hochbruck and Ostermann).
+
+    The lengths of the steps are continuous in all parameters, so that differences of outputs are derivatives.
+    """
+    common = parameters[_COMMON:]
+    last, z, e = state[0], state[1], state[2]
+    if u != last and math.isfinite(z):
+        direction = 1.0 if u > last else -1.0
+        of_z, of_u = parameters[_SCALE], parameters[_SCALE + 1]
+        w, e = rough_advance(direction * z * of_z, e * of_z * of_u, abs(u - last) * of_u, parameters)
+        state[1], state[2] = direction * w / of_z, e / of_u / of_z
+    state[0] = u
+    return float(common[5] + boucwen.polynomial(u, common, 6) + common[4] * state[1])
+
+
+@inner
+def rough_advance(w: float, e: float, length: float, parameters: FloatArray) -> tuple[float, float]:
+    """w and e after the input has moved by `length`, roughly."""
+    n, pinches = parameters[EXPONENT], parameters[3] != 0.0
+    loading = parameters[BETA] + parameters[GAMMA]
+    bend = max(abs(loading), abs(parameters[GAMMA] - parameters[BETA]))
+    bent = (abs(parameters[STRENGTH]) / bend) ** (1.0 / n) if bend > 0.0 else math.inf
+    parting = parameters[4] * max(loading, 0.0) ** (-1.0 / n) if pinches and parameters[4] != 0.0 else 0.0
+    t, left = 0.0, length
+    for _ in range(_MOST_ROUGH):
+        if not left > 1e-12 * length:
+            return w, e
+        ahead = e + 0.5 * t * w  # as far again as the step before: half of it is the middle of this one
+        depth, where, width = 0.0, 0.0, 1.0
+        if pinches:
+            depth = -parameters[3] * math.expm1(min(-parameters[5] * ahead, 500.0))
+            nu = 1.0 + parameters[1] * ahead
+            where = parting * nu ** (-1.0 / n) if parting != 0.0 and nu > 0.0 else parting
+            width = (parameters[6] + parameters[7] * ahead) * (parameters[8] + depth)
+        f, slope = rough_slope(w, ahead, depth, where, width, parameters)
+        size = min(max(bent, abs(w)), abs(w) + abs(f) * length)
+        room = _STRIDE * size
+        if pinches:
+            room = min(room, max(_ACROSS * abs(width), abs(w - where) - 2.0 * abs(width)))
+        if w * f < 0.0:
+            room = min(room, max(abs(w), _NEAR_ZERO * size))
+        t = min(left, room / max(abs(f), 1e-300), 1.0 / max(slope, 1e-300))
+        first, third = phi(slope * t)
+        middle = w + t * first * f
+        there, _ = rough_slope(middle, ahead, depth, where, width, parameters)
+        after = middle + 2.0 * t * third * (there - f - slope * (middle - w))
+        if not abs(after) < _BEYOND:
+            return math.copysign(math.inf, w), e
+        e += 0.5 * t * (w + after)
+        w = after
+        left -= t
+    return math.nan, e
+
+
+@inner
+def rough_slope(
+    w: float, e: float, depth: float, where: float, width: float, parameters: FloatArray
+) -> tuple[float, float]:
+    """dw/dL at w, and its derivative by w, for a bell and an energy that stand still."""
+    n, nu, eta = parameters[EXPONENT], 1.0 + parameters[1] * e, 1.0 + parameters[2] * e
+    side = 1.0 if w > 0.0 else -1.0
+    power = abs(w) if n == 1.0 else w * w if n == 2.0 else abs(w) ** n
+    term = (parameters[GAMMA] + side * parameters[BETA]) * nu * power / eta
+    f = (parameters[STRENGTH] - parameters[0] * e) / eta - term
+    slope = -n * term / w if w != 0.0 and n >= 1.0 else 0.0
+    if depth == 0.0:
+        return f, slope
+    x = (w - where) / width
+    bell = depth * math.exp(-x * x)
+    return (1.0 - bell) * f, (1.0 - bell) * slope + 2.0 * x / width * bell * f
+
+
+@inner
+def phi(x: float) -> tuple[float, float]:
+    """(exp(x) - 1) / x, and ((exp(x) - 1 - x) / x - x / 2) / x^2, the weights of an exponential step."""
+    if abs(x) < 0.02:
+        return 1.0 + x * (0.5 + x / 6.0), 1.0 / 6.0 + x / 24.0
+    first = math.expm1(x) / x
+    return first, ((first - 1.0) / x - 0.5) / x

@@ -29,6 +29,7 @@ from hysim.models.inverse_search import inverse_at_rest, inverse_response, inver
 from hysim.models.parameters import Parameter, declared_space
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.stages import Simpler, Stage, Subset
 from hysim.models.steady_cycle import PassOf, fixed_point
 from hysim.models.tables import Tables, arguments_of, scalars_of, table_of_one, tables_of
 from hysim.records import Record
@@ -69,6 +70,10 @@ class Law(Composable, ABC):
         Points from which a search begins beside the law's own, in the units of `searched`.
     screened : int, optional
         Random points that a search tries at first; by default `hysim.identify` chooses.
+    contains : Subset, optional
+        A simpler family that this one contains, whose optimum starts the search.
+    stages : tuple of Stage
+        Parameters that a search frees in turn; the Bayesian information criterion says which of them stay.
     workspace : int
         Further places at the end of the state, which a step may use as it likes; zero at first.
     """
@@ -78,6 +83,8 @@ class Law(Composable, ABC):
     searched: ClassVar[tuple[Parameter, ...]] = ()
     starts: ClassVar[tuple[Mapping[str, float], ...]] = ()
     screened: ClassVar[int | None] = None
+    contains: ClassVar[Subset | None] = None
+    stages: ClassVar[tuple[Stage, ...]] = ()
     workspace: ClassVar[int] = 0
 
     # ------------------------------------------------------------------------------ what a family may say more
@@ -367,6 +374,14 @@ class Law(Composable, ABC):
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box that `hysim.identify` searches, by the declarations in `searched`."""
         return declared_space(self.searched, self.starts, self.scalars, self.initial, record, freedom, self.screened)
+
+    def simpler(self) -> Simpler | None:
+        """The law that this one `contains`, with the values that both have."""
+        return None if self.contains is None else self.contains.of(self.scalars)
+
+    def rough(self) -> "Law":
+        """A law with nearly the same output, for the first steps of a search; itself where that is cheap enough."""
+        return self
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns in which the output is affine, and the rest of it, shape (n_sets, n_samples, n_columns + 1)."""

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol, TypeGuard, runtime_check
 
 from hysim._frozen import FloatArray
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.stages import Simpler, Stage
 from hysim.records import Record
 
 Limits = tuple[float, float]
@@ -171,6 +172,25 @@ class Undecided(Protocol):
 
     def variants(self) -> tuple[Variant, ...]:
         """Further choices, the simplest first; the last one contains all others. None where nothing is left open."""
+
+
+@runtime_checkable
+class Staged(Protocol):
+    """A subject of `identify` that says how its search is staged; see `hysim.models.stages`."""
+
+    @property
+    def scalars(self) -> Mapping[str, float]:
+        """Every parameter by name, as the search begins."""
+
+    @property
+    def stages(self) -> tuple[Stage, ...]:
+        """Parameters that are freed in turn."""
+
+    def simpler(self) -> Simpler | None:
+        """The simpler family whose optimum starts the search."""
+
+    def rough(self) -> Identifiable:
+        """A subject with the same search box and nearly the same outputs, cheaper to compute."""
 
 
 @runtime_checkable

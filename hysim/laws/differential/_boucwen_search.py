@@ -14,9 +14,8 @@ for every n,
 The box is |k| <= 40 for both, n in [0.5, 10] on a log scale, z0/Z in [-1, 1], and open for the
 parameters in which the output is affine. The further shape coefficients b2 to b6 of the generalised law
 have the coordinates of beta; the forcing delta of Zhu and Wang is measured by what it adds to |A| where |u|
-is largest, in [-5, 5]. What wears off by Baber and Noori is measured by what Z times the length of the record's way
-takes away, and the widths of the pinching in Z. A parameter that the user bounds is its own coordinate,
-between these bounds; bounds from or to zero and infinity cut the box at zero.
+is largest, in [-5, 5]. A parameter that the user bounds is its own coordinate, between these bounds; bounds from
+or to zero and infinity cut the box at zero.
 """
 
 from collections.abc import Mapping
@@ -32,28 +31,19 @@ REDUNDANT = (("A", "gain"),)
 _FURTHER = ("b2", "b3", "b4", "b5", "b6")
 _SCALED = {  # parameters with a unit of their own, and their box in it
     "delta": (-5.0, 5.0),
-    "delta_a": (-5.0, 5.0),
-    "delta_nu": (-1.0, 20.0),
-    "delta_eta": (-1.0, 20.0),
-    "zeta_s": (0.0, 0.99),
-    "q": (-1.0, 1.0),
-    "p": (0.0, 50.0),
-    "psi": (0.01, 5.0),
-    "delta_psi": (-1.0, 20.0),
-    "lambda_": (0.01, 5.0),
     "z0": (-1.0, 1.0),
 }
 _MEMORY = ("A", "beta", "gamma", "n", *_FURTHER, *_SCALED)
 _PAIR = ("loading", "unloading")
-_KNEE = float(np.arcsinh(40.0))
+KNEE = float(np.arcsinh(40.0))
 _BOX = {
     "A": (-10.0, 10.0),
-    "loading": (-_KNEE, _KNEE),
-    "unloading": (-_KNEE, _KNEE),
-    "beta": (-_KNEE, _KNEE),
-    "gamma": (-_KNEE, _KNEE),
+    "loading": (-KNEE, KNEE),
+    "unloading": (-KNEE, KNEE),
+    "beta": (-KNEE, KNEE),
+    "gamma": (-KNEE, KNEE),
     "n": (0.5, 10.0),
-    **dict.fromkeys(_FURTHER, (-_KNEE, _KNEE)),
+    **dict.fromkeys(_FURTHER, (-KNEE, KNEE)),
     **_SCALED,
 }
 
@@ -80,22 +70,33 @@ def search_space(
     box = {name: limits.get(name, _cut(name, signs.get(name))) for name in chart.coordinates}
     box |= {"n": (float(np.log(box["n"][0])), float(np.log(box["n"][1])))} if "n" in box else {}
     lower, upper = (np.array([pair[side] for pair in box.values()]) for side in (0, 1))
-    extended = bool({*_SCALED, *_FURTHER} & set(defaults) - {"z0"})  # what is admissible for such a law is not known
+    known = {*columns, *("A", "beta", "gamma", "n", "z0")}
+    extended = not known.issuperset(defaults)  # what is admissible for such a law is not known
+
+    def encoded(parameters: Mapping[str, float]) -> FloatArray:
+        return np.asarray(np.clip(chart.encode({**chart.values, **parameters}), lower, upper))
+
+    further = {name: value for name, value in held.items() if name not in (*_MEMORY, *columns)}
+
+    def decoded(x: FloatArray) -> dict[str, FloatArray]:
+        return {name: np.full(len(np.atleast_2d(x)), value) for name, value in further.items()} | chart.decode(x)
+
     quadrant = np.array([max(low, 0.0) if name in _PAIR else low for name, (low, _) in box.items()])
     return SearchSpace(
         coordinates=chart.coordinates,
         lower=lower,
         upper=upper,
-        starts=np.clip(chart.encode({**defaults, **held}), lower, upper)[np.newaxis],
+        starts=encoded({})[np.newaxis],
         names=tuple(name for name in defaults if name not in held),
         columns=columns,
         linear=tuple(name for name in columns if name not in held),
         held=held,
-        parameters=chart.decode,
+        parameters=decoded,
         redundant=REDUNDANT,
         regions={"admissible": (quadrant, upper)} if set(_PAIR) <= set(box) and not extended else {},
         bounds={name: pair for name, pair in bounds.items() if name in columns},
         state=("z0",),
+        encoded=encoded,
     )
 
 
@@ -118,7 +119,6 @@ class _Chart:
     limits: Mapping[str, tuple[float, float]]  # parameters that are their own coordinates
     span: float
     reach: float  # of |u|
-    way: float  # of u
     slope: float  # what A is measured in
 
     def decode(self, x: FloatArray) -> dict[str, FloatArray]:
@@ -130,7 +130,7 @@ class _Chart:
         unit = self._unit(A, n)
         parameters = held | {"A": A, "n": n}
         shapes = (*_PAIR, "beta", "gamma", *_FURTHER)
-        scaled = {name: _shape(raw[name], n) * unit for name in shapes if name in raw}
+        scaled = {name: shape(raw[name], n) * unit for name in shapes if name in raw}
         if "loading" in scaled:
             parameters["beta"] = 0.5 * (scaled["loading"] + scaled["unloading"])
             parameters["gamma"] = 0.5 * (scaled["loading"] - scaled["unloading"])
@@ -144,53 +144,50 @@ class _Chart:
         beta, gamma, unit = parameters["beta"], parameters["gamma"], self._unit(A, n)
         scaled: dict[str, FloatArray | float] = {
             "A": A / self.slope,
-            "loading": _knee((beta + gamma) / unit, n),
-            "unloading": _knee((beta - gamma) / unit, n),
-            "beta": _knee(beta / unit, n),
-            "gamma": _knee(gamma / unit, n),
-            **{name: _knee(parameters[name] / unit, n) for name in _FURTHER if name in parameters},
+            "loading": knee((beta + gamma) / unit, n),
+            "unloading": knee((beta - gamma) / unit, n),
+            "beta": knee(beta / unit, n),
+            "gamma": knee(gamma / unit, n),
+            **{name: knee(parameters[name] / unit, n) for name in _FURTHER if name in parameters},
             **{name: parameters[name] / size for name, size in self._sizes(A).items() if name in parameters},
         }
         scaled |= {name: parameters[name] for name in self.limits if name in scaled}
         scaled["n"] = np.log(n)
         return np.array([float(scaled[name]) for name in self.coordinates])
 
-    def _slope(self, A: FloatArray) -> FloatArray:
-        return np.where(A == 0.0, 1.0, np.abs(A))
-
     def _sizes(self, A: FloatArray) -> dict[str, FloatArray]:
         """Units of the scaled parameters."""
-        slope, one = self._slope(A), np.ones_like(A)
-        worn = slope * self.span * self.way  # e where z is Z all the way
-        return {
-            "delta": slope / self.reach,
-            "delta_a": slope / worn,
-            **dict.fromkeys(("delta_nu", "delta_eta", "p"), one / worn),
-            **dict.fromkeys(("zeta_s", "q", "lambda_"), one),
-            "psi": slope * self.span,
-            "delta_psi": slope * self.span / worn,
-            "z0": slope * self.span,
-        }
+        slope = _steepness(A)
+        return {"delta": slope / self.reach, "z0": slope * self.span}
 
     def _unit(self, A: FloatArray, n: FloatArray) -> FloatArray:
-        slope = self._slope(A)
-        return np.asarray(slope / (slope * self.span) ** n)
+        return shape_unit(A, n, self.span)
 
 
-def _shape(c: FloatArray, n: FloatArray) -> FloatArray:
+def shape_unit(A: FloatArray, n: FloatArray, span: float) -> FloatArray:
+    """What beta and gamma are measured in, |A| / Z^n."""
+    slope = _steepness(A)
+    return np.asarray(slope / (slope * span) ** n)
+
+
+def _steepness(A: FloatArray) -> FloatArray:
+    return np.where(A == 0.0, 1.0, np.abs(A))
+
+
+def shape(c: FloatArray, n: FloatArray) -> FloatArray:
     """Shape coefficient l from its coordinate."""
     k = np.sinh(c)
     return np.asarray(k * (1.0 + np.abs(k)) ** (n - 1.0))
 
 
-def _knee(coefficient: FloatArray, n: FloatArray) -> float:
-    """Coordinate of a shape coefficient l, the inverse of `_shape`, by bisection."""
+def knee(coefficient: FloatArray, n: FloatArray) -> float:
+    """Coordinate of a shape coefficient l, the inverse of `shape`, by bisection."""
     low, high = 0.0, 2.0
-    while _shape(np.array(high), n) < abs(coefficient) and high < 300.0:
+    while shape(np.array(high), n) < abs(coefficient) and high < 300.0:
         high *= 2.0
     for _ in range(80):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if _shape(np.array(middle), n) < abs(coefficient) else (low, middle)
+        low, high = (middle, high) if shape(np.array(middle), n) < abs(coefficient) else (low, middle)
     return float(np.copysign(high, coefficient)) if coefficient else 0.0
 
 
@@ -201,9 +198,6 @@ def _chart(
     signed: frozenset[str],
     record: Record,
 ) -> _Chart:
-    span = float(np.ptp(record.u))
-    if span == 0.0:
-        raise ValueError("the input is constant: nothing can be identified from it")
     paired = {"beta", "gamma"} <= free and not {"beta", "gamma"} & (limits.keys() | signed)
     shapes = _PAIR if paired else ("beta", "gamma")
     order = ("A", *shapes, "n", *_FURTHER, *_SCALED)
@@ -212,8 +206,20 @@ def _chart(
         coordinates=tuple(coordinates),
         values=values,
         limits=limits,
-        span=span,
+        span=span_of(record),
         reach=float(np.abs(record.u).max()),
-        way=float(np.abs(np.diff(record.u)).sum()),
-        slope=float(np.ptp(record.y)) / (abs(values["gain"]) or 1.0) / span or 1.0,
+        slope=slope_of(record, values),
     )
+
+
+def span_of(record: Record) -> float:
+    """Span of the input; ValueError where it is constant."""
+    span = float(np.ptp(record.u))
+    if span == 0.0:
+        raise ValueError("the input is constant: nothing can be identified from it")
+    return span
+
+
+def slope_of(record: Record, values: Mapping[str, float]) -> float:
+    """What A is measured in: the output's span over the gain and the input's."""
+    return float(np.ptp(record.y)) / (abs(values["gain"]) or 1.0) / span_of(record) or 1.0

@@ -1,5 +1,6 @@
 """The Bouc-Wen law of Baber and Noori, which degrades with the energy that it has taken, and pinches."""
 
+from dataclasses import replace
 from typing import ClassVar, Self
 
 import numpy as np
@@ -7,17 +8,34 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim.kernels import baber_noori as kernels
-from hysim.laws.differential import _boucwen_conversions, _power_units
+from hysim.laws.differential import _boucwen_conversions, _boucwen_search, _power_units, _wear_search
 from hysim.laws.differential._memory_law import MemoryLaw
+from hysim.laws.differential.boucwen import BoucWen
 from hysim.models.holding import Holding
 from hysim.models.law import Packed
 from hysim.models.model import family
-from hysim.models.search_space import Freedom, Parameters
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.stages import Stage, Subset
 from hysim.models.tables import Tables
 from hysim.records import Record
 
-_PINCHING = ("zeta_s", "q", "p", "psi", "delta_psi", "lambda_")
-_OWN = ("delta_a", "delta_nu", "delta_eta", *_PINCHING)
+_WEAR = Stage(
+    word="wear",
+    names=("delta_nu", "delta_eta"),
+    neutral={"delta_nu": 0.0, "delta_eta": 0.0},
+    optional=("delta_a",),
+    drawn=16,
+    rounds=((16, 25),),
+)
+_PINCHING = Stage(
+    word="pinching",
+    names=("zeta_s", "q", "p", "psi"),
+    neutral={"zeta_s": 0.0},
+    optional=("delta_psi", "lambda_"),
+    drawn=512,
+    rounds=((32, 8), (8, 25)),
+)
+_OWN = ("delta_a", "delta_nu", "delta_eta", "zeta_s", "q", "p", "psi", "delta_psi", "lambda_")
 
 
 @family
@@ -63,10 +81,12 @@ class BoucWenBaberNoori(MemoryLaw):
     Notes
     -----
     Solved by power series along monotone strokes, good to 1e-12 of the range; a law that neither degrades nor pinches
-    is the Bouc-Wen law to the bit. A law that degrades is never in a steady cycle. `identify` holds delta_a, which A
-    and the other rates can nearly do without, and needs a law that pinches as the start, or ``free=("zeta_s",)``, to
-    search the pinching. Sources: T. T. Baber and Y. K. Wen, J. Eng. Mech. Div. 107 (1981); T. T. Baber and M. N. Noori,
-    J. Eng. Mech. 111 (1985); G. C. Foliente, J. Struct. Eng. 121 (1995), for the form of the pinching.
+    is the Bouc-Wen law to the bit. A law that degrades is never in a steady cycle. `identify` searches the Bouc-Wen
+    law, then the wear, then the pinching, and keeps of them what lowers the BIC; a start that wears off or pinches, or
+    ``free=`` or ``bounds=`` with one of its parameters, keeps it in any case. It holds delta_a, which A and the other
+    rates can nearly do without, and delta_psi and lambda_, which psi can. Sources: T. T. Baber and Y. K. Wen, J. Eng.
+    Mech. Div. 107 (1981); T. T. Baber and M. N. Noori, J. Eng. Mech. 111 (1985); G. C. Foliente, J. Struct. Eng. 121
+    (1995), for the form of the pinching.
 
     Examples
     --------
@@ -94,6 +114,12 @@ class BoucWenBaberNoori(MemoryLaw):
     z0: float = 0.0
     input_coefficients: tuple[float, ...] = (0.0,)
 
+    contains = Subset(
+        BoucWen,
+        neutral={"delta_a": 0.0, "delta_nu": 0.0, "delta_eta": 0.0, "zeta_s": 0.0, "input_coefficients": 0.0},
+        names={"feedthrough": "input_coefficients[0]"},
+    )
+    stages = (_WEAR, _PINCHING)
     step = staticmethod(kernels.step)
     workspace: ClassVar[int] = kernels.N_STATE - 3
 
@@ -203,10 +229,24 @@ class BoucWenBaberNoori(MemoryLaw):
         """Work e done on the memory at the samples of `u`, shape (n_samples,) [unit of z unit of u]; see `response`."""
         return self.remembered(u)[:, 1]
 
-    def alike(self, record: Record, freedom: Freedom) -> tuple[tuple[str, ...], ...]:
-        """Parameters held by default: the wear of A, and pinching in a law that does not pinch."""
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """The box in the scales of wear and pinching, and that of the Bouc-Wen law where both are held at zero.
+
+        Held by default are the wear of A, and the pinching in a law that does not pinch.
+        """
         pinches = self.zeta_s != 0.0 or "zeta_s" in freedom.free
-        return tuple((name,) for name in ("delta_a", *(() if pinches else _PINCHING)))
+        alone = ("delta_a", *(() if pinches else (*_PINCHING.names, *_PINCHING.optional)))
+        at_rest = ("z0",) if freedom.starts_at_rest() else ()
+        groups = (*_boucwen_search.REDUNDANT, *((name,) for name in alone))
+        held = freedom.held(self.scalars, redundant=groups, at_rest=at_rest)
+        if all(held.get(name, 1.0) == 0.0 for name in ("delta_a", "delta_nu", "delta_eta", "zeta_s")):
+            every = replace(freedom, fixed={**held, **freedom.fixed})
+            return _boucwen_search.search_space(self.scalars, self.columns, record, every)
+        return _wear_search.search_space(self.scalars, self.columns, record, freedom, held)
+
+    def rough(self) -> MemoryLaw:
+        """The law by Rosenbrock steps, good to a few parts in a thousand."""
+        return _RoughBaberNoori(**self.arguments)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
         """Initial memory of a steady cycle; ValueError for a law that degrades or pinches, which has none."""
@@ -229,3 +269,10 @@ class BoucWenBaberNoori(MemoryLaw):
         depth = -self.zeta_s * np.expm1(-self.p * e)
         width = (self.psi + self.delta_psi * e) * (self.lambda_ + depth)
         return np.asarray(1.0 - depth * np.exp(-(((w - where) / width) ** 2)))
+
+
+class _RoughBaberNoori(BoucWenBaberNoori):
+    """The law as the first steps of a search take it."""
+
+    step = staticmethod(kernels.rough_step)
+    workspace: ClassVar[int] = 0

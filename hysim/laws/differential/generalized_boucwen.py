@@ -7,9 +7,11 @@ import numpy as np
 from hysim._frozen import FloatArray
 from hysim.kernels import generalized as kernels
 from hysim.laws.differential._memory_law import MemoryLaw
+from hysim.laws.differential.boucwen import BoucWen
 from hysim.models.law import Packed
 from hysim.models.model import family
 from hysim.models.search_space import Freedom
+from hysim.models.stages import Subset
 from hysim.models.tables import Tables
 from hysim.records import Record
 
@@ -70,6 +72,11 @@ class GeneralizedBoucWen(MemoryLaw):
     z0: float = 0.0
     input_coefficients: tuple[float, ...] = (0.0,)
 
+    contains = Subset(
+        BoucWen,
+        neutral={**dict.fromkeys(_SECTORS, 0.0), "input_coefficients": 0.0},
+        names={"feedthrough": "input_coefficients[0]"},
+    )
     step = staticmethod(kernels.step)
     workspace: ClassVar[int] = kernels.N_STATE - 2
 

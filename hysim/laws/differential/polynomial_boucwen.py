@@ -1,7 +1,9 @@
 """The Bouc-Wen law beside a polynomial of the input, for asymmetric loops."""
 
 from hysim.laws.differential._boucwen_law import BoucWenLaw
+from hysim.laws.differential.boucwen import BoucWen
 from hysim.models.model import family
+from hysim.models.stages import Subset
 
 
 @family
@@ -39,3 +41,5 @@ class PolynomialBoucWen(BoucWenLaw):
     offset: float = 0.0
     z0: float = 0.0
     input_coefficients: tuple[float, ...] = (0.0, 0.0)
+
+    contains = Subset(BoucWen, neutral={"input_coefficients": 0.0}, names={"feedthrough": "input_coefficients[0]"})

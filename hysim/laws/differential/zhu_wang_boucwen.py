@@ -14,8 +14,10 @@ from hysim._frozen import FloatArray
 from hysim.kernels import zhu_wang as kernels
 from hysim.laws.differential import _power_units
 from hysim.laws.differential._memory_law import MemoryLaw
+from hysim.laws.differential.boucwen import BoucWen
 from hysim.models.law import Packed
 from hysim.models.model import family
+from hysim.models.stages import Subset
 from hysim.models.tables import Tables
 
 
@@ -67,6 +69,11 @@ class ZhuWangBoucWen(MemoryLaw):
     z0: float = 0.0
     input_coefficients: tuple[float, ...] = (0.0,)
 
+    contains = Subset(
+        BoucWen,
+        neutral={"delta": 0.0, "input_coefficients": 0.0},
+        names={"feedthrough": "input_coefficients[0]"},
+    )
     step = staticmethod(kernels.step)
     workspace: ClassVar[int] = kernels.N_STATE - 2
 
