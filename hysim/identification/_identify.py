@@ -11,6 +11,7 @@ import numpy.typing as npt
 from hysim._blas import one_blas_thread
 from hysim._parallel import Progress, at_most
 from hysim.identification import _direct as direct
+from hysim.identification._extrapolation import implausible
 from hysim.identification._noise import Gaussian, Noise, Quantised, Robust
 from hysim.identification._problem import Problem, problem
 from hysim.identification._resampling import left_out_errors, rms_of_known
@@ -106,15 +107,17 @@ def identify(
         if isinstance(model_or_class, Direct):
             direct.refuse(model_or_class, options, noise, intervals)
             fit = direct.identified(model_or_class, records, left_out(cross_validate, records), seed)
-            doubt = swapped_columns(records)
+            doubts = [swapped_columns(records)]
         else:
             family = _family(model_or_class)
             least_squares = problem(family, records, options, initial)
             fit = _searched(least_squares, noise, intervals, left_out(cross_validate, records), seed, progress)
-            doubt = swapped_columns(records)
-            if not doubt and not needs_time(fit.model):
-                doubt = swapped_for(family, records, options, initial, 1.0 - fit.fit_percent / 100.0)
-        return replace(fit, warnings=(*fit.warnings, doubt)) if doubt else fit
+            doubts = [swapped_columns(records)]
+            if not any(doubts) and not needs_time(fit.model):
+                doubts = [swapped_for(family, records, options, initial, 1.0 - fit.fit_percent / 100.0)]
+            doubts.append(implausible(fit.models, records))
+        warnings = (*fit.warnings, *filter(None, doubts))
+        return replace(fit, warnings=warnings) if any(doubts) else fit
 
 
 def _searched(
