@@ -1,9 +1,9 @@
 """Whether an identified model stays plausible on inputs that its record does not hold.
 
-It is tried inside the span of the record's input, after the record's own turning points: on the record's path at smaller
-amplitudes, about its middle and shifted towards either end, on fading and growing stairs, and on minor loops about
-three inputs on either branch. What counts is the output beside the line that fits the record best: its range on the
-trials is compared with that on the record. A device stays inside the band of its outer loop or little beyond. A law
+It is tried inside the span of the record's input, after the record's own turning points: on the record's path at
+smaller amplitudes, about its middle and shifted towards either end, on fading and growing stairs, and on minor loops
+about three inputs on either branch. What counts is the output beside the line that fits the record best: its range on
+the trials is compared with that on the record. A device stays inside the band of its outer loop or little beyond. A law
 whose memory grows, or drifts from one minor loop to the next, leaves it by far: Bouc and Wen's does both outside its
 admissible parameters, and drifts inside them where the hysteresis is weak.
 """
