@@ -245,6 +245,19 @@ def rate_dependent(rng: Rng, invertible: bool = False) -> Drawn:
     return Drawn(hs.RateDependentPrandtlIshlinskii(**plain, beta=decades(rng, -6.0, -1.0)), length)
 
 
+def parametric_plays(rng: Rng) -> Drawn:
+    """Plays of a density with two parameters."""
+    length = decades(rng, -3.0, 3.0)
+    density = {"exponent": rng.uniform(-0.99, 4.0), "decay": length * decades(rng, -3.0, 3.0), "reach": length}
+    sizes = {"weight": rng.normal(), "weight_slope": rng.normal() / length, "offset": rng.normal()}
+    coefficients = rng.normal(size=int(rng.integers(0, 5))) * 10.0 ** rng.uniform(-2.0, 2.0)
+    z0 = positions(rng, length, int(rng.integers(1, 4)))
+    law = hs.ParametricPrandtlIshlinskii(
+        **density, **sizes, input_coefficients=coefficients, plays=float(rng.integers(1, 60)), z0=z0
+    )
+    return Drawn(law, length)
+
+
 def maxwell_slip(rng: Rng) -> Drawn:
     """Springs that slip."""
     slips, length = thresholds(rng)
@@ -339,6 +352,7 @@ DRAWS: dict[str, Callable[..., Drawn]] = {
     "ModifiedPrandtlIshlinskii": modified,
     "GeneralizedPrandtlIshlinskii": enveloped,
     "RateDependentPrandtlIshlinskii": rate_dependent,
+    "ParametricPrandtlIshlinskii": parametric_plays,
     "MaxwellSlip": maxwell_slip,
     "Preisach": relays(hs.Preisach),
     "PreisachRelays": relays(hs.PreisachRelays),

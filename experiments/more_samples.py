@@ -39,8 +39,8 @@ OFF, NEAREST = 2.0**-36, 2.0**-51
 UNIT = 2.0**-53
 SMALLEST = 2.0**-1022
 PEAK_ROUNDS, PEAK_PIECES = 40, 8
-BITS = ("Play", "Stop", "PrandtlIshlinskii", "ModifiedPrandtlIshlinskii", "MaxwellSlip", "Preisach", "PreisachRelays",
-        "CustomLaw", "Line", "SingleValued")  # fmt: skip
+BITS = ("Play", "Stop", "PrandtlIshlinskii", "ModifiedPrandtlIshlinskii", "MaxwellSlip",
+        "ParametricPrandtlIshlinskii", "Preisach", "PreisachRelays", "CustomLaw", "Line", "SingleValued")  # fmt: skip
 
 
 class Case(NamedTuple):

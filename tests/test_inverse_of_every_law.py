@@ -45,6 +45,9 @@ LAWS = {
     "RateDependentPrandtlIshlinskii": hs.RateDependentPrandtlIshlinskii(
         thresholds=(0.0, 0.2), weights=(1.0, 0.5), beta=0.1
     ),
+    "ParametricPrandtlIshlinskii": hs.ParametricPrandtlIshlinskii(
+        exponent=-0.5, decay=0.3, weight=0.4, weight_slope=0.1, input_coefficients=(1.0, 0.05, 0.05), reach=2.0
+    ),
     "MaxwellSlip": hs.MaxwellSlip(stiffness=(1.0, 0.5), slips=(9.0, 0.4)),
     "Stop": hs.Stop(threshold=9.0),
     "Play": hs.Play(threshold=0.0, gain=2.0),

@@ -43,6 +43,7 @@ AT_ZERO = [
     hs.Stop(threshold=0.2),
     hs.PrandtlIshlinskii(thresholds=(0.0, 0.1, 0.4), weights=(1.0, 0.5, 0.3)),
     hs.MaxwellSlip(stiffness=(1.0, 0.5), slips=(0.1, 0.4)),
+    hs.ParametricPrandtlIshlinskii(exponent=-0.5, decay=0.3, weight=0.4, weight_slope=0.1, reach=2.0),
     hs.ModifiedPrandtlIshlinskii(
         thresholds=(0.0, 0.2), weights=(1.0, 0.5), dead_zones=(0.0, 0.3), dead_zone_weights=(1.0, 0.4)
     ),

@@ -20,6 +20,7 @@ LAWS = [
     hs.Duhem.from_terms({"u'": 0.5, "|u'| z": -0.3}, y0=0.1),
     hs.PrandtlIshlinskii(thresholds=(0.0, 0.2), weights=(1.0, 0.5)),
     hs.GeneralizedPrandtlIshlinskii(thresholds=(0.0, 0.2), weights=(1.0, 0.5), left=(1.0, 0.1, 0.0, 0.0, 0.0)),
+    hs.ParametricPrandtlIshlinskii(exponent=-0.5, decay=0.3, weight=0.4, weight_slope=0.1, reach=2.0),
     hs.MaxwellSlip(stiffness=(1.0, 0.5), slips=(0.1, 0.2)),
     hs.Play(threshold=0.2),
     hs.Preisach(levels=(-1.0, 0.0, 1.0), weights=(0.1, 0.2, 0.3)),

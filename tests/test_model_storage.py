@@ -22,6 +22,8 @@ MODELS = [
     hs.ModifiedPrandtlIshlinskii(dead_zones=(-1 / 3, 0.0), dead_zone_weights=(0.1, 1.0)),
     hs.GeneralizedPrandtlIshlinskii(thresholds=(0.0, 1 / 3), weights=(0.1, 0.2), left=(1 / 3, 0.1, -0.7, 1e-17, 0.0)),
     hs.RateDependentPrandtlIshlinskii(thresholds=(0.0, 1 / 3), weights=(0.1, 0.2), beta=1e-17),
+    hs.ParametricPrandtlIshlinskii(exponent=1 / 3, weight=1e-17, reach=0.1, z0=(0.1, 1 / 3, -0.7)),
+    hs.ParametricPrandtlIshlinskii(),
     hs.Preisach(levels=(0.0, 1 / 3, 1.0), weights=(0.1, 1e-17, 0.3), offset=0.7, z0=(0.5, 0.2)),
     hs.PreisachRelays(levels=(0.0, 1 / 3), weights=(0.1,)),
     hs.Play(threshold=1 / 3, z0=0.1),

@@ -19,6 +19,8 @@ NUMBERS = [
     (hs.ModifiedPrandtlIshlinskii, {"dead_zones": (0.0, 0.5), "dead_zone_weights": (1.0, 2.0)}, "dead_zone_weights"),
     (hs.GeneralizedPrandtlIshlinskii, {"left": (1.0, 2.0, 0.1, 0.2, 0.3)}, "left"),
     (hs.RateDependentPrandtlIshlinskii, {"thresholds": (0.5,), "weights": (1.0,), "beta": 0.1}, "beta"),
+    (hs.ParametricPrandtlIshlinskii, {"exponent": 0.5, "weight": 1.0, "reach": 2.0}, "exponent"),
+    (hs.ParametricPrandtlIshlinskii, {"weight": 1.0, "reach": 2.0}, "reach"),
     (hs.Preisach, {"levels": (0.0, 1.0, 2.0), "weights": (1.0, 0.5, 2.0)}, "weights"),
     (hs.PreisachRelays, {"levels": (0.0, 1.0), "weights": (1.0,)}, "levels"),
     (hs.Play, {"threshold": 0.5}, "threshold"),

@@ -25,7 +25,7 @@ N_CASES = 2 if numba.config.DISABLE_JIT else 8
 NOT_RATE_INDEPENDENT = {"TransferFunction", "Dashpot", "Actuator", "BoucWenOscillator"}
 """Between two samples the input of these is held, or goes on a line: with more samples it is another input."""
 INVERSES = {"BoucWenInverse"}  # under the laws that it inverts
-SEARCHED = {"CustomLaw", "Line", "MaxwellSlip", "Play", "PreisachRelays", "Stop"}
+SEARCHED = {"CustomLaw", "Line", "MaxwellSlip", "ParametricPrandtlIshlinskii", "Play", "PreisachRelays", "Stop"}
 """Laws whose only inverse is the search on their step, as a sum's is; `test_inverse_of_every_law.py` has them."""
 
 

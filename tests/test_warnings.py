@@ -10,6 +10,7 @@ from scipy import stats
 import hysim as hs
 from hysim.cli import main
 from hysim.identification._diagnostics import whiteness
+from hysim.identification._extrapolation import implausible
 from hysim.identification._noise import Quantised
 from hysim.identification.sentences import sentences
 
@@ -223,3 +224,62 @@ def test_a_bootstrap_leaves_two_and_a_half_percent_on_each_side():
         sides.append(np.abs(np.subtract(fit.intervals["slope"], fit.estimates["slope"])) / fit.stderr["slope"])
     # quantiles of 200 draws scatter by 0.19, the means of 20 by 0.05; 3.75 % would lie at 1.78
     assert np.mean(sides, axis=0) == pytest.approx([1.96, 1.96], abs=0.1)
+
+
+# ---------------------------------------------------------------------------------- off the record
+
+OUTER = np.concatenate([LOOP, 0.5 * LOOP, [-1.0]])
+PLAUSIBLE = [
+    hs.BoucWen(beta=0.7, gamma=0.3, feedthrough=1.0),
+    hs.BoucWen(beta=0.7, gamma=0.3, n=1.6, gain=-2.0),
+    hs.PolynomialBoucWen(gain=-1.0, input_coefficients=(2.0, 0.5, 0.1)),
+    hs.Dahl(coulomb=0.2),
+    hs.ColemanHodgdon(alpha=3.0, c=1.0),
+    hs.PrandtlIshlinskii(thresholds=(0.0, 0.2, 0.5), weights=(1.0, 0.5, 0.3)),
+    hs.ParametricPrandtlIshlinskii(exponent=-0.5, decay=0.3, weight=0.5, reach=2.0),
+    hs.MaxwellSlip(stiffness=(1.0, 2.0), slips=(0.1, 0.5)),
+    hs.Preisach.from_density(np.linspace(-1.0, 1.0, 8), lambda a, b: np.exp(-4.0 * (a + b) ** 2)),
+    hs.PreisachRelays(levels=(-1.0, -0.2, 0.3, 1.0), weights=(0.5, 1.0, 0.1, 0.4, 0.2, 0.3)),
+    hs.Line(slope=2.0),
+]
+OFF = "inside the span of the input"
+
+
+@pytest.mark.parametrize("law", PLAUSIBLE, ids=lambda law: type(law).__name__)
+def test_a_law_with_a_memory_that_fades_is_plausible_off_its_own_record(law):
+    for u in (LOOP, OUTER, 0.5 * LOOP):
+        assert implausible([law], [hs.Record(u=u, y=law.response(u))]) == ""
+
+
+def test_a_memory_that_grows_on_minor_loops_is_doubted():
+    """Bouc-Wen with beta < 0 follows one loop, and leaves it on any other path."""
+    law = hs.BoucWen(beta=-0.6, gamma=1.2, gain=0.3)
+    words = implausible([law], [hs.Record(u=LOOP, y=law.response(LOOP))])
+    assert OFF in words
+    assert "times this range" in words
+    faster = hs.BoucWen(beta=-0.3, gamma=1.3, n=2.0)
+    inner = hs.Record(u=0.5 * LOOP, y=faster.response(0.5 * LOOP))
+    assert "the model diverges on" in implausible([faster], [inner])
+
+
+def test_the_summary_says_that_a_model_is_not_plausible_off_the_record():
+    smooth = hs.Record(u=LOOP, y=LOOP + 0.01 * hs.Dahl(stiffness=5.0).response(LOOP))
+    jumping = hs.identify(hs.PreisachRelays, smooth)
+    assert sum(OFF in each for each in jumping.warnings) == 1
+    assert OFF in jumping.summary()
+    assert not any(OFF in each for each in hs.identify(hs.PrandtlIshlinskii, smooth).warnings)
+
+
+def test_nothing_is_said_where_nothing_can_be_tried():
+    law = hs.BoucWen(beta=-0.6, gamma=1.2, gain=0.3)
+    rising = np.linspace(-1.0, 1.0, 30)
+    assert implausible([law], [hs.Record(u=rising, y=law.response(rising))]) == ""
+    timed = hs.Actuator(hysteresis=law, creep=hs.Creep.per_decade(1.0))
+    assert implausible([timed], [hs.Record(u=LOOP, y=law.response(LOOP), t=np.arange(LOOP.size))]) == ""
+
+
+def test_of_several_records_the_one_of_the_widest_input_is_tried_with_its_own_model():
+    law = hs.BoucWen(beta=-0.6, gamma=1.2, gain=0.3)
+    wide, narrow = (hs.Record(u=u, y=law.response(u)) for u in (LOOP, 0.1 * LOOP))
+    assert OFF in implausible([hs.Line(), law], [narrow, wide])
+    assert implausible([law, hs.Line()], [narrow, wide]) == ""

@@ -13,6 +13,7 @@ from hysim._frozen import FloatArray, check_count, read_only
 from hysim._parallel import Progress, at_most
 from hysim.identification import _direct as direct
 from hysim.identification._assumptions import decided, quiet_where_better
+from hysim.identification._extrapolation import implausible
 from hysim.identification._noise import Gaussian, Noise, Quantised, Robust
 from hysim.identification._problem import Problem
 from hysim.identification._resampling import left_out_errors, rms_of_known
@@ -120,23 +121,22 @@ def identify(
         if isinstance(model_or_class, Direct):
             direct.refuse(model_or_class, options, noise, intervals, shares)
             fit = direct.identified(model_or_class, records, left_out(cross_validate, records), seed)
-            doubt = swapped_columns(records)
+            doubts = [swapped_columns(records)]
         else:
             family = _family(model_or_class)
             paths, noisy = quiet_where_better(family, records, options, initial)
             choice = decided(family, paths, options, initial, shares, max_evaluations)
             fit = _searched(choice.problems, noise, intervals, left_out(cross_validate, records), seed, progress)
             fit = replace(fit, message="; ".join(filter(None, (fit.message, choice.sentence, noisy))))
-            doubt = swapped_columns(records)
-            budget = choice.problems[0].budget
-            if budget is not None and (budget.cut or not fit.success):
-                stopped = (
-                    f"partial: the search stopped at max_evaluations={max_evaluations}, better parameters may exist"
-                )
-                fit = replace(fit, success=False, message=f"{stopped}; {fit.message}")
-            elif not doubt and not needs_time(fit.model):
-                doubt = swapped_for(choice.problems[0].family, records, options, initial, 1.0 - fit.fit_percent / 100.0)
-        return replace(fit, warnings=(*fit.warnings, doubt)) if doubt else fit
+            first, doubts = choice.problems[0], [swapped_columns(records)]
+            if is_partial := first.budget is not None and (first.budget.cut or not fit.success):
+                stopped = f"partial: the search stopped at max_evaluations={max_evaluations}"
+                fit = replace(fit, success=False, message=f"{stopped}, better parameters may exist; {fit.message}")
+            if not any(doubts) and not is_partial and not needs_time(fit.model):
+                doubts = [swapped_for(first.family, records, options, initial, 1.0 - fit.fit_percent / 100.0)]
+            doubts.append(implausible(fit.models, records))
+        warnings = (*fit.warnings, *filter(None, doubts))
+        return replace(fit, warnings=warnings) if any(doubts) else fit
 
 
 def _searched(

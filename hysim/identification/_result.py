@@ -92,7 +92,7 @@ class Identification(Stored):
         Seed of the search.
     warnings : tuple of str
         Sentences on a search that did not converge, a constant output, unknown standard errors, correlated residuals,
-        or input and output that may be swapped.
+        input and output that may be swapped, or a response off the record that leaves the measured range by far.
     """
 
     json_name = "identification"

@@ -12,7 +12,10 @@ is what is left of the input, u - z. All laws of this family are one sum of such
 over plays with through = 0, over stops with through = 1. The plays do not know of each other: at each sample
 the clamps are taken side by side, then the terms are added in their order, from the first to the last.
 
-`output` is (through, offset, feedthrough). A position z changes in place.
+`output` is (through, offset, feedthrough). A position z changes in place. The plays may also have a common weight that
+depends on the input, beside a polynomial of it (`bent_step`):
+
+    y = offset + c_1 u + ... + c_n u^n + (weight + weight_slope u) sum_i m_i (z_i - u)
 """
 
 import numpy as np
@@ -21,6 +24,7 @@ from hysim._frozen import FloatArray
 from hysim.kernels._compile import inlined, kernel
 
 N_OUTPUT = 3
+N_BENT = 4
 
 
 @inlined
@@ -92,3 +96,22 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
         total += parameters[N_OUTPUT + n_plays + i] * (through * u + (1.0 - 2.0 * through) * z)
     state[0] = u
     return float(total)
+
+
+@kernel
+def bent_step(parameters: FloatArray, state: FloatArray, u: float) -> float:
+    """Output of plays of a common weight at the next input `u`; `state` is the last u and the positions.
+
+    `parameters` is (n, offset, weight, weight_slope, c_1 ... c_n, thresholds, shares m_i).
+    """
+    first, n_plays = N_BENT + int(parameters[0]), state.size - 1
+    lag = 0.0
+    for i in range(n_plays):
+        z = clamp(state[1 + i], u, parameters[first + i])
+        state[1 + i] = z
+        lag += parameters[first + n_plays + i] * (z - u)
+    state[0] = u
+    static = 0.0
+    for k in range(first - 1, N_BENT - 1, -1):
+        static = (static + parameters[k]) * u
+    return float(parameters[1] + static + (parameters[2] + parameters[3] * u) * lag)

@@ -1,0 +1,240 @@
+"""The Prandtl-Ishlinskii law of a density with two parameters, beside a polynomial of the input.
+
+The plays stand on a fixed grid, finer towards zero, where the density may be singular: play k has the thresholds
+between the edges e_(k-1) and e_k, their middle r_k, and their share m_k of the density,
+
+    e_k = reach (k / plays)^2,    m_k = (integral of w from e_(k-1) to e_k) / (integral of w from 0 to reach)
+
+The shares are quotients of incomplete gamma functions. The thresholds do not depend on what is searched, so that the
+positions of the plays are the same for every density.
+"""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray
+from hysim.kernels import clamps as kernels
+from hysim.models.law import Law, Packed
+from hysim.models.model import family
+from hysim.models.parameters import Parameter, declared_space, spans
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.tables import Tables
+from hysim.records import Record
+
+_DENSITIES = ((-0.5, 0.3), (0.0, 0.15), (1.0, 0.15), (0.0, 1.0))  # exponent, and decay in half spans of the input
+_TURNS = (-2.0, -1.0, 0.0, 1.0, 2.0)  # of a free memory, in half spans from the first input
+_SMALLEST = 1e-280  # a smaller incomplete gamma function is its first term
+_SAMPLES, _TURN = 250, 0.01  # beside reversals by more than this part of the span, for the choice of the past
+_STRONG = 10.0  # difference of two BIC that is very strong evidence
+
+
+@family
+class ParametricPrandtlIshlinskii(Law):
+    """Plays of the density ``w(r) ~ r^exponent exp(-r / decay)`` beside a polynomial of the input.
+
+    ::
+
+        y    = offset + c_1 u + c_2 u^2 + c_3 u^3 + (weight + weight_slope u) sum_k m_k (z_k - u)
+        z_k  = min(max(z_k, u - r_k), u + r_k),    m_k ~ the integral of w over the thresholds of play k,  sum m_k = 1
+
+    Eight numbers describe loops of all sizes. The slope dy/du right after a reversal is that of the polynomial less
+    weight + weight_slope u, and returns to it as the plays are pushed one after the other. Sources: M. Al Janaideh, S.
+    Rakheja and C.-Y. Su, IEEE/ASME Trans. Mechatronics 16 (2011), for a parametric density; P. Krejci and K. Kuhnen,
+    IEE Proc. Control Theory Appl. 148 (2001), for the law.
+
+    Parameters
+    ----------
+    exponent : float
+        Exponent of the density at small thresholds, above -1; negative for loops that are sharp at their reversals.
+    decay : float
+        Threshold over which the density falls by the factor e, positive [unit of u].
+    weight : float
+        Sum of the weights of the plays at u = 0, positive for a counterclockwise loop [unit of y / unit of u].
+    weight_slope : float
+        Change of this sum with the input [unit of y / unit of u^2].
+    offset : float
+        Output at u = 0 where all plays stand at zero [unit of y].
+    input_coefficients : sequence of float
+        (c_1, c_2, ...) [unit of y / (unit of u)^k]. Their number is the degree that `identify` fits.
+    reach : float
+        Largest threshold, positive where there is a weight [unit of u]. Loops up to the amplitude `reach` widen by the
+        density, larger ones no more.
+    plays : float
+        Their number, whole and positive.
+    z0 : sequence of float
+        Inputs before the first sample, the oldest first, at which all plays stand [unit of u].
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite, the exponent is not above -1, the decay is not positive, the reach is negative or
+        zero beside a weight, the number of plays is not whole and positive, or z0 is empty.
+
+    Notes
+    -----
+    As a start of `hysim.identify` the class leaves the reach to the record, the span of the input, and what was before
+    it: the cycle between the lowest and the highest input, on the branch in whose direction the record moves first, or
+    plays that all stand at zero or at the first input, where that fits clearly better (the BIC of a few densities is
+    lower by 10). With ``initial="rest"`` all plays stand at zero before the first sample, with ``"free"`` they have
+    made one stroke from there, to ``z0[1]``.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> law = hs.ParametricPrandtlIshlinskii(exponent=-0.5, decay=0.3, weight=0.4, reach=2.0)
+    >>> law.response([0.0, 1.0, 0.5, -1.0]).round(6).tolist()
+    [0.0, 0.940997, 0.523183, -0.940997]
+    """
+
+    exponent: float = 0.0
+    decay: float = 1.0
+    weight: float = 0.0
+    weight_slope: float = 0.0
+    offset: float = 0.0
+    input_coefficients: tuple[float, ...] = (1.0, 0.0, 0.0)
+    reach: float = 0.0
+    plays: float = 40.0
+    z0: tuple[float, ...] = (0.0, 0.0)
+
+    step = staticmethod(kernels.bent_step)
+    searched = (
+        Parameter("exponent", -0.95, 4.0),
+        Parameter("decay", 3e-3, 1e2, unit="h", log=True),
+        *(Parameter(name, affine=True) for name in ("weight", "weight_slope", "offset", "input_coefficients")),
+        Parameter("z0", -2.0, 2.0, unit="h", from_first=True),
+    )
+    screened = 64
+
+    @classmethod
+    def check(cls, tables: Tables) -> None:
+        """Refuse what is no density or no number of plays."""
+        if not (tables["exponent"] > -1.0).all():
+            raise ValueError(f"exponent must be above -1, got {tables['exponent'].min()}")
+        if not (tables["decay"] > 0.0).all():
+            raise ValueError(f"decay must be positive, got {tables['decay'].min()}")
+        idle = (tables["weight"] == 0.0) & (tables["weight_slope"] == 0.0)
+        if not ((tables["reach"] > 0.0) | (idle & (tables["reach"] == 0.0))).all():
+            raise ValueError(f"reach must be positive beside a weight, got {tables['reach'].min()}")
+        plays = tables["plays"]
+        if not ((plays >= 1.0) & (plays == np.round(plays))).all():
+            raise ValueError(f"plays must be whole and positive, got {plays.min()}")
+        if not tables["z0"].shape[1]:
+            raise ValueError("z0 must hold at least one input")
+
+    @classmethod
+    def pack(cls, tables: Tables) -> Packed:
+        """Parameters as `hysim.kernels.clamps.bent_step` takes them, and the positions after the inputs z0."""
+        thresholds, shares = _plays(tables)
+        coefficients = tables["input_coefficients"]
+        head = [tables[name] for name in ("offset", "weight", "weight_slope")]
+        degree = np.full_like(tables["offset"], coefficients.shape[1])
+        past = tables["z0"].T[:, :, np.newaxis]
+        z = past[0] + np.zeros_like(thresholds)
+        for u in past[1:]:
+            z = np.minimum(np.maximum(z, u - thresholds), u + thresholds)
+        parameters = np.concatenate([degree, *head, coefficients, thresholds, shares], axis=1)
+        return Packed(parameters, np.concatenate([np.zeros_like(degree), z], axis=1))
+
+    def memory(self, u: npt.ArrayLike) -> FloatArray:
+        """Positions of the plays at the samples of `u`, shape (n_samples, n_plays); errors as of `response`."""
+        return self.remembered(u)
+
+    @property
+    def thresholds(self) -> FloatArray:
+        """Threshold r_k of each play, shape (n_plays,) [unit of u]."""
+        return np.asarray(_plays(self.tables)[0][0])
+
+    @property
+    def shares(self) -> FloatArray:
+        """Share m_k of each play in the weight, shape (n_plays,); their sum is one."""
+        return np.asarray(_plays(self.tables)[1][0])
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """Box of the two parameters of the density, and of the former turning point where the memory is free."""
+        law = replace(self, reach=self.reach or spans(record)["u"], z0=self.z0 if any(self.z0) else (0.0, 0.0))
+        names, known = law.initial_names, {}
+        if freedom.initial is None:
+            known = dict(zip(names, law.z0 if any(law.z0) else law._likely_past(record), strict=True))
+        elif freedom.initial == "free":  # the last input before the first sample is
+            known = dict(zip(names[:-1], law.z0, strict=False))
+        held = {name: value for name, value in known.items() if name not in freedom.free} | {**freedom.fixed}
+        turns = [{}] if names[-1] in held else [{names[-1]: turn} for turn in _TURNS]
+        starts = [{"exponent": a, "decay": decay} | turn for a, decay in _DENSITIES for turn in turns]
+        asked = replace(freedom, fixed=held)
+        return declared_space(law.searched, starts, law.scalars, law.initial, record, asked, law.screened)
+
+    def _likely_past(self, record: Record) -> tuple[float, float]:
+        """Inputs before the first sample: those of the cycle, unless plays that stand still fit clearly better."""
+        chosen = np.linspace(0, len(record) - 1, min(_SAMPLES, len(record))).round().astype(np.intp)
+        kept = np.union1d(chosen, record.reversals(_TURN))
+        short, first = Record(u=record.u[kept], y=record.y[kept]), float(record.u[0])
+        best, criterion = conditioned(record.u), np.inf
+        for past in (best, (0.0, 0.0), (first, first)):
+            own = 2.0 * len(short) * np.log(max(replace(self, z0=past)._least_error(short), _SMALLEST))
+            if own < criterion - _STRONG:
+                best, criterion = past, own
+        return best
+
+    def _least_error(self, record: Record) -> float:
+        """Norm of the residual of the best of the densities from which a search begins."""
+        exponent, decay = np.array(_DENSITIES).T
+        density = {"exponent": exponent, "decay": spans(record)["h"] * decay}
+        columns = self.regressors({**self.scalars, **density}, record)[..., :-1]
+        columns = columns / np.maximum(np.linalg.norm(columns, axis=1, keepdims=True), _SMALLEST)
+        fits = (each @ np.linalg.lstsq(each, record.y, rcond=None)[0] for each in columns)
+        return min(float(np.linalg.norm(record.y - fit)) for fit in fits)
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """Columns of weight, weight_slope, 1, u, u^2, ... and 0, shape (n_sets, n_samples, n_columns + 1)."""
+        n_inputs = sum(name.startswith("z0[") for name in parameters) or len(self.z0)
+        law = replace(self, z0=(0.0,) * n_inputs)
+        zero = {**parameters, **dict.fromkeys(law.columns, 0.0)}
+        lag = law.outputs({**zero, "weight": 1.0}, record.u)
+        powers = [np.broadcast_to(record.u**k, lag.shape) for k in range(len(self.input_coefficients) + 1)]
+        return np.stack([lag, record.u * lag, *powers, np.zeros_like(lag)], axis=-1)
+
+    def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
+        """The record's own dominant turning points as the inputs before it, (n_sets,) by name."""
+        n_sets = max((np.size(value) for value in parameters.values()), default=1)
+        inputs = dominant_extremes(np.append(record.u, record.u[0]))
+        return {**parameters} | {f"z0[{k}]": np.full(n_sets, u) for k, u in enumerate(inputs)}
+
+
+def conditioned(u: FloatArray) -> tuple[float, float]:
+    """Extremes of the cycle between the lowest and the highest input, that of the branch at the first sample last."""
+    moves = np.diff(u)
+    rises = bool(moves[np.flatnonzero(moves)[:1]].sum() > 0.0)
+    low, high = float(u.min()), float(u.max())
+    return (high, low) if rises else (low, high)
+
+
+def dominant_extremes(u: FloatArray) -> list[float]:
+    """The last input, behind the turning points that no later one has wiped out, the oldest first; at least two.
+
+    Seen from the end, they are where the input is higher or lower than ever: of highs in a row the highest, and so on.
+    """
+    back = u[::-1]
+    higher = np.flatnonzero(np.diff(np.maximum.accumulate(back)) > 0.0) + 1
+    lower = np.flatnonzero(np.diff(np.minimum.accumulate(back)) < 0.0) + 1
+    places = np.concatenate([higher, lower])
+    kinds = np.repeat([1, -1], [higher.size, lower.size])[np.argsort(places)]
+    last_of_a_row = np.append(kinds[1:] != kinds[:-1], True)[: kinds.size]
+    extremes = back[np.sort(places)[last_of_a_row]][::-1].tolist()
+    return [*extremes, float(u[-1])] if extremes else [float(u[-1])] * 2
+
+
+def _plays(tables: Tables) -> tuple[FloatArray, FloatArray]:
+    """Thresholds and shares (n_sets, n_plays); laws with fewer plays have some without a share."""
+    from scipy.special import gammainc  # imported where it is needed
+
+    plays = tables["plays"]
+    place = np.minimum(np.arange(plays.max() + 1.0), plays) / plays
+    edges = tables["reach"] * place**2
+    power, decay = tables["exponent"] + 1.0, tables["decay"]
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore", under="ignore"):
+        whole = gammainc(power, tables["reach"] / decay)
+        below = np.where(whole > _SMALLEST, gammainc(power, edges / decay) / whole, place ** (2.0 * power))
+    return 0.5 * (edges[:, 1:] + edges[:, :-1]), np.diff(below, axis=1)

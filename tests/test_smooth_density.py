@@ -1,0 +1,93 @@
+"""A Preisach law of a smooth density from records, as smooth as predicts best what is left out."""
+
+import numpy as np
+import pytest
+
+import hysim as hs
+from hysim.laws.operators._smooth_density import parts_of, roughness
+
+CYCLE = np.sin(np.linspace(0.0, 2.0 * np.pi, 120, endpoint=False))
+LEVELS = np.linspace(-1.3, 1.3, 41)
+
+
+def positive(a, b):
+    return np.exp(-8.0 * ((a + b) / 2.0) ** 2 - 6.0 * ((a - b) / 2.0 - 0.4) ** 2)
+
+
+def butterfly(a, b):
+    """Of both signs, as the strain of a ferroelectric has it."""
+    return (a + b) * np.exp(-3.0 * ((a + b) / 2.0) ** 2 - 6.0 * ((a - b) / 2.0 - 0.4) ** 2)
+
+
+def steady(law, amplitude, noise=0.0, seed=0):
+    u = amplitude * CYCLE
+    y = law.response(np.tile(u, 2))[u.size :]
+    return hs.Record(u=u, y=y + noise * np.random.default_rng(seed).normal(size=u.size))
+
+
+def relative_error(law, record):
+    model = law.response(np.tile(record.u, 2))[len(record) :]
+    return float(np.sqrt(np.mean((record.y - model) ** 2)) / np.ptp(record.y))
+
+
+@pytest.mark.parametrize("density", [positive, butterfly])
+def test_loops_of_four_amplitudes_tell_one_between_them(density):
+    law = hs.Preisach.from_density(LEVELS, density)
+    size = float(np.ptp(steady(law, 1.2).y))
+    records = [steady(law, amplitude, 5e-3 * size, k) for k, amplitude in enumerate((0.4, 0.6, 0.9, 1.2))]
+    between = steady(law, 0.75)
+    own = relative_error(hs.Preisach.smoothed(records, intervals=16), between)
+    others = [relative_error(hs.Preisach.smoothed(records, intervals=16, strength=s), between) for s in (1e-9, 1e4)]
+    assert own < 0.012
+    assert own < 0.7 * min(others)  # than without smoothness, and than with nothing else
+
+
+def test_reversal_curves_give_every_weight_of_a_smooth_density():
+    law = hs.Preisach.from_density(LEVELS[::4], positive)
+    u = hs.signals.reversal_curves(-1.3, 1.3, curves=10, samples_per_step=4)
+    found = hs.Preisach.smoothed(hs.Record(u=u, y=law.response(u)), intervals=10)
+    assert found.weights == pytest.approx(law.weights, abs=5e-3 * max(law.weights))
+    assert found.z0 == ()  # all relays down, as the curves begin
+
+
+def test_the_past_is_the_one_that_predicts_better():
+    law = hs.Preisach.from_density(LEVELS, positive)
+    assert hs.Preisach.smoothed([steady(law, 0.9), steady(law, 1.2)], intervals=8).z0 != ()
+    u = np.concatenate([np.linspace(-1.3, 0.2, 40), 0.9 * CYCLE])
+    assert hs.Preisach.smoothed(hs.Record(u=u, y=law.response(u)), intervals=8).z0 == ()
+
+
+def test_a_record_beyond_the_others_is_not_left_out():
+    small, large = hs.Record(u=CYCLE, y=CYCLE), hs.Record(u=2.0 * CYCLE, y=CYCLE)
+    whole = [part.size for part in parts_of([small, large]) if part.size == CYCLE.size]
+    assert len(whole) == 1
+    assert parts_of([small, large])[0][0] == 0  # the small one
+
+
+def test_a_density_that_is_linear_in_both_thresholds_is_smooth():
+    """Second differences vanish, and what is left is the ridge, on the diagonal and off it."""
+    rows, columns = np.tril_indices(7)
+    linear = np.where(rows == columns, 5.0 - 0.5 * rows, 1.0 + 2.0 * rows - 3.0 * columns)
+    ridge = 1e-3 * float(linear @ linear)
+    assert linear @ roughness(7) @ linear == pytest.approx(ridge, rel=1e-9)
+    bent = np.where(rows == columns, 0.0, (rows - columns) ** 2.0)
+    assert bent @ roughness(7) @ bent > 10.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        ({"intervals": 2.0}, TypeError, "intervals must be a whole number"),
+        ({"intervals": 0}, ValueError, "intervals must be at least 1"),
+        ({"strength": -1.0}, ValueError, "strength must be finite and not negative"),
+        ({"strength": np.inf}, ValueError, "strength must be finite and not negative"),
+    ],
+)
+def test_wrong_options_are_refused(arguments, error, message):
+    with pytest.raises(error, match=message):
+        hs.Preisach.smoothed(hs.Record(u=CYCLE, y=CYCLE), **arguments)
+
+
+def test_a_constant_input_is_refused():
+    with pytest.raises(ValueError, match="the input is constant"):
+        hs.Preisach.smoothed(hs.Record(u=np.ones(5), y=np.arange(5.0)))
