@@ -20,6 +20,7 @@ from hysim.models.stages import Stage
 
 N_SCREENED = 4096
 N_DESCENDING = 64
+N_DESCENDING_BESIDE = 16  # where one evaluation is dear, and the optima of a simpler family are starts
 N_STEPS = 40
 N_POLISHED = 8
 N_POLISHING = 200
@@ -116,6 +117,8 @@ def optima(
     share = min(1.0, _LONG / problem.y.size)
     screened = max(256, round(N_SCREENED * share)) if space.screened is None else space.screened
     n_starts = max(16, round(N_DESCENDING * share))
+    if begun.size and space.screened is not None:
+        n_starts = N_DESCENDING_BESIDE
     starts = _starts(problem, screened, seed, n_starts, np.concatenate([space.starts, begun]))
     if not len(starts):
         return []

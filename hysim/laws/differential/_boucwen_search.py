@@ -55,6 +55,7 @@ def search_space(
     freedom: Freedom,
     *,
     alike: tuple[tuple[str, ...], ...] = (),
+    screened: int | None = None,
 ) -> SearchSpace:
     """Declare the coordinates, their box and the way back to the user's parameters for one record."""
     at_rest = ("z0",) if freedom.starts_at_rest() else ()
@@ -96,6 +97,7 @@ def search_space(
         regions={"admissible": (quadrant, upper)} if set(_PAIR) <= set(box) and not extended else {},
         bounds={name: pair for name, pair in bounds.items() if name in columns},
         state=("z0",),
+        screened=screened,
         encoded=encoded,
     )
 

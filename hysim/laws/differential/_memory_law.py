@@ -117,7 +117,12 @@ class MemoryLaw(Law):
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         return _boucwen_search.search_space(
-            self.scalars, self.columns, record, freedom, alike=self.alike(record, freedom)
+            self.scalars,
+            self.columns,
+            record,
+            freedom,
+            alike=self.alike(record, freedom),
+            screened=self.screened,
         )
 
     def alike(self, record: Record, freedom: Freedom) -> tuple[tuple[str, ...], ...]:

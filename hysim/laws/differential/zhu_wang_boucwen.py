@@ -69,6 +69,7 @@ class ZhuWangBoucWen(MemoryLaw):
     z0: float = 0.0
     input_coefficients: tuple[float, ...] = (0.0,)
 
+    screened = 1024  # a step costs twenty times that of the Bouc-Wen law
     contains = Subset(
         BoucWen,
         neutral={"delta": 0.0, "input_coefficients": 0.0},
