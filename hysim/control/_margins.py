@@ -92,7 +92,7 @@ class LinearLoop:
 
     def max_sensitivity(self, controller: SampledController, slope: float = 1.0) -> float:
         """Largest ``|1 / (1 + L)|`` with a law of this slope, within 0.1 %; infinite if the loop is unstable."""
-        poles = self._poles(controller, slope)
+        poles = self.poles(controller, slope)
         if not np.abs(poles).max() < 1.0:
             return math.inf
         own = _around(_light(poles), _LOOPS_POLES) / self.sample_time
@@ -103,12 +103,14 @@ class LinearLoop:
 
     def is_stable(self, controller: SampledController, slope: float = 1.0) -> bool:
         """Whether all poles of the loop with a law of this slope lie inside the unit circle."""
-        return bool(np.abs(self._poles(controller, slope)).max() < 1.0)
+        return bool(np.abs(self.poles(controller, slope)).max() < 1.0)
 
     def margins(self, controller: SampledController, slope: float = 1.0) -> tuple[float, float]:
-        """Gain and phase margin [degrees] with a law of this slope, by python-control, and at z = -1."""
+        """Gain and phase margin [degrees] at a slope, by python-control, and at z = -1; nan if the loop is unstable."""
         import control
 
+        if not self.is_stable(controller, slope):
+            return math.nan, math.nan
         loop = slope * self.response(controller)
         gain, phase = control.margin(control.frd(loop, self.frequencies))[:2]
         at_nyquist = -1.0 / loop[-1].real if loop[-1].real < 0.0 else math.inf
@@ -124,7 +126,8 @@ class LinearLoop:
             states, power = states + power @ states @ power.T, power @ power
         return math.sqrt(loop.through**2 + max(0.0, float(loop.K @ states @ loop.K)))
 
-    def _poles(self, controller: SampledController, slope: float) -> npt.NDArray[np.complex128]:
+    def poles(self, controller: SampledController, slope: float = 1.0) -> npt.NDArray[np.complex128]:
+        """Poles of the loop in z with a law of this slope."""
         return np.asarray(np.linalg.eigvals(self._loop(controller, slope).M))
 
     def _default(self) -> FloatArray:
