@@ -26,6 +26,7 @@ from hysim.control._open_loop import slopes as slopes
 from hysim.control._pid import PID as PID
 from hysim.control._shaping import ModeInverse as ModeInverse
 from hysim.control._shaping import Shaper as Shaper
+from hysim.control._stability import later as later
 from hysim.control._to_control import to_control as to_control
 from hysim.control._tracking import TrackingController as TrackingController
 from hysim.control._tune import tune as tune

@@ -16,6 +16,7 @@ summed by doubling, with M, G and K the loop's matrices from the noise to the st
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -104,6 +105,11 @@ class LinearLoop:
     def is_stable(self, controller: SampledController, slope: float = 1.0) -> bool:
         """Whether all poles of the loop with a law of this slope lie inside the unit circle."""
         return bool(np.abs(self.poles(controller, slope)).max() < 1.0)
+
+    def are_stable(self, controllers: Sequence[SampledController], slope: float = 1.0) -> npt.NDArray[np.bool_]:
+        """Whether the loop of each of several controllers of one class is stable, as `is_stable` says."""
+        matrices = np.stack([self._loop(controller, slope).M for controller in controllers])
+        return np.asarray(np.abs(np.linalg.eigvals(matrices)).max(axis=1) < 1.0)
 
     def margins(self, controller: SampledController, slope: float = 1.0) -> tuple[float, float]:
         """Gain and phase margin [degrees] at a slope, by python-control, and at z = -1; nan if the loop is unstable."""

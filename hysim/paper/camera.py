@@ -123,8 +123,9 @@ class _Cameras:
         slower: list[PID] = []
         for rate in FRAME_RATES:
             found: list[PID] = []
+            ideal = self.task(self.plant, self.frame(rate))
             for k, (quantum, shake) in enumerate(SENSORS):
-                task = self.task(self.with_camera(rate, quantum, shake, seed=0), self.frame(rate))
+                task = replace(ideal, plant=self.with_camera(rate, quantum, shake, seed=0))
                 starts = _scaled([*found[:1], *found[-1:], *slower[k : k + 1], *slower[:1]])
                 generations, population, polish = _FAST if rate > 100.0 else _FIRST if k == 0 else _NEXT
                 best = search(

@@ -14,19 +14,18 @@ delay, in which a computer would work.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy.optimize import differential_evolution, minimize
 
 from hysim import signals
 from hysim._frozen import FloatArray, frozen
-from hysim.control import PID, LinearLoop, RestingPlant, as_actuator, secant_gain, slopes
+from hysim.control import PID, LinearLoop, RestingPlant, as_actuator, later, secant_gain, slopes
 from hysim.datasets import PIXEL
 from hysim.metrics import step_metrics
 from hysim.plants.actuator import Actuator
-from hysim.plants.sensor import Sensor
 
 Limits = tuple[float, float] | None
 
@@ -44,6 +43,8 @@ _SIMPLEXES = (0.03, 0.01)  # sizes, of the box
 _UNSTABLE = 1e6  # cost of a loop that is not stable
 _BEYOND = 1e3  # of one that exceeds a bound
 _REFINED = {True: 1.002, False: 1.01}  # margin for what lies between the grid's frequencies, with and without `exact`
+_CLEAR = 1.02  # margin beyond which nothing between them can reach the bound
+_AT_ONCE = 500_000  # samples of the loops that are simulated together
 
 
 @frozen
@@ -108,6 +109,22 @@ class Found:
         )
 
 
+@frozen
+class Gains:
+    """Numbers of several PIDs, each of shape (m, 1)."""
+
+    kp: FloatArray
+    ki: FloatArray
+    kd: FloatArray
+    derivative_filter: FloatArray
+
+    def response(self, z: npt.NDArray[np.complex128], sample_time: float) -> npt.NDArray[np.complex128]:
+        """As `PID.frequency_response`, shape (m, n)."""
+        lag = self.derivative_filter + sample_time
+        derivative = (self.kd / lag) * ((z - 1.0) / (z - self.derivative_filter / lag))
+        return np.asarray(self.kp + self.ki * (sample_time / (z - 1.0)) + derivative)
+
+
 class Robustness:
     """Largest sensitivities of a plant's loops, without and with one sample more of delay, unless that is no matter."""
 
@@ -115,10 +132,11 @@ class Robustness:
         self, plant: Any, sample_time: float, slopes: tuple[float, ...] = (1.0,), *, with_delay: bool = True
     ) -> None:
         actuator = as_actuator(plant)
-        sensor = actuator.sensor or Sensor()
-        delayed = replace(actuator, sensor=replace(sensor, delay=sensor.delay + sample_time))
         self.h, self.slopes = sample_time, slopes
-        self.loops = [LinearLoop(each, sample_time) for each in (actuator, delayed)[: 1 + with_delay]]
+        self.loops = [
+            LinearLoop(each, sample_time) for each in (actuator, later(actuator, sample_time))[: 1 + with_delay]
+        ]
+        self.z = [np.exp(1j * loop.frequencies * sample_time) for loop in self.loops]
 
     def of(self, controller: PID) -> tuple[float, float]:
         """Both, within 0.1 %; infinite if a loop is unstable."""
@@ -131,17 +149,22 @@ class Robustness:
         spare = WITH_DELAY if len(self.loops) > 1 else 1.0
         return max(0.0, min(max(first, second / spare) / bound - 1.0, _UNSTABLE))
 
-    def roughly(self, controller: PID, bound: float, margin: float) -> float:
-        """Both sensitivities on a grid of frequencies, four times as fast."""
-        worst = 0.0
-        for loop, most in zip(self.loops, (bound, WITH_DELAY * bound), strict=False):
-            response = loop.response(controller)
+    def over_bound(self, gains: Gains, bound: float) -> FloatArray:
+        """Largest ratio of a sensitivity on the grid of frequencies to its bound, of many controllers at once.
+
+        Whether the loops are stable is not looked at.
+        """
+        worst = np.zeros(gains.kp.size)
+        for loop, z, most in zip(self.loops, self.z, (bound, WITH_DELAY * bound), strict=False):
+            response = loop.plant * gains.response(z, self.h)
             for slope in self.slopes:
-                ratio = margin / most / float(np.abs(1.0 + slope * response).min())
-                worst = max(worst, ratio if ratio > 1.0 or loop.is_stable(controller, slope) else _UNSTABLE)
-            if worst > 1.0:
-                return worst - 1.0
-        return 0.0
+                worst = np.maximum(worst, 1.0 / (most * np.abs(1.0 + slope * response).min(axis=1)))
+        return worst
+
+    def are_stable(self, controllers: Sequence[PID]) -> npt.NDArray[np.bool_]:
+        """Whether all loops of each controller are stable."""
+        each = [loop.are_stable(controllers, slope) for loop in self.loops for slope in self.slopes]
+        return np.asarray(np.all(each, axis=0))
 
 
 def search(
@@ -177,7 +200,16 @@ def search(
     start = min((tried.point(pid) for pid in starts), key=tried.cost) if starts else None
     if generations:
         start = differential_evolution(
-            tried.cost, BOX, maxiter=generations, popsize=population, seed=seed, tol=0.0, polish=False, x0=start
+            tried.costs,
+            BOX,
+            maxiter=generations,
+            popsize=population,
+            seed=seed,
+            tol=0.0,
+            polish=False,
+            x0=start,
+            vectorized=True,
+            updating="deferred",
         ).x
     if start is None:
         raise ValueError("a search without generations needs controllers to start from")
@@ -240,17 +272,38 @@ class _Tried:
         )
 
     def cost(self, x: FloatArray) -> float:
-        self.controllers += 1
-        controller = self.controller(x)
-        if self.is_polished and self.exact:
-            excess = self.robustness.excess(controller, self.bound)
-        else:
-            excess = self.robustness.roughly(controller, self.bound, _REFINED[self.exact])
-        if excess > 0.0:
-            return _BEYOND + min(excess, _UNSTABLE)
-        self.simulations += 1
-        signals = self.resting.attempt(controller, self.task.reference)
-        return self.task.cost(signals.y) if signals.lost < 0 else _UNSTABLE
+        return float(self.costs(x[:, np.newaxis])[0])
+
+    def costs(self, points: FloatArray) -> FloatArray:
+        """Of many points at once, shape (6, m)."""
+        self.controllers += points.shape[1]
+        size, Ti, Td, ratio = 10.0 ** points[:4, :, np.newaxis]
+        kp = size / self.gain
+        over = self.robustness.over_bound(
+            Gains(kp=kp, ki=kp / Ti, kd=kp * Td, derivative_filter=ratio * Td), self.bound
+        )
+        refines = self.is_polished and self.exact
+        margin = 1.0 if refines else _REFINED[self.exact]
+        costs = _BEYOND + np.minimum(margin * over - 1.0, _UNSTABLE)
+        near = np.flatnonzero(margin * over <= 1.0)
+        pids = [self.controller(points[:, k]) for k in near]
+        stable = self.robustness.are_stable(pids) if pids else near
+        within = []
+        for k, pid, is_stable in zip(near.tolist(), pids, stable, strict=True):
+            excess = 0.0 if is_stable else _UNSTABLE
+            if is_stable and refines and _CLEAR * over[k] > 1.0:
+                excess = self.robustness.excess(pid, self.bound)
+            costs[k] = _BEYOND + excess
+            if excess == 0.0:
+                within.append((k, pid))
+        block = max(1, _AT_ONCE // self.task.reference.size)
+        for start in range(0, len(within), block):
+            part = within[start : start + block]
+            y, lost = self.resting.attempt_each([pid for _, pid in part], self.task.reference)
+            for i, (k, _) in enumerate(part):
+                costs[k] = self.task.cost(y[i]) if lost[i] < 0 else _UNSTABLE
+        self.simulations += len(within)
+        return costs
 
 
 def step_task(plant: Any, *, step: float, limits: Limits, duration: float, sample_time: float) -> Task:
