@@ -25,7 +25,7 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim.control._loop import as_actuator
-from hysim.control._sampled import SampledController
+from hysim.control._sampled import Feedback, SampledController
 from hysim.control._to_control import to_control
 
 _FREQUENCIES = 300
@@ -85,7 +85,7 @@ class LinearLoop:
         self.system = to_control(replace(as_actuator(plant), hysteresis=None), sample_time)
         self.resonances = _light(np.linalg.eigvals(self.system.A))
         self.frequencies = self._default() if frequencies is None else np.array(frequencies, dtype=float)
-        self.plant = self._plant(self.frequencies)
+        self.plant = self.plant_at(self.frequencies)
 
     def response(self, controller: SampledController) -> npt.NDArray[np.complex128]:
         """L at `frequencies`."""
@@ -106,9 +106,9 @@ class LinearLoop:
         """Whether all poles of the loop with a law of this slope lie inside the unit circle."""
         return bool(np.abs(self.poles(controller, slope)).max() < 1.0)
 
-    def are_stable(self, controllers: Sequence[SampledController], slope: float = 1.0) -> npt.NDArray[np.bool_]:
+    def are_stable(self, feedbacks: Sequence[Feedback], slope: float = 1.0) -> npt.NDArray[np.bool_]:
         """Whether the loop of each of several controllers of one class is stable, as `is_stable` says."""
-        matrices = np.stack([self._loop(controller, slope).M for controller in controllers])
+        matrices = np.stack([self._closed(feedback, slope).M for feedback in feedbacks])
         return np.asarray(np.abs(np.linalg.eigvals(matrices)).max(axis=1) < 1.0)
 
     def margins(self, controller: SampledController, slope: float = 1.0) -> tuple[float, float]:
@@ -141,8 +141,8 @@ class LinearLoop:
         apart = np.geomspace(_SLOWEST * highest, highest, _FREQUENCIES)
         return np.union1d(apart, _around(self.resonances, _PLANTS_POLES) / self.sample_time)
 
-    def _plant(self, frequencies: FloatArray) -> npt.NDArray[np.complex128]:
-        """C (z - A)^-1 B at all z on the unit circle at once; the sampled plant has no D."""
+    def plant_at(self, frequencies: FloatArray) -> npt.NDArray[np.complex128]:
+        """Response of the sampled plant at frequencies [rad/s], C (z - A)^-1 B; it has no D."""
         A, B, C = self.system.A, self.system.B, self.system.C
         z = np.exp(1j * frequencies * self.sample_time)[:, np.newaxis, np.newaxis]
         states = np.linalg.solve(z * np.eye(len(A)) - A, np.broadcast_to(B, (z.size, *B.shape)))
@@ -150,7 +150,7 @@ class LinearLoop:
 
     def _at(self, frequencies: FloatArray, controller: SampledController, slope: float) -> FloatArray:
         feedback = controller.frequency_response(frequencies, self.sample_time)
-        return _sensitivity(slope * self._plant(frequencies) * feedback)
+        return _sensitivity(slope * self.plant_at(frequencies) * feedback)
 
     def _highest(
         self, frequencies: FloatArray, values: FloatArray, controller: SampledController, slope: float
@@ -169,7 +169,10 @@ class LinearLoop:
         return highest
 
     def _loop(self, controller: SampledController, slope: float) -> _Loop:
-        feedback, n = controller.linear(self.sample_time), len(self.system.A)
+        return self._closed(controller.linear(self.sample_time), slope)
+
+    def _closed(self, feedback: Feedback, slope: float) -> _Loop:
+        n = len(self.system.A)
         output, drive = self.system.C[0], slope * self.system.B[:, 0]
         K = np.concatenate([feedback.D * output, feedback.C])
         M = np.zeros((K.size, K.size))

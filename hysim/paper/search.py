@@ -14,6 +14,7 @@ delay, in which a computer would work.
 
 import math
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -42,8 +43,8 @@ _POLISH = 250
 _SIMPLEXES = (0.03, 0.01)  # sizes, of the box
 _UNSTABLE = 1e6  # cost of a loop that is not stable
 _BEYOND = 1e3  # of one that exceeds a bound
-_REFINED = {True: 1.002, False: 1.01}  # margin for what lies between the grid's frequencies, with and without `exact`
-_CLEAR = 1.02  # margin beyond which nothing between them can reach the bound
+_REFINED = {True: 1.0005, False: 1.01}  # margin for what lies between the frequencies of a grid, fine or not
+_FINE, _SLOWEST = 1200, 1e-4  # frequencies of the fine grid, and the lowest in units of the highest
 _AT_ONCE = 500_000  # samples of the loops that are simulated together
 
 
@@ -125,6 +126,14 @@ class Gains:
         return np.asarray(self.kp + self.ki * (sample_time / (z - 1.0)) + derivative)
 
 
+class _Grid:
+    """A plant's response at many frequencies."""
+
+    def __init__(self, loop: LinearLoop, frequencies: FloatArray) -> None:
+        self.z = np.exp(1j * frequencies * loop.sample_time)
+        self.plant = loop.plant_at(frequencies)
+
+
 class Robustness:
     """Largest sensitivities of a plant's loops, without and with one sample more of delay, unless that is no matter."""
 
@@ -136,34 +145,37 @@ class Robustness:
         self.loops = [
             LinearLoop(each, sample_time) for each in (actuator, later(actuator, sample_time))[: 1 + with_delay]
         ]
-        self.z = [np.exp(1j * loop.frequencies * sample_time) for loop in self.loops]
+        self.grids = [_Grid(loop, loop.frequencies) for loop in self.loops]
+
+    @cached_property
+    def fine_grids(self) -> "list[_Grid]":
+        """Of frequencies so close that nothing lies between them, unless a pole of the loop is very lightly damped."""
+        highest = math.pi / self.h
+        between = np.geomspace(_SLOWEST * highest, highest, _FINE)
+        return [_Grid(loop, np.union1d(loop.frequencies, between)) for loop in self.loops]
 
     def of(self, controller: PID) -> tuple[float, float]:
         """Both, within 0.1 %; infinite if a loop is unstable."""
         each = [max(loop.max_sensitivity(controller, slope) for slope in self.slopes) for loop in self.loops]
         return each[0], each[-1]
 
-    def excess(self, controller: PID, bound: float) -> float:
-        """Part by which a bound is exceeded; 0 within the bounds."""
-        first, second = self.of(controller)
-        spare = WITH_DELAY if len(self.loops) > 1 else 1.0
-        return max(0.0, min(max(first, second / spare) / bound - 1.0, _UNSTABLE))
-
-    def over_bound(self, gains: Gains, bound: float) -> FloatArray:
-        """Largest ratio of a sensitivity on the grid of frequencies to its bound, of many controllers at once.
+    def over_bound(self, gains: Gains, bound: float, *, fine: bool = False) -> FloatArray:
+        """Largest ratio of a sensitivity on a grid of frequencies to its bound, of many controllers at once.
 
         Whether the loops are stable is not looked at.
         """
         worst = np.zeros(gains.kp.size)
-        for loop, z, most in zip(self.loops, self.z, (bound, WITH_DELAY * bound), strict=False):
-            response = loop.plant * gains.response(z, self.h)
+        grids = self.fine_grids if fine else self.grids
+        for grid, most in zip(grids, (bound, WITH_DELAY * bound), strict=False):
+            response = grid.plant * gains.response(grid.z, self.h)
             for slope in self.slopes:
                 worst = np.maximum(worst, 1.0 / (most * np.abs(1.0 + slope * response).min(axis=1)))
         return worst
 
     def are_stable(self, controllers: Sequence[PID]) -> npt.NDArray[np.bool_]:
         """Whether all loops of each controller are stable."""
-        each = [loop.are_stable(controllers, slope) for loop in self.loops for slope in self.slopes]
+        feedbacks = [controller.linear(self.h) for controller in controllers]
+        each = [loop.are_stable(feedbacks, slope) for loop in self.loops for slope in self.slopes]
         return np.asarray(np.all(each, axis=0))
 
 
@@ -192,7 +204,7 @@ def search(
     starts : sequence of PID
         Controllers of which the best begins the search.
     exact : bool
-        Whether the simplex goes to the bound itself, or keeps 1 % below it, which is four times as fast.
+        Whether the simplex goes to the bound itself, or keeps 1 % below it, which is faster.
     seed : int
         Of the random numbers.
     """
@@ -279,23 +291,15 @@ class _Tried:
         self.controllers += points.shape[1]
         size, Ti, Td, ratio = 10.0 ** points[:4, :, np.newaxis]
         kp = size / self.gain
-        over = self.robustness.over_bound(
-            Gains(kp=kp, ki=kp / Ti, kd=kp * Td, derivative_filter=ratio * Td), self.bound
-        )
-        refines = self.is_polished and self.exact
-        margin = 1.0 if refines else _REFINED[self.exact]
-        costs = _BEYOND + np.minimum(margin * over - 1.0, _UNSTABLE)
-        near = np.flatnonzero(margin * over <= 1.0)
+        gains = Gains(kp=kp, ki=kp / Ti, kd=kp * Td, derivative_filter=ratio * Td)
+        fine = self.is_polished and self.exact
+        over = _REFINED[fine] * self.robustness.over_bound(gains, self.bound, fine=fine)
+        costs = _BEYOND + np.minimum(over - 1.0, _UNSTABLE)
+        near = np.flatnonzero(over <= 1.0).tolist()
         pids = [self.controller(points[:, k]) for k in near]
-        stable = self.robustness.are_stable(pids) if pids else near
-        within = []
-        for k, pid, is_stable in zip(near.tolist(), pids, stable, strict=True):
-            excess = 0.0 if is_stable else _UNSTABLE
-            if is_stable and refines and _CLEAR * over[k] > 1.0:
-                excess = self.robustness.excess(pid, self.bound)
-            costs[k] = _BEYOND + excess
-            if excess == 0.0:
-                within.append((k, pid))
+        costs[near] = _BEYOND + _UNSTABLE
+        stable = self.robustness.are_stable(pids) if pids else np.empty(0, dtype=bool)
+        within = [(k, pid) for k, pid, is_stable in zip(near, pids, stable, strict=True) if is_stable]
         block = max(1, _AT_ONCE // self.task.reference.size)
         for start in range(0, len(within), block):
             part = within[start : start + block]
