@@ -67,6 +67,8 @@ class Task:
         Least and largest slope of the law [um/V]; 1 without one.
     with_delay : bool
         Whether the loop has to bear one sample more of delay; a camera's frame of delay is in the plant.
+    again : tuple of Actuator
+        The plant behind other noises of its sensor; the cost is the mean.
     """
 
     plant: Actuator
@@ -76,6 +78,7 @@ class Task:
     cost: Callable[[FloatArray], float]
     slopes: tuple[float, ...] = (1.0,)
     with_delay: bool = True
+    again: tuple[Actuator, ...] = ()
 
 
 @frozen
@@ -209,17 +212,17 @@ def search(
         Of the random numbers.
     """
     tried = _Tried(task, bound, exact)
-    start = min((tried.point(pid) for pid in starts), key=tried.cost) if starts else None
+    start = tried.best([tried.point(pid) for pid in starts]) if starts else None
     if generations:
         start = differential_evolution(
             tried.costs,
             BOX,
             maxiter=generations,
             popsize=population,
+            x0=start,
             seed=seed,
             tol=0.0,
             polish=False,
-            x0=start,
             vectorized=True,
             updating="deferred",
         ).x
@@ -234,7 +237,7 @@ class _Tried:
 
     def __init__(self, task: Task, bound: float, exact: bool) -> None:
         self.task, self.bound = task, bound
-        self.resting = RestingPlant(task.plant, task.sample_time)
+        self.resting = [RestingPlant(plant, task.sample_time) for plant in (task.plant, *task.again)]
         self.robustness = Robustness(task.plant, task.sample_time, task.slopes, with_delay=task.with_delay)
         law = task.plant.hysteresis
         self.gain = task.plant.dc_gain * (1.0 if law is None else float(np.mean(task.slopes)))
@@ -265,7 +268,7 @@ class _Tried:
         """The best controller that the simplex finds from a point; it begins anew once, on a smaller scale."""
         low, high = np.array(BOX).T
         best, least = start, self.cost(start)
-        for scale in _SIMPLEXES:
+        for scale in _SIMPLEXES if polish else ():
             step = scale * (high - low) * np.where(best > 0.5 * (low + high), -1.0, 1.0)
             simplex = np.clip(best + np.vstack([np.zeros(len(BOX)), np.diag(step)]), low, high)
             options = {"maxfev": polish // 2, "xatol": 1e-5, "fatol": 1e-9, "initial_simplex": simplex}
@@ -282,6 +285,9 @@ class _Tried:
             controllers=self.controllers,
             simulations=self.simulations,
         )
+
+    def best(self, points: Sequence[FloatArray]) -> FloatArray:
+        return points[int(np.argmin(self.costs(np.stack(points, axis=1))))]
 
     def cost(self, x: FloatArray) -> float:
         return float(self.costs(x[:, np.newaxis])[0])
@@ -303,11 +309,15 @@ class _Tried:
         block = max(1, _AT_ONCE // self.task.reference.size)
         for start in range(0, len(within), block):
             part = within[start : start + block]
-            y, lost = self.resting.attempt_each([pid for _, pid in part], self.task.reference)
-            for i, (k, _) in enumerate(part):
-                costs[k] = self.task.cost(y[i]) if lost[i] < 0 else _UNSTABLE
+            simulated = np.mean([self.simulated(resting, [pid for _, pid in part]) for resting in self.resting], axis=0)
+            costs[[k for k, _ in part]] = simulated
         self.simulations += len(within)
         return costs
+
+    def simulated(self, resting: RestingPlant, pids: Sequence[PID]) -> list[float]:
+        """Costs of stable controllers behind one noise."""
+        displacements, lost = resting.attempt_each(pids, self.task.reference)
+        return [self.task.cost(y) if sample < 0 else _UNSTABLE for y, sample in zip(displacements, lost, strict=True)]
 
 
 def step_task(plant: Any, *, step: float, limits: Limits, duration: float, sample_time: float) -> Task:
