@@ -60,7 +60,7 @@ def row(bound: float, effort: dict[str, int], seeds: tuple[int, ...], before: li
 def main(smoke: bool = False) -> list[dict[str, Any]]:
     """Search for every bound; print the table and write it, the figure and the numbers."""
     bounds = (2.0, 50.0) if smoke else (1.4, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0)
-    effort = {"generations": 2, "polish": 10} if smoke else {"generations": 60, "polish": 800}
+    effort = {"generations": 2, "polish": 10} if smoke else {"generations": 80, "polish": 1000}
     before: list[hs.PID] = []
     rows = [row(bound, effort, SEEDS[:1] if smoke else SEEDS, before) for bound in bounds]
     for line in rows:

@@ -45,6 +45,7 @@ _UNSTABLE = 1e6  # cost of a loop that is not stable
 _BEYOND = 1e3  # of one that exceeds a bound
 _REFINED = {True: 1.0005, False: 1.01}  # margin for what lies between the frequencies of a grid, fine or not
 _FINE, _SLOWEST = 1200, 1e-4  # frequencies of the fine grid, and the lowest in units of the highest
+_SHARP = 2.5  # bound above which peaks may be too sharp for a grid
 _AT_ONCE = 500_000  # samples of the loops that are simulated together
 
 
@@ -161,6 +162,12 @@ class Robustness:
         """Both, within 0.1 %; infinite if a loop is unstable."""
         each = [max(loop.max_sensitivity(controller, slope) for slope in self.slopes) for loop in self.loops]
         return each[0], each[-1]
+
+    def excess(self, controller: PID, bound: float) -> float:
+        """Part by which a bound is exceeded; 0 within the bounds."""
+        first, second = self.of(controller)
+        spare = WITH_DELAY if len(self.loops) > 1 else 1.0
+        return max(0.0, min(max(first, second / spare) / bound - 1.0, _UNSTABLE))
 
     def over_bound(self, gains: Gains, bound: float, *, fine: bool = False) -> FloatArray:
         """Largest ratio of a sensitivity on a grid of frequencies to its bound, of many controllers at once.
@@ -306,6 +313,10 @@ class _Tried:
         costs[near] = _BEYOND + _UNSTABLE
         stable = self.robustness.are_stable(pids) if pids else np.empty(0, dtype=bool)
         within = [(k, pid) for k, pid, is_stable in zip(near, pids, stable, strict=True) if is_stable]
+        if fine and self.bound > _SHARP:
+            for k, pid in within:
+                costs[k] = _BEYOND + self.robustness.excess(pid, self.bound)
+            within = [(k, pid) for k, pid in within if costs[k] == _BEYOND]
         block = max(1, _AT_ONCE // self.task.reference.size)
         for start in range(0, len(within), block):
             part = within[start : start + block]
