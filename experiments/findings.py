@@ -495,11 +495,11 @@ _DAMPED = "model-following, damped"
 def _beside(rows: Sequence[Row]) -> str:
     """A sentence on what the reductions of some loops are worth."""
     require(all(row["stable"] for row in rows), "all loops are stable")
-    limited = max(column(rows, "limited_percent"))
+    limited, jump = (max(column(rows, name)) for name in ("limited_percent", "volts_per_pixel"))
     return (
-        f"All loops are stable, at a limit of the voltage in at most {percent(limited)} of the samples; one more sample "
-        f"of delay raises their maximum sensitivity to at most {number(max(column(rows, _DELAYED)))}, and a pixel of "
-        f"the paper's camera would move their commands by up to {number(max(column(rows, 'volts_per_pixel')))} V."
+        f"All loops are stable, at a limit of the voltage in at most {percent(limited)} of the samples; one more "
+        f"sample of delay raises their maximum sensitivity to at most {number(max(column(rows, _DELAYED)))}, and a "
+        f"pixel of the paper's camera would move their commands by up to {number(jump)} V."
     )
 
 

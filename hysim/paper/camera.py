@@ -45,8 +45,9 @@ _COMPARED: _Effort = (0, 4, 0)  # of the controllers of all sensors, in the end
 _SHORT, _SKIPPED = 0.005, 2.0  # frames that leave time for one cycle only, and its begin that does not count [s]
 _SCALES = (1.0, 0.4)  # gains of the starts over those of a neighbour
 _RECORD = 160.0  # of a step [samples of Table 2]
-_SEED = 10  # of the first noise that is measured
-_SEARCHED, _AGAIN = (0,), (0, 1, 2)  # seeds of the noises of a search, and of the comparison in the end
+_SEED = 10  # of the first noise that is measured; the search has those from 0 on
+_AGAIN = 9  # noises behind which controllers are compared in the end
+_FEW = 3  # at 1000 Hz, and behind which those of a step are searched below 100 Hz
 
 
 @frozen
@@ -118,6 +119,7 @@ class _Cameras:
     task: Callable[[Actuator, float], Task]
     judged: Callable[[float, float, float, Found, Any], CameraLoop]
     plant: Actuator
+    searched = 1  # noises behind which a controller is searched
 
     def loops(self) -> list[CameraLoop]:
         """Every frame rate with every sensor."""
@@ -142,15 +144,14 @@ class _Cameras:
         for k, sensor in enumerate(SENSORS):
             starts = _scaled([*pids[:1], *pids[-1:], *slower[k : k + 1], *slower[:1]])
             effort = _FAST if is_fast else _NEXT if pids else _FIRST
-            pids.append(_searched(self.seen(ideal, rate, *sensor, _SEARCHED), starts, effort).controller)
-        return [
-            _searched(self.seen(ideal, rate, *sensor, _AGAIN), [*pids, *slower[k : k + 1]], _COMPARED)
-            for k, sensor in enumerate(SENSORS)
-        ]
+            task = self.seen(ideal, rate, *sensor, 1 if rate >= 100.0 else self.searched)
+            pids.append(_searched(task, starts, effort).controller)
+        tasks = [self.seen(ideal, rate, *sensor, _FEW if is_fast else _AGAIN) for sensor in SENSORS]
+        return [_searched(task, [*pids, *slower[k : k + 1]], _COMPARED) for k, task in enumerate(tasks)]
 
-    def seen(self, task: Task, rate: float, quantum: float, shake: float, seeds: Sequence[int]) -> Task:
+    def seen(self, task: Task, rate: float, quantum: float, shake: float, noises: int) -> Task:
         """A task behind a camera, with several noises if it shakes."""
-        plants = [self.with_camera(rate, quantum, shake, seed) for seed in (seeds if shake else seeds[:1])]
+        plants = [self.with_camera(rate, quantum, shake, seed) for seed in range(noises if shake else 1)]
         return replace(task, plant=plants[0], again=tuple(plants[1:]))
 
     def kept(self, pid: PID, rate: float) -> PID:
@@ -228,6 +229,8 @@ def _width(y: FloatArray, samples: int) -> float:
 
 
 class _Step(_Cameras):
+    searched = _FEW
+
     def __init__(self) -> None:
         self.name, self.unit, self.plant = "eq4", SAMPLE_SECONDS, as_actuator(EQUATION_4)
         self.decay = float(np.min(-EQUATION_4.poles.real))
