@@ -95,6 +95,7 @@ def main(smoke: bool = False) -> list[Row]:
         "verdict": found.verdict,
         "equation": found.equation,
         "terms": list(found.coefficients),
+        "draws": DRAWS,
         "found_again": shares,
         "cpu_seconds": seconds,
     }

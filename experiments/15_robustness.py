@@ -22,7 +22,7 @@ import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import loop_columns, write_results
 from table1_actuator import (
     HIGH,
     LOW,
@@ -49,7 +49,7 @@ Row = dict[str, float | str | None]
 def measured(
     plant: hs.Actuator, chosen: list[hs.TrackingController], period: float, cycles: int, duration: float
 ) -> np.ndarray:
-    """The measures of each controller on one plant; nan where the loop is lost."""
+    """The measures of each controller on one plant; nan where the loop is not stable."""
     samples = round(period / H)
     reference = hs.signals.triangle(LOW, HIGH, cycles=cycles, samples_per_cycle=samples)
     opened = hs.control.open_loop(plant, reference, H, samples)
@@ -57,15 +57,14 @@ def measured(
 
     def measures(controller: hs.TrackingController) -> np.ndarray:
         try:
-            y = hs.close_loop(plant, controller, opened.t, reference).y
-            told, known = (
-                hs.control.assess_step(plant, controller, known_ahead=known, **step).reduction
-                for known in (False, True)
-            )
+            loop = hs.control.assess_loop(plant, controller, opened.t, reference, period=period)
+            steps = [hs.control.assess_step(plant, controller, known_ahead=known, **step) for known in (False, True)]
         except hs.SimulationError:
             return UNSTABLE
-        figures = [getattr(found, name) for found in (told, known) for name in STEP]
-        return np.array([opened.reduction_percent(y), hs.metrics.rmse(opened.cycle, opened.last(y)), *figures])
+        if not (loop.stable and all(found.loop.stable for found in steps)):
+            return UNSTABLE
+        figures = [getattr(found.reduction, name) for found in steps for name in STEP]
+        return np.array([opened.reduction_percent(loop.closed.y), loop.tracking_rms, *figures])
 
     return np.array([measures(controller) for controller in chosen])
 
@@ -78,11 +77,18 @@ def rows_of(names: list[str], draws: int, exponent: bool, period: float, cycles:
     factors = np.random.default_rng(SEED).uniform(1.0 - SPREAD, 1.0 + SPREAD, (draws, 11 if exponent else 10))
     with ThreadPoolExecutor() as pool:
         found = list(pool.map(lambda each: measured(drawn(nominal, each), chosen, period, cycles, duration), factors))
-    return [row(name, np.array(values), exponent) for name, values in zip(names, np.swapaxes(found, 0, 1), strict=True)]
+    samples = round(period / H)
+    reference = hs.signals.triangle(LOW, HIGH, cycles=cycles, samples_per_cycle=samples)
+    t = H * np.arange(reference.size)
+    loops = [hs.control.assess_loop(nominal, controller, t, reference, period=period) for controller in chosen]
+    return [
+        row(name, np.array(values), exponent) | {f"nominal_{key}": value for key, value in loop_columns(loop).items()}
+        for name, values, loop in zip(names, np.swapaxes(found, 0, 1), loops, strict=True)
+    ]
 
 
 def row(name: str, values: np.ndarray, exponent: bool) -> Row:
-    """Percentiles of the measures over the loops that were not lost."""
+    """Percentiles of the measures over the stable loops."""
     stable = np.isfinite(values[:, 0])
     percentiles = np.percentile(values[stable], PERCENTILES, axis=0)
     return {

@@ -16,7 +16,7 @@ import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import PIXEL, loop_columns, words, write_results
 from table1_actuator import (
     DAMPING,
     FREQUENCY,
@@ -30,7 +30,6 @@ from table1_actuator import (
 )
 
 RESULTS = Path(__file__).parent / "results" / "pixel_sensor"
-PIXEL = 0.0763  # um
 STEP = ("overshoot_reduction_percent", "residual_rms_reduction_percent", "settling_time_reduction_percent")
 
 Row = dict[str, float | str | None]
@@ -52,16 +51,19 @@ def rows_of(chosen: dict[str, hs.TrackingController], period: float, cycles: int
     step = {"step": 1.0, "duration": duration, "sample_time": H, "u0": resting_voltage(plant, REST)}
     rows: list[Row] = []
     for name, controller in chosen.items():
-        run = hs.close_loop(plant, controller, opened.t, reference)
+        loop = hs.control.assess_loop(plant, controller, opened.t, reference, period=period)
+        run = loop.closed
         moved = hs.control.assess_step(plant, controller, **step)
         both = seen(moved.open_y), moved.closed.measurement
         pixels = hs.metrics.vibration_reduction(moved.closed.t, *both, decay_rate=DAMPING * FREQUENCY)
         rows.append(
             {
                 "controller": name,
-                "hysteresis_reduction_percent": opened.reduction_percent(run.y),
-                "measured_hysteresis_reduction_percent": measured.reduction_percent(run.measurement),
-                "tracking_rms_um": float(hs.metrics.rmse(opened.cycle, opened.last(run.y))),
+                "hysteresis_reduction_percent": opened.reduction_percent(run.y) if loop.stable else None,
+                "measured_hysteresis_reduction_percent": (
+                    measured.reduction_percent(run.measurement) if loop.stable else None
+                ),
+                **loop_columns(loop),
                 "measured_tracking_rms_um": float(hs.metrics.rmse(opened.cycle, opened.last(run.measurement))),
                 **{measure: getattr(moved.reduction, measure) for measure in STEP},
                 **{f"measured_{measure}": getattr(pixels, measure) for measure in STEP},
@@ -78,7 +80,7 @@ def main(smoke: bool = False) -> list[Row]:
     rows = rows_of(chosen, *((0.02, 2, 0.3) if smoke else (1.0, 10, 1.0)))
     for row in rows:
         shown = {key: math.nan if value is None else value for key, value in row.items()}
-        print(shown["controller"])
+        print(f"{shown['controller']}: {words(row)}")
         for measure in ("hysteresis_reduction_percent", "tracking_rms_um", *STEP):
             print(f"  {measure:<34} true {shown[measure]:9.4f}, measured {shown[f'measured_{measure}']:9.4f}")
     if not smoke:
@@ -100,7 +102,9 @@ def draw(rows: list[Row]) -> Figure:
             remains = [math.nan if value is None else 100.0 - float(value) for value in values]
             ax.plot(remains, places, "o", color="#0072B2", markersize=5, fillstyle=style, label=name)
         ax.set_xscale("log")
+        ax.set_xlim(1.0, 200.0)
         ax.set_xlabel(label)
+        ax.tick_params(axis="x", which="minor", labelbottom=False)
     left.set_yticks(places, [str(row["controller"]) for row in rows])
     left.invert_yaxis()
     handles, names = right.get_legend_handles_labels()

@@ -16,14 +16,14 @@ import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import loop_columns, open_loop_columns, words, write_results
 from table1_actuator import HIGH, LOW, H, controllers, reference_plant
 
 RESULTS = Path(__file__).parent / "results" / "rate_sweep"
 FREQUENCIES = (0.1, 0.5, 1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 250.0, 400.0, 500.0)  # Hz
 SHOWN = ("PID", "inverse + creep inverse", "... + PID", "... + PID + mode-inverse + preview", "model-following")
 
-Row = dict[str, float | str | None]
+Row = dict[str, float | str | bool | None]
 
 
 def rows_at(frequency: float, chosen: dict[str, hs.TrackingController], lasting: float) -> list[Row]:
@@ -33,22 +33,31 @@ def rows_at(frequency: float, chosen: dict[str, hs.TrackingController], lasting:
     phase = 2.0 * math.pi * np.arange(cycles * samples + 1) / samples
     reference = 0.5 * (LOW + HIGH) - 0.5 * (HIGH - LOW) * np.cos(phase)
     opened = hs.control.open_loop(plant, reference, H, samples)
-    rows = [row("open loop", frequency, opened, opened.y, opened.u)]
+    rms = float(hs.metrics.rmse(opened.cycle, opened.last(opened.y)))
+    beside = open_loop_columns(samples * H, rms)
+    rows = [row("open loop", frequency, 0.0, opened.last(opened.u), beside)]
     for name, controller in chosen.items():
-        run = hs.close_loop(plant, controller, opened.t, reference)
-        rows.append(row(name, frequency, opened, run.y, run.u))
+        loop = hs.control.assess_loop(plant, controller, opened.t, reference, period=samples * H)
+        reduction = opened.reduction_percent(loop.closed.y) if loop.stable else None
+        rows.append(row(name, frequency, reduction, opened.last(loop.closed.u), loop_columns(loop)))
     return rows
 
 
-def row(name: str, frequency: float, opened: hs.control.OpenLoop, y: np.ndarray, u: np.ndarray) -> Row:
+def row(name: str, frequency: float, reduction: float | None, u: np.ndarray, columns: Row) -> Row:
     """One loop at one frequency."""
     return {
         "controller": name,
         "frequency_hz": frequency,
-        "hysteresis_reduction_percent": opened.reduction_percent(y),
-        "tracking_rms_um": float(hs.metrics.rmse(opened.cycle, opened.last(y))),
-        "peak_voltage": float(opened.last(u).max()),
+        "hysteresis_reduction_percent": reduction,
+        **columns,
+        "peak_voltage": float(u.max()),
     }
+
+
+def shown(row: Row) -> str:
+    """The reduction as it is printed."""
+    reduction = row["hysteresis_reduction_percent"]
+    return "no" if reduction is None else f"{float(reduction):.2f}"
 
 
 def main(smoke: bool = False) -> list[Row]:
@@ -59,8 +68,8 @@ def main(smoke: bool = False) -> list[Row]:
     rows = [each for frequency in frequencies for each in rows_at(frequency, chosen, lasting)]
     for each in rows:
         print(
-            f"{each['frequency_hz']:6.1f} Hz {each['controller']:<36} {each['hysteresis_reduction_percent']:8.2f} %, "
-            f"rms {1e3 * float(each['tracking_rms_um']):8.2f} nm, {each['peak_voltage']:6.1f} V"
+            f"{each['frequency_hz']:6.1f} Hz {each['controller']:<36} {shown(each):>8} %, "
+            f"rms {1e3 * float(each['tracking_rms_um']):8.2f} nm, {each['peak_voltage']:6.1f} V; {words(each)}"
         )
     if not smoke:
         write_results(RESULTS, rows, draw, {"low_um": LOW, "high_um": HIGH})
@@ -78,7 +87,8 @@ def draw(rows: list[Row]) -> Figure:
     ):
         for name in ("open loop", *SHOWN):
             line = [each for each in rows if each["controller"] == name]
-            values = [100.0 - float(each[key]) if "percent" in key else float(each[key]) for each in line]
+            known = [math.nan if each[key] is None else float(each[key]) for each in line]
+            values = [100.0 - value if "percent" in key else value for value in known]
             ax.plot([each["frequency_hz"] for each in line], values, "o-", markersize=3, label=name)
         ax.set_xscale("log")
         ax.set_ylabel(label)

@@ -7,6 +7,7 @@ is the width of the same loop with the law replaced by a line, over the closed l
 left. The sensor's delay is there throughout, its noise is not.
 """
 
+import math
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +19,7 @@ import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import loop_columns, words, write_results
 from table1_actuator import FREQUENCY, HIGH, LIMITS, LOW, H, extreme_slopes, reference_plant
 
 RESULTS = Path(__file__).parent / "results" / "pid_hysteresis"
@@ -28,7 +29,7 @@ STARTS = ((0.1, 1e-5), (0.1, 1e-3), (2.0, 1e-3), (2.0, 2e-2))  # kp, kd
 HALVINGS = 24  # of 20 in log ki: to 1e-6, well below the tolerance of the search
 FILTER = 2.0 * H  # of the derivative [s]
 
-Row = dict[str, float | str]
+Row = dict[str, float | str | bool | None]
 
 
 def plants() -> dict[str, hs.Actuator]:
@@ -66,6 +67,11 @@ def largest_integral(
     return fastest(best.x), bool(best.success)
 
 
+def as_number(value: float | str | None) -> float:
+    """A cell of the table, nan where it is empty."""
+    return math.nan if value is None else float(value)
+
+
 def main(smoke: bool = False) -> list[Row]:
     """Design, measure, print and write table, figure and result."""
     slopes = extreme_slopes(reference_plant())
@@ -86,12 +92,14 @@ def main(smoke: bool = False) -> list[Row]:
                         "plant": name,
                         "max_sensitivity": bound,
                         "frequency_hz": rate,
-                        "hysteresis_reduction_percent": loops.hysteresis_reduction_percent,
+                        "hysteresis_reduction_percent": loops.hysteresis_reduction_percent
+                        if loops.loop.stable
+                        else None,
                         "lag_share_percent": 100.0 * loops.lag_width / loops.closed_width,
                         "open_width_um": loops.open_width,
                         "closed_width_um": loops.closed_width,
                         "lag_width_um": loops.lag_width,
-                        "tracking_rms_um": loops.tracking_rms,
+                        **loop_columns(loops.loop),
                         "kp": pid.kp,
                         "ki": pid.ki,
                         "kd": pid.kd,
@@ -101,8 +109,8 @@ def main(smoke: bool = False) -> list[Row]:
     for row in rows:
         print(
             f"{row['plant']:<17} sensitivity {row['max_sensitivity']:3.1f}, {row['frequency_hz']:4.0f} Hz: "
-            f"{row['hysteresis_reduction_percent']:7.2f} %, of the rest {row['lag_share_percent']:5.1f} % lag; "
-            f"kp {row['kp']:.3g}, ki {row['ki']:.3g}, kd {row['kd']:.3g}"
+            f"{as_number(row['hysteresis_reduction_percent']):7.2f} %, of the rest {row['lag_share_percent']:5.1f} % "
+            f"lag; kp {row['kp']:.3g}, ki {row['ki']:.3g}, kd {row['kd']:.3g}; {words(row)}"
         )
     if not smoke:
         write_results(RESULTS, rows, draw, {"derivative_filter_s": FILTER})
@@ -117,7 +125,7 @@ def draw(rows: list[Row]) -> Figure:
         for k, rate in enumerate(RATES):
             line = [row for row in rows if (row["plant"], row["frequency_hz"]) == (name, rate)]
             bounds = [row["max_sensitivity"] for row in line]
-            left = [100.0 - float(row["hysteresis_reduction_percent"]) for row in line]
+            left = [100.0 - as_number(row["hysteresis_reduction_percent"]) for row in line]
             lag = [value * float(row["lag_share_percent"]) / 100.0 for value, row in zip(left, line, strict=True)]
             ax.plot(bounds, left, "o-", color=f"C{k}", markersize=4, label=f"{rate:g} Hz")
             ax.plot(bounds, lag, ":", color=f"C{k}", label="of it lag" if k == 0 else None)

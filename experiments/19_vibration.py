@@ -19,7 +19,7 @@ from hysim.paper.equations import EQUATION_4, EQUATION_6
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import loop_columns, words, write_results
 from table1_actuator import REST, H, controllers, reference_plant, resting_voltage, robust_controllers
 
 RESULTS = Path(__file__).parent / "results" / "vibration"
@@ -29,7 +29,7 @@ SIZES = (0.1, 0.5, 1.0, 1.5)  # um
 LINEAR_SIZES = (0.5, 1.0, 2.0, 4.0)  # um
 STEP = ("overshoot_reduction_percent", "residual_rms_reduction_percent", "settling_time_reduction_percent")
 
-Row = dict[str, float | str | None]
+Row = dict[str, float | str | bool | None]
 
 
 def on_the_actuator(sizes: tuple[float, ...], names: tuple[str, ...], duration: float) -> list[Row]:
@@ -67,6 +67,7 @@ def row(plant_name: str, plant: Any, name: str, controller: Any, size: float, st
         **{measure: value if math.isfinite(value) else None for measure, value in figures.items()},
         "highest_voltage": found.closed.conditions["highest_u"],
         "limited_samples": found.closed.conditions["limited_samples"],
+        **loop_columns(found.loop),
     }
 
 
@@ -85,7 +86,7 @@ def main(smoke: bool = False) -> list[Row]:
         print(
             f"{each['plant']:<8} {each['controller']:<34} {each['step_um']:+4.1f} um: overshoot {overshoot:7.2f} %, "
             f"residual {residual:7.2f} %, settling {settling:7.2f} %; {each['highest_voltage']:6.1f} V, "
-            f"{each['limited_samples']} samples limited"
+            f"{words(each)}"
         )
     if not smoke:
         write_results(RESULTS, rows, draw, {})

@@ -20,10 +20,9 @@ import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import PIXEL, loop_columns, write_results
 
 RESULTS = Path(__file__).parent / "results" / "virtual_rig"
-PIXEL = hs.datasets.PIXEL
 SEEDS = 20
 FIRST = 100  # texture: none of those that the measurement was made with
 SHAKE = 0.31  # pixel
@@ -40,6 +39,11 @@ COLOURS = {
 }
 
 Row = dict[str, Any]
+
+NOTHING = dict.fromkeys(
+    ("hysteresis_reduction_percent", "stable", "period_s", "tracking_rms_um", "limited_percent",
+     "max_sensitivity_with_delay", "volts_per_pixel")
+)  # fmt: skip
 
 
 def measurements(seed: int) -> dict[str, tuple[hs.rig.Rig, str]]:
@@ -84,18 +88,20 @@ def row(name: str, seed: int, table: hs.Record, truth: hs.Record, cycles: int = 
         "width_error_percent": 100.0 * (width.value / true_width - 1.0) if known else None,
         "width_covers": bool(width.lower <= true_width <= width.upper) if known else None,
         "law_rms_pixels": float(np.std(fit.model.response(truth.u) - truth.y)) / PIXEL if known else None,
-        "hysteresis_reduction_percent": reduction(fit.model, cycles) if known else None,
+        **(reduction(fit.model, cycles) if known else NOTHING),
     }
 
 
-def reduction(law: Any, cycles: int) -> float:
-    """Hysteresis that the inverse of a law takes away from the true actuator [%]."""
+def reduction(law: Any, cycles: int) -> Row:
+    """Hysteresis that the inverse of a law takes away from the true actuator [%], and figures of that loop."""
     plant = hs.rig.table1().actuator
     samples = round(1.0 / H)
     reference = hs.signals.triangle(0.1, 2.5, cycles=cycles, samples_per_cycle=samples)
     opened = hs.control.open_loop(plant, reference, H, samples)
     controller = hs.TrackingController(feedforward=hs.InverseFeedforward(law=law), limits=plant.amplifier.limits)
-    return float(opened.reduction_percent(hs.close_loop(plant, controller, opened.t, reference).y))
+    loop = hs.control.assess_loop(plant, controller, opened.t, reference, period=1.0)
+    left = opened.reduction_percent(loop.closed.y) if loop.stable else None
+    return {"hysteresis_reduction_percent": left, **loop_columns(loop)}
 
 
 def summary(rows: list[Row]) -> list[Row]:
@@ -121,7 +127,7 @@ def main(smoke: bool = False) -> list[Row]:
     if smoke:
         return [row(*next(tables(1, drive)), truth, cycles=1)]
     rows = [row(*each, truth) for each in tables(SEEDS, drive)]
-    best, lines = reduction(hs.rig.LAW, 10), summary(rows)
+    best, lines = reduction(hs.rig.LAW, 10)["hysteresis_reduction_percent"], summary(rows)
     print(f"the inverse of the true law takes {best:.2f} % of the hysteresis away")
     for line in lines:
         print(f"{line['measured']}: {line['tables']} tables, {line.get('width_covers')} intervals hold the true width")

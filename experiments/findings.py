@@ -395,9 +395,9 @@ def sindy_table1(result: Result) -> list[str]:
         f"{percent(own['fit_percent'], 2)} (BIC {own['bic']:.1f}). The best fit of the Bouc-Wen laws beside it is "
         f"{percent(fit['fit_percent'], 2)} ({fit['model']}, {fit['n_parameters']} parameters), their lowest BIC "
         f"{bic['bic']:.1f} ({bic['model']}).",
-        f"Records drawn anew from the law give back {len(often)} of its terms in at least {100 * min(often):.0f} % "
-        "of the "
-        f'draws, and the last one in {100 * seldom:.0f} %. The verdict is "{result["verdict"]}".',
+        f"{count(result['draws'])} records drawn anew from the law give back {len(often)} of its terms in at least "
+        f"{100 * min(often):.0f} % of the draws, and the last one in {100 * seldom:.0f} %. The verdict is "
+        f'"{result["verdict"]}".',
     ]
 
 
@@ -492,6 +492,20 @@ def lag_of_equation_1(result: Result) -> list[str]:
 _DAMPED = "model-following, damped"
 
 
+def _beside(rows: Sequence[Row]) -> str:
+    """A sentence on what the reductions of some loops are worth."""
+    require(all(row["stable"] for row in rows), "all loops are stable")
+    limited, jump = (max(column(rows, name)) for name in ("limited_percent", "volts_per_pixel"))
+    return (
+        f"All loops are stable, at a limit of the voltage in at most {percent(limited)} of the samples; one more "
+        f"sample of delay raises their maximum sensitivity to at most {number(max(column(rows, _DELAYED)))}, and a "
+        f"pixel of the paper's camera would move their commands by up to {number(jump)} V."
+    )
+
+
+_DELAYED = "max_sensitivity_with_delay"
+
+
 def compensation_matrix(result: Result) -> list[str]:
     """What each part of a controller adds."""
     rows = {row["controller"]: row for row in result["rows"]}
@@ -511,7 +525,7 @@ def compensation_matrix(result: Result) -> list[str]:
         "Where the controller knows the actuator exactly, the hysteresis reduction of a triangle of 1 Hz is "
         f"{listed(widths)}.",
         "Of the residual vibration after a step, with the mode as the controller believes and with a mode 10 % off, "
-        f"{'; '.join(shaken)} are taken away (a negative reduction is more vibration).",
+        f"{'; '.join(shaken)} are taken away (a negative reduction is more vibration). {_beside(list(rows.values()))}",
         f"With all parameters of law and creep within 5 % but the exponent, the inverse alone keeps {off(held)}; "
         f"with n drawn too {off(with_n)}; in the law's normalised form {off(normalised)}.",
     ]
@@ -544,15 +558,17 @@ def pixel_sensor(result: Result) -> list[str]:
     rows = {row["controller"]: row for row in result["rows"]}
     best, pid = rows["inverse + creep inverse"], rows["PID"]
     true, measured = "hysteresis_reduction_percent", "measured_hysteresis_reduction_percent"
-    fed_back = [row for row in result["rows"] if "PID" in row["controller"] or "follow" in row["controller"]]
-    require(best[true] == max(row[true] for row in result["rows"]), "no feedback on pixels beats the inverse")
+    stable = [row for row in result["rows"] if row["stable"]]
+    fed_back = [row for row in stable if "PID" in row["controller"] or "follow" in row["controller"]]
+    require(best[true] == max(column(stable, true)), "no feedback on pixels beats the inverse")
+    require(pid not in stable, "a fast PID is in a limit cycle on pixels")
     return [
         f"Through whole pixels of {result['pixel_um']:g} um the inverse of law and creep, without feedback and with "
         f"the law known exactly, takes {percent(best[true])} of the true hysteresis away, and the pixels show "
         f"{percent(best[measured])}.",
-        f"Feedback on pixels makes it worse: {span([row[true] for row in fed_back if row is not pid], 3, ' %')} with "
-        f"the inverse, {percent(pid[true])} with a fast PID alone (a negative reduction is a wider loop). The camera "
-        "is taken to be as fast as the controller.",
+        f"Feedback on pixels makes it worse: {span(column(fed_back, true), 3, ' %')} with the inverse. A fast PID "
+        f"alone, whose command moves by {number(pid['volts_per_pixel'])} V for a pixel, is in a limit cycle on the "
+        "pixels, stable as it is in linear theory. The camera is taken to be as fast as the controller.",
     ]
 
 
@@ -595,8 +611,9 @@ def pid_hysteresis(result: Result) -> list[str]:
     return [
         f"On law, creep and mode a PID within a maximum sensitivity of 2 takes {by_rate(usual)} away; within "
         f"{robust[0]['max_sensitivity']:g}, {by_rate(robust)} (a negative reduction is a wider loop).",
-        f"At 2, at least {percent(least, 0)} of the width that is left would be there without hysteresis: lag. "
-        f"{search}",
+        f"At 2, at least {percent(least, 0)} of the width that is left would be there without hysteresis: lag; with "
+        f"one sample more of delay the sensitivity is {number(max(column(usual, _DELAYED)))}, and a pixel of the "
+        f"paper's camera would move the command by {number(max(column(usual, 'volts_per_pixel')))} V. {search}",
     ]
 
 

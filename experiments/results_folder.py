@@ -6,7 +6,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
+import hysim as hs
 from hysim.plot import Figure, house_style, save_svg
+
+PIXEL = hs.datasets.PIXEL  # um, of the paper's camera
 
 Row = TypeVar("Row", bound=Mapping[str, Any])
 
@@ -24,3 +27,38 @@ def write_results(
     (folder / "result.json").write_text(document + "\n", encoding="utf-8")
     with house_style():
         save_svg(draw(rows), folder / "figure.svg", name=folder.name)
+
+
+def loop_columns(loop: hs.control.LoopAssessment) -> dict[str, float | bool | None]:
+    """What stands beside a reduction in the table of every control experiment; a pixel is the paper's camera's."""
+    columns = loop.row(PIXEL)
+    return {
+        "stable": columns["stable"],
+        "period_s": columns["period"],
+        "tracking_rms_um": columns["tracking_rms"],
+        "limited_percent": columns["limited_percent"],
+        "max_sensitivity_with_delay": columns["max_sensitivity_with_delay"],
+        "volts_per_pixel": columns["volts_per_quantum"],
+    }
+
+
+def open_loop_columns(period: float, tracking_rms: float) -> dict[str, float | bool | None]:
+    """The same of an open loop, which nothing makes unstable."""
+    return {
+        "stable": True,
+        "period_s": period,
+        "tracking_rms_um": tracking_rms,
+        "limited_percent": 0.0,
+        "max_sensitivity_with_delay": 1.0,
+        "volts_per_pixel": 0.0,
+    }
+
+
+def words(row: Mapping[str, Any]) -> str:
+    """These columns of a row in words, for printing."""
+    sensitivity = row["max_sensitivity_with_delay"]
+    return (
+        f"{'stable' if row['stable'] else 'NOT STABLE'}, at a limit {row['limited_percent']:.1f} %, sensitivity with "
+        f"a sample more of delay {'infinite' if sensitivity is None else format(sensitivity, '.2f')}, "
+        f"{row['volts_per_pixel']:.3g} V a pixel"
+    )

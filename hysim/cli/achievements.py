@@ -57,11 +57,12 @@ def document(design: Design) -> dict[str, Any]:
         "tuning": design.tuning and outputs.fields_of(design.tuning, _TUNED),
         "triangle": {
             "low": task.low, "high": task.high, "period": task.period, "cycles": CYCLES,
-            **outputs.scalars(triangle), "open_tracking_rms": design.open_tracking_rms,
+            **outputs.scalars(triangle), "open_tracking_rms": design.open_tracking_rms, "stable": triangle.loop.stable,
         },
         "step": {
             "u0": task.u0, "height": task.step, "duration": task.duration,
             **outputs.scalars(reduction), "open": asdict(reduction.open), "closed": asdict(reduction.closed),
+            "stable": design.step.loop.stable,
         },
         "reference_tracking_rms": design.file_rms,
         "conditions": {name: value for name, value in triangle.closed.conditions.items() if not is_dataclass(value)},
@@ -90,10 +91,13 @@ def _head(design: Design) -> Iterator[str]:
 
 def _triangle(design: Design) -> Iterator[str]:
     result, task, y = design.triangle, design.task, design.units.get("y", "")
-    is_lag = math.isnan(result.hysteresis_reduction_percent)
+    is_lag = result.is_lag
     reduction = result.lag_reduction_percent if is_lag else result.hysteresis_reduction_percent
     yield f"triangle    {task.low:.4g} to {quantity(task.high, y)}, {1.0 / task.period:.4g} Hz, cycle {CYCLES}"
-    yield _row(f"{'lag' if is_lag else 'hysteresis'} reduction", f"{reduction:.2f} %")
+    yield _row(
+        f"{'lag' if is_lag else 'hysteresis'} reduction",
+        f"{reduction:.2f} %" if result.loop.stable else f"none: {result.loop.message}",
+    )
     yield _row("width", f"open {result.open_width:.4g}, closed {quantity(result.closed_width, y)}")
     if not is_lag:
         yield _row(
@@ -107,6 +111,8 @@ def _step(design: Design) -> Iterator[str]:
     reduction, u = design.step.reduction, design.units.get("u", "")
     height = quantity(design.task.step, design.units.get("y", ""))
     yield f"step        {height} from rest at {quantity(design.task.u0, u)}"
+    if design.step.loop.message:
+        yield _row("no reduction", design.step.loop.message)
     for name, value in outputs.scalars(reduction).items():
         percent = "does not exist" if math.isnan(value) else f"{value:.2f} %"
         yield _row(name.removesuffix("_percent").replace("_", " "), percent)

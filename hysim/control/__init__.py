@@ -1,13 +1,13 @@
 """Controllers, the loops they close, and measures of these loops."""
 
-from hysim.control._assessment import HysteresisAssessment as HysteresisAssessment
-from hysim.control._assessment import OpenLoop as OpenLoop
-from hysim.control._assessment import SquareWaveAssessment as SquareWaveAssessment
-from hysim.control._assessment import StepAssessment as StepAssessment
 from hysim.control._assessment import assess_hysteresis as assess_hysteresis
 from hysim.control._assessment import assess_square_wave as assess_square_wave
 from hysim.control._assessment import assess_step as assess_step
 from hysim.control._assessment import open_loop as open_loop
+from hysim.control._assessment_results import HysteresisAssessment as HysteresisAssessment
+from hysim.control._assessment_results import OpenLoop as OpenLoop
+from hysim.control._assessment_results import SquareWaveAssessment as SquareWaveAssessment
+from hysim.control._assessment_results import StepAssessment as StepAssessment
 from hysim.control._bandwidth import bandwidth as bandwidth
 from hysim.control._c_export import CSource as CSource
 from hysim.control._c_export import to_c as to_c
@@ -18,12 +18,15 @@ from hysim.control._loop import ClosedLoop as ClosedLoop
 from hysim.control._loop import RestingPlant as RestingPlant
 from hysim.control._loop import as_actuator as as_actuator
 from hysim.control._loop import close_loop as close_loop
+from hysim.control._loop_assessment import LoopAssessment as LoopAssessment
+from hysim.control._loop_assessment import assess_loop as assess_loop
 from hysim.control._margins import LinearLoop as LinearLoop
 from hysim.control._open_loop import secant_gain as secant_gain
 from hysim.control._open_loop import slopes as slopes
 from hysim.control._pid import PID as PID
 from hysim.control._shaping import ModeInverse as ModeInverse
 from hysim.control._shaping import Shaper as Shaper
+from hysim.control._stability import later as later
 from hysim.control._to_control import to_control as to_control
 from hysim.control._tracking import TrackingController as TrackingController
 from hysim.control._tune import tune as tune

@@ -1,178 +1,27 @@
 """Figures of a closed loop beside those of the same plant in open loop, driven with reference / secant gain.
 
 Hysteresis loops and square waves are measured over their last cycle, steps by `hysim.metrics.vibration_reduction`.
+The reductions of a loop that is not stable are nan: a limit cycle along the reference may be narrower than any loop.
 """
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim import signals
-from hysim._frozen import FloatArray, frozen, read_only
-from hysim._printing import extent, printed, summary_text
-from hysim.control._loop import ClosedLoop, RestingPlant, as_actuator, close_loop
+from hysim._frozen import FloatArray, read_only
+from hysim.control._assessment_results import HysteresisAssessment, OpenLoop, SquareWaveAssessment, StepAssessment
+from hysim.control._loop import RestingPlant, as_actuator, close_loop
+from hysim.control._loop_assessment import judged
 from hysim.control._open_loop import secant_gain, without_memory
 from hysim.control._protocols import Controller, preview
-from hysim.metrics import LoopMetrics, VibrationReduction, loop_metrics, reduction_percent, rmse, vibration_reduction
+from hysim.metrics import VibrationReduction, rmse, vibration_reduction
 from hysim.plants.actuator import Actuator
 
 _FEWEST = 10  # samples of which a step is measured
-
-
-@printed
-@frozen
-class OpenLoop:
-    """Response to a periodic reference without a controller; every signal has shape (n,).
-
-    Parameters
-    ----------
-    t, reference : array
-        Times [s] and reference [unit of y].
-    u, y : array
-        Voltage reference / secant gain [unit of u], and true displacement just before it [unit of y].
-    secant_gain, samples_per_cycle
-        Stroke over span of the last cycle [unit of y / unit of u], and length of a cycle.
-    """
-
-    t: FloatArray
-    reference: FloatArray
-    u: FloatArray
-    y: FloatArray
-    secant_gain: float
-    samples_per_cycle: int
-
-    def __str__(self) -> str:
-        return summary_text([f"OpenLoop: {self.t.size} samples, secant gain {self.secant_gain:.4g}", str(self.loop)])
-
-    @property
-    def cycle(self) -> FloatArray:
-        """Last cycle of the reference, both ends included."""
-        return self.last(self.reference)
-
-    @property
-    def loop(self) -> LoopMetrics:
-        return self.loop_of(self.y)
-
-    def last(self, signal: FloatArray) -> FloatArray:
-        return signal[-self.samples_per_cycle - 1 :]
-
-    def loop_of(self, y: FloatArray) -> LoopMetrics:
-        """Measures of a displacement against the reference in the last cycle."""
-        return loop_metrics(self.cycle, self.last(y))
-
-    def reduction_percent(self, y: FloatArray) -> float:
-        """100 (1 - W closed / W open) [%], W the largest width over the stroke."""
-        return reduction_percent(self.loop.relative_width, self.loop_of(y).relative_width)
-
-
-@printed
-@frozen
-class HysteresisAssessment:
-    """Figures of a triangle in open and in closed loop, over the last cycle.
-
-    Parameters
-    ----------
-    hysteresis_reduction_percent, lag_reduction_percent : float
-        100 (1 - W closed / W open) [%], W the largest width over the stroke of the true displacement against the
-        reference. The first is nan for a plant without a law, whose loop is lag; the second is nan with one.
-    open_width, closed_width : float
-        Largest widths [unit of y].
-    open_lag_width, lag_width : float
-        The same with the law replaced by a line of its secant gain [unit of y].
-    tracking_rms, closure_gap : float
-        Rms error, and displacement at the end minus at the start [unit of y].
-    secant_gain : float
-        Secant gain of the open loop [unit of y / unit of u].
-    open_u, open_y, closed
-        Signals of the open loop, shape (n,), and the closed loop.
-    """
-
-    hysteresis_reduction_percent: float
-    lag_reduction_percent: float
-    open_width: float
-    closed_width: float
-    open_lag_width: float
-    lag_width: float
-    tracking_rms: float
-    closure_gap: float
-    secant_gain: float
-    open_u: FloatArray
-    open_y: FloatArray
-    closed: ClosedLoop
-
-    def __str__(self) -> str:
-        is_lag = math.isnan(self.hysteresis_reduction_percent)
-        what = "lag" if is_lag else "hysteresis"
-        reduction = self.lag_reduction_percent if is_lag else self.hysteresis_reduction_percent
-        return summary_text(
-            [f"HysteresisAssessment: {what} reduction {reduction:.2f} %, tracking rms {self.tracking_rms:.4g}"],
-            {
-                "open width": f"{self.open_width:.4g}, without the memory {self.open_lag_width:.4g}",
-                "closed width": f"{self.closed_width:.4g}, without the memory {self.lag_width:.4g}",
-                "closure gap": f"{self.closure_gap:.4g}",
-                "secant gain": f"{self.secant_gain:.4g}",
-                "voltage": extent(self.closed.u),
-            },
-        )
-
-
-@printed
-@frozen
-class StepAssessment:
-    """Figures of a step in open and in closed loop.
-
-    Parameters
-    ----------
-    reduction : VibrationReduction
-        The three figures, and the measures of both responses.
-    open_y, closed
-        Displacement in open loop, shape (n,), where the voltage steps to its final value; and the closed loop.
-    """
-
-    reduction: VibrationReduction
-    open_y: FloatArray
-    closed: ClosedLoop
-
-    def __str__(self) -> str:
-        ends = f"from {self.closed.y[0]:.4g} to {self.closed.reference[-1]:.4g}"
-        return summary_text([f"StepAssessment {ends}, voltage {extent(self.closed.u)}", f"  {self.reduction}"])
-
-
-@printed
-@frozen
-class SquareWaveAssessment:
-    """Figures of a square wave in its periodic steady state, in open and in closed loop.
-
-    Parameters
-    ----------
-    open_tracking_rms, tracking_rms : float
-        Rms errors over the last period [unit of y].
-    open_peak_excess_percent, peak_excess_percent : float
-        Largest displacement beyond the reference's range in the last period [% of the wave's height].
-    reduction : VibrationReduction, or None
-        The step's figures over the last half period, if it lasts the open loop's t98 and five of its periods.
-    open_y, closed
-        Displacement in open loop, shape (n,), and the closed loop.
-    """
-
-    open_tracking_rms: float
-    tracking_rms: float
-    open_peak_excess_percent: float
-    peak_excess_percent: float
-    reduction: VibrationReduction | None
-    open_y: FloatArray
-    closed: ClosedLoop
-
-    def __str__(self) -> str:
-        return summary_text(
-            [
-                f"SquareWaveAssessment: tracking rms {self.tracking_rms:.4g}, open loop {self.open_tracking_rms:.4g}",
-                f"  peak excess {self.peak_excess_percent:.2f} %, open loop {self.open_peak_excess_percent:.2f} %",
-                "" if self.reduction is None else f"  {self.reduction}",
-            ],
-        )
 
 
 def assess_hysteresis(
@@ -223,8 +72,10 @@ def assess_hysteresis(
     opened = open_loop(actuator, reference, sample_time, samples)
     line = RestingPlant(without_memory(actuator, opened.cycle / opened.secant_gain), sample_time)
     closed = close_loop(actuator, controller, opened.t, reference)
-    reduction, after = opened.reduction_percent(closed.y), opened.loop_of(closed.y)
-    has_law = actuator.hysteresis is not None
+    counted = slice(-samples - 1, None)
+    loop = judged(actuator, controller, closed, opened.cycle, opened.secant_gain, counted, period)
+    reduction = opened.reduction_percent(closed.y) if loop.stable else math.nan
+    after, has_law = opened.loop_of(closed.y), actuator.hysteresis is not None
     return HysteresisAssessment(
         hysteresis_reduction_percent=reduction if has_law else math.nan,
         lag_reduction_percent=math.nan if has_law else reduction,
@@ -232,12 +83,13 @@ def assess_hysteresis(
         closed_width=after.max_width,
         open_lag_width=opened.loop_of(line.driven(opened.u)).max_width,
         lag_width=opened.loop_of(line.run(controller, reference).y).max_width,
-        tracking_rms=rmse(opened.cycle, opened.last(closed.y)),
+        tracking_rms=loop.tracking_rms,
         closure_gap=after.closure_gap,
         secant_gain=opened.secant_gain,
         open_u=opened.u,
         open_y=opened.y,
         closed=closed,
+        loop=loop,
     )
 
 
@@ -342,14 +194,18 @@ def assess_step(
     resting = RestingPlant(actuator, sample_time, u0)
     reference = resting.y0 + np.where(np.arange(t.size) < before + ahead, 0.0, step)
     closed = close_loop(actuator, controller, t, reference, u0=u0)
-    gain = secant_gain(actuator, np.array([resting.y0, resting.y0 + step]))
+    cycle = np.array([resting.y0, resting.y0 + step])
+    gain = secant_gain(actuator, cycle)
+    loop = judged(actuator, controller, closed, cycle, gain, slice(None))
     waits = np.arange(after) < (ahead if known_ahead else 0)
     open_y = resting.driven(u0 + np.where(waits, 0.0, step / gain))
     decay_rate = -_least_damped(actuator).real
+    reduction = vibration_reduction(t[:after], open_y, closed.y[before:], decay_rate=decay_rate)
     return StepAssessment(
-        reduction=vibration_reduction(t[:after], open_y, closed.y[before:], decay_rate=decay_rate),
+        reduction=reduction if loop.stable else _unknown(reduction),
         open_y=open_y,
         closed=closed,
+        loop=loop,
     )
 
 
@@ -393,24 +249,37 @@ def assess_square_wave(
     half = _samples_in("a half period", 0.5 * period, sample_time)
     reference = np.tile(np.repeat([low, high], half), periods)
     t = sample_time * np.arange(reference.size)
-    gain = secant_gain(actuator, np.array([low, high]))
+    levels = np.array([low, high])
+    gain = secant_gain(actuator, levels)
     closed = close_loop(actuator, controller, t, reference)
     open_y = RestingPlant(actuator, sample_time).driven(reference / gain)
     last, last_half = slice(-2 * half, None), slice(-half, None)
+    loop = judged(actuator, controller, closed, levels, gain, last, period)
     mode, step = _least_damped(actuator), None
-    if half >= _FEWEST:
+    if half >= _FEWEST and loop.stable:
         halves = t[last_half], open_y[last_half], closed.y[last_half]
         reduction = vibration_reduction(*halves, decay_rate=-mode.real)
         if half * sample_time >= reduction.open.t98 + 5.0 * 2.0 * math.pi / mode.imag:
             step = reduction
     return SquareWaveAssessment(
         open_tracking_rms=rmse(reference[last], open_y[last]),
-        tracking_rms=rmse(reference[last], closed.y[last]),
+        tracking_rms=loop.tracking_rms,
         open_peak_excess_percent=_peak_excess(open_y[last], low, high),
         peak_excess_percent=_peak_excess(closed.y[last], low, high),
         reduction=step,
         open_y=open_y,
         closed=closed,
+        loop=loop,
+    )
+
+
+def _unknown(reduction: VibrationReduction) -> VibrationReduction:
+    """The measures of both responses, without the reductions."""
+    return replace(
+        reduction,
+        overshoot_reduction_percent=math.nan,
+        residual_rms_reduction_percent=math.nan,
+        settling_time_reduction_percent=math.nan,
     )
 
 

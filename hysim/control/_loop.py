@@ -1,7 +1,7 @@
 """The verb `close_loop`: a sampled controller around a continuous actuator."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from typing import Any, TypeGuard
 
@@ -188,6 +188,16 @@ class RestingPlant:
         samples = min(preview(controller, self.sample_time), reference.size)
         ahead = read_only(np.append(reference[samples:], np.full(samples, reference[-1])))
         return self.chain.run(compiled, self.state, ahead, progress)[0]
+
+    def attempt_each(
+        self, controllers: Sequence[Controller], reference: FloatArray
+    ) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+        """Displacements of the loops of several controllers of one class without preview, shape (m, n).
+
+        With them the first sample of each that is not finite, -1 without one.
+        """
+        compiled = [CompiledController(*each.compiled(self.sample_time, self.u0, self.y0)) for each in controllers]
+        return self.chain.run_each(compiled, self.state, reference)
 
     def voltages(self, signals: Signals) -> FloatArray:
         return self.chain.just_after(float(self.state.voltages[1]), signals.v)

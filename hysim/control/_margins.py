@@ -16,6 +16,7 @@ summed by doubling, with M, G and K the loop's matrices from the noise to the st
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -24,7 +25,7 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim.control._loop import as_actuator
-from hysim.control._sampled import SampledController
+from hysim.control._sampled import Feedback, SampledController
 from hysim.control._to_control import to_control
 
 _FREQUENCIES = 300
@@ -84,7 +85,7 @@ class LinearLoop:
         self.system = to_control(replace(as_actuator(plant), hysteresis=None), sample_time)
         self.resonances = _light(np.linalg.eigvals(self.system.A))
         self.frequencies = self._default() if frequencies is None else np.array(frequencies, dtype=float)
-        self.plant = self._plant(self.frequencies)
+        self.plant = self.plant_at(self.frequencies)
 
     def response(self, controller: SampledController) -> npt.NDArray[np.complex128]:
         """L at `frequencies`."""
@@ -92,7 +93,7 @@ class LinearLoop:
 
     def max_sensitivity(self, controller: SampledController, slope: float = 1.0) -> float:
         """Largest ``|1 / (1 + L)|`` with a law of this slope, within 0.1 %; infinite if the loop is unstable."""
-        poles = self._poles(controller, slope)
+        poles = self.poles(controller, slope)
         if not np.abs(poles).max() < 1.0:
             return math.inf
         own = _around(_light(poles), _LOOPS_POLES) / self.sample_time
@@ -103,12 +104,19 @@ class LinearLoop:
 
     def is_stable(self, controller: SampledController, slope: float = 1.0) -> bool:
         """Whether all poles of the loop with a law of this slope lie inside the unit circle."""
-        return bool(np.abs(self._poles(controller, slope)).max() < 1.0)
+        return bool(np.abs(self.poles(controller, slope)).max() < 1.0)
+
+    def are_stable(self, feedbacks: Sequence[Feedback], slope: float = 1.0) -> npt.NDArray[np.bool_]:
+        """Whether the loop of each of several controllers of one class is stable, as `is_stable` says."""
+        matrices = np.stack([self._closed(feedback, slope).M for feedback in feedbacks])
+        return np.asarray(np.abs(np.linalg.eigvals(matrices)).max(axis=1) < 1.0)
 
     def margins(self, controller: SampledController, slope: float = 1.0) -> tuple[float, float]:
-        """Gain and phase margin [degrees] with a law of this slope, by python-control, and at z = -1."""
+        """Gain and phase margin [degrees] at a slope, by python-control, and at z = -1; nan if the loop is unstable."""
         import control
 
+        if not self.is_stable(controller, slope):
+            return math.nan, math.nan
         loop = slope * self.response(controller)
         gain, phase = control.margin(control.frd(loop, self.frequencies))[:2]
         at_nyquist = -1.0 / loop[-1].real if loop[-1].real < 0.0 else math.inf
@@ -124,7 +132,8 @@ class LinearLoop:
             states, power = states + power @ states @ power.T, power @ power
         return math.sqrt(loop.through**2 + max(0.0, float(loop.K @ states @ loop.K)))
 
-    def _poles(self, controller: SampledController, slope: float) -> npt.NDArray[np.complex128]:
+    def poles(self, controller: SampledController, slope: float = 1.0) -> npt.NDArray[np.complex128]:
+        """Poles of the loop in z with a law of this slope."""
         return np.asarray(np.linalg.eigvals(self._loop(controller, slope).M))
 
     def _default(self) -> FloatArray:
@@ -132,8 +141,8 @@ class LinearLoop:
         apart = np.geomspace(_SLOWEST * highest, highest, _FREQUENCIES)
         return np.union1d(apart, _around(self.resonances, _PLANTS_POLES) / self.sample_time)
 
-    def _plant(self, frequencies: FloatArray) -> npt.NDArray[np.complex128]:
-        """C (z - A)^-1 B at all z on the unit circle at once; the sampled plant has no D."""
+    def plant_at(self, frequencies: FloatArray) -> npt.NDArray[np.complex128]:
+        """Response of the sampled plant at frequencies [rad/s], C (z - A)^-1 B; it has no D."""
         A, B, C = self.system.A, self.system.B, self.system.C
         z = np.exp(1j * frequencies * self.sample_time)[:, np.newaxis, np.newaxis]
         states = np.linalg.solve(z * np.eye(len(A)) - A, np.broadcast_to(B, (z.size, *B.shape)))
@@ -141,7 +150,7 @@ class LinearLoop:
 
     def _at(self, frequencies: FloatArray, controller: SampledController, slope: float) -> FloatArray:
         feedback = controller.frequency_response(frequencies, self.sample_time)
-        return _sensitivity(slope * self._plant(frequencies) * feedback)
+        return _sensitivity(slope * self.plant_at(frequencies) * feedback)
 
     def _highest(
         self, frequencies: FloatArray, values: FloatArray, controller: SampledController, slope: float
@@ -160,7 +169,10 @@ class LinearLoop:
         return highest
 
     def _loop(self, controller: SampledController, slope: float) -> _Loop:
-        feedback, n = controller.linear(self.sample_time), len(self.system.A)
+        return self._closed(controller.linear(self.sample_time), slope)
+
+    def _closed(self, feedback: Feedback, slope: float) -> _Loop:
+        n = len(self.system.A)
         output, drive = self.system.C[0], slope * self.system.B[:, 0]
         K = np.concatenate([feedback.D * output, feedback.C])
         M = np.zeros((K.size, K.size))

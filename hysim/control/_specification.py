@@ -10,6 +10,7 @@ from hysim._frozen import FloatArray, check_positive
 from hysim.control._margins import LinearLoop
 from hysim.control._open_loop import secant_gain, slopes
 from hysim.control._sampled import SampledController
+from hysim.control._stability import slowest_decay
 from hysim.control._tuning import Trial
 from hysim.plants.actuator import Actuator
 
@@ -76,6 +77,10 @@ class _PlantLoops:
         self.loop = LinearLoop(plant, sample_time)
         self.noise = 0.0 if plant.sensor is None else plant.sensor.noise
         self.volts = 1.0 if plant.amplifier is None else abs(plant.amplifier.gain)
+
+    def decay(self, controller: SampledController) -> float:
+        """Of the slowest oscillation of the stable loops, per sample."""
+        return slowest_decay(self.loop, controller, self.slopes)
 
     def voltage_noise(self, controller: SampledController) -> float:
         if not self.noise:

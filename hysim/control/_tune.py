@@ -10,6 +10,9 @@ in units of the reference's span, the largest one where several limits are given
     "itae"   integral of t |e| / duration^2     a step: late errors count most
     "rms"    rms of e                           a periodic reference
 
+The loop of the controller that is returned, and of each in the trade-off, comes to rest where the reference stops:
+those that are in a limit cycle, between the limits or on the steps of the sensor, are sorted out in the end.
+
 The sensor's noise is in the simulation, always the same: it moves the memory of a law, which no linear figure shows.
 """
 
@@ -27,6 +30,7 @@ from hysim.control._loop import RestingPlant, as_actuator, sample_time_of
 from hysim.control._margins import LinearLoop
 from hysim.control._protocols import limits_of
 from hysim.control._specification import Specification
+from hysim.control._stability import limit_cycle
 from hysim.control._template import Limits, Tuned, as_template
 from hysim.control._tuning import Trial, Tuning, front
 
@@ -95,7 +99,8 @@ def tune(
     ------
     TypeError, ValueError
         If a plant is not one, has no gain or cannot rest at `u0`, the reference is constant at the resting
-        displacement, times are uneven, an option is unknown, or no controller of the linear rule is stable.
+        displacement, times are uneven, an option is unknown, no controller of the linear rule is stable, or every
+        loop that was simulated is in a limit cycle.
 
     Examples
     --------
@@ -151,6 +156,22 @@ class _SimulatedLoop:
             largest = max(largest, self.objective((self.reference - signals.y)[self.counted] / self.span))
         return largest
 
+    def rests(self, controller: Tuned, decay: float, gain: float) -> bool:
+        """Whether the loop comes to rest where the reference stops, under each of the limits."""
+        asked = self.span / abs(gain)
+        return not any(
+            limit_cycle(
+                self.actuator,
+                replace(controller, limits=limits),
+                self.reference,
+                self.h,
+                self.plant.u0,
+                decay=decay,
+                asked=asked,
+            )
+            for limits in self.limits
+        )
+
     def limited(self, controller: Tuned) -> int:
         signals = self.plant.attempt(controller, self.reference)
         return int(np.count_nonzero(signals.drive != signals.command))
@@ -201,12 +222,7 @@ class _Search:
     def result(self) -> Tuning:
         """Best controller within the bounds, or the nearest to them, with its margins."""
         bounds = self.specification
-        beyond = [bounds.excess(trial) for trial in self.trials]
-        least = min(beyond)
-        best = min(
-            (trial for trial, excess in zip(self.trials, beyond, strict=True) if excess == least),
-            key=lambda trial: (trial.objective, trial.max_sensitivity),
-        )
+        best, trade_off = self.chosen()
         gain_margin, phase_margin = bounds.margins(best.controller)
         limited, samples = self.loop.limited(best.controller), self.loop.reference.size
         return Tuning(
@@ -216,14 +232,43 @@ class _Search:
             gain_margin=gain_margin,
             phase_margin=phase_margin,
             voltage_noise=best.voltage_noise,
-            trade_off=front(trial for trial in self.trials if trial.voltage_noise <= bounds.max_voltage_noise),
+            trade_off=trade_off,
             trials=tuple(self.trials),
-            success=least == 0.0 and math.isfinite(best.objective),
+            success=bounds.excess(best) == 0.0,
             message=(
                 f"{len(self.trials)} loops simulated; {bounds.words(best)}; "
                 f"the voltage is limited at {limited} of {samples} samples"
             ),
         )
+
+    def chosen(self) -> tuple[Trial, tuple[Trial, ...]]:
+        """The best trial and the trade-off, once none of them is in a limit cycle."""
+        bounds = self.specification
+        resting: set[int] = set()
+        while True:
+            simulated = [(k, trial) for k, trial in enumerate(self.trials) if trial.objective < math.inf]
+            if not simulated:
+                raise ValueError(
+                    "every loop that was simulated is in a limit cycle: lower max_sensitivity, or widen the limits"
+                )
+            best = min(simulated, key=lambda each: _rank(bounds.excess(each[1]), each[1]))
+            trade_off = front(trial for _, trial in simulated if trial.voltage_noise <= bounds.max_voltage_noise)
+            doubtful = [k for k, trial in simulated if k not in resting and (k == best[0] or trial in trade_off)]
+            if not doubtful:
+                return best[1], trade_off
+            for k in doubtful:
+                if self.rests(self.trials[k].controller):
+                    resting.add(k)
+                else:
+                    self.trials[k] = replace(self.trials[k], objective=math.inf)
+
+    def rests(self, controller: Tuned) -> bool:
+        plant = self.specification.plants[0]
+        return self.loop.rests(controller, plant.decay(controller), plant.gain)
+
+
+def _rank(excess: float, trial: Trial) -> tuple[float, float, float]:
+    return excess, trial.objective, trial.max_sensitivity
 
 
 def _each(limits: Any, controller: Any) -> tuple[Limits, ...]:

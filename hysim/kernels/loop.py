@@ -41,7 +41,10 @@ With e = 1 - exp(-t / tau) both pieces of s have closed forms:
 """
 
 import math
+from collections.abc import Callable
 
+import numpy as np
+import numpy.typing as npt
 from numba import float64, int64, types
 
 from hysim._frozen import FloatArray
@@ -51,6 +54,8 @@ from hysim.kernels.stepping import CONSTANTS, STEP, VECTOR, Step
 
 SIGNALS = types.Array(float64, 2, "C")
 INPUTS = types.Array(float64, 2, "C", readonly=True)
+CONSTANT_ROWS = INPUTS
+LOST = types.Array(int64, 1, "C")
 
 N_AMPLIFIER = 6
 N_HEAD = N_AMPLIFIER + 7
@@ -186,3 +191,49 @@ def close(
                 readings[waiting] = output(within, x, oldest, older, newer)
             advance(decline, A, B, x, oldest, older, newer)
     return -1
+
+
+@signed_kernel(
+    int64(
+        CONTROLLER, CONSTANT_ROWS, SIGNALS, STEP, CONSTANTS, CONSTANTS, CONSTANTS, CONSTANTS,
+        INPUTS, SIGNALS, LOST,
+    )
+)  # fmt: skip
+def close_each(
+    controller: Callable[..., float],
+    parameters: FloatArray,
+    states: FloatArray,
+    law: Step,
+    law_parameters: FloatArray,
+    law_rest: FloatArray,
+    plant: FloatArray,
+    plant_rest: FloatArray,
+    inputs: FloatArray,
+    displacements: FloatArray,
+    lost: npt.NDArray[np.int64],
+) -> int:
+    """Close a loop from rest with each of several controllers of one kind; 0.
+
+    Parameters
+    ----------
+    parameters, states : array, shape (m, p) and (m, q)
+        Of the controllers; the states move along.
+    law_rest, plant_rest : array
+        States at rest, as `close` takes them.
+    inputs : array, shape (2, n)
+        As `close` takes them.
+    displacements : array, shape (m, n)
+        For the displacements at the samples.
+    lost : array, shape (m,)
+        For the results of `close`.
+    """
+    n, substeps = inputs.shape[1], int(plant[N_AMPLIFIER + 4])
+    samples, path = np.empty((4, n)), np.empty((2, n * substeps))
+    for i in range(lost.size):
+        law_state, plant_state = law_rest.copy(), plant_rest.copy()
+        lost[i] = close(
+            controller, parameters[i], states[i], law, law_parameters, law_state, plant, plant_state, inputs, 0, n,
+            samples, path,
+        )  # fmt: skip
+        displacements[i] = samples[2]
+    return 0

@@ -14,19 +14,19 @@ delay, in which a computer would work.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy.optimize import differential_evolution, minimize
 
 from hysim import signals
 from hysim._frozen import FloatArray, frozen
-from hysim.control import PID, LinearLoop, RestingPlant, as_actuator, secant_gain, slopes
+from hysim.control import PID, LinearLoop, RestingPlant, as_actuator, later, secant_gain, slopes
 from hysim.datasets import PIXEL
 from hysim.metrics import step_metrics
 from hysim.plants.actuator import Actuator
-from hysim.plants.sensor import Sensor
 
 Limits = tuple[float, float] | None
 
@@ -43,7 +43,10 @@ _POLISH = 250
 _SIMPLEXES = (0.03, 0.01)  # sizes, of the box
 _UNSTABLE = 1e6  # cost of a loop that is not stable
 _BEYOND = 1e3  # of one that exceeds a bound
-_REFINED = {True: 1.002, False: 1.01}  # margin for what lies between the grid's frequencies, with and without `exact`
+_REFINED = {True: 1.0005, False: 1.01}  # margin for what lies between the frequencies of a grid, fine or not
+_FINE, _SLOWEST = 1200, 1e-4  # frequencies of the fine grid, and the lowest in units of the highest
+_SHARP = 2.5  # bound above which peaks may be too sharp for a grid
+_AT_ONCE = 500_000  # samples of the loops that are simulated together
 
 
 @frozen
@@ -65,6 +68,8 @@ class Task:
         Least and largest slope of the law [um/V]; 1 without one.
     with_delay : bool
         Whether the loop has to bear one sample more of delay; a camera's frame of delay is in the plant.
+    again : tuple of Actuator
+        The plant behind other noises of its sensor; the cost is the mean.
     """
 
     plant: Actuator
@@ -74,6 +79,7 @@ class Task:
     cost: Callable[[FloatArray], float]
     slopes: tuple[float, ...] = (1.0,)
     with_delay: bool = True
+    again: tuple[Actuator, ...] = ()
 
 
 @frozen
@@ -108,6 +114,30 @@ class Found:
         )
 
 
+@frozen
+class Gains:
+    """Numbers of several PIDs, each of shape (m, 1)."""
+
+    kp: FloatArray
+    ki: FloatArray
+    kd: FloatArray
+    derivative_filter: FloatArray
+
+    def response(self, z: npt.NDArray[np.complex128], sample_time: float) -> npt.NDArray[np.complex128]:
+        """As `PID.frequency_response`, shape (m, n)."""
+        lag = self.derivative_filter + sample_time
+        derivative = (self.kd / lag) * ((z - 1.0) / (z - self.derivative_filter / lag))
+        return np.asarray(self.kp + self.ki * (sample_time / (z - 1.0)) + derivative)
+
+
+class _Grid:
+    """A plant's response at many frequencies."""
+
+    def __init__(self, loop: LinearLoop, frequencies: FloatArray) -> None:
+        self.z = np.exp(1j * frequencies * loop.sample_time)
+        self.plant = loop.plant_at(frequencies)
+
+
 class Robustness:
     """Largest sensitivities of a plant's loops, without and with one sample more of delay, unless that is no matter."""
 
@@ -115,10 +145,18 @@ class Robustness:
         self, plant: Any, sample_time: float, slopes: tuple[float, ...] = (1.0,), *, with_delay: bool = True
     ) -> None:
         actuator = as_actuator(plant)
-        sensor = actuator.sensor or Sensor()
-        delayed = replace(actuator, sensor=replace(sensor, delay=sensor.delay + sample_time))
         self.h, self.slopes = sample_time, slopes
-        self.loops = [LinearLoop(each, sample_time) for each in (actuator, delayed)[: 1 + with_delay]]
+        self.loops = [
+            LinearLoop(each, sample_time) for each in (actuator, later(actuator, sample_time))[: 1 + with_delay]
+        ]
+        self.grids = [_Grid(loop, loop.frequencies) for loop in self.loops]
+
+    @cached_property
+    def fine_grids(self) -> "list[_Grid]":
+        """Of frequencies so close that nothing lies between them, unless a pole of the loop is very lightly damped."""
+        highest = math.pi / self.h
+        between = np.geomspace(_SLOWEST * highest, highest, _FINE)
+        return [_Grid(loop, np.union1d(loop.frequencies, between)) for loop in self.loops]
 
     def of(self, controller: PID) -> tuple[float, float]:
         """Both, within 0.1 %; infinite if a loop is unstable."""
@@ -131,17 +169,24 @@ class Robustness:
         spare = WITH_DELAY if len(self.loops) > 1 else 1.0
         return max(0.0, min(max(first, second / spare) / bound - 1.0, _UNSTABLE))
 
-    def roughly(self, controller: PID, bound: float, margin: float) -> float:
-        """Both sensitivities on a grid of frequencies, four times as fast."""
-        worst = 0.0
-        for loop, most in zip(self.loops, (bound, WITH_DELAY * bound), strict=False):
-            response = loop.response(controller)
+    def over_bound(self, gains: Gains, bound: float, *, fine: bool = False) -> FloatArray:
+        """Largest ratio of a sensitivity on a grid of frequencies to its bound, of many controllers at once.
+
+        Whether the loops are stable is not looked at.
+        """
+        worst = np.zeros(gains.kp.size)
+        grids = self.fine_grids if fine else self.grids
+        for grid, most in zip(grids, (bound, WITH_DELAY * bound), strict=False):
+            response = grid.plant * gains.response(grid.z, self.h)
             for slope in self.slopes:
-                ratio = margin / most / float(np.abs(1.0 + slope * response).min())
-                worst = max(worst, ratio if ratio > 1.0 or loop.is_stable(controller, slope) else _UNSTABLE)
-            if worst > 1.0:
-                return worst - 1.0
-        return 0.0
+                worst = np.maximum(worst, 1.0 / (most * np.abs(1.0 + slope * response).min(axis=1)))
+        return worst
+
+    def are_stable(self, controllers: Sequence[PID]) -> npt.NDArray[np.bool_]:
+        """Whether all loops of each controller are stable."""
+        feedbacks = [controller.linear(self.h) for controller in controllers]
+        each = [loop.are_stable(feedbacks, slope) for loop in self.loops for slope in self.slopes]
+        return np.asarray(np.all(each, axis=0))
 
 
 def search(
@@ -169,15 +214,24 @@ def search(
     starts : sequence of PID
         Controllers of which the best begins the search.
     exact : bool
-        Whether the simplex goes to the bound itself, or keeps 1 % below it, which is four times as fast.
+        Whether the simplex goes to the bound itself, or keeps 1 % below it, which is faster.
     seed : int
         Of the random numbers.
     """
     tried = _Tried(task, bound, exact)
-    start = min((tried.point(pid) for pid in starts), key=tried.cost) if starts else None
+    start = tried.best([tried.point(pid) for pid in starts]) if starts else None
     if generations:
         start = differential_evolution(
-            tried.cost, BOX, maxiter=generations, popsize=population, seed=seed, tol=0.0, polish=False, x0=start
+            tried.costs,
+            BOX,
+            maxiter=generations,
+            popsize=population,
+            x0=start,
+            seed=seed,
+            tol=0.0,
+            polish=False,
+            vectorized=True,
+            updating="deferred",
         ).x
     if start is None:
         raise ValueError("a search without generations needs controllers to start from")
@@ -190,7 +244,7 @@ class _Tried:
 
     def __init__(self, task: Task, bound: float, exact: bool) -> None:
         self.task, self.bound = task, bound
-        self.resting = RestingPlant(task.plant, task.sample_time)
+        self.resting = [RestingPlant(plant, task.sample_time) for plant in (task.plant, *task.again)]
         self.robustness = Robustness(task.plant, task.sample_time, task.slopes, with_delay=task.with_delay)
         law = task.plant.hysteresis
         self.gain = task.plant.dc_gain * (1.0 if law is None else float(np.mean(task.slopes)))
@@ -221,7 +275,7 @@ class _Tried:
         """The best controller that the simplex finds from a point; it begins anew once, on a smaller scale."""
         low, high = np.array(BOX).T
         best, least = start, self.cost(start)
-        for scale in _SIMPLEXES:
+        for scale in _SIMPLEXES if polish else ():
             step = scale * (high - low) * np.where(best > 0.5 * (low + high), -1.0, 1.0)
             simplex = np.clip(best + np.vstack([np.zeros(len(BOX)), np.diag(step)]), low, high)
             options = {"maxfev": polish // 2, "xatol": 1e-5, "fatol": 1e-9, "initial_simplex": simplex}
@@ -239,18 +293,42 @@ class _Tried:
             simulations=self.simulations,
         )
 
+    def best(self, points: Sequence[FloatArray]) -> FloatArray:
+        return points[int(np.argmin(self.costs(np.stack(points, axis=1))))]
+
     def cost(self, x: FloatArray) -> float:
-        self.controllers += 1
-        controller = self.controller(x)
-        if self.is_polished and self.exact:
-            excess = self.robustness.excess(controller, self.bound)
-        else:
-            excess = self.robustness.roughly(controller, self.bound, _REFINED[self.exact])
-        if excess > 0.0:
-            return _BEYOND + min(excess, _UNSTABLE)
-        self.simulations += 1
-        signals = self.resting.attempt(controller, self.task.reference)
-        return self.task.cost(signals.y) if signals.lost < 0 else _UNSTABLE
+        return float(self.costs(x[:, np.newaxis])[0])
+
+    def costs(self, points: FloatArray) -> FloatArray:
+        """Of many points at once, shape (6, m)."""
+        self.controllers += points.shape[1]
+        size, Ti, Td, ratio = 10.0 ** points[:4, :, np.newaxis]
+        kp = size / self.gain
+        gains = Gains(kp=kp, ki=kp / Ti, kd=kp * Td, derivative_filter=ratio * Td)
+        fine = self.is_polished and self.exact
+        over = _REFINED[fine] * self.robustness.over_bound(gains, self.bound, fine=fine)
+        costs = _BEYOND + np.minimum(over - 1.0, _UNSTABLE)
+        near = np.flatnonzero(over <= 1.0).tolist()
+        pids = [self.controller(points[:, k]) for k in near]
+        costs[near] = _BEYOND + _UNSTABLE
+        stable = self.robustness.are_stable(pids) if pids else np.empty(0, dtype=bool)
+        within = [(k, pid) for k, pid, is_stable in zip(near, pids, stable, strict=True) if is_stable]
+        if fine and self.bound > _SHARP:
+            for k, pid in within:
+                costs[k] = _BEYOND + self.robustness.excess(pid, self.bound)
+            within = [(k, pid) for k, pid in within if costs[k] == _BEYOND]
+        block = max(1, _AT_ONCE // self.task.reference.size)
+        for start in range(0, len(within), block):
+            part = within[start : start + block]
+            simulated = np.mean([self.simulated(resting, [pid for _, pid in part]) for resting in self.resting], axis=0)
+            costs[[k for k, _ in part]] = simulated
+        self.simulations += len(within)
+        return costs
+
+    def simulated(self, resting: RestingPlant, pids: Sequence[PID]) -> list[float]:
+        """Costs of stable controllers behind one noise."""
+        displacements, lost = resting.attempt_each(pids, self.task.reference)
+        return [self.task.cost(y) if sample < 0 else _UNSTABLE for y, sample in zip(displacements, lost, strict=True)]
 
 
 def step_task(plant: Any, *, step: float, limits: Limits, duration: float, sample_time: float) -> Task:

@@ -4,9 +4,11 @@ Every loop and every response goes through here. A response is a loop whose cont
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
 from hysim._parallel import Progress
@@ -172,6 +174,26 @@ class Chain:
         end = ChainState(state.samples + n, voltages, law, x, np.roll(past, -n * self.substeps), remaining)
         (command, drive, y, measurement), (v, w) = samples, path
         return Signals(command, drive, v, w, y, measurement, lost), end
+
+    def run_each(
+        self, controllers: Sequence[CompiledController], state: ChainState, reference: FloatArray
+    ) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+        """Displacements of several controllers of one kind, shape (m, n), and their first samples that are not finite.
+
+        Each runs from the state `state` of the chain; the second result is -1 where all are finite.
+        """
+        n, m = reference.size, len(controllers)
+        noise = self.sensor.noise_samples(state.samples + n)[state.samples :]
+        inputs = read_only(np.stack([reference, noise]), finite=False)
+        parameters = np.stack([each.parameters for each in controllers])
+        states = np.stack([each.state for each in controllers])
+        plant = np.concatenate([state.voltages, state.x, state.past, state.readings])
+        y, lost = np.empty((m, n)), np.empty(m, dtype=np.int64)
+        kernels.close_each(
+            controllers[0].step, parameters, states, state.law.step, state.law.parameters, state.law.state,
+            self._parameters, plant, inputs, y, lost,
+        )  # fmt: skip
+        return y, lost
 
     def driven(self, u: FloatArray, state: ChainState) -> tuple[Signals, ChainState]:
         """Run the commands `u` themselves."""
