@@ -59,9 +59,9 @@ def test_the_past_is_the_one_that_predicts_better():
 
 def test_a_record_beyond_the_others_is_not_left_out():
     small, large = hs.Record(u=CYCLE, y=CYCLE), hs.Record(u=2.0 * CYCLE, y=CYCLE)
-    whole = [part.size for part in parts_of([small, large]) if part.size == CYCLE.size]
-    assert len(whole) == 1
-    assert parts_of([small, large])[0][0] == 0  # the small one
+    whole, quarters = parts_of([small, large])
+    assert [part.tolist() for part in whole] == [list(range(CYCLE.size))]  # the small one
+    assert sum(part.size for part in quarters) == 2 * CYCLE.size
 
 
 def test_a_density_that_is_linear_in_both_thresholds_is_smooth():

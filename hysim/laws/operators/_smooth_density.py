@@ -7,9 +7,10 @@ holds what these leave free. For each strength the best weights are those of
     min ||y - c - A w||^2 + strength (trace(A'A) / trace(P)) w' P w,    P = D'D + ridge
 
 Parts are left out one at a time, and the strength is that whose fits to the others predict them best: each record whose
-input the others reach, each cycle or curve of a single record, and a quarter of each record. Generalised
-cross-validation chooses too weak a strength here: what a smooth law leaves of a clean record is no noise, but follows
-the curves. One generalised eigenproblem for each part gives the weights of all strengths at once.
+input the others reach, or each cycle or curve of a single record; and a quarter of each record. The squared errors of
+the former, and those of all, are each taken over their least value, and added. Generalised cross-validation chooses too
+weak a strength here: what a smooth law leaves of a clean record is no noise, but follows the curves. One generalised
+eigenproblem for each part gives the weights of all strengths at once.
 
 What was before a record, all relays down or the record itself, is what the better of the two errors says.
 """
@@ -37,6 +38,10 @@ _COVERED = 0.02  # of its span, by which a record left out may reach beyond the 
 _MIXED = np.sqrt(2.0)  # weight of the difference across both thresholds, which is met once where it stands twice
 
 
+Parts = Sequence[npt.NDArray[np.intp]]
+"""Samples that are left out together."""
+
+
 class Chosen(NamedTuple):
     """Weights and offset; the strength, and the rms of the errors at the left-out samples."""
 
@@ -46,20 +51,20 @@ class Chosen(NamedTuple):
     left_out: float
 
 
-def chosen(
-    columns: FloatArray, y: FloatArray, parts: Sequence[npt.NDArray[np.intp]], n: int, strength: float | None = None
-) -> Chosen:
+def chosen(columns: FloatArray, y: FloatArray, parts: Sequence[Parts], n: int, strength: float | None = None) -> Chosen:
     """The fit to outputs `y` (n_samples,) of relays on `n` intervals, with the strength that the parts choose."""
     penalty, strengths = roughness(n), STRENGTHS if strength is None else np.array([strength])
-    errors = np.zeros(strengths.size)
-    for part in parts:
+    errors = np.zeros((len(parts), strengths.size))
+    for kind, part in ((kind, part) for kind, each in enumerate(parts) for part in each):
         training = np.ones(y.size, dtype=bool)
         training[part] = False
         weights, offsets = fits(columns[training], y[training], penalty, strengths)
-        errors += np.sum((y[part, np.newaxis] - columns[part] @ weights - offsets) ** 2, axis=0)
-    best = int(np.argmin(errors))
+        errors[kind] += np.sum((y[part, np.newaxis] - columns[part] @ weights - offsets) ** 2, axis=0)
+    voices = np.cumsum(errors, axis=0)  # of the first kind, and of all parts
+    least = np.maximum(voices.min(axis=1, keepdims=True), np.finfo(float).tiny)
+    best = int(np.argmin(np.sum(voices / least, axis=0)))
     weights, offsets = fits(columns, y, penalty, strengths[[best]])
-    left_out = float(np.sqrt(errors[best] / sum(part.size for part in parts)))
+    left_out = float(np.sqrt(errors[:, best].sum() / sum(part.size for each in parts for part in each)))
     return Chosen(weights[:, 0], float(offsets[0]), float(strengths[best]), left_out)
 
 
@@ -102,17 +107,19 @@ def _thinned(record: Record) -> Record:
     return Record(u=record.u[kept], y=record.y[kept])
 
 
-def parts_of(records: Sequence[Record]) -> list[npt.NDArray[np.intp]]:
-    """Samples to leave out at a time."""
+def parts_of(records: Sequence[Record]) -> list[Parts]:
+    """Samples to leave out at a time, of each kind that these records have."""
     cuts = np.cumsum([0, *(len(record) for record in records)])
     samples = np.split(np.arange(cuts[-1]), cuts[1:-1])
     quarters = [part for each in samples for part in np.array_split(each, 4)]
     if len(records) > 1:
         reached = [_covered(record.u, [*records[:k], *records[k + 1 :]]) for k, record in enumerate(records)]
-        return [part for part, within in zip(samples, reached, strict=True) if within] + quarters
-    curves = np.split(samples[0], records[0].reversals(TOLERANCE)[1::2])
-    count = min(_MOST_CURVES, len(curves))
-    return [np.concatenate(curves[k::count]) for k in range(count if count > 2 else 0)] + quarters
+        whole = [part for part, within in zip(samples, reached, strict=True) if within]
+    else:
+        curves = np.split(samples[0], records[0].reversals(TOLERANCE)[1::2])
+        count = min(_MOST_CURVES, len(curves))
+        whole = [np.concatenate(curves[k::count]) for k in range(count if count > 2 else 0)]
+    return [whole, quarters] if whole else [quarters]
 
 
 def _covered(u: FloatArray, others: Sequence[Record]) -> bool:
