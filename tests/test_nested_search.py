@@ -61,7 +61,7 @@ def test_a_larger_family_has_the_outputs_of_the_simpler_one(name):
     (
         "name",
         "of",
-    ),  # all pairs on all records take too long for every change: the experiment on nested searches has them
+    ),  # all pairs on all records take too long for every change: all on all by hand
     [(name, of) for name in ("PolynomialBoucWen", "GeneralizedBoucWen") for of in RECORDS]
     + [("ZhuWangBoucWen", "few samples"), ("BoucWenBaberNoori", "mid-cycle")],
 )
