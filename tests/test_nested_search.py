@@ -1,5 +1,7 @@
 """A larger family never fits worse than a family that it contains, and says what its stages are good for."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from hysim.models.model import every_family
 from hysim.models.search_space import Freedom
 
 FAMILIES = {name: cls for name, cls in every_family().items() if cls.__module__.startswith("hysim.")}
-PAIRS = {name: cls for name, cls in FAMILIES.items() if issubclass(cls, Law) and cls.contains is not None}
+PAIRS = {name: cls for name, cls in sorted(FAMILIES.items()) if issubclass(cls, Law) and cls.contains is not None}
 ROUNDING = 1e-6  # of the cost: a search ends where a step gains 2e-8 of it
 
 
@@ -57,19 +59,16 @@ def test_a_larger_family_has_the_outputs_of_the_simpler_one(name):
     np.testing.assert_allclose(same, law.response(u), rtol=0.0, atol=1e-11)
 
 
-@pytest.mark.parametrize(
-    (
-        "name",
-        "of",
-    ),  # all pairs on all records take too long for every change: all on all by hand
-    [(name, of) for name in ("PolynomialBoucWen", "GeneralizedBoucWen") for of in RECORDS]
-    + [("ZhuWangBoucWen", "few samples"), ("BoucWenBaberNoori", "mid-cycle")],
-)
+@pytest.mark.parametrize("of", RECORDS)
+@pytest.mark.parametrize("name", ["GeneralizedBoucWen", "PolynomialBoucWen"])
 def test_a_larger_family_never_fits_worse(name, of):
+    """Though its search has one random point beside the start that the simpler family gives."""
     *_, larger = problems(PAIRS[name](), [RECORDS[of][::2]], Freedom(), None)
+    alone = replace(larger.space, starts=larger.space.starts[:0], screened=1)
     known = optima(larger.simpler, seed=0)
     floor = (1e-9 * larger.scale) ** 2 * larger.y.size  # both fits are exact, to the rounding of the memory
-    assert optima(larger, seed=0, known=known)[0].cost <= known[0].cost * (1.0 + ROUNDING) + floor
+    best = optima(replace(larger, space=alone), seed=0, known=known)[0]
+    assert best.cost <= known[0].cost * (1.0 + ROUNDING) + floor
 
 
 def test_a_start_from_the_simpler_family_is_where_that_family_stands():
