@@ -2,7 +2,7 @@
 
 The path of the input is its turning points. It repeats itself after q of them, an even number, if
 
-1. the turning points behind are those q before, to 5 % of the span, as far as the record goes, and
+1. the turning points behind are those q before, to 5 % of the branch that leads there, as far as the record goes, and
 2. the branch after q turning points comes back to the first input.
 
 The least such q is the cycle. A record of 2.5 cycles repeats itself after 1, and one of 1.2 cycles too; where the
@@ -29,9 +29,10 @@ def repeated_cycle(u: FloatArray, tolerance: float = TOLERANCE) -> int | None:
     plateaus = turns(u, tolerance).plateaus
     levels = u[[first for first, _ in plateaus]]
     inner = levels[1:-1]
+    branches = np.abs(np.diff(levels[:-1]))
     near, rising = NEAR * span, bool(levels[1] > levels[0])
     for q in range(2, len(plateaus), 2):
-        if np.abs(inner[q:] - inner[:-q]).max(initial=0.0) > near:
+        if (np.abs(inner[q:] - inner[:-q]) > np.maximum(NEAR * branches[q:], tolerance * span)).any():
             continue
         if (sample := _return(u, plateaus[q][0], _end(plateaus, q), near=near, rising=rising)) is not None:
             return sample

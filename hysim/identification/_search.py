@@ -20,7 +20,7 @@ from hysim.models.stages import Stage
 
 N_SCREENED = 4096
 N_DESCENDING = 64
-N_DESCENDING_BESIDE = 16  # where one evaluation is dear, and the optima of a simpler family are starts
+N_DESCENDING_BESIDE = 32  # on a record that is not short, where the optima of a simpler family are starts
 N_STEPS = 40
 N_POLISHED = 8
 N_POLISHING = 200
@@ -117,7 +117,7 @@ def optima(
     share = min(1.0, _LONG / problem.y.size)
     screened = max(256, round(N_SCREENED * share)) if space.screened is None else space.screened
     n_starts = max(16, round(N_DESCENDING * share))
-    if begun.size and space.screened is not None:
+    if begun.size and space.screened is not None and problem.y.size >= _SHORT:
         n_starts = N_DESCENDING_BESIDE
     starts = _starts(problem, screened, seed, n_starts, np.concatenate([space.starts, begun]))
     if not len(starts):
@@ -144,11 +144,11 @@ def brief_cost(problem: Problem) -> float:
 def brief_optimum(problem: Problem) -> tuple[FloatArray, float]:
     """Coordinates (n_x,) at which a short search ends, and the sum of squares there; inf if every set diverges."""
     space = problem.space
-    if not space.coordinates:
-        return np.empty(0), float(problem.costs(np.empty((1, 0)))[0])
     if problem.y.size > _LONG and (short := problem.thinned(_SHORT)) is not None:
         x, cost = brief_optimum(short)
         return x, cost * problem.y.size / short.y.size
+    if not space.coordinates:
+        return np.empty(0), float(problem.costs(np.empty((1, 0)))[0])
     screened = N_BRIEF_SCREENED if space.screened is None else min(space.screened, N_BRIEF_SCREENED)
     best = _starts(problem, screened, 0, N_BRIEF_DESCENDING, space.starts, are_kept=False)
     if not len(best):
