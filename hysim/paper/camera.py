@@ -86,9 +86,14 @@ class CameraLoop:
     y: FloatArray
 
 
-def camera_loops(law: Any) -> tuple[CameraLoop, ...]:
-    """Every camera on the hysteresis of a law before (7), and on the vibration of (4); laws as `loops` takes them."""
-    return (*_Triangle(law).loops(), *_Step().loops())
+def hysteresis_cameras(law: Any) -> list[CameraLoop]:
+    """Every camera on the hysteresis of a law before (7); laws as `loops` takes them."""
+    return _Triangle(law).loops()
+
+
+def vibration_cameras() -> list[CameraLoop]:
+    """Every camera on the vibration of (4)."""
+    return _Step().loops()
 
 
 def camera_measures(loops: Sequence[CameraLoop]) -> list[dict[str, Any]]:

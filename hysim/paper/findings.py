@@ -7,7 +7,7 @@ from typing import Any
 from hysim._frozen import frozen
 from hysim._parallel import awaited, second_process
 from hysim.paper.approximations import Approximation, approximations
-from hysim.paper.camera import CameraLoop, camera_loops
+from hysim.paper.camera import CameraLoop, hysteresis_cameras, vibration_cameras
 from hysim.paper.claims import Claim, claims, evidence
 from hysim.paper.dwell import DwellWidth, dwell_widths
 from hysim.paper.equations import EQUATION_1, EQUATION_4, EQUATION_6, Characteristics, characteristics
@@ -76,20 +76,22 @@ def find(*, quick: bool = False, progress: Progress | None = None) -> Findings:
                 begun["reidentification"] = beside.submit(reidentify, fit)
             if name == "bouc-wen-asymmetric":
                 begun["loops"] = beside.submit(loops, fit.model)
+                begun["cameras"] = beside.submit(vibration_cameras)
 
         steps = _Steps(progress)
         models = study(quick=quick, progress=steps.inner, finished=begin, asymmetric=lambda _: awaited(asymmetric))
         steps.next("closed loops")
         asymmetric_model = models.fits["bouc-wen-asymmetric"].model
-        cameras = camera_loops(asymmetric_model)
+        cameras = hysteresis_cameras(asymmetric_model)
         reidentification, closed = awaited(begun["reidentification"]), awaited(begun["loops"])
+        cameras += awaited(begun["cameras"])
     steps.next("claims")
     law = models.fits["bouc-wen"].model
     return Findings(
         study=models,
         reidentification=reidentification,
         loops=closed,
-        cameras=cameras,
+        cameras=tuple(cameras),
         periods=period_curves(asymmetric_model, closed.hysteresis[0], cameras),
         dwell=dwell_widths(
             models.comparison.record.u,
