@@ -97,8 +97,8 @@ def assess_loop(
     t: npt.ArrayLike,
     reference: npt.ArrayLike,
     *,
-    period: float = math.nan,
     u0: float = 0.0,
+    period: float = math.nan,
 ) -> LoopAssessment:
     """Close a loop, and judge its stability, robustness and error.
 

@@ -120,7 +120,7 @@ class ClampStructure(Identifiable, Composable):
             points,
             bounds=bounds | {name: pair for name, pair in limits.items() if name in columns},
             state=(TURN,),
-            screened=0 if {each.name for each in box} - set(held) <= {TURN, *axes} else 256,
+            screened=64 if {each.name for each in box} - set(held) <= {TURN, *axes} else 256,
         )
         return replace(space, parameters=lambda x: self._with_derived(space.parameters(x), record))
 
