@@ -66,7 +66,7 @@ class LoopAssessment:
         )
 
     def row(self, quantum: float | None = None) -> dict[str, float | bool | None]:
-        """What stands beside a reduction in a table: numbers, None where one is infinite or unknown.
+        """The columns beside a reduction in a table: numbers, None where one is infinite or unknown.
 
         Parameters
         ----------

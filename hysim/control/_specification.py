@@ -79,7 +79,7 @@ class _PlantLoops:
         self.volts = 1.0 if plant.amplifier is None else abs(plant.amplifier.gain)
 
     def decay(self, controller: SampledController) -> float:
-        """Of the slowest oscillation of the stable loops, per sample."""
+        """Decay of the slowest oscillation of the stable loops, per sample."""
         return slowest_decay(self.loop, controller, self.slopes)
 
     def voltage_noise(self, controller: SampledController) -> float:

@@ -209,7 +209,7 @@ def _with_starts(best: _Trial, trials: Any) -> Problem:
 
 
 def _sentence(best: _Trial, others: Sequence[_Trial], records: Sequence[Record]) -> str:
-    """What was assumed, and by how much the next best other state and the next best other choice are worse."""
+    """The assumptions in words, and by how much the next best other state and the next best other choice are worse."""
     states = [each.bic for each in others if each.initial != best.initial]
     choices = [each.bic for each in others if each.initial == best.initial and each.variant.words != best.variant.words]
     words = []

@@ -342,7 +342,7 @@ def _alone(
 
 
 def _before(record: Record, kind: str | None) -> Record | None:
-    """What ran ahead of the first sample: the cycle that the record repeats, by default all of it, or no motion."""
+    """The record before the first sample: the cycle that the record repeats, by default all of it, or no motion."""
     if kind == "still":
         return replace(record[:2], u=np.repeat(record.u[:1], 2))
     return record[: repeated_cycle(record.u)] if kind == "periodic" else None

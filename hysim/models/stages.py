@@ -90,7 +90,7 @@ class Simpler(NamedTuple):
         return {**self.neutral, **{larger: parameters[name] for name, larger in self.names.items()}}
 
     def reduced(self, freedom: Freedom) -> Freedom:
-        """What the user says of the parameters that both families have."""
+        """The part of `freedom` that is about the parameters of both families."""
         return replace(
             freedom,
             fixed=self.carried(freedom.fixed),

@@ -153,7 +153,7 @@ class Robustness:
 
     @cached_property
     def fine_grids(self) -> "list[_Grid]":
-        """Of frequencies so close that nothing lies between them, unless a pole of the loop is very lightly damped."""
+        """Grids so fine that nothing lies between their frequencies, unless a pole is very lightly damped."""
         highest = math.pi / self.h
         between = np.geomspace(_SLOWEST * highest, highest, _FINE)
         return [_Grid(loop, np.union1d(loop.frequencies, between)) for loop in self.loops]
@@ -300,7 +300,7 @@ class _Tried:
         return float(self.costs(x[:, np.newaxis])[0])
 
     def costs(self, points: FloatArray) -> FloatArray:
-        """Of many points at once, shape (6, m)."""
+        """Costs of many points, shape (6, m), at once."""
         self.controllers += points.shape[1]
         size, Ti, Td, ratio = 10.0 ** points[:4, :, np.newaxis]
         kp = size / self.gain

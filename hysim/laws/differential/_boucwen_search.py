@@ -167,7 +167,7 @@ class _Chart:
 
 
 def shape_unit(A: FloatArray, n: FloatArray, span: float) -> FloatArray:
-    """What beta and gamma are measured in, |A| / Z^n."""
+    """The unit of beta and gamma, |A| / Z^n."""
     slope = _steepness(A)
     return np.asarray(slope / (slope * span) ** n)
 
@@ -223,5 +223,5 @@ def span_of(record: Record) -> float:
 
 
 def slope_of(record: Record, values: Mapping[str, float]) -> float:
-    """What A is measured in: the output's span over the gain and the input's."""
+    """The unit of A: the output's span over the gain and the input's."""
     return float(np.ptp(record.y)) / (abs(values["gain"]) or 1.0) / span_of(record) or 1.0
