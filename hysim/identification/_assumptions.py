@@ -26,6 +26,7 @@ from hysim.errors import SimulationError
 from hysim.identification._budget import Budget
 from hysim.identification._problem import Problem, problem, problems
 from hysim.identification._search import brief_optimum
+from hysim.metrics.criteria import information
 from hysim.models.protocols import Undecided, Variant
 from hysim.models.search_space import Freedom
 from hysim.records import Record
@@ -186,8 +187,7 @@ def _bic(attempt: Problem, x: FloatArray, cost: float) -> float:
         linear = attempt.completed(x[np.newaxis])[0, attempt.n_x :]
         near = _AT_BOUND * float(np.abs(linear).max(initial=0.0))
         d -= int(np.sum(np.minimum(*np.abs(linear - attempt.linear_box())) <= near))
-    variance = max(cost / n, (_ROUNDING * attempt.scale) ** 2)
-    return n * math.log(variance) + d * math.log(n)
+    return information(max(cost / n, (_ROUNDING * attempt.scale) ** 2), n, d)
 
 
 def _best(choices: Sequence[int], bic: Callable[[int], float]) -> int:

@@ -15,6 +15,7 @@ from hysim._parallel import Progress
 from hysim.identification._descent import Descent, Reached
 from hysim.identification._noise import Gaussian
 from hysim.identification._problem import Problem
+from hysim.metrics.criteria import information
 from hysim.models.search_space import SearchSpace
 from hysim.models.stages import Stage
 
@@ -67,7 +68,7 @@ def chosen(
         known = optima(problem, seed=seed, progress=progress, known=known, may_end=problem is not problems[0])
         if known:
             cost = max(known[0].cost, n_samples * (PERFECT * problem.scale) ** 2)
-            criterion = n_samples * math.log(cost / n_samples) + n_names * math.log(n_samples)
+            criterion = information(cost / n_samples, n_samples, n_names)
             best = min(best, (criterion, problem, known), key=lambda each: each[0])
     return best[1:]
 
