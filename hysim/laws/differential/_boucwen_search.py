@@ -19,7 +19,8 @@ or to zero and infinity cut the box at zero.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -48,6 +49,24 @@ _BOX = {
 }
 
 
+class Chart(Protocol):
+    """Coordinates of the parameters of a memory: their names, the values at the start, and the ways there and back."""
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates."""
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """Parameters by name, as the search begins."""
+
+    def encode(self, parameters: Mapping[str, float]) -> FloatArray:
+        """Coordinates (n_x,) of the parameters."""
+
+    def decode(self, x: FloatArray) -> dict[str, FloatArray]:
+        """Parameters (n_sets,) by name at the coordinates (n_sets, n_x)."""
+
+
 def search_space(
     defaults: Mapping[str, float],
     columns: tuple[str, ...],
@@ -74,15 +93,34 @@ def search_space(
     known = {*columns, *("A", "beta", "gamma", "n", "z0")}
     extended = not known.issuperset(defaults)  # what is admissible for such a law is not known
 
-    def encoded(parameters: Mapping[str, float]) -> FloatArray:
-        return np.asarray(np.clip(chart.encode({**chart.values, **parameters}), lower, upper))
-
     further = {name: value for name, value in held.items() if name not in (*_MEMORY, *columns)}
 
     def decoded(x: FloatArray) -> dict[str, FloatArray]:
         return {name: np.full(len(np.atleast_2d(x)), value) for name, value in further.items()} | chart.decode(x)
 
     quadrant = np.array([max(low, 0.0) if name in _PAIR else low for name, (low, _) in box.items()])
+    return replace(
+        space_of_chart(chart, (lower, upper), defaults, columns, held, bounds),
+        parameters=decoded,
+        regions={"admissible": (quadrant, upper)} if set(_PAIR) <= set(box) and not extended else {},
+        screened=screened,
+    )
+
+
+def space_of_chart(
+    chart: Chart,
+    box: tuple[FloatArray, FloatArray],
+    defaults: Mapping[str, float],
+    columns: tuple[str, ...],
+    held: Mapping[str, float],
+    bounds: Mapping[str, tuple[float, float]],
+) -> SearchSpace:
+    """The search in the coordinates of a chart, between both sides of its `box`, from the chart's own values."""
+    lower, upper = box
+
+    def encoded(parameters: Mapping[str, float]) -> FloatArray:
+        return np.asarray(np.clip(chart.encode({**chart.values, **parameters}), lower, upper))
+
     return SearchSpace(
         coordinates=chart.coordinates,
         lower=lower,
@@ -92,12 +130,10 @@ def search_space(
         columns=columns,
         linear=tuple(name for name in columns if name not in held),
         held=held,
-        parameters=decoded,
+        parameters=chart.decode,
         redundant=REDUNDANT,
-        regions={"admissible": (quadrant, upper)} if set(_PAIR) <= set(box) and not extended else {},
         bounds={name: pair for name, pair in bounds.items() if name in columns},
         state=("z0",),
-        screened=screened,
         encoded=encoded,
     )
 

@@ -18,7 +18,7 @@ A parameter that the user bounds is its own coordinate, between these bounds.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -99,24 +99,9 @@ def search_space(
         pair if name in limits else _DRAWN.get(name, pair) for name, pair in zip(chart.coordinates, box, strict=True)
     ]
 
-    def encoded(parameters: Mapping[str, float]) -> FloatArray:
-        return np.asarray(np.clip(chart.encode({**chart.values, **parameters}), lower, upper))
-
-    return SearchSpace(
-        coordinates=chart.coordinates,
-        lower=lower,
-        upper=upper,
-        starts=encoded({})[np.newaxis],
-        names=tuple(name for name in defaults if name not in held),
-        columns=columns,
-        linear=tuple(name for name in columns if name not in held),
-        held=held,
-        parameters=chart.decode,
-        redundant=plain.REDUNDANT,
-        bounds={name: pair for name, pair in bounds.items() if name in columns},
-        state=("z0",),
-        drawn=tuple(np.array([pair[side] for pair in drawn]) for side in (0, 1)),  # type: ignore[arg-type]
-        encoded=encoded,
+    return replace(
+        plain.space_of_chart(chart, (lower, upper), defaults, columns, held, bounds),
+        drawn=(np.array([low for low, _ in drawn]), np.array([high for _, high in drawn])),
     )
 
 
