@@ -347,6 +347,28 @@ def nested_table1(result: Result) -> list[str]:
     ]
 
 
+def simulated_twins(result: Result) -> list[str]:
+    """Default calls of `identify` against the truth and SciPy."""
+    devices = result["devices"]
+    missed = {name: each for name, each in devices.items() if each["reached_percent"] < 100.0}
+    slowest = max(devices, key=lambda name: devices[name]["worst_seconds"])
+    sentences = [
+        f"On {count(result['cases'])} records of {len(devices)} kinds of device the default call of `identify` reaches "
+        f"the best sum of squares known to 1 % in {percent(result['reached_percent'])} of cases; "
+        "`scipy.optimize.least_squares` from up to 20 random starts, in ten times the time and on the same compiled "
+        f"laws, beats it by more in {percent(result['beaten_by_scipy_percent'])}.",
+        f"It takes {result['median_seconds']:.2f} s in the median and {result['worst_seconds']:.0f} s at worst "
+        f"({slowest}).",
+    ]
+    if missed:
+        named = [f"{name} ({percent(each['reached_percent'], 0)} reached)" for name, each in missed.items()]
+        sentences.append(
+            f"Missed: {listed(named)}; at worst the sum of squares is {number(result['worst_over_best_known'])} times "
+            "the best known. A stack of plays has a memory before its record that no default assumption describes."
+        )
+    return sentences
+
+
 # Discovery -----------------------------------------------------------------------------------------------------------
 
 
@@ -837,6 +859,7 @@ GROUPS: dict[str, tuple[Finding, ...]] = {
         recovery,
         all_families,
         nested_table1,
+        simulated_twins,
     ),
     "Discovery": (sindy_recovery, sindy_table1, sindy_benchmark, sindy_lag_trap, adversarial_records),
     "Control": (

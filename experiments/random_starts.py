@@ -1,0 +1,106 @@
+"""`scipy.optimize.least_squares` from random starts on a law of hysim: the peer that default calls are held against.
+
+The law that it calls is hysim's own, compiled and exact, and the record is scaled for it, the input to a largest value
+of 1. What it does not know is where to begin: its starts are drawn in a box, positive parameters by their logarithm.
+"""
+
+import contextlib
+import time
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import least_squares
+
+import hysim as hs
+
+N_STARTS = 20
+PATIENCE = 10.0  # times as long as the default call
+REACHED = 1.01  # ratio of sums of squares
+
+FloatArray = npt.NDArray[np.float64]
+Box = dict[str, tuple[float, float]]
+"""Name to (lowest, highest) of a start; by the logarithm where the lowest is positive."""
+
+OFFSET: Box = {"offset": (-3.0, 3.0)}
+OUTPUT: Box = {"gain": (-5.0, 5.0), "z0": (-1.0, 1.0)} | OFFSET
+MEMORY: Box = {"beta": (0.02, 50.0), "gamma": (-20.0, 20.0), "n": (0.5, 5.0)}
+COLEMAN_HODGDON: Box = {"alpha": (0.05, 100.0), "c": (-5.0, 5.0), "B": (-5.0, 5.0), "z0": (-2.0, 2.0)} | OFFSET
+DAHL: Box = {"stiffness": (0.1, 1000.0), "coulomb": (0.01, 10.0), "z0": (-2.0, 2.0)} | OFFSET
+
+
+def coefficients(n: int) -> Box:
+    """Box of the polynomial in the input."""
+    return {f"input_coefficients[{k}]": (-5.0, 5.0) for k in range(n)}
+
+
+def reaches(fit: hs.Identification, cost: float, least: float, n_parameters: int) -> bool:
+    """Whether a default call's sum of squares is as good as another's with `n_parameters`: to 1 %, or by the BIC.
+
+    A default call may leave out a parameter that the record does not show.
+    """
+    samples, saved = fit.residual.size, max(0, n_parameters - fit.n_parameters)
+    return bool(cost <= REACHED * least or samples * np.log(cost / least) <= saved * np.log(samples))
+
+
+class Descents(NamedTuple):
+    """The least sum of squares of several descents, how many there were, and their seconds."""
+
+    cost: float
+    n: int
+    seconds: float
+
+
+class Peer(NamedTuple):
+    """A law that is fitted to a scaled record; `names` without a box stay as they are in `law`."""
+
+    law: Any
+    box: Box
+    u: FloatArray
+    y: FloatArray
+
+    @property
+    def ends(self) -> FloatArray:
+        """Both ends of the box, shape (2, n_names), by the logarithm where the lower is positive."""
+        return np.array([np.log(pair) if pair[0] > 0.0 else pair for pair in self.box.values()]).T
+
+    @property
+    def logs(self) -> npt.NDArray[np.bool_]:
+        """Whether each parameter is searched by its logarithm, shape (n_names,)."""
+        return np.array([pair[0] > 0.0 for pair in self.box.values()])
+
+    def from_law(self) -> float:
+        """Sum of squares at the end of a descent from the law's own parameters."""
+        own = np.array([self.law.scalars[name] for name in self.box])
+        return self.descend(np.where(self.logs, np.log(np.where(self.logs, own, 1.0)), own))
+
+    def from_random_starts(self, rng: np.random.Generator, seconds: float) -> Descents:
+        """The best of `N_STARTS` descents, or of as many as `seconds` are enough for; the last one may be cut off."""
+        begin, best, n = time.perf_counter(), np.inf, 0
+        while n < N_STARTS and time.perf_counter() - begin < seconds:
+            best = min(best, self.descend(rng.uniform(*self.ends), until=begin + seconds))
+            n += 1
+        return Descents(best, n, time.perf_counter() - begin)
+
+    def descend(self, x: FloatArray, until: float = np.inf) -> float:
+        """Least sum of squares of all that a descent tried, to its end or until the time is over."""
+        lower, upper = self.ends
+        best, known = np.inf, self.law.scalars
+
+        def residual(x: FloatArray) -> FloatArray:
+            nonlocal best
+            if time.perf_counter() > until:
+                raise TimeoutError
+            values = np.where(self.logs, np.exp(np.where(self.logs, x, 0.0)), x)
+            try:
+                law = self.law.assemble({**known, **dict(zip(self.box, values.tolist(), strict=True))})
+                difference = law.response(self.u) - self.y
+            except (hs.SimulationError, ValueError):
+                return np.full(self.y.size, 1e3)
+            best = min(best, float(np.sum(difference**2)))
+            return np.asarray(difference)
+
+        wide = np.maximum(upper - lower, 1e-9)
+        with contextlib.suppress(TimeoutError):
+            least_squares(residual, x, bounds=(np.minimum(lower, x - wide), np.maximum(upper, x + wide)), x_scale="jac")
+        return best
