@@ -11,7 +11,7 @@ from hysim.paper.camera import CameraLoop, hysteresis_cameras, vibration_cameras
 from hysim.paper.claims import Claim, claims, evidence
 from hysim.paper.dwell import DwellWidth, dwell_widths
 from hysim.paper.equations import EQUATION_1, EQUATION_4, EQUATION_6, Characteristics, characteristics
-from hysim.paper.loops import DYNAMICS_7, Loops, control_measures, loops
+from hysim.paper.loops import DYNAMICS_7, Loops, control_measures, loops, on_equations
 from hysim.paper.periods import PeriodCurve, period_curves
 from hysim.paper.reidentification import Reidentification, reidentify
 from hysim.paper.state_space import EQUATIONS_7_8, EQUATIONS_13_14
@@ -69,29 +69,29 @@ def find(*, quick: bool = False, progress: Progress | None = None) -> Findings:
     """
     with second_process() as beside:
         asymmetric = beside.submit(asymmetric_law, quick)
-        begun: dict[str, Future[Any]] = {}
+        equations = beside.submit(on_equations)
+        vibration = beside.submit(vibration_cameras)
+        begun: dict[str, Future[Reidentification]] = {}
 
         def begin(name: str, fit: Any) -> None:
             if name == "tf-identified":
-                begun["reidentification"] = beside.submit(reidentify, fit)
-            if name == "bouc-wen-asymmetric":
-                begun["loops"] = beside.submit(loops, fit.model)
-                begun["cameras"] = beside.submit(vibration_cameras)
+                begun[name] = beside.submit(reidentify, fit)
 
         steps = _Steps(progress)
         models = study(quick=quick, progress=steps.inner, finished=begin, asymmetric=lambda _: awaited(asymmetric))
         steps.next("closed loops")
         asymmetric_model = models.fits["bouc-wen-asymmetric"].model
-        cameras = hysteresis_cameras(asymmetric_model)
-        reidentification, closed = awaited(begun["reidentification"]), awaited(begun["loops"])
-        cameras += awaited(begun["cameras"])
+        on_hysteresis = hysteresis_cameras(asymmetric_model)
+        closed = loops(asymmetric_model, lambda: awaited(equations))
+        cameras = (*on_hysteresis, *awaited(vibration))
+        reidentification = awaited(begun["tf-identified"])
     steps.next("claims")
     law = models.fits["bouc-wen"].model
     return Findings(
         study=models,
         reidentification=reidentification,
         loops=closed,
-        cameras=tuple(cameras),
+        cameras=cameras,
         periods=period_curves(asymmetric_model, closed.hysteresis[0], cameras),
         dwell=dwell_widths(
             models.comparison.record.u,

@@ -10,9 +10,9 @@ middle, 34 V, of Table 2's 18 and 50 V.
 The paper prints no gains: they come from `hysim.paper.search`, one search for each plant and each pair of limits.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -98,21 +98,37 @@ class Loops:
     law_width: float
 
 
-def loops(law: Any) -> Loops:
+class OnEquations(NamedTuple):
+    """The loops around the printed equations, in the order of `Loops`."""
+
+    hysteresis: tuple[HysteresisCase, ...]
+    steps: tuple[StepCase, ...]
+    squares: tuple[SquareCase, ...]
+
+
+def on_equations() -> OnEquations:
+    """Search the controllers of (1), (4) and (6), and close their loops."""
+    steps, squares = zip(*(_vibration(name, plant) for name, plant in _VIBRATING.items()), strict=True)
+    return OnEquations(_on_equation_1(), (*sum(steps, ()), _step_on_equation_1()), sum(squares, ()))
+
+
+def loops(law: Any, equations: Callable[[], OnEquations] = on_equations) -> Loops:
     """Search the controllers, and close every loop.
 
     Parameters
     ----------
     law : law
         The hysteresis, from voltage [V] to displacement [um], bounded over repeated cycles.
+    equations : callable
+        Gives the loops around the equations, perhaps from where they have been computed meanwhile.
     """
-    hysteresis = (*_on_the_law(law), *_on_equation_1())
-    steps, squares = zip(*(_vibration(name, plant) for name, plant in _VIBRATING.items()), strict=True)
+    on_law = _on_the_law(law)
+    others = equations()
     return Loops(
-        hysteresis=hysteresis,
-        steps=(*sum(steps, ()), _step_on_equation_1()),
-        squares=sum(squares, ()),
-        law_width=_width_of_law(law, hysteresis[0].assessment),
+        hysteresis=(*on_law, *others.hysteresis),
+        steps=others.steps,
+        squares=others.squares,
+        law_width=_width_of_law(law, on_law[0].assessment),
     )
 
 
@@ -156,19 +172,19 @@ def tracking_rms(assessment: StepAssessment) -> float:
 _VIBRATING: Mapping[str, TransferFunction] = {"eq4": EQUATION_4, "eq6": EQUATION_6}
 
 
-def _on_the_law(law: Any) -> list[HysteresisCase]:
+def _on_the_law(law: Any) -> tuple[HysteresisCase, ...]:
     """Within the supply only: beyond the measured voltages a polynomial law means nothing."""
     plant = law_plant(law)
     task = triangle_task(plant, low=0.1, high=HIGH, period=PERIOD, limits=SUPPLY, sample_time=SAMPLE_TIME, cycles=2)
     found = search(task)
-    return [_triangle("bouc-wen+eq7", plant, found, low, SUPPLY) for low in (0.1, 0.0)]
+    return tuple(_triangle("bouc-wen+eq7", plant, found, low, SUPPLY) for low in (0.1, 0.0))
 
 
-def _on_equation_1() -> list[HysteresisCase]:
+def _on_equation_1() -> tuple[HysteresisCase, ...]:
     plant = Actuator(vibration=EQUATION_1)
     task = triangle_task(plant, low=0.0, high=HIGH, period=PERIOD, limits=SUPPLY, sample_time=SAMPLE_TIME, cycles=3)
     found = _longer_search(task, seed=3, generations=60)
-    return [_triangle("eq1", plant, found, 0.0, limits) for limits in (SUPPLY, None)]
+    return tuple(_triangle("eq1", plant, found, 0.0, limits) for limits in (SUPPLY, None))
 
 
 def _longer_search(task: Task, seed: int, generations: int = 40) -> Found:
