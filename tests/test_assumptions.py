@@ -176,3 +176,27 @@ def test_weights_of_one_sign_stay_where_they_are_the_truth():
 def test_a_family_that_contains_another_never_fits_worse(family, record):
     wide, narrow = (error(family.structure(one_signed=sign), record, initial="rest") for sign in (False, True))
     assert wide <= narrow * (1.0 + 1e-6)
+
+
+@pytest.mark.parametrize("u0", [0.0, 0.4])
+def test_a_sum_leaves_to_the_record_what_its_plays_leave(u0):
+    u = np.append(u0, np.tile(hs.signals.triangle(-1.0, 1.0, cycles=1, samples_per_cycle=80)[1:], 2))
+    law = hs.PrandtlIshlinskii(thresholds=(0.0, 0.2, 0.5), weights=(1.0, 0.7, -0.4), z0=(u0, u0, u0))
+    record = hs.Record(u=u, y=law.response(u) + 0.3 * u)
+    plays = hs.PrandtlIshlinskii.structure(thresholds=law.thresholds)
+    found = hs.identify(hs.Sum.structure(plays, hs.Line), record)
+    assert found.fit_percent > 99.999
+    assert "weights of both signs" in found.message
+    assert ("stood still" in found.message) == (u0 != 0.0)
+
+
+def test_a_cascade_leaves_to_the_record_what_its_carrier_leaves():
+    t = np.linspace(0.0, 1.0, 400)
+    u = np.cos(2.0 * np.pi * 4.0 * t) * np.linspace(1.0, 0.6, t.size)
+    law = hs.PrandtlIshlinskii(thresholds=(0.0, 0.2, 0.5), weights=(1.0, 0.7, -0.4), z0=(0.0, 0.0, 0.0))
+    plant = hs.TransferFunction(num=(400.0,), den=(1.0, 28.0, 400.0))
+    record = hs.Record(u=u, y=(law >> plant).response(u, t[1]), t=t)
+    plays = hs.PrandtlIshlinskii.structure(thresholds=law.thresholds)
+    found = hs.identify(hs.Cascade.structure(plays, hs.TransferFunction.structure(poles=2, zeros=0)), record)
+    assert found.fit_percent > 99.99
+    assert "prandtl_ishlinskii with weights of both signs" in found.message

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from hysim._frozen import FloatArray, checked
-from hysim.models._joint_space import declared, together
+from hysim.models._joint_space import combined_variants, common_states, declared, together
 from hysim.models._parts import labels, own, response_of
 from hysim.models._sum_search import assembled, started, time_of
 from hysim.models.composable import Composable, composed
@@ -24,6 +24,7 @@ from hysim.models.protocols import (
     LinearStage,
     LinearStructure,
     UnitGainStructure,
+    Variant,
     needs_time,
 )
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
@@ -97,6 +98,26 @@ class CascadeStructure(Identifiable, Composable):
         if needs_time(law):
             return ()
         return tuple(f"{labels(self.stages)[self.carrier]}: {note}" for note in carrier.notes(record, law))
+
+    def assumed_states(self, record: Record) -> tuple[str, ...]:
+        """The states that the stages from the carrier on leave to the record; a cascade has no cycle ahead of it."""
+        seen = self._record_at(labels(self.stages)[self.carrier], record)
+        return tuple(state for state in common_states(self._with_state, seen) if state != "periodic")
+
+    def variants(self) -> tuple[Variant, ...]:
+        """The choices of the carrier."""
+        return combined_variants(dict([next(iter(self._with_state.items()))]), self._with)
+
+    def _with(self, others: Mapping[str, Any]) -> "CascadeStructure":
+        """The same with other stages by their labels."""
+        stages = zip(labels(self.stages), self.stages, strict=True)
+        return replace(self, stages=tuple(others.get(label, stage) for label, stage in stages))
+
+    @property
+    def _with_state(self) -> dict[str, Any]:
+        """The stages whose state can be free, by their labels: the carrier, and the structures behind it."""
+        stages = list(zip(labels(self.stages), self.stages, strict=True))[self.carrier :]
+        return {label: stage for label, stage in stages if isinstance(stage, Identifiable)}
 
     @property
     def _by_label(self) -> dict[str, Any]:

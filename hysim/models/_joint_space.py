@@ -1,4 +1,4 @@
-"""The search spaces of several parts as one.
+"""The search spaces of several parts as one, and what the parts leave to the record.
 
 The names of a part begin with its label, as in ``"bouc_wen.beta"``. Coordinates stand one behind the other; the
 starts of the whole are the combinations of those of the parts. Columns of different parts that are the same whatever
@@ -15,7 +15,9 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.models._parts import own
+from hysim.models.protocols import Undecided, Variant
 from hysim.models.search_space import Freedom, SearchSpace
+from hysim.records import Record
 
 _SAME = 1e-12  # rounding of a column
 _MOST_STARTS = 16
@@ -141,3 +143,33 @@ def _starts(spaces: Sequence[SearchSpace]) -> FloatArray:
     choices = [space.starts if len(space.starts) else 0.5 * (space.lower + space.upper)[np.newaxis] for space in spaces]
     ranked = sorted(product(*(range(len(rows)) for rows in choices)), key=sum)[:_MOST_STARTS]
     return np.array([np.concatenate([rows[k] for rows, k in zip(choices, places, strict=True)]) for places in ranked])
+
+
+def common_states(parts: Mapping[str, Any], record: Record) -> tuple[str, ...]:
+    """Values of `initial` that every part with a state leaves to the record, in the order of the first part.
+
+    None if a part with a state leaves nothing open: it would be asked for a state that is not its default.
+    """
+    offered = [
+        part.assumed_states(record) if isinstance(part, Undecided) else ()
+        for part in parts.values()
+        if part.search_space(record).state
+    ]
+    return tuple(state for state in offered[0] if all(state in each for each in offered)) if offered else ()
+
+
+def combined_variants(parts: Mapping[str, Any], assembled: Callable[[Mapping[str, Any]], Any]) -> tuple[Variant, ...]:
+    """Every combination of the parts' variants; `assembled` gives the whole with other parts by their labels."""
+    choices = {
+        label: found for label, part in parts.items() if isinstance(part, Undecided) and (found := part.variants())
+    }
+    if not choices:
+        return ()
+    return tuple(
+        Variant(
+            assembled({label: each.family for label, each in zip(choices, chosen, strict=True)}),
+            " and ".join(f"{label} with {each.words}" for label, each in zip(choices, chosen, strict=True)),
+            all(each.offered for each in chosen),
+        )
+        for chosen in product(*choices.values())
+    )

@@ -4,15 +4,16 @@ What is linear in a part is linear in the sum. A part that cannot be identified 
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from hysim._frozen import FloatArray, checked, items
-from hysim.models._joint_space import declared, together, without_repetition
+from hysim.models._joint_space import combined_variants, common_states, declared, together, without_repetition
 from hysim.models._parts import checked_tuple, labels, own, response_of
 from hysim.models.composable import Composable, composed
-from hysim.models.protocols import Identifiable, Responding, needs_time
+from hysim.models.protocols import Identifiable, Responding, Variant, needs_time
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
@@ -77,8 +78,9 @@ class SumStructure(Identifiable, Composable):
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
         """The parameters with the parts' states in the steady cycle of which `record` is one period or more."""
         states: dict[str, Any] = {}
+        moving = record if np.ptp(record.u) else replace(record, u=record.u + np.arange(len(record)))
         for label, part in self._identified.items():
-            if part.search_space(record).state:
+            if part.search_space(moving).state:  # which does not depend on how the input moves, but needs it to
                 try:
                     found = part.steady(own(parameters, label), record)
                 except ValueError as error:
@@ -98,6 +100,19 @@ class SumStructure(Identifiable, Composable):
             if isinstance(part, Identifiable) and not needs_time(found)
             for note in part.notes(record, found)
         )
+
+    def assumed_states(self, record: Record) -> tuple[str, ...]:
+        """The states that all parts with a memory leave to the record."""
+        return common_states(self._identified, record)
+
+    def variants(self) -> tuple[Variant, ...]:
+        """The choices of the parts, in every combination."""
+        return combined_variants(self._identified, self._with)
+
+    def _with(self, others: Mapping[str, Any]) -> "SumStructure":
+        """The same with other parts by their labels."""
+        parts = zip(labels(self.parts), self.parts, strict=True)
+        return replace(self, parts=tuple(others.get(label, part) for label, part in parts))
 
     @property
     def _identified(self) -> dict[str, Identifiable]:
