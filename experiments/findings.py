@@ -719,9 +719,11 @@ def preisach(result: Result) -> list[str]:
     return [
         f"On a random input that it has not seen, a law from {few['curves']} to {many['curves']} reversal curves "
         f"with {100 * result['noise']:g} % of noise is {number(few['read_error_percent'], 2)} to "
-        f"{number(many['read_error_percent'], 2)} % wrong where the table is read from them, and "
-        f"{number(few['fitted_error_percent'], 2)} to {number(many['fitted_error_percent'], 2)} % where it is fitted.",
-        "The truth is a bank of relays with a smooth density: a case that suits both.",
+        f"{number(many['read_error_percent'], 2)} % wrong where the table is read from them, "
+        f"{number(few['fitted_error_percent'], 2)} to {number(many['fitted_error_percent'], 2)} % where it is fitted, "
+        f"and {number(few['smooth_error_percent'], 2)} to {number(many['smooth_error_percent'], 2)} % where its "
+        "density is smooth.",
+        "The truth is a bank of relays with a smooth density: a case that suits all three.",
     ]
 
 

@@ -381,6 +381,11 @@ def test_slopes_lie_between_their_bounds(law, u):
             ValueError,
             "from 1 must end at the lowest input 0, it ends at 0.5",
         ),
+        (
+            lambda: hs.Preisach.from_reversal_curves(hs.Record(u=[0, 1, 0], y=np.zeros(3)), levels=(0.5, 1.0)),
+            ValueError,
+            r"levels must begin at the lowest input 0 or below, got \[0.5\]",
+        ),
     ],
 )
 def test_wrong_arguments_are_named(call, error, message):
@@ -408,9 +413,37 @@ def test_reversal_curves_tell_the_whole_law(law, u, samples):
     k = hs.signals.reversal_curves(0.0, levels.size - 1.0, curves=levels.size - 1, samples_per_step=samples)
     curves = np.interp(k, np.arange(levels.size), levels)
     start = dataclasses.replace(law, z0=())
-    found = hs.Preisach.from_reversal_curves(hs.Record(u=curves, y=start.response(curves)))
-    assert found.weights == pytest.approx(law.weights, abs=ROUNDING)
-    assert found.response(u) == pytest.approx(start.response(u), abs=ROUNDING)
+    record = hs.Record(u=curves, y=start.response(curves))
+    known = hs.Preisach.from_reversal_curves(record, levels=levels)
+    assert known.weights == pytest.approx(law.weights, abs=ROUNDING)
+    for found in (known, hs.Preisach.from_reversal_curves(record)):
+        assert found.response(u) == pytest.approx(start.response(u), abs=ROUNDING)
+
+
+@pytest.mark.parametrize("sign", [0.0, 1.0])
+@pytest.mark.parametrize("seed", range(3))
+def test_reversal_curves_without_a_common_grid_tell_a_smooth_law(sign, seed):
+    """Turning points and samples at random; between curves E is off by the second order of their distance."""
+
+    def density(a, b):  # of one sign, and of both, whose output rises and falls on the way up
+        return (1.0 - sign + sign * (a + b)) * np.exp(-4.0 * ((a + b) / 2.0) ** 2 - 6.0 * ((a - b) / 2.0 - 0.4) ** 2)
+
+    rng = np.random.default_rng(seed)
+    truth = hs.Preisach.from_density(np.linspace(-1.0, 1.0, 81), density)
+    ways = [np.array([-1.0])]
+    for turn in [*np.sort(rng.uniform(-0.9, 0.95, 7)), 1.0]:
+        n = int(rng.integers(20, 60))
+        ways += [np.linspace(-1.0, turn, n)[1:], np.linspace(turn, -1.0, n + 7)[1:]]
+    u = np.concatenate(ways)
+    y = truth.response(u)
+    found = hs.Preisach.from_reversal_curves(hs.Record(u=u, y=y))
+    assert np.std(found.response(u) - y) < 1e-3 * np.ptp(y)  # on four to six intervals between turning points 2e-2
+    walk = np.append(-1.0, rng.uniform(-1.0, 1.0, 200))
+    wanted = truth.response(walk)
+    assert np.std(found.response(walk) - wanted) < 2e-2 * np.ptp(wanted)
+    turns = np.unique(u[hs.Record(u=u, y=y).reversals(0.01)])
+    coarse = hs.Preisach.from_reversal_curves(hs.Record(u=u, y=y), levels=turns)
+    assert np.std(found.response(walk) - wanted) < 0.5 * np.std(coarse.response(walk) - wanted)
 
 
 def test_coarse_reversal_curves_predict_a_random_input_of_a_smooth_law():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hysim as hs
-from hysim.laws.operators._smooth_density import parts_of, roughness
+from hysim.laws.operators._smooth_density import linear_between, parts_of, roughness
 
 CYCLE = np.sin(np.linspace(0.0, 2.0 * np.pi, 120, endpoint=False))
 LEVELS = np.linspace(-1.3, 1.3, 41)
@@ -72,6 +72,28 @@ def test_a_density_that_is_linear_in_both_thresholds_is_smooth():
     assert linear @ roughness(7) @ linear == pytest.approx(ridge, rel=1e-9)
     bent = np.where(rows == columns, 0.0, (rows - columns) ** 2.0)
     assert bent @ roughness(7) @ bent > 10.0
+
+
+def test_coarse_cells_hold_a_density_that_is_linear_in_both_thresholds():
+    """Its weights off the diagonal are those of the density itself, on any number of finer intervals."""
+    coarse, fine = (
+        np.array(hs.Preisach.from_density(np.linspace(-1.0, 1.0, n + 1), lambda a, b: 3.0 + a - 2.0 * b).weights)
+        for n in (5, 12)
+    )
+    off = np.not_equal(*np.tril_indices(12))
+    table = linear_between(5, 12)
+    assert (table @ coarse)[off] == pytest.approx(fine[off], rel=1e-12)
+    along = np.equal(*np.tril_indices(5)).astype(float)
+    assert (table @ along)[~off] == pytest.approx(np.full(12, 5.0 / 12.0), rel=1e-12)  # an even slope stays even
+
+
+def test_a_clean_record_is_not_made_too_smooth():
+    """Without a record the gap is twice as wide as between two: errors added up as they are choose 5e-3 here."""
+    law = hs.Preisach.from_density(
+        np.linspace(-1.3, 1.3, 81), lambda a, b: np.exp(-((((a - b) / 2.0 - 0.3) / 0.1) ** 2) - (a + b) ** 2 / 2.0)
+    )
+    found = hs.Preisach.smoothed([steady(law, amplitude) for amplitude in (0.4, 0.6, 0.9, 1.2)])
+    assert relative_error(found, steady(law, 0.75)) < 4e-3
 
 
 @pytest.mark.parametrize(

@@ -89,8 +89,9 @@ def forc(
     """Draw the density of relays over their thresholds: the diagram of first-order reversal curves.
 
     The density is the weight of the relays in a cell over its area; from reversal curves, half the mixed second
-    difference of the output, as `hysim.Preisach.from_reversal_curves` computes it, without smoothing. Grey is zero,
-    lighter is more, darker is less. The cells along the diagonal, of relays that switch up and down at one input, are
+    difference of the output, as `hysim.Preisach.from_reversal_curves` computes it on the turning points, without
+    smoothing; a picture finer than the curves is that of ``hysim.Preisach.smoothed(record)``. Grey is zero, lighter is
+    more, darker is less. The cells along the diagonal, of relays that switch up and down at one input, are
     triangles.
 
     `source` is a Preisach, a PreisachRelays, or a Record of curves such as `hysim.signals.reversal_curves`, whose
@@ -113,7 +114,9 @@ def forc(
     if coordinates not in _COORDINATES:
         raise ValueError(f'coordinates must be "thresholds" or "centre", got {coordinates!r}')
     if isinstance(source, Record):
-        law: PreisachRelays | Preisach = Preisach.from_reversal_curves(source, tolerance=tolerance)
+        turning_points = [branch.u[0] for branch in source.branches(tolerance) if branch.u[-1] < branch.u[0]]
+        levels = np.unique([source.u.min(), *turning_points])
+        law: PreisachRelays | Preisach = Preisach.from_reversal_curves(source, levels=levels, tolerance=tolerance)
         labels = source.units if units is None else units
     else:
         law, labels = source, units or {}

@@ -1,18 +1,24 @@
 """A smooth density of relays from records, as smooth as predicts best what was left out.
 
-With the output A w + c of weights w and offset c, smoothness is a small sum of squares of second differences of
-neighbouring weights, along each threshold and across both; the weights of the diagonal have their own along it. A ridge
-holds what these leave free. For each strength the best weights are those of
+The density is linear between the centres of coarse cells, and the law's weights w = B c are its integrals over the
+finer pairs of intervals between the levels: a law as coarse as the cells would be wrong between its levels by as much
+as the density is bent. With the output A w + d of weights w and offset d, smoothness is a small sum of squares of
+second differences of neighbouring cells, along each threshold and across both; the weights of the diagonal have their
+own along it. A ridge holds what these leave free. For each strength the best cells are those of
 
-    min ||y - c - A w||^2 + strength (trace(A'A) / trace(P)) w' P w,    P = D'D + ridge
+    min ||y - d - A B c||^2 + strength (trace(B'A'A B) / trace(P)) c' P c,    P = D'D + ridge
 
-Parts are left out one at a time, and the strength is that whose fits to the others predict them best: each record whose
-input the others reach, or each cycle or curve of a single record; and a quarter of each record. The squared errors of
-the former, and those of all, are each taken over their least value, and added. Generalised cross-validation chooses too
-weak a strength here: what a smooth law leaves of a clean record is no noise, but follows the curves. One generalised
-eigenproblem for each part gives the weights of all strengths at once.
+Parts are left out one at a time and predicted by fits to the others: each record whose input the others reach, or each
+cycle or curve of a single record; and a quarter of each record. The rms error of each part is taken over its least for
+any strength, so that a part that no strength predicts well has no more say than another; the strength is that of the
+least sum of the means over both kinds. Whole records alone choose too strong a smoothness, since without a record the
+gap is twice as wide as between records; quarters alone, and generalised cross-validation, choose too weak a one, since
+what a smooth law leaves of a clean record is no noise, but follows the curves. One generalised eigenproblem for each
+part gives the cells of all strengths at once.
 
-What was before a record, all relays down or the record itself, is what the better of the two errors says.
+The state before a record, all relays down or what the record itself leaves, is the one of the lower left-out error.
+
+Source: P. H. C. Eilers, B. D. Marx, Statist. Sci. 11 (1996), for differences as a penalty on many coefficients.
 """
 
 from collections.abc import Sequence
@@ -23,17 +29,16 @@ import numpy.typing as npt
 
 from hysim._cycles import TOLERANCE
 from hysim._frozen import FloatArray
-from hysim.laws.operators._clamp_search import TURN
-from hysim.laws.operators._preisach_search import PreisachStructure
-from hysim.models.search_space import Parameters
 from hysim.records import Record
 
 STRENGTHS = np.logspace(-10.0, 4.0, 43)
 _RIDGE = 1e-3  # of the squares of second differences
 _MOST_CURVES = 8
-_MOST_INTERVALS = 32
+_MOST_INTERVALS = 64
+_MOST_CELLS = 24  # along a threshold; of 16, 24 and 32 those with the best predictions for their time
 _MOST_SAMPLES, _TURN = 2000, 0.01  # of a record, beside reversals by more than this part of the span
 _LEAST = 1e-14  # strength, below which rounding decides what the record does not determine
+_EXACT = 1e-6  # of the outputs' standard deviation: smaller errors are all equally good
 _COVERED = 0.02  # of its span, by which a record left out may reach beyond the others
 _MIXED = np.sqrt(2.0)  # weight of the difference across both thresholds, which is met once where it stands twice
 
@@ -43,7 +48,7 @@ Parts = Sequence[npt.NDArray[np.intp]]
 
 
 class Chosen(NamedTuple):
-    """Weights and offset; the strength, and the rms of the errors at the left-out samples."""
+    """Coefficients of the columns and offset; the strength, and the rms of the errors at the left-out samples."""
 
     weights: FloatArray
     offset: float
@@ -51,54 +56,65 @@ class Chosen(NamedTuple):
     left_out: float
 
 
-def chosen(columns: FloatArray, y: FloatArray, parts: Sequence[Parts], n: int, strength: float | None = None) -> Chosen:
-    """The fit to outputs `y` (n_samples,) of relays on `n` intervals, with the strength that the parts choose."""
-    penalty, strengths = roughness(n), STRENGTHS if strength is None else np.array([strength])
-    errors = np.zeros((len(parts), strengths.size))
-    for kind, part in ((kind, part) for kind, each in enumerate(parts) for part in each):
-        training = np.ones(y.size, dtype=bool)
-        training[part] = False
-        weights, offsets = fits(columns[training], y[training], penalty, strengths)
-        errors[kind] += np.sum((y[part, np.newaxis] - columns[part] @ weights - offsets) ** 2, axis=0)
-    voices = np.cumsum(errors, axis=0)  # of the first kind, and of all parts
-    least = np.maximum(voices.min(axis=1, keepdims=True), np.finfo(float).tiny)
-    best = int(np.argmin(np.sum(voices / least, axis=0)))
-    weights, offsets = fits(columns, y, penalty, strengths[[best]])
-    left_out = float(np.sqrt(errors[:, best].sum() / sum(part.size for each in parts for part in each)))
-    return Chosen(weights[:, 0], float(offsets[0]), float(strengths[best]), left_out)
+def chosen(
+    columns: FloatArray, y: FloatArray, parts: Sequence[Parts], penalty: FloatArray, strength: float | None = None
+) -> Chosen:
+    """The fit to outputs `y` (n_samples,) with the strength that the parts choose."""
+    strengths = STRENGTHS if strength is None else np.array([strength])
+    centre, middle = columns.mean(axis=0), float(y.mean())  # about which the sums keep more digits
+    columns, y = columns - centre, y - middle
+    whole, exact = moments(columns, y), _EXACT * float(np.std(y))
+    score, squares = np.zeros(strengths.size), np.zeros(strengths.size)
+    for kind in parts:
+        for part in kind:
+            weights, offsets = fits(whole - moments(columns[part], y[part]), penalty, strengths)
+            each = np.sum((y[part, np.newaxis] - columns[part] @ weights - offsets) ** 2, axis=0)
+            rms = np.maximum(np.sqrt(each / part.size), max(exact, np.finfo(float).tiny))
+            score += rms / rms.min() / len(kind)
+            squares += each
+    best = int(np.argmin(score))
+    weights, offsets = fits(whole, penalty, strengths[[best]])
+    left_out = float(np.sqrt(squares[best] / sum(part.size for each in parts for part in each)))
+    offset = middle + float(offsets[0]) - float(centre @ weights[:, 0])
+    return Chosen(weights[:, 0], offset, float(strengths[best]), left_out)
 
 
 def smooth(
-    structure: PreisachStructure, records: Sequence[Record], strength: float | None
-) -> tuple[Chosen, tuple[float, ...]]:
-    """The fit of a structure with levels, and the inputs before the first record."""
+    law: type[Any], levels: tuple[float, ...], records: Sequence[Record], strength: float | None
+) -> tuple[FloatArray, float, tuple[float, ...]]:
+    """Weights and offset of a law of spread relays between the levels, and the inputs before the first record."""
     short = [_thinned(record) for record in records]
-    y, parts, levels = np.concatenate([record.y for record in short]), parts_of(short), structure.levels
-    places: dict[str, Any] = {f"levels[{k}]": level for k, level in enumerate(levels)}
+    y, parts, n = np.concatenate([record.y for record in short]), parts_of(short), len(levels) - 1
+    cells = min(n, _MOST_CELLS)
+    table, penalty = linear_between(cells, n), roughness(cells)
+    relays = law(levels=levels, weights=(0.0,) * len(table))
+    at_rest = [levels[:1] for _ in short]
+    repeated = [(*levels[:1], *relays.advance(record.u)[1][1:]) for record in short]
     best: tuple[Chosen, tuple[float, ...]] | None = None
-    for before in (_down, structure.steady):
-        starts = [before({**places, TURN: levels[0]}, record) for record in short]
-        outputs = [structure.regressors(start, record)[0] for start, record in zip(starts, short, strict=True)]
-        fit = chosen(np.concatenate(outputs)[:, :-2], y, parts, len(levels) - 1, strength)
+    for pasts in (at_rest, repeated):
+        columns = [_outputs(law, levels, table, past, each.u) for past, each in zip(pasts, short, strict=True)]
+        fit = chosen(np.concatenate(columns), y, parts, penalty, strength)
         if best is None or fit.left_out < best[0].left_out:
-            past = [float(value) for name, value in starts[0].items() if name.startswith("z0[")]
-            best = fit, tuple(value for value in past if value > levels[0])
+            best = fit, tuple(value for value in pasts[0] if value > levels[0])
     assert best is not None  # there are two states
-    return best
+    return table @ best[0].weights, best[0].offset, best[1]
+
+
+def _outputs(
+    law: type[Any], levels: tuple[float, ...], table: FloatArray, past: tuple[float, ...], u: FloatArray
+) -> FloatArray:
+    """Outputs (n_samples, n_coefficients) of laws whose weights are the columns of a table."""
+    sets = {"levels": np.array(levels), "weights": table.T, "z0": np.tile(past, (table.shape[1], 1))}
+    return np.asarray(law.responses(sets, u)).T
 
 
 def supported(records: Sequence[Record]) -> int:
-    """Intervals no finer than the steps of the inputs, at most 32."""
+    """Intervals no finer than the steps of the inputs, at most 64."""
     span = max(float(each.u.max()) for each in records) - min(float(each.u.min()) for each in records)
     steps = np.abs(np.concatenate([np.diff(each.u) for each in records]))
     if span == 0.0:
         raise ValueError("the input is constant: nothing can be identified from it")
     return int(np.clip(span / np.median(steps[steps > 0.0]), 2, _MOST_INTERVALS))
-
-
-def _down(parameters: Parameters, record: Record) -> dict[str, Any]:
-    """All relays down before the record."""
-    return dict(parameters)
 
 
 def _thinned(record: Record) -> Record:
@@ -151,17 +167,64 @@ def roughness(n: int) -> FloatArray:
     return np.asarray(table.T @ table + _RIDGE * np.eye(rows.size))
 
 
-def fits(
-    columns: FloatArray, y: FloatArray, penalty: FloatArray, strengths: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Weights (n_weights, n_strengths) and offsets (n_strengths,) of the best fits."""
+def linear_between(cells: int, n: int) -> FloatArray:
+    """Table B (n (n + 1) / 2, cells (cells + 1) / 2) from weights of coarse cells to weights on `n` intervals.
+
+    The density is linear between the centres of the cells off the diagonal, and goes on linearly beyond them; so do the
+    weights per length along the diagonal.
+    """
+    rows, columns = np.tril_indices(n)
+    if cells >= n:
+        return np.eye(rows.size)
+    ratio = cells / n
+    centre = (np.arange(n) + 0.5) * ratio - 0.5
+    first = np.clip(np.floor(centre).astype(np.intp), 0, cells - 2)
+    share = centre - first
+    tents = np.zeros((n, cells))  # of each coarse cell at the centres of the intervals
+    tents[np.arange(n), first], tents[np.arange(n), first + 1] = 1.0 - share, share
+    values = _beyond_diagonal(cells)
+    table = np.zeros((rows.size, values.shape[2]))
+    for a in (0, 1):
+        for b in (0, 1):
+            p, q = first + a, first + b
+            part = tents[rows, p[rows]] * tents[columns, q[columns]]
+            table += part[:, np.newaxis] * values[p[rows], q[columns]]
+    table *= ratio**2
+    table[rows == columns] = 0.0
+    of_diagonal = np.flatnonzero(np.equal(*np.tril_indices(cells)))
+    table[np.ix_(np.flatnonzero(rows == columns), of_diagonal)] = ratio * tents
+    return table
+
+
+def _beyond_diagonal(cells: int) -> FloatArray:
+    """Densities (cells, cells, n_coefficients) in a square of cells: linear on the diagonal and next to it above."""
+    rows, columns = np.tril_indices(cells)
+    values = np.zeros((cells, cells, rows.size))
+    below = np.flatnonzero(rows > columns)
+    values[rows[below], columns[below], below] = 1.0
+    inner = np.arange(1, cells - 1)
+    values[inner, inner] = values[inner, inner - 1] + values[inner + 1, inner] - values[inner + 1, inner - 1]
+    values[0, 0] = 2.0 * values[1, 0] - values[2, 0]
+    values[-1, -1] = 2.0 * values[-1, -2] - values[-1, -3]
+    k = np.arange(cells - 1)
+    values[k, k + 1] = values[k, k] + values[k + 1, k + 1] - values[k + 1, k]
+    return values
+
+
+def moments(columns: FloatArray, y: FloatArray) -> FloatArray:
+    """Sums of products (n_columns + 2, n_columns + 2) of columns, a constant and outputs; those of parts add up."""
+    beside = np.column_stack([columns, np.ones(y.size), y])
+    return np.asarray(beside.T @ beside)
+
+
+def fits(sums: FloatArray, penalty: FloatArray, strengths: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Coefficients (n_columns, n_strengths) and offsets (n_strengths,) of the best fits, from `moments`."""
     from scipy.linalg import eigh  # imported where it is needed
 
-    centre, middle = columns.mean(axis=0), float(y.mean())
-    beside = columns - centre
-    normal = beside.T @ beside
+    columns, middle = sums[:-2, -2] / sums[-2, -2], sums[-1, -2] / sums[-2, -2]
+    normal = sums[:-2, :-2] - np.outer(columns, sums[-2, :-2])
     scale = float(np.trace(normal) / np.trace(penalty)) or 1.0
     size, vectors = eigh(normal / scale, penalty)
-    share = vectors.T @ (beside.T @ (y - middle)) / scale
+    share = vectors.T @ (sums[:-2, -1] - columns * sums[-1, -2]) / scale
     weights = vectors @ (share[:, np.newaxis] / (np.maximum(size, 0.0)[:, np.newaxis] + np.maximum(strengths, _LEAST)))
-    return weights, middle - centre @ weights
+    return weights, middle - columns @ weights

@@ -29,6 +29,7 @@ from hysim._cycles import TOLERANCE
 from hysim._frozen import FloatArray, check_whole, read_only
 from hysim.kernels import preisach as kernels
 from hysim.laws.operators._relays import RelayLaw, everett_of, weights_of
+from hysim.laws.operators._reversal_curves import curves_of, everett_between, levels_of
 from hysim.laws.operators._smooth_density import smooth, supported
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.law import State
@@ -192,16 +193,22 @@ class Preisach(RelayLaw):
         return cls.from_everett(grid, everett, offset=lowest + float(everett[-1, 0]))
 
     @classmethod
-    def from_reversal_curves(cls, record: Record, *, tolerance: float = TOLERANCE) -> Self:
+    def from_reversal_curves(
+        cls, record: Record, *, levels: npt.ArrayLike | None = None, tolerance: float = TOLERANCE
+    ) -> Self:
         """The law whose Everett function is read from first-order reversal curves, ``E(a, b) = (y_a - y_ab) / 2``.
 
         y_a is the output where the input turns at a on its way up from the lowest one, and y_ab where it is back at b.
+        Between two turning points, E is interpolated as the rise to the upper one goes.
 
         Parameters
         ----------
         record : Record
             Strokes from the lowest input up to rising turning points, each followed by one back down, such as
-            `hysim.signals.reversal_curves` has. The turning points become the levels.
+            `hysim.signals.reversal_curves` has. The curves' samples need no common inputs.
+        levels : array, shape (n_levels,), optional
+            Levels of the law [unit of u]; by default the turning points and all inputs of the curves, or, if these are
+            more than 100, the turning points and about 100 even steps between them.
         tolerance : float
             Retreats of the input up to this fraction of its span are ignored: noise.
 
@@ -209,38 +216,30 @@ class Preisach(RelayLaw):
         -------
         Preisach
             Noise of the standard deviation s leaves some s in each weight, of either sign; ``hs.identify`` on the same
-            record and levels fits all samples at once with weights of one sign.
+            record and few levels fits all samples at once with weights of one sign.
 
         Raises
         ------
         ValueError
-            If the input does not turn, or a curve does not begin and end at the lowest input.
+            If the input does not turn, a curve does not begin and end at the lowest input, or levels begin above it.
 
         Examples
         --------
         >>> import hysim as hs
         >>> law = hs.Preisach(levels=(0.0, 1.0, 2.0), weights=(1.0, 0.5, 1.0), offset=3.0)
         >>> u = hs.signals.reversal_curves(0.0, 2.0, curves=2, samples_per_step=5)
-        >>> curves = hs.Preisach.from_reversal_curves(hs.Record(u=u, y=law.response(u)))
+        >>> curves = hs.Preisach.from_reversal_curves(hs.Record(u=u, y=law.response(u)), levels=law.levels)
         >>> [round(weight, 12) for weight in curves.weights], round(curves.offset, 12)
         ([1.0, 0.5, 1.0], 3.0)
         """
-        low, slack = float(record.u.min()), tolerance * float(np.ptp(record.u))
-        falls = [branch for branch in record.branches(tolerance) if branch.u[-1] < branch.u[0]]
-        if not falls:
-            raise ValueError("the input never falls: a reversal curve is a way up and the way down after it")
-        for fall in falls:
-            if fall.u[-1] > low + slack:
-                raise ValueError(
-                    f"the way down from {fall.u[0]:g} must end at the lowest input {low:g}, it ends at {fall.u[-1]:g}"
-                )
-        falls.sort(key=lambda fall: float(fall.u[0]))
-        levels = np.array([low, *(float(fall.u[0]) for fall in falls)])
-        everett = np.zeros((levels.size, levels.size))
-        for m, fall in enumerate(falls, 1):
-            everett[m, :m] = 0.5 * (fall.y[0] - _at(levels[:m], fall))
-        lowest = float(np.mean([fall.y[-1] for fall in falls]))
-        return cls.from_everett(levels, everett, offset=lowest + float(everett[-1, 0]))
+        curves = curves_of(record, tolerance)
+        low = float(record.u.min())
+        grid = levels_of(low, curves) if levels is None else read_only(levels, "levels", ndim=1)
+        if not grid.size or grid[0] > low + tolerance * float(np.ptp(record.u)):
+            raise ValueError(f"levels must begin at the lowest input {low:g} or below, got {grid[:1].tolist()}")
+        everett = everett_between(low, grid, curves)
+        lowest = float(np.mean([curve.fall.y[-1] for curve in curves]))
+        return cls.from_everett(grid, everett, offset=lowest + float(everett[-1, 0]))
 
     @classmethod
     def smoothed(
@@ -256,11 +255,12 @@ class Preisach(RelayLaw):
         records : Record or sequence of Record
             Inputs and outputs, best at several amplitudes, or reversal curves.
         intervals : int, optional
-            Number of equal intervals over the span of all inputs; by default as fine as their steps, at most 32.
+            Number of equal intervals over the span of all inputs; by default as fine as their steps, at most 64. The
+            density has at most 24 cells along each threshold, and is linear between their centres.
         strength : float, optional
             Weight of the second differences against the errors, 0 for none; by default that of 43 between 1e-10 and 1e4
-            whose fits predict best each record that the others reach, each cycle or curve of a single record, and
-            a quarter of each record from the rest.
+            whose fits to the rest predict best what is left out: each record that the others reach, or each cycle or
+            curve of a single record; and each quarter of a record.
 
         Returns
         -------
@@ -291,8 +291,8 @@ class Preisach(RelayLaw):
         low, high = min(float(each.u.min()) for each in given), max(float(each.u.max()) for each in given)
         levels = tuple(np.linspace(low, high, count + 1).tolist())
         with one_blas_thread():
-            fit, past = smooth(cls.structure(levels=levels), given, strength)
-        return cls(levels=levels, weights=tuple(fit.weights.tolist()), offset=fit.offset, z0=past)
+            weights, offset, past = smooth(cls, levels, given, strength)
+        return cls(levels=levels, weights=tuple(weights.tolist()), offset=offset, z0=past)
 
     def slope_bounds(self) -> tuple[float, float]:
         """Lowest and highest slope dy/du over every input between the levels.
@@ -347,9 +347,3 @@ class Preisach(RelayLaw):
             read_only(np.concatenate([limits, [sign], parameters]), finite=False),
             np.concatenate([[u, sign * y[d], u, d], x, y]),
         )
-
-
-def _at(levels: FloatArray, branch: Record) -> FloatArray:
-    """Outputs of a branch where its input passes the levels."""
-    order = np.argsort(branch.u, kind="stable")
-    return np.interp(levels, branch.u[order], branch.y[order])
