@@ -32,6 +32,7 @@ from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record
 
 _STRONG = 10.0  # difference of two BIC
+_IN_VAIN = 2  # longer pasts in a row that are no better: one number more may be of use only with another one
 _ROUNDING = 1e-10  # of the output's size: smaller residuals are those of a perfect fit
 _AT_BOUND = 1e-9  # of the largest linear parameter
 
@@ -155,10 +156,12 @@ def _decided(
     widest = len(variants) - 1
     for k in range(len(states)):
         trial(k, widest)
-    for longer in range(1, longest + 1):
-        before = trial(states.index(_State("free", longer - 1)), widest)
-        states.append(_State("free", longer))
-        if trial(len(states) - 1, widest).bic >= before.bic - _STRONG:
+    free = [states.index(_State("free"))] if longest else []
+    while 0 < len(free) <= longest:
+        states.append(_State("free", len(free)))
+        free.append(len(states) - 1)
+        bics = [trial(k, widest).bic for k in free]
+        if len(bics) > _IN_VAIN and min(bics[-_IN_VAIN:]) >= min(bics[:-_IN_VAIN]) - _STRONG:
             break
     state = _best(range(len(states)), lambda k: trial(k, widest).bic)
     for k in range(len(variants)):
@@ -212,14 +215,19 @@ def _tried(attempt: Problem, state: _State, variant: Variant, before: Sequence[_
 
 
 def _starts_beside(space: SearchSpace, before: Sequence[_Trial]) -> FloatArray:
-    """The starts of a space, and those with the coordinates of a smaller space where its search ended."""
-    starts = [space.starts]
+    """The starts of a space, and those that hold the end of a search with coordinates of the state alone.
+
+    The numbers of a shorter state keep their order: what is new stands before them, between them or behind them.
+    """
+    starts, coordinates = [space.starts], space.coordinates
     for each in before:
-        if each.names and set(each.names) < set(space.coordinates):
-            places = [space.coordinates.index(name) for name in each.names]
-            for end in each.ends:
-                starts.append(space.starts.copy())
-                starts[-1][:, places] = end
+        if each.names and {*each.names, *coordinates} <= {*space.state}:
+            for places in itertools.combinations(range(len(coordinates)), len(each.names)):
+                beside = np.repeat(
+                    space.starts[: None if len(places) < len(coordinates) else 1], len(each.ends), axis=0
+                )
+                beside[:, places] = np.tile(each.ends, (len(beside) // len(each.ends), 1))
+                starts.append(beside)
     return np.concatenate(starts)
 
 
@@ -250,8 +258,8 @@ def _with_starts(best: _Trial, trials: Iterable[_Trial]) -> Problem:
     known = np.clip(np.concatenate(ends), space.lower, space.upper)
     if not known.size:
         return best.problem
-    if set(best.names) <= set(space.state):  # in so few a short search is a whole one
-        return replace(best.problem, space=replace(space, starts=known, screened=0))
+    if set(best.names) <= set(space.state):  # for so few coordinates a short search is a whole one
+        return replace(best.problem, ends=known)
     return replace(best.problem, space=replace(space, starts=np.concatenate([space.starts, known])))
 
 

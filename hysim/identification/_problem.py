@@ -60,6 +60,7 @@ class Problem:
     simpler: "Problem | None" = None  # whose optimum starts the search
     enlarged: Callable[[Mapping[str, float]], dict[str, float]] = dict  # its parameters to those of this family
     stage: Stage | None = None  # what this problem frees, and the simpler one does not
+    ends: FloatArray | None = None  # (n_sets, n_x), where searches have ended: they are only polished
     settled: Settled | None = None  # rows that may stand for samples, if they are known
     below: Settled | None = None  # rows that do stand for samples, which the parts do not have any more
 

@@ -30,6 +30,7 @@ N_STAGED = 3  # points of a stage that are polished
 N_POLISHED_WHOLE = 3  # optima of a thinned record that descend on all samples
 N_BRIEF_SCREENED = 512
 N_BRIEF_DESCENDING = 12
+N_BRIEF_WHOLE = 4  # steps on all samples
 _LONG = 512  # samples beyond which fewer points are tried: each costs more, and longer records have fewer optima
 _SHORT = 250  # samples of a thinned record beside its reversals
 _APART = 0.05  # distance of two starts, in units of the box, under which the better one stands for both
@@ -102,6 +103,11 @@ def optima(
     space = problem.space
     if not space.coordinates:
         return polish(problem, np.empty((1, 0)))
+    if problem.ends is not None:
+        condensed = problem.condensed()
+        return _distinct(
+            polish(condensed, _apart(space, problem.ends, condensed.costs(problem.ends), _SAME, N_POLISHED_WHOLE))
+        )
     if problem.y.size > _LONG and (short := problem.thinned(_SHORT)) is not None:
         likely = optima(short, seed=seed, progress=progress, known=known, may_end=may_end)[:N_POLISHED_WHOLE]
         if likely and likely[0].is_simpler:
@@ -159,9 +165,10 @@ def brief_optima(problem: Problem) -> tuple[FloatArray, FloatArray]:
         if condensed is problem:
             ends, costs = brief_optima(short)
             return ends, costs * problem.y.size / short.y.size
-        known = polish(condensed, brief_optima(short)[0] if space.coordinates else np.empty((1, 0)))
-        known = _distinct(known) or [Optimum(0.5 * (space.lower + space.upper), math.inf, False)]
-        return np.array([each.x for each in known]), np.array([each.cost for each in known])
+        ends = brief_optima(short)[0] if space.coordinates else np.empty((1, 0))
+        reached = _descended(condensed, ends[:1], exact=False, steps=N_BRIEF_WHOLE)
+        ends[0] = reached.theta[0, : condensed.n_x]
+        return ends, condensed.costs(ends)
     problem = condensed
     if not space.coordinates:
         return np.empty((1, 0)), problem.costs(np.empty((1, 0)))

@@ -19,7 +19,7 @@ steady cycle is ``"periodic"``: the positions that the cycle leaves behind. By d
 """
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any, ClassVar, NamedTuple
 
@@ -35,7 +35,7 @@ from hysim.records import Record
 
 TURN = "turn"
 BANK_STATES = ("rest", "still", "periodic", "free")
-_LEVELS = 9  # of the oldest former turning point, from which the search begins
+_LEVELS = 33, 17  # of a single former turning point, and of one beside others, from which the search begins
 _MOST_TURNS = 4  # more are seldom determined
 _ROUNDING = 1e-9  # of a threshold
 
@@ -109,10 +109,11 @@ class ClampStructure(Identifiable, Composable):
             *(Coordinate(turn, first - 2.0 * half, first + 2.0 * half, half) for turn in turns),
         ]
         box += [Coordinate(name, axis.lower, axis.upper, axis.scale) for name, axis in axes.items()]
-        levels = tuple(first + half * np.linspace(-2.0, 2.0, _LEVELS))
-        starts = {turns[-1]: levels} | {name: axis.starts for name, axis in axes.items()}
+        levels = tuple(first + half * np.linspace(-2.0, 2.0, _LEVELS[self.turns > 1]))
+        starts = {TURN: levels} | {name: axis.starts for name, axis in axes.items()}
         starts = {name: values for name, values in starts.items() if name not in held}
         points = [dict(zip(starts, values, strict=True)) for values in itertools.product(*starts.values())]
+        points = [dict.fromkeys(turns, point.get(TURN, first)) | point for point in points]  # as if they were one
         signs = self._signs(record, dict(zip(self._names("weights", thresholds.size), thresholds, strict=True)))
         bounds = {name: pair for name, pair in signs.items() if name in columns and name not in held}
         space = space_of(
@@ -124,7 +125,7 @@ class ClampStructure(Identifiable, Composable):
             points,
             bounds=bounds | {name: pair for name, pair in limits.items() if name in columns},
             state=turns,
-            screened=64 if {each.name for each in box} - set(held) <= {*turns, *axes} else 256,
+            screened=_screened({each.name for each in box} - set(held), turns, axes),
         )
         return replace(space, parameters=lambda x: self._with_derived(space.parameters(x), record))
 
@@ -209,8 +210,10 @@ class ClampStructure(Identifiable, Composable):
         n_sets = max((np.size(value) for value in parameters.values()), default=1)
 
         def table(what: str) -> FloatArray:
-            columns = [np.broadcast_to(np.ravel(parameters[name]), n_sets) for name in self._names(what, count)]
-            return np.stack(columns, axis=1)
+            values = np.empty((n_sets, count))
+            for column, name in zip(values.T, self._names(what, count), strict=True):
+                column[:] = parameters[name]
+            return values
 
         thresholds = table("thresholds")
         if "z0[0]" in parameters:
@@ -224,6 +227,13 @@ class ClampStructure(Identifiable, Composable):
         positive = (self.law.stops == runs_clockwise(record)) != self.against
         side = (0.0, np.inf) if positive else (-np.inf, 0.0)
         return {name: side for name, threshold in thresholds.items() if threshold > 0.0}
+
+
+def _screened(searched: set[str], turns: Sequence[str], axes: Iterable[str]) -> int:
+    """Random points beside the starts; none where these lie close."""
+    if searched <= {*turns}:
+        return 0
+    return 64 if searched <= {*turns, *axes} else 256
 
 
 def _turns(count: int) -> tuple[str, ...]:
