@@ -228,7 +228,7 @@ def _starts_beside(space: SearchSpace, before: Sequence[_Trial]) -> FloatArray:
                 )
                 beside[:, places] = np.tile(each.ends, (len(beside) // len(each.ends), 1))
                 starts.append(beside)
-    return np.concatenate(starts)
+    return np.unique(np.concatenate(starts), axis=0)
 
 
 def _bic(attempt: Problem, x: FloatArray, cost: float) -> float:

@@ -35,7 +35,8 @@ from hysim.records import Record
 
 TURN = "turn"
 BANK_STATES = ("rest", "still", "periodic", "free")
-_LEVELS = 33, 17  # of a single former turning point, and of one beside others, from which the search begins
+_LEVELS = 33, 9  # of a single former turning point, and of one beside others, from which the search begins
+_SIZES = (0.2, 0.4, 0.6, 0.8, 1.0, 1.3)  # of several about the middle of the input, in half spans, likewise
 _MOST_TURNS = 4  # more are seldom determined
 _ROUNDING = 1e-9  # of a threshold
 
@@ -109,11 +110,13 @@ class ClampStructure(Identifiable, Composable):
             *(Coordinate(turn, first - 2.0 * half, first + 2.0 * half, half) for turn in turns),
         ]
         box += [Coordinate(name, axis.lower, axis.upper, axis.scale) for name, axis in axes.items()]
-        levels = tuple(first + half * np.linspace(-2.0, 2.0, _LEVELS[self.turns > 1]))
-        starts = {TURN: levels} | {name: axis.starts for name, axis in axes.items()}
-        starts = {name: values for name, values in starts.items() if name not in held}
-        points = [dict(zip(starts, values, strict=True)) for values in itertools.product(*starts.values())]
-        points = [dict.fromkeys(turns, point.get(TURN, first)) | point for point in points]  # as if they were one
+        pasts = [point for point in _pasts(turns, record) if not set(turns) & set(held)] or [{}]
+        starts = {name: axis.starts for name, axis in axes.items() if name not in held}
+        points = [
+            past | dict(zip(starts, values, strict=True))
+            for past in pasts
+            for values in itertools.product(*starts.values())
+        ]
         signs = self._signs(record, dict(zip(self._names("weights", thresholds.size), thresholds, strict=True)))
         bounds = {name: pair for name, pair in signs.items() if name in columns and name not in held}
         space = space_of(
@@ -239,6 +242,17 @@ def _screened(searched: set[str], turns: Sequence[str], axes: Iterable[str]) -> 
 def _turns(count: int) -> tuple[str, ...]:
     """Names of the former turning points, the last one first."""
     return (TURN, *(f"{TURN}_{k}" for k in range(2, count + 1)))
+
+
+def _pasts(turns: Sequence[str], record: Record) -> list[dict[str, float]]:
+    """Former turning points from which a search begins: single ones, or cycles that faded towards the first sample."""
+    half, first = spans(record)["h"], float(record.u[0])
+    levels = first + half * np.linspace(-2.0, 2.0, _LEVELS[len(turns) > 1])
+    middle = 0.5 * float(record.u.min() + record.u.max())
+    sides = middle + half * (-1.0) ** np.arange(len(turns)) * np.array([[-1.0], [1.0]])
+    fading = [middle + np.array(sizes) * (sides - middle) for sizes in itertools.combinations(_SIZES, len(turns))]
+    every = np.concatenate([np.tile(levels[:, np.newaxis], len(turns)), *(fading if len(turns) > 1 else [])])
+    return [dict(zip(turns, past, strict=True)) for past in every.tolist()]
 
 
 def _after(turns: Sequence[Any], thresholds: FloatArray) -> FloatArray:
