@@ -138,7 +138,8 @@ def _decided(
     if initial is None and not is_told:
         states = [_State(each) for each in _possible(family, records)] or states
     variants = family.variants() or (Variant(family, ""),)
-    longest = 0 if is_told or _State("free") not in states else _longer_pasts(variants[-1].family)
+    may_be_longer = _State("free") in states and len(records) == 1 and not is_told
+    longest = _longer_pasts(variants[-1].family) if may_be_longer else 0
     if len(states) == len(variants) == 1 and not longest:
         only = problem(variants[0].family, records, freedom, initial).weighted(weights)
         return Decision([only], initial, "")
@@ -265,7 +266,7 @@ def _with_starts(best: _Trial, trials: Iterable[_Trial]) -> Problem:
 
 def _sentence(best: _Trial, others: Sequence[_Trial], records: Sequence[Record]) -> str:
     """The assumptions in words, and by how much the next best other state and the next best other choice are worse."""
-    states = [each.bic for each in others if each.state != best.state]
+    states = [each.bic for each in others if each.state != best.state and each.state.longer <= best.state.longer]
     choices = [each.bic for each in others if each.state == best.state and each.variant.words != best.variant.words]
     words = []
     if states and isinstance(best.state.initial, str):

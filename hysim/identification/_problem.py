@@ -20,7 +20,8 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray
 from hysim._repeats import repeated_cycle
 from hysim.identification._budget import Budget
-from hysim.identification._settled import Settled, triangle
+from hysim.identification._regression import least_squares, triangle
+from hysim.identification._settled import Settled
 from hysim.models.protocols import Forgetting, Identifiable, Staged
 from hysim.models.search_space import STATES, STATES_IN_WORDS, Freedom, Parameters, SearchSpace
 from hysim.models.stages import BASE, Stage
@@ -28,9 +29,6 @@ from hysim.records import Record
 
 _CHUNK = 200_000  # samples that are evaluated at once, to bound the memory
 _LARGEST = 1e150  # beyond it squares overflow: such a set counts as one that has diverged
-_RANK = 1e-11  # singular values of the normalised columns below this are taken as zero
-_MANY = 8  # columns from which on a triangle costs clearly less than a decomposition into singular values
-_WELL = 1e9  # norm of an inverse below which no singular value is near `_RANK`
 _FEWEST = 2  # samples of a record
 _TURN = 0.01  # of the span: smaller reversals are noise, or change little
 _DIFFERENCE = 1e-6  # step of a central difference in units of the box: truncation and rounding both ~1e-10
@@ -125,10 +123,11 @@ class Problem:
         if sum(len(record) - k for record, k in zip(records, first, strict=True)) < 2 * (len(self.space.linear) + 1):
             return self
         columns, fixed_part = self.split(0.5 * (self.space.lower + self.space.upper)[np.newaxis])
-        later = np.concatenate([np.arange(len(record)) >= k for record, k in zip(records, first, strict=True)])
-        root = np.sqrt(self.weights[later])
-        rows, target = triangle(columns[:, later] * root[:, np.newaxis], (self.y - fixed_part)[:, later] * root)
-        return replace(self, settled=Settled(first, self.space.linear, rows[0], target[0], self.scale))
+        is_later = np.concatenate([np.arange(len(record)) >= k for record, k in zip(records, first, strict=True)])
+        root = np.sqrt(self.weights[is_later])
+        target = root * (self.y - fixed_part)[:, is_later]
+        rows, short = triangle(root[:, np.newaxis] * columns[:, is_later], target)
+        return replace(self, settled=Settled(first, self.space.linear, rows[0], short[0], self.scale))
 
     def condensed(self) -> "Problem":
         """This problem with the same sums of squares on fewer rows, where no coordinate has an effect on many samples.
@@ -302,9 +301,7 @@ class Problem:
         normalised = columns / norms[:, np.newaxis, :]
         if self.space.bounds:
             return self._bounded(normalised, target, norms)
-        if columns.shape[2] >= _MANY:
-            return _by_triangle(normalised, target) / norms
-        return _least(normalised, target) / norms
+        return np.asarray(least_squares(normalised, target) / norms)
 
     def _bounded(self, columns: FloatArray, target: FloatArray, norms: FloatArray) -> FloatArray:
         from scipy.optimize import lsq_linear
@@ -320,29 +317,6 @@ class Problem:
         limits = [self.space.bounds.get(name, (-np.inf, np.inf)) for name in self.space.linear]
         lower, upper = np.array(limits).reshape(-1, 2).T
         return lower, upper
-
-
-def _least(columns: FloatArray, target: FloatArray) -> FloatArray:
-    """Shortest least-squares solutions (n_sets, n_columns) for columns of length one."""
-    basis, singular, right = np.linalg.svd(columns, full_matrices=False)
-    inverse = np.where(singular > _RANK, 1.0 / np.maximum(singular, _RANK), 0.0)
-    projected = inverse[..., np.newaxis] * (basis.transpose(0, 2, 1) @ target[..., np.newaxis])
-    return np.asarray((right.transpose(0, 2, 1) @ projected)[..., 0])
-
-
-def _by_triangle(columns: FloatArray, target: FloatArray) -> FloatArray:
-    """`_least`, by the triangles where they have full rank."""
-    rows, goal = triangle(columns, target)
-    n = columns.shape[2]
-    solutions = np.empty((len(columns), n))
-    is_well = np.zeros(len(columns), dtype=bool)
-    if rows.shape[1] >= n:
-        is_well = np.abs(np.diagonal(rows, axis1=1, axis2=2)).min(axis=1) > 1.0 / _WELL
-        inverse = np.linalg.inv(rows[is_well, :n])
-        solutions[is_well] = (inverse @ goal[is_well, :n, np.newaxis])[..., 0]
-        is_well[is_well] = np.linalg.norm(inverse, axis=(1, 2)) < _WELL
-    solutions[~is_well] = _least(rows[~is_well], goal[~is_well])
-    return solutions
 
 
 def _thinned(part: Part, samples: int) -> Part:

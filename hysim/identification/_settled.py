@@ -7,8 +7,6 @@ all of these samples: || C b - t || = || R [b, -1] || for all b, to rounding.
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from hysim._frozen import FloatArray
 
 
@@ -25,12 +23,3 @@ class Settled:
     columns: FloatArray
     target: FloatArray
     scale: float
-
-
-def triangle(columns: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Columns (n_sets, n_rows, n_linear) and target (n_sets, n_rows) of the same regression with few rows.
-
-    There is one row more than there are columns: the last one holds what no parameters explain.
-    """
-    both = np.linalg.qr(np.concatenate([columns, target[..., np.newaxis]], axis=2), mode="r")
-    return both[..., :-1], both[..., -1]

@@ -9,13 +9,17 @@ loop in one sense. Without it least squares fit noise by weights of alternating 
 inverse; a loop that crosses itself or bends the other way needs both signs. By default the record decides.
 
 The memory of many plays is as many unknowns, which no record determines. With ``initial="rest"`` the plays stand at
-zero before the first sample, with ``"still"`` at the first input. With ``"free"`` the memory is that of a single former
-turning point, the stroke from rest at zero to `turn`:
+zero before the first sample, with ``"still"`` at the first input. With ``"free"`` the memory is that of former turning
+points: the stroke from rest at zero to the oldest, `turn_2` or further back, and so on to the last one, `turn`. For one
 
     z_i = sign(turn) max(|turn| - r_i, 0)
 
-It holds for every record that begins at rest or at a turning point of its cycle, or in a cycle about zero; any other
-steady cycle is ``"periodic"``: the positions that the cycle leaves behind. By default the record decides.
+One holds for every record that begins at rest or at a turning point of its cycle, or in a cycle about zero; cycles that
+faded or grew before the record need more. Any other steady cycle is ``"periodic"``: the positions that the cycle leaves
+behind. By default the record decides, also how many former turning points there are.
+
+Once the input has moved by twice the largest threshold all of this is forgotten: what follows is the same for every
+past, and for weights of any sign.
 """
 
 import itertools
