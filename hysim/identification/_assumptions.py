@@ -168,6 +168,9 @@ def _decided(
     for k in range(len(variants)):
         trial(state, k)
     chosen = _best([k for k, each in enumerate(variants) if each.offered], lambda k: trial(state, k).bic)
+    if state in free and chosen != widest:  # fewer free weights may show what was not clear with all of them
+        likely = [k for k in free if k > state and trial(k, widest).bic < trial(state, widest).bic]
+        state = _best([state, *likely], lambda k: trial(k, chosen).bic)
     best = trial(state, chosen)
     others = [each for key, each in trials.items() if key != (state, chosen) and each.variant.offered]
     return Decision([_with_starts(best, trials.values())], best.state.initial, _sentence(best, others, records))
