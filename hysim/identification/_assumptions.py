@@ -13,7 +13,7 @@ where the search of the other ended, so that it never fits worse.
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -25,13 +25,14 @@ from hysim._repeats import repeated_cycle
 from hysim.errors import SimulationError
 from hysim.identification._budget import Budget
 from hysim.identification._problem import Problem, problem, problems
-from hysim.identification._search import brief_optimum
+from hysim.identification._search import brief_optima, brief_optimum
 from hysim.metrics.criteria import information
-from hysim.models.protocols import Undecided, Variant
-from hysim.models.search_space import Freedom
+from hysim.models.protocols import LongerPast, Undecided, Variant
+from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record
 
 _STRONG = 10.0  # difference of two BIC
+_IN_VAIN = 2  # longer pasts in a row that are no better: one number more may be of use only with another one
 _ROUNDING = 1e-10  # of the output's size: smaller residuals are those of a perfect fit
 _AT_BOUND = 1e-9  # of the largest linear parameter
 
@@ -54,12 +55,24 @@ class Decision(NamedTuple):
     sentence: str
 
 
+class _State(NamedTuple):
+    """A value of `initial`, and how many times the past of the family is made longer."""
+
+    initial: str | Sequence[str] | None
+    longer: int = 0
+
+
 class _Trial(NamedTuple):
     problem: Problem
-    initial: str | Sequence[str] | None
+    state: _State
     variant: Variant
-    x: FloatArray
+    ends: FloatArray  # (n_sets, n_x), the best first
     bic: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the coordinates."""
+        return self.problem.space.coordinates
 
 
 def quiet_where_better(
@@ -118,31 +131,61 @@ def _decided(
     if not isinstance(family, Undecided):
         every = problems(given, records, freedom, initial)
         return Decision([each.weighted(weights) for each in every], initial, "")
-    states: list[str | Sequence[str] | None] = [initial]
-    if initial is None:
-        plain = problem(given, records, freedom, None)
-        told = {*freedom.fixed, *freedom.free, *freedom.bounds} & set(plain.own.state)
-        states = [None] if told else [*_possible(family, records)] or [None]
+    states, is_told = [_State(initial)], False
+    if initial in (None, "free"):
+        plain = problem(given, records, freedom, initial)
+        is_told = bool({*freedom.fixed, *freedom.free, *freedom.bounds} & set(plain.own.state))
+    if initial is None and not is_told:
+        states = [_State(each) for each in _possible(family, records)] or states
     variants = family.variants() or (Variant(family, ""),)
-    if len(states) == len(variants) == 1:
-        only = problem(variants[0].family, records, freedom, states[0]).weighted(weights)
-        return Decision([only], states[0], "")
+    may_be_longer = _State("free") in states and len(records) == 1 and not is_told
+    longest = _longer_pasts(variants[-1].family) if may_be_longer else 0
+    if len(states) == len(variants) == 1 and not longest:
+        only = problem(variants[0].family, records, freedom, initial).weighted(weights)
+        return Decision([only], initial, "")
     trials: dict[tuple[int, int], _Trial] = {}
-    brief = None if max_evaluations is None else max_evaluations / (2 * (len(states) + len(variants)))
+    brief = None if max_evaluations is None else max_evaluations / (2 * (len(states) + longest + len(variants)))
 
     def trial(state: int, variant: int) -> _Trial:
         if (state, variant) not in trials:
-            trials[state, variant] = _tried(variants[variant], records, freedom, states[state], weights, brief)
+            choice = _longer(variants[variant], states[state].longer)
+            attempt = problem(choice.family, records, freedom, states[state].initial).weighted(weights)
+            attempt = attempt.within(_budget(brief, records))
+            trials[state, variant] = _tried(attempt, states[state], choice, [*trials.values()])
         return trials[state, variant]
 
     widest = len(variants) - 1
+    for k in range(len(states)):
+        trial(k, widest)
+    free = [states.index(_State("free"))] if longest else []
+    while 0 < len(free) <= longest:
+        states.append(_State("free", len(free)))
+        free.append(len(states) - 1)
+        bics = [trial(k, widest).bic for k in free]
+        if len(bics) > _IN_VAIN and min(bics[-_IN_VAIN:]) >= min(bics[:-_IN_VAIN]) - _STRONG:
+            break
     state = _best(range(len(states)), lambda k: trial(k, widest).bic)
     for k in range(len(variants)):
         trial(state, k)
     chosen = _best([k for k, each in enumerate(variants) if each.offered], lambda k: trial(state, k).bic)
+    if state in free and chosen != widest:  # fewer free weights may show what was not clear with all of them
+        likely = [k for k in free if k > state and trial(k, widest).bic < trial(state, widest).bic]
+        state = _best([state, *likely], lambda k: trial(k, chosen).bic)
     best = trial(state, chosen)
     others = [each for key, each in trials.items() if key != (state, chosen) and each.variant.offered]
-    return Decision([_with_starts(best, trials.values())], best.initial, _sentence(best, others, records))
+    return Decision([_with_starts(best, trials.values())], best.state.initial, _sentence(best, others, records))
+
+
+def _longer_pasts(family: Any) -> int:
+    """Number of times that the past of a family can be made longer."""
+    longer = family.longer_past() if isinstance(family, LongerPast) else None
+    return 0 if longer is None else 1 + _longer_pasts(longer)
+
+
+def _longer(variant: Variant, times: int) -> Variant:
+    for _ in range(times):
+        variant = variant._replace(family=variant.family.longer_past())
+    return variant
 
 
 def _budget(max_evaluations: float | None, records: Sequence[Record]) -> Budget | None:
@@ -161,22 +204,35 @@ def _possible(family: Undecided, records: Sequence[Record]) -> list[str]:
     ]
 
 
-def _tried(
-    variant: Variant,
-    records: Sequence[Record],
-    freedom: Freedom,
-    initial: str | Sequence[str] | None,
-    weights: Sequence[FloatArray] | None,
-    max_evaluations: float | None,
-) -> _Trial:
-    attempt = problem(variant.family, records, freedom, initial).weighted(weights)
-    attempt = attempt.within(_budget(max_evaluations, records))
+def _tried(attempt: Problem, state: _State, variant: Variant, before: Sequence[_Trial]) -> _Trial:
+    """A short search that begins, beside its own starts, where those `before` ended that it contains."""
+    known = next((each.problem.settled for each in before if each.problem.settled is not None), None)
+    attempt = attempt.with_settled(known)
+    space = attempt.space
+    attempt = replace(attempt, space=replace(space, starts=_starts_beside(space, before)))
     try:
-        x, cost = brief_optimum(attempt)
-        bic = _bic(attempt, x, cost)
+        ends, costs = brief_optima(attempt)
+        bic = _bic(attempt, ends[0], float(costs[0]))
     except (ArithmeticError, SimulationError):
-        x, bic = np.empty(0), math.inf
-    return _Trial(attempt, initial, variant, x, bic)
+        ends, bic = np.empty((0, attempt.n_x)), math.inf
+    return _Trial(attempt, state, variant, ends, bic)
+
+
+def _starts_beside(space: SearchSpace, before: Sequence[_Trial]) -> FloatArray:
+    """The starts of a space, and those that hold the end of a search with coordinates of the state alone.
+
+    The numbers of a shorter state keep their order: what is new stands before them, between them or behind them.
+    """
+    starts, coordinates = [space.starts], space.coordinates
+    for each in before:
+        if each.names and {*each.names, *coordinates} <= {*space.state}:
+            for places in itertools.combinations(range(len(coordinates)), len(each.names)):
+                beside = np.repeat(
+                    space.starts[: None if len(places) < len(coordinates) else 1], len(each.ends), axis=0
+                )
+                beside[:, places] = np.tile(each.ends, (len(beside) // len(each.ends), 1))
+                starts.append(beside)
+    return np.unique(np.concatenate(starts), axis=0)
 
 
 def _bic(attempt: Problem, x: FloatArray, cost: float) -> float:
@@ -184,7 +240,7 @@ def _bic(attempt: Problem, x: FloatArray, cost: float) -> float:
     if not math.isfinite(cost) or n <= d:
         return math.inf
     if attempt.space.bounds:
-        linear = attempt.completed(x[np.newaxis])[0, attempt.n_x :]
+        linear = attempt.condensed().completed(x[np.newaxis])[0, attempt.n_x :]
         near = _AT_BOUND * float(np.abs(linear).max(initial=0.0))
         d -= int(np.sum(np.minimum(*np.abs(linear - attempt.linear_box())) <= near))
     return information(max(cost / n, (_ROUNDING * attempt.scale) ** 2), n, d)
@@ -199,23 +255,27 @@ def _best(choices: Sequence[int], bic: Callable[[int], float]) -> int:
     return best
 
 
-def _with_starts(best: _Trial, trials: Any) -> Problem:
+def _with_starts(best: _Trial, trials: Iterable[_Trial]) -> Problem:
+    """The problem of the best trial, whose search begins where the trials of the same coordinates ended."""
     space = best.problem.space
-    alike = [each.x for each in trials if each.problem.space.coordinates == space.coordinates and each.x.size]
-    if not alike:
+    ends = [best.ends, *(each.ends[:1] for each in trials if each is not best and each.names == best.names)]
+    known = np.clip(np.concatenate(ends), space.lower, space.upper)
+    if not known.size:
         return best.problem
-    starts = np.clip(np.array(alike), space.lower, space.upper)
-    return replace(best.problem, space=replace(space, starts=np.concatenate([space.starts, starts])))
+    if set(best.names) <= set(space.state):  # for so few coordinates a short search is a whole one
+        return replace(best.problem, ends=known)
+    return replace(best.problem, space=replace(space, starts=np.concatenate([space.starts, known])))
 
 
 def _sentence(best: _Trial, others: Sequence[_Trial], records: Sequence[Record]) -> str:
     """The assumptions in words, and by how much the next best other state and the next best other choice are worse."""
-    states = [each.bic for each in others if each.initial != best.initial]
-    choices = [each.bic for each in others if each.initial == best.initial and each.variant.words != best.variant.words]
+    states = [each.bic for each in others if each.state != best.state and each.state.longer <= best.state.longer]
+    choices = [each.bic for each in others if each.state == best.state and each.variant.words != best.variant.words]
     words = []
-    if states and isinstance(best.initial, str):
+    if states and isinstance(best.state.initial, str):
         cycles = ", ".join(f"{repeated_cycle(record.u)}" for record in records)
-        words.append(_STATES[best.initial].format(cycles) + _by(min(states) - best.bic))
+        numbers = f", by {len(best.problem.own.state)} numbers" if best.state.longer else ""
+        words.append(_STATES[best.state.initial].format(cycles) + numbers + _by(min(states) - best.bic))
     if choices:
         words.append(best.variant.words + _by(min(choices) - best.bic))
     return f"assumed {' and '.join(words)}" if words else ""

@@ -7,9 +7,10 @@ import numpy as np
 from hysim import metrics
 from hysim._frozen import FloatArray
 from hysim.identification._descent import Descent
+from hysim.identification._problem import Problem
+from hysim.identification._uncertainty import output_slopes
 from hysim.metrics.rows import LoopRows
 
-_STEP = 1e-3  # of a difference, in standard errors: the place of the largest width may move
 _MOST_LAGS = 20
 
 
@@ -63,16 +64,12 @@ def loop_widths(descent: Descent, theta: FloatArray) -> FloatArray:
         return np.empty(0)
 
 
-def width_stderr(descent: Descent, theta: FloatArray, of_theta: FloatArray) -> float:
+def width_stderr(problem: Problem, theta: FloatArray, of_theta: FloatArray) -> float:
     """Standard error of the largest width, by the linearised model; nan where there is no loop."""
-    lower, upper = descent.box()
-    scale = np.sqrt(np.maximum(np.diag(of_theta), 0.0))
-    steps = np.diag(np.where(scale > 0.0, _STEP * scale, 0.0))
-    ends = [np.clip(theta + sign * steps, lower, upper) for sign in (1.0, -1.0)]
-    widths = [loop_widths(descent, end) for end in ends]
-    distance = np.diag(ends[0] - ends[1])
-    if any(each.size != theta.size for each in widths):
+    record = problem.parts[0].record
+    slopes = output_slopes(problem, theta)[: len(record)]
+    output = problem.model(theta[np.newaxis])[0, : len(record)]
+    if not (np.isfinite(slopes).all() and np.isfinite(output).all()):
         return float("nan")
-    moving = distance > 0.0
-    slope = np.where(moving, (widths[0] - widths[1]) / np.where(moving, distance, 1.0), 0.0)
+    slope = LoopRows(record.u).max_width_slopes(output, slopes.T)
     return float(np.sqrt(np.maximum(slope @ of_theta @ slope, 0.0)))

@@ -20,14 +20,16 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray
 from hysim._repeats import repeated_cycle
 from hysim.identification._budget import Budget
-from hysim.models.protocols import Identifiable, Staged
+from hysim.identification._regression import least_squares, triangle
+from hysim.identification._settled import Settled
+from hysim.models.protocols import Forgetting, Identifiable, Staged
 from hysim.models.search_space import STATES, STATES_IN_WORDS, Freedom, Parameters, SearchSpace
 from hysim.models.stages import BASE, Stage
 from hysim.records import Record
 
 _CHUNK = 200_000  # samples that are evaluated at once, to bound the memory
 _LARGEST = 1e150  # beyond it squares overflow: such a set counts as one that has diverged
-_RANK = 1e-11  # singular values of the normalised columns below this are taken as zero
+_FEWEST = 2  # samples of a record
 _TURN = 0.01  # of the span: smaller reversals are noise, or change little
 _DIFFERENCE = 1e-6  # step of a central difference in units of the box: truncation and rounding both ~1e-10
 
@@ -56,6 +58,9 @@ class Problem:
     simpler: "Problem | None" = None  # whose optimum starts the search
     enlarged: Callable[[Mapping[str, float]], dict[str, float]] = dict  # its parameters to those of this family
     stage: Stage | None = None  # what this problem frees, and the simpler one does not
+    ends: FloatArray | None = None  # (n_sets, n_x), where searches have ended: they are only polished
+    settled: Settled | None = None  # rows that may stand for samples, if they are known
+    below: Settled | None = None  # rows that do stand for samples, which the parts do not have any more
 
     @property
     def n_x(self) -> int:
@@ -64,14 +69,15 @@ class Problem:
 
     @cached_property
     def y(self) -> FloatArray:
-        return np.concatenate([part.record.y for part in self.parts])
+        below = [] if self.below is None else [self.below.target]
+        return np.concatenate([*(part.record.y for part in self.parts), *below])
 
     @cached_property
     def weights(self) -> FloatArray:
         """Weight of each sample in the sum of squares (n_samples,), zero for one that is left out."""
-        return np.concatenate(
-            [np.ones(len(part.record)) if part.weights is None else part.weights for part in self.parts]
-        )
+        below = [] if self.below is None else [np.ones(self.below.target.size)]
+        own = [np.ones(len(part.record)) if part.weights is None else part.weights for part in self.parts]
+        return np.concatenate([*own, *below])
 
     @property
     def n_samples(self) -> int:
@@ -81,6 +87,8 @@ class Problem:
     @cached_property
     def scale(self) -> float:
         """Size of the outputs [unit of y]."""
+        if self.below is not None:
+            return self.below.scale
         return float(np.abs(self.y).max()) or 1.0
 
     @cached_property
@@ -95,7 +103,7 @@ class Problem:
         through the same memories at the samples that remain, except for reversals of less than 1 % of the span.
         """
         parts = tuple(_thinned(part, samples) for part in self.parts)
-        short = replace(self, parts=parts, simpler=self.simpler and self.simpler.thinned(samples))
+        short = replace(self, parts=parts, simpler=self.simpler and self.simpler.thinned(samples), settled=None)
         if 2 * sum(len(part.record) for part in parts) > self.y.size:
             return None
         try:
@@ -103,6 +111,37 @@ class Problem:
         except ValueError:  # the records have no time any more
             return None
         return short
+
+    def with_settled(self, known: Settled | None = None) -> "Problem":
+        """This problem with the rows that may stand for samples: the `known` ones of a problem of the same columns."""
+        if known is not None and known.names == self.space.linear:
+            return replace(self, settled=known)
+        if not isinstance(self.family, Forgetting):
+            return self
+        records = [part.record for part in self.parts]
+        first = tuple(max(_FEWEST, self.family.forgotten(record, self.own)) for record in records)
+        if sum(len(record) - k for record, k in zip(records, first, strict=True)) < 2 * (len(self.space.linear) + 1):
+            return self
+        columns, fixed_part = self.split(0.5 * (self.space.lower + self.space.upper)[np.newaxis])
+        is_later = np.concatenate([np.arange(len(record)) >= k for record, k in zip(records, first, strict=True)])
+        root = np.sqrt(self.weights[is_later])
+        target = root * (self.y - fixed_part)[:, is_later]
+        rows, short = triangle(root[:, np.newaxis] * columns[:, is_later], target)
+        return replace(self, settled=Settled(first, self.space.linear, rows[0], short[0], self.scale))
+
+    def condensed(self) -> "Problem":
+        """This problem with the same sums of squares on fewer rows, where no coordinate has an effect on many samples.
+
+        It has no record to look at any more: it is for searches alone.
+        """
+        settled = self.with_settled().settled if self.settled is None and self.below is None else self.settled
+        if settled is None:
+            return self
+        parts = (
+            replace(part, record=part.record[:k], weights=None if part.weights is None else part.weights[:k])
+            for part, k in zip(self.parts, settled.first, strict=True)
+        )
+        return replace(self, parts=tuple(parts), settled=None, below=settled)
 
     def within(self, budget: Budget | None) -> "Problem":
         """This problem with a budget, which it shares with the simpler one."""
@@ -186,7 +225,9 @@ class Problem:
             self.budget.take(len(x), self.y.size)
         n_linear = len(self.space.linear)
         columns = np.zeros((len(x), self.y.size, n_linear))
-        fixed_part = np.empty((len(x), self.y.size))
+        fixed_part = np.zeros((len(x), self.y.size))
+        if self.below is not None:
+            columns[:, self.cuts[-1] :] = self.below.columns
         for k, part in enumerate(self.parts):
             samples = slice(self.cuts[k], self.cuts[k + 1])
             parameters = self.parameters(x, k)
@@ -260,20 +301,15 @@ class Problem:
         normalised = columns / norms[:, np.newaxis, :]
         if self.space.bounds:
             return self._bounded(normalised, target, norms)
-        basis, singular, right = np.linalg.svd(normalised, full_matrices=False)
-        inverse = np.where(singular > _RANK, 1.0 / np.maximum(singular, _RANK), 0.0)
-        projected = inverse[..., np.newaxis] * (basis.transpose(0, 2, 1) @ target[..., np.newaxis])
-        return np.asarray((right.transpose(0, 2, 1) @ projected)[..., 0] / norms)
+        return np.asarray(least_squares(normalised, target) / norms)
 
     def _bounded(self, columns: FloatArray, target: FloatArray, norms: FloatArray) -> FloatArray:
         from scipy.optimize import lsq_linear
 
         lower, upper = self.linear_box()
-        basis, triangle = np.linalg.qr(columns)  # the same problem with as many equations as unknowns
-        short = (basis.transpose(0, 2, 1) @ target[..., np.newaxis])[..., 0]
         solutions = [
             lsq_linear(one, goal, bounds=(lower * norm, upper * norm), method="bvls").x / norm
-            for one, goal, norm in zip(triangle, short, norms, strict=True)
+            for one, goal, norm in zip(*triangle(columns, target), norms, strict=True)
         ]
         return np.array(solutions).reshape(len(columns), lower.size)
 

@@ -30,6 +30,7 @@ N_STAGED = 3  # points of a stage that are polished
 N_POLISHED_WHOLE = 3  # optima of a thinned record that descend on all samples
 N_BRIEF_SCREENED = 512
 N_BRIEF_DESCENDING = 12
+N_BRIEF_WHOLE = 4  # steps on all samples
 _LONG = 512  # samples beyond which fewer points are tried: each costs more, and longer records have fewer optima
 _SHORT = 250  # samples of a thinned record beside its reversals
 _APART = 0.05  # distance of two starts, in units of the box, under which the better one stands for both
@@ -102,11 +103,17 @@ def optima(
     space = problem.space
     if not space.coordinates:
         return polish(problem, np.empty((1, 0)))
+    if problem.ends is not None:
+        condensed = problem.condensed()
+        return _distinct(
+            polish(condensed, _apart(space, problem.ends, condensed.costs(problem.ends), _SAME, N_POLISHED_WHOLE))
+        )
     if problem.y.size > _LONG and (short := problem.thinned(_SHORT)) is not None:
         likely = optima(short, seed=seed, progress=progress, known=known, may_end=may_end)[:N_POLISHED_WHOLE]
         if likely and likely[0].is_simpler:
             return _as_they_are(problem, np.array([each.x for each in likely]))
         return _distinct(polish(problem, np.array([each.x for each in likely]))) if likely else []
+    problem = problem.condensed()
     if known is None and problem.simpler is not None:
         known = optima(problem.simpler, seed=seed)
     begun = problem.begun(np.array([each.x for each in known[:N_NESTED]])) if known else np.empty((0, problem.n_x))
@@ -144,22 +151,38 @@ def brief_cost(problem: Problem) -> float:
 
 def brief_optimum(problem: Problem) -> tuple[FloatArray, float]:
     """Coordinates (n_x,) at which a short search ends, and the sum of squares there; inf if every set diverges."""
-    space = problem.space
+    ends, costs = brief_optima(problem)
+    return ends[0], float(costs[0])
+
+
+def brief_optima(problem: Problem) -> tuple[FloatArray, FloatArray]:
+    """Distinct ends (n_sets, n_x) of a short search, at least one, and sums of squares (n_sets,), the best first.
+
+    On a long record the sums of squares are estimates by fewer samples, unless few rows stand for all of them.
+    """
+    space, condensed = problem.space, problem.condensed()
     if problem.y.size > _LONG and (short := problem.thinned(_SHORT)) is not None:
-        x, cost = brief_optimum(short)
-        return x, cost * problem.y.size / short.y.size
+        if condensed is problem:
+            ends, costs = brief_optima(short)
+            return ends, costs * problem.y.size / short.y.size
+        ends = brief_optima(short)[0] if space.coordinates else np.empty((1, 0))
+        reached = _descended(condensed, ends[:1], exact=False, steps=N_BRIEF_WHOLE)
+        ends[0] = reached.theta[0, : condensed.n_x]
+        return ends, condensed.costs(ends)
+    problem = condensed
     if not space.coordinates:
-        return np.empty(0), float(problem.costs(np.empty((1, 0)))[0])
+        return np.empty((1, 0)), problem.costs(np.empty((1, 0)))
     screened = N_BRIEF_SCREENED if space.screened is None else min(space.screened, N_BRIEF_SCREENED)
     best = _starts(problem, screened, 0, N_BRIEF_DESCENDING, space.starts, are_kept=False)
     if not len(best):
-        return 0.5 * (space.lower + space.upper), math.inf
-    ends = _descended(problem, best, exact=False).theta[:, : problem.n_x]
-    costs = problem.costs(ends)
-    return ends[np.argmin(costs)], float(costs.min())
+        return 0.5 * (space.lower + space.upper)[np.newaxis], np.array([math.inf])
+    reached = _descended(problem, best, exact=False)
+    ends = _apart(space, reached.theta[:, : problem.n_x], reached.loss, _SAME, N_POLISHED_WHOLE)
+    return (ends, problem.costs(ends)) if len(ends) else (best[:1], np.array([math.inf]))
 
 
 def polish(problem: Problem, starts: FloatArray) -> list[Optimum]:
+    problem = problem.condensed()
     if (rough := problem.rough()) is not problem and len(starts):
         starts = _descended(problem, starts, exact=True, nearly=rough).theta[:, : starts.shape[1]]
     reached = _descended(problem, starts, exact=True)

@@ -67,7 +67,7 @@ class Search:
             if np.all(x >= lower) and np.all(x <= upper):
                 continue
             box = replace(space, lower=lower, upper=upper, starts=np.clip(space.starts, lower, upper), regions={})
-            inside = replace(self, problem=replace(self.problem, space=box))
+            inside = replace(self, problem=replace(self.problem, space=box, ends=None))
             if self.problem.budget is not None and self.problem.budget.cut:
                 continue
             if squares := optima(inside.problem, seed=self.seed):
@@ -220,7 +220,7 @@ class Search:
         if len(draws):
             lower, upper = np.quantile(loop_widths(self.descent, draws), TAILS).tolist()
         else:
-            reach = self._quantile() * width_stderr(self.descent, theta, known.of_theta)
+            reach = self._quantile() * width_stderr(self.problem, theta, known.of_theta)
             lower, upper = width - reach, width + reach
         return Width(value=width, lower=lower, upper=upper)
 

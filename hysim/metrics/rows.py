@@ -22,6 +22,20 @@ class LoopRows:
 
     def max_width(self, y: FloatArray) -> FloatArray:
         """Largest magnitude of the width of each row, shape (n_sets,)."""
+        widths: FloatArray = np.abs(self._widths(y)).max(axis=1)
+        return widths
+
+    def max_width_slopes(self, y: FloatArray, slopes: FloatArray) -> FloatArray:
+        """Derivatives (n,) of the largest width of the one output `y` (n_samples,), for those of y, (n, n_samples).
+
+        Widths are linear in the output: the derivative is that of the width at the input where it is largest.
+        """
+        widths = self._widths(np.concatenate([y[np.newaxis], slopes]))
+        largest = int(np.argmax(np.abs(widths[0])))
+        return np.asarray(np.sign(widths[0, largest]) * widths[1:, largest])
+
+    def _widths(self, y: FloatArray) -> FloatArray:
+        """Width of each row at common inputs, (n_sets, n_inputs)."""
         loops = measured_cycles(self.u, 1, TOLERANCE)
         u, rows = loops.of(self.u), loops.of(y)
         branches = [(part, settled(u[part])) for part in (loops.cycles[0].unloading, loops.cycles[0].loading)]
@@ -30,8 +44,7 @@ class LoopRows:
         outputs = [
             _interpolated(grid, x, rows[:, part][:, order]) for x, (part, order) in zip(inputs, branches, strict=True)
         ]
-        widths: FloatArray = np.abs(outputs[0] - outputs[1]).max(axis=1)
-        return widths
+        return np.asarray(outputs[0] - outputs[1])
 
     def area(self, y: FloatArray) -> FloatArray:
         """Enclosed area of each row, shape (n_sets,)."""

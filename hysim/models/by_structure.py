@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from hysim._frozen import FloatArray
-from hysim.models.protocols import Identifiable, Undecided, Variant
+from hysim.models.protocols import Forgetting, Identifiable, LongerPast, Undecided, Variant
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
@@ -46,3 +46,13 @@ class ByStructure(ABC):
         """Further choices that the record decides."""
         structure = self.as_structure()
         return structure.variants() if isinstance(structure, Undecided) else ()
+
+    def longer_past(self) -> Any | None:
+        """The structure with one number more for a free state."""
+        structure = self.as_structure()
+        return structure.longer_past() if isinstance(structure, LongerPast) else None
+
+    def forgotten(self, record: Record, space: SearchSpace) -> int:
+        """The first sample from which on no coordinate and no state before it has an effect."""
+        structure = self.as_structure()
+        return structure.forgotten(record, space) if isinstance(structure, Forgetting) else len(record)

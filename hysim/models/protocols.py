@@ -175,6 +175,25 @@ class Undecided(Protocol):
 
 
 @runtime_checkable
+class Forgetting(Protocol):
+    """A family whose columns depend, from some sample on, on the input since the first sample alone."""
+
+    def forgotten(self, record: Record, space: SearchSpace) -> int:
+        """The first sample from which on neither a coordinate of `space` nor a state or variant has an effect.
+
+        It is the number of samples where there is none.
+        """
+
+
+@runtime_checkable
+class LongerPast(Protocol):
+    """A family whose free state at the first sample can be described by more numbers; the BIC decides how many."""
+
+    def longer_past(self) -> Any | None:
+        """The family with one number more, which contains this one; None where there is none."""
+
+
+@runtime_checkable
 class Staged(Protocol):
     """A subject of `identify` that says how its search is staged; see `hysim.models.stages`."""
 

@@ -9,19 +9,23 @@ loop in one sense. Without it least squares fit noise by weights of alternating 
 inverse; a loop that crosses itself or bends the other way needs both signs. By default the record decides.
 
 The memory of many plays is as many unknowns, which no record determines. With ``initial="rest"`` the plays stand at
-zero before the first sample, with ``"still"`` at the first input. With ``"free"`` the memory is that of a single former
-turning point, the stroke from rest at zero to `turn`:
+zero before the first sample, with ``"still"`` at the first input. With ``"free"`` the memory is that of former turning
+points: the stroke from rest at zero to the oldest, `turn_2` or further back, and so on to the last one, `turn`. For one
 
     z_i = sign(turn) max(|turn| - r_i, 0)
 
-It holds for every record that begins at rest or at a turning point of its cycle, or in a cycle about zero; any other
-steady cycle is ``"periodic"``: the positions that the cycle leaves behind. By default the record decides.
+One holds for every record that begins at rest or at a turning point of its cycle, or in a cycle about zero; cycles that
+faded or grew before the record need more. Any other steady cycle is ``"periodic"``: the positions that the cycle leaves
+behind. By default the record decides, also how many former turning points there are.
+
+Once the input has moved by twice the largest threshold all of this is forgotten: what follows is the same for every
+past, and for weights of any sign.
 """
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, replace
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -35,7 +39,10 @@ from hysim.records import Record
 
 TURN = "turn"
 BANK_STATES = ("rest", "still", "periodic", "free")
-_LEVELS = 9  # of the former turning point, from which the search begins
+_LEVELS = 33, 9  # of a single former turning point, and of one beside others, from which the search begins
+_SIZES = (0.2, 0.4, 0.6, 0.8, 1.0, 1.3)  # of several about the middle of the input, in half spans, likewise
+_MOST_TURNS = 4  # more are seldom determined
+_ROUNDING = 1e-9  # of a threshold
 
 
 class Axis(NamedTuple):
@@ -50,6 +57,8 @@ class Axis(NamedTuple):
 @checked
 class Pushing:
     """The search for the way in which the input pushes plays; here it pushes them itself."""
+
+    by_input: ClassVar[bool] = True  # whether the input itself pushes
 
     def axes(self, record: Record) -> dict[str, Axis]:
         """Coordinates beside thresholds and turning point, by name."""
@@ -77,6 +86,7 @@ class ClampStructure(Identifiable, Composable):
     plays: int = 10
     one_signed: bool | None = None
     against: bool = False  # whether weights of one sign turn against the loop of the record
+    turns: int = 1  # former turning points that describe a free memory
     pushing: Pushing = Pushing()
 
     def __post_init__(self) -> None:
@@ -88,27 +98,29 @@ class ClampStructure(Identifiable, Composable):
         half = spans(record)["h"]
         thresholds = self._thresholds(half)
         names, columns = self._names("thresholds", thresholds.size), self._columns(thresholds.size)
-        first, axes = float(record.u[0]), self.pushing.axes(record)
+        first, axes, turns = float(record.u[0]), self.pushing.axes(record), _turns(self.turns)
         defaults = {
             **dict(zip(names, thresholds.tolist(), strict=True)),
             **{name: axis.starts[0] for name, axis in axes.items()},
             **dict.fromkeys(columns, 0.0),
-            TURN: first,
+            **dict.fromkeys(turns, first),
         }
-        chosen = freedom.held(defaults, at_rest=(TURN,) if freedom.starts_at_rest("rest") else ())
+        chosen = freedom.held(defaults, at_rest=turns if freedom.starts_at_rest("rest") else ())
         held = {name: defaults[name] for name in names if name not in freedom.free} | chosen
         limits = freedom.limits(defaults, held)
         gaps = zip(names, _gaps(thresholds), strict=True)
         box = [
             *(Coordinate(name, *gap, half) for name, gap in gaps),
-            Coordinate(TURN, first - 2.0 * half, first + 2.0 * half, half),
+            *(Coordinate(turn, first - 2.0 * half, first + 2.0 * half, half) for turn in turns),
         ]
         box += [Coordinate(name, axis.lower, axis.upper, axis.scale) for name, axis in axes.items()]
-        starts = {TURN: tuple(first + half * np.linspace(-2.0, 2.0, _LEVELS))} | {
-            name: axis.starts for name, axis in axes.items()
-        }
-        starts = {name: values for name, values in starts.items() if name not in held}
-        points = [dict(zip(starts, values, strict=True)) for values in itertools.product(*starts.values())]
+        pasts = [point for point in _pasts(turns, record) if not set(turns) & set(held)] or [{}]
+        starts = {name: axis.starts for name, axis in axes.items() if name not in held}
+        points = [
+            past | dict(zip(starts, values, strict=True))
+            for past in pasts
+            for values in itertools.product(*starts.values())
+        ]
         signs = self._signs(record, dict(zip(self._names("weights", thresholds.size), thresholds, strict=True)))
         bounds = {name: pair for name, pair in signs.items() if name in columns and name not in held}
         space = space_of(
@@ -119,8 +131,8 @@ class ClampStructure(Identifiable, Composable):
             limits,
             points,
             bounds=bounds | {name: pair for name, pair in limits.items() if name in columns},
-            state=(TURN,),
-            screened=64 if {each.name for each in box} - set(held) <= {TURN, *axes} else 256,
+            state=turns,
+            screened=_screened({each.name for each in box} - set(held), turns, axes),
         )
         return replace(space, parameters=lambda x: self._with_derived(space.parameters(x), record))
 
@@ -167,6 +179,19 @@ class ClampStructure(Identifiable, Composable):
         """Weights of one sign, of that of the record's loop or the other, or of both."""
         return variants_of_sign(self, self.one_signed)
 
+    def longer_past(self) -> "ClampStructure | None":
+        """With one former turning point more."""
+        may_be_longer = self.turns < _MOST_TURNS and self.pushing.by_input
+        return replace(self, turns=self.turns + 1) if may_be_longer else None
+
+    def forgotten(self, record: Record, space: SearchSpace) -> int:
+        """The first sample at which the input has pushed every play from both sides."""
+        if not self.pushing.by_input or not set(space.coordinates) <= {*space.state}:
+            return len(record)
+        widest = 2.0 * max((value for name, value in space.held.items() if name.startswith(self._prefix)), default=0.0)
+        moved = np.maximum.accumulate(record.u) - np.minimum.accumulate(record.u)
+        return int(np.count_nonzero(moved <= widest * (1.0 + _ROUNDING)))
+
     def _thresholds(self, half: float) -> FloatArray:
         """The structure's own, or even steps: from zero for plays, up to the end for stops, which vanish at zero."""
         if self.thresholds:
@@ -178,21 +203,29 @@ class ClampStructure(Identifiable, Composable):
         own = {"thresholds": self.law.thresholds_name, "weights": self.law.weights_name}
         return tuple(f"{own.get(what, what)}[{k}]" for k in range(count))
 
+    @property
+    def _prefix(self) -> str:
+        return f"{self.law.thresholds_name}["
+
     def _columns(self, count: int) -> tuple[str, ...]:
         static = ("feedthrough",) if _has_feedthrough(self.law) else ()
         return (*self._names("weights", count), *static, "offset")
 
     def _elements(self, parameters: Parameters) -> tuple[FloatArray, FloatArray]:
         """Thresholds and initial positions, shape (n_sets, n_plays) each."""
-        count = sum(name.startswith(f"{self.law.thresholds_name}[") for name in parameters)
+        count = sum(name.startswith(self._prefix) for name in parameters)
         n_sets = max((np.size(value) for value in parameters.values()), default=1)
 
         def table(what: str) -> FloatArray:
-            columns = [np.broadcast_to(np.ravel(parameters[name]), n_sets) for name in self._names(what, count)]
-            return np.stack(columns, axis=1)
+            values = np.empty((n_sets, count))
+            for column, name in zip(values.T, self._names(what, count), strict=True):
+                column[:] = parameters[name]
+            return values
 
         thresholds = table("thresholds")
-        return thresholds, table("z0") if "z0[0]" in parameters else _after(parameters.get(TURN, 0.0), thresholds)
+        if "z0[0]" in parameters:
+            return thresholds, table("z0")
+        return thresholds, _after([parameters[turn] for turn in _turns(self.turns) if turn in parameters], thresholds)
 
     def _signs(self, record: Record, thresholds: Mapping[str, float]) -> dict[str, tuple[float, float]]:
         """Bounds at zero of the weights that turn the loop."""
@@ -203,10 +236,36 @@ class ClampStructure(Identifiable, Composable):
         return {name: side for name, threshold in thresholds.items() if threshold > 0.0}
 
 
-def _after(turn: Any, thresholds: FloatArray) -> FloatArray:
-    """Positions (n_sets, n_plays) after the way from rest at zero to `turn`, shape (n_sets,)."""
-    level = np.ravel(turn)[:, np.newaxis]
-    return np.asarray(np.sign(level) * np.maximum(np.abs(level) - thresholds, 0.0))
+def _screened(searched: set[str], turns: Sequence[str], axes: Iterable[str]) -> int:
+    """Random points beside the starts; none where these lie close."""
+    if searched <= {*turns}:
+        return 0
+    return 64 if searched <= {*turns, *axes} else 256
+
+
+def _turns(count: int) -> tuple[str, ...]:
+    """Names of the former turning points, the last one first."""
+    return (TURN, *(f"{TURN}_{k}" for k in range(2, count + 1)))
+
+
+def _pasts(turns: Sequence[str], record: Record) -> list[dict[str, float]]:
+    """Former turning points from which a search begins: single ones, or cycles that faded towards the first sample."""
+    half, first = spans(record)["h"], float(record.u[0])
+    levels = first + half * np.linspace(-2.0, 2.0, _LEVELS[len(turns) > 1])
+    middle = 0.5 * float(record.u.min() + record.u.max())
+    sides = middle + half * (-1.0) ** np.arange(len(turns)) * np.array([[-1.0], [1.0]])
+    fading = [middle + np.array(sizes) * (sides - middle) for sizes in itertools.combinations(_SIZES, len(turns))]
+    every = np.concatenate([np.tile(levels[:, np.newaxis], len(turns)), *(fading if len(turns) > 1 else [])])
+    return [dict(zip(turns, past, strict=True)) for past in every.tolist()]
+
+
+def _after(turns: Sequence[Any], thresholds: FloatArray) -> FloatArray:
+    """Positions (n_sets, n_plays) after the way from rest at zero through `turns`, (n_sets,) each, the last first."""
+    z = np.zeros_like(thresholds)
+    for turn in reversed(turns):
+        level = np.ravel(turn)[:, np.newaxis]
+        z = np.minimum(np.maximum(z, level - thresholds), level + thresholds)
+    return z
 
 
 def _gaps(thresholds: FloatArray) -> list[tuple[float, float]]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -151,6 +151,7 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
 class Envelopes(Pushing):
     """The search for envelopes, unless the left one is known."""
 
+    by_input: ClassVar[bool] = False
     left: tuple[float, ...] = ()
     right: tuple[float, ...] = ()
     count: int = 1

@@ -294,6 +294,7 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
 class Widening(Pushing):
     """The search for beta, from a law's own or from none."""
 
+    by_input: ClassVar[bool] = False
     beta: float | None = None
 
     def axes(self, record: Record) -> dict[str, Axis]:
