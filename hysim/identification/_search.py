@@ -36,7 +36,11 @@ _APART = 0.05  # distance of two starts, in units of the box, under which the be
 _SAME = 0.01  # likewise of two points after the descent
 _GAIN = 1e-5  # share of the sum of squares: a descent that gains less rests
 _TOLERANCE = 2e-8  # likewise of a polish
+_PASSES = 4  # of a polish with the slopes of the rough law
+_PASSED = 1e-6  # share of the sum of squares: a step that gains less ends a pass, a pass the polish
+_RIVAL = 20.0  # log-likelihood below the best optimum's, from which on an optimum is not within the noise
 _ROUGH = 0.1  # share of the cost by which the rough law's may differ: beyond, it does not say what stays
+NOT_YET, NEARLY, FULLY = range(3)  # as far as optima of a law with a rough one are polished
 PERFECT = 1e-14  # smallest sigma, in units of the output's size
 
 
@@ -65,12 +69,16 @@ def chosen(
         n_samples, n_names = problem.n_samples, len(problem.space.names)
         if n_names > n_samples and problem is not problems[0]:
             break
-        known = optima(problem, seed=seed, progress=progress, known=known, may_end=problem is not problems[0])
+        may_end = problem is not problems[0]
+        known = optima(problem, seed=seed, progress=progress, known=known, may_end=may_end, to=NEARLY)
         if known:
             cost = max(known[0].cost, n_samples * (PERFECT * problem.scale) ** 2)
             criterion = information(cost / n_samples, n_samples, n_names)
             best = min(best, (criterion, problem, known), key=lambda each: each[0])
-    return best[1:]
+    _, problem, likely = best
+    if problem.rough() is not problem and likely:
+        likely = _distinct(polish(problem, np.array([each.x for each in likely])))
+    return problem, likely
 
 
 def stages_in_words(problems: Sequence[Problem], best: Problem) -> str:
@@ -93,20 +101,23 @@ def optima(
     progress: Progress | None = None,
     known: Sequence[Optimum] | None = None,
     may_end: bool = False,
+    to: int = FULLY,
 ) -> list[Optimum]:
     """Distinct local optima, best first; empty if every parameter set diverges.
 
     `known` are those of the simpler problem, which is searched without them. If it `may_end`, a stage that will not
-    lower the Bayesian information criterion is not searched to its end.
+    lower the Bayesian information criterion is not searched to its end. `to` is that of `polish`.
     """
     space = problem.space
     if not space.coordinates:
         return polish(problem, np.empty((1, 0)))
     if problem.y.size > _LONG and (short := problem.thinned(_SHORT)) is not None:
-        likely = optima(short, seed=seed, progress=progress, known=known, may_end=may_end)[:N_POLISHED_WHOLE]
+        likely = optima(short, seed=seed, progress=progress, known=known, may_end=may_end, to=NOT_YET)[
+            :N_POLISHED_WHOLE
+        ]
         if likely and likely[0].is_simpler:
             return _as_they_are(problem, np.array([each.x for each in likely]))
-        return _distinct(polish(problem, np.array([each.x for each in likely]))) if likely else []
+        return _distinct(polish(problem, np.array([each.x for each in likely]), to)) if likely else []
     if known is None and problem.simpler is not None:
         known = optima(problem.simpler, seed=seed)
     begun = problem.begun(np.array([each.x for each in known[:N_NESTED]])) if known else np.empty((0, problem.n_x))
@@ -114,7 +125,7 @@ def optima(
         points = _staged(problem, problem.stage, begun, seed)
         if may_end and len(begun) and not _may_stay(problem, begun, points):
             return _as_they_are(problem, begun)
-        return _distinct(polish(problem, points))
+        return _distinct(polish(problem, points, to))
     share = min(1.0, _LONG / problem.y.size)
     screened = max(256, round(N_SCREENED * share)) if space.screened is None else space.screened
     n_starts = max(16, round(N_DESCENDING * share))
@@ -127,7 +138,7 @@ def optima(
     best = _apart(space, reached.theta[:, : problem.n_x], reached.loss, _SAME, N_POLISHED)
     report = progress or (lambda done, total: None)
     report(1, 2)
-    polished = polish(problem, best) if len(best) else []
+    polished = polish(problem, best, to) if len(best) else []
     report(2, 2)
     return _distinct(polished)
 
@@ -159,15 +170,52 @@ def brief_optimum(problem: Problem) -> tuple[FloatArray, float]:
     return ends[np.argmin(costs)], float(costs.min())
 
 
-def polish(problem: Problem, starts: FloatArray) -> list[Optimum]:
-    if (rough := problem.rough()) is not problem and len(starts):
-        starts = _descended(problem, starts, exact=True, nearly=rough).theta[:, : starts.shape[1]]
-    reached = _descended(problem, starts, exact=True)
+def polish(problem: Problem, starts: FloatArray, to: int = FULLY) -> list[Optimum]:
+    """The ends of descents from `starts` (n_sets, n_x); where the law has a rough one, `to` says how far they go."""
+    rough = problem.rough()
+    if rough is problem or not len(starts):
+        reached = _descended(problem, starts, exact=True)
+    elif to == NOT_YET:
+        return _as_they_are(problem, starts, is_simpler=False)
+    else:
+        reached = _descended(problem, starts, exact=True, nearly=rough, gain=_PASSED)
+        reached = _amended(problem, rough, reached) if to == FULLY else reached
     x = reached.theta[:, : starts.shape[1]]
     costs = problem.costs(x)
     return [
         Optimum(x[k], float(costs[k]), bool(reached.at_rest[k])) for k in np.flatnonzero(np.isfinite(costs)).tolist()
     ]
+
+
+def _amended(problem: Problem, rough: Problem, reached: Reached) -> Reached:
+    """Ends of passes with the slopes of the rough law, plus those of the law minus those of the rough at the start.
+
+    A step of a pass needs one exact set, and the beginning of a pass one for each coordinate. The last pass is that of
+    the best optimum alone.
+    """
+    for _ in range(_PASSES):
+        before = reached.loss.min()
+        reached = _pass(problem, rough, reached.theta, gain=_PASSED, hopeless=float(before) + _RIVAL)
+        if not reached.loss.min() < before - 0.5 * problem.y.size * _PASSED:
+            break
+    best = [int(reached.loss.argmin())]
+    last = _pass(problem, rough, reached.theta[best], gain=_TOLERANCE)
+    for values, others in zip(last, reached, strict=True):
+        others[best] = values
+    return reached
+
+
+def _pass(problem: Problem, rough: Problem, theta: FloatArray, *, gain: float, hopeless: float = math.inf) -> Reached:
+    amended = _slopes(problem, theta) - _slopes(rough, theta)
+    x = theta[:, : problem.n_x]
+    return _descended(problem, x, exact=True, nearly=rough, amended=amended, gain=gain, hopeless=hopeless)
+
+
+def _slopes(problem: Problem, theta: FloatArray) -> FloatArray:
+    """Slopes of the outputs by the coordinates, (n_sets, n_samples, n_x)."""
+    descent = Descent(problem, Gaussian(0.0), problem.y[np.newaxis], np.ones((1, problem.y.size)))
+    nothing = np.empty((len(theta), problem.y.size, 0))
+    return descent.slopes(theta, problem.model(theta), nothing)
 
 
 def _staged(problem: Problem, stage: Stage, begun: FloatArray, seed: int) -> FloatArray:
@@ -186,8 +234,9 @@ def _staged(problem: Problem, stage: Stage, begun: FloatArray, seed: int) -> Flo
     return _apart(space, points, cost, _SAME, N_STAGED)
 
 
-def _as_they_are(problem: Problem, x: FloatArray) -> list[Optimum]:
-    return _distinct([Optimum(each, float(cost), True, True) for each, cost in zip(x, problem.costs(x), strict=True)])
+def _as_they_are(problem: Problem, x: FloatArray, *, is_simpler: bool = True) -> list[Optimum]:
+    costs = problem.costs(x).tolist()
+    return _distinct([Optimum(each, cost, True, is_simpler) for each, cost in zip(x, costs, strict=True)])
 
 
 def _may_stay(problem: Problem, begun: FloatArray, points: FloatArray) -> bool:
@@ -203,12 +252,21 @@ def _may_stay(problem: Problem, begun: FloatArray, points: FloatArray) -> bool:
 
 
 def _descended(
-    problem: Problem, starts: FloatArray, *, exact: bool, steps: int = N_STEPS, nearly: Problem | None = None
+    problem: Problem,
+    starts: FloatArray,
+    *,
+    exact: bool,
+    steps: int = N_STEPS,
+    nearly: Problem | None = None,
+    amended: FloatArray | None = None,
+    gain: float | None = None,
+    hopeless: float = np.inf,
 ) -> Reached:
     noise, everything = Gaussian(floor=PERFECT * problem.scale), np.ones((1, problem.y.size))
-    descent = Descent(problem, noise, problem.y[np.newaxis], everything, not problem.space.bounds, nearly)
-    gain, most = (_TOLERANCE, N_POLISHING) if exact else (_GAIN, steps)
-    return descent.run(problem.completed(starts), tolerance=0.5 * problem.y.size * gain, steps=most)
+    descent = Descent(problem, noise, problem.y[np.newaxis], everything, not problem.space.bounds, nearly, amended)
+    least, most = (_TOLERANCE, N_POLISHING) if exact else (_GAIN, steps)
+    tolerance = 0.5 * problem.y.size * (gain or least)
+    return descent.run(problem.completed(starts), tolerance=tolerance, steps=most, hopeless=hopeless)
 
 
 def _starts(
