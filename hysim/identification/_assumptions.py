@@ -125,8 +125,8 @@ def _decided(
         states = [None] if told else [*_possible(family, records)] or [None]
     variants = family.variants() or (Variant(family, ""),)
     if len(states) == len(variants) == 1:
-        only = problem(variants[0].family, records, freedom, states[0]).weighted(weights)
-        return Decision([only], states[0], "")
+        chain = problems(variants[0].family, records, freedom, states[0])
+        return Decision([each.weighted(weights) for each in chain], states[0], "")
     trials: dict[tuple[int, int], _Trial] = {}
     brief = None if max_evaluations is None else max_evaluations / (2 * (len(states) + len(variants)))
 

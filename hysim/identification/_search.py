@@ -36,7 +36,10 @@ _APART = 0.05  # distance of two starts, in units of the box, under which the be
 _SAME = 0.01  # likewise of two points after the descent
 _GAIN = 1e-5  # share of the sum of squares: a descent that gains less rests
 _TOLERANCE = 2e-8  # likewise of a polish
-_PASSES = 4  # of a polish with the slopes of the rough law
+_PASS = 60  # steps of a pass, in which the slopes of a law are those of the rough one, amended
+_PASSES_OF_ALL = 2
+_PASSES = 3  # of the best alone
+_LAST = 25  # steps with exact slopes
 _PASSED = 1e-6  # share of the sum of squares: a step that gains less ends a pass, a pass the polish
 _RIVAL = 20.0  # log-likelihood below the best optimum's, from which on an optimum is not within the noise
 _ROUGH = 0.1  # share of the cost by which the rough law's may differ: beyond, it does not say what stays
@@ -76,9 +79,7 @@ def chosen(
             criterion = information(cost / n_samples, n_samples, n_names)
             best = min(best, (criterion, problem, known), key=lambda each: each[0])
     _, problem, likely = best
-    if problem.rough() is not problem and likely:
-        likely = _distinct(polish(problem, np.array([each.x for each in likely])))
-    return problem, likely
+    return problem, polish_on(problem, likely)
 
 
 def stages_in_words(problems: Sequence[Problem], best: Problem) -> str:
@@ -178,37 +179,59 @@ def polish(problem: Problem, starts: FloatArray, to: int = FULLY) -> list[Optimu
     elif to == NOT_YET:
         return _as_they_are(problem, starts, is_simpler=False)
     else:
-        reached = _descended(problem, starts, exact=True, nearly=rough, gain=_PASSED)
-        reached = _amended(problem, rough, reached) if to == FULLY else reached
-    x = reached.theta[:, : starts.shape[1]]
+        reached = _descended(problem, starts, exact=True, nearly=rough, gain=_PASSED, steps=_PASS)
+        reached = _amended(problem, rough, reached.theta) if to == FULLY else reached
+    return _optima(problem, reached)
+
+
+def polish_on(problem: Problem, optima: Sequence[Optimum]) -> list[Optimum]:
+    """The optima that were polished nearly, now fully."""
+    rough = problem.rough()
+    if rough is problem or not optima:
+        return list(optima)
+    theta = problem.completed(np.array([each.x for each in optima]))
+    return _distinct(_optima(problem, _amended(problem, rough, theta)))
+
+
+def _optima(problem: Problem, reached: Reached) -> list[Optimum]:
+    x = reached.theta[:, : problem.n_x]
     costs = problem.costs(x)
     return [
         Optimum(x[k], float(costs[k]), bool(reached.at_rest[k])) for k in np.flatnonzero(np.isfinite(costs)).tolist()
     ]
 
 
-def _amended(problem: Problem, rough: Problem, reached: Reached) -> Reached:
+def _amended(problem: Problem, rough: Problem, theta: FloatArray) -> Reached:
     """Ends of passes with the slopes of the rough law, plus those of the law minus those of the rough at the start.
 
-    A step of a pass needs one exact set, and the beginning of a pass one for each coordinate. The last pass is that of
-    the best optimum alone.
+    A step of a pass needs one exact set, and the beginning of a pass one for each coordinate. After the first passes
+    the best optimum descends alone, at last with its own slopes.
     """
-    for _ in range(_PASSES):
-        before = reached.loss.min()
-        reached = _pass(problem, rough, reached.theta, gain=_PASSED, hopeless=float(before) + _RIVAL)
-        if not reached.loss.min() < before - 0.5 * problem.y.size * _PASSED:
-            break
+    reached = _pass(problem, rough, theta, gain=_PASSED)
+    for _ in range(_PASSES_OF_ALL - 1):
+        hopeless = float(reached.loss.min()) + _RIVAL
+        reached = _pass(problem, rough, reached.theta, gain=_PASSED, hopeless=hopeless)
     best = [int(reached.loss.argmin())]
-    last = _pass(problem, rough, reached.theta[best], gain=_TOLERANCE)
-    for values, others in zip(last, reached, strict=True):
-        others[best] = values
+    for _ in range(_PASSES):
+        before = float(reached.loss[best[0]])
+        _replace(reached, best, _pass(problem, rough, reached.theta[best], gain=_TOLERANCE))
+        if not float(reached.loss[best[0]]) < before - 0.5 * problem.y.size * _PASSED:
+            break
+    rested = reached.at_rest[best]
+    _replace(reached, best, _descended(problem, reached.theta[best, : problem.n_x], exact=True, steps=_LAST))
+    reached.at_rest[best] |= rested
     return reached
+
+
+def _replace(reached: Reached, places: list[int], others: Reached) -> None:
+    for values, there in zip(reached, others, strict=True):
+        values[places] = there
 
 
 def _pass(problem: Problem, rough: Problem, theta: FloatArray, *, gain: float, hopeless: float = math.inf) -> Reached:
     amended = _slopes(problem, theta) - _slopes(rough, theta)
     x = theta[:, : problem.n_x]
-    return _descended(problem, x, exact=True, nearly=rough, amended=amended, gain=gain, hopeless=hopeless)
+    return _descended(problem, x, exact=True, nearly=rough, amended=amended, gain=gain, steps=_PASS, hopeless=hopeless)
 
 
 def _slopes(problem: Problem, theta: FloatArray) -> FloatArray:
@@ -256,7 +279,7 @@ def _descended(
     starts: FloatArray,
     *,
     exact: bool,
-    steps: int = N_STEPS,
+    steps: int | None = None,
     nearly: Problem | None = None,
     amended: FloatArray | None = None,
     gain: float | None = None,
@@ -264,9 +287,9 @@ def _descended(
 ) -> Reached:
     noise, everything = Gaussian(floor=PERFECT * problem.scale), np.ones((1, problem.y.size))
     descent = Descent(problem, noise, problem.y[np.newaxis], everything, not problem.space.bounds, nearly, amended)
-    least, most = (_TOLERANCE, N_POLISHING) if exact else (_GAIN, steps)
+    least, most = (_TOLERANCE, N_POLISHING) if exact else (_GAIN, N_STEPS)
     tolerance = 0.5 * problem.y.size * (gain or least)
-    return descent.run(problem.completed(starts), tolerance=tolerance, steps=most, hopeless=hopeless)
+    return descent.run(problem.completed(starts), tolerance=tolerance, steps=steps or most, hopeless=hopeless)
 
 
 def _starts(
