@@ -36,6 +36,7 @@ _APART = 0.05  # distance of two starts, in units of the box, under which the be
 _SAME = 0.01  # likewise of two points after the descent
 _GAIN = 1e-5  # share of the sum of squares: a descent that gains less rests
 _TOLERANCE = 2e-8  # likewise of a polish
+_BRIEF = 25  # steps on a thinned record
 _PASS = 60  # steps of a pass, in which the slopes of a law are those of the rough one, amended
 _PASSES_OF_ALL = 2
 _PASSES = 3  # of the best alone
@@ -43,7 +44,7 @@ _LAST = 25  # steps with exact slopes
 _PASSED = 1e-6  # share of the sum of squares: a step that gains less ends a pass, a pass the polish
 _RIVAL = 20.0  # log-likelihood below the best optimum's, from which on an optimum is not within the noise
 _ROUGH = 0.1  # share of the cost by which the rough law's may differ: beyond, it does not say what stays
-NOT_YET, NEARLY, FULLY = range(3)  # as far as optima of a law with a rough one are polished
+BRIEFLY, NEARLY, FULLY = range(3)  # as far as optima of a law with a rough one are polished
 PERFECT = 1e-14  # smallest sigma, in units of the output's size
 
 
@@ -113,7 +114,7 @@ def optima(
     if not space.coordinates:
         return polish(problem, np.empty((1, 0)))
     if problem.y.size > _LONG and (short := problem.thinned(_SHORT)) is not None:
-        likely = optima(short, seed=seed, progress=progress, known=known, may_end=may_end, to=NOT_YET)[
+        likely = optima(short, seed=seed, progress=progress, known=known, may_end=may_end, to=BRIEFLY)[
             :N_POLISHED_WHOLE
         ]
         if likely and likely[0].is_simpler:
@@ -176,10 +177,9 @@ def polish(problem: Problem, starts: FloatArray, to: int = FULLY) -> list[Optimu
     rough = problem.rough()
     if rough is problem or not len(starts):
         reached = _descended(problem, starts, exact=True)
-    elif to == NOT_YET:
-        return _as_they_are(problem, starts, is_simpler=False)
     else:
-        reached = _descended(problem, starts, exact=True, nearly=rough, gain=_PASSED, steps=_PASS)
+        gain, steps = (_GAIN, _BRIEF) if to == BRIEFLY else (_PASSED, _PASS)
+        reached = _descended(problem, starts, exact=True, nearly=rough, gain=gain, steps=steps)
         reached = _amended(problem, rough, reached.theta) if to == FULLY else reached
     return _optima(problem, reached)
 
@@ -257,9 +257,8 @@ def _staged(problem: Problem, stage: Stage, begun: FloatArray, seed: int) -> Flo
     return _apart(space, points, cost, _SAME, N_STAGED)
 
 
-def _as_they_are(problem: Problem, x: FloatArray, *, is_simpler: bool = True) -> list[Optimum]:
-    costs = problem.costs(x).tolist()
-    return _distinct([Optimum(each, cost, True, is_simpler) for each, cost in zip(x, costs, strict=True)])
+def _as_they_are(problem: Problem, x: FloatArray) -> list[Optimum]:
+    return _distinct([Optimum(each, float(cost), True, True) for each, cost in zip(x, problem.costs(x), strict=True)])
 
 
 def _may_stay(problem: Problem, begun: FloatArray, points: FloatArray) -> bool:
