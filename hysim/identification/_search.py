@@ -36,6 +36,7 @@ _APART = 0.05  # distance of two starts, in units of the box, under which the be
 _SAME = 0.01  # likewise of two points after the descent
 _GAIN = 1e-5  # share of the sum of squares: a descent that gains less rests
 _TOLERANCE = 2e-8  # likewise of a polish
+_HOPELESS = 3.0  # times the least sum of squares on a thinned record
 _BRIEF = 25  # steps on a thinned record
 _PASS = 60  # steps of a pass, in which the slopes of a law are those of the rough one, amended
 _PASSES_OF_ALL = 2
@@ -117,6 +118,8 @@ def optima(
         likely = optima(short, seed=seed, progress=progress, known=known, may_end=may_end, to=BRIEFLY)[
             :N_POLISHED_WHOLE
         ]
+        if problem.rough() is not problem:  # each costs much to polish
+            likely = [each for each in likely if each.cost <= _HOPELESS * likely[0].cost]
         if likely and likely[0].is_simpler:
             return _as_they_are(problem, np.array([each.x for each in likely]))
         return _distinct(polish(problem, np.array([each.x for each in likely]), to)) if likely else []
