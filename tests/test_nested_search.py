@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import hysim as hs
+from hysim.identification._assumptions import decided
 from hysim.identification._problem import problem, problems
-from hysim.identification._search import optima
+from hysim.identification._search import _descended, optima, polish
 from hysim.models.law import Law
 from hysim.models.model import every_family
 from hysim.models.search_space import Freedom
@@ -123,6 +124,24 @@ def test_stages_follow_what_the_user_says(freedom, law, stages):
             assert parameters[name][0] == value
         for name, (lower, upper) in freedom.bounds.items():
             assert lower <= parameters[name][0] <= upper
+
+
+def test_what_holds_parameters_of_a_family_passes_its_stages_on():
+    (held,) = hs.BoucWenBaberNoori.candidates().values()
+    chain = decided(held, [RECORDS["pinching"]], Freedom(), None).problems
+    assert [each.stage.word for each in chain] == ["", "wear", "pinching"]
+    for each in (*chain, chain[0].simpler):
+        assert "n" not in each.space.names
+        assert each.space.held["n"] == 1.0
+        assert (each.rough() is each) == (each is chain[0].simpler)
+
+
+def test_amended_slopes_of_the_rough_law_lead_as_low_as_slopes_of_the_law():
+    _, worn, _ = problems(hs.BoucWenBaberNoori(), [RECORDS["pinching"]], Freedom(), None)
+    starts = worn.begun(np.array([[0.3, 0.2, np.log(1.2), 0.4], [0.8, -0.3, 0.0, 0.0]])[:, : worn.simpler.n_x])
+    by_law = worn.costs(_descended(worn, starts, exact=True).theta[:, : worn.n_x])
+    by_rough = [each.cost for each in polish(worn, starts)]
+    assert min(by_rough) <= by_law.min() * (1.0 + ROUNDING)
 
 
 def test_the_rough_law_of_a_search_is_near_the_law():

@@ -141,8 +141,8 @@ def _decided(
     may_be_longer = _State("free") in states and len(records) == 1 and not is_told
     longest = _longer_pasts(variants[-1].family) if may_be_longer else 0
     if len(states) == len(variants) == 1 and not longest:
-        only = problem(variants[0].family, records, freedom, initial).weighted(weights)
-        return Decision([only], initial, "")
+        chain = problems(variants[0].family, records, freedom, states[0].initial)
+        return Decision([each.weighted(weights) for each in chain], states[0].initial, "")
     trials: dict[tuple[int, int], _Trial] = {}
     brief = None if max_evaluations is None else max_evaluations / (2 * (len(states) + longest + len(variants)))
 

@@ -47,7 +47,8 @@ class Reached(NamedTuple):
 class Descent:
     """Outputs `targets` to be met with `weights`, (n_sets or 1, n_samples); `projected` solves for b at each step.
 
-    `nearly`, if given, is a problem with the same box from which slopes are taken.
+    `nearly`, if given, is a problem with the same box from which slopes are taken, and `amended` what is added to them
+    in each set, (n_sets, n_samples, n_x).
     """
 
     problem: Problem
@@ -56,11 +57,21 @@ class Descent:
     weights: FloatArray
     projected: bool = False
     nearly: Problem | None = None  # where slopes cost less, with nearly the same outputs
+    amended: FloatArray | None = None
 
     def run(
-        self, theta: FloatArray, *, constraint: Constraint | None = None, tolerance: float = 1e-5, steps: int = N_STEPS
+        self,
+        theta: FloatArray,
+        *,
+        constraint: Constraint | None = None,
+        tolerance: float = 1e-5,
+        steps: int = N_STEPS,
+        hopeless: float = np.inf,
     ) -> Reached:
-        """Descend from `theta` (n_sets, n_theta) until a step lowers the loss by less than `tolerance`."""
+        """Descend from `theta` (n_sets, n_theta) until a step lowers the loss by less than `tolerance`.
+
+        A set also ends where the steps that remain would not bring it below `hopeless`.
+        """
         targets, weights = (np.broadcast_to(each, (len(theta), each.shape[1])) for each in (self.targets, self.weights))
         sets = _Sets(self, targets, weights * self.problem.weights, constraint)
         theta = np.clip(theta, *self.box())
@@ -68,7 +79,7 @@ class Descent:
             theta = self.restored(theta, constraint, self.pivots(theta, constraint)[0])
         if (budget := self.problem.budget) is not None:
             steps = budget.steps(steps, len(theta) * (self.problem.n_x + _TRIALS), self.problem.y.size)
-        reached = descend(sets, theta, tolerance=tolerance, steps=steps)
+        reached = descend(sets, theta, tolerance=tolerance, steps=steps, hopeless=hopeless)
         return Reached(reached.x, reached.loss, reached.evaluated[2][:, 0], reached.at_rest)
 
     def box(self) -> tuple[FloatArray, FloatArray]:
@@ -76,6 +87,7 @@ class Descent:
         return np.concatenate([space.lower, linear[0]]), np.concatenate([space.upper, linear[1]])
 
     def slopes(self, theta: FloatArray, outputs: FloatArray, columns: FloatArray) -> FloatArray:
+        """dm/dtheta, (n_sets, n_samples, n_theta), at points with these `outputs` and `columns`, as `nearly` has it."""
         n_sets, n_x = len(theta), self.problem.n_x
         if not n_x:
             return columns
@@ -157,7 +169,10 @@ class _Sets:
         _, slope, curvature = self.descent.noise.terms(self.targets[sets] - outputs, sigma)
         root = np.sqrt(self.weights[sets] * np.maximum(curvature, 1e-12 / sigma**2))
         goal = -self.weights[sets] * slope / np.where(root > 0.0, root, 1.0)
-        return root[..., np.newaxis] * self.descent.slopes(x, outputs, columns), goal
+        slopes = self.descent.slopes(x, outputs, columns)
+        if self.descent.amended is not None:
+            slopes[:, :, : self.descent.problem.n_x] += self.descent.amended[sets]
+        return root[..., np.newaxis] * slopes, goal
 
     def stepped(
         self, x: FloatArray, sets: Sets, jacobian: FloatArray, goal: FloatArray, damping: FloatArray

@@ -37,7 +37,16 @@ _APART = 0.05  # distance of two starts, in units of the box, under which the be
 _SAME = 0.01  # likewise of two points after the descent
 _GAIN = 1e-5  # share of the sum of squares: a descent that gains less rests
 _TOLERANCE = 2e-8  # likewise of a polish
+_HOPELESS = 3.0  # times the least sum of squares on a thinned record
+_BRIEF = 25  # steps on a thinned record
+_PASS = 60  # steps of a pass, in which the slopes of a law are those of the rough one, amended
+_PASSES_OF_ALL = 2
+_PASSES = 3  # of the best alone
+_LAST = 25  # steps with exact slopes
+_PASSED = 1e-6  # share of the sum of squares: a step that gains less ends a pass, a pass the polish
+_RIVAL = 20.0  # log-likelihood below the best optimum's, from which on an optimum is not within the noise
 _ROUGH = 0.1  # share of the cost by which the rough law's may differ: beyond, it does not say what stays
+BRIEFLY, NEARLY, FULLY = range(3)  # as far as optima of a law with a rough one are polished
 PERFECT = 1e-14  # smallest sigma, in units of the output's size
 
 
@@ -66,12 +75,14 @@ def chosen(
         n_samples, n_names = problem.n_samples, len(problem.space.names)
         if n_names > n_samples and problem is not problems[0]:
             break
-        known = optima(problem, seed=seed, progress=progress, known=known, may_end=problem is not problems[0])
+        may_end = problem is not problems[0]
+        known = optima(problem, seed=seed, progress=progress, known=known, may_end=may_end, to=NEARLY)
         if known:
             cost = max(known[0].cost, n_samples * (PERFECT * problem.scale) ** 2)
             criterion = information(cost / n_samples, n_samples, n_names)
             best = min(best, (criterion, problem, known), key=lambda each: each[0])
-    return best[1:]
+    _, problem, likely = best
+    return problem, polish_on(problem, likely)
 
 
 def stages_in_words(problems: Sequence[Problem], best: Problem) -> str:
@@ -94,11 +105,12 @@ def optima(
     progress: Progress | None = None,
     known: Sequence[Optimum] | None = None,
     may_end: bool = False,
+    to: int = FULLY,
 ) -> list[Optimum]:
     """Distinct local optima, best first; empty if every parameter set diverges.
 
     `known` are those of the simpler problem, which is searched without them. If it `may_end`, a stage that will not
-    lower the Bayesian information criterion is not searched to its end.
+    lower the Bayesian information criterion is not searched to its end. `to` is that of `polish`.
     """
     space = problem.space
     if not space.coordinates:
@@ -109,10 +121,14 @@ def optima(
             polish(condensed, _apart(space, problem.ends, condensed.costs(problem.ends), _SAME, N_POLISHED_WHOLE))
         )
     if problem.y.size > _LONG and (short := problem.thinned(_SHORT)) is not None:
-        likely = optima(short, seed=seed, progress=progress, known=known, may_end=may_end)[:N_POLISHED_WHOLE]
+        likely = optima(short, seed=seed, progress=progress, known=known, may_end=may_end, to=BRIEFLY)[
+            :N_POLISHED_WHOLE
+        ]
+        if problem.rough() is not problem:  # each costs much to polish
+            likely = [each for each in likely if each.cost <= _HOPELESS * likely[0].cost]
         if likely and likely[0].is_simpler:
             return _as_they_are(problem, np.array([each.x for each in likely]))
-        return _distinct(polish(problem, np.array([each.x for each in likely]))) if likely else []
+        return _distinct(polish(problem, np.array([each.x for each in likely]), to)) if likely else []
     problem = problem.condensed()
     if known is None and problem.simpler is not None:
         known = optima(problem.simpler, seed=seed)
@@ -121,7 +137,7 @@ def optima(
         points = _staged(problem, problem.stage, begun, seed)
         if may_end and len(begun) and not _may_stay(problem, begun, points):
             return _as_they_are(problem, begun)
-        return _distinct(polish(problem, points))
+        return _distinct(polish(problem, points, to))
     share = min(1.0, _LONG / problem.y.size)
     screened = max(256, round(N_SCREENED * share)) if space.screened is None else space.screened
     n_starts = max(16, round(N_DESCENDING * share))
@@ -134,7 +150,7 @@ def optima(
     best = _apart(space, reached.theta[:, : problem.n_x], reached.loss, _SAME, N_POLISHED)
     report = progress or (lambda done, total: None)
     report(1, 2)
-    polished = polish(problem, best) if len(best) else []
+    polished = polish(problem, best, to) if len(best) else []
     report(2, 2)
     return _distinct(polished)
 
@@ -181,16 +197,74 @@ def brief_optima(problem: Problem) -> tuple[FloatArray, FloatArray]:
     return (ends, problem.costs(ends)) if len(ends) else (best[:1], np.array([math.inf]))
 
 
-def polish(problem: Problem, starts: FloatArray) -> list[Optimum]:
+def polish(problem: Problem, starts: FloatArray, to: int = FULLY) -> list[Optimum]:
+    """The ends of descents from `starts` (n_sets, n_x); where the law has a rough one, `to` says how far they go."""
     problem = problem.condensed()
-    if (rough := problem.rough()) is not problem and len(starts):
-        starts = _descended(problem, starts, exact=True, nearly=rough).theta[:, : starts.shape[1]]
-    reached = _descended(problem, starts, exact=True)
-    x = reached.theta[:, : starts.shape[1]]
+    rough = problem.rough()
+    if rough is problem or not len(starts):
+        reached = _descended(problem, starts, exact=True)
+    else:
+        gain, steps = (_GAIN, _BRIEF) if to == BRIEFLY else (_PASSED, _PASS)
+        reached = _descended(problem, starts, exact=True, nearly=rough, gain=gain, steps=steps)
+        reached = _amended(problem, rough, reached.theta) if to == FULLY else reached
+    return _optima(problem, reached)
+
+
+def polish_on(problem: Problem, optima: Sequence[Optimum]) -> list[Optimum]:
+    """The optima that were polished nearly, now fully."""
+    rough = problem.rough()
+    if rough is problem or not optima:
+        return list(optima)
+    theta = problem.completed(np.array([each.x for each in optima]))
+    return _distinct(_optima(problem, _amended(problem, rough, theta)))
+
+
+def _optima(problem: Problem, reached: Reached) -> list[Optimum]:
+    x = reached.theta[:, : problem.n_x]
     costs = problem.costs(x)
     return [
         Optimum(x[k], float(costs[k]), bool(reached.at_rest[k])) for k in np.flatnonzero(np.isfinite(costs)).tolist()
     ]
+
+
+def _amended(problem: Problem, rough: Problem, theta: FloatArray) -> Reached:
+    """Ends of passes with the slopes of the rough law, plus those of the law minus those of the rough at the start.
+
+    A step of a pass needs one exact set, and the beginning of a pass one for each coordinate. After the first passes
+    the best optimum descends alone, at last with its own slopes.
+    """
+    reached = _pass(problem, rough, theta, gain=_PASSED)
+    for _ in range(_PASSES_OF_ALL - 1):
+        hopeless = float(reached.loss.min()) + _RIVAL
+        reached = _pass(problem, rough, reached.theta, gain=_PASSED, hopeless=hopeless)
+    best = [int(reached.loss.argmin())]
+    for _ in range(_PASSES):
+        before = float(reached.loss[best[0]])
+        _replace(reached, best, _pass(problem, rough, reached.theta[best], gain=_TOLERANCE))
+        if not float(reached.loss[best[0]]) < before - 0.5 * problem.y.size * _PASSED:
+            break
+    rested = reached.at_rest[best]
+    _replace(reached, best, _descended(problem, reached.theta[best, : problem.n_x], exact=True, steps=_LAST))
+    reached.at_rest[best] |= rested
+    return reached
+
+
+def _replace(reached: Reached, places: list[int], others: Reached) -> None:
+    for values, there in zip(reached, others, strict=True):
+        values[places] = there
+
+
+def _pass(problem: Problem, rough: Problem, theta: FloatArray, *, gain: float, hopeless: float = math.inf) -> Reached:
+    amended = _slopes(problem, theta) - _slopes(rough, theta)
+    x = theta[:, : problem.n_x]
+    return _descended(problem, x, exact=True, nearly=rough, amended=amended, gain=gain, steps=_PASS, hopeless=hopeless)
+
+
+def _slopes(problem: Problem, theta: FloatArray) -> FloatArray:
+    """Slopes of the outputs by the coordinates, (n_sets, n_samples, n_x)."""
+    descent = Descent(problem, Gaussian(0.0), problem.y[np.newaxis], np.ones((1, problem.y.size)))
+    nothing = np.empty((len(theta), problem.y.size, 0))
+    return descent.slopes(theta, problem.model(theta), nothing)
 
 
 def _staged(problem: Problem, stage: Stage, begun: FloatArray, seed: int) -> FloatArray:
@@ -226,12 +300,21 @@ def _may_stay(problem: Problem, begun: FloatArray, points: FloatArray) -> bool:
 
 
 def _descended(
-    problem: Problem, starts: FloatArray, *, exact: bool, steps: int = N_STEPS, nearly: Problem | None = None
+    problem: Problem,
+    starts: FloatArray,
+    *,
+    exact: bool,
+    steps: int | None = None,
+    nearly: Problem | None = None,
+    amended: FloatArray | None = None,
+    gain: float | None = None,
+    hopeless: float = np.inf,
 ) -> Reached:
     noise, everything = Gaussian(floor=PERFECT * problem.scale), np.ones((1, problem.y.size))
-    descent = Descent(problem, noise, problem.y[np.newaxis], everything, not problem.space.bounds, nearly)
-    gain, most = (_TOLERANCE, N_POLISHING) if exact else (_GAIN, steps)
-    return descent.run(problem.completed(starts), tolerance=0.5 * problem.y.size * gain, steps=most)
+    descent = Descent(problem, noise, problem.y[np.newaxis], everything, not problem.space.bounds, nearly, amended)
+    least, most = (_TOLERANCE, N_POLISHING) if exact else (_GAIN, N_STEPS)
+    tolerance = 0.5 * problem.y.size * (gain or least)
+    return descent.run(problem.completed(starts), tolerance=tolerance, steps=steps or most, hopeless=hopeless)
 
 
 def _starts(

@@ -83,10 +83,12 @@ class BoucWenBaberNoori(MemoryLaw):
     Solved by power series along monotone strokes, good to 1e-12 of the range; a law that neither degrades nor pinches
     is the Bouc-Wen law to the bit. A law that degrades is never in a steady cycle. `identify` searches the Bouc-Wen
     law, then the wear, then the pinching, and keeps of them what lowers the BIC; a start that wears off or pinches, or
-    ``free=`` or ``bounds=`` with one of its parameters, keeps it in any case. It holds delta_a, which A and the other
-    rates can nearly do without, and delta_psi and ``lambda_``, which psi can. Sources: T. T. Baber and Y. K. Wen, J.
-    Eng. Mech. Div. 107 (1981); T. T. Baber and M. N. Noori, J. Eng. Mech. 111 (1985); G. C. Foliente, J. Struct. Eng.
-    121 (1995), for the form of the pinching.
+    ``free=`` or ``bounds=`` with one of its parameters, keeps it in any case. Pinching is searched beside wear only:
+    each stage begins where the one before ended, and wear at a rate of zero costs no more than its two parameters in
+    the BIC. For pinching alone, ``fixed={"delta_nu": 0.0, "delta_eta": 0.0}`` leaves the wear out. It holds delta_a,
+    which A and the other rates can nearly do without, and delta_psi and ``lambda_``, which psi can. Sources: T. T.
+    Baber and Y. K. Wen, J. Eng. Mech. Div. 107 (1981); T. T. Baber and M. N. Noori, J. Eng. Mech. 111 (1985); G. C.
+    Foliente, J. Struct. Eng. 121 (1995), for the form of the pinching.
 
     Examples
     --------
