@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import hysim as hs
+from hysim.identification import _search
 
 
 def test_the_order_of_a_stiff_plant_is_found_in_noise():
@@ -61,3 +62,26 @@ def test_what_cannot_be_ranked_is_refused(candidates, options, message):
 def test_one_candidate_is_no_selection():
     with pytest.raises(TypeError, match="use identify"):
         hs.select(hs.Line, hs.datasets.table1())
+
+
+def test_what_candidates_have_in_common_is_searched_once_and_is_what_each_finds_alone(monkeypatch):
+    searched = []
+    found = _search._found
+
+    def counted(problem, *arguments):
+        searched.append((type(problem.family), problem.y.size))
+        return found(problem, *arguments)
+
+    monkeypatch.setattr(_search, "_found", counted)
+    u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=40)
+    noise = 0.01 * np.random.default_rng(0).standard_normal(u.size)
+    record = hs.Record(u=u, y=u - 0.5 * hs.BoucWen(beta=2.0, gamma=0.5, n=1.5).memory(u) + noise)
+    families = {"plain": hs.BoucWen, "polynomial": hs.PolynomialBoucWen, "generalised": hs.GeneralizedBoucWen}
+    together = hs.select(families, record).fits
+    assert searched.count((hs.BoucWen, u.size)) == 1
+    for name, family in families.items():
+        assert hs.identify(family, record).estimates == together[name].estimates
+    assert searched.count((hs.BoucWen, u.size)) == 4
+    rows = hs.compare(families, record, workers=2, cross_validate=None)
+    assert searched.count((hs.BoucWen, u.size)) == 5
+    assert [rows[name].rmse for name in families] == [together[name].rmse for name in families]

@@ -19,6 +19,7 @@ from hysim._parallel import Progress, map_on_threads
 from hysim.comparison._result import Comparison, ComparisonRow
 from hysim.errors import SimulationError
 from hysim.identification import Identification, identify
+from hysim.identification.sharing import sharing
 from hysim.metrics import LoopMetrics, loop_metrics
 from hysim.models.candidates import candidates, is_identifiable, is_searched
 from hysim.models.protocols import Direct, Responding, needs_time
@@ -101,9 +102,10 @@ def compare(
         cross_validate = "loo" if len(training) <= _SHORT else _BLOCKS
     protocol = _Protocol(training, _last_loop(training), cross_validate, seed, trial, max_evaluations, announce)
     names = list(subjects)
-    results = map_on_threads(
-        lambda k: protocol.row(names[k], subjects[names[k]]), len(names), workers=workers, progress=progress
-    )
+    with sharing():
+        results = map_on_threads(
+            lambda k: protocol.row(names[k], subjects[names[k]]), len(names), workers=workers, progress=progress
+        )
     by_name = dict(zip(names, results, strict=True))
     return Comparison(
         record=training,

@@ -15,6 +15,7 @@ from hysim._parallel import Progress
 from hysim.identification._descent import Descent, Reached
 from hysim.identification._noise import Gaussian
 from hysim.identification._problem import Problem
+from hysim.identification.sharing import once
 from hysim.metrics.criteria import information
 from hysim.models.search_space import SearchSpace
 from hysim.models.stages import Stage
@@ -112,6 +113,17 @@ def optima(
     `known` are those of the simpler problem, which is searched without them. If it `may_end`, a stage that will not
     lower the Bayesian information criterion is not searched to its end. `to` is that of `polish`.
     """
+
+    def search() -> list[Optimum]:
+        return _found(problem, seed, progress, known, may_end, to)
+
+    is_whole = known is None and not may_end and problem.rough() is problem
+    return once(problem, seed, search) if is_whole else search()
+
+
+def _found(
+    problem: Problem, seed: int, progress: Progress | None, known: Sequence[Optimum] | None, may_end: bool, to: int
+) -> list[Optimum]:
     space = problem.space
     if not space.coordinates:
         return polish(problem, np.empty((1, 0)))

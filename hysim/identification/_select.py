@@ -9,6 +9,7 @@ from hysim._parallel import Progress
 from hysim._printing import aligned, printed, summary_text
 from hysim.identification._identify import identify
 from hysim.identification._result import Identification
+from hysim.identification.sharing import sharing
 from hysim.records import Record
 
 CRITERIA: dict[str, Callable[[Identification], float]] = {
@@ -122,20 +123,21 @@ def select(
         raise ValueError('criterion="cv_rmse" needs a cross-validation: cross_validate="loo", or a number of blocks')
     named, report = _named(candidates), progress or (lambda done, total: None)
     fits: dict[str, Identification] = {}
-    for name, candidate in named.items():
-        if announce is not None:
-            announce(name)
-        fits[name] = identify(
-            candidate,
-            record_or_records,
-            initial=initial,
-            noise=noise,
-            cross_validate=cross_validate,
-            max_evaluations=max_evaluations,
-            seed=seed,
-            workers=workers,
-        )
-        report(len(fits), len(named))
+    with sharing():
+        for name, candidate in named.items():
+            if announce is not None:
+                announce(name)
+            fits[name] = identify(
+                candidate,
+                record_or_records,
+                initial=initial,
+                noise=noise,
+                cross_validate=cross_validate,
+                max_evaluations=max_evaluations,
+                seed=seed,
+                workers=workers,
+            )
+            report(len(fits), len(named))
 
     def score(name: str) -> float:
         value = CRITERIA[criterion](fits[name])

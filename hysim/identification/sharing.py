@@ -1,0 +1,81 @@
+"""Searches that several families have in common, done once within one call of `compare` or `select`.
+
+A family that contains a simpler one begins its search with the optima of that one (`Problem.simpler`). Several families
+contain the same one, and it is often compared itself. The first that needs a search does it; the others wait, and take
+what it found. The results are those of each alone.
+"""
+
+import hashlib
+import threading
+from collections.abc import Callable, Hashable, Iterator
+from concurrent.futures import Future
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any, TypeVar
+
+from hysim._frozen import FloatArray
+from hysim._parallel import awaited
+from hysim.identification._problem import Problem
+
+T = TypeVar("T")
+
+
+class _Known:
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.results: dict[Hashable, Future[Any]] = {}
+
+
+_known: ContextVar[_Known | None] = ContextVar("searches that are known", default=None)
+
+
+@contextmanager
+def sharing() -> Iterator[None]:
+    """Within the block `once` searches a problem once, in threads that `map_on_threads` begins there too."""
+    token = _known.set(_Known())
+    try:
+        yield
+    finally:
+        _known.reset(token)
+
+
+def once(problem: Problem, seed: int, search: Callable[[], T]) -> T:
+    """The result of `search`, a function of the problem and the seed; one with a budget or a start is not shared."""
+    known = _known.get()
+    if known is None or problem.budget is not None or problem.ends is not None or problem.stage is not None:
+        return search()
+    key = (problem.family, _contents(problem), seed)
+    if not _can_be_a_key(key):
+        return search()
+    with known.lock:
+        is_first = key not in known.results
+        result = known.results.setdefault(key, Future())
+    if is_first:
+        try:
+            result.set_result(search())
+        except BaseException as error:
+            result.set_exception(error)
+            raise
+    shared: T = awaited(result)
+    return shared
+
+
+def _can_be_a_key(key: Hashable) -> bool:
+    try:
+        hash(key)
+    except TypeError:  # a family of the user's, with a list among its fields
+        return False
+    return True
+
+
+def _contents(problem: Problem) -> Hashable:
+    """The freedom of a problem's family, and a digest of its records."""
+    space, digest = problem.space, hashlib.blake2b()
+    arrays: list[FloatArray | None] = [space.lower, space.upper, space.starts]
+    for part in problem.parts:
+        before = None if part.before is None else part.before.u
+        arrays += [part.record.u, part.record.y, part.record.t, part.weights, before]
+    for values in arrays:
+        digest.update(b"none" if values is None else repr(values.shape).encode() + values.tobytes())
+    freedom = (space.coordinates, space.names, space.linear, space.screened)
+    return digest.digest(), freedom, tuple(sorted(space.held.items())), tuple(sorted(space.bounds.items()))
