@@ -1,10 +1,14 @@
 """A measured input turns at every sample; and samples count by their weights."""
 
+import io
+import json
+
 import numpy as np
 import pytest
 
 import hysim as hs
 from hysim._input_noise import input_noise, quiet_path
+from hysim.cli import main
 
 CYCLES = hs.signals.triangle(-1.0, 1.0, cycles=3, samples_per_cycle=200)
 SINE = np.sin(2.0 * np.pi * np.arange(800) / 250.0)
@@ -90,3 +94,21 @@ def test_wrong_weights_are_named(weights, message):
         hs.identify(hs.Line, hs.Record(u=u, y=u), weights=weights)
     with pytest.raises(ValueError, match="fitted without weights"):
         hs.identify(hs.SingleValued, hs.Record(u=u, y=u), weights=np.ones(12))
+
+
+@pytest.mark.parametrize("source", ["spoilt.csv", "-"])
+def test_the_command_line_takes_weights_from_a_column(source, tmp_path, monkeypatch, capsys):
+    u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=40)
+    y = hs.Dahl(stiffness=3.0, coulomb=0.7).response(u)
+    weights = np.ones(u.size)
+    weights[30:40] = 0.0
+    table = "u,y,quality\n" + "\n".join(
+        f"{a!r},{b!r},{w!r}" for a, b, w in zip(u.tolist(), (y + 5.0 * (1.0 - weights)).tolist(), weights, strict=True)
+    )
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "spoilt.csv").write_text(table)
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(table.encode())))
+    assert main(["identify", source, "--model", "dahl", "--weights", "quality", "--json"]) == 0
+    estimates = json.loads(capsys.readouterr().out)["estimates"]
+    assert estimates["stiffness"] == pytest.approx(3.0, rel=1e-6)
+    assert estimates["coulomb"] == pytest.approx(0.7, rel=1e-6)

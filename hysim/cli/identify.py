@@ -13,13 +13,15 @@ def run(options: argparse.Namespace) -> int:
     from hysim.identification import identify
     from hysim.models.storage import to_json
 
-    model, record = models.to_identify(options), records.read(options)
+    model = models.to_identify(options)
+    record, weights = records.read_with_weights(options)
     fit = identify(
         model,
         record,
         fixed=dict(options.fix),
         free=tuple(options.free),
         bounds=dict(options.bounds),
+        weights=weights,
         progress=outputs.progress(),
         **outputs.fields_of(options, ("initial", "noise", "intervals", "cross_validate", "max_evaluations", "seed")),
     )
@@ -43,7 +45,7 @@ COMMAND = Command(
     "Identify a model's parameters by its error in free run, and print them with their standard errors. Exit code 1: "
     "the search did not converge.",
     f"""
-{records.OPTIONS}
+{records.OPTIONS_WITH_WEIGHTS}
 {models.OPTIONS}
 --fix NAME=VALUE...  parameter that is not free: n=1 [unit of the parameter]
 --free NAME...  parameter that is free, where it is fixed by default

@@ -5,6 +5,7 @@ import io
 import sys
 from typing import Any
 
+from hysim._frozen import FloatArray
 from hysim.cli.options import positive
 from hysim.records import Record
 
@@ -32,28 +33,55 @@ or --no-t  read no time from the file
     multiples
 --unit SIGNAL=UNIT...  unit of t, u or y, as in u=V
 """
+WEIGHTS = (
+    "--weights COLUMN  weight of each sample in the sum of squares, 0 to leave it out: name or number of its column"
+)
 OPTIONS = f"{_FILE}\n\nrecord:\n{_INPUT}\n{_OUTPUT}{_OTHERS}"
+OPTIONS_WITH_WEIGHTS = f"""{OPTIONS.rstrip()}
+--weights COLUMN  weight of each sample in the sum of squares, 0 to leave it out: name or number of its column
+"""
 OPTIONS_OF_AN_INPUT = f"{_FILE}\n\nrecord:\n{_INPUT}{_OTHERS}"
 """Options for a file that needs no column of the output."""
 
 
 def read(options: argparse.Namespace, file: str | None = None) -> Record:
     """The record that the options describe, or that of another `file`; without an output column, y is u."""
+    path = options.file if file is None else file
+    return _read(options, path, _source(path), options.y if "y" in options else None, options.resolution)
+
+
+def read_with_weights(options: argparse.Namespace) -> tuple[Record, FloatArray | None]:
+    """The record that the options describe, and the column of weights that they name."""
+    if options.weights is None:
+        return read(options), None
+    source = _source(options.file)
+    if options.file == STANDARD:
+        content = source.read()
+        source = io.BytesIO(content.encode() if isinstance(content, str) else content)
+    record = _read(options, options.file, source, options.y, options.resolution)
+    if options.file == STANDARD:
+        source.seek(0)
+    return record, _read(options, options.file, source, options.weights, None).y
+
+
+def _source(path: str) -> Any:
+    if path != STANDARD:
+        return path
+    return sys.stdin.buffer if isinstance(sys.stdin, io.TextIOWrapper) else sys.stdin
+
+
+def _read(options: argparse.Namespace, path: str, source: Any, y: str | None, resolution: Any) -> Record:
     from dataclasses import replace
 
     import numpy as np
 
     from hysim.files import load
 
-    path = options.file if file is None else file
-    source: Any = path
-    if path == STANDARD:
-        source = sys.stdin.buffer if isinstance(sys.stdin, io.TextIOWrapper) else sys.stdin
     u = options.u if "y" in options or options.u is not None else "u"
     record: Record = load(
         source,
         u=u,
-        y=options.y if "y" in options else u,
+        y=y if "y" in options else u,
         t=False if options.no_t else options.t,
         delimiter=_DELIMITERS.get(options.delimiter, options.delimiter),
         units=dict(options.unit),
@@ -61,7 +89,7 @@ def read(options: argparse.Namespace, file: str | None = None) -> Record:
         on_missing=options.on_missing,
         decimal=options.decimal,
         encoding=options.encoding,
-        resolution=options.resolution,
+        resolution=resolution,
     )
     if options.sample_time is None:
         return record
