@@ -103,7 +103,8 @@ def test_the_command_line_takes_weights_from_a_column(source, tmp_path, monkeypa
     weights = np.ones(u.size)
     weights[30:40] = 0.0
     table = "u,y,quality\n" + "\n".join(
-        f"{a!r},{b!r},{w!r}" for a, b, w in zip(u.tolist(), (y + 5.0 * (1.0 - weights)).tolist(), weights, strict=True)
+        f"{a!r},{b!r},{w!r}"
+        for a, b, w in zip(u.tolist(), (y + 5.0 * (1.0 - weights)).tolist(), weights.tolist(), strict=True)
     )
     monkeypatch.chdir(tmp_path)
     (tmp_path / "spoilt.csv").write_text(table)
