@@ -232,7 +232,8 @@ def _starts_beside(space: SearchSpace, before: Sequence[_Trial]) -> FloatArray:
                 )
                 beside[:, places] = np.tile(each.ends, (len(beside) // len(each.ends), 1))
                 starts.append(beside)
-    return np.unique(np.concatenate(starts), axis=0)
+    every = np.concatenate(starts)
+    return every[np.sort(np.unique(every, axis=0, return_index=True)[1])]
 
 
 def _bic(attempt: Problem, x: FloatArray, cost: float) -> float:
