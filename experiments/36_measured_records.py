@@ -69,8 +69,8 @@ SUBJECTS: dict[str, tuple[Any, Box]] = {
 def records(folder: Path) -> Iterator[tuple[str, FloatArray, FloatArray]]:
     """Name, input and output of every record under the folder."""
     mirror = np.load(folder / "fsm_cubespec" / "fsm_subset.npz")
-    for level in ("100mV", "300mV"):
-        u, y = (np.asarray(mirror[f"{name}_{level}_train"][:, 0, 0, 0], dtype=float) for name in "uy")
+    for level in ("100mV", "300mV"):  # the first quarter of a period
+        u, y = (np.asarray(mirror[f"{name}_{level}_train"][:2048, 0, 0, 0], dtype=float) for name in "uy")
         yield f"mirror {level}", u, y
     for file in sorted((folder / "mr_damper_labcontrol").glob("data_simulation_4.*_MRdamper.mat")):
         columns = loadmat(file)["x_F"]
