@@ -299,6 +299,7 @@ def main(smoke: bool = False, resume: bool = False) -> list[Row]:
         print(line_of(rows[-1]), flush=True)
         with stored.open("w" if len(rows) == 1 else "a", encoding="utf-8") as file:
             file.write(json.dumps(rows[-1]) + "\n")
+    rows.sort(key=lambda row: (row["seed"], list(DEVICES).index(row["device"])))
     numbers = summary(rows)
     for name, value in numbers.items():
         print(name, value)

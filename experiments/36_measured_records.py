@@ -8,8 +8,8 @@ call's time (`random_starts`); both see the record scaled. A memory before the r
 SciPy as the default call found it. The default call is beaten if SciPy, or a descent from the default's own end with
 every parameter free, has less than 99 % of its sum of squares, and a lower BIC.
 
-- `fsm_cubespec/fsm_subset.npz`: fast steering mirror on piezo actuators under a quarter of a multisine, first input to
-  first output (M. Floren et al., ISMA 2024, CC BY 4.0)
+- `fsm_cubespec/fsm_subset.npz`: fast steering mirror on piezo actuators under a sixteenth of a multisine, first
+  input to first output (M. Floren et al., ISMA 2024, CC BY 4.0)
 - `mr_damper_labcontrol/data_simulation_4.*_MRdamper.mat`: magnetorheological damper at three coil supplies,
   displacement to force (LabControl UTFPR, doi 10.5281/zenodo.4445334, MIT)
 - `magnetic_jamodel/[HB]_*.mat`: loops of magnetic materials, field to flux density, each column a record (R. Szewczyk,
@@ -70,7 +70,7 @@ def records(folder: Path) -> Iterator[tuple[str, FloatArray, FloatArray]]:
     """Name, input and output of every record under the folder."""
     mirror = np.load(folder / "fsm_cubespec" / "fsm_subset.npz")
     for level in ("100mV", "300mV"):
-        u, y = (np.asarray(mirror[f"{name}_{level}_train"][:2048, 0, 0, 0], dtype=float) for name in "uy")
+        u, y = (np.asarray(mirror[f"{name}_{level}_train"][:512, 0, 0, 0], dtype=float) for name in "uy")
         yield f"mirror {level}", u, y
     for file in sorted((folder / "mr_damper_labcontrol").glob("data_simulation_4.*_MRdamper.mat")):
         columns = loadmat(file)["x_F"]

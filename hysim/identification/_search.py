@@ -12,6 +12,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim._parallel import Progress
+from hysim._printing import listed
 from hysim.identification._descent import Descent, Reached
 from hysim.identification._noise import Gaussian
 from hysim.identification._problem import Problem
@@ -94,8 +95,8 @@ def stages_in_words(problems: Sequence[Problem], best: Problem) -> str:
     after = next(k for k, problem in enumerate(problems) if problem is best)
     n_kept = len(stages) - (len(problems) - 1 - after)
     kept, others = stages[:n_kept], stages[n_kept:]
-    words = [f"keeps {' and '.join(kept)}"] if kept else []
-    words += [f"leaves out {' and '.join(others)}"] if others else []
+    words = [f"keeps {listed(kept)}"] if kept else []
+    words += [f"leaves out {listed(others)}"] if others else []
     return f"the BIC {' and '.join(words)}"
 
 

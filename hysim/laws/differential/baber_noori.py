@@ -31,10 +31,11 @@ _PINCHING = Stage(
     word="pinching",
     names=("zeta_s", "q", "p", "psi"),
     neutral={"zeta_s": 0.0},
-    optional=("delta_psi", "lambda_"),
+    optional=("delta_psi",),
     drawn=512,
     rounds=((32, 8), (8, 25)),
 )
+_SPREAD = Stage(word="lambda_", names=("lambda_",), neutral={"lambda_": 0.5}, drawn=8, rounds=((8, 25),))
 _OWN = ("delta_a", "delta_nu", "delta_eta", "zeta_s", "q", "p", "psi", "delta_psi", "lambda_")
 
 
@@ -82,13 +83,13 @@ class BoucWenBaberNoori(MemoryLaw):
     -----
     Solved by power series along monotone strokes, good to 1e-12 of the range; a law that neither degrades nor pinches
     is the Bouc-Wen law to the bit. A law that degrades is never in a steady cycle. `identify` searches the Bouc-Wen
-    law, then the wear, then the pinching, and keeps of them what lowers the BIC; a start that wears off or pinches, or
-    ``free=`` or ``bounds=`` with one of its parameters, keeps it in any case. Pinching is searched beside wear only:
-    each stage begins where the one before ended, and wear at a rate of zero costs no more than its two parameters in
-    the BIC. For pinching alone, ``fixed={"delta_nu": 0.0, "delta_eta": 0.0}`` leaves the wear out. It holds delta_a,
-    which A and the other rates can nearly do without, and delta_psi and ``lambda_``, which psi can. Sources: T. T.
-    Baber and Y. K. Wen, J. Eng. Mech. Div. 107 (1981); T. T. Baber and M. N. Noori, J. Eng. Mech. 111 (1985); G. C.
-    Foliente, J. Struct. Eng. 121 (1995), for the form of the pinching.
+    law, then the wear, then the pinching, then ``lambda_``, and keeps of them what lowers the BIC; a start that wears
+    off or pinches, or ``free=`` or ``bounds=`` with one of its parameters, keeps it in any case. Pinching is searched
+    beside wear only: each stage begins where the one before ended, and wear at a rate of zero costs no more than its
+    two parameters in the BIC. For pinching alone, ``fixed={"delta_nu": 0.0, "delta_eta": 0.0}`` leaves the wear out. It
+    holds delta_a and delta_psi, whose work the other rates and psi nearly do. Sources: T. T. Baber and Y. K. Wen, J.
+    Eng. Mech. Div. 107 (1981); T. T. Baber and M. N. Noori, J. Eng. Mech. 111 (1985); G. C. Foliente, J. Struct. Eng.
+    121 (1995), for the form of the pinching.
 
     Examples
     --------
@@ -121,7 +122,7 @@ class BoucWenBaberNoori(MemoryLaw):
         neutral={"delta_a": 0.0, "delta_nu": 0.0, "delta_eta": 0.0, "zeta_s": 0.0, "input_coefficients": 0.0},
         names={"feedthrough": "input_coefficients[0]"},
     )
-    stages = (_WEAR, _PINCHING)
+    stages = (_WEAR, _PINCHING, _SPREAD)
     step = staticmethod(kernels.step)
     workspace: ClassVar[int] = kernels.N_STATE - 3
 
@@ -237,7 +238,7 @@ class BoucWenBaberNoori(MemoryLaw):
         Held by default are the wear of A, and the pinching in a law that does not pinch.
         """
         pinches = self.zeta_s != 0.0 or "zeta_s" in freedom.free
-        alone = ("delta_a", *(() if pinches else (*_PINCHING.names, *_PINCHING.optional)))
+        alone = ("delta_a", *(() if pinches else (*_PINCHING.names, *_PINCHING.optional, *_SPREAD.names)))
         at_rest = ("z0",) if freedom.starts_at_rest() else ()
         groups = (*_boucwen_search.REDUNDANT, *((name,) for name in alone))
         held = freedom.held(self.scalars, redundant=groups, at_rest=at_rest)
