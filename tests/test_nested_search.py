@@ -90,33 +90,43 @@ def test_a_start_from_the_simpler_family_is_where_that_family_stands():
 def test_the_criterion_chooses_the_stages_and_the_user_may_ask_for_one():
     record = RECORDS["noise"]
     fit = hs.identify(hs.BoucWenBaberNoori, record)
-    assert "the BIC leaves out wear and pinching" in fit.message
+    assert "the BIC leaves out wear, pinching and lambda_" in fit.message
     assert fit.estimates["delta_nu"] == fit.estimates["zeta_s"] == 0.0
     assert "zeta_s" not in fit.free_names
 
     fit = hs.identify(hs.BoucWenBaberNoori, RECORDS["pinching"])
-    assert "the BIC keeps wear and pinching" in fit.message
+    assert "the BIC keeps wear and pinching and leaves out lambda_" in fit.message
     assert {"delta_nu", "zeta_s", "psi"} <= set(fit.free_names)
     assert not {"lambda_", "delta_a"} & set(fit.free_names)
+
+
+def test_the_spread_of_the_pinching_is_freed_where_the_record_shows_it():
+    u = hs.signals.growing_sine(1.0, cycles=5, samples_per_cycle=60)
+    pinched = {"delta_nu": 0.02, "delta_eta": 0.02, "zeta_s": 0.9, "q": 0.2, "p": 0.8, "psi": 0.15}
+    law = hs.BoucWenBaberNoori(beta=1.5, gamma=0.8, n=1.2, lambda_=0.2, input_coefficients=(0.1,), **pinched)
+    fit = hs.identify(hs.BoucWenBaberNoori, hs.Record(u=u, y=law.response(u)))
+    assert "the BIC keeps wear, pinching and lambda_" in fit.message
+    assert fit.model.lambda_ == pytest.approx(0.2, rel=1e-3)
 
 
 @pytest.mark.parametrize(
     ("freedom", "law", "stages"),
     [
-        (Freedom(), hs.BoucWenBaberNoori(), ["", "wear", "pinching"]),
+        (Freedom(), hs.BoucWenBaberNoori(), ["", "wear", "pinching", "lambda_"]),
         (Freedom(fixed={"zeta_s": 0.0}), hs.BoucWenBaberNoori(), ["", "wear"]),
-        (Freedom(fixed={"delta_nu": 0.1, "delta_eta": 0.0}), hs.BoucWenBaberNoori(), ["", "pinching"]),
-        (Freedom(free=("lambda_",)), hs.BoucWenBaberNoori(), ["pinching"]),
-        (Freedom(bounds={"delta_nu": (0.0, 1.0)}), hs.BoucWenBaberNoori(), ["wear", "pinching"]),
-        (Freedom(), hs.BoucWenBaberNoori(delta_eta=0.1), ["wear", "pinching"]),
-        (Freedom(), hs.BoucWenBaberNoori(zeta_s=0.5), ["pinching"]),
+        (Freedom(fixed={"delta_nu": 0.1, "delta_eta": 0.0}), hs.BoucWenBaberNoori(), ["", "pinching", "lambda_"]),
+        (Freedom(free=("lambda_",)), hs.BoucWenBaberNoori(), ["lambda_"]),
+        (Freedom(fixed={"lambda_": 0.3}), hs.BoucWenBaberNoori(), ["", "wear", "pinching"]),
+        (Freedom(bounds={"delta_nu": (0.0, 1.0)}), hs.BoucWenBaberNoori(), ["wear", "pinching", "lambda_"]),
+        (Freedom(), hs.BoucWenBaberNoori(delta_eta=0.1), ["wear", "pinching", "lambda_"]),
+        (Freedom(), hs.BoucWenBaberNoori(zeta_s=0.5), ["pinching", "lambda_"]),
     ],
 )
 def test_stages_follow_what_the_user_says(freedom, law, stages):
     candidates = problems(law, [RECORDS["pinching"]], freedom, None)
     assert [each.stage.word for each in candidates] == stages
     names = candidates[-1].space.names
-    assert ("lambda_" in names) == ("lambda_" in freedom.free or law.zeta_s != 0.0)
+    assert ("lambda_" in names) == (stages[-1] == "lambda_")
     assert not set(freedom.fixed) & set(names)
     for each in candidates:
         parameters = each.parameters(each.space.starts)
@@ -129,7 +139,7 @@ def test_stages_follow_what_the_user_says(freedom, law, stages):
 def test_what_holds_parameters_of_a_family_passes_its_stages_on():
     (held,) = hs.BoucWenBaberNoori.candidates().values()
     chain = decided(held, [RECORDS["pinching"]], Freedom(), None).problems
-    assert [each.stage.word for each in chain] == ["", "wear", "pinching"]
+    assert [each.stage.word for each in chain] == ["", "wear", "pinching", "lambda_"]
     for each in (*chain, chain[0].simpler):
         assert "n" not in each.space.names
         assert each.space.held["n"] == 1.0
@@ -137,7 +147,7 @@ def test_what_holds_parameters_of_a_family_passes_its_stages_on():
 
 
 def test_amended_slopes_of_the_rough_law_lead_as_low_as_slopes_of_the_law():
-    _, worn, _ = problems(hs.BoucWenBaberNoori(), [RECORDS["pinching"]], Freedom(), None)
+    _, worn, *_ = problems(hs.BoucWenBaberNoori(), [RECORDS["pinching"]], Freedom(), None)
     starts = worn.begun(np.array([[0.3, 0.2, np.log(1.2), 0.4], [0.8, -0.3, 0.0, 0.0]])[:, : worn.simpler.n_x])
     by_law = worn.costs(_descended(worn, starts, exact=True).theta[:, : worn.n_x])
     by_rough = [each.cost for each in polish(worn, starts)]

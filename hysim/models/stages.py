@@ -29,6 +29,8 @@ class Stage:
         Random points in these parameters, beside the optimum of the stage before in all others.
     rounds : tuple of (int, int)
         How many of the best points descend for how many steps, round after round.
+    idle : mapping
+        Parameters of other stages, and the values at which, fixed, they leave this stage without an effect.
     """
 
     word: str
@@ -37,10 +39,12 @@ class Stage:
     optional: tuple[str, ...] = ()
     drawn: int = 64
     rounds: tuple[tuple[int, int], ...] = ((16, 25),)
+    idle: Mapping[str, float] = field(default_factory=dict)
 
     def is_open(self, freedom: Freedom) -> bool:
-        """Whether the user has left something to free."""
-        return any(name not in freedom.fixed for name in self.neutral)
+        """Whether the user has left something to free that has an effect."""
+        is_idle = any(freedom.fixed.get(name) == value for name, value in self.idle.items())
+        return not is_idle and any(name not in freedom.fixed for name in self.neutral)
 
     def is_asked_for(self, freedom: Freedom, values: Mapping[str, float]) -> bool:
         """Whether the user frees, bounds or starts from a law with this stage, `values` by name."""

@@ -35,7 +35,14 @@ _PINCHING = Stage(
     drawn=512,
     rounds=((32, 8), (8, 25)),
 )
-_SPREAD = Stage(word="lambda_", names=("lambda_",), neutral={"lambda_": 0.5}, drawn=8, rounds=((8, 25),))
+_SPREAD = Stage(
+    word="lambda_",
+    names=("lambda_",),
+    neutral={"lambda_": 0.5},
+    drawn=8,
+    rounds=((8, 25),),
+    idle={"zeta_s": 0.0},
+)
 _OWN = ("delta_a", "delta_nu", "delta_eta", "zeta_s", "q", "p", "psi", "delta_psi", "lambda_")
 
 
