@@ -369,20 +369,6 @@ def simulated_twins(result: Result) -> list[str]:
     return sentences
 
 
-def measured_records(result: Result) -> list[str]:
-    """Default calls of `identify` on public records, against SciPy."""
-    slowest = max(result["rows"], key=lambda row: row["seconds"])
-    return [
-        f"On {count(result['records'])} public measured records (a fast steering mirror, dampers, magnetic materials, "
-        f"steel), {count(result['laws'])} laws each: `scipy.optimize.least_squares` from up to 20 random starts, in "
-        f"ten times the time, beats the default call in {count(result['beaten_by_scipy'])} of {result['fits']} fits, "
-        f"and stays more than 1 % behind it in {result['better_than_scipy']}. The largest sum of squares over SciPy's "
-        f"is {number(result['worst_over_scipy'])} ({result['worst']}).",
-        f"A default call takes {result['median_seconds']:.2f} s in the median and {result['worst_seconds']:.0f} s at "
-        f"worst ({slowest['law']} on {slowest['record']}).",
-    ]
-
-
 # Discovery -----------------------------------------------------------------------------------------------------------
 
 
@@ -876,7 +862,6 @@ GROUPS: dict[str, tuple[Finding, ...]] = {
         all_families,
         nested_table1,
         simulated_twins,
-        measured_records,
     ),
     "Discovery": (sindy_recovery, sindy_table1, sindy_benchmark, sindy_lag_trap, adversarial_records),
     "Control": (
