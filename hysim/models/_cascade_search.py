@@ -109,7 +109,7 @@ class CascadeStructure(Identifiable, Composable):
         return combined_variants(dict([next(iter(self._with_state.items()))]), self._with)
 
     def _with(self, others: Mapping[str, Any]) -> "CascadeStructure":
-        """The same with other stages by their labels."""
+        """This cascade with other stages, by their labels."""
         stages = zip(labels(self.stages), self.stages, strict=True)
         return replace(self, stages=tuple(others.get(label, stage) for label, stage in stages))
 

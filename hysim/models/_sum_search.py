@@ -110,7 +110,7 @@ class SumStructure(Identifiable, Composable):
         return combined_variants(self._identified, self._with)
 
     def _with(self, others: Mapping[str, Any]) -> "SumStructure":
-        """The same with other parts by their labels."""
+        """This sum with other parts, by their labels."""
         parts = zip(labels(self.parts), self.parts, strict=True)
         return replace(self, parts=tuple(others.get(label, part) for label, part in parts))
 
