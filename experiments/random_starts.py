@@ -52,7 +52,7 @@ class Descents(NamedTuple):
 
 
 class Peer(NamedTuple):
-    """A law that is fitted to a scaled record; `names` without a box stay as they are in `law`."""
+    """A law that is fitted to a scaled record; parameters without a box stay as they are in `law`."""
 
     law: Any
     box: Box
@@ -61,12 +61,12 @@ class Peer(NamedTuple):
 
     @property
     def ends(self) -> FloatArray:
-        """Both ends of the box, shape (2, n_names), by the logarithm where the lower is positive."""
+        """Both ends of the box, shape (2, n_parameters), by the logarithm where the lower is positive."""
         return np.array([np.log(pair) if pair[0] > 0.0 else pair for pair in self.box.values()]).T
 
     @property
     def logs(self) -> npt.NDArray[np.bool_]:
-        """Whether each parameter is searched by its logarithm, shape (n_names,)."""
+        """Whether each parameter is searched by its logarithm, shape (n_parameters,)."""
         return np.array([pair[0] > 0.0 for pair in self.box.values()])
 
     def from_law(self) -> float:

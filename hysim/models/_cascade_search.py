@@ -16,7 +16,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray, checked
 from hysim.models._joint_space import combined_variants, common_states, declared, together
-from hysim.models._parts import labels, own, response_of
+from hysim.models._parts import exchanged, labels, own, response_of
 from hysim.models._sum_search import assembled, started, time_of
 from hysim.models.composable import Composable, composed
 from hysim.models.protocols import (
@@ -106,12 +106,8 @@ class CascadeStructure(Identifiable, Composable):
 
     def variants(self) -> tuple[Variant, ...]:
         """The choices of the carrier."""
-        return combined_variants(dict([next(iter(self._with_state.items()))]), self._with)
-
-    def _with(self, others: Mapping[str, Any]) -> "CascadeStructure":
-        """This cascade with other stages, by their labels."""
-        stages = zip(labels(self.stages), self.stages, strict=True)
-        return replace(self, stages=tuple(others.get(label, stage) for label, stage in stages))
+        carrier = {labels(self.stages)[self.carrier]: self.stages[self.carrier]}
+        return combined_variants(carrier, lambda others: replace(self, stages=exchanged(self.stages, others)))
 
     @property
     def _with_state(self) -> dict[str, Any]:

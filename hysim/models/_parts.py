@@ -18,6 +18,11 @@ def labels(parts: Sequence[Any]) -> tuple[str, ...]:
     return tuple(f"{name}[{names[:k].count(name)}]" if names.count(name) > 1 else name for k, name in enumerate(names))
 
 
+def exchanged(parts: Sequence[Any], others: Mapping[str, Any]) -> tuple[Any, ...]:
+    """The parts, those with a label in `others` exchanged."""
+    return tuple(others.get(label, part) for label, part in zip(labels(parts), parts, strict=True))
+
+
 def _label(part: Any) -> str:
     kind = part if isinstance(part, type) else part.law if isinstance(part, OfFamily) else type(part)
     family = kind.__name__.removesuffix("Structure")

@@ -11,7 +11,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray, checked, items
 from hysim.models._joint_space import combined_variants, common_states, declared, together, without_repetition
-from hysim.models._parts import checked_tuple, labels, own, response_of
+from hysim.models._parts import checked_tuple, exchanged, labels, own, response_of
 from hysim.models.composable import Composable, composed
 from hysim.models.protocols import Identifiable, Responding, Variant, needs_time
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
@@ -107,12 +107,7 @@ class SumStructure(Identifiable, Composable):
 
     def variants(self) -> tuple[Variant, ...]:
         """The choices of the parts, in every combination."""
-        return combined_variants(self._identified, self._with)
-
-    def _with(self, others: Mapping[str, Any]) -> "SumStructure":
-        """This sum with other parts, by their labels."""
-        parts = zip(labels(self.parts), self.parts, strict=True)
-        return replace(self, parts=tuple(others.get(label, part) for label, part in parts))
+        return combined_variants(self._identified, lambda others: replace(self, parts=exchanged(self.parts, others)))
 
     @property
     def _identified(self) -> dict[str, Identifiable]:
