@@ -457,7 +457,7 @@ class Expressions:
         return None
 
     def _extreme(self, name: str, values: list[Value]) -> Value:
-        kind = Scalar(max(value.type for value in values))
+        kind = Scalar.DOUBLE if any(value.type is Scalar.DOUBLE for value in values) else Scalar.INT
         total = values[0]
         for value in values[1:]:
             total = self._helped(name if kind is Scalar.DOUBLE else f"{name}_int", kind, total, value)

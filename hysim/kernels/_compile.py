@@ -54,6 +54,12 @@ def signed_closure(*signatures: Any) -> Callable[[F], F]:
     return lambda function: compiler(list(signatures), nogil=True, error_model="numpy")(function)
 
 
+def closure(function: F) -> F:
+    """As `kernel`, for a function that closes over kernels: no later process would find it in the cache."""
+    compiler: Any = numba.njit
+    return compiler(nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+
+
 class Addressed(types.WrapperAddressProtocol):
     """A kernel, `function`, that numba knows by its signature and its address alone."""
 
