@@ -208,7 +208,7 @@ class Duhem(Law):
 
     def inverse_begun(self, y: FloatArray, u0: float | None, state: State | None) -> CompiledLaw:
         """By a search on the step; by default from rest at u = 0, the output at y0."""
-        begin = state or self.start(float(u0 or 0.0), np.empty(0))
+        begin = state or self.start(float(u0 or 0.0), self.packed[1])
         terms = abs(self.offset) + abs(self.feedthrough * begin[0]) + abs(begin[1])
         return self.search_inverse(begin, terms=terms)
 
@@ -224,15 +224,26 @@ class Duhem(Law):
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
-        """Parameters (offset, feedthrough, shape and numbers of the slopes by direction) and memory (u, 0)."""
+        """Parameters (offset, feedthrough, shape and numbers of the slopes by direction) and memory (u, y0)."""
         laws = branches(Polynomials(*(tables[name] for name in Polynomials._fields)))
         shape = np.broadcast_to(np.array(laws.shape[1:], dtype=float), (len(laws), 3))
         parts = (tables["offset"], tables["feedthrough"], shape, laws.reshape(len(laws), -1))
-        return Packed(np.concatenate(parts, axis=1), np.zeros((len(laws), 2)))
+        return Packed(np.concatenate(parts, axis=1), cls.initial_memory(tables))
 
     def start(self, u0: float, memory: FloatArray) -> State:
         """The input, and the memory with which the output is y0."""
-        return u0, self.y0 - self.offset - self.feedthrough * u0
+        return u0, float(memory[1]) - self.offset - self.feedthrough * u0
+
+    def exchanged(self, columns: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        tables = super().exchanged({name: columns[name] for name in columns if name in _OUTPUT})
+        for name, column in columns.items():
+            if name not in _OUTPUT:
+                term = Term.parse(name)
+                field = Polynomials._fields[2 * int(term.absolute) + int(term.rectified)]
+                chosen = np.zeros(tables[field].shape[1:], dtype=bool)
+                chosen[term.i, term.j] = True
+                tables[field] = np.where(chosen, column, tables[field])
+        return tables
 
     @classmethod
     def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:
