@@ -45,6 +45,14 @@ def line(parameters: FloatArray, state: FloatArray, u: float) -> float:
     return float(parameters[0] + parameters[1] * u)
 
 
+@signed_kernel(float64(CONSTANTS, VECTOR, float64))
+def dashpot(parameters: FloatArray, state: FloatArray, u: float) -> float:
+    """The damper, `parameters` (c, sample time) and `state` (last u)."""
+    rise = u - state[0]
+    state[0] = u
+    return float(parameters[0] * (rise / parameters[1]))
+
+
 # ---------------------------------------------------------------------------------- starts
 
 

@@ -42,8 +42,12 @@ class Composite(ByStructure, Composable):
         """
 
     @abstractmethod
-    def compiled(self, u0: float = 0.0) -> CompiledLaw:
-        """As compiled loops take it, after a first sample at `u0`; TypeError if a member cannot be stepped."""
+    def compiled(self, u0: float = 0.0, *, sample_time: float | None = None) -> CompiledLaw:
+        """As compiled loops take it, after a first sample at `u0`, or at rest there as far as it depends on time.
+
+        Only what depends on time needs the `sample_time` [s], and raises ValueError without it; TypeError if a member
+        cannot be stepped.
+        """
 
     @abstractmethod
     def startable(self, sample_time: float | None = None) -> Startable:
