@@ -60,14 +60,14 @@ def closure(function: F) -> F:
     return compiler(nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
 
 
-class _Address(types.WrapperAddressProtocol):
-    """A kernel that numba knows by its signature and its address alone."""
+class Addressed(types.WrapperAddressProtocol):
+    """A kernel, `function`, that numba knows by its signature and its address alone."""
 
     def __init__(self, function: Any, signature: Any) -> None:
-        self._function, self._signature = function, signature
+        self.function, self._signature = function, signature
 
     def __wrapper_address__(self) -> int:
-        return int(_get_wrapper_address(self._function, self._signature))
+        return int(_get_wrapper_address(self.function, self._signature))
 
     def signature(self) -> Any:
         return self._signature
@@ -75,7 +75,7 @@ class _Address(types.WrapperAddressProtocol):
 
 def by_address(function: F, signature: Any) -> F:
     """A kernel that a closure calls by its address: its code is not compiled into the closure once more."""
-    address: Any = _Address(function, signature) if isinstance(function, Dispatcher) else function
+    address: Any = Addressed(function, signature) if isinstance(function, Dispatcher) else function
     return address  # type: ignore[no-any-return]
 
 

@@ -115,6 +115,19 @@ class Stepwise(Protocol):
 
 
 @runtime_checkable
+class Stretched(Protocol):
+    """A `Steppable` law that says where in its state the memory is, and between which bounds its slope lies."""
+
+    @property
+    def memory_places(self) -> tuple[tuple[int, int], ...]:
+        """First place and length of each stretch of the state that is memory; the rest is room for work."""
+
+    @property
+    def known_slopes(self) -> tuple[float, float]:
+        """Lowest and highest slope dy/du over every input, infinite where they are not known."""
+
+
+@runtime_checkable
 class Sampled(Protocol):
     """A law that depends on the sample time, and is a `Steppable` law at each."""
 

@@ -78,6 +78,11 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
         return 0 if self.n in (1.0, 2.0) else super().workspace
 
     @property
+    def structural(self) -> tuple[str, ...]:
+        """The exponent where it has a kernel of its own."""
+        return ("n",) if self.n in (1.0, 2.0) else ()
+
+    @property
     def admissible(self) -> bool:
         """Whether ``-beta <= gamma <= beta``: the law then creates no energy, whatever the input."""
         return -self.beta <= self.gamma <= self.beta
@@ -128,6 +133,11 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
         (0.721535457239, 0.278464542761, 0.593244754991)
         """
         return limit_cycle.limit_cycle(self.A, self.beta, self.gamma, self.n, float(amplitude))
+
+    @property
+    def known_slopes(self) -> tuple[float, float]:
+        """Those of `slope_bounds`."""
+        return self.slope_bounds()
 
     def slope_bounds(self, low: float = -np.inf, high: float = np.inf) -> tuple[float, float]:
         """Lowest and highest slope dy/du over every input between `low` and `high` [unit of u] that begins with z0.
