@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim.models import _parts
+from hysim.models._parts import compiled_law
 from hysim.models.by_structure import ByStructure
 from hysim.models.composable import Composable
 from hysim.models.inverse_search import inverse_at_rest, inverse_response
@@ -66,7 +66,7 @@ class Composite(ByStructure, Composable):
         places: list[tuple[int, int]] = []
         end = 0
         for member in self.members:
-            size = _parts.compiled_law(member, 0.0).state.size
+            size = compiled_law(member, 0.0, None).state.size
             own = member.memory_places if isinstance(member, Stretched) else ((0, size),)
             for first, count in own:
                 if places and sum(places[-1]) == end + first:
