@@ -52,6 +52,13 @@ class Packed(NamedTuple):
     memory: FloatArray
 
 
+class Stepping(NamedTuple):
+    """A step, and the places at the end of the state that it works in."""
+
+    step: Any
+    workspace: int
+
+
 class Law(Composable, ABC):
     """A rate-independent law that is known by its step.
 
@@ -163,6 +170,14 @@ class Law(Composable, ABC):
     def scalars(self) -> dict[str, float]:
         """Every number by the name that `hysim.identify` has for it, ``name`` or ``name[k]``."""
         return scalars_of(self.arguments)
+
+    @property
+    def stepping(self) -> Stepping:
+        """The leanest step of this law: one for its own numbers, where the family has several.
+
+        It has the bits of the family's `step`, and is that by default.
+        """
+        return Stepping(self.step, self.workspace)
 
     @property
     def memory_places(self) -> tuple[tuple[int, int], ...]:
@@ -514,10 +529,11 @@ class Law(Composable, ABC):
         start = self.start(float(u[0]) if u.size else 0.0, memory) if state is None else state
         if len(start) != memory.size:
             raise ValueError(f"the state must hold {memory.size} numbers, got {len(start)}")
-        moving = np.zeros(len(start) + self.workspace)
+        step, workspace = self.stepping
+        moving = np.zeros(len(start) + workspace)
         moving[: len(start)] = start
         self.prepare(parameters, moving)
-        return CompiledLaw(compiled_step(self.step), parameters, moving), start
+        return CompiledLaw(compiled_step(step), parameters, moving), start
 
     def _follow(self, law: CompiledLaw, u: FloatArray, y: FloatArray) -> None:
         """Outputs at `u` into `y`, the state moving along."""
