@@ -82,7 +82,8 @@ class Law(Composable, ABC):
     stages : tuple of Stage
         Parameters that a search frees in turn; the Bayesian information criterion says which of them stay.
     workspace : int
-        Further places at the end of the state, which a step may use as it likes; zero at first.
+        Further places at the end of the state, zero at first, for what the memory and the parameters determine: work,
+        and numbers that are kept since they take long. Trials of an inverse share them; their memory they do not.
     """
 
     step: ClassVar[Any]
