@@ -109,15 +109,18 @@ def to_fmu(
     ...     zipfile.ZipFile(path).namelist()
     ['modelDescription.xml', 'sources/Dahl.c']
     """
-    from hysim.export import program_of
-
     target = _checked(Path(path), version, platforms)
+    labels = dict(units or {})
+    if not all(isinstance(text, str) for pair in labels.items() for text in pair):
+        raise TypeError(f"units must be labels by the names u, y and t, got {units!r}")
     chosen = _checked_name(type(thing).__name__ if name is None else name)
     if not math.isfinite(u0):
         raise ValueError(f"u0 must be finite, got {u0}")
+    from hysim.export import program_of
+
     program = program_of(thing, sample_time, u0=u0, y0=y0)
     systems = None if platforms is None else tuple(platforms)
-    write_all({target: archive(program, Options(chosen, version, systems, units or {}, u0))})
+    write_all({target: archive(program, Options(chosen, version, systems, labels, u0))})
     return target
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from hysim._release import __version__
+from hysim.export._c import number, table
 from hysim.export._fmu_variables import Variable, is_tunable
 from hysim.export._program import Program
 
@@ -68,19 +69,3 @@ def _numbers(program: Program, variables: Sequence[Variable], token: str) -> str
         tables |= {"FIELD_MINIMA": [each.lower for each in fields], "FIELD_MAXIMA": [each.upper for each in fields]}
     defined = [f"#define FMU_{name} {value}" for name, value in (sizes | calls | others).items()]
     return "\n".join([*defined, "", *(table(f"FMU_{name}", numbers) for name, numbers in tables.items())])
-
-
-def number(value: float) -> str:
-    """A double in C, with all its digits."""
-    if math.isnan(value):
-        return "NAN"
-    if math.isinf(value):
-        return "INFINITY" if value > 0.0 else "-INFINITY"
-    return repr(value)
-
-
-def table(name: str, values: Sequence[float]) -> str:
-    """A table of constants in C; an empty one has one zero, since C knows no empty tables."""
-    numbers = [number(value) for value in values] or ["0.0"]
-    rows = [", ".join(numbers[k : k + 4]) for k in range(0, len(numbers), 4)]
-    return f"static const double {name}[{len(numbers)}] = {{\n    " + ",\n    ".join(rows) + "\n};"
