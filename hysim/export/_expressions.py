@@ -9,7 +9,7 @@ import builtins
 import math
 from collections.abc import Callable
 from functools import partial
-from types import MappingProxyType, ModuleType
+from types import BuiltinFunctionType, MappingProxyType, ModuleType
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -17,7 +17,7 @@ import numpy as np
 from hysim.export import _c
 from hysim.export._routine import Routine, UntranslatableError, plain
 from hysim.export._types import Known, Scalar, Several, Type, Vector, joined
-from hysim.kernels._compile import borrowed
+from hysim.kernels.stepping import borrowed
 
 CONDITIONAL, OR, AND, EQUALITY, RELATION, SUM, PRODUCT, UNARY, PRIMARY = range(9)
 
@@ -231,9 +231,9 @@ class Expressions:
         if node.attr == "size" and isinstance(self._type(node.value), Vector):
             return Value(self._vector(node.value, quietly=True).lengths[0](), Scalar.INT, SUM)
         owner = self._module(node.value)
-        if owner is None or not hasattr(owner, node.attr):
+        if owner is None or node.attr not in vars(owner):
             raise self._refusal(node, f"{ast.unparse(node)} is unknown")
-        result: Value | Stretch = self._literal(node, getattr(owner, node.attr), node.attr)
+        result: Value | Stretch = self._literal(node, vars(owner)[node.attr], node.attr)
         return result
 
     def quietly(self, node: ast.expr) -> Stretch:
@@ -415,9 +415,9 @@ class Expressions:
                 return type_.value
             if node.id in self.scope.source.names:
                 return plain(self.scope.source.names[node.id])
-            return getattr(builtins, node.id, None) if type_ is None else None
+            return vars(builtins).get(node.id) if type_ is None else None
         if isinstance(node, ast.Attribute) and (owner := self._module(node.value)) is not None:
-            return plain(getattr(owner, node.attr, None))
+            return plain(vars(owner).get(node.attr))
         raise self._refusal(node, f"{ast.unparse(node)} is no function that is known beforehand")
 
     def _reshaped(self, node: ast.Call, of: ast.expr) -> Stretch:
@@ -434,8 +434,8 @@ class Expressions:
         """A call of a function that C has, or that is a helper; None for another one."""
         if called is len:
             return Value(self.quietly(node.args[0]).lengths[0](), Scalar.INT, SUM)
-        name, module = getattr(called, "__name__", ""), getattr(called, "__module__", None)
-        if called in (float, int, bool, abs, min, max) or module == "math":
+        name = called.__name__ if isinstance(called, BuiltinFunctionType) and called.__module__ == "math" else ""
+        if called in (float, int, bool, abs, min, max) or name:
             values = [self.value(each) for each in node.args]
         if called in (float, int):
             kind = Scalar.DOUBLE if called is float else Scalar.INT
@@ -450,9 +450,9 @@ class Expressions:
             return self._helped("absolute_int", Scalar.INT, value)
         if called in (min, max):
             return self._extreme("smaller" if called is min else "larger", values)
-        if module == "math" and name in _TESTS:
+        if name in _TESTS:
             return Value(f"{name}({values[0].text}) != 0", Scalar.BOOL, EQUALITY)
-        if module == "math" and name in _MATHEMATICS:
+        if name in _MATHEMATICS:
             return Value(f"{name}({', '.join(value.text for value in values)})", Scalar.DOUBLE)
         return None
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from numba.core.dispatcher import Dispatcher
 
-from hysim.kernels._compile import Addressed
+from hysim.kernels.stepping import Addressed
 
 
 class UntranslatableError(ValueError):
@@ -28,7 +28,8 @@ class Routine(NamedTuple):
 
     def refusal(self, node: ast.AST, reason: str) -> UntranslatableError:
         """The error for a place in the function."""
-        line = self.function.__code__.co_firstlineno + getattr(node, "lineno", 1) - 1
+        first = node.lineno if isinstance(node, ast.stmt | ast.expr) else 1
+        line = self.function.__code__.co_firstlineno + first - 1
         return UntranslatableError(f"{self.file}:{line}: {reason}; hysim/kernels/__init__.py says what is translated")
 
 

@@ -17,6 +17,8 @@ from collections.abc import Callable
 from numba import float64, int64, types, void
 
 from hysim._frozen import FloatArray
+from hysim.kernels._compile import Addressed as Addressed
+from hysim.kernels._compile import borrowed as borrowed
 from hysim.kernels._compile import by_address, closure, signed_closure, signed_kernel
 
 VECTOR = types.Array(float64, 1, "C")

@@ -162,6 +162,20 @@ class Law(Composable, ABC):
         return scalars_of(self.arguments)
 
     @property
+    def structural(self) -> tuple[str, ...]:
+        """Names in `scalars` of the numbers that decide which step the law has, and how many parameters this takes."""
+        return ()
+
+    def exchanged(self, columns: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        """The `tables`, with columns (1, 1) in place of some numbers, by their names in `scalars`."""
+        tables = dict(self.tables)
+        for name, column in columns.items():
+            field, bracket, place = name.partition("[")
+            chosen = np.arange(tables[field].shape[1]) == (int(place[:-1]) if bracket else 0)
+            tables[field] = np.where(chosen, column, tables[field])
+        return tables
+
+    @property
     def initial_names(self) -> tuple[str, ...]:
         """Names of the numbers of the initial memory."""
         return tuple(name for name in self.scalars if name.partition("[")[0] in self.initial)

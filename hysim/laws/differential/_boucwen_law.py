@@ -78,6 +78,11 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
         return 0 if self.n in (1.0, 2.0) else super().workspace
 
     @property
+    def structural(self) -> tuple[str, ...]:
+        """The exponent where it has a kernel of its own."""
+        return ("n",) if self.n in (1.0, 2.0) else ()
+
+    @property
     def admissible(self) -> bool:
         """Whether ``-beta <= gamma <= beta``: the law then creates no energy, whatever the input."""
         return -self.beta <= self.gamma <= self.beta

@@ -232,6 +232,17 @@ class Duhem(Law):
         first = np.broadcast_to(tables["y0"] - tables["offset"], (len(laws), 1))
         return Packed(np.concatenate(parts, axis=1), np.concatenate([np.zeros((len(laws), 1)), first], axis=1))
 
+    def exchanged(self, columns: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        tables = super().exchanged({name: columns[name] for name in columns if name in _OUTPUT})
+        for name, column in columns.items():
+            if name not in _OUTPUT:
+                term = Term.parse(name)
+                field = Polynomials._fields[2 * int(term.absolute) + int(term.rectified)]
+                chosen = np.zeros(tables[field].shape[1:], dtype=bool)
+                chosen[term.i, term.j] = True
+                tables[field] = np.where(chosen, column, tables[field])
+        return tables
+
     @classmethod
     def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:
         offset, feedthrough, *shape = law.parameters[:5]
