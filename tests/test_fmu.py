@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import hysim as hs
+from hysim.cli import main
 from hysim.export import _compilers, _fmu
 from hysim.export._program import Field, Program
 
@@ -473,3 +474,77 @@ def test_a_sampled_model_runs_at_its_own_sample_time(slave, version, step, per_s
     for k in range(40):
         integrator.unit.doStep(currentCommunicationPoint=k * step, communicationStepSize=step)
         assert integrator.get("command") == 1.0 + 0.5 * math.ceil((k + 1) * per_step)
+
+
+@needs_compiler
+@pytest.mark.extra("fmpy")
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_model_that_diverges_ends_the_simulation(tmp_path, version):
+    source = "static double grow(const double *p, double *s, double u) { return s[0] = p[0] * s[0] + u; }"
+    program = Program(
+        source=source, step="grow", inputs=("u",), output="y", parameters=np.array([1e200]), state=np.array([1.0])
+    )
+    model = Slave(unit(tmp_path, program, version, platforms=None), tmp_path / "unit")
+    model.start()
+    assert model.outputs([0.0]).tolist() == [1e200]
+    with pytest.raises(Exception, match="status 3"):
+        model.outputs([0.0], 1)
+    model.unit.freeInstance()
+
+
+# ------------------------------------------------------------------------------------- on the command line
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch, capsys):
+    """Run `hysim fmu` in a folder with a law and a record: exit code and standard error."""
+    monkeypatch.chdir(tmp_path)
+    hs.save(LAW, "law.json", units={"u": "mm", "y": "N"})
+    hs.save(hs.PID(kp=1.0), "pid.json")
+    Path("loop.csv").write_text("u,y\n0,0\n1,1\n")
+
+    def command(*arguments):
+        try:
+            code = main(["fmu", *arguments])
+        except SystemExit as exit_:
+            code = exit_.code
+        out, err = capsys.readouterr()
+        assert out == ""
+        return code, err
+
+    return command
+
+
+def test_a_unit_is_written_from_the_command_line(run):
+    options = ("--version", "3.0", "--platforms", "none", "--u0", "0.5", "--unit", "y=kN", "--name", "Brake")
+    assert run("law.json", "--out", "law.fmu", *options) == (0, "")
+    root, variables = described("law.fmu")
+    assert (root.get("fmiVersion"), root.get("modelName")) == ("3.0", "Brake")
+    assert [variables[name]["unit"] for name in ("u", "y", "stiffness")] == ["mm", "kN", "kN/mm"]
+    assert variables["u0"]["start"] == "0.5"
+    same = hs.to_fmu(LAW, "a.fmu", "3.0", name="Brake", units={"u": "mm", "y": "kN"}, platforms=(), u0=0.5)
+    assert same.read_bytes() == Path("law.fmu").read_bytes()
+    assert run("pid.json", "--out", "pid.fmu", "--sample-time", "0.01", "--platforms", "none") == (0, "")
+    assert described("pid.fmu")[1]["sample_time"]["start"] == "0.01"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("law.json", "--out", "law.zip"), "is a file .fmu, got 'law.zip'"),
+        (("law.json", "--out", "none/law.fmu"), "its folder does not exist"),
+        (("law.json", "--out", "law.fmu", "--version", "1.0"), "invalid choice: '1.0'"),
+        (("law.json", "--out", "law.fmu", "--platforms", "linux,amiga"), "got 'amiga'"),
+        (("law.json", "--out", "law.fmu", "--name", "my law"), "name must be letters"),
+        (("law.json", "--out", "law.fmu", "--sample-time", "0"), "--sample-time must be positive"),
+        (("pid.json", "--out", "pid.fmu"), "sample"),
+        (("loop.csv", "--out", "law.fmu"), "does not hold a model"),
+        (("none.json", "--out", "law.fmu"), "No such file"),
+        (("law.json",), "required: --out"),
+    ],
+)
+def test_what_makes_no_unit_is_refused_in_one_line(run, tmp_path, arguments, message):
+    code, err = run(*arguments)
+    assert (code, err.count("\n")) == (2, 1)
+    assert message in err
+    assert not list(tmp_path.glob("*.fmu"))

@@ -116,7 +116,7 @@ def to_fmu(
     chosen = _checked_name(type(thing).__name__ if name is None else name)
     if not math.isfinite(u0):
         raise ValueError(f"u0 must be finite, got {u0}")
-    from hysim.export import program_of
+    from hysim.export._program import program_of
 
     program = program_of(thing, sample_time, u0=u0, y0=y0)
     systems = None if platforms is None else tuple(platforms)
