@@ -13,6 +13,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 OPTIONS = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC", "-shared", "-s", "-Werror=implicit")
+_PROCESSORS = MappingProxyType({"amd64": "x86_64", "arm64": "aarch64"})
 _FAT_MAGIC, _FAT_ALIGNMENT = 0xCAFEBABE, 14  # of a Mach-O file for several processors, 2^14 bytes
 
 
@@ -48,7 +49,7 @@ TARGETS = MappingProxyType(
 def host() -> str:
     """The name of this machine in FMI 3.0, such as ``x86_64-linux``."""
     machine = platform.machine().lower()
-    return f"{ {'amd64': 'x86_64', 'arm64': 'aarch64'}.get(machine, machine) }-{platform.system().lower()}"
+    return f"{_PROCESSORS.get(machine, machine)}-{platform.system().lower()}"
 
 
 def compiler(target: Target) -> tuple[str, ...] | None:
@@ -92,5 +93,6 @@ def universal(libraries: Sequence[bytes]) -> bytes:
         offset = step + len(parts)
         places.append((*struct.unpack("<II", library[4:12]), offset, len(library), _FAT_ALIGNMENT))
         parts += library + bytes(-len(library) % step)
-    header = struct.pack(">II", _FAT_MAGIC, len(places)) + b"".join(struct.pack(">IIIII", *place) for place in places)
+    header = struct.pack(">II", _PROCESSORS = MappingProxyType({"amd64": "x86_64", "arm64": "aarch64"})
+_FAT_MAGIC, len(places)) + b"".join(struct.pack(">IIIII", *place) for place in places)
     return header.ljust(step, b"\0") + parts
