@@ -93,6 +93,5 @@ def universal(libraries: Sequence[bytes]) -> bytes:
         offset = step + len(parts)
         places.append((*struct.unpack("<II", library[4:12]), offset, len(library), _FAT_ALIGNMENT))
         parts += library + bytes(-len(library) % step)
-    header = struct.pack(">II", _PROCESSORS = MappingProxyType({"amd64": "x86_64", "arm64": "aarch64"})
-_FAT_MAGIC, len(places)) + b"".join(struct.pack(">IIIII", *place) for place in places)
+    header = struct.pack(">II", _FAT_MAGIC, len(places)) + b"".join(struct.pack(">IIIII", *place) for place in places)
     return header.ljust(step, b"\0") + parts
