@@ -17,7 +17,7 @@ from hysim._frozen import check_choice
 from hysim.export._compilers import TARGETS, Target, compiler, host, shared_library, universal
 from hysim.export._fmu_source import source_of, token_of
 from hysim.export._fmu_variables import build_description, description, variables_of
-from hysim.export._program import Program
+from hysim.export._program import Program, program_of
 
 Version = Literal["2.0", "3.0"]
 Platform = Literal["linux", "windows", "mac"]
@@ -116,9 +116,7 @@ def to_fmu(
     chosen = _checked_name(type(thing).__name__ if name is None else name)
     if not math.isfinite(u0):
         raise ValueError(f"u0 must be finite, got {u0}")
-    from hysim.export._program import program_of
-
-    program = program_of(thing, sample_time, u0=u0, y0=y0)
+    program = program_of(thing, sample_time, u0=u0, y0=y0, tunable=True)
     systems = None if platforms is None else tuple(platforms)
     write_all({target: archive(program, Options(chosen, version, systems, labels, u0))})
     return target

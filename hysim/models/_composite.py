@@ -1,5 +1,6 @@
 """Base class of sums and cascades of models."""
 
+import math
 from abc import abstractmethod
 from typing import Any
 
@@ -7,10 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
+from hysim.models._parts import compiled_law
 from hysim.models.by_structure import ByStructure
 from hysim.models.composable import Composable
 from hysim.models.inverse_search import inverse_at_rest, inverse_response
-from hysim.models.protocols import CompiledLaw, Continuable, Startable, needed_time, needs_time
+from hysim.models.protocols import CompiledLaw, Continuable, Startable, Stretched, needed_time, needs_time
 
 State = tuple[Any, ...]
 """The state of each member."""
@@ -42,8 +44,12 @@ class Composite(ByStructure, Composable):
         """
 
     @abstractmethod
-    def compiled(self, u0: float = 0.0) -> CompiledLaw:
-        """As compiled loops take it, after a first sample at `u0`; TypeError if a member cannot be stepped."""
+    def compiled(self, u0: float = 0.0, *, sample_time: float | None = None) -> CompiledLaw:
+        """As compiled loops take it, after a first sample at `u0`, or at rest there as far as it depends on time.
+
+        Only what depends on time needs the `sample_time` [s], and raises ValueError without it; TypeError if a member
+        cannot be stepped.
+        """
 
     @abstractmethod
     def startable(self, sample_time: float | None = None) -> Startable:
@@ -53,6 +59,27 @@ class Composite(ByStructure, Composable):
     def dynamic(self) -> bool:
         """Whether a member depends on time."""
         return any(needs_time(member) for member in self.members)
+
+    @property
+    def memory_places(self) -> tuple[tuple[int, int], ...]:
+        """First place and length of each stretch of the compiled state that is memory, member after member."""
+        places: list[tuple[int, int]] = []
+        end = 0
+        for member in self.members:
+            size = compiled_law(member, 0.0, None).state.size
+            own = member.memory_places if isinstance(member, Stretched) else ((0, size),)
+            for first, count in own:
+                if places and sum(places[-1]) == end + first:
+                    places[-1] = places[-1][0], places[-1][1] + count
+                else:
+                    places.append((end + first, count))
+            end += size
+        return tuple(places)
+
+    @property
+    @abstractmethod
+    def known_slopes(self) -> tuple[float, float]:
+        """Lowest and highest slope dy/du over every input, as far as the members know theirs; else infinite."""
 
     def inverse_response(self, y: npt.ArrayLike, u0: float | None = None) -> FloatArray:
         """Input that gives the output `y`, monotone between the samples; see `hysim.Law.inverse_response`.
@@ -75,3 +102,8 @@ def continued(part: Any, u: FloatArray, sample_time: float | None, state: Any) -
     plant: Any = part
     y, end = plant.advance(u, needed_time(part, sample_time), state) if needs_time(part) else part.advance(u, state)
     return np.asarray(y["y"] if isinstance(y, dict) else y), end
+
+
+def known_slopes(members: tuple[Any, ...]) -> list[tuple[float, float]]:
+    """Lowest and highest slope of each member, infinite where they are not known."""
+    return [member.known_slopes if isinstance(member, Stretched) else (-math.inf, math.inf) for member in members]

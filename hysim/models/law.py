@@ -26,7 +26,7 @@ from hysim.kernels.stepping import Step, drive
 from hysim.models.batch import Batch, Reduction, Sets
 from hysim.models.compiled_step import compiled_start, compiled_step
 from hysim.models.composable import Composable
-from hysim.models.inverse_search import inverse_at_rest, inverse_response, inverse_step, not_reached
+from hysim.models.inverse_search import inverse_at_rest, inverse_response, not_reached, searched_inverse
 from hysim.models.parameters import Parameter, declared_space
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, Startable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
@@ -160,6 +160,16 @@ class Law(Composable, ABC):
     def scalars(self) -> dict[str, float]:
         """Every number by the name that `hysim.identify` has for it, ``name`` or ``name[k]``."""
         return scalars_of(self.arguments)
+
+    @property
+    def memory_places(self) -> tuple[tuple[int, int], ...]:
+        """First place and length of each stretch of the state that is memory: the front of it."""
+        return ((0, self.packed[1].size),)
+
+    @property
+    def known_slopes(self) -> tuple[float, float]:
+        """Lowest and highest slope dy/du over every input that begins with the initial memory, infinite if unknown."""
+        return -math.inf, math.inf
 
     @property
     def structural(self) -> tuple[str, ...]:
@@ -366,7 +376,8 @@ class Law(Composable, ABC):
 
     def search_inverse(self, state: State, *, terms: float = 0.0) -> CompiledLaw:
         """The inverse of the law in this state by a search on its step; see `hysim.models.inverse_search`."""
-        return inverse_step(self._begun(state[0], state)[0], state[0], terms=terms)
+        law = self.assemble(dict(zip(self.initial_names, state[1:], strict=False)))  # whose slopes are those from here
+        return searched_inverse(law, self._begun(state[0], state)[0], terms=terms)
 
     def unreached(self, sample: int, y: float, inverse: CompiledLaw) -> str:
         """Message for an output that has no input."""
@@ -389,7 +400,7 @@ class Law(Composable, ABC):
         CompiledLaw
             ``u = step(parameters, state, y)``, nan where no input has the output y.
         """
-        return inverse_step(self.compiled(u0), u0, limits=limits)
+        return searched_inverse(self, self.compiled(u0), limits=limits)
 
     # ------------------------------------------------------------------------------ identification
 

@@ -134,6 +134,11 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
         """
         return limit_cycle.limit_cycle(self.A, self.beta, self.gamma, self.n, float(amplitude))
 
+    @property
+    def known_slopes(self) -> tuple[float, float]:
+        """Those of `slope_bounds`."""
+        return self.slope_bounds()
+
     def slope_bounds(self, low: float = -np.inf, high: float = np.inf) -> tuple[float, float]:
         """Lowest and highest slope dy/du over every input between `low` and `high` [unit of u] that begins with z0.
 

@@ -43,6 +43,11 @@ class EquivalentBoucWen(BoucWenStep):
         """The `BoucWen` law with the same output."""
         return BoucWen(**{name: float(table[0, 0]) for name, table in self.equivalent(self.tables).items()})
 
+    @property
+    def known_slopes(self) -> tuple[float, float]:
+        """Those of the Bouc-Wen law."""
+        return self.bouc_wen.known_slopes
+
     def tangent(self, direction: npt.ArrayLike, z: npt.ArrayLike) -> FloatArray:
         """Slope dy/du at the memory `z` in a `direction` that is not zero; see `hysim.BoucWen.tangent`."""
         return self.bouc_wen.tangent(direction, z)
