@@ -852,6 +852,39 @@ def virtual_rig(result: Result) -> list[str]:
     ]
 
 
+# Outside Python ------------------------------------------------------------------------------------------------------
+
+
+def one_law_everywhere(result: Result) -> list[str]:
+    """Differences between a step in Python and its translations, and what they cost."""
+    rows, ran = result["rows"], result["run"]
+    worst = {name: column(rows, f"worst_{name}") for name in ran}
+    require(max(map(max, worst.values())) <= result["promised"], "every number is within what is promised")
+    slowest = max(rows, key=lambda row: row["ns_c"])
+    gains = [row["ns_numba"] / row["ns_c"] for row in rows]
+    board = result["cortex_m7_bytes"]
+    on_board = (
+        "The size on a Cortex-M7 was not measured."
+        if board is None
+        else f"Bouc-Wen with n = 1 is {count(int(board))} bytes of code on a Cortex-M7, without the C library, and "
+        f"{count(int(result['cortex_m7_ram_bytes']))} bytes of state."
+    )
+    missing = f" Not run: {listed(result['not_run'])}." if result["not_run"] else ""
+    ends = listed([f"{error_of(median(values))} and {error_of(max(values))} in {n}" for n, values in worst.items()])
+    return [
+        f"In {count(int(result['compared']))} comparisons of {len(rows)} families, inverses, plants and controllers "
+        "with Python's compiled step, the largest difference as a part of the range, median and worst of the families, "
+        f"is {ends}; no sanitizer reports anything.{missing}",
+        f"A sample takes {number(median(column(rows, 'ns_c')), 2)} ns in C in the median and "
+        f"{number(slowest['ns_c'], 2)} ns at worst ({slowest['family']}), where numba's pointer takes "
+        f"{span(gains, 2)} times as long; the inverse of Bouc-Wen with a general exponent takes "
+        f"{number(result['general_inverse_ns'], 2)} ns in the median of its laws and "
+        f"{number(result['general_inverse_ns_most'], 2)} ns at worst, "
+        f"{number(result['general_inverse_ns_numba'], 2)} ns through numba's pointer.",
+        on_board,
+    ]
+
+
 GROUPS: dict[str, tuple[Finding, ...]] = {
     "Evaluation and speed": (exact_step, work_precision, batch, cold_start, more_samples, wear_and_pinching),
     "Identification": (
@@ -877,6 +910,7 @@ GROUPS: dict[str, tuple[Finding, ...]] = {
     "Other families": (extended_plays, preisach, dashpot),
     "Studies and files": (sweep_study, kill_and_resume, scaling, fuzz),
     "Camera": (registration, virtual_rig),
+    "Outside Python": (one_law_everywhere,),
 }
 HIGHLIGHTS: tuple[Finding, ...] = (
     closed_loop_speed,

@@ -6,12 +6,11 @@ not installed. Compilers are those of the machine and, for WebAssembly, zig's.
 
 import ctypes
 import importlib.util
-import shutil
 import struct
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -133,6 +132,31 @@ class Library:
         return y, least
 
 
+def least_seconds(call: Callable[[], Any]) -> float:
+    """The least of some times of a call."""
+    times = []
+    for _ in range(REPEATS):
+        began = time.perf_counter()
+        call()
+        times.append(time.perf_counter() - began)
+    return min(times)
+
+
+def program_output(source: hs.CSource, case: Case, folder: Path) -> Array:
+    """Outputs of the program that `hysim.to_c` makes, which reads and prints text."""
+    source.write(folder)
+    files = [f"{source.name}.c", f"{source.name}_main.c"]
+    command = ["gcc", *STRICT, *files, "-o", f"{source.name}_main", "-lm"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    if done.returncode or done.stderr:
+        raise RuntimeError(f"{case.family}: {done.stderr}")
+    n_inputs = 1 if isinstance(case.thing, hs.InverseFeedforward) else len(case.inputs)
+    lines = "\n".join(" ".join(map(repr, values)) for values in case.inputs[:n_inputs].T.tolist())
+    main = folder / f"{source.name}_main"
+    printed = subprocess.run([main], input=lines, capture_output=True, text=True, check=True).stdout
+    return np.array([float(word) for word in printed.split()])
+
+
 # ---------------------------------------------------------------------------------- under sanitizers
 
 
@@ -217,6 +241,7 @@ class Unit:
         problems = validate_fmu(str(path))
         if problems:
             raise RuntimeError(f"{case.family}, FMI {version}: {problems}")
+        self.scalars = fields_of(case)
         self.version, self.inputs, self.output = version, program.inputs, program.output
         self.description = fmpy.read_model_description(str(path))
         self.folder = fmpy.extract(str(path), str(target))
@@ -237,7 +262,11 @@ class Unit:
         inputs, output = [self.references[name] for name in self.inputs], [self.references[self.output]]
         unit.instantiate()
         try:
-            fields = fields_of(case)
+            scalars = fields_of(case)
+            fixed = {name: value for name, value in scalars.items() if name not in self.references}
+            if fixed != {name: self.scalars[name] for name in fixed}:
+                raise ValueError(f"{case.family}: {', '.join(fixed)} cannot be set in a unit")
+            fields = {name: value for name, value in scalars.items() if name in self.references}
             u0 = {"u0": float(case.inputs[0, 0])} if "u0" in self.references else {}
             values = {**fields, **u0}
             set_([self.references[name] for name in values], [float(each) for each in values.values()])
