@@ -121,6 +121,8 @@ def program_of(
         raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
     if not (math.isfinite(u0) and math.isfinite(y0)):
         raise ValueError(f"u0 and y0 must be finite, got {u0} and {y0}")
+    if isinstance(thing, type):
+        raise TypeError(f"an instance is expected, got the class {thing.__name__}: give it its parameters first")
     if isinstance(thing, Stepwise):
         model = thing.startable(sample_time)
         timed = sample_time if needs_time(thing) else None
@@ -139,10 +141,7 @@ def program_of(
         if sample_time is None:
             raise ValueError(f"a {type(thing).__name__} is sampled: give sample_time")
         return _of_controller(thing, sample_time, u0, y0)
-    raise TypeError(
-        f"a law, a plant or a controller that can be stepped is expected, got {type(thing).__name__}; a class must "
-        "be given its parameters first"
-    )
+    raise TypeError(f"a law, a plant or a controller that can be stepped is expected, got {type(thing).__name__}")
 
 
 def _of_model(model: Startable, sample_time: float | None) -> Program:
