@@ -9,6 +9,7 @@ import hysim as hs
 from hysim._frozen import checked
 from hysim.models.compiled_step import startable
 from hysim.models.protocols import needs_time
+from hysim.plants.actuator import as_stepwise
 
 TIME = 0.05
 
@@ -214,7 +215,7 @@ DYNAMIC = {
 def test_sums_and_cascades_with_plants_are_their_response(model):
     u = walk(8)
     assert stepped(model, u, TIME).tolist() == model.response(u, TIME).tolist()
-    with pytest.raises(ValueError, match="moves in time.* sample_time"):
+    with pytest.raises(ValueError, match=r"moves in time.* sample_time"):
         startable(model)
 
 
@@ -224,12 +225,9 @@ def test_sums_and_cascades_with_plants_rest_at_any_input(model):
     rest = [step(parameters, state, 0.4) for _ in range(50)]
     assert rest == pytest.approx([rest[0]] * 50, abs=1e-12)  # the mode's rest to rounding
     long = model.response(np.full(4000, 0.4), TIME)[-1]  # the mode decays by exp(-0.2 0.05 4000) = 4e-18
-    starts_at_its_input = [
-        DYNAMIC["everything"],
-        DYNAMIC["plants in between"],
-    ]  # of Duhem laws, not of the settled plant
-    assert model in starts_at_its_input or rest[0] == pytest.approx(long, abs=1e-12)
-    with pytest.raises(ValueError, match="moves in time.* sample_time"):
+    with_duhem = [DYNAMIC["everything"], DYNAMIC["plants in between"]]  # whose output is y0 at its first input
+    assert model in with_duhem or rest[0] == pytest.approx(long, abs=1e-12)
+    with pytest.raises(ValueError, match=r"moves in time.* sample_time"):
         model.compiled(0.4)
 
 
@@ -271,3 +269,30 @@ def test_what_has_no_step_says_so():
             startable(plant)
         with pytest.raises(ValueError, match="sample_time must be positive and finite, got -1"):
             startable(plant, -1.0)
+
+
+def test_stages_without_a_response_are_steps_of_an_actuator():
+    u = walk(10)
+    for part, actuator in (
+        (CREEP, hs.Actuator(creep=CREEP)),
+        (SLOW, hs.Actuator(amplifier=SLOW)),
+        (VIBRATIONS["state space"], hs.Actuator(vibration=VIBRATIONS["state space"])),
+        (VIBRATIONS["modes"], hs.Actuator(vibration=VIBRATIONS["modes"])),
+    ):
+        assert hs.control.as_actuator(part) == actuator
+        expected = actuator.response(u, TIME)
+        assert stepped(as_stepwise(part), u, TIME) == pytest.approx(expected, abs=1e-13 * np.abs(expected).max())
+    assert as_stepwise(LAW) is LAW
+    with pytest.raises(TypeError, match="plant must be an Actuator"):
+        as_stepwise(3.0)
+
+
+def test_a_loop_takes_laws_in_front_of_a_transfer_function():
+    plant = hs.Actuator(hysteresis=LAW, vibration=MODE)
+    assert hs.control.as_actuator(LAW >> MODE) == plant
+    assert hs.control.as_actuator(LAW >> DUHEM >> MODE) == replace(plant, hysteresis=LAW >> DUHEM)
+    t = TIME * np.arange(40)
+    run, expected = (hs.close_loop(each, hs.PID(ki=0.5), t, np.sin(t), u0=0.3) for each in (LAW >> MODE, plant))
+    assert run.y.tolist() == expected.y.tolist()
+    with pytest.raises(TypeError, match="law that a loop can step"):
+        hs.close_loop(MODE >> MODE, hs.PID(ki=0.5), t, t)
