@@ -7,6 +7,7 @@ import pytest
 
 import hysim as hs
 from hysim._frozen import checked
+from hysim.export import program_of
 from hysim.models.compiled_step import startable
 from hysim.models.protocols import needs_time
 from hysim.plants.actuator import as_stepwise
@@ -282,6 +283,9 @@ def test_stages_without_a_response_are_steps_of_an_actuator():
         assert hs.control.as_actuator(part) == actuator
         expected = actuator.response(u, TIME)
         assert stepped(as_stepwise(part), u, TIME) == pytest.approx(expected, abs=1e-13 * np.abs(expected).max())
+        program = program_of(part, TIME)
+        assert program.state.tolist() == actuator.startable(TIME).state.tolist()
+        assert program.sample_time == TIME
     assert as_stepwise(LAW) is LAW
     with pytest.raises(TypeError, match="plant must be an Actuator"):
         as_stepwise(3.0)
@@ -296,3 +300,10 @@ def test_a_loop_takes_laws_in_front_of_a_transfer_function():
     assert run.y.tolist() == expected.y.tolist()
     with pytest.raises(TypeError, match="law that a loop can step"):
         hs.close_loop(MODE >> MODE, hs.PID(ki=0.5), t, t)
+
+
+@pytest.mark.parametrize("model", [*DYNAMIC.values(), MODE, SENSED], ids=[*DYNAMIC, "plant", "sensed"])
+def test_every_step_is_translated(model):
+    program = program_of(model, TIME)
+    assert program.step in program.source
+    assert program.start == ("" if model is MODE else "start")  # the input of a plant is zero before its first sample
