@@ -100,12 +100,12 @@ def one_behind_the_other(first: Step, second: Step) -> Step:
 
 def started_both(first: Start, second: Start) -> Start:
     """The start of two laws for the same input."""
+    first_by, second_by = by_address(first, START.signature), by_address(second, START.signature)
 
     @closure
     def start_both(parameters: FloatArray, state: FloatArray, u0: float) -> None:
-        n, m = 2 + int(parameters[0]), int(parameters[1])
-        first(parameters[2:n], state[:m], u0)
-        second(parameters[n:], state[m:], u0)
+        first_by(parameters[2 : 2 + int(parameters[0])], state[: int(parameters[1])], u0)
+        second_by(parameters[2 + int(parameters[0]) :], state[int(parameters[1]) :], u0)
 
     return start_both
 
