@@ -5,7 +5,7 @@ import pytest
 
 import hysim as hs
 from hysim.kernels.stepping import drive
-from hysim.models.compiled_step import compiled_step
+from hysim.models.compiled_step import compiled_start, compiled_step
 
 U = np.concatenate([2.0 * np.sin(np.linspace(0.0, 12.0, 120)), np.random.default_rng(5).normal(size=80), [0.0, 3.0]])
 PLACES = {
@@ -35,7 +35,7 @@ def test_the_leanest_step_has_the_bits_of_the_family(law):
     family = compiled_step(type(law).step)
     state = np.zeros(law.packed[1].size + type(law).workspace)
     state[: law.packed[1].size] = law.packed[1]
-    law.prepare(law.packed[0], state)
+    compiled_start(type(law).start)(law.packed[0], state, 0.0)
     family(law.packed[0], state, 0.0)
     ours, theirs = np.empty(U.size), np.empty(U.size)
     assert drive(lean.step, lean.parameters, lean.state, U, ours) == -1
@@ -47,7 +47,7 @@ def test_the_leanest_step_has_the_bits_of_the_family(law):
 def test_a_worn_law_without_wear_is_computed_without_charts():
     worn, plain = hs.BoucWenBaberNoori(n=1.5, delta_nu=0.1), hs.BoucWenBaberNoori(n=1.5)
     state, y = worn.compiled(0.0).state, np.empty(U.size)
-    drive(worn.stepping.step, plain.packed[0], state, U, y)
+    drive(worn.leanest.step, plain.packed[0], state, U, y)
     assert y == pytest.approx(plain.response(U), abs=1e-12)
 
 

@@ -1,1 +1,8 @@
 """Laws, plants and controllers outside Python: C99, functional mock-up units, pages for a browser."""
+
+from hysim.export._c_source import CSource as CSource
+from hysim.export._c_source import to_c as to_c
+from hysim.export._program import Field as Field
+from hysim.export._program import Program as Program
+from hysim.export._program import program_of as program_of
+from hysim.export._routine import UntranslatableError as UntranslatableError

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import gammainc
 
 from hysim._frozen import FloatArray
-from hysim.export._expressions import HELPERS, OPERATIONS, Number, Symbol, Tape, UntraceableError
+from hysim.export._symbols import HELPERS, OPERATIONS, Number, Symbol, Tape, UntraceableError
 from hysim.models.law import Law
 
 _MANY = 8  # equal numbers in a row

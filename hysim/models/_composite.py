@@ -12,7 +12,7 @@ from hysim.models import _parts
 from hysim.models.by_structure import ByStructure
 from hysim.models.composable import Composable
 from hysim.models.inverse_search import inverse_at_rest, inverse_response
-from hysim.models.protocols import CompiledLaw, Continuable, Stretched, needs_time
+from hysim.models.protocols import CompiledLaw, Continuable, Startable, Stretched, needed_time, needs_time
 
 State = tuple[Any, ...]
 """The state of each member."""
@@ -46,6 +46,10 @@ class Composite(ByStructure, Composable):
     @abstractmethod
     def compiled(self, u0: float = 0.0) -> CompiledLaw:
         """As compiled loops take it, after a first sample at `u0`; TypeError if a member cannot be stepped."""
+
+    @abstractmethod
+    def startable(self, sample_time: float | None = None) -> Startable:
+        """As exports take it, from any first input; TypeError if a member cannot be stepped."""
 
     @property
     def dynamic(self) -> bool:
@@ -92,9 +96,7 @@ def continued(part: Any, u: FloatArray, sample_time: float | None, state: Any) -
     if isinstance(part, Composite):
         return part.advance(u, state, sample_time=sample_time)
     plant: Any = part
-    y, end = (
-        plant.advance(u, _parts.needed_time(part, sample_time), state) if needs_time(part) else part.advance(u, state)
-    )
+    y, end = plant.advance(u, needed_time(part, sample_time), state) if needs_time(part) else part.advance(u, state)
     return np.asarray(y["y"] if isinstance(y, dict) else y), end
 
 

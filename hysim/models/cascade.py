@@ -10,9 +10,18 @@ from hysim._frozen import FloatArray, read_only
 from hysim.kernels.stepping import one_behind_the_other
 from hysim.models._cascade_search import CascadeStructure
 from hysim.models._composite import Composite, State, continued, known_slopes
-from hysim.models._parts import check_parts, compiled_law, compiled_pair, labels, response_of
+from hysim.models._parts import (
+    check_parts,
+    compiled_law,
+    compiled_pair,
+    labels,
+    response_of,
+    self_started,
+    startable_pair,
+)
+from hysim.models.compiled_step import startable
 from hysim.models.model import family
-from hysim.models.protocols import CompiledLaw
+from hysim.models.protocols import CompiledLaw, Startable
 
 __all__ = ["Cascade", "CascadeStructure"]
 
@@ -107,6 +116,11 @@ class Cascade(Composite):
             laws.append(compiled_law(stage, level))
             level = float(stage.response([level])[0])
         return reduce(lambda first, second: compiled_pair(one_behind_the_other, first, second), laws)
+
+    def startable(self, sample_time: float | None = None) -> Startable:
+        first, *others = (startable(stage, sample_time) for stage in self.stages)
+        behind = [self_started(stage) for stage in others]
+        return reduce(lambda first, second: startable_pair(one_behind_the_other, first, second), behind, first)
 
     @property
     def known_slopes(self) -> tuple[float, float]:

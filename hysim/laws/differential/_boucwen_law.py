@@ -16,6 +16,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray, read_only
 from hysim.kernels import boucwen as kernels
+from hysim.kernels import stepping
 from hysim.kernels.charts import N_WORK
 from hysim.laws.differential import _boucwen_facts, boucwen_inverse, limit_cycle
 from hysim.laws.differential._memory_law import MemoryLaw
@@ -31,14 +32,8 @@ class BoucWenStep(Law):
     """A law that packs the parameters (A, beta, gamma, n, gain, offset, c1, c2, ...) and the memory (u, z)."""
 
     step = staticmethod(kernels.step)
+    start = staticmethod(kernels.start)
     workspace: ClassVar[int] = N_WORK - 2
-
-    @classmethod
-    def prepare(cls, parameters: FloatArray, state: FloatArray) -> None:
-        """Fill in the charts of the exponent."""
-        A, beta, gamma, n = parameters[:4].tolist()
-        if n not in (1.0, 2.0):
-            kernels.prepare(A, beta, gamma, n, 0.0, state)
 
     @classmethod
     def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:
@@ -67,11 +62,11 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
     """A law with the memory of Bouc and Wen, exact at the samples of an input that is linear between them."""
 
     @property
-    def stepping(self) -> Stepping:
-        """The kernel for the exponent: a loop compiles no other, and n = 1 and 2 need no charts."""
+    def leanest(self) -> Stepping:
+        """The kernels for the exponent: a loop compiles no other, and n = 1 and 2 need no charts."""
         if self.n == 1.0:
-            return Stepping(kernels.linear_step, 0)
-        return Stepping(kernels.quadratic_step, 0) if self.n == 2.0 else super().stepping
+            return Stepping(kernels.linear_step, 0, stepping.start)
+        return Stepping(kernels.quadratic_step, 0, stepping.start) if self.n == 2.0 else super().leanest
 
     @property
     def structural(self) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim.kernels import boucwen as kernels
+from hysim.kernels import stepping
 from hysim.laws.differential._boucwen_law import BoucWenStep
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.laws.differential.boucwen_inverse import BoucWenInverse, InverseState
@@ -22,6 +23,7 @@ class EquivalentBoucWen(BoucWenStep):
     """A law that says which Bouc-Wen law it is."""
 
     step = staticmethod(kernels.linear_step)
+    start = staticmethod(stepping.start)
     workspace: ClassVar[int] = 0
 
     @classmethod

@@ -87,9 +87,9 @@ class ZhuWangBoucWen(MemoryLaw):
         return Packed(parameters, cls.initial_memory(tables))
 
     @property
-    def stepping(self) -> Stepping:
+    def leanest(self) -> Stepping:
         """For n = 1 without room for a series."""
-        return Stepping(self.step, 0) if self.n == 1.0 else super().stepping
+        return Stepping(self.step, 0, self.start) if self.n == 1.0 else super().leanest
 
     @property
     def structural(self) -> tuple[str, ...]:

@@ -24,7 +24,6 @@ from hysim.kernels import preisach as kernels
 from hysim.laws.operators._preisach_search import PreisachStructure, check_relays
 from hysim.models.by_structure import ByStructure
 from hysim.models.law import Law, Packed, State
-from hysim.models.protocols import CompiledLaw
 from hysim.models.tables import Tables
 
 _ROOM = 1000  # extremes that a compiled loop remembers
@@ -103,15 +102,6 @@ class RelayLaw(ByStructure, Law):
         return np.array([*corners, (extremes[-1], extremes[-1])])
 
     memory = remembered = None  # type: ignore[assignment]  # a staircase of any length, see `staircase`
-
-    def compiled(self, u0: float = 0.0) -> CompiledLaw:
-        """As `Law.compiled`; the state holds the place of the last extreme, extremes, and outputs there."""
-        state = np.zeros(2 + 2 * _ROOM)
-        parameters, x, y, d = self._staircase((*self.z0, u0), 0)
-        size = min(d + 1, _ROOM)
-        state[0], state[1] = u0, size - 1
-        state[2 : 2 + size], state[2 + _ROOM : 2 + _ROOM + size] = x[:size], y[:size]
-        return CompiledLaw(kernels.step, parameters, state)
 
     @classmethod
     def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
