@@ -47,7 +47,7 @@ def test_the_leanest_step_has_the_bits_of_the_family(law):
 def test_a_worn_law_without_wear_is_computed_without_charts():
     worn, plain = hs.BoucWenBaberNoori(n=1.5, delta_nu=0.1), hs.BoucWenBaberNoori(n=1.5)
     state, y = worn.compiled(0.0).state, np.empty(U.size)
-    drive(worn.leanest.step, plain.packed[0], state, U, y)
+    drive(worn.stepping.step, plain.packed[0], state, U, y)
     assert y == pytest.approx(plain.response(U), abs=1e-12)
 
 

@@ -17,6 +17,7 @@ from hysim.cli import (
     compare,
     control,
     discover,
+    fmu,
     identify,
     measure,
     metrics,
@@ -31,7 +32,7 @@ from hysim.cli import (
 from hysim.cli.options import Command
 from hysim.errors import SimulationError
 
-_MODULES = (metrics, identify, discover, compare, simulate, control, plot, sweep, measure, reproduce)
+_MODULES = (metrics, identify, discover, compare, simulate, control, fmu, plot, sweep, measure, reproduce)
 COMMANDS = {module.COMMAND.name: module.COMMAND for module in _MODULES}
 """Every command by its name."""
 

@@ -54,11 +54,11 @@ class Packed(NamedTuple):
 
 
 class Stepping(NamedTuple):
-    """A step, the places at the end of the state that it works in, and its start."""
+    """A step, the start of its state, and the places at the end of the state that it works in."""
 
     step: Any
-    workspace: int
     start: Any
+    workspace: int
 
 
 class Law(Composable, ABC):
@@ -171,12 +171,12 @@ class Law(Composable, ABC):
         return scalars_of(self.arguments)
 
     @property
-    def leanest(self) -> Stepping:
+    def stepping(self) -> Stepping:
         """The leanest step of this law: one for its own numbers, where the family has several.
 
         It has the bits of the family's `step`, and is that by default.
         """
-        return Stepping(self.step, self.workspace, self.start)
+        return Stepping(self.step, self.start, self.workspace)
 
     @property
     def memory_places(self) -> tuple[tuple[int, int], ...]:
@@ -296,7 +296,8 @@ class Law(Composable, ABC):
 
     def startable(self, sample_time: float | None = None) -> Startable:
         """The law as a step that runs from any first input, for exports; it has no use for the sample time."""
-        (parameters, memory), (step, workspace, start) = self.packed, self.leanest
+        parameters, memory = self.packed
+        step, start, workspace = self.stepping
         state = np.zeros(memory.size + workspace)
         state[: memory.size] = memory
         return Startable(compiled_step(step), parameters, state, compiled_start(start))

@@ -62,11 +62,11 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
     """A law with the memory of Bouc and Wen, exact at the samples of an input that is linear between them."""
 
     @property
-    def leanest(self) -> Stepping:
-        """The kernels for the exponent: a loop compiles no other, and n = 1 and 2 need no charts."""
+    def stepping(self) -> Stepping:
+        """The kernel for the exponent: a loop compiles no other, and n = 1 and 2 need no charts."""
         if self.n == 1.0:
-            return Stepping(kernels.linear_step, 0, stepping.start)
-        return Stepping(kernels.quadratic_step, 0, stepping.start) if self.n == 2.0 else super().leanest
+            return Stepping(kernels.linear_step, stepping.start, 0)
+        return Stepping(kernels.quadratic_step, stepping.start, 0) if self.n == 2.0 else super().stepping
 
     @property
     def structural(self) -> tuple[str, ...]:

@@ -238,11 +238,11 @@ class BoucWenBaberNoori(MemoryLaw):
         return _boucwen_conversions.to_opensees_pinching(self)
 
     @property
-    def leanest(self) -> Stepping:
+    def stepping(self) -> Stepping:
         """Without the charts that only a law of a general exponent needs that neither degrades nor pinches."""
         if self.n not in (1.0, 2.0) and not any(self.scalars[name] for name in _WEARING):
-            return super().leanest
-        return Stepping(self.step, min(self.workspace, kernels.N_LEAN - 3), self.start)
+            return super().stepping
+        return super().stepping._replace(workspace=min(self.workspace, kernels.N_LEAN - 3))
 
     @property
     def known_slopes(self) -> tuple[float, float]:

@@ -94,9 +94,9 @@ class GeneralizedBoucWen(MemoryLaw):
         return Packed(np.concatenate(laws, axis=1), cls.initial_memory(tables))
 
     @property
-    def leanest(self) -> Stepping:
+    def stepping(self) -> Stepping:
         """The kernel for the exponent: n = 1 and 2 need no charts."""
-        return Stepping(kernels.elementary_step, 0, self.start) if self.n in (1.0, 2.0) else super().leanest
+        return Stepping(kernels.elementary_step, self.start, 0) if self.n in (1.0, 2.0) else super().stepping
 
     @property
     def structural(self) -> tuple[str, ...]:

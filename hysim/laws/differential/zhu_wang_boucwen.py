@@ -87,9 +87,9 @@ class ZhuWangBoucWen(MemoryLaw):
         return Packed(parameters, cls.initial_memory(tables))
 
     @property
-    def leanest(self) -> Stepping:
+    def stepping(self) -> Stepping:
         """For n = 1 without room for a series."""
-        return Stepping(self.step, 0, self.start) if self.n == 1.0 else super().leanest
+        return super().stepping._replace(workspace=0) if self.n == 1.0 else super().stepping
 
     @property
     def structural(self) -> tuple[str, ...]:

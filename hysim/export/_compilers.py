@@ -1,0 +1,97 @@
+"""Shared libraries from C: the compiler of this machine, or zig's, which compiles for every platform."""
+
+import platform
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from types import MappingProxyType
+from typing import NamedTuple
+
+OPTIONS = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC", "-shared", "-s", "-Werror=implicit")
+_PROCESSORS = MappingProxyType({"amd64": "x86_64", "arm64": "aarch64"})
+_FAT_MAGIC, _FAT_ALIGNMENT = 0xCAFEBABE, 14  # of a Mach-O file for several processors, 2^14 bytes
+
+
+class Target(NamedTuple):
+    """A system and a processor: its name in FMI 3.0, zig's name for it, and the ending of its shared libraries."""
+
+    name: str
+    zig: str
+    ending: str
+
+    @property
+    def is_host(self) -> bool:
+        """Whether this machine is one."""
+        return self.name == host()
+
+
+TARGETS = MappingProxyType(
+    {
+        "linux": (
+            Target("x86_64-linux", "x86_64-linux-gnu.2.17", ".so"),
+            Target("aarch64-linux", "aarch64-linux-gnu.2.17", ".so"),
+        ),
+        "windows": (Target("x86_64-windows", "x86_64-windows-gnu", ".dll"),),
+        "mac": (
+            Target("x86_64-darwin", "x86_64-macos", ".dylib"),
+            Target("aarch64-darwin", "aarch64-macos", ".dylib"),
+        ),
+    }
+)
+"""Targets of each platform."""
+
+
+def host() -> str:
+    """The name of this machine in FMI 3.0, such as ``x86_64-linux``."""
+    machine = platform.machine().lower()
+    return f"{_PROCESSORS.get(machine, machine)}-{platform.system().lower()}"
+
+
+def compiler(target: Target) -> tuple[str, ...] | None:
+    """The beginning of a command that compiles for a target; None where there is no compiler.
+
+    A compiler of this machine comes first, for this machine.
+    """
+    own = shutil.which("gcc") or shutil.which("clang") if target.is_host else None
+    if own is not None:
+        return (own,)
+    if find_spec("ziglang") is None:
+        return None
+    return sys.executable, "-m", "ziglang", "cc", "-target", target.zig
+
+
+def shared_library(source: str, name: str, target: Target, command: Sequence[str]) -> bytes:
+    """The shared library of a C source; `command` is what `compiler` returned.
+
+    Raises
+    ------
+    OSError
+        If it cannot be compiled; the message has the compiler's first error.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder, f"{name}.c").write_text(source, encoding="utf-8")
+        arguments = [*command, *OPTIONS, f"{name}.c", "-o", f"{name}{target.ending}"]
+        if not target.name.endswith("windows"):
+            arguments.append("-lm")
+        done = subprocess.run(arguments, cwd=folder, capture_output=True, text=True, check=False)
+        if done.returncode:
+            lines = [line for line in done.stderr.splitlines() if "error" in line] or done.stderr.splitlines() or [""]
+            raise OSError(f"{' '.join(command)} could not compile the source for {target.name}: {lines[0]}")
+        return Path(folder, f"{name}{target.ending}").read_bytes()
+
+
+def universal(libraries: Sequence[bytes]) -> bytes:
+    """One Mach-O file for several processors, of 64-bit Mach-O files for one each."""
+    step = 1 << _FAT_ALIGNMENT
+    parts, places = b"", []
+    for library in libraries:
+        offset = step + len(parts)
+        places.append((*struct.unpack("<II", library[4:12]), offset, len(library), _FAT_ALIGNMENT))
+        parts += library + bytes(-len(library) % step)
+    header = struct.pack(">II", _FAT_MAGIC, len(places)) + b"".join(struct.pack(">IIIII", *place) for place in places)
+    return header.ljust(step, b"\0") + parts
