@@ -4,12 +4,14 @@ import math
 import os
 import shutil
 import subprocess
+import sys
 
 import numpy as np
 import pytest
 
 import hysim as hs
 from hysim._frozen import read_only
+from hysim.cli import main
 from hysim.kernels.controllers import replay
 
 H = 5e-5  # s
@@ -243,3 +245,48 @@ def test_the_state_of_a_lean_law_is_small():
 def test_a_thing_without_a_program_is_refused(thing, arguments, error, message):
     with pytest.raises(error, match=message):
         hs.to_c(thing, **arguments)
+
+
+@needs_compiler
+def test_an_inverse_from_a_file_by_the_command_line_alone(tmp_path):
+    """Identified plays, their inverse in C, and its commands through the identified law."""
+    true = hs.PrandtlIshlinskii(thresholds=(0.0, 1.0, 3.0), weights=(0.5, 0.3, 0.2))
+    u = np.concatenate([hs.signals.triangle(0.0, high, cycles=1, samples_per_cycle=80) for high in (10.0, 6.0)])
+    lines = [f"{v!r},{w!r}" for v, w in zip(u.tolist(), true.response(u).tolist(), strict=True)]
+    (tmp_path / "loop.csv").write_text("\n".join(["voltage,displacement", *lines]) + "\n")
+    hysim = [sys.executable, "-m", "hysim"]
+    columns = ["--u", "voltage", "--y", "displacement", "--model", "prandtl-ishlinskii"]
+    for command in (
+        [*hysim, "identify", "loop.csv", *columns, "--out", "law.json"],
+        [*hysim, "c", "law.json", "--inverse", "--out", "inverse.c"],
+        [compiler, *STRICT, "inverse.c", "inverse_main.c", "-o", "inverse", "-lm"],
+    ):
+        subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    law, wanted = hs.load_model(tmp_path / "law.json"), 2.5 + 2.4 * np.sin(0.1 * np.arange(300))
+    text = "\n".join(map(repr, wanted.tolist()))
+    out = subprocess.run([tmp_path / "inverse"], input=text, capture_output=True, text=True, check=True).stdout
+    voltages = np.array(out.split(), dtype=float)
+    assert np.abs(law.response(np.append(0.0, voltages))[1:] - wanted).max() < 1e-12 * np.ptp(wanted)
+    in_python = law.compiled_inverse(0.0)
+    expected = [in_python.step(in_python.parameters, in_python.state, y) for y in wanted]
+    assert np.abs(voltages - expected).max() < 1e-12 * np.ptp(voltages)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["law.json", "--out", "law.h"], "call the file .c"),
+        (["law.json", "--out", "2.c"], "name must be letters"),
+        (["play.json", "--inverse", "--out", "a.c"], "has no inverse"),
+        (["none.json", "--out", "a.c"], "none.json"),
+    ],
+)
+def test_wrong_input_of_the_command_is_refused_in_one_line(arguments, message, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    hs.save(hs.Line(slope=1.0), "law.json")
+    hs.save(hs.Play(threshold=1.0), "play.json")
+    assert main(["c", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert not list(tmp_path.glob("*.c"))

@@ -144,6 +144,8 @@ def program_of(
             memory=len(free.memory),
         )
     if isinstance(thing, Controller):
+        if isinstance(thing, InverseFeedforward) and not thing.dynamic:
+            return replace(_of_controller(thing, math.inf, u0, y0), sample_time=math.nan)
         if sample_time is None:
             raise ValueError(f"a {type(thing).__name__} is sampled: give sample_time")
         return _of_controller(thing, sample_time, u0, y0)
