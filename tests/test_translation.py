@@ -143,6 +143,12 @@ def kept_from_pass_to_pass(parameters, state, u):
     return total
 
 
+def names_that_mean_something_in_c(parameters, state, u):
+    """Local names like those of C, of its functions, and of helpers and tables of the translator."""
+    double, exp, smaller, table, few = u, 2.0 * u, 3.0 * u, TABLE[3], 4.0
+    return min(double, 0.5) + math.exp(-exp) + smaller + table + few + FEW[1]
+
+
 def mathematics(parameters, state, u):
     first = math.exp(u) + math.log1p(u) * math.tanh(u) + math.copysign(math.sqrt(u + 1.0), -u) - math.expm1(-u)
     return first + math.floor(3.7 * u) + math.atan2(u, 2.0) + math.fabs(-u) + (0.0 if math.isfinite(u) else 1.0)
@@ -150,6 +156,7 @@ def mathematics(parameters, state, u):
 
 CONSTRUCTS = (
     operators, comparisons, extremes, loops, slices, swaps, calls, matrices, work, kept_from_pass_to_pass, mathematics,
+    names_that_mean_something_in_c,
 )  # fmt: skip
 
 

@@ -160,8 +160,9 @@ class Scope:
         self.written |= {name} | self.roots.get(name, frozenset())
 
     def c_name(self, name: str) -> str:
-        """The name in C."""
-        return f"{name}_" if name in _c.RESERVED else name.strip("_") or "ignored"
+        """The name in C, which is none of a function that an expression may call."""
+        plain_name = name.strip("_") or "ignored"
+        return f"{plain_name}_" if plain_name in _c.RESERVED | _c.HELPERS.keys() | _MATHEMATICS | _TESTS else plain_name
 
 
 class Expressions:
