@@ -13,11 +13,14 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from square_dahl import SquareDahl
 
 import hysim as hs
 from hysim.cli import main
 from hysim.export import _compilers, _fmu
+from hysim.export._field_units import FIELD_UNITS, field_unit
 from hysim.export._program import Field, Program
+from hysim.models.model import every_family
 
 VERSIONS = ("2.0", "3.0")
 LAW = hs.Dahl(stiffness=2.0, coulomb=0.5, offset=0.1, z0=0.2)
@@ -126,6 +129,22 @@ def test_a_sampled_model_says_its_sample_time(tmp_path, version):
     assert "u0" not in variables
     assert [variables[name]["unit"] for name in ("reference", "measurement", "command")] == ["N", "N", "mm"]
     assert root.find("CoSimulation").get("fixedInternalStepSize") == ("0.01" if version == "3.0" else None)
+
+
+def test_a_controller_with_preview_says_how_far_ahead_its_reference_is(tmp_path):
+    assert "later" not in described(unit(tmp_path, INTEGRATOR))[0].get("description")
+    ahead = dataclasses.replace(INTEGRATOR, ahead=7)
+    assert "The reference is that of 7 samples later." in described(unit(tmp_path, ahead))[0].get("description")
+
+
+def test_units_of_parameters_are_those_of_fields_that_the_families_have():
+    families = every_family()
+    for name, units in FIELD_UNITS.items():
+        fields = {each.name for each in dataclasses.fields(families[name])}
+        shared = units.keys() - fields
+        assert shared <= {"threshold", "thresholds", "gain", "weights"}, (name, shared)  # of plays, alone or in sums
+    assert field_unit(SquareDahl(), "k") == "y/u"
+    assert field_unit(SquareDahl(), "offset") == ""
 
 
 def test_a_value_outside_its_box_widens_the_box(tmp_path):

@@ -9,15 +9,18 @@ import math
 import re
 import zipfile
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from hysim._atomic import write_all
 from hysim._frozen import check_choice
 from hysim.export._compilers import TARGETS, Target, compiler, host, shared_library, universal
+from hysim.export._field_units import field_unit
 from hysim.export._fmu_source import source_of, token_of
 from hysim.export._fmu_variables import build_description, description, variables_of
 from hysim.export._program import Program, program_of
+from hysim.models.law import Law
 
 Version = Literal["2.0", "3.0"]
 Platform = Literal["linux", "windows", "mac"]
@@ -116,10 +119,16 @@ def to_fmu(
     chosen = _checked_name(type(thing).__name__ if name is None else name)
     if not math.isfinite(u0):
         raise ValueError(f"u0 must be finite, got {u0}")
-    program = program_of(thing, sample_time, u0=u0, y0=y0, tunable=True)
+    program = _with_units(program_of(thing, sample_time, u0=u0, y0=y0, tunable=True), thing)
     systems = None if platforms is None else tuple(platforms)
     write_all({target: archive(program, Options(chosen, version, systems, labels, u0))})
     return target
+
+
+def _with_units(program: Program, thing: Any) -> Program:
+    if not isinstance(thing, Law):
+        return program
+    return replace(program, fields=tuple(each._replace(unit=field_unit(thing, each.name)) for each in program.fields))
 
 
 def _checked(path: Path, version: str, platforms: Sequence[str] | None) -> Path:
