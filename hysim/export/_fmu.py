@@ -57,8 +57,8 @@ def to_fmu(
 
     Parameters
     ----------
-    thing : law, inverse of a law, sum, cascade, plant or controller
-        The model.
+    thing : model or controller
+        A law, sum, cascade, plant or actuator, `InverseFeedforward` for the inverse of a law, or another controller.
     path : str or Path
         The file, which ends in ``.fmu``.
     version : "2.0" or "3.0"
@@ -73,7 +73,8 @@ def to_fmu(
         Systems that find a shared library in the file. By default that of this machine if it has a C compiler (gcc,
         clang, or zig of the extra `export`); an empty sequence writes the sources alone. Zig compiles for all three.
     u0, y0 : float
-        Input and output at rest, at which it starts [unit of u], [unit of y].
+        Input at which a law rests before the simulation, the default of the parameter ``u0``; command and displacement
+        at which a controller starts [unit of u], [unit of y].
 
     Returns
     -------
@@ -93,9 +94,9 @@ def to_fmu(
 
     Notes
     -----
-    A unit has an input, an output, its model's parameters as tunable parameters, and where the model remembers its
-    input a fixed parameter ``u0``, the input at which it rests before the simulation. Its state can be saved, restored
-    and turned into bytes.
+    A unit has an input, an output, the numbers of a law as tunable parameters, and where the model remembers its input
+    a fixed parameter ``u0``, the input at which it rests before the simulation. Its state can be saved, restored and
+    turned into bytes.
 
     The master sets the input at a communication point and reads the output at the next one: the output is one
     communication step late. At the start it is the output for the input at the start. A sampled model is computed at
