@@ -148,6 +148,14 @@ def test_units_of_parameters_are_those_of_fields_that_the_families_have():
     assert field_unit(SquareDahl(), "offset") == ""
 
 
+def test_a_law_whose_numbers_cannot_be_followed_has_no_parameters(tmp_path):
+    levels = {"levels": (-1.0, 0.0, 1.0), "weights": (1.0, 0.5, 1.0)}
+    fresh, after = hs.Preisach(**levels), hs.Preisach(**levels, z0=(0.5, -0.2))
+    names = [described(hs.to_fmu(law, tmp_path / "law.fmu", platforms=()))[1].keys() for law in (fresh, after)]
+    assert "weights[0]" in names[0]
+    assert names[1] == {"u", "y", "u0"}
+
+
 def test_a_value_outside_its_box_widens_the_box(tmp_path):
     wide = dataclasses.replace(FRICTION, fields=(FIELDS[0]._replace(value=1e6), *FIELDS[1:]))
     assert described(unit(tmp_path, wide))[1]["stiffness"]["max"] == "1000000.0"

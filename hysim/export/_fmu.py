@@ -19,6 +19,7 @@ from hysim.export._compilers import TARGETS, Target, compiler, host, shared_libr
 from hysim.export._field_units import field_unit
 from hysim.export._fmu_source import source_of, token_of
 from hysim.export._fmu_variables import build_description, description, variables_of
+from hysim.export._packing import packing
 from hysim.export._program import Program, program_of
 from hysim.models.law import Law
 
@@ -120,10 +121,22 @@ def to_fmu(
     chosen = _checked_name(type(thing).__name__ if name is None else name)
     if not math.isfinite(u0):
         raise ValueError(f"u0 must be finite, got {u0}")
-    program = _with_units(program_of(thing, sample_time, u0=u0, y0=y0, tunable=True), thing)
+    program = program_of(thing, sample_time, u0=u0, y0=y0, tunable=_is_tunable(thing))
+    program = _with_units(program, thing)
     systems = None if platforms is None else tuple(platforms)
     write_all({target: archive(program, Options(chosen, version, systems, labels, u0))})
     return target
+
+
+def _is_tunable(thing: Any) -> bool:
+    """Whether the parameters of the step follow from a law's numbers by arithmetic; else the numbers are constants."""
+    if not isinstance(thing, Law):
+        return False
+    try:
+        packing(thing)
+    except ValueError:
+        return False
+    return True
 
 
 def _with_units(program: Program, thing: Any) -> Program:
