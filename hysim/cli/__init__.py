@@ -14,6 +14,7 @@ from typing import NoReturn
 
 from hysim import __version__
 from hysim.cli import (
+    c,
     compare,
     control,
     discover,
@@ -32,7 +33,7 @@ from hysim.cli import (
 from hysim.cli.options import Command
 from hysim.errors import SimulationError
 
-_MODULES = (metrics, identify, discover, compare, simulate, control, fmu, plot, sweep, measure, reproduce)
+_MODULES = (metrics, identify, discover, compare, simulate, control, c, fmu, plot, sweep, measure, reproduce)
 COMMANDS = {module.COMMAND.name: module.COMMAND for module in _MODULES}
 """Every command by its name."""
 
