@@ -28,7 +28,7 @@ RANKS = (
     ("simulation", "benchmarks"),
     ("identification",),
     ("discovery", "control"),
-    ("comparison", "sweeps", "rig"),
+    ("comparison", "sweeps", "rig", "export"),
     ("plot",),
     ("paper",),
     ("cli",),

@@ -54,14 +54,20 @@ def signed_closure(*signatures: Any) -> Callable[[F], F]:
     return lambda function: compiler(list(signatures), nogil=True, error_model="numpy")(function)
 
 
-class _Address(types.WrapperAddressProtocol):
-    """A kernel that numba knows by its signature and its address alone."""
+def closure(function: F) -> F:
+    """As `kernel`, for a function that closes over kernels: no later process would find it in the cache."""
+    compiler: Any = numba.njit
+    return compiler(nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+
+
+class Addressed(types.WrapperAddressProtocol):
+    """A kernel, `function`, that numba knows by its signature and its address alone."""
 
     def __init__(self, function: Any, signature: Any) -> None:
-        self._function, self._signature = function, signature
+        self.function, self._signature = function, signature
 
     def __wrapper_address__(self) -> int:
-        return int(_get_wrapper_address(self._function, self._signature))
+        return int(_get_wrapper_address(self.function, self._signature))
 
     def signature(self) -> Any:
         return self._signature
@@ -69,7 +75,7 @@ class _Address(types.WrapperAddressProtocol):
 
 def by_address(function: F, signature: Any) -> F:
     """A kernel that a closure calls by its address: its code is not compiled into the closure once more."""
-    address: Any = _Address(function, signature) if isinstance(function, Dispatcher) else function
+    address: Any = Addressed(function, signature) if isinstance(function, Dispatcher) else function
     return address  # type: ignore[no-any-return]
 
 

@@ -366,6 +366,13 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
 
 
 @kernel
+def start(parameters: FloatArray, state: FloatArray, u0: float) -> None:
+    """Complete the state of `step` for a first input `u0`: the input, and the charts of the exponent."""
+    state[0] = u0
+    prepare(parameters[0], parameters[1], parameters[2], parameters[3], 0.0, state)
+
+
+@kernel
 def linear_step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """As `step` for n = 1, without a workspace."""
     z, du = state[1], u - state[0]

@@ -307,6 +307,13 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
 
 
 @kernel
+def start(parameters: FloatArray, state: FloatArray, u0: float) -> None:
+    """Complete a state that holds the first output less the offset: the memory z is what the feedthrough leaves."""
+    state[0] = u0
+    state[1] -= parameters[1] * u0
+
+
+@kernel
 def state_size(rows: int, columns: int) -> int:
     """Length of the state of `step` for polynomials of `rows` by `columns` coefficients."""
     return 2 + rows * columns + max(2, columns) * (N_TERMS + 1)

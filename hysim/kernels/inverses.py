@@ -25,6 +25,9 @@ from hysim.kernels.stepping import CONSTANTS, STEP, VECTOR, Step
 N_LIMITS = 2  # parameters before those of the inverse itself
 N_PLACE = 2  # places of the state before those of the inverse itself
 N_SEARCH = 4  # places of the state of `searched` before the law's: input, output, slope, largest output so far
+N_SEARCHED = (
+    N_LIMITS + 3
+)  # parameters before the places of the memory: limits, certain, numbers of stretches and places
 
 _POINTS = 16  # of a branch at which the output is evaluated
 _DOUBLINGS = 1100  # more than there are between the smallest number and the largest
@@ -97,13 +100,44 @@ def plays(parameters: FloatArray, state: FloatArray, y: float) -> float:
 
 
 @inlined
+def keep(law: FloatArray, before: FloatArray, places: FloatArray) -> None:
+    """Copy the memory of a law into `before`; see `put_back`."""
+    i = 0
+    for k in range(places.size // 2):
+        first = int(places[2 * k])
+        for j in range(int(places[2 * k + 1])):
+            before[i + j] = law[first + j]
+        i += int(places[2 * k + 1])
+
+
+@inlined
+def put_back(law: FloatArray, before: FloatArray, places: FloatArray) -> None:
+    """Put the memory `before` into the state of a law; `places` are first place and length of its stretches.
+
+    The workspace of the law stays: it holds nothing that the memory does not determine.
+    """
+    i = 0
+    for k in range(places.size // 2):
+        first = int(places[2 * k])
+        for j in range(int(places[2 * k + 1])):
+            law[first + j] = before[i + j]
+        i += int(places[2 * k + 1])
+
+
+@inlined
 def _rise(
-    step: Step, parameters: FloatArray, state: FloatArray, trial: FloatArray, u: float, side: float, level: float
+    step: Step,
+    parameters: FloatArray,
+    law: FloatArray,
+    before: FloatArray,
+    places: FloatArray,
+    u: float,
+    side: float,
+    level: float,
 ) -> float:
-    """Output at `u` less `level`, counted positive on one side of it; the state does not change."""
-    for k in range(state.size):  # `trial[:] = state` would compile the text of an error, for seconds
-        trial[k] = state[k]
-    return side * (step(parameters, trial, u) - level)
+    """Output at `u` less `level`, counted positive on one side of it, from the memory `before`."""
+    put_back(law, before, places)
+    return side * (step(parameters, law, u) - level)
 
 
 @inlined
@@ -117,8 +151,9 @@ def _apart(here: float, direction: float, low: float, length: float, high: float
 def _bracket(
     step: Step,
     parameters: FloatArray,
-    state: FloatArray,
-    trial: FloatArray,
+    law: FloatArray,
+    before: FloatArray,
+    places: FloatArray,
     here: float,
     direction: float,
     side: float,
@@ -139,12 +174,12 @@ def _bracket(
     high, too_far = min(guess, 0.5 * limit), limit
     high_error = math.nan
     for _ in range(_DOUBLINGS):
-        high_error = _rise(step, parameters, state, trial, here + direction * high, side, wanted)
+        high_error = _rise(step, parameters, law, before, places, here + direction * high, side, wanted)
         if 0.0 <= high_error < math.inf:
             return low, low_error, high, high_error
         rises = -math.inf < high_error < 0.0 and high_error >= low_error - noise
         if rises and ahead > 0.0:
-            next_error = side * (step(parameters, trial, here + direction * (high + ahead * high)) - wanted)
+            next_error = side * (step(parameters, law, here + direction * (high + ahead * high)) - wanted)
             rises = next_error >= high_error - noise
         if rises:
             low, low_error = high, high_error
@@ -160,8 +195,9 @@ def _bracket(
 def _closed_in(
     step: Step,
     parameters: FloatArray,
-    state: FloatArray,
-    trial: FloatArray,
+    law: FloatArray,
+    before: FloatArray,
+    places: FloatArray,
     here: float,
     direction: float,
     side: float,
@@ -179,7 +215,7 @@ def _closed_in(
             length = 0.5 * (low + high)
         if high_error == 0.0 or not _apart(here, direction, low, length, high):
             break
-        error = _rise(step, parameters, state, trial, here + direction * length, side, wanted)
+        error = _rise(step, parameters, law, before, places, here + direction * length, side, wanted)
         if error < 0.0:
             low, low_error = length, error
             high_error *= 0.5 if last_side < 0 else 1.0
@@ -195,8 +231,9 @@ def _closed_in(
 def _turn(
     step: Step,
     parameters: FloatArray,
-    state: FloatArray,
-    trial: FloatArray,
+    law: FloatArray,
+    before: FloatArray,
+    places: FloatArray,
     here: float,
     direction: float,
     side: float,
@@ -205,13 +242,13 @@ def _turn(
     noise: float,
 ) -> float:
     """Length at which the output has fallen; zero if it rises all along."""
-    before = 0.0
+    last = 0.0
     for i in range(1, _POINTS + 1):
         part = length * i / _POINTS
-        rise = _rise(step, parameters, state, trial, here + direction * part, side, reached)
-        if not rise > before - noise:
+        rise = _rise(step, parameters, law, before, places, here + direction * part, side, reached)
+        if not rise > last - noise:
             return part
-        before = rise
+        last = rise
     return 0.0
 
 
@@ -219,8 +256,9 @@ def _turn(
 def _falls_back(
     step: Step,
     parameters: FloatArray,
-    state: FloatArray,
-    trial: FloatArray,
+    law: FloatArray,
+    before: FloatArray,
+    places: FloatArray,
     here: float,
     direction: float,
     side: float,
@@ -234,7 +272,9 @@ def _falls_back(
     """
     near, noise, known = _NEAR, 0.0, False
     while near > _NEAREST:
-        back = _rise(step, parameters, state, trial, here - direction * (near * largest / steepness), side, reached)
+        back = _rise(
+            step, parameters, law, before, places, here - direction * (near * largest / steepness), side, reached
+        )
         if back < -noise and math.isfinite(back):
             return True
         known = known or math.isfinite(back)
@@ -251,8 +291,10 @@ def search(step: Step, parameters: FloatArray, state: FloatArray, y: float) -> f
     ahead, which tells an end before the turn from one behind it, and before the turn.
     """
     parameters, state = borrowed(parameters), borrowed(state)
-    m = (state.size - N_SEARCH) // 2
-    own, law, trial = parameters[N_LIMITS:], state[N_SEARCH : N_SEARCH + m], state[N_SEARCH + m :]
+    certain, n_stretches, m = parameters[2] != 0.0, int(parameters[3]), state.size - int(parameters[4])
+    own, places = parameters[N_SEARCHED + 2 * n_stretches :], parameters[N_SEARCHED : N_SEARCHED + 2 * n_stretches]
+    law, before = state[N_SEARCH:m], state[m:]
+    keep(law, before, places)
     here, reached, slope = state[0], state[1], state[2]
     rising, side, gap = math.copysign(1.0, slope), math.copysign(1.0, y - reached), abs(y - reached)
     direction, length = side * rising, math.nan
@@ -266,14 +308,20 @@ def search(step: Step, parameters: FloatArray, state: FloatArray, y: float) -> f
         for _ in range(_ATTEMPTS):
             allowed = noise if resolved else math.inf
             low, low_error, high, high_error = _bracket(
-                step, own, law, trial, here, direction, side, y, gap, guess, limit, ahead, allowed
+                step, own, law, before, places, here, direction, side, y, gap, guess, limit, ahead, allowed
             )
             reaches = 0.0 <= high_error < math.inf
             if reaches:
-                high = _closed_in(step, own, law, trial, here, direction, side, y, low, low_error, high, high_error)
+                high = _closed_in(
+                    step, own, law, before, places, here, direction, side, y, low, low_error, high, high_error
+                )
             if reaches or ahead > 0.0:
                 end = high if reaches else low
-                turn = _turn(step, own, law, trial, here, direction, side, reached, end, noise)
+                turn = (
+                    0.0
+                    if certain
+                    else _turn(step, own, law, before, places, here, direction, side, reached, end, noise)
+                )
                 if turn == 0.0 or not resolved:
                     length = high if reaches else math.nan
                     break
@@ -281,12 +329,15 @@ def search(step: Step, parameters: FloatArray, state: FloatArray, y: float) -> f
             ahead = max(_AHEAD, _CLEAR * noise / gap)
         if resolved and not math.isnan(length):
             steepness = gap / length
-            if _falls_back(step, own, law, trial, here, direction, side, reached, steepness, largest):
+            if certain or _falls_back(
+                step, own, law, before, places, here, direction, side, reached, steepness, largest
+            ):
                 state[2] = rising * steepness
             else:
                 length = math.nan
     u = here + direction * length
     end = within_limits(parameters, u, direction)
+    put_back(law, before, places)
     if not math.isnan(end) and (length != 0.0 or end != here):
         output = step(own, law, end)
         state[0], state[1] = end, y if end == u else output
@@ -296,8 +347,9 @@ def search(step: Step, parameters: FloatArray, state: FloatArray, y: float) -> f
 def searched(step: Step) -> Step:
     """The inverse of the law with this step.
 
-    Its parameters are the limits and the law's; its state is (u, y, slope dy/du of the right sign, 0), the law's
-    state, and room for one more.
+    Its parameters are the limits, one for a law that is known to rise or fall along every branch, else zero, the
+    numbers of stretches and of places of the law's memory, first place and length of each stretch in the law's state,
+    and the law's own. Its state is (u, y, slope dy/du of the right sign, 0), the law's state, and room for its memory.
     """
     search_by = by_address(search, _SEARCH)
     step_by = by_address(step, STEP.signature)

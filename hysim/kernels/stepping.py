@@ -5,21 +5,29 @@ and is found in the cache by later processes. `state` is changed in place.
 
 Two steps make one of the same type. Its parameters are the numbers of the first law's parameters and states, and
 then both laws' own; its state is that of the first law, and then that of the second. More than two are pairs of pairs.
+
+A start, `start(parameters, state, u0)`, completes a state that has not been stepped yet for a first input `u0`: the
+first step is that to `u0` itself. It is run once on a state. The second of two laws behind each other learns its first
+input from the first one: it is `self_starting`, with one place more at the end of its state.
 """
 
 import math
 from collections.abc import Callable
 
-from numba import float64, int64, types
+from numba import float64, int64, types, void
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import signed_closure, signed_kernel
+from hysim.kernels._compile import Addressed as Addressed
+from hysim.kernels._compile import borrowed as borrowed
+from hysim.kernels._compile import by_address, closure, signed_closure, signed_kernel
 
 VECTOR = types.Array(float64, 1, "C")
 CONSTANTS = types.Array(float64, 1, "C", readonly=True)
 STEP = types.FunctionType(float64(CONSTANTS, VECTOR, float64))
+_START = void(CONSTANTS, VECTOR, float64)
 
 Step = Callable[[FloatArray, FloatArray, float], float]
+Start = Callable[[FloatArray, FloatArray, float], None]
 
 
 @signed_kernel(int64(STEP, CONSTANTS, VECTOR, CONSTANTS, VECTOR))
@@ -37,6 +45,20 @@ def line(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """The law without memory, `parameters` (offset, slope) and `state` (last u)."""
     state[0] = u
     return float(parameters[0] + parameters[1] * u)
+
+
+# ---------------------------------------------------------------------------------- starts
+
+
+@signed_kernel(_START)
+def start(parameters: FloatArray, state: FloatArray, u0: float) -> None:
+    """The last input is the first one: all that most laws need."""
+    state[0] = u0
+
+
+@signed_kernel(_START)
+def complete(parameters: FloatArray, state: FloatArray, u0: float) -> None:
+    """Nothing: the state does not depend on the first input."""
 
 
 # ---------------------------------------------------------------------- laws side by side and behind each other
@@ -66,9 +88,41 @@ def one_behind_the_other(first: Step, second: Step) -> Step:
     return step
 
 
+def started_both(first: Start, second: Start) -> Start:
+    """The start of two laws for the same input."""
+
+    @closure
+    def start_both(parameters: FloatArray, state: FloatArray, u0: float) -> None:
+        n, m = 2 + int(parameters[0]), int(parameters[1])
+        first(parameters[2:n], state[:m], u0)
+        second(parameters[n:], state[m:], u0)
+
+    return start_both
+
+
+def self_starting(step: Step, start: Start) -> Step:
+    """The step of a law that starts at its first input; the last place of its state is zero before."""
+    start_by, step_by = by_address(start, _START), by_address(step, STEP.signature)
+
+    @signed_closure(STEP.signature)
+    def started_step(parameters: FloatArray, state: FloatArray, u: float) -> float:
+        last = state.size - 1
+        if state[last] == 0.0:
+            start_by(parameters, state[:last], u)
+            state[last] = 1.0
+        return step_by(parameters, state[:last], u)
+
+    return started_step
+
+
 # ---------------------------------------------------------------------------------- a user's own step
 
 
 def compile_step(function: Step) -> Step:
     """Compile a plain function for the type `STEP`; numba's errors pass through."""
     return signed_kernel(float64(CONSTANTS, VECTOR, float64))(function)
+
+
+def compile_start(function: Start) -> Start:
+    """Compile a plain function as a start; numba's errors pass through."""
+    return signed_kernel(_START)(function)

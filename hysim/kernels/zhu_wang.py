@@ -233,6 +233,7 @@ def serves(terms: FloatArray, bend: float, n: float) -> float:
     rows = terms.size // 2
     w = terms[rows]
     x, allowed = _WIDEST, 0.9 * w
+    reaches = False
     for _ in range(_MAX_DISCS):
         total, slope = 0.0, 0.0
         for k in range(N_TERMS, 0, -1):
@@ -240,13 +241,12 @@ def serves(terms: FloatArray, bend: float, n: float) -> float:
             total = total * x + abs(terms[rows + k])
         slope = slope * x + total
         total *= x
-        if total <= allowed:
-            break
-        if total < 1.2 * allowed:
-            x *= allowed / total  # enough: without a constant term, a sum of powers falls at least as x does
+        reaches = total < 1.2 * allowed
+        if reaches:
+            x *= min(1.0, allowed / total)  # enough: without a constant term, a sum of powers falls at least as x does
             break
         x *= (allowed / total) ** (total / (slope * x))  # Newton's rule on logarithms, where the sum is convex
-    else:
+    if not reaches:
         return 0.0
     rise = 1.9**n - 1.0 if n >= 1.0 else 1.0 - 0.1**n
     return min(1.0, x * fraction(x * bend * rise, w))

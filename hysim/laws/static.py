@@ -43,6 +43,11 @@ class Line(Law):
     searched = (Parameter("offset", affine=True), Parameter("slope", affine=True))
     memory = None  # type: ignore[assignment]  # a line remembers nothing
 
+    @property
+    def known_slopes(self) -> tuple[float, float]:
+        """The slope."""
+        return self.slope, self.slope
+
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
         if not self.slope:
             raise ValueError("the law has no inverse: its slope is zero")

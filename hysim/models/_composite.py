@@ -1,5 +1,6 @@
 """Base class of sums and cascades of models."""
 
+import math
 from abc import abstractmethod
 from typing import Any
 
@@ -11,7 +12,7 @@ from hysim.models import _parts
 from hysim.models.by_structure import ByStructure
 from hysim.models.composable import Composable
 from hysim.models.inverse_search import inverse_at_rest, inverse_response
-from hysim.models.protocols import CompiledLaw, Continuable, needs_time
+from hysim.models.protocols import CompiledLaw, Continuable, Startable, Stretched, needed_time, needs_time
 
 State = tuple[Any, ...]
 """The state of each member."""
@@ -46,10 +47,35 @@ class Composite(ByStructure, Composable):
     def compiled(self, u0: float = 0.0) -> CompiledLaw:
         """As compiled loops take it, after a first sample at `u0`; TypeError if a member cannot be stepped."""
 
+    @abstractmethod
+    def startable(self, sample_time: float | None = None) -> Startable:
+        """As exports take it, from any first input; TypeError if a member cannot be stepped."""
+
     @property
     def dynamic(self) -> bool:
         """Whether a member depends on time."""
         return any(needs_time(member) for member in self.members)
+
+    @property
+    def memory_places(self) -> tuple[tuple[int, int], ...]:
+        """First place and length of each stretch of the compiled state that is memory, member after member."""
+        places: list[tuple[int, int]] = []
+        end = 0
+        for member in self.members:
+            size = _parts.compiled_law(member, 0.0).state.size
+            own = member.memory_places if isinstance(member, Stretched) else ((0, size),)
+            for first, count in own:
+                if places and sum(places[-1]) == end + first:
+                    places[-1] = places[-1][0], places[-1][1] + count
+                else:
+                    places.append((end + first, count))
+            end += size
+        return tuple(places)
+
+    @property
+    @abstractmethod
+    def known_slopes(self) -> tuple[float, float]:
+        """Lowest and highest slope dy/du over every input, as far as the members know theirs; else infinite."""
 
     def inverse_response(self, y: npt.ArrayLike, u0: float | None = None) -> FloatArray:
         """Input that gives the output `y`, monotone between the samples; see `hysim.Law.inverse_response`.
@@ -70,7 +96,10 @@ def continued(part: Any, u: FloatArray, sample_time: float | None, state: Any) -
     if isinstance(part, Composite):
         return part.advance(u, state, sample_time=sample_time)
     plant: Any = part
-    y, end = (
-        plant.advance(u, _parts.needed_time(part, sample_time), state) if needs_time(part) else part.advance(u, state)
-    )
+    y, end = plant.advance(u, needed_time(part, sample_time), state) if needs_time(part) else part.advance(u, state)
     return np.asarray(y["y"] if isinstance(y, dict) else y), end
+
+
+def known_slopes(members: tuple[Any, ...]) -> list[tuple[float, float]]:
+    """Lowest and highest slope of each member, infinite where they are not known."""
+    return [member.known_slopes if isinstance(member, Stretched) else (-math.inf, math.inf) for member in members]

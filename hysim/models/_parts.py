@@ -3,13 +3,13 @@
 import functools
 import re
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from hysim._frozen import FloatArray, read_only
-from hysim.kernels.stepping import Step
-from hysim.models.protocols import CompiledLaw, OfFamily, Responding, Steppable, needs_time
+from hysim.kernels.stepping import Start, Step, complete, self_starting, started_both
+from hysim.models.protocols import CompiledLaw, OfFamily, Responding, Startable, Steppable, needed_time, needs_time
 
 
 def labels(parts: Sequence[Any]) -> tuple[str, ...]:
@@ -55,13 +55,6 @@ def response_of(part: Any, u: FloatArray, sample_time: float | None) -> FloatArr
     return np.asarray(part.response(u, needed_time(part, sample_time)) if needs_time(part) else part.response(u))
 
 
-def needed_time(part: Any, sample_time: float | None) -> float:
-    """The sample time, which a part that moves in time cannot do without."""
-    if sample_time is None:
-        raise ValueError(f"a {type(part).__name__} moves in time: give sample_time")
-    return sample_time
-
-
 def compiled_pair(join: Callable[[Step, Step], Step], first: CompiledLaw, second: CompiledLaw) -> CompiledLaw:
     """Two laws as one, joined by a function of `hysim.kernels.stepping`."""
     sizes = [float(first.parameters.size), float(first.state.size)]
@@ -72,8 +65,25 @@ def compiled_pair(join: Callable[[Step, Step], Step], first: CompiledLaw, second
     )
 
 
+def startable_pair(join: Callable[[Step, Step], Step], first: Startable, second: Startable) -> Startable:
+    """As `compiled_pair`, of laws that start at the same input."""
+    return Startable(*compiled_pair(join, first.law, second.law), _joined(started_both, first.start, second.start))
+
+
+def self_started(law: Startable) -> Startable:
+    """The law as one that learns its first input by its first step."""
+    if law.start is complete:
+        return law
+    return law._replace(
+        step=_joined(self_starting, law.step, law.start), state=np.append(law.state, 0.0), start=complete
+    )
+
+
+_Kernel = TypeVar("_Kernel", Step, Start)
+
+
 @functools.lru_cache(maxsize=256)
-def _joined(join: Callable[[Step, Step], Step], first: Step, second: Step) -> Step:
+def _joined(join: Callable[[Any, Any], _Kernel], first: Step | Start, second: Step | Start) -> _Kernel:
     return join(first, second)
 
 

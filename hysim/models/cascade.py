@@ -1,5 +1,6 @@
 """Models one behind the other,  u -> stage 1 -> stage 2 -> ... -> y."""
 
+import math
 from functools import reduce
 from typing import Any
 
@@ -8,10 +9,19 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, read_only
 from hysim.kernels.stepping import one_behind_the_other
 from hysim.models._cascade_search import CascadeStructure
-from hysim.models._composite import Composite, State, continued
-from hysim.models._parts import check_parts, compiled_law, compiled_pair, labels, response_of
+from hysim.models._composite import Composite, State, continued, known_slopes
+from hysim.models._parts import (
+    check_parts,
+    compiled_law,
+    compiled_pair,
+    labels,
+    response_of,
+    self_started,
+    startable_pair,
+)
+from hysim.models.compiled_step import startable
 from hysim.models.model import family
-from hysim.models.protocols import CompiledLaw
+from hysim.models.protocols import CompiledLaw, Startable
 
 __all__ = ["Cascade", "CascadeStructure"]
 
@@ -107,6 +117,23 @@ class Cascade(Composite):
             level = float(stage.response([level])[0])
         return reduce(lambda first, second: compiled_pair(one_behind_the_other, first, second), laws)
 
+    def startable(self, sample_time: float | None = None) -> Startable:
+        first, *others = (startable(stage, sample_time) for stage in self.stages)
+        behind = [self_started(stage) for stage in others]
+        return reduce(lambda first, second: startable_pair(one_behind_the_other, first, second), behind, first)
+
+    @property
+    def known_slopes(self) -> tuple[float, float]:
+        return reduce(_products, known_slopes(self.stages))
+
     def as_structure(self) -> CascadeStructure:
         """The structure of the same members, those that can be identified as starts."""
         return CascadeStructure(stages=self.stages)
+
+
+def _products(first: tuple[float, float], second: tuple[float, float]) -> tuple[float, float]:
+    """Bounds of the products of numbers between bounds."""
+    if not all(map(math.isfinite, (*first, *second))):
+        return -math.inf, math.inf
+    products = [a * b for a in first for b in second]
+    return min(products), max(products)

@@ -1,4 +1,4 @@
-"""A step as loops take it: a kernel as it is, a plain function compiled once in a process."""
+"""Steps and starts as loops and exports take them: a kernel as it is, a plain function compiled once in a process."""
 
 import functools
 import inspect
@@ -7,7 +7,42 @@ from typing import Any
 
 from numba.core.dispatcher import Dispatcher
 
-from hysim.kernels.stepping import Step, compile_step
+from hysim.kernels.stepping import Start, Step, compile_start, compile_step
+from hysim.models.protocols import Startable, Stepwise
+
+
+def startable(thing: Any, sample_time: float | None = None) -> Startable:
+    """A law or a plant as a step, with the start that its state needs.
+
+    Parameters
+    ----------
+    thing : model
+        A law, a plant, or a sum or cascade of them.
+    sample_time : float, optional
+        Time between two samples [s]; a law that does not depend on time needs none.
+
+    Returns
+    -------
+    Startable
+
+    Raises
+    ------
+    TypeError
+        If the model cannot be stepped.
+    ValueError
+        If no time is given where one is needed.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> from hysim.models.compiled_step import startable
+    >>> step, parameters, state = startable(hs.Duhem.from_terms({"u'": 1.0, "|u'| y": -1.0})).started(0.5)
+    >>> [round(step(parameters, state, u), 6) for u in (0.5, 1.5)]
+    [0.0, 0.632121]
+    """
+    if not isinstance(thing, Stepwise):
+        raise TypeError(f"a {type(thing).__name__} cannot be stepped: it has no compiled step")
+    return thing.startable(sample_time)
 
 
 def compiled_step(function: Callable[[Any, Any, float], float]) -> Step:
@@ -15,21 +50,28 @@ def compiled_step(function: Callable[[Any, Any, float], float]) -> Step:
 
     Raises TypeError if it is no function of (parameters, state, u), or does not compile to one number.
     """
-    if isinstance(function, Dispatcher) and function.py_func.__module__.startswith("hysim.kernels."):
-        return function
-    return _compiled(function)
+    return function if _is_kernel(function) else _compiled(function, compile_step, "step(parameters, state, u) -> y")
+
+
+def compiled_start(function: Callable[[Any, Any, float], None]) -> Start:
+    """The start of a family, as `compiled_step`; TypeError if it is no function of (parameters, state, u0)."""
+    return function if _is_kernel(function) else _compiled(function, compile_start, "start(parameters, state, u0)")
+
+
+def _is_kernel(function: Any) -> bool:
+    return isinstance(function, Dispatcher) and function.py_func.__module__.startswith("hysim.kernels.")
 
 
 @functools.lru_cache(maxsize=256)
-def _compiled(function: Callable[[Any, Any, float], float]) -> Step:
-    plain = function.py_func if isinstance(function, Dispatcher) else function
+def _compiled(function: Any, compiler: Callable[[Any], Any], kind: str) -> Any:
+    plain, name = (function.py_func if isinstance(function, Dispatcher) else function), kind.partition("(")[0]
     if not inspect.isfunction(plain):
-        raise TypeError(f"step must be a function step(parameters, state, u) -> y, got {type(function).__name__}")
-    taken = inspect.signature(plain).parameters
+        raise TypeError(f"{name} must be a function {kind}, got {type(function).__name__}")
+    wanted, taken = kind[len(name) :].partition(")")[0] + ")", inspect.signature(plain).parameters
     if len(taken) != 3:
-        raise TypeError(f"step must take (parameters, state, u), but {plain.__name__} takes ({', '.join(taken)})")
+        raise TypeError(f"{name} must take {wanted}, but {plain.__name__} takes ({', '.join(taken)})")
     try:
-        return compile_step(plain)
+        return compiler(plain)
     except Exception as error:  # numba's errors share no class
         reason = " ".join(str(error).split())
-        raise TypeError(f"{plain.__name__} does not compile as step(parameters, state, u) -> y: {reason}") from None
+        raise TypeError(f"{plain.__name__} does not compile as {kind}: {reason}") from None

@@ -11,12 +11,13 @@ from hysim._parallel import in_pieces
 from hysim.errors import SimulationError
 from hysim.kernels import inverses as kernels
 from hysim.kernels.stepping import drive
-from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, Stretched
 
 _REACH, _WIDER = 1e-6, 16.0  # how far at most the output is looked at to either side of the first input; the ratio
 _SHORTEST = 2.0**-46  # of the first input, or this number
 _NEXT_TO_NOTHING = 1e-150
 _HIDDEN, _FARTHEST = 2.0**-44, 1e150  # part of the output by which rounding may hide a rise: it is then sought further
+_FLAT = 1e-6  # of the highest slope: one that is flatter somewhere is looked at, as one that turns
 _LINEAR = 0.1  # part by which rises over once, twice and four times a length are no multiples of each other
 
 Unreached = Callable[[int, float, CompiledLaw], str]
@@ -25,17 +26,18 @@ Unreached = Callable[[int, float, CompiledLaw], str]
 _searched = functools.lru_cache(maxsize=256)(kernels.searched)
 
 
-def inverse_step(
-    forward: CompiledLaw, u: float, y: float | None = None, limits: Limits = UNLIMITED, terms: float = 0.0
+def searched_inverse(
+    law: Any, forward: CompiledLaw, y: float | None = None, limits: Limits = UNLIMITED, terms: float = 0.0
 ) -> CompiledLaw:
-    """The inverse of a law that stands at the input `u`, as `hysim.kernels.inverses` has it.
+    """The inverse of a law in the state of `forward`, as `hysim.kernels.inverses` has it.
 
     `y` is the output there, by default that of the step; `terms` is the size of the terms that it is the sum of, where
-    they are larger: their rounding is the output's.
+    they are larger: their rounding is the output's. Of a `law` that says where its memory is, the search copies no
+    more than that; of one that knows its slopes, it looks for no turn where these have one sign.
 
     Raises ValueError if the output does not rise or fall through `u`.
     """
-    trial = np.empty_like(forward.state)
+    u, trial = float(forward.state[0]), np.empty_like(forward.state)
 
     def output(u: float) -> float:
         trial[:] = forward.state
@@ -45,11 +47,21 @@ def inverse_step(
         reached, slope = output(u), _slope(output, u)
     if slope == 0.0:
         raise ValueError(f"the law has no inverse: its output does not rise or fall through u = {u:g}")
+    places = law.memory_places if isinstance(law, Stretched) else ((0, forward.state.size),)
+    certain = isinstance(law, Stretched) and one_signed(law.known_slopes)
+    n_memory = sum(count for _, count in places)
+    head = [*limits, certain, len(places), n_memory, *(number for stretch in places for number in stretch)]
     return CompiledLaw(
         _searched(forward.step),
-        read_only(np.concatenate([limits, forward.parameters]), finite=False),
-        np.concatenate([[u, reached if y is None else y, slope, terms], forward.state, trial]),
+        read_only(np.concatenate([head, forward.parameters]), finite=False),
+        np.concatenate([[u, reached if y is None else y, slope, terms], forward.state, np.zeros(n_memory)]),
     )
+
+
+def one_signed(slopes: tuple[float, float]) -> bool:
+    """Whether slopes between these two are clearly above zero, or below."""
+    least, most = sorted(map(abs, slopes))
+    return slopes[0] * slopes[1] > 0.0 and _FLAT * most < least and most < np.inf
 
 
 def inverse_response(inverse: CompiledLaw, y: FloatArray, unreached: Unreached | None = None) -> FloatArray:
@@ -73,7 +85,7 @@ def not_reached(sample: int, y: float, inverse: CompiledLaw) -> str:
 def inverse_at_rest(law: Any, y: float, u0: float | None) -> CompiledLaw:
     """The inverse of a law that rests at `u0`; by default at the first input with the first output `y`."""
     here, reached = (first_input(law, y), y) if u0 is None else (float(u0), None)
-    return inverse_step(law.compiled(here), here, reached)
+    return searched_inverse(law, law.compiled(here), reached)
 
 
 def first_input(law: Any, y: float) -> float:

@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from hysim.models import inverse_search
+from hysim.models.inverse_search import searched_inverse
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, StepwiseInvertible
 
 
@@ -23,4 +23,4 @@ def inverse_step(law: Any, u0: float, limits: Limits = UNLIMITED, sample_time: f
     """
     if isinstance(law, StepwiseInvertible):
         return law.compiled_inverse(u0, limits, sample_time)
-    return inverse_search.inverse_step(CompiledLaw(*law.compiled(u0)), u0, limits=limits)
+    return searched_inverse(law, CompiledLaw(*law.compiled(u0)), limits=limits)

@@ -21,13 +21,14 @@ from hysim._cycles import TOLERANCE
 from hysim._frozen import FloatArray, items, read_only
 from hysim._parallel import in_pieces
 from hysim.errors import SimulationError
+from hysim.kernels import stepping
 from hysim.kernels.stepping import Step, drive
 from hysim.models.batch import Batch, Reduction, Sets
-from hysim.models.compiled_step import compiled_step
+from hysim.models.compiled_step import compiled_start, compiled_step
 from hysim.models.composable import Composable
-from hysim.models.inverse_search import inverse_at_rest, inverse_response, inverse_step, not_reached
+from hysim.models.inverse_search import inverse_at_rest, inverse_response, not_reached, searched_inverse
 from hysim.models.parameters import Parameter, declared_space
-from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, Startable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.stages import Simpler, Stage, Subset
 from hysim.models.steady_cycle import PassOf, fixed_point
@@ -62,6 +63,9 @@ class Law(Composable, ABC):
     ----------
     step : staticmethod
         ``step(parameters, state, u) -> y``, a plain function that numba can compile, or a kernel.
+    start : staticmethod
+        ``start(parameters, state, u0)``, likewise, which completes for a first input the state that `pack` has and the
+        workspace behind it; by default the last input is the first one.
     initial : tuple of str
         Fields that are the initial memory; they stand in the state behind the last input. By default ``("z0",)``.
     searched : tuple of Parameter
@@ -79,6 +83,7 @@ class Law(Composable, ABC):
     """
 
     step: ClassVar[Any]
+    start: ClassVar[Any] = staticmethod(stepping.start)
     initial: ClassVar[tuple[str, ...]] = ("z0",)
     searched: ClassVar[tuple[Parameter, ...]] = ()
     starts: ClassVar[tuple[Mapping[str, float], ...]] = ()
@@ -106,14 +111,6 @@ class Law(Composable, ABC):
         n_sets = len(next(iter(tables.values())))
         memory = [np.zeros((n_sets, 1)), *(tables[name] for name in cls.initial), np.zeros((n_sets, further))]
         return np.concatenate(memory, axis=1)
-
-    def start(self, u0: float, memory: FloatArray) -> State:
-        """The front of the state before a first sample at the input `u0`; `memory` is what `pack` has."""
-        return (u0, *memory[1:].tolist())
-
-    @classmethod
-    def prepare(cls, parameters: FloatArray, state: FloatArray) -> None:
-        """Fill the scratch of a state that begins, where a step needs it filled."""
 
     @classmethod
     def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:
@@ -163,6 +160,30 @@ class Law(Composable, ABC):
     def scalars(self) -> dict[str, float]:
         """Every number by the name that `hysim.identify` has for it, ``name`` or ``name[k]``."""
         return scalars_of(self.arguments)
+
+    @property
+    def memory_places(self) -> tuple[tuple[int, int], ...]:
+        """First place and length of each stretch of the state that is memory: the front of it."""
+        return ((0, self.packed[1].size),)
+
+    @property
+    def known_slopes(self) -> tuple[float, float]:
+        """Lowest and highest slope dy/du over every input that begins with the initial memory, infinite if unknown."""
+        return -math.inf, math.inf
+
+    @property
+    def structural(self) -> tuple[str, ...]:
+        """Names in `scalars` of the numbers that decide which step the law has, and how many parameters this takes."""
+        return ()
+
+    def exchanged(self, columns: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        """The `tables`, with columns (1, 1) in place of some numbers, by their names in `scalars`."""
+        tables = dict(self.tables)
+        for name, column in columns.items():
+            field, bracket, place = name.partition("[")
+            chosen = np.arange(tables[field].shape[1]) == (int(place[:-1]) if bracket else 0)
+            tables[field] = np.where(chosen, column, tables[field])
+        return tables
 
     @property
     def initial_names(self) -> tuple[str, ...]:
@@ -220,7 +241,7 @@ class Law(Composable, ABC):
             As `response`; also if the state has another length.
         """
         inputs = read_only(u, "u", ndim=1)
-        law, start = self._begun(inputs, state)
+        law, start = self._begun(_first(inputs), state)
         y = np.empty(inputs.size)
         self._follow(law, inputs, y)
         return y, tuple(law.state[: len(start)].tolist()) if y.size else start
@@ -241,7 +262,7 @@ class Law(Composable, ABC):
         from hysim.kernels.memories import drive_memory  # compiled where it is needed
 
         inputs = read_only(u, "u", ndim=1)
-        law, start = self._begun(inputs, None)
+        law, start = self._begun(_first(inputs), None)
         z = np.empty((inputs.size, len(start) - 1))
         with np.errstate(all="ignore"):
             lost = in_pieces(lambda k: drive_memory(*law, inputs[k], z[k]), inputs.size)
@@ -251,10 +272,21 @@ class Law(Composable, ABC):
 
     def compiled(self, u0: float = 0.0) -> CompiledLaw:
         """The law as compiled loops take it; the state is that after a first sample at the input `u0`."""
-        law, _ = self._begun(np.array([u0]), None)
+        law = self.startable().started(u0)
         with np.errstate(all="ignore"):
             law.step(law.parameters, law.state, u0)
         return law
+
+    def startable(self, sample_time: float | None = None) -> Startable:
+        """The law as a step that runs from any first input, for exports; it has no use for the sample time."""
+        parameters, memory = self.packed
+        state = np.zeros(memory.size + self.workspace)
+        state[: memory.size] = memory
+        return Startable(compiled_step(self.step), parameters, state, compiled_start(self.start))
+
+    def first_state(self, u0: float) -> State:
+        """Last input and memory before a first sample at the input `u0`."""
+        return self._begun(u0, None)[1]
 
     @classmethod
     def responses(
@@ -344,7 +376,8 @@ class Law(Composable, ABC):
 
     def search_inverse(self, state: State, *, terms: float = 0.0) -> CompiledLaw:
         """The inverse of the law in this state by a search on its step; see `hysim.models.inverse_search`."""
-        return inverse_step(self._begun(np.array([state[0]]), state)[0], state[0], terms=terms)
+        law = self.assemble(dict(zip(self.initial_names, state[1:], strict=False)))  # whose slopes are those from here
+        return searched_inverse(law, self._begun(state[0], state)[0], terms=terms)
 
     def unreached(self, sample: int, y: float, inverse: CompiledLaw) -> str:
         """Message for an output that has no input."""
@@ -367,7 +400,7 @@ class Law(Composable, ABC):
         CompiledLaw
             ``u = step(parameters, state, y)``, nan where no input has the output y.
         """
-        return inverse_step(self.compiled(u0), u0, limits=limits)
+        return searched_inverse(self, self.compiled(u0), limits=limits)
 
     # ------------------------------------------------------------------------------ identification
 
@@ -483,16 +516,15 @@ class Law(Composable, ABC):
         """The tables with what the constructor would add."""
         return tables
 
-    def _begun(self, u: FloatArray, state: State | None) -> tuple[CompiledLaw, State]:
-        """The law before the first sample of `u`, and the front of its state."""
-        parameters, memory = self.packed
-        start = self.start(float(u[0]) if u.size else 0.0, memory) if state is None else state
-        if len(start) != memory.size:
-            raise ValueError(f"the state must hold {memory.size} numbers, got {len(start)}")
-        moving = np.zeros(len(start) + self.workspace)
-        moving[: len(start)] = start
-        self.prepare(parameters, moving)
-        return CompiledLaw(compiled_step(self.step), parameters, moving), start
+    def _begun(self, u0: float, state: State | None) -> tuple[CompiledLaw, State]:
+        """The law before a first sample at `u0`, or in a state; and the front of its state."""
+        size = self.packed[1].size
+        if state is not None and len(state) != size:
+            raise ValueError(f"the state must hold {size} numbers, got {len(state)}")
+        law = self.startable().started(u0)
+        if state is not None:
+            law.state[:size] = state
+        return law, tuple(law.state[:size].tolist())
 
     def _follow(self, law: CompiledLaw, u: FloatArray, y: FloatArray) -> None:
         """Outputs at `u` into `y`, the state moving along."""
@@ -500,6 +532,10 @@ class Law(Composable, ABC):
             lost = in_pieces(lambda k: self.path(law, u[k], y[k]), u.size)
         if lost >= 0:
             raise SimulationError(self.divergence(lost, u[lost], y[lost]))
+
+
+def _first(u: FloatArray) -> float:
+    return float(u[0]) if u.size else 0.0
 
 
 def _of_sets(parameters: Parameters, sets: npt.NDArray[np.intp]) -> dict[str, Any]:

@@ -8,6 +8,8 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, NamedTuple, Protocol, TypeGuard, runtime_checkable
 
+import numpy as np
+
 from hysim._frozen import FloatArray
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.stages import Simpler, Stage
@@ -25,6 +27,32 @@ class CompiledLaw(NamedTuple):
     step: Callable[[FloatArray, FloatArray, float], float]
     parameters: FloatArray
     state: FloatArray
+
+
+class Startable(NamedTuple):
+    """A model that runs sample by sample from any first input, as exported programs take it.
+
+    ``start(parameters, state, u0)`` completes `state` once; then ``y = step(parameters, state, u)`` has the outputs of
+    the model's `response` at the samples of an input that begins with `u0`. Both are kernels of the subset in
+    `hysim.kernels`, or functions that close over such.
+    """
+
+    step: Callable[[FloatArray, FloatArray, float], float]
+    parameters: FloatArray
+    state: FloatArray
+    start: Callable[[FloatArray, FloatArray, float], None]
+
+    @property
+    def law(self) -> CompiledLaw:
+        """Step, parameters and state."""
+        return CompiledLaw(self.step, self.parameters, self.state)
+
+    def started(self, u0: float) -> CompiledLaw:
+        """The step before a first sample at the input `u0`, with a state of its own."""
+        state = self.state.copy()
+        with np.errstate(all="ignore"):
+            self.start(self.parameters, state, float(u0))
+        return CompiledLaw(self.step, self.parameters, state)
 
 
 class CompiledController(NamedTuple):
@@ -72,6 +100,27 @@ class Steppable(Protocol):
 
     def compiled(self, u0: float = 0.0) -> CompiledLaw:
         """The step, its parameters, and the state after a first sample at the input `u0`."""
+
+
+@runtime_checkable
+class Stepwise(Protocol):
+    """A model that runs sample by sample from any first input."""
+
+    def startable(self, sample_time: float | None = None) -> Startable:
+        """The step, and the start that its state needs; only what depends on time needs the `sample_time` [s]."""
+
+
+@runtime_checkable
+class Stretched(Protocol):
+    """A `Steppable` law that says where in its state the memory is, and between which bounds its slope lies."""
+
+    @property
+    def memory_places(self) -> tuple[tuple[int, int], ...]:
+        """First place and length of each stretch of the state that is memory; the rest is room for work."""
+
+    @property
+    def known_slopes(self) -> tuple[float, float]:
+        """Lowest and highest slope dy/du over every input, infinite where they are not known."""
 
 
 @runtime_checkable
@@ -270,6 +319,13 @@ class Direct(Protocol):
 def needs_time(plant: Any) -> TypeGuard[Dynamic]:
     """Whether the output of a plant depends on time."""
     return isinstance(plant, Dynamic) and plant.dynamic
+
+
+def needed_time(plant: Any, sample_time: float | None) -> float:
+    """The sample time [s], which a plant that moves in time cannot do without; ValueError if it is not given."""
+    if sample_time is None:
+        raise ValueError(f"a {type(plant).__name__} moves in time: give sample_time")
+    return sample_time
 
 
 def law_at(law: Any, sample_time: float) -> Any:

@@ -8,11 +8,12 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
 from hysim.kernels.stepping import side_by_side
-from hysim.models._composite import Composite, State, continued
-from hysim.models._parts import check_parts, compiled_law, compiled_pair, labels, response_of
+from hysim.models._composite import Composite, State, continued, known_slopes
+from hysim.models._parts import check_parts, compiled_law, compiled_pair, labels, response_of, startable_pair
 from hysim.models._sum_search import SumStructure
+from hysim.models.compiled_step import startable
 from hysim.models.model import family
-from hysim.models.protocols import CompiledLaw
+from hysim.models.protocols import CompiledLaw, Startable
 
 __all__ = ["Sum", "SumStructure"]
 
@@ -100,6 +101,15 @@ class Sum(Composite):
     def compiled(self, u0: float = 0.0) -> CompiledLaw:
         laws = [compiled_law(part, u0) for part in self.parts]
         return reduce(lambda first, second: compiled_pair(side_by_side, first, second), laws)
+
+    def startable(self, sample_time: float | None = None) -> Startable:
+        parts = [startable(part, sample_time) for part in self.parts]
+        return reduce(lambda first, second: startable_pair(side_by_side, first, second), parts)
+
+    @property
+    def known_slopes(self) -> tuple[float, float]:
+        lowest, highest = map(sum, zip(*known_slopes(self.parts), strict=True))
+        return lowest, highest
 
     def as_structure(self) -> SumStructure:
         """The structure of the same members, those that can be identified as starts."""

@@ -16,8 +16,9 @@ import numpy as np
 
 from hysim._frozen import FloatArray, read_only
 from hysim.kernels import boucwen as kernels
+from hysim.kernels import stepping
 from hysim.kernels.charts import N_WORK
-from hysim.kernels.stepping import Step
+from hysim.kernels.stepping import Start, Step
 from hysim.laws.differential import _boucwen_facts, boucwen_inverse, limit_cycle
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen_inverse import BoucWenInverse, InverseState
@@ -32,14 +33,8 @@ class BoucWenStep(Law):
     """A law that packs the parameters (A, beta, gamma, n, gain, offset, c1, c2, ...) and the memory (u, z)."""
 
     step = staticmethod(kernels.step)
+    start = staticmethod(kernels.start)
     workspace: ClassVar[int] = N_WORK - 2
-
-    @classmethod
-    def prepare(cls, parameters: FloatArray, state: FloatArray) -> None:
-        """Fill in the charts of the exponent."""
-        A, beta, gamma, n = parameters[:4].tolist()
-        if n not in (1.0, 2.0):
-            kernels.prepare(A, beta, gamma, n, 0.0, state)
 
     @classmethod
     def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:
@@ -73,9 +68,19 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
         return kernels.linear_step if self.n == 1.0 else kernels.quadratic_step if self.n == 2.0 else kernels.step
 
     @property
+    def start(self) -> Start:  # type: ignore[override]
+        """The kernel that makes the charts of the exponent, where there are any."""
+        return stepping.start if self.n in (1.0, 2.0) else kernels.start
+
+    @property
     def workspace(self) -> int:  # type: ignore[override]
         """Places for the charts of the exponent."""
         return 0 if self.n in (1.0, 2.0) else super().workspace
+
+    @property
+    def structural(self) -> tuple[str, ...]:
+        """The exponent where it has a kernel of its own."""
+        return ("n",) if self.n in (1.0, 2.0) else ()
 
     @property
     def admissible(self) -> bool:
@@ -128,6 +133,11 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
         (0.721535457239, 0.278464542761, 0.593244754991)
         """
         return limit_cycle.limit_cycle(self.A, self.beta, self.gamma, self.n, float(amplitude))
+
+    @property
+    def known_slopes(self) -> tuple[float, float]:
+        """Those of `slope_bounds`."""
+        return self.slope_bounds()
 
     def slope_bounds(self, low: float = -np.inf, high: float = np.inf) -> tuple[float, float]:
         """Lowest and highest slope dy/du over every input between `low` and `high` [unit of u] that begins with z0.

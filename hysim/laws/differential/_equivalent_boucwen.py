@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim.kernels import boucwen as kernels
+from hysim.kernels import stepping
 from hysim.laws.differential._boucwen_law import BoucWenStep
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.laws.differential.boucwen_inverse import BoucWenInverse, InverseState
@@ -22,6 +23,7 @@ class EquivalentBoucWen(BoucWenStep):
     """A law that says which Bouc-Wen law it is."""
 
     step = staticmethod(kernels.linear_step)
+    start = staticmethod(stepping.start)
     workspace: ClassVar[int] = 0
 
     @classmethod
@@ -40,6 +42,11 @@ class EquivalentBoucWen(BoucWenStep):
     def bouc_wen(self) -> BoucWen:
         """The `BoucWen` law with the same output."""
         return BoucWen(**{name: float(table[0, 0]) for name, table in self.equivalent(self.tables).items()})
+
+    @property
+    def known_slopes(self) -> tuple[float, float]:
+        """Those of the Bouc-Wen law."""
+        return self.bouc_wen.known_slopes
 
     def tangent(self, direction: npt.ArrayLike, z: npt.ArrayLike) -> FloatArray:
         """Slope dy/du at the memory `z` in a `direction` that is not zero; see `hysim.BoucWen.tangent`."""

@@ -11,6 +11,7 @@ from hysim.kernels import baber_noori as kernels
 from hysim.laws.differential import _boucwen_conversions, _boucwen_search, _power_units, _wear_search
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen import BoucWen
+from hysim.laws.differential.polynomial_boucwen import PolynomialBoucWen
 from hysim.models.holding import Holding
 from hysim.models.law import Packed
 from hysim.models.model import family
@@ -43,6 +44,7 @@ _SPREAD = Stage(
     rounds=((8, 25),),
     idle={"zeta_s": 0.0},
 )
+_WEARING = ("delta_a", "delta_nu", "delta_eta", "zeta_s")
 _OWN = ("delta_a", "delta_nu", "delta_eta", "zeta_s", "q", "p", "psi", "delta_psi", "lambda_")
 
 
@@ -235,6 +237,13 @@ class BoucWenBaberNoori(MemoryLaw):
         """
         return _boucwen_conversions.to_opensees_pinching(self)
 
+    @property
+    def known_slopes(self) -> tuple[float, float]:
+        """Those of the Bouc-Wen law, where it neither degrades nor pinches."""
+        if any(self.scalars[name] for name in _WEARING):
+            return super().known_slopes
+        return PolynomialBoucWen(**{name: self.arguments[name] for name in PolynomialBoucWen.defaults()}).known_slopes
+
     def energy(self, u: npt.ArrayLike) -> FloatArray:
         """Work e done on the memory at the samples of `u`, shape (n_samples,) [unit of z unit of u]; see `response`."""
         return self.remembered(u)[:, 1]
@@ -249,7 +258,7 @@ class BoucWenBaberNoori(MemoryLaw):
         at_rest = ("z0",) if freedom.starts_at_rest() else ()
         groups = (*_boucwen_search.REDUNDANT, *((name,) for name in alone))
         held = freedom.held(self.scalars, redundant=groups, at_rest=at_rest)
-        if all(held.get(name, 1.0) == 0.0 for name in ("delta_a", "delta_nu", "delta_eta", "zeta_s")):
+        if all(held.get(name, 1.0) == 0.0 for name in _WEARING):
             every = replace(freedom, fixed={**held, **freedom.fixed})
             return _boucwen_search.search_space(self.scalars, self.columns, record, every)
         return _wear_search.search_space(self.scalars, self.columns, record, freedom, held)
@@ -261,7 +270,7 @@ class BoucWenBaberNoori(MemoryLaw):
     def steady(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
         """Initial memory of a steady cycle; ValueError for a law that degrades or pinches, which has none."""
         values = {**self.scalars, **parameters}
-        if any(np.any(values[name]) for name in ("delta_a", "delta_nu", "delta_eta", "zeta_s")):
+        if any(np.any(values[name]) for name in _WEARING):
             raise ValueError('a law that wears off has no steady cycle: use initial="free"')
         return super().steady(parameters, record)
 

@@ -94,6 +94,7 @@ class Duhem(Law):
     y0: float = 0.0
 
     step = staticmethod(kernels.step)
+    start = staticmethod(kernels.start)
     initial: ClassVar[tuple[str, ...]] = ("y0",)
 
     def __post_init__(self) -> None:
@@ -208,7 +209,7 @@ class Duhem(Law):
 
     def inverse_begun(self, y: FloatArray, u0: float | None, state: State | None) -> CompiledLaw:
         """By a search on the step; by default from rest at u = 0, the output at y0."""
-        begin = state or self.start(float(u0 or 0.0), np.empty(0))
+        begin = state or self.first_state(float(u0 or 0.0))
         terms = abs(self.offset) + abs(self.feedthrough * begin[0]) + abs(begin[1])
         return self.search_inverse(begin, terms=terms)
 
@@ -224,15 +225,23 @@ class Duhem(Law):
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
-        """Parameters (offset, feedthrough, shape and numbers of the slopes by direction) and memory (u, 0)."""
+        """Parameters (offset, feedthrough, shape and numbers of the slopes by direction), memory (u, y0 - offset)."""
         laws = branches(Polynomials(*(tables[name] for name in Polynomials._fields)))
         shape = np.broadcast_to(np.array(laws.shape[1:], dtype=float), (len(laws), 3))
         parts = (tables["offset"], tables["feedthrough"], shape, laws.reshape(len(laws), -1))
-        return Packed(np.concatenate(parts, axis=1), np.zeros((len(laws), 2)))
+        first = np.broadcast_to(tables["y0"] - tables["offset"], (len(laws), 1))
+        return Packed(np.concatenate(parts, axis=1), np.concatenate([np.zeros((len(laws), 1)), first], axis=1))
 
-    def start(self, u0: float, memory: FloatArray) -> State:
-        """The input, and the memory with which the output is y0."""
-        return u0, self.y0 - self.offset - self.feedthrough * u0
+    def exchanged(self, columns: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        tables = super().exchanged({name: columns[name] for name in columns if name in _OUTPUT})
+        for name, column in columns.items():
+            if name not in _OUTPUT:
+                term = Term.parse(name)
+                field = Polynomials._fields[2 * int(term.absolute) + int(term.rectified)]
+                chosen = np.zeros(tables[field].shape[1:], dtype=bool)
+                chosen[term.i, term.j] = True
+                tables[field] = np.where(chosen, column, tables[field])
+        return tables
 
     @classmethod
     def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:

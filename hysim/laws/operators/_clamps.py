@@ -112,6 +112,11 @@ class ClampLaw(Bank):
         moving = ~pushed if self.stops else pushed
         return np.asarray(self.feedthrough + np.sum(weights * moving, axis=-1))
 
+    @property
+    def known_slopes(self) -> tuple[float, float]:
+        """Those of `slope_bounds`."""
+        return self.slope_bounds()
+
     def slope_bounds(self) -> tuple[float, float]:
         """Lowest and highest slope dy/du over every input.
 

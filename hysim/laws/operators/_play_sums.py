@@ -74,7 +74,7 @@ class ExtendedPlays(ByStructure, Bank):
 
     def inverse_from(self, state: State, limits: Limits = UNLIMITED) -> CompiledLaw:
         """The inverse of the law in this state, as `hysim.kernels.inverses` has it."""
-        law, _ = self._begun(np.array([state[0]]), state)
+        law, _ = self._begun(state[0], state)
         y = kernels.step(law.parameters, law.state.copy(), state[0])
         parameters = read_only(np.concatenate([limits, law.parameters]), finite=False)
         return CompiledLaw(kernels.inverse_step, parameters, np.concatenate([[state[0], y], law.state]))

@@ -23,8 +23,7 @@ from hysim._parallel import in_pieces
 from hysim.kernels import preisach as kernels
 from hysim.laws.operators._preisach_search import PreisachStructure, check_relays
 from hysim.models.by_structure import ByStructure
-from hysim.models.law import Law, State
-from hysim.models.protocols import CompiledLaw
+from hysim.models.law import Law, Packed, State
 from hysim.models.tables import Tables
 
 _ROOM = 1000  # extremes that a compiled loop remembers
@@ -46,6 +45,23 @@ class RelayLaw(ByStructure, Law):
     def check(cls, tables: Tables) -> None:
         """Refuse levels and weights that are no relays."""
         check_relays(tables["levels"], tables["weights"])
+
+    @classmethod
+    def pack(cls, tables: Tables) -> Packed:
+        """Parameters and state as `hysim.kernels.preisach.step` takes them, after the inputs z0."""
+        parameters = cls._rows(tables["levels"], tables["weights"], tables["offset"][:, 0])
+        n_sets, n_past = len(parameters), tables["z0"].shape[1]
+        if not n_past:
+            lowest, low = parameters[:, kernels.HEAD : kernels.HEAD + 1], parameters[:, 1:2]
+            rest = np.zeros((n_sets, _ROOM - 1))
+            return Packed(parameters, np.concatenate([np.zeros((n_sets, 2)), lowest, rest, low, rest], axis=1))
+        memory = np.zeros((n_sets, 2 + 2 * _ROOM))
+        numbers, past = (np.asarray(table, dtype=float) for table in (parameters, tables["z0"]))
+        for state, row, inputs in zip(memory, numbers, past, strict=True):
+            state[2], state[2 + _ROOM] = row[kernels.HEAD], row[1]
+            for u in inputs.tolist():
+                kernels.step(read_only(row), state, u)
+        return Packed(parameters, memory)
 
     @property
     def everett(self) -> FloatArray:
@@ -86,15 +102,6 @@ class RelayLaw(ByStructure, Law):
         return np.array([*corners, (extremes[-1], extremes[-1])])
 
     memory = remembered = None  # type: ignore[assignment]  # a staircase of any length, see `staircase`
-
-    def compiled(self, u0: float = 0.0) -> CompiledLaw:
-        """As `Law.compiled`; the state holds the place of the last extreme, extremes, and outputs there."""
-        state = np.zeros(2 + 2 * _ROOM)
-        parameters, x, y, d = self._staircase((*self.z0, u0), 0)
-        size = min(d + 1, _ROOM)
-        state[0], state[1] = u0, size - 1
-        state[2 : 2 + size], state[2 + _ROOM : 2 + _ROOM + size] = x[:size], y[:size]
-        return CompiledLaw(kernels.step, parameters, state)
 
     @classmethod
     def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
@@ -140,22 +147,20 @@ class RelayLaw(ByStructure, Law):
             levels, weights = _NOTHING
         everett = everett_of(weights)
         n_sets, n = max(len(levels), len(weights), len(offset)), levels.shape[1]
-        rows = np.empty((n_sets, kernels.HEAD + n + n * n))
-        rows[:, 0], rows[:, 2] = cls.spread, n
-        rows[:, 1] = offset - everett[:, -1, 0]
-        rows[:, kernels.HEAD : kernels.HEAD + n] = levels
-        rows[:, kernels.HEAD + n :] = (everett - everett.transpose(0, 2, 1)).reshape(len(everett), n * n)
-        return rows
+        signed = (everett - everett.transpose(0, 2, 1)).reshape(len(everett), n * n)
+        lowest = (offset - everett[:, -1, 0])[:, np.newaxis]
+        parts = np.array([[float(cls.spread)]]), lowest, np.array([[float(n)]]), levels, signed
+        return np.concatenate([np.broadcast_to(part, (n_sets, part.shape[1])) for part in parts], axis=1)
 
 
 def everett_of(weights: FloatArray) -> FloatArray:
     """E at the pairs of levels, shape (n_sets, N + 1, N + 1), zero above the diagonal, for (n_sets, N (N + 1) / 2)."""
     n = (math.isqrt(1 + 8 * weights.shape[1]) - 1) // 2
-    everett = np.zeros((len(weights), n + 1, n + 1))
-    rows, columns = np.tril_indices(n)
-    everett[:, rows + 1, columns] = weights
-    everett[:, :, :-1] = np.cumsum(everett[:, :, -2::-1], axis=2)[:, :, ::-1]
-    return np.cumsum(everett, axis=1)
+    place = np.full((n + 1, n), -1)
+    place[1:][np.tril_indices(n)] = np.arange(weights.shape[1])
+    single = np.where(place < 0, 0.0, weights[:, place])
+    summed = np.cumsum(single[:, :, ::-1], axis=2)[:, :, ::-1]
+    return np.cumsum(np.concatenate([summed, np.zeros((len(weights), n + 1, 1))], axis=2), axis=1)
 
 
 def weights_of(everett: FloatArray) -> FloatArray:

@@ -82,7 +82,7 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
     def check(cls, tables: Tables) -> None:
         """Refuse elements that are no plays, and envelopes that do not increase."""
         super().check(tables)
-        _envelopes(tables["left"], tables["right"])
+        _check_envelopes(tables["left"], tables["right"])
 
     @classmethod
     def structure(
@@ -114,7 +114,7 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
             raise ValueError(f"envelopes must be 1 or 2, got {envelopes!r}")
         known = tuple(tuple(read_only(side, "envelopes", ndim=1).tolist()) for side in (left, right))
         if known[0]:
-            _envelopes(*(np.atleast_2d(side) for side in known))
+            _check_envelopes(*(np.atleast_2d(side) for side in known))
         pushing = Envelopes(left=known[0], right=known[1], count=envelopes)
         plain = PrandtlIshlinskii.structure(plays=plays, thresholds=thresholds, one_signed=one_signed)
         return replace(plain, law=cls, pushing=pushing)
@@ -122,7 +122,7 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
         """Rows with envelopes; see `hysim.kernels.play_sums`."""
-        left, right = _envelopes(tables["left"], tables["right"])
+        left, right = _both(tables["left"], tables["right"])
         return Packed(kernel_rows(tables, left=left, right=right), cls.initial_memory(tables))
 
     def as_structure(self) -> ClampStructure:
@@ -203,13 +203,16 @@ def _between_the_ends(bend: FloatArray, phase: FloatArray, record: Record) -> li
     return [height, bend / half, phase - bend * middle / half, level, np.zeros_like(height)]
 
 
-def _envelopes(left: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Both envelopes (n_sets, 5); refuse what does not increase."""
-    both = left, right if right.size else left
-    for name, side in zip(("left", "right"), both, strict=True):
+def _both(left: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Both envelopes (n_sets, 5); without coefficients the right one is the left one."""
+    return left, right if right.size else left
+
+
+def _check_envelopes(left: FloatArray, right: FloatArray) -> None:
+    """Refuse envelopes (n_sets, 5) that do not increase."""
+    for name, side in zip(("left", "right"), _both(left, right), strict=True):
         if side.shape[1] != len(IDENTITY):
             raise ValueError(f"{name} must hold 5 coefficients, got {side.shape[1]}")
         bend, line = side[:, 0] * side[:, 1], side[:, 4]
         if not ((bend >= 0.0) & (line >= 0.0) & (bend + line > 0.0)).all():
             raise ValueError(f"the envelope {name} must increase: a_0 a_1 and a_4 not negative, one of them positive")
-    return both

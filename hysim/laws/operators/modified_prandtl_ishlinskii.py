@@ -16,7 +16,7 @@ from hysim._frozen import FloatArray, read_only
 from hysim.laws.operators._dead_zone_search import DeadZoneStructure
 from hysim.laws.operators._play_sums import ExtendedPlays, check_dead_zones, dead_zone, kernel_rows
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii, wrong_sum
-from hysim.models.inverse_search import inverse_step
+from hysim.models.inverse_search import searched_inverse
 from hysim.models.law import Packed, State
 from hysim.models.model import family
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
@@ -148,7 +148,7 @@ class ModifiedPrandtlIshlinskii(ExtendedPlays):
         return PrandtlIshlinskii(thresholds=tuple(np.abs(thresholds).tolist()), weights=weights)
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
-        return inverse_step(self.compiled(u0), u0, limits=limits)
+        return searched_inverse(self, self.compiled(u0), limits=limits)
 
     def refusal(self) -> str | None:
         """Why the law has no inverse: r_0 > 0, no dead zone of threshold zero, or weights whose sums change sign."""

@@ -138,6 +138,11 @@ class ParametricPrandtlIshlinskii(Law):
         parameters = np.concatenate([degree, *head, coefficients, thresholds, shares], axis=1)
         return Packed(parameters, np.concatenate([np.zeros_like(degree), z], axis=1))
 
+    @property
+    def structural(self) -> tuple[str, ...]:
+        """The number of plays."""
+        return ("plays",)
+
     def memory(self, u: npt.ArrayLike) -> FloatArray:
         """Positions of the plays at the samples of `u`, shape (n_samples, n_plays); errors as of `response`."""
         return self.remembered(u)

@@ -30,7 +30,7 @@ from hysim.models.composable import Composable
 from hysim.models.law import Packed, State
 from hysim.models.model import family
 from hysim.models.parameters import spans
-from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, Startable, needed_time
 from hysim.models.search_space import Parameters
 from hysim.models.tables import Tables
 from hysim.records import Record
@@ -211,6 +211,10 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
     def compiled(self, u0: float = 0.0, *, sample_time: float) -> CompiledLaw:
         """The law as compiled loops take it, after a first sample at the input `u0`."""
         return self.at(sample_time).compiled(u0)
+
+    def startable(self, sample_time: float | None = None) -> Startable:
+        """The law at a sample time [s] as a step that runs from any first input, for exports."""
+        return self.at(needed_time(self, sample_time)).startable()
 
     @classmethod
     def responses(
