@@ -10,7 +10,7 @@ from typing import Any
 from hysim._frozen import FloatArray
 from hysim.export._packing import packing
 from hysim.export._page_controls import Control, by_fields, controls_of, exchanged
-from hysim.export._page_modules import kernels_of, module_of
+from hysim.export._page_modules import Kernels, kernels_of, module_of
 from hysim.laws.dashpot import Dashpot
 from hysim.laws.operators.rate_dependent_prandtl_ishlinskii import RateDependentPrandtlIshlinskii
 from hysim.laws.static import SingleValued
@@ -78,7 +78,7 @@ def _law(law: Law, parts: Parts, first: int) -> dict[str, Any]:
     """A law by its module and the function that packs its numbers."""
     general = _general(law)
     packed = packing(general)
-    kernels = kernels_of(general.step)
+    kernels, state = kernels_of(general), general.startable().state
     if kernels.name not in parts.modules:
         parts.modules[kernels.name] = module_of(kernels)
     parts.packs.append(packed.to_js(f"pack{len(parts.packs)}"))
@@ -90,11 +90,20 @@ def _law(law: Law, parts: Parts, first: int) -> dict[str, Any]:
         "module": kernels.name,
         "pack": len(parts.packs) - 1,
         "sizes": [len(packed.parameters), len(packed.memory)],
-        "work": general.workspace,
+        "work": state.size - len(packed.memory),
         "first": first,
         "free": [names.index(name) for name in packed.fields],
         **_printed(law, first),
     }
+
+
+def steps_of(thing: Any) -> list[Kernels]:
+    """The steps that a page for a model needs."""
+    if isinstance(thing, (Sum, Cascade)):
+        members = thing.parts if isinstance(thing, Sum) else thing.stages
+        return [kernels for member in members for kernels in steps_of(member)]
+    law = thing.at(1.0) if isinstance(thing, RateDependentPrandtlIshlinskii) else thing
+    return [kernels_of(_general(law))] if isinstance(law, Law) else []
 
 
 def _general(law: Law) -> Law:

@@ -20,14 +20,12 @@ from collections.abc import Callable
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from hysim._frozen import FloatArray
 from hysim.export._routine import plain
 from hysim.export._translate import Function, Translation
 from hysim.export._types import Known, Scalar, Vector
-from hysim.kernels import boucwen, duhem
-from hysim.kernels._compile import borrowed
+from hysim.models.law import Law
 
 FOLDER = "page/wasm"
 _TARGET = "wasm32-wasi"
@@ -36,7 +34,7 @@ _WRAPPER = """
 __attribute__((export_name("begin")))
 void begin(const double *parameters, int n_parameters, double *state, int n_state, double u0) {{
     (void)parameters; (void)n_parameters; (void)state; (void)n_state; (void)u0;
-    {begin}
+    {begin};
 }}
 
 __attribute__((export_name("run")))
@@ -48,34 +46,21 @@ void run(const double *parameters, int n_parameters, double *state, int n_state,
 
 
 class Kernels(NamedTuple):
-    """A step, and the function that completes its state before the first sample, if there is one."""
+    """A step, and the start that completes its state for the first sample."""
 
     step: Callable[..., float]
-    start: Callable[..., None] | None = None
+    start: Callable[..., None]
 
     @property
     def name(self) -> str:
         """Name of the module: ``clamps_step`` for the function `step` of `hysim.kernels.clamps`."""
-        function = plain(self.step)
+        function = self.step
         return f"{function.__module__.rpartition('.')[2]}_{function.__name__}".replace("__", "_").strip("_")
 
 
-def boucwen_start(parameters: FloatArray, state: FloatArray, u0: float) -> None:
-    """Fill in the charts of the exponent."""
-    boucwen.prepare(parameters[0], parameters[1], parameters[2], parameters[3], 0.0, borrowed(state))
-
-
-def duhem_start(parameters: FloatArray, state: FloatArray, u0: float) -> None:
-    """Take what stands beside the memory from the first output."""
-    state[1] = state[1] - parameters[0] - parameters[1] * u0
-
-
-_STARTS = {plain(boucwen.step): boucwen_start, plain(duhem.step): duhem_start}
-
-
-def kernels_of(step: Callable[..., float]) -> Kernels:
-    """A step with what it needs before the first sample."""
-    return Kernels(step, _STARTS.get(plain(step)))
+def kernels_of(law: Law) -> Kernels:
+    """The step of a law, and how it starts."""
+    return Kernels(plain(law.step), plain(law.start))
 
 
 def module_of(kernels: Kernels) -> bytes:
@@ -99,7 +84,7 @@ def module_of(kernels: Kernels) -> bytes:
         If the step is not in the portable subset of Python.
     """
     own = files("hysim.export").joinpath(f"{FOLDER}/{kernels.name}.wasm.gz")
-    if plain(kernels.step).__module__.startswith("hysim.") and own.is_file():
+    if kernels.step.__module__.startswith("hysim.") and own.is_file():
         return own.read_bytes()
     return compressed(compiled(c_source(kernels)))
 
@@ -112,12 +97,10 @@ def compressed(module: bytes) -> bytes:
 def c_source(kernels: Kernels) -> str:
     """C99 text of a module."""
     translation = Translation()
-    vector = Vector()
-    step = translation.function(kernels.step, (vector, vector, Scalar.DOUBLE))
-    begin = "" if kernels.start is None else translation.function(kernels.start, (vector, vector, Scalar.DOUBLE))
-    return "#include <math.h>\n" + translation.text() + _WRAPPER.format(
-        step=_call(step, "u[k]"), begin="" if isinstance(begin, str) else f"{_call(begin, 'u0')};"
-    )
+    types = Vector(), Vector(), Scalar.DOUBLE
+    step, begin = (translation.function(kernel, types) for kernel in kernels)
+    wrapper = _WRAPPER.format(step=_call(step, "u[k]"), begin=_call(begin, "u0"))
+    return f"#include <math.h>\n{translation.text()}{wrapper}"
 
 
 @lru_cache(maxsize=32)
@@ -156,5 +139,3 @@ def _call(function: Function, u: str) -> str:
         arguments += [f"n_{values[each.name]}" for _ in each.axes]
     return f"{function.name}({', '.join(arguments)})"
 
-
-Modules = dict[str, Any]

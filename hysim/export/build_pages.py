@@ -5,42 +5,26 @@ pinned, so that the same sources give the same bytes.
 """
 
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
-from hysim.export._page_modules import FOLDER, Kernels, c_source, compiled, compressed, kernels_of
-from hysim.kernels import baber_noori, boucwen, clamps, duhem, generalized, play_sums, preisach, stepping, zhu_wang
-
-STEPS = (
-    stepping.line,
-    boucwen.linear_step,
-    boucwen.step,
-    zhu_wang.step,
-    generalized.step,
-    baber_noori.step,
-    duhem.step,
-    clamps.step,
-    clamps.bent_step,
-    play_sums.step,
-    preisach.step,
-)
-"""The steps of the registry's laws; a test compares them with the registry."""
+from hysim.export._page_model import steps_of
+from hysim.export._page_modules import FOLDER, Kernels, c_source, compiled, compressed
+from hysim.export._page_presets import presets
 
 
-def modules() -> Iterator[tuple[Kernels, bytes]]:
-    """Each step, and its module."""
-    for step in STEPS:
-        kernels = kernels_of(step)
-        yield kernels, compiled(c_source(kernels))
+def kernels() -> list[Kernels]:
+    """The steps of all models with which the explorer begins, each once."""
+    return sorted({each for shown in presets().values() for each in steps_of(shown.model)}, key=lambda each: each.name)
 
 
 def main(folder: Path) -> None:
     """Write all modules into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    for kernels, module in modules():
+    for each in kernels():
+        module = compiled(c_source(each))
         content = compressed(module)
-        folder.joinpath(f"{kernels.name}.wasm.gz").write_bytes(content)
-        print(f"{kernels.name}: {len(module)} bytes, {len(content)} compressed")
+        folder.joinpath(f"{each.name}.wasm.gz").write_bytes(content)
+        print(f"{each.name}: {len(module)} bytes, {len(content)} compressed")
 
 
 if __name__ == "__main__":

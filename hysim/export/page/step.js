@@ -29,7 +29,6 @@ class Step {
     room.set(parameters, 0);
     room.fill(0, places[1], places[2]);
     room.set(memory, places[1]);
-    room[places[1]] = u[0];
     room.set(u, places[2]);
     const [p, s, x, y] = places.map((place) => first + 8 * place);
     begin(p, sizes[0], s, sizes[1], u[0]);
