@@ -39,6 +39,7 @@ from hysim.control import tune as tune
 from hysim.control import Tuning as Tuning
 from hysim.control import to_c as to_c
 from hysim.control import CSource as CSource
+from hysim.export import to_page as to_page
 from hysim.control import to_control as to_control
 from hysim.comparison import compare as compare
 from hysim.comparison import Comparison as Comparison

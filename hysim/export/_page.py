@@ -20,11 +20,11 @@ from hysim._atomic import write_text
 from hysim._cycles import TOLERANCE, Samples
 from hysim._excursions import measured_cycles
 from hysim._frozen import FloatArray
+from hysim._prefixes import label, printed
 from hysim._release import __version__
 from hysim.export._page_model import Parts, about, heading, node_of, plane_of
 from hysim.export._page_modules import compressed
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
-from hysim.plot._style import label, printed
 from hysim.records import Record
 
 LARGEST = 250_000
@@ -180,23 +180,19 @@ def _inputs(amplitude: float, middle: float, timed: bool) -> list[dict[str, Any]
 
 
 def _stack(controls: list[dict[str, Any]], law: PrandtlIshlinskii) -> list[dict[str, Any]]:
-    """Sliders for the number, the largest threshold and the sum of the weights of plays behind that of threshold zero."""
+    """Sliders for number, largest threshold and weights of the plays behind that of threshold zero, and its weight."""
     places = {name: k for k, name in enumerate(law.scalars)}
-    count, reach, weight = len(law.thresholds) - 1, law.thresholds[-1], sum(law.weights[1:])
-    thresholds, weights = ([places[f"{name}[{k + 1}]"] for k in range(count)] for name in ("thresholds", "weights"))
-    idle = sum(each == 0.0 for each in law.weights)
-    sliders: list[dict[str, Any]] = [
-        {"name": "plays", "value": count - idle, "lower": 1, "upper": count, "whole": True, "places": [], "stack": "plays"},
-        {
-            **{"name": "largest threshold", "value": _short(reach * (count - idle) / count), "stack": "reach"},
-            **{"lower": _short(0.1 * reach), "upper": _short(2.0 * reach), "places": thresholds},
-        },
-        {
-            **{"name": "weight of all plays", "value": _short(weight), "stack": "weight"},
-            **{"lower": -2.0 * abs(weight), "upper": 2.0 * abs(weight), "places": weights},
-        },
-        {"name": "weight of the input", "value": law.weights[0], "lower": -1.0, "upper": 2.0, "places": [places["weights[0]"]]},
+    most, weight = len(law.thresholds) - 1, sum(law.weights[1:])
+    plays = sum(each != 0.0 for each in law.weights[1:])
+    reach = _short(law.thresholds[plays])
+    of = {name: [places[f"{name}[{k + 1}]"] for k in range(most)] for name in ("thresholds", "weights")}
+    ends: list[tuple[str, float, float, float, dict[str, Any]]] = [
+        ("plays", plays, 1, most, {"whole": True, "places": [], "stack": "plays"}),
+        ("largest threshold", reach, 0.1 * reach, 2.5 * reach, {"places": of["thresholds"], "stack": "reach"}),
+        ("weight of all plays", weight, -2.0 * weight, 2.0 * weight, {"places": of["weights"], "stack": "weight"}),
+        ("weight of the input", law.weights[0], -1.0, 2.0, {"places": [places["weights[0]"]]}),
     ]
+    sliders = [{"name": name, "value": value, "lower": low, "upper": up, **rest} for name, value, low, up, rest in ends]
     return sliders + [control for control in controls if control["name"] == "offset"]
 
 

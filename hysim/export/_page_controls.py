@@ -42,9 +42,7 @@ class Control(NamedTuple):
         return {**described, **flags, "places": [first + place for place in self.places]}
 
 
-def controls_of(
-    law: Law, free: tuple[str, ...], u: FloatArray, names: Sequence[str] | None = None
-) -> list[Control]:
+def controls_of(law: Law, free: tuple[str, ...], u: FloatArray, names: Sequence[str] | None = None) -> list[Control]:
     """A slider for each number in `free`, names as in `law.scalars`; long tuples share one, initial tuples have none.
 
     Places are those among `names`, by default all numbers of the law.

@@ -177,4 +177,3 @@ def plane_of(node: Mapping[str, Any]) -> dict[str, Any] | None:
         return None
     places = {name: place for name, place, _ in node["fields"]}
     return {"levels": places["levels"], "weights": places["weights"]}
-

@@ -121,7 +121,19 @@ def compiled(source: str) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         text, module = Path(folder, "step.c"), Path(folder, "step.wasm")
         text.write_text(source, encoding="utf-8")
-        command = [sys.executable, "-m", "ziglang", "cc", "-target", _TARGET, *_FLAGS, "-o", module.name, text.name, "-lm"]
+        command = [
+            sys.executable,
+            "-m",
+            "ziglang",
+            "cc",
+            "-target",
+            _TARGET,
+            *_FLAGS,
+            "-o",
+            module.name,
+            text.name,
+            "-lm",
+        ]
         done = subprocess.run(command, capture_output=True, text=True, cwd=folder, check=False)
         if done.returncode:
             raise RuntimeError(f"ziglang could not compile the step: {done.stderr.strip()}")
@@ -138,4 +150,3 @@ def _call(function: Function, u: str) -> str:
         arguments += [values[each.name]] * each.is_used
         arguments += [f"n_{values[each.name]}" for _ in each.axes]
     return f"{function.name}({', '.join(arguments)})"
-
