@@ -120,7 +120,9 @@ def test_the_package_has_the_modules_of_all_steps_and_no_others(all_steps):
 
 def test_the_command_writes_the_same_page(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    rows = [f"{u},{y}" for u, y in zip(*(hs.datasets.table1()[:].u.tolist(), hs.datasets.table1().y.tolist()), strict=True)]
+    rows = [
+        f"{u},{y}" for u, y in zip(*(hs.datasets.table1()[:].u.tolist(), hs.datasets.table1().y.tolist()), strict=True)
+    ]
     Path("loop.csv").write_text("\n".join(["voltage [V],displacement [um]", *rows]))
     hs.save(LAW, "law.json", units={"u": "V", "y": "um"})
     columns = ("--u", "voltage", "--y", "displacement")
@@ -235,7 +237,7 @@ class Browser:
         self.events.clear()
         self.send("Page.navigate", url="about:blank")
         self.send("Page.navigate", url=path.as_uri() + fragment)
-        wait_for(lambda: self.value("document.documentElement.dataset.ready") == "yes")
+        wait_for(lambda: self.value("document.documentElement?.dataset.ready") == "yes")
 
     def press(self, slider, key, times=1):
         """Keys on a slider, and the state of the page once it is drawn again."""
@@ -254,13 +256,15 @@ class Browser:
 
     def drawn(self):
         return self.value(
-            "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => { const s = window.hysim.state;"
-            "done({...s, values: Array.from(s.values), u: Array.from(s.u), y: Array.from(s.y),"
+            "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => {"
+            " const s = window.hysim.state; done({...s, values: Array.from(s.values), u: Array.from(s.u), y: Array.from(s.y),"
             " code: document.getElementById('code').textContent, address: location.hash}); })))"
         )
 
     def requests(self):
-        names = [event["params"]["request"]["url"] for event in self.events if event["method"] == "Network.requestWillBeSent"]
+        names = [
+            event["params"]["request"]["url"] for event in self.events if event["method"] == "Network.requestWillBeSent"
+        ]
         return [name for name in names if not name.startswith(("data:", "about:"))]
 
 
@@ -272,7 +276,13 @@ def started(folder):
     """A browser without a window."""
     from websockets.sync.client import connect
 
-    quiet = "--headless --disable-gpu --no-first-run --disable-background-networking --remote-debugging-port=0".split()
+    quiet = [
+        "--headless",
+        "--disable-gpu",
+        "--no-first-run",
+        "--disable-background-networking",
+        "--remote-debugging-port=0",
+    ]
     if os.geteuid() == 0:
         quiet.append("--no-sandbox")  # which the browser does not start for root
     command = [BROWSER, *quiet, f"--user-data-dir={folder}", "about:blank"]
@@ -303,8 +313,8 @@ def browser(tmp_path_factory):
 
 def assert_as_python(state, record=None):
     """The page's output, its measures and the code that it shows are those of Python."""
-    namespace = {}
-    exec(state["code"].replace("import hysim as hs", "").replace('hs.load("measured.csv")', "record"), {"hs": hs, "record": record}, namespace) if record is not None else exec(state["code"], namespace)
+    namespace = {"measured": record}
+    exec(state["code"].replace('hs.load("measured.csv")', "measured"), namespace)
     y = namespace["y"]
     span = np.ptp(y)
     np.testing.assert_allclose(state["y"], y, rtol=0.0, atol=1e-9 * span)
@@ -391,5 +401,7 @@ def test_nothing_is_wider_than_the_window(browser, tmp_path, width):
     browser.open(to_page(LAW, tmp_path / "page.html", hs.datasets.table1()))
     browser.send("Emulation.setDeviceMetricsOverride", width=width, height=844, deviceScaleFactor=1, mobile=width < 500)
     assert browser.value("document.documentElement.scrollWidth") <= width
-    assert browser.value("[...document.querySelectorAll('input, select')].every(each => each.labels.length || each.ariaLabel)")
+    assert browser.value(
+        "[...document.querySelectorAll('input, select')].every(each => each.labels.length || each.ariaLabel)"
+    )
     browser.send("Emulation.setDeviceMetricsOverride", width=1280, height=900, deviceScaleFactor=1, mobile=False)

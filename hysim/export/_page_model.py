@@ -7,6 +7,8 @@ from html import escape
 from inspect import getdoc
 from typing import Any
 
+import numpy as np
+
 from hysim._frozen import FloatArray
 from hysim.export._packing import packing
 from hysim.export._page_controls import Control, by_fields, controls_of, exchanged
@@ -121,12 +123,18 @@ def _printed(law: Law, first: int) -> dict[str, Any]:
     """Fields by the places of their numbers, and the values that need not be said; or the law to begin with."""
     names, defaults = list(law.scalars), law.defaults()
     if not by_fields(law):
-        return {"fields": [], "base": repr(law), "named": [[name, first + k] for k, name in enumerate(names)]}
+        return {"fields": [], "base": _in_python(law), "named": [[name, first + k] for k, name in enumerate(names)]}
     fields: list[list[Any]] = []
     for name, value in law.arguments.items():
         places = [first + names.index(f"{name}[{k}]") for k in range(len(value))] if isinstance(value, tuple) else None
         fields.append([name, first + names.index(name) if places is None else places, defaults.get(name)])
     return {"fields": fields}
+
+
+def _in_python(law: Law) -> str:
+    """The law's constructor with all its arguments."""
+    plain = {name: np.asarray(value).tolist() for name, value in law.arguments.items()}
+    return f"{_name(type(law))}({', '.join(f'{name}={value!r}' for name, value in plain.items())})"
 
 
 def _at_sample_time(law: RateDependentPrandtlIshlinskii, u: FloatArray, parts: Parts, prefix: str) -> dict[str, Any]:

@@ -6,7 +6,7 @@ function lawInPython(law, values) {
   if (law.knots) return "hs.SingleValued(u=..., y=...)";
   if (law.base) {
     const named = law.named.map(([name, place]) => `${JSON.stringify(name)}: ${inPython(values[place])}`);
-    return `hs.${law.base}.assemble(\n${wrapped(`    {${named.join(", ")}}`)}\n)`;
+    return `${law.base}.assemble(\n${wrapped(`    {${named.join(", ")}}`)}\n)`;
   }
   let fields = law.fields.map(([name, place, start]) => {
     const own = Array.isArray(place) ? place.map((each) => values[each]) : values[place];
