@@ -14,14 +14,14 @@ _BASES = frozenset(
 
 def power_of_ten(old: str, new: str) -> int:
     """The power of ten that converts a value from the old unit to the new one; ValueError if only a prefix cannot."""
-    (before, base), (after, other) = _parts(old), _parts(new)
+    (before, base), (after, other) = prefixed(old), prefixed(new)
     if base != other:
         raise ValueError(f"{old!r} cannot become {new!r}: only the prefix of a unit can change")
     return before - after
 
 
-def _parts(unit: str) -> tuple[int, str]:
-    """The power of a unit's prefix, and its base: m is a metre, mm a thousandth of it."""
+def prefixed(unit: str) -> tuple[int, str]:
+    """The power of a unit's prefix, and its base: m is a metre, mm a thousandth of it; ValueError if it is unknown."""
     for prefix, power in _POWERS.items():
         if unit.startswith(prefix) and unit[len(prefix) :] in _BASES:
             return power, unit[len(prefix) :]

@@ -257,7 +257,8 @@ class Browser:
     def drawn(self):
         return self.value(
             "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => {"
-            " const s = window.hysim.state; done({...s, values: Array.from(s.values), u: Array.from(s.u), y: Array.from(s.y),"
+            " const s = window.hysim.state;"
+            "done({...s, values: Array.from(s.values), u: Array.from(s.u), y: Array.from(s.y),"
             " code: document.getElementById('code').textContent, address: location.hash}); })))"
         )
 

@@ -1,5 +1,7 @@
 """Laws, plants, sums and cascades run sample by sample as they respond, from any first input."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -79,3 +81,139 @@ def test_a_law_of_the_users_own_may_say_how_it_starts():
     u = walk()
     assert Since().response(u).tolist() == (2.0 * (u - u[0])).tolist()
     assert stepped(Since() + hs.Line(slope=1.0), u).tolist() == (2.0 * (u - u[0]) + u).tolist()
+
+
+# ---------------------------------------------------------------------------------- plants
+
+LAW = hs.BoucWen(feedthrough=0.8, gain=-0.3, offset=0.1)
+CREEP = hs.Creep(time_constants=(0.03, 4.0), weights=(0.05, 0.1))
+DELAYS = {"none": 0.0, "whole": 3 * TIME, "part": 0.4 * TIME, "whole and part": 2.3 * TIME}
+POLYNOMIALS = {
+    "gain": ((3.0,), (2.0,)),
+    "lag": ((2.0,), (1.0, 0.5)),
+    "mode": ((0.3, 30.0), (1.0, 0.4, 40.0)),
+    "proper": ((1.0, 2.0, 3.0), (2.0, 0.5, 4.0)),
+    "integrator": ((1.0,), (1.0, 0.3, 0.0)),
+    "unstable": ((1.0,), (1.0, -0.3)),
+}
+
+
+@pytest.mark.parametrize("delay", DELAYS.values(), ids=DELAYS)
+@pytest.mark.parametrize(("num", "den"), POLYNOMIALS.values(), ids=POLYNOMIALS)
+def test_a_transfer_function_is_its_response_to_the_bit(num, den, delay):
+    u = walk(2)
+    for hold, sample in (("zoh", "start"), ("zoh", "end"), ("foh", "start")):
+        plant = hs.TransferFunction(num=num, den=den, delay=delay, hold=hold, sample=sample)
+        moving = replace(plant, initial_state=tuple(np.arange(1.0, plant.order + 1)))
+        for each in (plant, moving):
+            assert stepped(each, u, TIME).tolist() == each.response(u, TIME).tolist()
+
+
+@pytest.mark.parametrize("delay", DELAYS.values(), ids=DELAYS)
+@pytest.mark.parametrize(("hold", "sample"), [("zoh", "start"), ("zoh", "end"), ("foh", "start")])
+def test_a_transfer_function_rests_at_any_input(delay, hold, sample):
+    for num, den in POLYNOMIALS.values():
+        plant = hs.TransferFunction(num=num, den=den, delay=delay, hold=hold, sample=sample)
+        if not den[-1]:
+            with pytest.raises(ValueError, match=r"it cannot rest at u = 0\.7"):
+                plant.compiled(0.7, sample_time=TIME)
+            continue
+        u, (step, parameters, state) = 0.7 + walk(3) - walk(3)[0], plant.compiled(0.7, sample_time=TIME)
+        y = [step(parameters, state, value) for value in u]
+        expected = plant.dc_gain * 0.7 + plant.response(u - 0.7, TIME)
+        assert y == pytest.approx(expected, abs=1e-12 * np.abs(expected).max())  # it is linear, to rounding
+
+
+def test_a_dashpot_is_its_response_to_the_bit():
+    u = walk(4)
+    assert stepped(hs.Dashpot(c=0.3), u, TIME).tolist() == hs.Dashpot(c=0.3).response(u, TIME).tolist()
+
+
+MODE = hs.TransferFunction(num=(0.3, 30.0), den=(1.0, 0.4, 40.0))
+FAST = hs.Amplifier(gain=2.0, offset=0.1, limits=(-3.0, 3.0))
+SLOW = hs.Amplifier(gain=2.0, offset=0.1, limits=(-3.0, 3.0), slew_rate=60.0, time_constant=0.4 * TIME)
+VIBRATIONS = {
+    "none": None,
+    "mode": MODE,
+    "late": replace(MODE, delay=2.3 * TIME),
+    "late end": replace(MODE, delay=2.3 * TIME, sample="end"),
+    "jumps": hs.TransferFunction(num=(1.0, 2.0, 3.0), den=(2.0, 0.5, 4.0), delay=2 * TIME),
+    "jumps late": hs.TransferFunction(num=(1.0, 2.0, 3.0), den=(2.0, 0.5, 4.0), delay=0.3 * TIME),
+    "state space": hs.StateSpace(A=[[-2.0, 1.0], [0.0, -3.0]], B=[1.0, 0.5], C=[3.0, 1.0], D=0.2, delay=0.6 * TIME),
+    "modes": hs.Modes(natural_frequencies=(3.0, 20.0), damping_ratios=(0.01, 0.02), gains=(0.9, 0.1)),
+}
+
+
+@pytest.mark.parametrize("amplifier", [None, FAST, SLOW], ids=["no amplifier", "fast", "slow"])
+@pytest.mark.parametrize("vibration", VIBRATIONS.values(), ids=VIBRATIONS)
+def test_an_actuator_is_its_response(amplifier, vibration):
+    u = walk(5)
+    for creep in (None, CREEP):
+        plant = hs.Actuator(amplifier=amplifier, hysteresis=LAW, creep=creep, vibration=vibration)
+        expected = plant.response(u, TIME)
+        # the output behind a jump is summed in another order
+        assert stepped(plant, u, TIME) == pytest.approx(expected, abs=1e-13 * np.abs(expected).max())
+        finer = startable_with(plant, u, substeps=7)
+        assert finer == pytest.approx(plant.response(u, TIME, substeps=7), abs=1e-13 * np.abs(expected).max())
+
+
+def startable_with(plant, u, substeps):
+    """Outputs of an actuator by steps of so many sub-steps."""
+    step, parameters, state = plant.startable(TIME, substeps=substeps).started(u[0])
+    return np.array([step(parameters, state, value) for value in u])
+
+
+@pytest.mark.parametrize("delay", DELAYS.values(), ids=DELAYS)
+def test_an_actuator_with_a_sensor_is_what_it_measures(delay):
+    u = walk(6)
+    for quantum in (0.0, 0.01):
+        sensor = hs.Sensor(quantum=quantum, delay=delay)
+        for plant in (
+            hs.Actuator(hysteresis=LAW, sensor=sensor),
+            hs.Actuator(amplifier=SLOW, hysteresis=LAW, creep=CREEP, vibration=VIBRATIONS["late"], sensor=sensor),
+        ):
+            expected = plant.measured(u, TIME)
+            assert stepped(plant, u, TIME) == pytest.approx(expected, abs=1e-13 * np.abs(expected).max())
+            noisy = replace(plant, sensor=replace(sensor, noise=0.1))
+            assert stepped(noisy, u, TIME).tolist() == stepped(plant, u, TIME).tolist()
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        None,
+        DUHEM,
+        LAWS["relays"],
+        LAWS["Bouc-Wen, any exponent"],
+        DUHEM + LAWS["line"],
+        hs.RateDependentPrandtlIshlinskii(thresholds=(0.0, 0.25), weights=(1.0, 1.0), beta=0.01),
+    ],
+    ids=["none", "Duhem", "relays", "any exponent", "sum", "rate dependent"],
+)
+def test_an_actuator_starts_its_law(law):
+    u, plant = walk(7), hs.Actuator(amplifier=FAST, hysteresis=law, vibration=MODE)
+    expected = plant.response(u, TIME)
+    assert stepped(plant, u, TIME) == pytest.approx(expected, abs=1e-13 * np.abs(expected).max())
+    still = hs.Actuator(amplifier=FAST, hysteresis=law)
+    time = TIME if still.dynamic else None
+    assert stepped(still, u, time) == pytest.approx(still.response(u, time), abs=1e-13)
+    step, parameters, state = plant.compiled(0.4, sample_time=TIME)
+    rest = [step(parameters, state, 0.4) for _ in range(30)]
+    assert rest == pytest.approx([plant.response([0.4], TIME)[0]] * 30, abs=1e-13)
+
+
+DYNAMIC = {
+    "law and plant": LAW >> MODE,
+    "plant and law": replace(MODE, num=(30.0,)) >> DUHEM,
+    "plant in between": LAWS["line"] >> replace(MODE, num=(30.0,), delay=0.3 * TIME) >> DUHEM >> hs.Dashpot(c=0.1),
+    "law and dashpot": LAW + hs.Dashpot(c=0.1) + MODE,
+    "everything": (LAW + hs.Dashpot(c=0.1)) >> (MODE + DUHEM) >> LAWS["relays"],
+    "rate": hs.RateDependentPrandtlIshlinskii(thresholds=(0.0, 0.25), weights=(1.0, 1.0), beta=0.01) >> MODE,
+    "actuator": hs.Cascade(stages=(hs.Actuator(hysteresis=LAW, vibration=MODE), LAWS["plays"])),
+}
+
+
+@pytest.mark.parametrize("model", DYNAMIC.values(), ids=DYNAMIC)
+def test_sums_and_cascades_with_plants_are_their_response(model):
+    u = walk(8)
+    assert stepped(model, u, TIME).tolist() == model.response(u, TIME).tolist()

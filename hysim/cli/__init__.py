@@ -17,6 +17,7 @@ from hysim.cli import (
     compare,
     control,
     discover,
+    fmu,
     identify,
     measure,
     metrics,
@@ -32,7 +33,7 @@ from hysim.cli import (
 from hysim.cli.options import Command
 from hysim.errors import SimulationError
 
-_MODULES = (metrics, identify, discover, compare, simulate, control, plot, sweep, measure, reproduce)
+_MODULES = (metrics, identify, discover, compare, simulate, control, fmu, plot, sweep, measure, reproduce)
 _COMMANDS = (*(module.COMMAND for module in _MODULES), page.COMMAND, page.EXPLORE)
 COMMANDS = {command.name: command for command in _COMMANDS}
 """Every command by its name."""

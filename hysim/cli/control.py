@@ -9,7 +9,7 @@ from hysim.cli.options import JSON, MODEL_IN, Command
 
 if TYPE_CHECKING:
     from hysim.cli.achievements import Design
-    from hysim.control import CSource
+    from hysim.export import CSource
 
 SUCCESS, NOT_WITHIN_BOUNDS = 0, 1
 CONTROLLERS = {
@@ -96,10 +96,9 @@ def _designed(options: argparse.Namespace) -> "Design":
 
 
 def _c_code(options: argparse.Namespace, controller: Any) -> "CSource":
-    from hysim.control import to_c
+    from hysim.export import to_c
 
-    precision: Any = "float" if options.single else "double"
-    return to_c(controller, options.sample_time, name=Path(options.c).stem, precision=precision)
+    return to_c(controller, options.sample_time, name=Path(options.c).stem)
 
 
 COMMAND = Command(
@@ -140,7 +139,6 @@ task of the loop:
 
 --out CONTROLLER.json  write the controller; - writes it to the standard output
 --c CONTROLLER.c  write it as C99, and its header beside it
---single  C code in single precision (default: double precision)
 --plot LOOP.svg  draw the loops and the steps
 {JSON}
 """,

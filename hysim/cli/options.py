@@ -98,7 +98,7 @@ def _settings(name: str, value: str | None, default: str | None, is_required: bo
 def _role(value: str) -> str:
     if value.endswith(".svg"):
         return PICTURE
-    return RESULT if value.endswith((".json", ".csv", ".c", ".sqlite", ".html")) else _ROLES.get(value, "")
+    return RESULT if value.endswith((".json", ".csv", ".c", ".fmu", ".html", ".sqlite")) else _ROLES.get(value, "")
 
 
 def word_or_number(
@@ -165,12 +165,18 @@ def library(text: str) -> str | list[str]:
     return names if len(names) > 1 or "'" in text else text
 
 
+def platforms(text: str) -> tuple[str, ...]:
+    """Names of platforms with commas between them, or the word none for no platform."""
+    return () if text == "none" else tuple(name.strip() for name in text.split(","))
+
+
 REAL = ("STEP", "TIME", "RMS", "PERCENT", "BOUND", "HERTZ", "HEIGHT", "VALUE", "SHARE", "LENGTH")
 READERS: dict[str, Callable[[str], Any]] = {
     **dict.fromkeys(("N", "NUMBER", "DEGREE"), int),
     **dict.fromkeys(REAL, float),
     **{form: numbers(form) for form in ("LOW,HIGH", "FREQUENCY,DAMPING", "NAME=VALUE", "NAME=LOW:HIGH")},
     "T,B,L,R": numbers("T,B,L,R", int),
+    "PLATFORMS": platforms,
     "COLUMN": column,
     "SIGNAL=UNIT": unit,
     "NAME|TERMS": library,

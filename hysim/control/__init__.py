@@ -9,8 +9,6 @@ from hysim.control._assessment_results import OpenLoop as OpenLoop
 from hysim.control._assessment_results import SquareWaveAssessment as SquareWaveAssessment
 from hysim.control._assessment_results import StepAssessment as StepAssessment
 from hysim.control._bandwidth import bandwidth as bandwidth
-from hysim.control._c_export import CSource as CSource
-from hysim.control._c_export import to_c as to_c
 from hysim.control._feedforward import InverseFeedforward as InverseFeedforward
 from hysim.control._filters import DampingLoop as DampingLoop
 from hysim.control._filters import Notch as Notch
@@ -24,6 +22,8 @@ from hysim.control._margins import LinearLoop as LinearLoop
 from hysim.control._open_loop import secant_gain as secant_gain
 from hysim.control._open_loop import slopes as slopes
 from hysim.control._pid import PID as PID
+from hysim.control._protocols import Controller as Controller
+from hysim.control._protocols import preview as preview
 from hysim.control._shaping import ModeInverse as ModeInverse
 from hysim.control._shaping import Shaper as Shaper
 from hysim.control._stability import later as later

@@ -3,7 +3,7 @@
 import ast
 from typing import Any
 
-from hysim.export._expressions import PRIMARY, SUM, Expressions, Library, Scope, Stretch, Value
+from hysim.export._expressions import PRIMARY, SUM, UNARY, Expressions, Library, Scope, Stretch, Value
 from hysim.export._routine import Routine
 from hysim.export._scopes import assignments, homes, reads, targets
 from hysim.export._types import Known, Scalar, Several, Type, Vector, joined
@@ -39,9 +39,9 @@ class Body:
     def settled(self) -> str:
         """The text of the body."""
         for _ in range(_MOST_PASSES):
-            before, self._results = (*self.scope.learnt(), self.returns), 0
+            returns, self._results = self.returns, 0
             lines = self._block(self._statements, _STEP)
-            if (*self.scope.learnt(), self.returns) == before:
+            if not self.scope.again() and returns == self.returns:
                 return "".join(f"{line}\n" for line in lines)
         raise self.source.refusal(self.source.tree, "the types of its names do not settle")
 
@@ -62,25 +62,21 @@ class Body:
         return isinstance(statement, ast.Assign) and not set(targets(statement)) & reads(statement.value)
 
     def _is_real(self, name: str) -> bool:
-        return name in self.scope.types and not isinstance(self.scope.types[name], Known)
+        known = self.scope.types.get(name)
+        return known is not None and not isinstance(known, Known) and self.scope.is_used(name)
 
     def _zero(self, name: str) -> str:
         """Declaration of a name that gets its value in a block within this one."""
         type_, c_name = self.scope.types[name], self.scope.c_name(name)
         if isinstance(type_, Vector):
-            sizes = [f" int {type_.length(c_name, axis)} = 0;" for axis in self._axes(name)]
+            sizes = [f" int {type_.length(c_name, axis)} = 0;" for axis in self.scope.axes(name)]
             return f"{self._constant(name)}double *{c_name} = 0;{''.join(sizes)}"
         assert isinstance(type_, Scalar)
         return f"{type_.c_type} {c_name} = {'0.0' if type_ is Scalar.DOUBLE else '0'};"
 
-    def _axes(self, name: str) -> list[int]:
-        """Axes of an array whose lengths are used."""
-        return sorted(axis for each, axis in self.scope.lengths if each == name)
-
     def _constant(self, name: str) -> str:
         """`const` for a vector that is not written to."""
-        roots = self.scope.roots.get(name, frozenset()) | {name}
-        return "" if roots & self.scope.written else "const "
+        return "" if self.scope.is_written(name) else "const "
 
     # ------------------------------------------------------------------------------ statements
 
@@ -179,7 +175,6 @@ class Body:
     def _target(self, node: ast.expr, type_: Type) -> str:
         """A place that is assigned."""
         if isinstance(node, ast.Name):
-            self.scope.used.add(node.id)
             return self.scope.c_name(node.id)
         if not isinstance(node, ast.Subscript) or isinstance(node.slice, ast.Slice):
             raise self.source.refusal(node, "names and elements of vectors are assigned")
@@ -207,7 +202,9 @@ class Body:
     def _one(
         self, target: ast.expr, node: ast.expr, indent: str, declared: set[str], *, loaded: bool = False
     ) -> list[str]:
-        """One assignment."""
+        """One assignment; a name that is not read is left out."""
+        if isinstance(target, ast.Name) and not self.scope.is_used(target.id):
+            return [f"{indent}(void){self.of.value(node).within(UNARY)};"] if self.of.writes(node) else []
         if isinstance(node, ast.Call) and ast.unparse(node.func) == "np.empty" and isinstance(target, ast.Name):
             return [indent + self._room(target, node)]
         value = self.of.any(ast.Name(node.id, ast.Load()) if loaded and isinstance(node, ast.Name) else node)
@@ -222,7 +219,7 @@ class Body:
             if isinstance(target, ast.Name):
                 self.scope.assign(target.id, value.type, target)
                 type_ = self.scope.types[target.id]
-                if isinstance(type_, Known):
+                if isinstance(type_, Known) or not self.scope.is_used(target.id):
                     continue
                 assert isinstance(type_, Scalar)
                 if target.id in declared:
@@ -241,7 +238,7 @@ class Body:
         self.scope.roots[name] = self.scope.roots.get(name, frozenset()) | value.roots
         own = name in declared
         lines = [f"{indent}{f'{self._constant(name)}double *' if own else ''}{c_name} = {value.text};"]
-        for axis in self._axes(name):
+        for axis in self.scope.axes(name):
             lines.append(
                 f"{indent}{'const int ' if own else ''}{value.type.length(c_name, axis)} = {value.lengths[axis]()};"
             )

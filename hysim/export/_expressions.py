@@ -88,10 +88,25 @@ class Library(Protocol):
         """Name of a constant vector."""
 
 
+class Uses(NamedTuple):
+    """Everything that one pass through a function has learnt; see `Scope`."""
+
+    types: dict[str, Type]
+    roots: dict[str, frozenset[str]]
+    lengths: set[tuple[str, int]]
+    written: set[str]
+    used: set[str]
+
+
 class Scope:
     """Names of a function while it is translated, and what was learnt about them.
 
     Parameters
+    ----------
+    source, arguments : Routine and dict
+        The function, and the types of its arguments.
+
+    Attributes
     ----------
     types : dict
         Type of each local name, as far as it is known.
@@ -101,19 +116,37 @@ class Scope:
         Arrays that are written to, and names that are read.
     roots : dict
         Arrays in which a local array lies.
+    before : Uses, optional
+        What the last pass has learnt.
     """
 
     def __init__(self, source: Routine, arguments: dict[str, Type]) -> None:
         self.source = source
         self.types: dict[str, Type] = dict(arguments)
+        self.roots: dict[str, frozenset[str]] = {}
         self.lengths: set[tuple[str, int]] = set()
         self.written: set[str] = set()
         self.used: set[str] = set()
-        self.roots: dict[str, frozenset[str]] = {}
+        self.before: Uses | None = None
 
-    def learnt(self) -> tuple[object, ...]:
-        """Everything that may still change while the types settle."""
-        return dict(self.types), set(self.lengths), set(self.written), set(self.used), dict(self.roots)
+    def again(self) -> bool:
+        """Begin another pass; False if the last one has learnt nothing new."""
+        uses = Uses(dict(self.types), dict(self.roots), self.lengths, self.written, self.used)
+        settled, self.before = uses == self.before, uses
+        self.lengths, self.written, self.used = set(), set(), set()
+        return not settled
+
+    def is_used(self, name: str) -> bool:
+        """Whether a name was read in the last pass."""
+        return self.before is None or name in self.before.used
+
+    def is_written(self, name: str) -> bool:
+        """Whether an array was written to in the last pass."""
+        return self.before is not None and bool((self.roots.get(name, frozenset()) | {name}) & self.before.written)
+
+    def axes(self, name: str) -> tuple[int, ...]:
+        """Axes of an array whose lengths were used in the last pass."""
+        return () if self.before is None else tuple(sorted(axis for each, axis in self.before.lengths if each == name))
 
     def assign(self, name: str, type_: Type, node: ast.AST) -> None:
         """Note that a name gets a value of this type."""
@@ -490,13 +523,22 @@ class Expressions:
                 self.scope.write(root)
         return [*[stretch.text] * parameter.is_used, *(stretch.lengths[axis]() for axis in parameter.axes)]
 
+    def writes(self, node: ast.expr) -> bool:
+        """Whether an expression writes to an array."""
+        return bool(self._tried(node)[1])
+
     def _type(self, node: ast.expr) -> Type:
         """Type of an expression, which is not used yet."""
+        return self._tried(node)[0]
+
+    def _tried(self, node: ast.expr) -> tuple[Type, set[str]]:
+        """Type of an expression, and the arrays that it writes to, without a trace."""
         scope = self.scope
-        before = set(scope.lengths), set(scope.written), set(scope.used)
-        type_ = self.any(node).type
+        before = scope.lengths, scope.written, scope.used
+        scope.lengths, scope.written, scope.used = set(), set(), set()
+        type_, written = self.any(node).type, scope.written
         scope.lengths, scope.written, scope.used = before
-        return type_
+        return type_, written
 
     def _refusal(self, node: ast.AST, reason: str) -> UntranslatableError:
         return self.scope.source.refusal(node, reason)

@@ -12,36 +12,32 @@ written, which needs the extra `export`.
 """
 
 import gzip
-import importlib.util
-import subprocess
-import sys
-import tempfile
 from collections.abc import Callable
 from functools import lru_cache
 from importlib.resources import files
-from pathlib import Path
 from typing import NamedTuple
 
+from hysim.export._compilers import web_module
+from hysim.export._program import entries
 from hysim.export._routine import plain
-from hysim.export._translate import Function, Translation
-from hysim.export._types import Known, Scalar, Vector
 from hysim.models.law import Law
 
 FOLDER = "page/wasm"
-_TARGET = "wasm32-wasi"
-_FLAGS = ("-mexec-model=reactor", "-Os", "-std=c99", "-ffp-contract=off", "-Wl,--strip-all", "-Wl,--export=__heap_base")
 _WRAPPER = """
 __attribute__((export_name("begin")))
-void begin(const double *parameters, int n_parameters, double *state, int n_state, double u0) {{
-    (void)parameters; (void)n_parameters; (void)state; (void)n_state; (void)u0;
-    {begin};
-}}
+void begin(const double *parameters, int n_parameters, double *state, int n_state, double u0) {
+    start(parameters, n_parameters, state, n_state, u0);
+}
 
 __attribute__((export_name("run")))
-void run(const double *parameters, int n_parameters, double *state, int n_state, const double *u, double *y, int n) {{
-    (void)parameters; (void)n_parameters; (void)state; (void)n_state;
-    for (int k = 0; k < n; k++) y[k] = {step};
-}}
+void run(const double *parameters, int n_parameters, double *state, int n_state, const double *u, double *y, int n) {
+    for (int k = 0; k < n; k++) y[k] = step(parameters, n_parameters, state, n_state, u[k]);
+}
+"""
+_NO_START = """
+static void start(const double *parameters, int n_parameters, double *state, int n_state, double u0) {
+    (void)parameters, (void)n_parameters, (void)state, (void)n_state, (void)u0;
+}
 """
 
 
@@ -96,57 +92,11 @@ def compressed(module: bytes) -> bytes:
 
 def c_source(kernels: Kernels) -> str:
     """C99 text of a module."""
-    translation = Translation()
-    types = Vector(), Vector(), Scalar.DOUBLE
-    step, begin = (translation.function(kernel, types) for kernel in kernels)
-    wrapper = _WRAPPER.format(step=_call(step, "u[k]"), begin=_call(begin, "u0"))
-    return f"#include <math.h>\n{translation.text()}{wrapper}"
+    text, has_start = entries(kernels.step, kernels.start)
+    return f"#include <math.h>\n{text}{'' if has_start else _NO_START}{_WRAPPER}"
 
 
 @lru_cache(maxsize=32)
 def compiled(source: str) -> bytes:
-    """A WebAssembly module of C99 text.
-
-    Raises
-    ------
-    ImportError
-        If ziglang is not installed.
-    RuntimeError
-        If the compiler refuses the text.
-    """
-    if importlib.util.find_spec("ziglang") is None:
-        raise ImportError(
-            "a page for a step that is not hysim's own needs a compiler: pip install 'hysim[export]' (ziglang)"
-        )
-    with tempfile.TemporaryDirectory() as folder:
-        text, module = Path(folder, "step.c"), Path(folder, "step.wasm")
-        text.write_text(source, encoding="utf-8")
-        command = [
-            sys.executable,
-            "-m",
-            "ziglang",
-            "cc",
-            "-target",
-            _TARGET,
-            *_FLAGS,
-            "-o",
-            module.name,
-            text.name,
-            "-lm",
-        ]
-        done = subprocess.run(command, capture_output=True, text=True, cwd=folder, check=False)
-        if done.returncode:
-            raise RuntimeError(f"ziglang could not compile the step: {done.stderr.strip()}")
-        return module.read_bytes()
-
-
-def _call(function: Function, u: str) -> str:
-    """A call of a translated function with the arguments of the wrapper."""
-    values = dict(zip((each.name for each in function.parameters), ("parameters", "state", u), strict=True))
-    arguments: list[str] = []
-    for each in function.parameters:
-        if isinstance(each.type, Known):
-            continue
-        arguments += [values[each.name]] * each.is_used
-        arguments += [f"n_{values[each.name]}" for _ in each.axes]
-    return f"{function.name}({', '.join(arguments)})"
+    """The module of a C99 text; errors as of `hysim.export._compilers.web_module`."""
+    return web_module(source)

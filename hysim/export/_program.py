@@ -1,8 +1,20 @@
 """A step in C99 with its numbers: what a C source, a functional mock-up unit and a page are made of."""
 
-from typing import NamedTuple
+import math
+from dataclasses import replace
+from typing import Any, NamedTuple
 
-from hysim._frozen import FloatArray, frozen
+from hysim._frozen import FloatArray, frozen, read_only
+from hysim.control import Controller, InverseFeedforward, preview
+from hysim.export._packing import packing
+from hysim.export._translate import Function, Translation
+from hysim.export._types import Scalar, Vector
+from hysim.kernels.stepping import Start, Step, complete
+from hysim.models.law import Law
+from hysim.models.protocols import Startable, Stepwise, needs_time
+
+_VECTORS = Vector(), Vector()
+_LAW, _CONTROLLER, _FEEDFORWARD = ("u",), ("reference", "measurement"), ("reference",)
 
 
 class Field(NamedTuple):
@@ -13,8 +25,8 @@ class Field(NamedTuple):
 
     name: str
     value: float
-    lower: float
-    upper: float
+    lower: float = -math.inf
+    upper: float = math.inf
     log: bool = False
     unit: str = ""
 
@@ -50,6 +62,8 @@ class Program:
         Places at the front of the state that are the input and the memory; the rest is room for work.
     sample_time : float
         Time between two samples [s]; nan for a law that does not depend on time.
+    ahead : int
+        Samples by which a controller gets the reference ahead of its time.
     """
 
     source: str
@@ -62,4 +76,159 @@ class Program:
     fields: tuple[Field, ...] = ()
     pack: str = ""
     memory: int = 0
-    sample_time: float = float("nan")
+    sample_time: float = math.nan
+    ahead: int = 0
+
+
+def program_of(
+    thing: Any, sample_time: float | None = None, *, u0: float = 0.0, y0: float = 0.0, tunable: bool = False
+) -> Program:
+    """The step of a law, a plant or a controller in C99.
+
+    Parameters
+    ----------
+    thing : model or controller
+        A law, plant, sum or cascade that can be stepped, or a sampled controller.
+    sample_time : float, optional
+        Time between two samples [s]; a law that does not depend on time needs none.
+    u0, y0 : float
+        Command and displacement at which a controller starts, at rest.
+    tunable : bool
+        Whether the numbers of a law may still be changed in the program.
+
+    Returns
+    -------
+    Program
+
+    Raises
+    ------
+    TypeError
+        If the thing cannot be stepped.
+    ValueError
+        If no sample time is given where one is needed, or `u0` or `y0` is not finite.
+    UntranslatableError
+        If a step is outside the subset of Python that is translated.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> from hysim.export import program_of
+    >>> program = program_of(hs.Play(threshold=0.5))
+    >>> program.inputs, program.parameters.tolist()
+    (('u',), [0.0, 0.0, 0.0, 0.5, 1.0])
+    """
+    if sample_time is not None and not 0.0 < sample_time < math.inf:
+        raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
+    if not (math.isfinite(u0) and math.isfinite(y0)):
+        raise ValueError(f"u0 and y0 must be finite, got {u0} and {y0}")
+    if isinstance(thing, Stepwise):
+        model = thing.startable(sample_time)
+        timed = sample_time if needs_time(thing) else None
+        if not (tunable and isinstance(thing, Law)):
+            return _of_model(model, timed)
+        free = packing(thing)
+        program = _of_model(model, timed)
+        return replace(
+            program,
+            source=program.source + "\n" + free.to_c("pack"),
+            fields=tuple(Field(name, thing.scalars[name]) for name in free.fields),
+            pack="pack",
+            memory=len(free.memory),
+        )
+    if isinstance(thing, Controller):
+        if sample_time is None:
+            raise ValueError(f"a {type(thing).__name__} is sampled: give sample_time")
+        return _of_controller(thing, sample_time, u0, y0)
+    raise TypeError(
+        f"a law, a plant or a controller that can be stepped is expected, got {type(thing).__name__}; a class must "
+        "be given its parameters first"
+    )
+
+
+def _of_model(model: Startable, sample_time: float | None) -> Program:
+    sizes = model.parameters.size, model.state.size
+    source, has_start = entries(model.step, model.start, sizes)
+    return Program(
+        source=source,
+        step="step",
+        inputs=_LAW,
+        output="y",
+        parameters=read_only(model.parameters, finite=False),
+        state=read_only(model.state, finite=False),
+        start="start" if has_start else "",
+        memory=model.state.size,
+        sample_time=math.nan if sample_time is None else sample_time,
+    )
+
+
+def _of_controller(controller: Controller, sample_time: float, u0: float, y0: float) -> Program:
+    step, parameters, state = controller.compiled(sample_time, u0, y0)
+    translation = Translation()
+    function = translation.function(step, (*_VECTORS, Scalar.DOUBLE, Scalar.DOUBLE))
+    inputs = _FEEDFORWARD if isinstance(controller, InverseFeedforward) else _CONTROLLER
+    return Program(
+        source=translation.text() + "\n" + _entry("step", function, inputs, (parameters.size, state.size), _CONTROLLER),
+        step="step",
+        inputs=inputs,
+        output="command",
+        parameters=read_only(parameters, finite=False),
+        state=read_only(state, finite=False),
+        memory=state.size,
+        sample_time=sample_time,
+        ahead=preview(controller, sample_time),
+    )
+
+
+def entries(step: Step, start: Start, sizes: tuple[int, int] | None = None) -> tuple[str, bool]:
+    """C99 text with the functions `step` and `start` of a model, and whether there is a `start`.
+
+    Parameters
+    ----------
+    step, start : function
+        Kernels, or functions in their subset of Python.
+    sizes : (int, int), optional
+        Numbers of the parameters and of the state. By default they are arguments of both functions, ``step(parameters,
+        n_parameters, state, n_state, u)``, so that one program serves every law of a family.
+
+    Returns
+    -------
+    text : str
+    has_start : bool
+        Whether the state depends on the first input.
+
+    Raises
+    ------
+    UntranslatableError
+        If a function is outside the subset of Python that is translated.
+    """
+    translation, types = Translation(), (*_VECTORS, Scalar.DOUBLE)
+    function = translation.function(step, types)
+    has_start = start is not complete
+    begun = translation.function(start, types) if has_start else None
+    texts = [translation.text(), _entry("step", function, _LAW, sizes, _LAW)]
+    if begun is not None:
+        texts.append(_entry("start", begun, ("u0",), sizes, ("u0",)))
+    return "\n".join(texts), has_start
+
+
+def _entry(
+    name: str, function: Function, inputs: tuple[str, ...], sizes: tuple[int, int] | None, every: tuple[str, ...]
+) -> str:
+    """A function of parameters, state and inputs that calls a translated one with what this uses.
+
+    `every` are the names of its own inputs, of which `inputs` are taken.
+    """
+    lengths = ("n_parameters", "n_state") if sizes is None else tuple(map(str, sizes))
+    given: list[str] = []
+    names = ("parameters", "state", *every)
+    for parameter, argument, length in zip(function.parameters, names, (*lengths, *every), strict=True):
+        given += [argument if argument in ("parameters", "state", *inputs) else "0.0"] * parameter.is_used
+        given += [length] * len(parameter.axes)
+    vectors = ["const double *parameters", "double *state"]
+    if sizes is None:
+        vectors = [vectors[0], "int n_parameters", vectors[1], "int n_state"]
+    taken = ("parameters", "state", *inputs, *lengths * (sizes is None))
+    unused = "".join(f"    (void){each};\n" for each in taken if each not in given)
+    result, call = ("void", "") if function.returns is None else ("double", "return ")
+    arguments = ", ".join([*vectors, *(f"double {each}" for each in inputs)])
+    return f"static {result} {name}({arguments}) {{\n{unused}    {call}{function.name}({', '.join(given)});\n}}\n"

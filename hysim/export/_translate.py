@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 
 from hysim.export import _c
 from hysim.export._body import Body
-from hysim.export._expressions import Scope
 from hysim.export._routine import Routine, plain, routine
 from hysim.export._types import Known, Scalar, Several, Type, Vector
 
@@ -101,7 +100,7 @@ class Translation:
         text = body.settled()
         scope = body.scope
         parameters = tuple(
-            Parameter(each, scope.types[each], each in scope.used, _axes(scope, each), each in scope.written)
+            Parameter(each, scope.types[each], scope.is_used(each), scope.axes(each), scope.is_written(each))
             for each in body.arguments
         )
         if isinstance(body.returns, Several):
@@ -125,10 +124,6 @@ def _declared(parameter: Parameter, name: str) -> list[str]:
     if isinstance(parameter.type, Known) or not parameter.is_used:
         return []
     return [f"{parameter.type.c_type} {name}"]
-
-
-def _axes(scope: Scope, name: str) -> tuple[int, ...]:
-    return tuple(sorted(axis for each, axis in scope.lengths if each == name))
 
 
 def _arguments(source: Routine, count: int) -> list[ast.arg]:

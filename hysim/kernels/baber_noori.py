@@ -45,11 +45,11 @@ from hysim.kernels.charts import N_WORK
 from hysim.kernels.duhem import place, untangled, zero
 from hysim.kernels.remainder import N_TERMS, ROUNDING
 
-_PLAIN = 3  # after u, z and e the workspace of the Bouc-Wen law
-_SERIES = _PLAIN + N_WORK
-_EXPONENT = _SERIES + N_ROWS * (N_TERMS + 1)  # the n that its charts are made for
-_READY = _EXPONENT + 1  # 0 before the first step
-N_STATE = _READY + 1
+_SERIES = 3  # after u, z and e
+_EXPONENT = _SERIES + N_ROWS * (N_TERMS + 1)  # the n that the charts are made for
+_PLAIN = _EXPONENT + 1  # the state of the Bouc-Wen law; behind it, at the end, 0 before the charts are looked at
+N_LEAN = _PLAIN + 3  # of a law that needs no charts: one that degrades or pinches, or has n = 1 or 2
+N_STATE = _PLAIN + N_WORK + 1
 
 MAX_STEPS = 5_000
 _SCALE = EXPONENT + 1  # place of the scales of z and u in the parameters
@@ -63,18 +63,16 @@ _RETREAT = 2.0**-10  # of a length at which a term overflows
 
 @kernel
 def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
-    """Output at the next input `u`; `state`, shape (N_STATE,), has the last u, z and e in front, and moves along.
+    """Output at the next input `u`; `state` has the last u, z and e in front, and moves along.
+
+    Its shape is (N_STATE,), or (N_LEAN,) without charts: a law that needs them is then computed by the series, too.
 
     `parameters` are those of wear and pinching, (A, beta, gamma, n, scale of z, scale of u), and (A, beta, gamma, n,
     gain, offset, c1, c2, ...). Those before the scales are of the law for z and u times their scales, powers of two;
     those after them, and the state, are in the user's units.
     """
-    common, plain = parameters[_COMMON:], state[_PLAIN:_SERIES]
+    common, plain = parameters[_COMMON:], state[_PLAIN : state.size - 1]
     last, z, e = state[0], state[1], state[2]
-    if state[_READY] == 0.0:
-        A, beta, gamma, n = common[0], common[1], common[2], common[3]
-        boucwen.prepare(A, beta, gamma, n, state[_EXPONENT], plain)
-        state[_EXPONENT], state[_READY] = n, 1.0
     if u != last and math.isfinite(z):  # a memory that has diverged remains so
         direction = 1.0 if u > last else -1.0
         series = state[_SERIES:_EXPONENT].reshape((N_ROWS, N_TERMS + 1))
@@ -82,7 +80,12 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
         w, e = advance(direction * z * of_z, e * of_z * of_u, abs(u - last) * of_u, parameters, series)
         state[1], state[2] = direction * w / of_z, e / of_u / of_z
     state[0] = u
-    if parameters[0] == 0.0 and parameters[1] == 0.0 and parameters[2] == 0.0 and parameters[3] == 0.0:
+    A, beta, gamma, n = common[0], common[1], common[2], common[3]
+    is_plain = parameters[0] == 0.0 and parameters[1] == 0.0 and parameters[2] == 0.0 and parameters[3] == 0.0
+    if is_plain and (n == 1.0 or n == 2.0 or plain.size >= N_WORK):
+        if state[-1] == 0.0:
+            boucwen.prepare(A, beta, gamma, n, state[_EXPONENT], plain)
+            state[_EXPONENT], state[-1] = n, 1.0
         plain[0], plain[1] = last, z
         y = boucwen.step(common, plain, u)
         state[1] = plain[1]

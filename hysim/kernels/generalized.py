@@ -17,7 +17,7 @@ import math
 
 from hysim._frozen import FloatArray
 from hysim.kernels import boucwen
-from hysim.kernels._compile import kernel
+from hysim.kernels._compile import inner, kernel, pasted
 from hysim.kernels.charts import N_WORK
 
 N_LAWS = 4  # falling at u < 0 and u > 0, rising at u < 0 and u > 0
@@ -35,19 +35,46 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
 
     `parameters` are those of the four laws, each as `boucwen.step` has them, one after the other.
     """
-    size = parameters.size // N_LAWS
     if state[_CURRENT] == 0.0:
         prepare(parameters, state)
-    last = state[0]
+    return moved(parameters, state, u, 1)
+
+
+@kernel
+def elementary_step(parameters: FloatArray, state: FloatArray, u: float) -> float:
+    """As `step` for n = 1 and 2, without a workspace: `state` is (last u, z)."""
+    return moved(parameters, state, u, None)
+
+
+@pasted
+def moved(parameters: FloatArray, state: FloatArray, u: float, charts: int | None) -> float:
+    """`step` or `elementary_step`, cut where u changes its sign."""
+    size, last = parameters.size // N_LAWS, state[0]
     direction = 2 if u > last else 0
     if (last < 0.0 and u > 0.0) or (last > 0.0 and u < 0.0):
         below, above = direction * size, (direction + 1) * size
         if parameters[below + 1] != parameters[above + 1] or parameters[below + 2] != parameters[above + 2]:
-            y = along(parameters, state, 0.0, direction + (1 if last > 0.0 else 0))
+            y = part(parameters, state, 0.0, direction + (1 if last > 0.0 else 0), charts)
             if not math.isfinite(state[1]):  # a memory that has diverged remains so
                 return y
             last = 0.0
-    return along(parameters, state, u, direction + (1 if last + u > 0.0 else 0))
+    return part(parameters, state, u, direction + (1 if last + u > 0.0 else 0), charts)
+
+
+@pasted
+def part(parameters: FloatArray, state: FloatArray, u: float, law: int, charts: int | None) -> float:
+    """As `moved` on a stretch where one of the four laws holds."""
+    if charts is not None:
+        return along(parameters, state, u, law)
+    return elementary_along(parameters, state, u, law)
+
+
+@inner
+def elementary_along(parameters: FloatArray, state: FloatArray, u: float, law: int) -> float:
+    """As `along`, for n = 1 and 2."""
+    size = parameters.size // N_LAWS
+    own = parameters[law * size : (law + 1) * size]
+    return boucwen.linear_step(own, state, u) if own[3] == 1.0 else boucwen.quadratic_step(own, state, u)
 
 
 @kernel

@@ -19,7 +19,7 @@ from numba import float64
 
 from hysim._frozen import FloatArray
 from hysim.kernels import clamps
-from hysim.kernels._compile import borrowed, by_address, inlined, kernel, signed_closure
+from hysim.kernels._compile import borrowed, by_address, inlined, inner, kernel, signed_closure
 from hysim.kernels.stepping import CONSTANTS, STEP, VECTOR, Step
 
 N_LIMITS = 2  # parameters before those of the inverse itself
@@ -124,7 +124,7 @@ def put_back(law: FloatArray, before: FloatArray, places: FloatArray) -> None:
         i += int(places[2 * k + 1])
 
 
-@inlined
+@inner
 def _rise(
     step: Step,
     parameters: FloatArray,

@@ -175,7 +175,7 @@ def outputs(
 def _seen(C: FloatArray, D: float, x: FloatArray, through: float) -> float:
     """C x + D v; a state that overflows does not matter where it is not seen."""
     total = D * through
-    for j in range(len(x)):
+    for j in range(x.size):
         if C[j] != 0.0:
             total += C[j] * x[j]
     return total
@@ -186,13 +186,74 @@ def _advance(
     A: FloatArray, B0: FloatArray, B1: FloatArray, begin: float, end: float, x: FloatArray, moved: FloatArray
 ) -> None:
     """One piece of a step."""
-    for row in range(len(x)):
+    for row in range(x.size):
         total = B0[row] * begin + B1[row] * end
-        for column in range(len(x)):
+        for column in range(x.size):
             total += A[row, column] * x[column]
         moved[row] = total
-    for row in range(len(x)):
+    for row in range(x.size):
         x[row] = moved[row]
+
+
+# ---------------------------------------------------------------------------------- one sample at a time
+
+N_HEAD = 7
+N_BEFORE = 3  # places of the state before the plant's own
+N_RING = 3  # more inputs than whole steps in the dead time
+
+
+@kernel
+def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
+    """Output at the next input `u`, with the bits of `outputs`.
+
+    `parameters` is (n, whole steps of the dead time, part, 1 for an output at the end of the step, 1 for an input that
+    is linear, 1 where there is a free response, D, C), then A, B0 and B1 of the whole step less the part, and, if there
+    is a part, those of the part. `state` is (last u, place of the last input, inputs so far up to `N_RING` more than
+    the whole steps, x, room, x of the free response), and a ring of inputs, zero at first.
+    """
+    n, part, at_end, free = int(parameters[0]), parameters[2], parameters[3] != 0.0, parameters[5] != 0.0
+    C, first = parameters[N_HEAD : N_HEAD + n], N_HEAD + n
+    A, B0 = parameters[first : first + n * n].reshape((n, n)), parameters[first + n * n : first + n * n + n]
+    B1, behind = parameters[first + n * n + n : first + n * n + 2 * n], first + n * n + 2 * n
+    x, moved = state[N_BEFORE : N_BEFORE + n], state[N_BEFORE + n : N_BEFORE + 2 * n]
+    free_at = N_BEFORE + 2 * n
+    ring_at = free_at + n if free else free_at
+    ring = state[ring_at:]
+    size = ring.size
+    place = (int(state[1]) + 1) % size
+    ring[place] = u
+    state[0], state[1] = u, place
+    known = state[2]
+    if known < size:
+        known += 1.0
+        state[2] = known
+    newer, older, oldest = ring[(place + 3) % size], ring[(place + 2) % size], ring[(place + 1) % size]
+    rise, last_rise = 0.0, 0.0  # of the input over the stretches that begin with `older` and with `oldest`
+    if parameters[4] != 0.0:
+        if known > size - 2:
+            rise = newer - older
+        if known > size - 1:
+            last_rise = older - oldest
+    begin, turn, begin_rise, turn_rise = oldest, older, last_rise, rise
+    if at_end:
+        begin, turn, begin_rise, turn_rise = older, newer, 0.0, 0.0
+    if at_end or known > 1.0:
+        if part > 0.0:
+            cut_A = parameters[behind : behind + n * n].reshape((n, n))
+            cut_B0 = parameters[behind + n * n : behind + n * n + n]
+            cut_B1 = parameters[behind + n * n + n : behind + n * n + 2 * n]
+            cut = begin + (1.0 - part) * begin_rise
+            _advance(cut_A, cut_B0, cut_B1, cut, begin + begin_rise, x, moved)
+            if free:
+                _advance(cut_A, cut_B0, cut_B1, 0.0, 0.0, state[free_at : free_at + n], moved)
+        _advance(A, B0, B1, turn, turn + (1.0 - part) * turn_rise, x, moved)
+        if free:
+            _advance(A, B0, B1, 0.0, 0.0, state[free_at : free_at + n], moved)
+    through = newer
+    if part > 0.0 and not at_end:
+        through = older + (1.0 - part) * rise
+    y = _seen(C, parameters[6], x, through)
+    return y + state[free_at] if free else y
 
 
 @inlined

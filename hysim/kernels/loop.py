@@ -38,6 +38,16 @@ With e = 1 - exp(-t / tau) both pieces of s have closed forms:
 
     ramp from s0 to s1 in the time t     v + (s0 - v) e + (s1 - s0) (1 - tau e / t)
     constant s1                          v + (s1 - v) e
+
+The chain without a controller is a step from the command to the displacement (`chain_step`, and `chain_start` at
+rest). Its parameters and state are
+
+    parameters   length of the law's state, 1 for an output at the end of the sample, quantum, the amplifier's six,
+                 number of creep elements, order, d, sub-steps of a sample, the row for `output`, decline, A, B_0, B_1,
+                 B_2 as above, x at rest under a constant input of one, and the parameters of the law
+
+    state        last command, place of the law's last output in its ring, two of the amplifier, the law's own, x twice,
+                 and the ring of the law's last d + 3 outputs
 """
 
 import math
@@ -45,17 +55,19 @@ from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
-from numba import float64, int64, types
+from numba import float64, int64, types, void
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import borrowed, inlined, signed_kernel
+from hysim.kernels._compile import borrowed, by_address, closure, inlined, signed_closure, signed_kernel
 from hysim.kernels.controllers import CONTROLLER
-from hysim.kernels.stepping import CONSTANTS, STEP, VECTOR, Step
+from hysim.kernels.stepping import CONSTANTS, START, STEP, VECTOR, Start, Step
 
 SIGNALS = types.Array(float64, 2, "C")
 INPUTS = types.Array(float64, 2, "C", readonly=True)
 CONSTANT_ROWS = INPUTS
 LOST = types.Array(int64, 1, "C")
+
+_LARGEST_FRACTION = 2.0**52  # larger numbers are whole
 
 N_AMPLIFIER = 6
 N_HEAD = N_AMPLIFIER + 7
@@ -116,6 +128,95 @@ def advance(
         x[order + i] = following
     for i in range(order):
         x[i] = x[order + i]
+
+
+N_STEP = 3  # parameters of a chain without controller before those of its amplifier
+N_STAGES = N_STEP + N_AMPLIFIER + 4
+N_PLACE = 2  # places of its state before those of its amplifier
+
+
+_CHAIN = float64(STEP, CONSTANTS, VECTOR, float64)
+_CHAIN_START = void(STEP, START, CONSTANTS, VECTOR, float64)
+
+
+def chain_step(law: Step) -> Step:
+    """The step of an amplifier, a law, a linear stage and a quantum one behind the other."""
+    chain_by, law_by = by_address(chain, _CHAIN), by_address(law, STEP.signature)
+
+    @signed_closure(STEP.signature)
+    def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
+        return chain_by(law_by, parameters, state, u)
+
+    return step
+
+
+def chain_start(law: Step, law_start: Start) -> Start:
+    """The start of the chain at rest at a command; one that integrates rests at zero only, else it is not finite."""
+    rest_by, law_by = by_address(chain_at_rest, _CHAIN_START), by_address(law, STEP.signature)
+    start_by = by_address(law_start, START.signature)
+
+    @closure
+    def start(parameters: FloatArray, state: FloatArray, u0: float) -> None:
+        rest_by(law_by, start_by, parameters, state, u0)
+
+    return start
+
+
+@inlined
+def rounded(y: float, quantum: float) -> float:
+    """The nearest whole number of quanta; a quantum of zero stands for none."""
+    quanta = y / quantum + 0.5 if quantum > 0.0 else math.inf
+    return quantum * math.floor(quanta) if abs(quanta) < _LARGEST_FRACTION else y
+
+
+@signed_kernel(_CHAIN)
+def chain(law: Step, parameters: FloatArray, state: FloatArray, u: float) -> float:
+    """The displacement at the next command `u`; see `chain_step`."""
+    parameters, state = borrowed(parameters), borrowed(state)
+    at_end, quantum, amplifier = parameters[1] != 0.0, parameters[2], parameters[N_STEP:N_STAGES]
+    creeping, order, lag = int(amplifier[6]), int(amplifier[7]), int(amplifier[8])
+    substeps, ring = int(amplifier[9]), lag + 3
+    row, a = parameters[N_STAGES : N_STAGES + order + 3], N_STAGES + order + 3
+    decline, b = parameters[a : a + creeping], a + creeping
+    A, c = parameters[b : b + (order - creeping) * order], b + (order - creeping) * order
+    B, own = parameters[c : c + 3 * order], parameters[c + 4 * order :]
+    voltages, begin = state[N_PLACE : N_PLACE + 2], N_PLACE + 2
+    memory, end = state[begin : begin + int(parameters[0])], begin + int(parameters[0])
+    x, past = state[end : end + 2 * order], state[end + 2 * order :]
+    target = min(max(amplifier[2] * u + amplifier[3], amplifier[4]), amplifier[5])
+    place, y = int(state[1]), 0.0
+    for sub in range(substeps):
+        v = charge(amplifier, voltages, target)
+        w = law(own, memory, v)
+        place = (place + 1) % ring
+        past[place] = w
+        oldest, older, newer = past[(place + 1) % ring], past[(place + 2) % ring], past[(place + 3) % ring]
+        if sub == 0 and not at_end:
+            y = output(row, x, oldest, older, newer)
+        advance(decline, A, B, x, oldest, older, newer)
+    if at_end:
+        y = output(row, x, past[(place + 2) % ring], past[(place + 3) % ring], 0.0)
+    state[0], state[1] = u, place
+    return float(rounded(y, quantum))
+
+
+@signed_kernel(_CHAIN_START)
+def chain_at_rest(law: Step, law_start: Start, parameters: FloatArray, state: FloatArray, u0: float) -> None:
+    """The state at rest at the command `u0`; see `chain_start`."""
+    amplifier = parameters[N_STEP:N_STAGES]
+    creeping, order = int(amplifier[6]), int(amplifier[7])
+    rest_at = N_STAGES + order + 3 + creeping + (order - creeping) * order + 3 * order
+    own, begin, size = parameters[rest_at + order :], N_PLACE + 2, int(parameters[0])
+    memory, x = state[begin : begin + size], state[begin + size : begin + size + order]
+    past = state[begin + size + 2 * order :]
+    voltage = min(max(amplifier[2] * u0 + amplifier[3], amplifier[4]), amplifier[5])
+    law_start(own, memory, voltage)
+    level = law(own, memory, voltage)
+    state[0], state[N_PLACE], state[N_PLACE + 1] = u0, voltage, voltage
+    for i in range(order):
+        x[i] = parameters[rest_at + i] * level if level != 0.0 else 0.0
+    for i in range(past.size):
+        past[i] = level
 
 
 @signed_kernel(

@@ -24,7 +24,7 @@ from hysim.kernels._compile import by_address, closure, signed_closure, signed_k
 VECTOR = types.Array(float64, 1, "C")
 CONSTANTS = types.Array(float64, 1, "C", readonly=True)
 STEP = types.FunctionType(float64(CONSTANTS, VECTOR, float64))
-_START = void(CONSTANTS, VECTOR, float64)
+START = types.FunctionType(void(CONSTANTS, VECTOR, float64))
 
 Step = Callable[[FloatArray, FloatArray, float], float]
 Start = Callable[[FloatArray, FloatArray, float], None]
@@ -47,16 +47,24 @@ def line(parameters: FloatArray, state: FloatArray, u: float) -> float:
     return float(parameters[0] + parameters[1] * u)
 
 
+@signed_kernel(float64(CONSTANTS, VECTOR, float64))
+def dashpot(parameters: FloatArray, state: FloatArray, u: float) -> float:
+    """The damper, `parameters` (c, sample time) and `state` (last u)."""
+    rise = u - state[0]
+    state[0] = u
+    return float(parameters[0] * (rise / parameters[1]))
+
+
 # ---------------------------------------------------------------------------------- starts
 
 
-@signed_kernel(_START)
+@signed_kernel(START.signature)
 def start(parameters: FloatArray, state: FloatArray, u0: float) -> None:
     """The last input is the first one: all that most laws need."""
     state[0] = u0
 
 
-@signed_kernel(_START)
+@signed_kernel(START.signature)
 def complete(parameters: FloatArray, state: FloatArray, u0: float) -> None:
     """Nothing: the state does not depend on the first input."""
 
@@ -102,7 +110,7 @@ def started_both(first: Start, second: Start) -> Start:
 
 def self_starting(step: Step, start: Start) -> Step:
     """The step of a law that starts at its first input; the last place of its state is zero before."""
-    start_by, step_by = by_address(start, _START), by_address(step, STEP.signature)
+    start_by, step_by = by_address(start, START.signature), by_address(step, STEP.signature)
 
     @signed_closure(STEP.signature)
     def started_step(parameters: FloatArray, state: FloatArray, u: float) -> float:
@@ -125,4 +133,4 @@ def compile_step(function: Step) -> Step:
 
 def compile_start(function: Start) -> Start:
     """Compile a plain function as a start; numba's errors pass through."""
-    return signed_kernel(_START)(function)
+    return signed_kernel(START.signature)(function)

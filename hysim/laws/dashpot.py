@@ -7,10 +7,11 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
+from hysim.kernels import stepping
 from hysim.laws.static import linear_space
 from hysim.models.composable import Composable
 from hysim.models.model import family
-from hysim.models.protocols import Identifiable
+from hysim.models.protocols import CompiledLaw, Identifiable, Startable, needed_time, positive_time
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
@@ -55,12 +56,20 @@ class Dashpot(Identifiable, Composable):
     ) -> tuple[FloatArray, float | None]:
         """Output continued from `state`, the last input, and the state after it; the same bits as uncut."""
         inputs = read_only(u, "u", ndim=1)
-        if not 0.0 < sample_time < np.inf:
-            raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
+        positive_time(sample_time)
         if not inputs.size:
             return inputs, state
         before = inputs[0] if state is None else state
         return self.c * (np.diff(inputs, prepend=before) / sample_time), float(inputs[-1])
+
+    def startable(self, sample_time: float | None = None) -> Startable:
+        """The damper at a sample time [s] as a step that runs from any first input, for exports."""
+        parameters = read_only([self.c, positive_time(needed_time(self, sample_time))])
+        return Startable(stepping.dashpot, parameters, np.zeros(1), stepping.start)
+
+    def compiled(self, u0: float = 0.0, *, sample_time: float | None = None) -> CompiledLaw:
+        """The damper as compiled loops take it, at rest at the input `u0`; ValueError without a sample time [s]."""
+        return self.startable(sample_time).started(u0)
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """Nothing to search: the output is linear in c."""

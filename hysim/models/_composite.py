@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim.models import _parts
+from hysim.models._parts import compiled_law
 from hysim.models.by_structure import ByStructure
 from hysim.models.composable import Composable
 from hysim.models.inverse_search import inverse_at_rest, inverse_response
@@ -44,8 +44,12 @@ class Composite(ByStructure, Composable):
         """
 
     @abstractmethod
-    def compiled(self, u0: float = 0.0) -> CompiledLaw:
-        """As compiled loops take it, after a first sample at `u0`; TypeError if a member cannot be stepped."""
+    def compiled(self, u0: float = 0.0, *, sample_time: float | None = None) -> CompiledLaw:
+        """As compiled loops take it, after a first sample at `u0`, or at rest there as far as it depends on time.
+
+        Only what depends on time needs the `sample_time` [s], and raises ValueError without it; TypeError if a member
+        cannot be stepped.
+        """
 
     @abstractmethod
     def startable(self, sample_time: float | None = None) -> Startable:
@@ -62,7 +66,7 @@ class Composite(ByStructure, Composable):
         places: list[tuple[int, int]] = []
         end = 0
         for member in self.members:
-            size = _parts.compiled_law(member, 0.0).state.size
+            size = compiled_law(member, 0.0, None).state.size
             own = member.memory_places if isinstance(member, Stretched) else ((0, size),)
             for first, count in own:
                 if places and sum(places[-1]) == end + first:

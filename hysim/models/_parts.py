@@ -87,12 +87,12 @@ def _joined(join: Callable[[Any, Any], _Kernel], first: Step | Start, second: St
     return join(first, second)
 
 
-def compiled_law(part: Any, u0: float) -> CompiledLaw:
+def compiled_law(part: Any, u0: float, sample_time: float | None) -> CompiledLaw:
     """A part as compiled loops take it."""
-    if needs_time(part) or not isinstance(part, Steppable):
-        why = "it moves in time" if needs_time(part) else "it has no compiled step"
-        raise TypeError(f"a {type(part).__name__} cannot be stepped as a law: {why}")
-    return CompiledLaw(*part.compiled(u0))
+    if not isinstance(part, Steppable):
+        raise TypeError(f"a {type(part).__name__} cannot be stepped as a law: it has no compiled step")
+    time = {"sample_time": needed_time(part, sample_time)} if needs_time(part) else {}
+    return CompiledLaw(*part.compiled(u0, **time))
 
 
 def own(parameters: Mapping[str, Any], label: str) -> dict[str, Any]:

@@ -110,11 +110,12 @@ class Cascade(Composite):
             signal = signals[label] = response_of(stage, signal, sample_time)
         return {"y": signal, **signals}
 
-    def compiled(self, u0: float = 0.0) -> CompiledLaw:
+    def compiled(self, u0: float = 0.0, *, sample_time: float | None = None) -> CompiledLaw:
         laws, level = [], u0
         for stage in self.stages:
-            laws.append(compiled_law(stage, level))
-            level = float(stage.response([level])[0])
+            laws.append(compiled_law(stage, level, sample_time))
+            step, parameters, state = laws[-1]
+            level = step(parameters, state.copy(), level)  # at rest it stays
         return reduce(lambda first, second: compiled_pair(one_behind_the_other, first, second), laws)
 
     def startable(self, sample_time: float | None = None) -> Startable:

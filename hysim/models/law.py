@@ -53,6 +53,14 @@ class Packed(NamedTuple):
     memory: FloatArray
 
 
+class Stepping(NamedTuple):
+    """A step, the start of its state, and the places at the end of the state that it works in."""
+
+    step: Any
+    start: Any
+    workspace: int
+
+
 class Law(Composable, ABC):
     """A rate-independent law that is known by its step.
 
@@ -79,7 +87,8 @@ class Law(Composable, ABC):
     stages : tuple of Stage
         Parameters that a search frees in turn; the Bayesian information criterion says which of them stay.
     workspace : int
-        Further places at the end of the state, which a step may use as it likes; zero at first.
+        Further places at the end of the state, zero at first, for what the memory and the parameters determine: work,
+        and numbers that are kept since they take long. Trials of an inverse share them; their memory they do not.
     """
 
     step: ClassVar[Any]
@@ -160,6 +169,14 @@ class Law(Composable, ABC):
     def scalars(self) -> dict[str, float]:
         """Every number by the name that `hysim.identify` has for it, ``name`` or ``name[k]``."""
         return scalars_of(self.arguments)
+
+    @property
+    def stepping(self) -> Stepping:
+        """The leanest step of this law: one for its own numbers, where the family has several.
+
+        It has the bits of the family's `step`, and is that by default.
+        """
+        return Stepping(self.step, self.start, self.workspace)
 
     @property
     def memory_places(self) -> tuple[tuple[int, int], ...]:
@@ -280,9 +297,10 @@ class Law(Composable, ABC):
     def startable(self, sample_time: float | None = None) -> Startable:
         """The law as a step that runs from any first input, for exports; it has no use for the sample time."""
         parameters, memory = self.packed
-        state = np.zeros(memory.size + self.workspace)
+        step, start, workspace = self.stepping
+        state = np.zeros(memory.size + workspace)
         state[: memory.size] = memory
-        return Startable(compiled_step(self.step), parameters, state, compiled_start(self.start))
+        return Startable(compiled_step(step), parameters, state, compiled_start(start))
 
     def first_state(self, u0: float) -> State:
         """Last input and memory before a first sample at the input `u0`."""

@@ -98,8 +98,12 @@ class Continuable(Protocol):
 class Steppable(Protocol):
     """A law that compiled loops take."""
 
-    def compiled(self, u0: float = 0.0) -> CompiledLaw:
-        """The step, its parameters, and the state after a first sample at the input `u0`."""
+    @property
+    def compiled(self) -> Callable[..., CompiledLaw]:
+        """``compiled(u0)`` returns the step, its parameters, and the state after a first sample at the input `u0`.
+
+        A `Dynamic` model is at rest at `u0`, and has ``compiled(u0, sample_time=...)``.
+        """
 
 
 @runtime_checkable
@@ -325,6 +329,13 @@ def needed_time(plant: Any, sample_time: float | None) -> float:
     """The sample time [s], which a plant that moves in time cannot do without; ValueError if it is not given."""
     if sample_time is None:
         raise ValueError(f"a {type(plant).__name__} moves in time: give sample_time")
+    return sample_time
+
+
+def positive_time(sample_time: float) -> float:
+    """A sample time [s]; ValueError if it is not positive and finite."""
+    if not 0.0 < sample_time < math.inf:
+        raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
     return sample_time
 
 

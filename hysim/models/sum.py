@@ -98,8 +98,8 @@ class Sum(Composite):
         own = [response_of(part, inputs, sample_time) for part in self.parts]
         return {"y": _total(own), **dict(zip(labels(self.parts), own, strict=True))}
 
-    def compiled(self, u0: float = 0.0) -> CompiledLaw:
-        laws = [compiled_law(part, u0) for part in self.parts]
+    def compiled(self, u0: float = 0.0, *, sample_time: float | None = None) -> CompiledLaw:
+        laws = [compiled_law(part, u0, sample_time) for part in self.parts]
         return reduce(lambda first, second: compiled_pair(side_by_side, first, second), laws)
 
     def startable(self, sample_time: float | None = None) -> Startable:

@@ -21,7 +21,7 @@ from hysim._printing import csv_text
 from hysim.comparison import Comparison
 from hysim.datasets import table2
 from hysim.discovery import Discovery
-from hysim.export._page import Shown, page_text
+from hysim.export import Shown, page_text
 from hysim.paper import figures
 from hysim.paper.camera import camera_measures
 from hysim.paper.dwell import dwell_measures

@@ -9,9 +9,11 @@ from typing import NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, read_only
 from hysim._parallel import in_chunks
 from hysim.kernels import linear as kernels
+from hysim.kernels.stepping import complete
+from hysim.models.protocols import Startable
 
 Indices = npt.NDArray[np.int64]
 
@@ -121,6 +123,24 @@ class LinearPlants(NamedTuple):
             C, D, sample == "end", x, out,
         )  # fmt: skip
         return out[:, repeated:], LinearState(x, level[:, 1:][:, -int(self.lags[k]) - 2 :])
+
+    def startable(self, initial_state: tuple[float, ...] = (), *, hold: str, sample: str) -> Startable:
+        """The first plant as a step, `kernels.step`; `initial_state` as of a `TransferFunction`."""
+        n, lag, part, rate = self.C.shape[1], int(self.lags[0]), float(self.parts[0]), self.rate[0]
+        head = [n, lag, part, sample == "end", hold == "foh", bool(initial_state), self.D[0]]
+        pieces = [self.A[0, 1].ravel(), self.B0[0, 1], self.B1[0, 1]]
+        pieces += [self.A[0, 0].ravel(), self.B0[0, 0], self.B1[0, 0]] if part else []
+        free = np.array(initial_state) * rate ** -np.arange(float(len(initial_state)))
+        state = [np.zeros(kernels.N_BEFORE + 2 * n), free, np.zeros(lag + kernels.N_RING)]
+        parameters = read_only(np.concatenate([head, self.C[0], *pieces]), finite=False)
+        return Startable(kernels.step, parameters, np.concatenate(state), complete)
+
+    def rest_at(self, u0: float, level: float, state: FloatArray) -> None:
+        """Put the first plant, as `startable` has it, to rest at the input `u0`; `level` is u0 / den(0), den monic."""
+        n, ring = self.C.shape[1], int(self.lags[0]) + kernels.N_RING
+        state[0], state[2], state[state.size - ring :] = u0, ring, u0
+        if n:
+            state[kernels.N_BEFORE] = level * self.rate[0, 0] ** n
 
 
 def scaled_companion(monic: FloatArray, sample_time: float) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -10,7 +10,16 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, items, read_only
 from hysim.errors import SimulationError
 from hysim.models.model import family
-from hysim.models.protocols import Remembering, Responding, Sampled, Steppable, law_at, needs_time
+from hysim.models.protocols import (
+    CompiledLaw,
+    Remembering,
+    Responding,
+    Sampled,
+    Startable,
+    Steppable,
+    law_at,
+    needs_time,
+)
 from hysim.plants.amplifier import Amplifier
 from hysim.plants.chain import Chain, ChainState, linear_chain
 from hysim.plants.creep import Creep
@@ -166,6 +175,23 @@ class Actuator:
             return self.response(u, sample_time, substeps=substeps)
         return self.sensor.measure(self._late(self.sensor.delay).response(u, sample_time, substeps=substeps))
 
+    def startable(self, sample_time: float | None = None, *, substeps: int | None = None) -> Startable:
+        """The actuator as a step from the command to what `measured` reads without noise, for exports.
+
+        An actuator that is not `dynamic` needs no `sample_time` [s]. Raises ValueError if one is needed, and TypeError
+        if the law has no start.
+        """
+        whole = self if self.sensor is None else self._late(self.sensor.delay)
+        at_end = isinstance(whole.vibration, TransferFunction) and whole.vibration.sample == "end"
+        return whole.chain(self._any_time(sample_time), substeps).startable(at_end=at_end)
+
+    def compiled(
+        self, u0: float = 0.0, *, sample_time: float | None = None, substeps: int | None = None
+    ) -> CompiledLaw:
+        """The step of `startable` at rest at the command `u0`; ValueError also if the actuator cannot rest there."""
+        self.chain(self._any_time(sample_time), substeps).rest(u0)
+        return self.startable(sample_time, substeps=substeps).started(u0)
+
     def signals(
         self, u: npt.ArrayLike, sample_time: float | None = None, *, substeps: int | None = None
     ) -> dict[str, FloatArray]:
@@ -223,6 +249,10 @@ class Actuator:
         """From command to measurement with a law of the slope one, without limits; and its dead time [s]."""
         delays = [stage.delay for stage in (self.vibration, self.sensor) if stage is not None]
         return linear_chain(self.amplifier, self.creep, self.vibration, sample_time), sum(delays)
+
+    def _any_time(self, sample_time: float | None) -> float | None:
+        """The sample time; where it has no effect any will do."""
+        return sample_time if self.dynamic or sample_time is not None else 1.0
 
     @property
     def _moves(self) -> bool:

@@ -3,6 +3,7 @@
 Every loop and every response goes through here. A response is a loop whose controller passes its reference on.
 """
 
+import functools
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -15,7 +16,8 @@ from hysim._parallel import Progress
 from hysim.kernels import controllers
 from hysim.kernels import loop as kernels
 from hysim.laws.static import Line
-from hysim.models.protocols import CompiledController, CompiledLaw, law_at
+from hysim.models.compiled_step import startable
+from hysim.models.protocols import CompiledController, CompiledLaw, Startable, law_at
 from hysim.plants.amplifier import Amplifier
 from hysim.plants.creep import Creep
 from hysim.plants.sampled import (
@@ -30,6 +32,9 @@ from hysim.plants.sampled import (
     whole_and_part,
 )
 from hysim.plants.sensor import Sensor
+
+_chain_step = functools.lru_cache(maxsize=256)(kernels.chain_step)
+_chain_start = functools.lru_cache(maxsize=256)(kernels.chain_start)
 
 _CHUNK = 1_000_000
 _PER_TIME_CONSTANT = 4  # sub-steps
@@ -138,7 +143,7 @@ class Chain:
 
     def after_the_command(self, signals: Signals, state: ChainState) -> FloatArray:
         """The displacement just after each new command; `state` is the one before the run."""
-        if self.amplifier.dynamic or whole_and_part(self.delay / self.step)[1] or not self.linear.D:
+        if not self._jumps:
             return signals.y
         w = np.concatenate([state.past[1:], signals.w])
         return signals.y + self.linear.D * np.diff(w)[1 : 1 + signals.y.size]
@@ -198,6 +203,33 @@ class Chain:
     def driven(self, u: FloatArray, state: ChainState) -> tuple[Signals, ChainState]:
         """Run the commands `u` themselves."""
         return self.run(CompiledController(controllers.through, read_only([]), np.zeros(1)), state, u)
+
+    def startable(self, *, at_end: bool = False) -> Startable:
+        """The chain without noise as a step from the command to the reading just after it, or before the next one.
+
+        The delay of the sensor is no part of it: it may be one of the vibration.
+        """
+        law, stage, linear = startable(self.hysteresis), self.stage, self.linear
+        row = [linear.D, 0.0, 0.0, *linear.C] if self._jumps and not at_end else stage.output
+        order = stage.rest.size
+        parts: list[Any] = [
+            [law.state.size, at_end, self.sensor.quantum], self.amplifier.compiled(self.step).parameters,
+            [stage.decline.size, order, stage.lag, self.substeps],
+            row, stage.decline, stage.A.ravel(), stage.B.ravel(), stage.rest, law.parameters,
+        ]  # fmt: skip
+        state = [np.zeros(kernels.N_PLACE + 2), law.state, np.zeros(2 * order + stage.lag + 3)]
+        return Startable(
+            _chain_step(law.step),
+            read_only(np.concatenate(parts), finite=False),
+            np.concatenate(state),
+            _chain_start(law.step, law.start),
+        )
+
+    @property
+    def _jumps(self) -> bool:
+        """Whether the displacement jumps with the command."""
+        takes_time = self.amplifier.dynamic or whole_and_part(self.delay / self.step)[1]
+        return bool(not takes_time and self.linear.D)
 
     def _packed(self) -> FloatArray:
         """The stages apart from the law, as `hysim.kernels.loop` takes them."""

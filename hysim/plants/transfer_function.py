@@ -19,7 +19,7 @@ from hysim._frozen import FloatArray, checked, read_only
 from hysim.errors import SimulationError
 from hysim.models.composable import Composable
 from hysim.models.model import family
-from hysim.models.protocols import Identifiable, Variant
+from hysim.models.protocols import CompiledLaw, Identifiable, Startable, Variant, needed_time, positive_time
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.plants._linear_response import LinearPlants, LinearState, affine_columns
 from hysim.plants._transfer_function_notes import notes
@@ -131,8 +131,7 @@ class TransferFunction(Composable):
         The bits are those of one uncut input.
         """
         inputs = read_only(u, "u", ndim=1)
-        if not 0.0 < sample_time < np.inf:
-            raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
+        positive_time(sample_time)
         with np.errstate(all="ignore"):
             plant = self._plant(float(sample_time))
             begin = state
@@ -148,6 +147,27 @@ class TransferFunction(Composable):
             k = int(np.argmin(np.isfinite(y)))
             raise SimulationError(f"the output leaves the finite numbers at sample {k}; the poles are {self.poles}")
         return y, end
+
+    def startable(self, sample_time: float | None = None) -> Startable:
+        """The plant at a sample time [s] as a step with the bits of `response`, for exports.
+
+        As there, the input is zero before the first sample, whatever that is.
+        """
+        plant = self._plant(positive_time(needed_time(self, sample_time)))
+        return plant.startable(self.initial_state, hold=self.hold, sample=self.sample)
+
+    def compiled(self, u0: float = 0.0, *, sample_time: float | None = None) -> CompiledLaw:
+        """The plant as compiled loops take it, at rest at the input `u0`, beside the free response.
+
+        Raises ValueError without a sample time [s], or if a plant that integrates is to rest elsewhere than at zero.
+        """
+        law = self.startable(sample_time).law
+        if u0:
+            if self.order and not self.den[-1]:
+                raise ValueError(f"the plant integrates: it cannot rest at u = {u0:g}")
+            plant, level = self._plant(needed_time(self, sample_time)), u0 * self.den[0] / self.den[-1]
+            plant.rest_at(u0, level, law.state)
+        return law
 
     def filtered(self, signals: FloatArray, sample_time: float) -> FloatArray:
         """Outputs (n_signals, n_samples) from rest for several inputs at once; they may be infinite or nan."""

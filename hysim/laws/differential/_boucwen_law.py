@@ -18,12 +18,11 @@ from hysim._frozen import FloatArray, read_only
 from hysim.kernels import boucwen as kernels
 from hysim.kernels import stepping
 from hysim.kernels.charts import N_WORK
-from hysim.kernels.stepping import Start, Step
 from hysim.laws.differential import _boucwen_facts, boucwen_inverse, limit_cycle
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen_inverse import BoucWenInverse, InverseState
 from hysim.laws.differential.limit_cycle import LimitCycle
-from hysim.models.law import Law, Packed, State
+from hysim.models.law import Law, Packed, State, Stepping
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.tables import Tables
 from hysim.records import Record
@@ -63,19 +62,11 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
     """A law with the memory of Bouc and Wen, exact at the samples of an input that is linear between them."""
 
     @property
-    def step(self) -> Step:  # type: ignore[override]
-        """The kernel for the exponent: a loop compiles no other."""
-        return kernels.linear_step if self.n == 1.0 else kernels.quadratic_step if self.n == 2.0 else kernels.step
-
-    @property
-    def start(self) -> Start:  # type: ignore[override]
-        """The kernel that makes the charts of the exponent, where there are any."""
-        return stepping.start if self.n in (1.0, 2.0) else kernels.start
-
-    @property
-    def workspace(self) -> int:  # type: ignore[override]
-        """Places for the charts of the exponent."""
-        return 0 if self.n in (1.0, 2.0) else super().workspace
+    def stepping(self) -> Stepping:
+        """The kernel for the exponent: a loop compiles no other, and n = 1 and 2 need no charts."""
+        if self.n == 1.0:
+            return Stepping(kernels.linear_step, stepping.start, 0)
+        return Stepping(kernels.quadratic_step, stepping.start, 0) if self.n == 2.0 else super().stepping
 
     @property
     def structural(self) -> tuple[str, ...]:

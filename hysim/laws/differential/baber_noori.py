@@ -13,7 +13,7 @@ from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.laws.differential.polynomial_boucwen import PolynomialBoucWen
 from hysim.models.holding import Holding
-from hysim.models.law import Packed
+from hysim.models.law import Packed, Stepping
 from hysim.models.model import family
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.stages import Stage, Subset
@@ -236,6 +236,13 @@ class BoucWenBaberNoori(MemoryLaw):
         stiffness.
         """
         return _boucwen_conversions.to_opensees_pinching(self)
+
+    @property
+    def stepping(self) -> Stepping:
+        """Without the charts that only a law of a general exponent needs that neither degrades nor pinches."""
+        if self.n not in (1.0, 2.0) and not any(self.scalars[name] for name in _WEARING):
+            return super().stepping
+        return super().stepping._replace(workspace=min(self.workspace, kernels.N_LEAN - 3))
 
     @property
     def known_slopes(self) -> tuple[float, float]:

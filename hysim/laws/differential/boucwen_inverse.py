@@ -116,7 +116,9 @@ def at_rest(law: Any, y: float) -> InverseState:
             "the first output does not tell the first input, as the law has no slope beside its memory: give u0"
         )
     # a memory that stands still, with the kernel that the law's own inverse takes
-    step, n, room = (boucwen.step, law.n, N_WORK) if law.step is boucwen.step else (boucwen.linear_step, 1.0, 2)
+    step, n, room = (
+        (boucwen.step, law.n, N_WORK) if law.stepping.step is boucwen.step else (boucwen.linear_step, 1.0, 2)
+    )
     shape = [0.0, 0.0, 0.0, n, law.gain, law.offset]
     forward = CompiledLaw(step, read_only([*shape, *c]), np.append([0.0, law.z0], np.zeros(room - 2)))
     last_y = forward.step(forward.parameters, forward.state, 0.0)

@@ -9,7 +9,7 @@ from hysim.kernels import generalized as kernels
 from hysim.laws.differential import _boucwen_facts
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen import BoucWen
-from hysim.models.law import Packed
+from hysim.models.law import Packed, Stepping
 from hysim.models.model import family
 from hysim.models.search_space import Freedom
 from hysim.models.stages import Subset
@@ -92,6 +92,16 @@ class GeneralizedBoucWen(MemoryLaw):
                 bend = gamma + both * b2 + direction * b4 + side * b6
                 laws += [A, beta + both * b3 + direction * b5, bend, n, cls.joined(tables)]
         return Packed(np.concatenate(laws, axis=1), cls.initial_memory(tables))
+
+    @property
+    def stepping(self) -> Stepping:
+        """The kernel for the exponent: n = 1 and 2 need no charts."""
+        return Stepping(kernels.elementary_step, self.start, 0) if self.n in (1.0, 2.0) else super().stepping
+
+    @property
+    def structural(self) -> tuple[str, ...]:
+        """The exponent where it has a step of its own."""
+        return ("n",) if self.n in (1.0, 2.0) else ()
 
     @property
     def known_slopes(self) -> tuple[float, float]:

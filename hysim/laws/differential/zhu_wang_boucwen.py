@@ -15,7 +15,7 @@ from hysim.kernels import zhu_wang as kernels
 from hysim.laws.differential import _power_units
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen import BoucWen
-from hysim.models.law import Packed
+from hysim.models.law import Packed, Stepping
 from hysim.models.model import family
 from hysim.models.stages import Subset
 from hysim.models.tables import Tables
@@ -85,6 +85,16 @@ class ZhuWangBoucWen(MemoryLaw):
         delta = units.times(tables["delta"], 2.0 * units.input - units.memory)
         parameters = np.concatenate([units.shape(tables), delta, units.scales, cls.joined(tables)], axis=1)
         return Packed(parameters, cls.initial_memory(tables))
+
+    @property
+    def stepping(self) -> Stepping:
+        """For n = 1 without room for a series."""
+        return super().stepping._replace(workspace=0) if self.n == 1.0 else super().stepping
+
+    @property
+    def structural(self) -> tuple[str, ...]:
+        """The exponent where it has a step of its own."""
+        return ("n",) if self.n == 1.0 else ()
 
     def _memory_slope(self, direction: FloatArray, z: FloatArray, u: FloatArray, *_: FloatArray) -> FloatArray:
         bend = np.abs(z) ** self.n * (self.gamma + self.beta * np.sign(z * direction))

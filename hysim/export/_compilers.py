@@ -1,0 +1,124 @@
+"""Shared libraries and WebAssembly from C: the compiler of this machine, or zig's, which compiles for all."""
+
+import platform
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from types import MappingProxyType
+from typing import NamedTuple
+
+OPTIONS = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC", "-shared", "-s", "-Werror=implicit")
+_WEB = "wasm32-wasi"
+_WEB_OPTIONS = (
+    *("-mexec-model=reactor", "-Os", "-std=c99", "-ffp-contract=off", "-Werror=implicit"),
+    *("-Wl,--strip-all", "-Wl,--export=__heap_base"),
+)
+_PROCESSORS = MappingProxyType({"amd64": "x86_64", "arm64": "aarch64"})
+_FAT_MAGIC, _FAT_ALIGNMENT = 0xCAFEBABE, 14  # of a Mach-O file for several processors, 2^14 bytes
+
+
+class Target(NamedTuple):
+    """A system and a processor: its name in FMI 3.0, zig's name for it, and the ending of its shared libraries."""
+
+    name: str
+    zig: str
+    ending: str
+
+    @property
+    def is_host(self) -> bool:
+        """Whether this machine is one."""
+        return self.name == host()
+
+
+TARGETS = MappingProxyType(
+    {
+        "linux": (
+            Target("x86_64-linux", "x86_64-linux-gnu.2.17", ".so"),
+            Target("aarch64-linux", "aarch64-linux-gnu.2.17", ".so"),
+        ),
+        "windows": (Target("x86_64-windows", "x86_64-windows-gnu", ".dll"),),
+        "mac": (
+            Target("x86_64-darwin", "x86_64-macos", ".dylib"),
+            Target("aarch64-darwin", "aarch64-macos", ".dylib"),
+        ),
+    }
+)
+"""Targets of each platform."""
+
+
+def host() -> str:
+    """The name of this machine in FMI 3.0, such as ``x86_64-linux``."""
+    machine = platform.machine().lower()
+    return f"{_PROCESSORS.get(machine, machine)}-{platform.system().lower()}"
+
+
+def compiler(target: Target) -> tuple[str, ...] | None:
+    """The beginning of a command that compiles for a target; None where there is no compiler.
+
+    A compiler of this machine comes first, for this machine.
+    """
+    own = shutil.which("gcc") or shutil.which("clang") if target.is_host else None
+    if own is not None:
+        return (own,)
+    if find_spec("ziglang") is None:
+        return None
+    return sys.executable, "-m", "ziglang", "cc", "-target", target.zig
+
+
+def shared_library(source: str, name: str, target: Target, command: Sequence[str]) -> bytes:
+    """The shared library of a C source; `command` is what `compiler` returned.
+
+    Raises
+    ------
+    OSError
+        If it cannot be compiled; the message has the compiler's first error.
+    """
+    libraries = () if target.name.endswith("windows") else ("-lm",)
+    return _built(source, f"{name}{target.ending}", (*command, *OPTIONS), libraries, target.name)
+
+
+def web_module(source: str) -> bytes:
+    """The WebAssembly module of a C source, by ziglang.
+
+    Raises
+    ------
+    ImportError
+        If ziglang is not installed.
+    OSError
+        If it cannot be compiled; the message has the compiler's first error.
+    """
+    if find_spec("ziglang") is None:
+        raise ImportError("a page for a step that is not hysim's own needs ziglang: pip install 'hysim[export]'")
+    command = (sys.executable, "-m", "ziglang", "cc", "-target", _WEB, *_WEB_OPTIONS)
+    return _built(source, "step.wasm", command, ("-lm",), _WEB)
+
+
+def _built(source: str, result: str, command: Sequence[str], libraries: Sequence[str], target: str) -> bytes:
+    """The file that a compiler makes of a C source."""
+    with tempfile.TemporaryDirectory() as folder:
+        name = f"{Path(result).stem}.c"
+        Path(folder, name).write_text(source, encoding="utf-8")
+        done = subprocess.run(
+            [*command, name, "-o", result, *libraries], cwd=folder, capture_output=True, text=True, check=False
+        )
+        if done.returncode:
+            lines = [line for line in done.stderr.splitlines() if "error" in line] or done.stderr.splitlines() or [""]
+            raise OSError(f"{' '.join(command[:4])} could not compile the source for {target}: {lines[0]}")
+        return Path(folder, result).read_bytes()
+
+
+def universal(libraries: Sequence[bytes]) -> bytes:
+    """One Mach-O file for several processors, of 64-bit Mach-O files for one each."""
+    step = 1 << _FAT_ALIGNMENT
+    parts, places = b"", []
+    for library in libraries:
+        offset = step + len(parts)
+        places.append((*struct.unpack("<II", library[4:12]), offset, len(library), _FAT_ALIGNMENT))
+        parts += library + bytes(-len(library) % step)
+    header = struct.pack(">II", _FAT_MAGIC, len(places)) + b"".join(struct.pack(">IIIII", *place) for place in places)
+    return header.ljust(step, b"\0") + parts

@@ -1,0 +1,205 @@
+"""The verb `to_fmu`: a model as a functional mock-up unit for co-simulation.
+
+A unit is a zip file of a description in XML, C sources and shared libraries. Nothing in it depends on the time or the
+place at which it is written.
+"""
+
+import io
+import math
+import re
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+from hysim._atomic import write_all
+from hysim._frozen import check_choice
+from hysim.export._compilers import TARGETS, Target, compiler, host, shared_library, universal
+from hysim.export._fmu_source import source_of, token_of
+from hysim.export._fmu_variables import build_description, description, variables_of
+from hysim.export._program import Program, program_of
+
+Version = Literal["2.0", "3.0"]
+Platform = Literal["linux", "windows", "mac"]
+
+VERSIONS = ("2.0", "3.0")
+_FOLDERS_2 = {"linux": "linux64", "windows": "win64", "darwin": "darwin64"}
+_WRITTEN = (1980, 1, 1, 0, 0, 0)  # the first time that a zip file knows
+_MODE = 0o100644 << 16
+
+
+class Options(NamedTuple):
+    """What a unit is to be: its name, version of FMI, platforms and units, and the input at which it starts."""
+
+    name: str
+    version: str
+    platforms: tuple[str, ...] | None
+    units: Mapping[str, str]
+    u0: float
+
+
+def to_fmu(
+    thing: Any,
+    path: str | Path,
+    version: Version = "2.0",
+    sample_time: float | None = None,
+    *,
+    name: str | None = None,
+    units: Mapping[str, str] | None = None,
+    platforms: Sequence[Platform] | None = None,
+    u0: float = 0.0,
+    y0: float = 0.0,
+) -> Path:
+    """Write a model as a functional mock-up unit (FMU) for co-simulation, with its C sources.
+
+    Parameters
+    ----------
+    thing : law, inverse of a law, sum, cascade, plant or controller
+        The model.
+    path : str or Path
+        The file, which ends in ``.fmu``.
+    version : "2.0" or "3.0"
+        Version of FMI; most tools read 2.0, and some 3.0 too.
+    sample_time : float, optional
+        Time between two samples of a plant or a controller [s]; a law that does not depend on time has none.
+    name : str, optional
+        Name of the model, a name in C; by default that of its class.
+    units : mapping, optional
+        Labels of the units of ``"u"`` and ``"y"``, which the variables then have.
+    platforms : sequence of "linux", "windows" and "mac", optional
+        Systems that find a shared library in the file. By default that of this machine if it has a C compiler (gcc,
+        clang, or zig of the extra `export`); an empty sequence writes the sources alone. Zig compiles for all three.
+    u0, y0 : float
+        Input and output at rest, at which it starts [unit of u], [unit of y].
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    TypeError
+        If the thing is no model that can be exported.
+    ValueError
+        If the version, the name, a platform or the ending of the file is unknown, or the sample time is missing.
+    ImportError
+        If a shared library is asked for and no compiler can make it.
+    OSError
+        If the file cannot be written, or the compiler fails.
+
+    Notes
+    -----
+    A unit has an input, an output, its model's parameters as tunable parameters, and where the model remembers its
+    input a fixed parameter ``u0``, the input at which it rests before the simulation. Its state can be saved, restored
+    and turned into bytes.
+
+    The master sets the input at a communication point and reads the output at the next one: the output is one
+    communication step late. At the start it is the output for the input at the start. A sampled model is computed at
+    multiples of its sample time, whatever the communication step.
+
+    Equal arguments give equal bytes. Standard: https://fmi-standard.org, versions 2.0.5 and 3.0.2.
+
+    Examples
+    --------
+    >>> import tempfile, zipfile, hysim as hs
+    >>> law = hs.Dahl(stiffness=2.0, coulomb=0.5)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = hs.to_fmu(law, f"{folder}/friction.fmu", units={"u": "mm", "y": "N"}, platforms=())
+    ...     zipfile.ZipFile(path).namelist()
+    ['modelDescription.xml', 'sources/Dahl.c']
+    """
+    target = _checked(Path(path), version, platforms)
+    labels = dict(units or {})
+    if not all(isinstance(text, str) for pair in labels.items() for text in pair):
+        raise TypeError(f"units must be labels by the names u, y and t, got {units!r}")
+    chosen = _checked_name(type(thing).__name__ if name is None else name)
+    if not math.isfinite(u0):
+        raise ValueError(f"u0 must be finite, got {u0}")
+    program = program_of(thing, sample_time, u0=u0, y0=y0, tunable=True)
+    systems = None if platforms is None else tuple(platforms)
+    write_all({target: archive(program, Options(chosen, version, systems, labels, u0))})
+    return target
+
+
+def _checked(path: Path, version: str, platforms: Sequence[str] | None) -> Path:
+    check_choice("version", version, VERSIONS)
+    if path.suffix.lower() != ".fmu":
+        raise ValueError(f"a functional mock-up unit is a file .fmu, got {str(path)!r}")
+    if isinstance(platforms, str):
+        raise TypeError(f"platforms must be a sequence such as ({platforms!r},), got {platforms!r}")
+    for each in platforms or ():
+        check_choice("platforms", each, TARGETS)
+    return path
+
+
+def _checked_name(name: str) -> str:
+    if not re.fullmatch("[A-Za-z_][A-Za-z0-9_]*", name):
+        raise ValueError(f"name must be letters, digits and underscores after a letter, got {name!r}")
+    return name
+
+
+def archive(program: Program, options: Options) -> bytes:
+    """The bytes of a unit."""
+    version, name = options.version, options.name
+    variables = variables_of(program, options.units, options.u0)
+    blank = description(program, variables, name, version, ""), source_of(program, variables, version, "")
+    token = token_of(*blank)
+    source = source_of(program, variables, version, token)
+    files: dict[str, bytes] = {
+        "modelDescription.xml": description(program, variables, name, version, token).encode(),
+        f"sources/{name}.c": source.encode(),
+    }
+    if version == "3.0":
+        files["sources/buildDescription.xml"] = build_description(name).encode()
+    return _zipped(files | libraries(source, options))
+
+
+def libraries(source: str, options: Options) -> dict[str, bytes]:
+    """Shared libraries by their places in the unit.
+
+    Raises
+    ------
+    ImportError
+        If a platform is asked for by name and no compiler can compile for it.
+    """
+    compiled = {
+        target: shared_library(source, options.name, target, command)
+        for target, command in _commands(options.platforms, options.version).items()
+    }
+    if options.version == "3.0":
+        return {f"binaries/{each.name}/{options.name}{each.ending}": data for each, data in compiled.items()}
+    places: dict[str, list[bytes]] = {}
+    for each, data in compiled.items():
+        folder = _FOLDERS_2[each.name.partition("-")[2]]
+        places.setdefault(f"binaries/{folder}/{options.name}{each.ending}", []).append(data)
+    return {place: data[0] if len(data) == 1 else universal(data) for place, data in places.items()}
+
+
+def _commands(platforms: tuple[str, ...] | None, version: str) -> dict[Target, Sequence[str]]:
+    """Targets, each with its compiler; FMI 2.0 has one place for Linux, which is that of x86-64."""
+    if platforms is None:
+        own = [(each, compiler(each)) for targets in TARGETS.values() for each in targets if each.name == host()]
+        return {each: command for each, command in own if command is not None}
+    commands: dict[Target, Sequence[str]] = {}
+    for name in dict.fromkeys(platforms):
+        targets = TARGETS[name][:1] if version == "2.0" and name == "linux" else TARGETS[name]
+        found = {each: command for each in targets if (command := compiler(each)) is not None}
+        if not found:
+            raise ImportError(
+                f"a shared library for {name} needs a compiler: pip install 'hysim[export]', or leave {name!r} out of "
+                "the platforms"
+            )
+        commands |= found
+    return commands
+
+
+def _zipped(files: Mapping[str, bytes]) -> bytes:
+    """A zip file whose bytes depend on its contents alone."""
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as unit:
+        for name, content in sorted(files.items()):
+            entry = zipfile.ZipInfo(name, _WRITTEN)
+            entry.create_system, entry.external_attr, entry.compress_type = 3, _MODE, zipfile.ZIP_DEFLATED
+            unit.writestr(entry, content)
+    return stream.getvalue()

@@ -1,0 +1,202 @@
+"""Variables of a functional mock-up unit, and the description in XML, of FMI 2.0 and 3.0."""
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+from xml.etree import ElementTree
+
+from hysim._release import __version__
+from hysim.export._program import Program
+from hysim.export._units import BASE_UNITS, base_unit, label
+
+DELAY = (
+    "Each communication step passes the input at its beginning to the model and ends with the output for it: "
+    "the output is one communication step late."
+)
+SAMPLED = (
+    "The model is computed at multiples of its sample time with the input of that moment, and its output holds "
+    "between them: it is late by one communication step."
+)
+_TUNED = "It may be changed during the simulation; the memory stays."
+
+
+class Variable(NamedTuple):
+    """A real variable: its name and value reference, its role in FMI, and its unit, start value and limits."""
+
+    name: str
+    reference: int
+    causality: str
+    variability: str
+    initial: str = ""
+    unit: str = ""
+    start: float | None = None
+    lower: float = -math.inf
+    upper: float = math.inf
+    description: str = ""
+
+    def attributes(self) -> dict[str, str]:
+        """Those that stand in the XML of both versions beside each other."""
+        named = {
+            "name": self.name,
+            "valueReference": str(self.reference),
+            "causality": self.causality,
+            "variability": self.variability,
+            "initial": self.initial,
+            "description": self.description,
+        }
+        return {name: value for name, value in named.items() if value}
+
+    def numbers(self) -> dict[str, str]:
+        """Unit, start value and limits."""
+        limits = {"min": self.lower, "max": self.upper}
+        finite = {name: repr(value) for name, value in limits.items() if math.isfinite(value)}
+        start = {} if self.start is None else {"start": repr(self.start)}
+        return ({"unit": self.unit} if self.unit else {}) | finite | start
+
+
+def is_tunable(program: Program) -> bool:
+    """Whether the program's numbers can be changed in the course of a simulation: its memory is known apart."""
+    return bool(program.fields) and program.memory > 0
+
+
+def start_name(program: Program) -> str:
+    """Name of the input at the start."""
+    return f"{program.inputs[0]}0"
+
+
+def variables_of(program: Program, units: Mapping[str, str], u0: float) -> list[Variable]:
+    """The variables of a program in the order of their value references.
+
+    Raises
+    ------
+    ValueError
+        If two of them have one name.
+    """
+    output = 1 + len(program.inputs)
+    first = label(program.inputs[0], units)
+    variables = [
+        *(
+            Variable(name, k, "input", "continuous", unit=label(name, units), start=u0 if k == 1 else 0.0)
+            for k, name in enumerate(program.inputs, 1)
+        ),
+        Variable(program.output, output, "output", "continuous", "calculated", label(program.output, units)),
+    ]
+    if program.start:
+        text = "Input at which the model rests before the simulation."
+        parameter = ("parameter", "fixed", "exact", first, u0)
+        variables.append(Variable(start_name(program), output + 1, *parameter, description=text))
+    if math.isfinite(program.sample_time):
+        time, text = program.sample_time, "Time between two samples of the model."
+        variables.append(Variable("sample_time", output + 2, "local", "constant", "exact", "s", time, description=text))
+    tunable = is_tunable(program)
+    variables += [
+        Variable(
+            each.name,
+            output + 3 + k,
+            "parameter",
+            "tunable" if tunable else "fixed",
+            "exact",
+            label(each.unit, units),
+            each.value,
+            min(each.lower, each.value),
+            max(each.upper, each.value),
+            _TUNED if tunable else "",
+        )
+        for k, each in enumerate(program.fields)
+    ]
+    names = [each.name for each in variables]
+    if double := next((name for name in [*names, "time"] if [*names, "time"].count(name) > 1), None):
+        raise ValueError(f"two variables of the unit would be called {double!r}: rename the parameter of the law")
+    return variables
+
+
+def description(program: Program, variables: list[Variable], name: str, version: str, token: str) -> str:
+    """The text of ``modelDescription.xml``."""
+    sampled = math.isfinite(program.sample_time)
+    root = ElementTree.Element(
+        "fmiModelDescription",
+        {
+            "fmiVersion": version,
+            "modelName": name,
+            "guid" if version == "2.0" else "instantiationToken": token,
+            "description": SAMPLED if sampled else DELAY,
+            "generationTool": f"hysim {__version__}",
+            "variableNamingConvention": "flat",
+        },
+    )
+    if version == "2.0":
+        _interface(
+            root, "canGetAndSetFMUstate", "canSerializeFMUstate", name, canNotUseMemoryManagementFunctions="true"
+        )
+        files = ElementTree.SubElement(root[0], "SourceFiles")
+        ElementTree.SubElement(files, "File", {"name": f"{name}.c"})
+    else:
+        internal = {"fixedInternalStepSize": repr(program.sample_time)} if sampled else {}
+        _interface(root, "canGetAndSetFMUState", "canSerializeFMUState", name, **internal)
+    _units(root, variables)
+    categories = ElementTree.SubElement(root, "LogCategories")
+    ElementTree.SubElement(categories, "Category", {"name": "logStatusError", "description": "Reasons of errors."})
+    if sampled:
+        ElementTree.SubElement(root, "DefaultExperiment", {"startTime": "0.0", "stepSize": repr(program.sample_time)})
+    _variables(root, variables, version)
+    _structure(root, variables, version)
+    return _text(root)
+
+
+def build_description(name: str) -> str:
+    """The text of ``buildDescription.xml``, which FMI 3.0 asks for beside sources."""
+    root = ElementTree.Element("fmiBuildDescription", {"fmiVersion": "3.0"})
+    build = ElementTree.SubElement(root, "BuildConfiguration", {"modelIdentifier": name})
+    sources = ElementTree.SubElement(build, "SourceFileSet", {"language": "C99"})
+    ElementTree.SubElement(sources, "SourceFile", {"name": f"{name}.c"})
+    return _text(root)
+
+
+def _interface(root: ElementTree.Element, saves: str, serializes: str, name: str, **others: str) -> None:
+    common = {"modelIdentifier": name, "canHandleVariableCommunicationStepSize": "true"}
+    ElementTree.SubElement(root, "CoSimulation", {**common, saves: "true", serializes: "true", **others})
+
+
+def _units(root: ElementTree.Element, variables: Iterable[Variable]) -> None:
+    labels = list(dict.fromkeys(each.unit for each in variables if each.unit))
+    if not labels:
+        return
+    definitions = ElementTree.SubElement(root, "UnitDefinitions")
+    for each in labels:
+        unit = ElementTree.SubElement(definitions, "Unit", {"name": each})
+        if (base := base_unit(each)) is not None:
+            exponents = {name: str(n) for name, n in zip(BASE_UNITS, base.exponents, strict=True) if n}
+            factor = {"factor": repr(10.0**base.power)} if base.power else {}
+            ElementTree.SubElement(unit, "BaseUnit", exponents | factor)
+
+
+def _variables(root: ElementTree.Element, variables: Iterable[Variable], version: str) -> None:
+    place = ElementTree.SubElement(root, "ModelVariables")
+    if version == "2.0":
+        for each in variables:
+            scalar = ElementTree.SubElement(place, "ScalarVariable", each.attributes())
+            ElementTree.SubElement(scalar, "Real", each.numbers())
+        return
+    time = {"name": "time", "valueReference": "0", "causality": "independent", "variability": "continuous"}
+    ElementTree.SubElement(place, "Float64", time)
+    for each in variables:
+        ElementTree.SubElement(place, "Float64", each.attributes() | each.numbers())
+
+
+def _structure(root: ElementTree.Element, variables: list[Variable], version: str) -> None:
+    """The output, which follows from earlier inputs only, and at the start from the input at once."""
+    structure = ElementTree.SubElement(root, "ModelStructure")
+    index, output = next((k, each) for k, each in enumerate(variables, 1) if each.causality == "output")
+    if version == "2.0":
+        for name, others in (("Outputs", {"dependencies": ""}), ("InitialUnknowns", {})):
+            unknowns = ElementTree.SubElement(structure, name)
+            ElementTree.SubElement(unknowns, "Unknown", {"index": str(index), **others})
+        return
+    reference = {"valueReference": str(output.reference)}
+    ElementTree.SubElement(structure, "Output", {**reference, "dependencies": ""})
+    ElementTree.SubElement(structure, "InitialUnknown", reference)
+
+
+def _text(root: ElementTree.Element) -> str:
+    ElementTree.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
