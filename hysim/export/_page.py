@@ -100,12 +100,7 @@ def to_page(
     '<!DOCTYPE html>'
     """
     name = heading(thing) if title is None else title
-    return write_page({name: Shown(thing, between, units or {})}, path, record)
-
-
-def write_page(models: Mapping[str, Shown], path: str | Path, record: Record | None = None, *, title: str = "") -> Path:
-    """Write a page with a choice of models by name, under a title or the first model's name; errors as of `to_page`."""
-    text = page_text(models, record, title=title)
+    text = page_text({name: Shown(thing, between, units or {})}, record)
     size = len(text.encode())
     if size > LARGEST:
         samples = "" if record is None else f": give a record of fewer than {len(record)} samples, such as record[::2]"

@@ -17,9 +17,9 @@ from hysim.models.tables import arguments_of
 from hysim.records import Record
 
 _MOST = 3  # elements of a tuple that have a slider each; longer ones have one for all
-_FIRST, _LAST = 1e-6, 1e3  # changes of a number that are tried, in sizes of itself
-_SMALL, _LARGE = 0.25, 1.0  # changes of the output, in its spans
-_FEW = 300  # samples of the input on which changes are computed
+_FIRST, _LAST = 1e-5, 1e3  # changes of a number that are tried, in sizes of itself
+_TINY, _SMALL, _LARGE = 0.02, 0.25, 1.0  # changes of the output, in its spans
+_FEW = 100  # samples of the input on which changes are computed
 _DECADE = 10.0
 _FACTOR = 4.0  # of a slider that scales a tuple
 
@@ -122,7 +122,7 @@ class _Reach:
             if change > _SMALL:
                 most = min(most, 4.0 * step)
             changes.append((change, step))
-            reached, step = step, 2.0 * step
+            reached, step = step, (4.0 if change < _TINY else 2.0) * step
         if most == math.inf and step > _LAST * size:  # never much: half of what there is
             greatest = max(change for change, _ in changes)
             reached = next(step for change, step in changes if change >= 0.5 * greatest) or size

@@ -1,13 +1,15 @@
 """Models with which `hysim explore` begins: one for every family of laws, and some devices."""
 
 import math
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
 import hysim as hs
+from hysim._atomic import write_text
 from hysim._frozen import FloatArray
-from hysim.export._page import Shown, write_page
+from hysim.export._page import Shown, page_text
 
 _DAMPER = {"u": "mm", "y": "kN"}
 _UNIT, _WIDE = (-1.0, 1.0), (-2.0, 2.0)
@@ -40,7 +42,13 @@ def explorer(path: str | Path) -> Path:
     ...     "Loop explorer" in explorer(pathlib.Path(folder, "explorer.html")).read_text()
     True
     """
-    return write_page(presets(), path, title="Loop explorer")
+    write_text(path, _text())
+    return Path(path)
+
+
+@lru_cache(maxsize=1)
+def _text() -> str:
+    return page_text(presets(), title="Loop explorer")
 
 
 def _differential() -> dict[str, Shown]:
