@@ -103,7 +103,7 @@ def test_show_versions_prints_every_dependency(capsys):
     project = tomllib.loads((Path(__file__).parent.parent / "pyproject.toml").read_text())["project"]
     extras = (
         name
-        for extra in ("dask", "tables", "io", "vision", "notebook")
+        for extra in ("dask", "tables", "io", "vision")
         for name in project["optional-dependencies"][extra]
     )
     for requirement in (*project["dependencies"], *extras):

@@ -12,6 +12,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
+from hysim._versions import optional
+
 OPTIONS = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC", "-shared", "-s", "-Werror=implicit")
 _WEB = "wasm32-wasi"
 _WEB_OPTIONS = (
@@ -92,8 +94,7 @@ def web_module(source: str) -> bytes:
     OSError
         If it cannot be compiled; the message has the compiler's first error.
     """
-    if find_spec("ziglang") is None:
-        raise ImportError("a page for a step that is not hysim's own needs ziglang: pip install 'hysim[export]'")
+    optional("ziglang", "a page for a step that is not hysim's own", "export")
     command = (sys.executable, "-m", "ziglang", "cc", "-target", _WEB, *_WEB_OPTIONS)
     return _built(source, "step.wasm", command, ("-lm",), _WEB)
 

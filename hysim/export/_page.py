@@ -140,7 +140,7 @@ def _model(name: str, shown: Shown, parts: Parts, record: Record | None) -> dict
     u = middle + amplitude * np.interp(quarters, np.arange(6), [0.0, 1.0, -1.0, 1.0, -0.5, 0.5])
     node = node_of(thing, u, parts)
     if shown.stack:
-        parts.controls[:] = _stack(parts.controls, thing)
+        parts.controls[:], node["stack"] = _stack(parts.controls, thing), True
     summary, equation = about(thing)
     return {
         "name": name,

@@ -43,7 +43,7 @@ function axes({ pen, width, height }, xs, ys, { xlabel, ylabel, colour, countX, 
   const down = ticksOf(...ys, countY ?? Math.max(2, Math.floor(height / 60)));
   const widest = Math.max(...down.ticks.map((tick) => pen.measureText(tickText(tick, down.digits)).width), 20);
   const box = { left: Math.max(Math.ceil(widest) + 28, least ?? 56), right: width - 18, top: 10, bottom: height - (xlabel ? 40 : 22) };
-  const across = ticksOf(...xs, countX ?? Math.max(2, Math.floor((box.right - box.left) / 80)));
+  const across = ticksOf(...xs, countX ?? Math.max(4, Math.floor((box.right - box.left) / 80)));
   const x = (value) => box.left + ((value - xs[0]) / (xs[1] - xs[0])) * (box.right - box.left);
   const y = (value) => box.bottom - ((value - ys[0]) / (ys[1] - ys[0])) * (box.bottom - box.top);
   pen.lineWidth = 1;

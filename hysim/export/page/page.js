@@ -165,8 +165,8 @@ class Page {
     const stack = Object.fromEntries(this.model.controls.map(({ stack: role, places }, k) => [role, { value: controls[k], places }]));
     if (stack.plays) {
       const plays = stack.plays.value;
-      stack.reach.places.forEach((place, k) => (values[place] = (stack.reach.value * (k + 1)) / plays));
-      stack.weight.places.forEach((place, k) => (values[place] = k < plays ? stack.weight.value / plays : 0));
+      stack.reach.places.forEach((place, k) => (values[place] = Number(((stack.reach.value * (k + 1)) / plays).toPrecision(6))));
+      stack.weight.places.forEach((place, k) => (values[place] = k < plays ? Number((stack.weight.value / plays).toPrecision(6)) : 0));
     }
     return values;
   }
@@ -260,19 +260,21 @@ function rows(body, pairs) {
   body.replaceChildren(...pairs.map(([name, value]) => element("tr", {}, element("th", { scope: "row" }, name), element("td", {}, value))));
 }
 
+const percent = (share) => (Number.isFinite(share) ? `${shortened(100 * share, 3)} %` : "–");
+
 function loopRows(loop, { u, y }) {
   const both = [y, u].filter(Boolean).join(" ");
   return [
     ["largest width", `${shortened(loop.max_width)} ${y}`],
     ["at the input", `${shortened(loop.max_width_at)} ${u}`],
-    ["relative width", `${shortened(100 * loop.relative_width, 3)} %`],
+    ["relative width", percent(loop.relative_width)],
     ["mean width", `${shortened(loop.mean_width)} ${y}`],
     ["area", `${shortened(loop.area)} ${both}`],
     ["stroke", `${shortened(loop.stroke)} ${y}`],
     ["orientation", loop.orientation],
     ["closure gap", `${shortened(Math.abs(loop.closure_gap) < 1e-12 * loop.stroke ? 0 : loop.closure_gap, 2)} ${y}`],
     ["secant stiffness", shortened(loop.secant_stiffness)],
-    ["equivalent damping", `${shortened(100 * Math.abs(loop.equivalent_damping), 3)} %`],
+    ["equivalent damping", percent(Math.abs(loop.equivalent_damping))],
   ];
 }
 
