@@ -418,10 +418,12 @@ class Expressions:
             return f"[{whole.lengths[0]()} - 1]"
         total = self.index(parts[0])
         for part, length in zip(parts[1:], whole.lengths[1:], strict=True):
+            if total.text == "0":
+                total = self.index(part)
+                continue
             times = Value(length(), Scalar.INT, SUM).within(PRODUCT + 1)
-            zero = total.text == "0"
-            text = self.index(part).within(SUM + 1) if not zero else self.index(part).text
-            total = Value(text if zero else f"{total.within(PRODUCT)} * {times} + {text}", Scalar.INT, SUM)
+            text = f"{total.within(PRODUCT)} * {times} + {self.index(part).within(SUM + 1)}"
+            total = Value(text, Scalar.INT, SUM)
         return f"[{total.text}]"
 
     # ------------------------------------------------------------------------------ calls
