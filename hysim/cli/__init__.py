@@ -24,6 +24,7 @@ from hysim.cli import (
     metrics,
     models,
     outputs,
+    page,
     plot,
     reproduce,
     signals,
@@ -34,7 +35,8 @@ from hysim.cli.options import Command
 from hysim.errors import SimulationError
 
 _MODULES = (metrics, identify, discover, compare, simulate, control, c, fmu, plot, sweep, measure, reproduce)
-COMMANDS = {module.COMMAND.name: module.COMMAND for module in _MODULES}
+_COMMANDS = (*(module.COMMAND for module in _MODULES), page.COMMAND, page.EXPLORE)
+COMMANDS = {command.name: command for command in _COMMANDS}
 """Every command by its name."""
 
 DONE, BAD_INPUT = 0, 2
