@@ -185,7 +185,7 @@ class Terminal(io.StringIO):
 
 
 def test_a_reproduction_is_told_as_json_and_its_steps_on_a_terminal(run, tmp_path, monkeypatch):
-    def reproduce(out, *, quick, progress):
+    def reproduce(out, *, quick, page, progress):
         if progress is not None:
             progress(0, 9, "line")
         fits = {"model": SimpleNamespace(success=True)}

@@ -24,6 +24,7 @@ from hysim.export._page_model import steps_of
 from hysim.export._page_modules import FOLDER, c_source, compiled, module_of
 from hysim.export._page_presets import presets
 from hysim.models.model import every_family
+from hysim.paper.reproduction import browser_page
 
 WASM = Path(hs.__file__).parent / "export" / FOLDER
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -134,6 +135,18 @@ def test_the_command_writes_the_same_page(tmp_path, monkeypatch, capsys):
     assert main(["explore", "--no-browser", "--out", "explorer.html"]) == 0
     assert capsys.readouterr().out == "explorer.html\n"
     assert main(["page", "law.json", "--out", "no/page.html"]) == 2
+
+
+def test_the_report_has_a_page_of_the_identified_law_on_request(reproduction):
+    findings = reproduction.findings
+    assert "table1.html" not in reproduction.files
+    (name, text), *others = browser_page(findings).items()
+    assert (name, others) == ("table1.html", [])
+    data = data_of(text)
+    law = findings.study.fits["bouc-wen"].model
+    assert data["models"][0]["values"] == list(law.scalars.values())
+    assert data["models"][0]["labels"]["u"] == "Voltage [V]"
+    assert len(text.encode()) < LARGEST
 
 
 # ---------------------------------------------------------------------------------- modules
