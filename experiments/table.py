@@ -42,8 +42,6 @@ python -m pytest tests/test_experiments.py -k smoke   # smoke mode: every experi
 
 From Python, `main(smoke=True)` of an experiment is its smoke mode. Times are those of one machine and one run; where
 two are compared, they were measured in turns.
-
-`marimo run experiments/loop_explorer.py` (extra `notebook`) is no question: sliders for a law, its loops drawn live.
 """
 
 

@@ -41,6 +41,7 @@ from hysim.control import to_control as to_control
 from hysim.export import to_c as to_c
 from hysim.export import CSource as CSource
 from hysim.export import to_fmu as to_fmu
+from hysim.export import to_page as to_page
 from hysim.comparison import compare as compare
 from hysim.comparison import Comparison as Comparison
 from hysim.sweeps import sweep as sweep

@@ -1,4 +1,7 @@
-"""Units with SI prefixes: micrometres are 1e-6 metres."""
+"""Units with SI prefixes: micrometres are 1e-6 metres; and the words that a unit stands for on an axis."""
+
+import re
+from collections.abc import Mapping
 
 _POWERS = {
     "": 0, "y": -24, "z": -21, "a": -18, "f": -15, "p": -12, "n": -9, "u": -6, "\u00b5": -6, "\u03bc": -6, "m": -3,
@@ -23,3 +26,33 @@ def prefixed(unit: str) -> tuple[int, str]:
         if unit.startswith(prefix) and unit[len(prefix) :] in _BASES:
             return power, unit[len(prefix) :]
     raise ValueError(f"{unit!r} is not a known unit with an SI prefix: scale the values, or pass other units")
+
+
+# ---------------------------------------------------------------------------------- axes
+
+_QUANTITIES = {
+    **dict.fromkeys(("V", "mV", "kV"), "Voltage"),
+    **dict.fromkeys(("nm", "um", "µm", "mm", "m"), "Displacement"),
+    **dict.fromkeys(("mN", "N", "kN"), "Force"),
+    **dict.fromkeys(("us", "µs", "ms", "s"), "Time"),
+}
+_NAMES = {"t": "Time", "u": "Input", "y": "Output", "z": "Memory z"}
+
+
+def label(units: Mapping[str, str], signal: str) -> str:
+    """`Voltage [V]` for ``{"u": "V"}`` and ``"u"``; `Input` if the unit is unknown."""
+    if signal not in units:
+        return _NAMES[signal]
+    unit = units[signal]
+    quantity = _NAMES[signal] if signal == "z" else _QUANTITIES.get(unit, _NAMES[signal])
+    return f"{quantity} [{printed(unit)}]"
+
+
+def in_unit(name: str, unit: str) -> str:
+    """`Loop width [µm]` for a name and a unit; the name alone without a unit."""
+    return f"{name} [{printed(unit)}]" if unit else name
+
+
+def printed(unit: str) -> str:
+    """A unit with its micro sign: `µm` for ``"um"``."""
+    return re.sub(r"\bu(?=(m|s|V|A|N)\b)", "µ", unit)

@@ -8,7 +8,7 @@ from typing import Any
 from hysim._release import __version__
 
 DEPENDENCIES = ("numpy", "scipy", "numba", "matplotlib", "pysindy", "control", "threadpoolctl")
-EXTRAS = ("h5py", "scikit-image", "imageio", "marimo", "pandas", "xarray", "dask", "distributed", "ziglang")
+EXTRAS = ("h5py", "scikit-image", "imageio", "pandas", "xarray", "dask", "distributed", "ziglang")
 
 
 def show_versions() -> None:

@@ -1,14 +1,18 @@
-"""A controller in C does what it does in Python: compiled with gcc, on a long replay of recorded measurements."""
+"""Laws, plants and controllers in C do what they do in Python; controllers on a long replay of measurements."""
 
 import math
 import os
 import shutil
 import subprocess
+import sys
 
 import numpy as np
 import pytest
 
 import hysim as hs
+from hysim._frozen import read_only
+from hysim.cli import main
+from hysim.kernels.controllers import replay
 
 H = 5e-5  # s
 COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
@@ -19,6 +23,9 @@ LAW = hs.BoucWen(beta=0.02, gamma=0.01, feedthrough=0.03, gain=-0.01)
 POLYNOMIAL = hs.PolynomialBoucWen(
     beta=0.004, gamma=0.058, n=1.0, gain=-0.0076, offset=-0.11, z0=-8.8, input_coefficients=(0.028, -3.8e-5)
 )
+GENERAL = hs.BoucWen(beta=0.02, gamma=0.01, n=1.6, feedthrough=0.03, gain=-0.01)
+PLAYS = hs.PrandtlIshlinskii(thresholds=(0.0, 2.0, 9.0), weights=(0.02, 0.006, 0.004))
+SEARCHED = hs.Dahl(stiffness=0.02, coulomb=0.1) + hs.Line(slope=0.02)
 STACK = hs.Actuator(hysteresis=LAW, creep=CREEP, vibration=hs.mode(**MODE), sensor=hs.Sensor(noise=1e-3, delay=H))
 AMPLIFIED = hs.Actuator(
     amplifier=hs.Amplifier(gain=15.0, offset=1.0, limits=(0.0, 90.0)),
@@ -69,6 +76,18 @@ CONTROLLERS = {  # functions: a controller compiles its law, which no collection
             limits=(0.0, 6.0),
         ),
     ),
+    "general_exponent": lambda: (
+        hs.Actuator(hysteresis=GENERAL),
+        hs.TrackingController(feedforward=hs.InverseFeedforward(law=GENERAL), limits=(0.0, 90.0)),
+    ),
+    "plays": lambda: (
+        hs.Actuator(hysteresis=PLAYS),
+        hs.TrackingController(feedforward=hs.InverseFeedforward(law=PLAYS), limits=(-20.0, 90.0)),
+    ),
+    "searched": lambda: (
+        hs.Actuator(hysteresis=SEARCHED),
+        hs.TrackingController(feedforward=hs.InverseFeedforward(law=SEARCHED), limits=(0.0, 90.0)),
+    ),
     "line": lambda: (
         LINEAR,
         hs.TrackingController(feedforward=hs.InverseFeedforward.of(LINEAR), feedback=hs.PID(ki=500.0)),
@@ -84,22 +103,14 @@ int main(void)
     static {name}_state state;
     double record[2], command[2];
 
-    {name}_start(&state);
+    {name}_init(&state);
     while (fread(record, sizeof record, 1, stdin) == 1) {{
-        command[1] = {name}_step(&state, ({name}_real)record[0], ({name}_real)record[1]);
-        command[0] = state.command;
+        command[1] = {name}_step(&state, record[0]{measurement});
+        command[0] = state.x[0];
         fwrite(command, sizeof command, 1, stdout);
     }}
     return 0;
 }}
-"""
-ARDUINO = """
-enum { A0 = 14, DAC0 = 66 };
-int analogRead(int pin);
-void analogWrite(int pin, int count);
-unsigned long micros(void);
-void setup(void);
-void loop(void);
 """
 compiler = shutil.which("gcc") or shutil.which("cc")
 needs_compiler = pytest.mark.skipif(compiler is None, reason="there is no C compiler here")
@@ -108,7 +119,8 @@ needs_compiler = pytest.mark.skipif(compiler is None, reason="there is no C comp
 def compiled(source, folder, *options):
     """A program that reads pairs of reference and measurement and writes pairs of command and drive."""
     source.write(folder)
-    (folder / "driver.c").write_text(DRIVER.format(name=source.name))
+    measurement = ", record[1]" if "measurement)" in source.header else ""
+    (folder / "driver.c").write_text(DRIVER.format(name=source.name, measurement=measurement))
     command = [compiler, *STRICT, *options, "driver.c", f"{source.name}.c", "-o", "driver", "-lm"]
     subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True)
     return folder / "driver"
@@ -123,11 +135,10 @@ def replayed(program, reference, measurement):
 
 def stepped(controller, reference, measurement, u0=0.0, y0=0.0):
     """Commands and drives in Python."""
-    state = controller.initial(H, u0, y0)
+    step, parameters, state = controller.compiled(H, u0, y0)
     out = np.empty((2, reference.size))
-    for k, (r, m) in enumerate(zip(reference, measurement, strict=True)):
-        out[1, k] = state.step(state.parameters, state.state, r, m)
-        out[0, k] = state.state[0]
+    with np.errstate(all="ignore"):
+        replay(step, parameters, state, read_only(reference), read_only(measurement), out[0], out[1])
     return out
 
 
@@ -148,29 +159,28 @@ def records():
 
 
 @needs_compiler
-@pytest.mark.parametrize(("precision", "tolerance"), [("double", 1e-12), ("float", 1e-4)])
 @pytest.mark.parametrize("name", CONTROLLERS)
-def test_c_follows_python_over_a_long_record(name, precision, tolerance, records, tmp_path):
-    """Of the range. The libraries' exponentials may differ in their last bit; a float has 6e-8, ten times amplified."""
+def test_c_follows_python_over_a_long_record(name, records, tmp_path):
+    """To 1e-12 of the range: the libraries' exponentials may differ in their last bit."""
     reference, measurement, y0, expected = records[name]
-    source = hs.to_c(CONTROLLERS[name]()[1], H, name=name, y0=y0, precision=precision)
+    source = hs.to_c(CONTROLLERS[name]()[1], H, name=name, y0=y0)
     given = replayed(compiled(source, tmp_path), reference, measurement)
-    assert np.abs(given - expected).max() < tolerance * np.ptp(expected[1])
+    assert np.abs(given - expected).max() < 1e-12 * np.ptp(expected[1])
 
 
 @needs_compiler
-@pytest.mark.parametrize(("precision", "tolerance"), [("double", 1e-12), ("float", 1e-4)])
-def test_a_small_board_without_expm1_and_log1p_does_as_well(precision, tolerance, records, tmp_path):
-    name = "inverse_of_law_and_creep"
-    reference, measurement, y0, expected = records[name]
-    source = hs.to_c(CONTROLLERS[name]()[1], H, y0=y0, precision=precision)
-    given = replayed(compiled(source, tmp_path, "-D__AVR__"), reference, measurement)
-    assert np.abs(given - expected).max() < tolerance * np.ptp(expected[1])
+def test_a_feedforward_alone_takes_the_reference_alone(records, tmp_path):
+    """The inverse of a law as a program of its own; nothing else stands in its way."""
+    reference, measurement, y0, _ = records["plays"]
+    source = hs.to_c(hs.InverseFeedforward(law=PLAYS), H, name="inverse", y0=y0)
+    assert "double inverse_step(inverse_state *state, double reference);" in source.header
+    given = replayed(compiled(source, tmp_path), reference, measurement)
+    assert np.abs(PLAYS.response(given[1]) - reference).max() < 1e-12 * np.ptp(reference)
 
 
 @needs_compiler
-def test_what_nothing_reaches_is_asked_for_as_in_python(tmp_path):
-    """Of a law that saturates, from a command other than zero, and to both of its limits."""
+def test_an_output_beyond_saturation_is_asked_for_as_in_python(tmp_path):
+    """A law that saturates, from a command other than zero, and to both of its limits."""
     law = hs.BoucWen(gain=2.0, z0=0.1)
     controller = hs.TrackingController(feedforward=hs.InverseFeedforward(law=law), limits=(-3.0, 4.0))
     reference, nothing = 2.5 * np.sin(0.01 * np.arange(2000)), np.zeros(2000)
@@ -180,66 +190,103 @@ def test_what_nothing_reaches_is_asked_for_as_in_python(tmp_path):
     assert np.abs(given - expected).max() < 1e-11  # where the law is flat the input is less sharp
 
 
-@needs_compiler
-def test_slow_creep_moves_in_single_precision_too(tmp_path):
-    """A sample moves the element by 5e-8 of its position, less than half the distance to the next float."""
-    creep = hs.Creep(time_constants=(1e3,), weights=(1.0,))
-    controller = hs.TrackingController(feedforward=hs.InverseFeedforward(creep=creep))
-    reference = np.full(200_000, 3.0)
-    double, single = (
-        replayed(
-            compiled(hs.to_c(controller, H, u0=1.0, y0=2.0, precision=precision), tmp_path / precision),
-            reference,
-            reference,
-        )[1]
-        for precision in ("double", "float")
-    )
-    assert double[0] - double[-1] > 9e-3
-    assert np.abs(single - double).max() < 1e-6
+MODELS = {
+    "sum": lambda: hs.BoucWen(beta=0.7) + hs.Play(threshold=0.2) + hs.Line(slope=2.0),
+    "cascade": lambda: hs.Line(slope=2.0) >> hs.BoucWen(n=1.5) >> hs.Duhem.from_terms({"u'": 1.0, "|u'| y": -1.0}),
+    "plant": lambda: hs.TransferFunction(num=(3.0,), den=(1e-3, 1.0), delay=1.5 * H),
+    "law_and_mode": lambda: hs.BoucWen(beta=0.7) >> hs.mode(**MODE),
+    "actuator": lambda: STACK,
+}
 
 
 @needs_compiler
-@pytest.mark.parametrize("precision", ["double", "float"])
-def test_the_sketch_compiles_with_the_functions_of_an_arduino(precision, tmp_path):
-    folder = tmp_path / "stage"
-    hs.to_c(PID, H, name="axis", precision=precision).write(folder)
-    assert sorted(path.name for path in folder.iterdir()) == ["axis.c", "axis.h", "stage.ino"]
-    (folder / "arduino.h").write_text(ARDUINO)
-    command = [compiler, *STRICT, "-include", "arduino.h", "-x", "c", "-c", "stage.ino", "-o", "stage.o"]
-    subprocess.run(command, cwd=folder, check=True)
+@pytest.mark.parametrize("name", MODELS)
+def test_the_worked_main_prints_the_response(name, tmp_path):
+    """From a first input other than zero."""
+    model = MODELS[name]()
+    u = 0.3 + np.sin(0.05 * np.arange(200)) * np.linspace(0.5, 2.0, 200)
+    timed = name in ("plant", "law_and_mode", "actuator")
+    source = hs.to_c(model, H if timed else None, name=name)
+    source.write(tmp_path)
+    command = [compiler, *STRICT, f"{name}_main.c", f"{name}.c", "-o", "main", "-lm"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    lines = "\n".join(map(repr, u.tolist()))
+    out = subprocess.run([tmp_path / "main"], input=lines, capture_output=True, text=True, check=True).stdout
+    law = model.startable(H).started(u[0]) if timed else None
+    y = model.response(u) if law is None else np.array([law.step(law.parameters, law.state, v) for v in u])
+    assert np.abs(np.array(out.split(), dtype=float) - y).max() <= 1e-12 * np.ptp(y)
 
 
-def test_the_same_settings_give_the_same_text():
+def test_equal_settings_have_equal_texts():
     controller = CONTROLLERS["everything"]()[1]
     assert hs.to_c(controller, H) == hs.to_c(controller, H)
     assert hs.to_c(controller, H) != hs.to_c(controller, 2.0 * H)
-    assert f"#define CONTROLLER_AHEAD {controller.ahead(H)}\n" in hs.to_c(controller, H).header
+    assert f"#define MODEL_AHEAD {controller.ahead(H)} " in hs.to_c(controller, H).header
 
 
-def test_a_feedforward_alone_is_a_controller_of_one_part():
-    alone = CONTROLLERS["inverse"]()[1].feedforward
-    assert hs.to_c(alone, H) == hs.to_c(hs.TrackingController(feedforward=alone), H)
-
-
-PLAYS = hs.PrandtlIshlinskii(thresholds=(0.0, 2.0), weights=(0.01, 0.003))
+def test_the_state_of_a_lean_law_is_small():
+    assert hs.to_c(hs.BoucWen()).state_size == 2
+    assert hs.to_c(hs.PrandtlIshlinskii(thresholds=(0.0, 1.0, 2.0), weights=(1.0, 1.0, 1.0))).state_size == 4
 
 
 @pytest.mark.parametrize(
-    ("controller", "options", "message"),
+    ("thing", "arguments", "error", "message"),
     [
-        (hs.InverseFeedforward(law=PLAYS), {}, "Bouc-Wen law with n = 1, or a line"),
-        (hs.InverseFeedforward(law=hs.BoucWen(n=2.0, feedthrough=1.0)), {}, "n must be 1, got 2"),
-        (PID, {"name": "2axes"}, "name must be letters"),
-        (PID, {"precision": "half"}, "precision must be"),
-        (PID, {"u0": math.nan}, "u0 and y0 must be finite"),
-        (hs.PID(kp=1e40), {"precision": "float"}, "does not fit into a float"),
+        (PID, {"sample_time": H, "name": "2axes"}, ValueError, "name must be letters"),
+        (PID, {"sample_time": H, "name": "double"}, ValueError, "name must be letters"),
+        (PID, {"sample_time": H, "u0": math.nan}, ValueError, "u0 and y0 must be finite"),
+        (PID, {}, ValueError, "give sample_time"),
+        (PID, {"sample_time": 0.0}, ValueError, "sample_time must be positive"),
+        (hs.TransferFunction(num=(1.0,), den=(1.0, 1.0)), {}, ValueError, "give sample_time"),
+        (hs.BoucWen, {}, TypeError, "got the class BoucWen: give it its parameters"),
+        ("law.json", {}, TypeError, "can be stepped is expected, got str"),
     ],
 )
-def test_what_there_is_no_c_for_is_refused(controller, options, message):
-    with pytest.raises(ValueError, match=message):
-        hs.to_c(controller, H, **options)
+def test_a_thing_without_a_program_is_refused(thing, arguments, error, message):
+    with pytest.raises(error, match=message):
+        hs.to_c(thing, **arguments)
 
 
-def test_what_is_no_controller_is_refused():
-    with pytest.raises(TypeError, match="or an InverseFeedforward, got BoucWen"):
-        hs.to_c(hs.BoucWen(), H)
+@needs_compiler
+def test_an_inverse_from_a_file_by_the_command_line_alone(tmp_path):
+    """Identified plays, their inverse in C, and its commands through the identified law."""
+    true = hs.PrandtlIshlinskii(thresholds=(0.0, 1.0, 3.0), weights=(0.5, 0.3, 0.2))
+    u = np.concatenate([hs.signals.triangle(0.0, high, cycles=1, samples_per_cycle=80) for high in (10.0, 6.0)])
+    lines = [f"{v!r},{w!r}" for v, w in zip(u.tolist(), true.response(u).tolist(), strict=True)]
+    (tmp_path / "loop.csv").write_text("\n".join(["voltage,displacement", *lines]) + "\n")
+    hysim = [sys.executable, "-m", "hysim"]
+    columns = ["--u", "voltage", "--y", "displacement", "--model", "prandtl-ishlinskii"]
+    for command in (
+        [*hysim, "identify", "loop.csv", *columns, "--out", "law.json"],
+        [*hysim, "c", "law.json", "--inverse", "--out", "inverse.c"],
+        [compiler, *STRICT, "inverse.c", "inverse_main.c", "-o", "inverse", "-lm"],
+    ):
+        subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    law, wanted = hs.load_model(tmp_path / "law.json"), 2.5 + 2.4 * np.sin(0.1 * np.arange(300))
+    text = "\n".join(map(repr, wanted.tolist()))
+    out = subprocess.run([tmp_path / "inverse"], input=text, capture_output=True, text=True, check=True).stdout
+    voltages = np.array(out.split(), dtype=float)
+    assert np.abs(law.response(np.append(0.0, voltages))[1:] - wanted).max() < 1e-12 * np.ptp(wanted)
+    in_python = law.compiled_inverse(0.0)
+    expected = [in_python.step(in_python.parameters, in_python.state, y) for y in wanted]
+    assert np.abs(voltages - expected).max() < 1e-12 * np.ptp(voltages)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["law.json", "--out", "law.h"], "call the file .c"),
+        (["law.json", "--out", "2.c"], "name must be letters"),
+        (["play.json", "--inverse", "--out", "a.c"], "has no inverse"),
+        (["none.json", "--out", "a.c"], "none.json"),
+    ],
+)
+def test_wrong_input_of_the_command_is_refused_in_one_line(arguments, message, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    hs.save(hs.Line(slope=1.0), "law.json")
+    hs.save(hs.Play(threshold=1.0), "play.json")
+    assert main(["c", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert not list(tmp_path.glob("*.c"))

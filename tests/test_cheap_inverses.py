@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import hysim as hs
+from hysim._frozen import checked
 from hysim.kernels.stepping import drive
 from hysim.models.inverse_search import searched_inverse
 
@@ -77,7 +78,7 @@ def test_most_generalised_laws_near_a_bouc_wen_law_know_their_slopes():
     assert np.isfinite(known).all()
 
 
-@hs.family
+@checked
 class Counting(hs.Law):
     """A line that counts its evaluations in its workspace."""
 

@@ -13,11 +13,15 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from square_dahl import SquareDahl
 
 import hysim as hs
 from hysim.cli import main
 from hysim.export import _compilers, _fmu
+from hysim.export._field_units import FIELD_UNITS, field_unit
 from hysim.export._program import Field, Program
+from hysim.models.model import every_family
+from hysim.models.protocols import needs_time
 
 VERSIONS = ("2.0", "3.0")
 LAW = hs.Dahl(stiffness=2.0, coulomb=0.5, offset=0.1, z0=0.2)
@@ -126,6 +130,30 @@ def test_a_sampled_model_says_its_sample_time(tmp_path, version):
     assert "u0" not in variables
     assert [variables[name]["unit"] for name in ("reference", "measurement", "command")] == ["N", "N", "mm"]
     assert root.find("CoSimulation").get("fixedInternalStepSize") == ("0.01" if version == "3.0" else None)
+
+
+def test_a_controller_with_preview_says_how_far_ahead_its_reference_is(tmp_path):
+    assert "later" not in described(unit(tmp_path, INTEGRATOR))[0].get("description")
+    ahead = dataclasses.replace(INTEGRATOR, ahead=7)
+    assert "The reference is that of 7 samples later." in described(unit(tmp_path, ahead))[0].get("description")
+
+
+def test_units_of_parameters_are_those_of_fields_that_the_families_have():
+    families = every_family()
+    for name, units in FIELD_UNITS.items():
+        fields = {each.name for each in dataclasses.fields(families[name])}
+        shared = units.keys() - fields
+        assert shared <= {"threshold", "thresholds", "gain", "weights"}, (name, shared)  # of plays, alone or in sums
+    assert field_unit(SquareDahl(), "k") == "y/u"
+    assert field_unit(SquareDahl(), "offset") == ""
+
+
+def test_a_law_whose_numbers_cannot_be_followed_has_no_parameters(tmp_path):
+    levels = {"levels": (-1.0, 0.0, 1.0), "weights": (1.0, 0.5, 1.0)}
+    fresh, after = hs.Preisach(**levels), hs.Preisach(**levels, z0=(0.5, -0.2))
+    names = [described(hs.to_fmu(law, tmp_path / "law.fmu", platforms=()))[1].keys() for law in (fresh, after)]
+    assert "weights[0]" in names[0]
+    assert names[1] == {"u", "y", "u0"}
 
 
 def test_a_value_outside_its_box_widens_the_box(tmp_path):
@@ -365,6 +393,64 @@ def test_a_simulation_gives_the_response_of_the_law_one_step_late(compiled, vers
     changed = dataclasses.replace(LAW, stiffness=5.0, z0=-0.1)
     y = driven(path, U, {"stiffness": 5.0, "z0": -0.1, "u0": -2.0})
     np.testing.assert_allclose(y[1:], changed.response([-2.0, *U])[1:-1], rtol=0.0, atol=ALLOWED)
+
+
+MODELS = {  # functions: a plant compiles its stages, which no collection of tests should wait for
+    "wide play that begins beside its first input": lambda: hs.Play(threshold=0.6, z0=3.0),
+    "relays": lambda: hs.Preisach(levels=(-1.0, 0.0, 0.5, 1.0), weights=(1.0, 0.5, 1.0, -0.2, 0.3, 0.7)),
+    "general exponent": lambda: hs.BoucWen(n=1.4, feedthrough=0.5),
+    "family of the user": lambda: SquareDahl(k=3.0, coulomb=0.4),
+    "sum": lambda: hs.Dahl(stiffness=2.0) + hs.Play(threshold=0.2),
+    "sum with a dashpot": lambda: hs.Dahl(stiffness=2.0) + hs.Dashpot(c=0.1),
+    "cascade": lambda: hs.Play(threshold=0.2) >> hs.TransferFunction(num=(2.0,), den=(0.3, 1.0)),
+    "mode": lambda: hs.mode(2.0, 0.1),
+    "actuator": lambda: hs.Actuator(hysteresis=LAW, creep=hs.Creep.per_decade(1.5), vibration=hs.mode(5.0, 0.1)),
+    "rate-dependent": lambda: hs.RateDependentPrandtlIshlinskii(thresholds=(0.1, 0.4), weights=(1.0, 0.5), beta=0.1),
+}
+
+
+@needs_compiler
+@pytest.mark.extra("fmpy")
+@pytest.mark.parametrize("name", MODELS)
+def test_units_of_all_kinds_do_what_their_models_do(tmp_path, name):
+    """Versions take turns; the simulation begins at the first input."""
+    model, version = MODELS[name](), VERSIONS[len(name) % 2]
+    timed = needs_time(model)
+    path = hs.to_fmu(model, tmp_path / "model.fmu", version, STEP if timed else None)
+    y = hs.simulate(model, STEP * np.arange(U.size), U).y
+    variables = described(path)[1]
+    assert ("sample_time" in variables) == timed
+    ours = driven(str(path), U, {"u0": U[0]} if "u0" in variables else {})
+    np.testing.assert_allclose(ours[1:], y[:-1], rtol=0.0, atol=1e-12 * np.ptp(y))
+    assert ours[0] == pytest.approx(y[0], abs=1e-12 * np.ptp(y))
+
+
+CONTROLLERS = {
+    "pid": lambda: hs.PID(kp=0.5, ki=2.0, kd=0.01, derivative_filter=0.05, limits=(-0.5, 0.6)),
+    "inverse and integral": lambda: hs.TrackingController(
+        feedforward=hs.InverseFeedforward(law=hs.BoucWen(feedthrough=0.5)), feedback=hs.PID(ki=1.0), limits=(-1.0, 1.0)
+    ),
+    "inverse alone": lambda: hs.InverseFeedforward(law=hs.PrandtlIshlinskii(thresholds=(0.0, 0.3), weights=(1.0, 0.5))),
+}
+
+
+@needs_compiler
+@pytest.mark.extra("fmpy")
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_units_of_controllers_do_what_the_controllers_do(tmp_path, name):
+    controller = CONTROLLERS[name]()
+    path = hs.to_fmu(controller, tmp_path / "controller.fmu", VERSIONS[len(name) % 2], STEP, u0=0.1, y0=0.2)
+    ours = Slave(str(path), tmp_path / "unit")
+    ours.start()
+    theirs = controller.compiled(STEP, 0.1, 0.2)
+    scale = np.ptp(U)
+    for k, (reference, measurement) in enumerate(zip(U.tolist(), np.roll(U, 2).tolist(), strict=True)):
+        values = {"reference": reference, "measurement": measurement}
+        ours.set(**{name: value for name, value in values.items() if name in ours.references})
+        ours.unit.doStep(currentCommunicationPoint=k * STEP, communicationStepSize=STEP)
+        command = theirs.step(theirs.parameters, theirs.state, reference, measurement)
+        assert ours.get("command") == pytest.approx(command, abs=1e-12 * scale)
+    ours.unit.freeInstance()
 
 
 @needs_compiler

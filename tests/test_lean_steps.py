@@ -5,7 +5,7 @@ import pytest
 
 import hysim as hs
 from hysim.kernels.stepping import drive
-from hysim.models.compiled_step import compiled_step
+from hysim.models.compiled_step import compiled_start, compiled_step
 
 U = np.concatenate([2.0 * np.sin(np.linspace(0.0, 12.0, 120)), np.random.default_rng(5).normal(size=80), [0.0, 3.0]])
 PLACES = {
@@ -35,7 +35,7 @@ def test_the_leanest_step_has_the_bits_of_the_family(law):
     family = compiled_step(type(law).step)
     state = np.zeros(law.packed[1].size + type(law).workspace)
     state[: law.packed[1].size] = law.packed[1]
-    law.prepare(law.packed[0], state)
+    compiled_start(type(law).start)(law.packed[0], state, 0.0)
     family(law.packed[0], state, 0.0)
     ours, theirs = np.empty(U.size), np.empty(U.size)
     assert drive(lean.step, lean.parameters, lean.state, U, ours) == -1

@@ -101,11 +101,7 @@ def test_show_versions_prints_every_dependency(capsys):
     printed = capsys.readouterr().out
     assert printed.startswith(f"hysim  {hs.__version__}".replace("  ", " " * 10))
     project = tomllib.loads((Path(__file__).parent.parent / "pyproject.toml").read_text())["project"]
-    extras = (
-        name
-        for extra in ("dask", "tables", "io", "vision", "notebook")
-        for name in project["optional-dependencies"][extra]
-    )
+    extras = (name for extra in ("dask", "tables", "io", "vision") for name in project["optional-dependencies"][extra])
     for requirement in (*project["dependencies"], *extras):
         name = requirement.partition(">")[0].partition("[")[0]
         assert f"\n{name} " in printed, name

@@ -14,6 +14,7 @@ from typing import NoReturn
 
 from hysim import __version__
 from hysim.cli import (
+    c,
     compare,
     control,
     discover,
@@ -23,6 +24,7 @@ from hysim.cli import (
     metrics,
     models,
     outputs,
+    page,
     plot,
     reproduce,
     signals,
@@ -32,8 +34,9 @@ from hysim.cli import (
 from hysim.cli.options import Command
 from hysim.errors import SimulationError
 
-_MODULES = (metrics, identify, discover, compare, simulate, control, fmu, plot, sweep, measure, reproduce)
-COMMANDS = {module.COMMAND.name: module.COMMAND for module in _MODULES}
+_MODULES = (metrics, identify, discover, compare, simulate, control, c, fmu, plot, sweep, measure, reproduce)
+_COMMANDS = (*(module.COMMAND for module in _MODULES), page.COMMAND, page.EXPLORE)
+COMMANDS = {command.name: command for command in _COMMANDS}
 """Every command by its name."""
 
 DONE, BAD_INPUT = 0, 2

@@ -32,8 +32,9 @@ COMMAND = Command(
 --sample-time TIME  time between two samples of a plant or a controller [s]
 --name NAME  name of the model, a name in C (default: that of its class)
 --unit SIGNAL=UNIT...  unit of u or y, such as u=V (default: those in the model's file)
---u0 VALUE  input at rest, at which it starts [unit of u] [default: 0]
---y0 VALUE  output at rest, at which a controller starts [unit of y] [default: 0]
+--u0 VALUE  input at which a law rests before the simulation, command at which a controller starts [unit of u]
+    [default: 0]
+--y0 VALUE  displacement at which a controller starts [unit of y] [default: 0]
 --platforms PLATFORMS  linux, windows, mac, with commas between them, for which it holds a shared library, or none
     (default: this machine, if it has a C compiler)
 """,

@@ -98,7 +98,7 @@ def _settings(name: str, value: str | None, default: str | None, is_required: bo
 def _role(value: str) -> str:
     if value.endswith(".svg"):
         return PICTURE
-    return RESULT if value.endswith((".json", ".csv", ".c", ".fmu", ".sqlite")) else _ROLES.get(value, "")
+    return RESULT if value.endswith((".json", ".csv", ".c", ".fmu", ".html", ".sqlite")) else _ROLES.get(value, "")
 
 
 def word_or_number(

@@ -36,7 +36,10 @@ or --no-t  read no time from the file
 WEIGHTS = (
     "--weights COLUMN  weight of each sample in the sum of squares, 0 to leave it out: name or number of its column"
 )
-OPTIONS = f"{_FILE}\n\nrecord:\n{_INPUT}\n{_OUTPUT}{_OTHERS}"
+OPTIONS_WITHOUT_FILE = f"record:\n{_INPUT}\n{_OUTPUT}{_OTHERS}"
+"""Options for a record whose file is named by an option of the command."""
+
+OPTIONS = f"{_FILE}\n\n{OPTIONS_WITHOUT_FILE}"
 OPTIONS_WITH_WEIGHTS = f"""{OPTIONS.rstrip()}
 --weights COLUMN  weight of each sample in the sum of squares, 0 to leave it out: name or number of its column
 """

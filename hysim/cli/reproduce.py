@@ -19,7 +19,9 @@ def run(options: argparse.Namespace) -> int:
     """Reproduce, and print the short table."""
     from hysim.paper import reproduce
 
-    result = reproduce(options.out, quick=options.quick, progress=_progress if sys.stderr.isatty() else None)
+    result = reproduce(
+        options.out, quick=options.quick, page=options.page, progress=_progress if sys.stderr.isatty() else None
+    )
     study = result.findings.study
     if options.json:
         print((result.folder / "summary.json").read_text(encoding="utf-8"), end="")
@@ -62,6 +64,7 @@ COMMAND = Command(
     """
 --out DIR  folder to write into [default: reproduction]
 --quick  skip the cross-validation
+--page  also write table1.html, a page for a browser: the identified Bouc-Wen law with sliders over the 52 points
 --json  print summary.json instead of the short table
 """,
     run,

@@ -77,6 +77,11 @@ class InverseFeedforward(SampledController):
         if not needs_time(self.law):
             inverse_step(self.law, 0.0)
 
+    @property
+    def dynamic(self) -> bool:
+        """Whether it depends on time: by its creep, or by its law."""
+        return self.creep is not None or needs_time(self.law)
+
     @classmethod
     def of(cls, plant: Actuator) -> Self:
         """Inverse of an actuator's amplifier, law and creep; it raises as the constructor does."""

@@ -15,10 +15,9 @@ from hysim.control._protocols import Controller, limits_of, preview
 from hysim.errors import SimulationError
 from hysim.models.model import in_brief
 from hysim.models.protocols import CompiledController, Remembering, Responding
-from hysim.plants.actuator import Actuator, is_law
+from hysim.plants.actuator import Actuator
+from hysim.plants.actuator import as_actuator as as_actuator
 from hysim.plants.chain import Signals
-from hysim.plants.sampled import Vibration
-from hysim.plants.state_space import linear_plant
 from hysim.records import even_step
 
 
@@ -102,7 +101,7 @@ def close_loop(
 
     Parameters
     ----------
-    plant : Actuator, law or linear plant
+    plant : Actuator, law, linear plant, creep, amplifier, or cascade of laws that ends with a TransferFunction
         At rest at `u0` before the first sample, creep included.
     controller : PID, TrackingController, InverseFeedforward, or anything with their ``compiled``
         At rest too. With a method ``ahead`` it gets the reference so many samples ahead, and at the end its last value.
@@ -222,25 +221,6 @@ def sample_time_of(t: FloatArray, reference: FloatArray) -> float:
 def is_controller(value: Any) -> TypeGuard[Controller]:
     """Whether a value closes a loop: it is compiled, and is no law."""
     return isinstance(value, Controller) and not isinstance(value, Responding)
-
-
-def as_actuator(plant: Any) -> Actuator:
-    """Any plant as an actuator: a law becomes its hysteresis, a linear plant its vibration; others are a TypeError.
-
-    Examples
-    --------
-    >>> import hysim as hs
-    >>> hs.control.as_actuator(hs.Line(slope=2.0)) == hs.Actuator(hysteresis=hs.Line(slope=2.0))
-    True
-    """
-    if isinstance(plant, Actuator):
-        return plant
-    if is_law(plant):
-        return Actuator(hysteresis=plant)
-    vibration = linear_plant(plant)
-    if isinstance(vibration, Vibration):
-        return Actuator(vibration=vibration)
-    raise TypeError(f"plant must be an Actuator, a law or a linear plant, got {type(plant).__name__}")
 
 
 def _conditions(

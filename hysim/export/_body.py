@@ -5,7 +5,7 @@ from typing import Any
 
 from hysim.export._expressions import PRIMARY, SUM, UNARY, Expressions, Library, Scope, Stretch, Value
 from hysim.export._routine import Routine
-from hysim.export._scopes import assignments, homes, reads, targets
+from hysim.export._scopes import assignments, counters_used_elsewhere, homes, reads, targets
 from hysim.export._types import Known, Scalar, Several, Type, Vector, joined
 
 _STEP = "    "
@@ -35,6 +35,8 @@ class Body:
         self._homes, self._counts = homes(self._statements, arguments), assignments(self._statements)
         self.returns: Type | None = None
         self._results = 0
+        for loop in counters_used_elsewhere(self._statements):
+            raise source.refusal(loop, f"{ast.unparse(loop.target)} counts a loop and has another use: rename one")
 
     def settled(self) -> str:
         """The text of the body."""

@@ -1,4 +1,4 @@
-"""Shared libraries from C: the compiler of this machine, or zig's, which compiles for every platform."""
+"""Shared libraries and WebAssembly from C: the compiler of this machine, or zig's, which compiles for all."""
 
 import platform
 import shutil
@@ -12,7 +12,14 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
+from hysim._versions import optional
+
 OPTIONS = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC", "-shared", "-s", "-Werror=implicit")
+_WEB = "wasm32-wasi"
+_WEB_OPTIONS = (
+    *("-mexec-model=reactor", "-Os", "-std=c99", "-ffp-contract=off", "-Werror=implicit"),
+    *("-Wl,--strip-all", "-Wl,--export=__heap_base"),
+)
 _PROCESSORS = MappingProxyType({"amd64": "x86_64", "arm64": "aarch64"})
 _FAT_MAGIC, _FAT_ALIGNMENT = 0xCAFEBABE, 14  # of a Mach-O file for several processors, 2^14 bytes
 
@@ -73,16 +80,37 @@ def shared_library(source: str, name: str, target: Target, command: Sequence[str
     OSError
         If it cannot be compiled; the message has the compiler's first error.
     """
+    libraries = () if target.name.endswith("windows") else ("-lm",)
+    return _built(source, f"{name}{target.ending}", (*command, *OPTIONS), libraries, target.name)
+
+
+def web_module(source: str) -> bytes:
+    """The WebAssembly module of a C source, by ziglang.
+
+    Raises
+    ------
+    ImportError
+        If ziglang is not installed.
+    OSError
+        If it cannot be compiled; the message has the compiler's first error.
+    """
+    optional("ziglang", "a page for a step that is not hysim's own", "export")
+    command = (sys.executable, "-m", "ziglang", "cc", "-target", _WEB, *_WEB_OPTIONS)
+    return _built(source, "step.wasm", command, ("-lm",), _WEB)
+
+
+def _built(source: str, result: str, command: Sequence[str], libraries: Sequence[str], target: str) -> bytes:
+    """The file that a compiler makes of a C source."""
     with tempfile.TemporaryDirectory() as folder:
-        Path(folder, f"{name}.c").write_text(source, encoding="utf-8")
-        arguments = [*command, *OPTIONS, f"{name}.c", "-o", f"{name}{target.ending}"]
-        if not target.name.endswith("windows"):
-            arguments.append("-lm")
-        done = subprocess.run(arguments, cwd=folder, capture_output=True, text=True, check=False)
+        name = f"{Path(result).stem}.c"
+        Path(folder, name).write_text(source, encoding="utf-8")
+        done = subprocess.run(
+            [*command, name, "-o", result, *libraries], cwd=folder, capture_output=True, text=True, check=False
+        )
         if done.returncode:
             lines = [line for line in done.stderr.splitlines() if "error" in line] or done.stderr.splitlines() or [""]
-            raise OSError(f"{' '.join(command)} could not compile the source for {target.name}: {lines[0]}")
-        return Path(folder, f"{name}{target.ending}").read_bytes()
+            raise OSError(f"{' '.join(command[:4])} could not compile the source for {target}: {lines[0]}")
+        return Path(folder, result).read_bytes()
 
 
 def universal(libraries: Sequence[bytes]) -> bytes:

@@ -160,8 +160,9 @@ class Scope:
         self.written |= {name} | self.roots.get(name, frozenset())
 
     def c_name(self, name: str) -> str:
-        """The name in C."""
-        return f"{name}_" if name in _c.RESERVED else name.strip("_") or "ignored"
+        """The name in C, which is none of a function that an expression may call."""
+        plain_name = name.strip("_") or "ignored"
+        return f"{plain_name}_" if plain_name in _c.RESERVED | _c.HELPERS.keys() | _MATHEMATICS | _TESTS else plain_name
 
 
 class Expressions:
@@ -418,10 +419,12 @@ class Expressions:
             return f"[{whole.lengths[0]()} - 1]"
         total = self.index(parts[0])
         for part, length in zip(parts[1:], whole.lengths[1:], strict=True):
+            if total.text == "0":
+                total = self.index(part)
+                continue
             times = Value(length(), Scalar.INT, SUM).within(PRODUCT + 1)
-            zero = total.text == "0"
-            text = self.index(part).within(SUM + 1) if not zero else self.index(part).text
-            total = Value(text if zero else f"{total.within(PRODUCT)} * {times} + {text}", Scalar.INT, SUM)
+            text = f"{total.within(PRODUCT)} * {times} + {self.index(part).within(SUM + 1)}"
+            total = Value(text, Scalar.INT, SUM)
         return f"[{total.text}]"
 
     # ------------------------------------------------------------------------------ calls

@@ -9,15 +9,19 @@ import math
 import re
 import zipfile
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from hysim._atomic import write_all
 from hysim._frozen import check_choice
 from hysim.export._compilers import TARGETS, Target, compiler, host, shared_library, universal
+from hysim.export._field_units import field_unit
 from hysim.export._fmu_source import source_of, token_of
 from hysim.export._fmu_variables import build_description, description, variables_of
+from hysim.export._packing import packing
 from hysim.export._program import Program, program_of
+from hysim.models.law import Law
 
 Version = Literal["2.0", "3.0"]
 Platform = Literal["linux", "windows", "mac"]
@@ -54,8 +58,8 @@ def to_fmu(
 
     Parameters
     ----------
-    thing : law, inverse of a law, sum, cascade, plant or controller
-        The model.
+    thing : model or controller
+        A law, sum, cascade, plant or actuator, `InverseFeedforward` for the inverse of a law, or another controller.
     path : str or Path
         The file, which ends in ``.fmu``.
     version : "2.0" or "3.0"
@@ -70,7 +74,8 @@ def to_fmu(
         Systems that find a shared library in the file. By default that of this machine if it has a C compiler (gcc,
         clang, or zig of the extra `export`); an empty sequence writes the sources alone. Zig compiles for all three.
     u0, y0 : float
-        Input and output at rest, at which it starts [unit of u], [unit of y].
+        Input at which a law rests before the simulation, the default of the parameter ``u0``; command and displacement
+        at which a controller starts [unit of u], [unit of y].
 
     Returns
     -------
@@ -90,9 +95,9 @@ def to_fmu(
 
     Notes
     -----
-    A unit has an input, an output, its model's parameters as tunable parameters, and where the model remembers its
-    input a fixed parameter ``u0``, the input at which it rests before the simulation. Its state can be saved, restored
-    and turned into bytes.
+    A unit has an input, an output, the numbers of a law as tunable parameters, and where the model remembers its input
+    a fixed parameter ``u0``, the input at which it rests before the simulation. Its state can be saved, restored and
+    turned into bytes.
 
     The master sets the input at a communication point and reads the output at the next one: the output is one
     communication step late. At the start it is the output for the input at the start. A sampled model is computed at
@@ -116,10 +121,28 @@ def to_fmu(
     chosen = _checked_name(type(thing).__name__ if name is None else name)
     if not math.isfinite(u0):
         raise ValueError(f"u0 must be finite, got {u0}")
-    program = program_of(thing, sample_time, u0=u0, y0=y0, tunable=True)
+    program = program_of(thing, sample_time, u0=u0, y0=y0, tunable=_is_tunable(thing))
+    program = _with_units(program, thing)
     systems = None if platforms is None else tuple(platforms)
     write_all({target: archive(program, Options(chosen, version, systems, labels, u0))})
     return target
+
+
+def _is_tunable(thing: Any) -> bool:
+    """Whether the parameters of the step follow from a law's numbers by arithmetic; else the numbers are constants."""
+    if not isinstance(thing, Law):
+        return False
+    try:
+        packing(thing)
+    except ValueError:
+        return False
+    return True
+
+
+def _with_units(program: Program, thing: Any) -> Program:
+    if not isinstance(thing, Law):
+        return program
+    return replace(program, fields=tuple(each._replace(unit=field_unit(thing, each.name)) for each in program.fields))
 
 
 def _checked(path: Path, version: str, platforms: Sequence[str] | None) -> Path:

@@ -119,7 +119,7 @@ def description(program: Program, variables: list[Variable], name: str, version:
             "fmiVersion": version,
             "modelName": name,
             "guid" if version == "2.0" else "instantiationToken": token,
-            "description": SAMPLED if sampled else DELAY,
+            "description": _sentences(program),
             "generationTool": f"hysim {__version__}",
             "variableNamingConvention": "flat",
         },
@@ -141,6 +141,14 @@ def description(program: Program, variables: list[Variable], name: str, version:
     _variables(root, variables, version)
     _structure(root, variables, version)
     return _text(root)
+
+
+def _sentences(program: Program) -> str:
+    """The delay of the output, and how far ahead the reference is."""
+    if math.isnan(program.sample_time):
+        return DELAY
+    ahead = f" The reference is that of {program.ahead} samples later." if program.ahead else ""
+    return SAMPLED + ahead
 
 
 def build_description(name: str) -> str:

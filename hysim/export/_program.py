@@ -12,6 +12,10 @@ from hysim.export._types import Scalar, Vector
 from hysim.kernels.stepping import Start, Step, complete
 from hysim.models.law import Law
 from hysim.models.protocols import Startable, Stepwise, needs_time
+from hysim.plants.actuator import as_stepwise
+from hysim.plants.amplifier import Amplifier
+from hysim.plants.creep import Creep
+from hysim.plants.sampled import Vibration
 
 _VECTORS = Vector(), Vector()
 _LAW, _CONTROLLER, _FEEDFORWARD = ("u",), ("reference", "measurement"), ("reference",)
@@ -121,6 +125,10 @@ def program_of(
         raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
     if not (math.isfinite(u0) and math.isfinite(y0)):
         raise ValueError(f"u0 and y0 must be finite, got {u0} and {y0}")
+    if isinstance(thing, type):
+        raise TypeError(f"an instance is expected, got the class {thing.__name__}: give it its parameters first")
+    if isinstance(thing, Creep | Amplifier | Vibration):
+        thing = as_stepwise(thing)
     if isinstance(thing, Stepwise):
         model = thing.startable(sample_time)
         timed = sample_time if needs_time(thing) else None
@@ -136,13 +144,12 @@ def program_of(
             memory=len(free.memory),
         )
     if isinstance(thing, Controller):
+        if isinstance(thing, InverseFeedforward) and not thing.dynamic:
+            return replace(_of_controller(thing, math.inf, u0, y0), sample_time=math.nan)
         if sample_time is None:
             raise ValueError(f"a {type(thing).__name__} is sampled: give sample_time")
         return _of_controller(thing, sample_time, u0, y0)
-    raise TypeError(
-        f"a law, a plant or a controller that can be stepped is expected, got {type(thing).__name__}; a class must "
-        "be given its parameters first"
-    )
+    raise TypeError(f"a law, a plant or a controller that can be stepped is expected, got {type(thing).__name__}")
 
 
 def _of_model(model: Startable, sample_time: float | None) -> Program:

@@ -31,6 +31,18 @@ def assignments(body: list[ast.stmt]) -> Mapping[str, int]:
     return counts
 
 
+def counters_used_elsewhere(body: list[ast.stmt]) -> list[ast.For]:
+    """Loops whose counting name is assigned within them, or has another use outside such loops."""
+    loops = [node for statement in body for node in ast.walk(statement) if isinstance(node, ast.For)]
+    outside = {name for statement in body for name in _mentioned(statement)}
+    return [
+        loop
+        for loop in loops
+        if isinstance(loop.target, ast.Name)
+        and (loop.target.id in assignments(loop.body) or loop.target.id in outside - {"_"})
+    ]
+
+
 def targets(statement: ast.stmt) -> list[str]:
     """Names that a statement assigns, if it is a plain assignment."""
     if not isinstance(statement, ast.Assign):

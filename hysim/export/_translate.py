@@ -73,7 +73,7 @@ class Translation:
     def table(self, name: str, values: Any) -> str:
         """Name of a constant vector in C."""
         if id(values) not in self._tables:
-            self._tables[id(values)] = self._free(name.strip("_").lower()), values
+            self._tables[id(values)] = self._free(f"table_{name.strip('_').lower()}"), values
         return self._tables[id(values)][0]
 
     def text(self) -> str:

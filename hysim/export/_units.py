@@ -29,11 +29,13 @@ class BaseUnit(NamedTuple):
 def label(unit: str, units: Mapping[str, str]) -> str:
     """The label of a unit such as ``"y/u"`` for the labels of u, y and t; empty where one of them is unknown.
 
+    ``"1"`` and ``"s"`` stand for themselves, ``"h"`` for half the span of an input.
+
     >>> label("y/u", {"u": "V", "y": "um"}), label("y", {}), label("1/u", {"u": "m/s"})
     ('um/V', '', '1/(m/s)')
     """
     parts = unit.split("/")
-    names = ["1" if part == "1" else units.get(_SIGNALS.get(part, part), "") for part in parts]
+    names = [part if part in ("1", "s") else units.get(_SIGNALS.get(part, part), "") for part in parts]
     if not all(names):
         return ""
     return "/".join([names[0], *(f"({name})" if "/" in name else name for name in names[1:])])

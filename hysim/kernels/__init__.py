@@ -1,7 +1,7 @@
 """Compiled numerics on plain floats and arrays; nothing here knows a class.
 
-Steps, `step(parameters, state, u) -> y`, keep to a subset of Python that can be translated to C one statement after the
-other:
+Steps, `step(parameters, state, u) -> y`, and their starts, `start(parameters, state, u0)`, keep to a subset of Python
+that can be translated to C one statement after the other:
 
 1. Arguments are annotated; arrays are contiguous vectors of doubles.
 2. Scalars are floats, integers or truth values; `and` and `or` join truth values only.

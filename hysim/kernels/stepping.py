@@ -74,36 +74,38 @@ def complete(parameters: FloatArray, state: FloatArray, u0: float) -> None:
 
 def side_by_side(first: Step, second: Step) -> Step:
     """The step of the sum of both outputs."""
+    first_by, second_by = by_address(first, STEP.signature), by_address(second, STEP.signature)
 
     @signed_closure(STEP.signature)
     def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
         n, m = 2 + int(parameters[0]), int(parameters[1])
-        y = first(parameters[2:n], state[:m], u)
-        return y + second(parameters[n:], state[m:], u)
+        y = first_by(parameters[2:n], state[:m], u)
+        return y + second_by(parameters[n:], state[m:], u)
 
     return step
 
 
 def one_behind_the_other(first: Step, second: Step) -> Step:
     """The step of the second law for the output of the first."""
+    first_by, second_by = by_address(first, STEP.signature), by_address(second, STEP.signature)
 
     @signed_closure(STEP.signature)
     def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
         n, m = 2 + int(parameters[0]), int(parameters[1])
-        y = first(parameters[2:n], state[:m], u)
-        return second(parameters[n:], state[m:], y) if math.isfinite(y) else y
+        y = first_by(parameters[2:n], state[:m], u)
+        return second_by(parameters[n:], state[m:], y) if math.isfinite(y) else y
 
     return step
 
 
 def started_both(first: Start, second: Start) -> Start:
     """The start of two laws for the same input."""
+    first_by, second_by = by_address(first, START.signature), by_address(second, START.signature)
 
     @closure
     def start_both(parameters: FloatArray, state: FloatArray, u0: float) -> None:
-        n, m = 2 + int(parameters[0]), int(parameters[1])
-        first(parameters[2:n], state[:m], u0)
-        second(parameters[n:], state[m:], u0)
+        first_by(parameters[2 : 2 + int(parameters[0])], state[: int(parameters[1])], u0)
+        second_by(parameters[2 + int(parameters[0]) :], state[int(parameters[1]) :], u0)
 
     return start_both
 

@@ -21,6 +21,7 @@ from hysim._printing import csv_text
 from hysim.comparison import Comparison
 from hysim.datasets import table2
 from hysim.discovery import Discovery
+from hysim.export import Shown, page_text
 from hysim.paper import figures
 from hysim.paper.camera import camera_measures
 from hysim.paper.dwell import dwell_measures
@@ -55,7 +56,7 @@ class Reproduction:
 
 
 def reproduce(
-    out: str | Path = "reproduction", *, quick: bool = False, progress: Progress | None = None
+    out: str | Path = "reproduction", *, quick: bool = False, page: bool = False, progress: Progress | None = None
 ) -> Reproduction:
     """Reproduce the paper on its 52 points, and write the report.
 
@@ -65,6 +66,8 @@ def reproduce(
         Folder to write into; it is made if it does not exist, and files of the same names are replaced.
     quick : bool
         Leave the cross-validation out.
+    page : bool
+        Also write ``table1.html``: the identified Bouc-Wen law with sliders over the points, for a browser.
     progress : callable, optional
         Called as ``progress(done, total, what)``.
 
@@ -83,7 +86,7 @@ def reproduce(
         pass
     with one_blas_thread():
         computed = find(quick=quick, progress=progress)
-        files = contents(computed)
+        files = contents(computed) | (browser_page(computed) if page else {})
     for name in files:
         (folder / name).parent.mkdir(exist_ok=True)
     write_all({folder / name: text for name, text in files.items()})
@@ -104,6 +107,14 @@ def contents(computed: Findings) -> dict[str, str]:
         "summary.json": json.dumps(_rounded(summary), indent=2, allow_nan=False) + "\n",
         "report.html": report_page(computed, drawn),
     }
+
+
+def browser_page(computed: Findings) -> dict[str, str]:
+    """The page of the identified Bouc-Wen law over the points of Table 1, by its name."""
+    study = computed.study
+    shown = Shown(study.fits["bouc-wen"].model)
+    title = "Table 1 and the identified Bouc-Wen law"
+    return {"table1.html": page_text({title: shown}, study.comparison.record)}
 
 
 def _model_drawings(comparison: Comparison, discovery: Discovery) -> dict[str, str]:

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, items, read_only
 from hysim.errors import SimulationError
+from hysim.models.cascade import Cascade
 from hysim.models.model import family
 from hysim.models.protocols import (
     CompiledLaw,
@@ -17,6 +18,7 @@ from hysim.models.protocols import (
     Sampled,
     Startable,
     Steppable,
+    Stepwise,
     law_at,
     needs_time,
 )
@@ -282,3 +284,56 @@ def as_vibration(value: Any) -> Vibration | None:
     if isinstance(plant, TransferFunction) and plant.initial_state:
         raise ValueError("an actuator begins at rest: its vibration must not hold an initial state")
     return plant
+
+
+def as_actuator(plant: Any) -> Actuator:
+    """Any plant as an actuator: a law becomes its hysteresis, a linear plant its vibration; others are a TypeError.
+
+    Of a cascade of laws that ends with a transfer function the laws become the hysteresis, and the transfer function
+    the vibration, which begins at rest as every actuator does. A creep and an amplifier are taken, too.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> hs.control.as_actuator(hs.Line(slope=2.0)) == hs.Actuator(hysteresis=hs.Line(slope=2.0))
+    True
+    >>> mode = hs.mode(2.0, 0.1)
+    >>> hs.control.as_actuator(hs.Line(slope=2.0) >> mode) == hs.Actuator(hysteresis=hs.Line(slope=2.0), vibration=mode)
+    True
+    """
+    if isinstance(plant, Actuator):
+        return plant
+    if is_law(plant):
+        return Actuator(hysteresis=plant)
+    if isinstance(plant, Creep):
+        return Actuator(creep=plant)
+    if isinstance(plant, Amplifier):
+        return Actuator(amplifier=plant)
+    if isinstance(plant, Cascade) and isinstance(plant.stages[-1], TransferFunction):
+        return _hammerstein(plant.stages)
+    vibration = linear_plant(plant)
+    if isinstance(vibration, Vibration):
+        return Actuator(vibration=vibration)
+    raise TypeError(f"plant must be an Actuator, a law or a linear plant, got {type(plant).__name__}")
+
+
+def _hammerstein(stages: tuple[Any, ...]) -> Actuator:
+    """Laws in front of a transfer function; TypeError if one of them is no law that a loop can step."""
+    if len(stages) < 3:
+        return Actuator(hysteresis=stages[0] if len(stages) > 1 else None, vibration=stages[-1])
+    return Actuator(hysteresis=Cascade(stages=stages[:-1]), vibration=stages[-1])
+
+
+def as_stepwise(plant: Any) -> Stepwise:
+    """A model as one that runs sample by sample: itself where it does, else as an actuator; TypeError if neither.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> from hysim.plants.actuator import as_stepwise
+    >>> creep = hs.Creep(time_constants=(1.0,), weights=(0.1,))
+    >>> step, parameters, state = as_stepwise(creep).startable(0.5).started(0.0)
+    >>> [round(step(parameters, state, u), 6) for u in (0.0, 1.0, 1.0)]
+    [0.0, 1.0, 1.039347]
+    """
+    return plant if isinstance(plant, Stepwise) else as_actuator(plant)

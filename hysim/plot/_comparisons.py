@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from hysim import metrics
 from hysim._frozen import FloatArray
+from hysim._prefixes import in_unit, label, printed
 from hysim.comparison import Comparison, ComparisonRow
 from hysim.identification import Identification
-from hysim.plot._style import GUIDE, MEASURED, POINTS, AxesArray, in_unit, label, line, one, printed, several
+from hysim.plot._style import GUIDE, MEASURED, POINTS, AxesArray, line, one, several
 from hysim.records import Record
 
 _FILLED: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 3.8, "markeredgewidth": 0.8}

@@ -11,9 +11,10 @@ from matplotlib.colors import Normalize
 
 from hysim._cycles import TOLERANCE, turns
 from hysim._frozen import FloatArray
+from hysim._prefixes import in_unit, label
 from hysim.metrics import LoopMetrics, loop_metrics
 from hysim.plot._records import InputOutput, names_of, times_of, units_of
-from hysim.plot._style import GUIDE, MARKERS, MEASURED, POINTS, SEQUENTIAL, in_unit, label, line, one
+from hysim.plot._style import GUIDE, MARKERS, MEASURED, POINTS, SEQUENTIAL, line, one
 from hysim.records import Record
 
 

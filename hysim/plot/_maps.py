@@ -12,9 +12,10 @@ from matplotlib.ticker import MaxNLocator
 
 from hysim._cycles import TOLERANCE, turns
 from hysim._frozen import FloatArray
+from hysim._prefixes import in_unit, label
 from hysim.identification import Identification
 from hysim.laws.operators.preisach import Preisach, PreisachRelays
-from hysim.plot._style import DIVERGING, GUIDE, AxesArray, in_unit, label, one, several
+from hysim.plot._style import DIVERGING, GUIDE, AxesArray, one, several
 from hysim.records import Record
 from hysim.simulation import Simulation, simulate
 

@@ -7,10 +7,11 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 
+from hysim._prefixes import in_unit, label
 from hysim.control import Tuning
 from hysim.discovery import Discovery, OscillatorDiscovery
 from hysim.metrics import describing_function as describing_function_of
-from hysim.plot._style import MEASURED, POINTS, AxesArray, in_unit, label, line, one, several
+from hysim.plot._style import MEASURED, POINTS, AxesArray, line, one, several
 from hysim.vision import Displacement
 
 _WORST_FIT = 5.0  # below the best fit [%]: worse structures would hide the differences that matter

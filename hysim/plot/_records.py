@@ -7,8 +7,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from hysim._frozen import FloatArray
+from hysim._prefixes import label
 from hysim.control import ClosedLoop
-from hysim.plot._style import MARKERS, MEASURED, POINTS, AxesArray, label, line, one, several
+from hysim.plot._style import MARKERS, MEASURED, POINTS, AxesArray, line, one, several
 from hysim.records import Record
 
 _DRAWN = {"zoh": "steps-post", "foh": "default"}

@@ -4,8 +4,7 @@ The colours are those of M. Okabe and K. Ito (2008), chosen for the colour-blind
 """
 
 import math
-import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -47,14 +46,6 @@ _LINES = (
 )
 
 _STYLE = Path(__file__).with_name("house.mplstyle")
-
-_QUANTITIES = {
-    **dict.fromkeys(("V", "mV", "kV"), "Voltage"),
-    **dict.fromkeys(("nm", "um", "µm", "mm", "m"), "Displacement"),
-    **dict.fromkeys(("mN", "N", "kN"), "Force"),
-    **dict.fromkeys(("us", "µs", "ms", "s"), "Time"),
-}
-_NAMES = {"t": "Time", "u": "Input", "y": "Output", "z": "Memory z"}
 
 
 @contextmanager
@@ -133,22 +124,3 @@ def line(k: int) -> dict[str, Any]:
     """Colour and dashes of the line with the number `k`."""
     colour, dashes = _LINES[k % len(_LINES)]
     return {"color": colour, "linestyle": dashes}
-
-
-def label(units: Mapping[str, str], signal: str) -> str:
-    """`Voltage [V]` for ``{"u": "V"}`` and ``"u"``; `Input` if the unit is unknown."""
-    if signal not in units:
-        return _NAMES[signal]
-    unit = units[signal]
-    quantity = _NAMES[signal] if signal == "z" else _QUANTITIES.get(unit, _NAMES[signal])
-    return f"{quantity} [{printed(unit)}]"
-
-
-def in_unit(name: str, unit: str) -> str:
-    """`Loop width [µm]` for a name and a unit; the name alone without a unit."""
-    return f"{name} [{printed(unit)}]" if unit else name
-
-
-def printed(unit: str) -> str:
-    """A unit with its micro sign: `µm` for ``"um"``."""
-    return re.sub(r"\bu(?=(m|s|V|A|N)\b)", "µ", unit)

@@ -204,9 +204,9 @@ FMI_STATUS FMI(DeSerializeFMUstate)(void *component, const char bytes[], size_t 
     return fmi_status(component, message);
 }
 
-FMI_STATUS FMI(DoStep)(void *component, double time, double step, int keeps_state)
+FMI_STATUS FMI(DoStep)(void *component, double time, double h, int keeps_state)
 {
-    return fmi_status(component, fmu_advance(&((FmiInstance *)component)->model, time, step));
+    return fmi_status(component, fmu_advance(&((FmiInstance *)component)->model, time, h));
 }
 
 FMI_STATUS FMI(CancelStep)(void *component)

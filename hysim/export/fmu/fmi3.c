@@ -254,11 +254,11 @@ FMI_STATUS FMI(DeserializeFMUState)(void *component, const uint8_t bytes[], size
 }
 
 FMI_STATUS FMI(DoStep)(
-    void *component, double time, double step, bool keeps_state, bool *needs_event, bool *ends, bool *is_early,
+    void *component, double time, double h, bool keeps_state, bool *needs_event, bool *ends, bool *is_early,
     double *last_time)
 {
     FmuModel *const model = &((FmiInstance *)component)->model;
-    const char *const message = fmu_advance(model, time, step);
+    const char *const message = fmu_advance(model, time, h);
 
     *needs_event = *ends = *is_early = false;
     *last_time = model->time;

@@ -52,13 +52,16 @@ static void fmu_reset(FmuModel *m)
     m->start_input = FMU_START_VALUE;
 }
 
-/* Parameters and state before the first sample. */
+/* Parameters and state before the first communication step: a model without time has rested at the start input. */
 static void fmu_begin(FmuModel *m)
 {
     memcpy(m->parameters, FMU_PARAMETER_VALUES, sizeof m->parameters);
     memcpy(m->state, FMU_STATE_VALUES, sizeof m->state);
     FMU_PACK(m->fields, m->parameters, m->state);
     FMU_BEGIN(m->parameters, m->state, m->start_input);
+#if defined(FMU_HAS_START) && !defined(FMU_SAMPLE_TIME)
+    (void)FMU_STEP(m->parameters, m->state, &m->start_input);
+#endif
     m->samples = 0.0;
     m->is_stale = 0.0;
 }

@@ -1,0 +1,250 @@
+"""Pages for a browser: a law's loop that follows sliders, in one HTML file that needs nothing else.
+
+The page computes with the step of the law, as WebAssembly; see `hysim.export._page_modules`. Files of the folder `page`
+are its parts: markup, style, and script, joined in the order of `_SCRIPTS`.
+"""
+
+import base64
+import json
+from collections.abc import Mapping
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hysim._atomic import write_text
+from hysim._cycles import TOLERANCE, Samples
+from hysim._excursions import measured_cycles
+from hysim._frozen import FloatArray
+from hysim._prefixes import label, printed
+from hysim._release import __version__
+from hysim.export._page_model import Parts, about, heading, node_of, plane_of
+from hysim.export._page_modules import compressed
+from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
+from hysim.records import Record
+
+LARGEST = 250_000
+"""Most bytes of a page."""
+
+_SCRIPTS = ("step.js", "inputs.js", "measures.js", "draw.js", "code.js", "page.js")
+_SAMPLES = 200  # of the input on which the sliders' ends are found
+
+
+class Shown(NamedTuple):
+    """A model of a page, the input between which it begins, and labels of units.
+
+    The plays of a Prandtl-Ishlinskii law with `stack` have equal weights and even thresholds, and sliders for both.
+    """
+
+    model: Any
+    between: tuple[float, float] | None = None
+    units: Mapping[str, str] = MappingProxyType({})
+    stack: bool = False
+
+
+def to_page(
+    thing: Any,
+    path: str | Path,
+    record: Record | None = None,
+    *,
+    between: tuple[float, float] | None = None,
+    units: Mapping[str, str] | None = None,
+    title: str | None = None,
+) -> Path:
+    """Write a page on which a law's loop follows sliders: one HTML file that works offline.
+
+    The page shows the loop and its measures for a triangle, a sine, a fading triangle or minor loops, and over the
+    measured points of a record. It computes with the law's own step, compiled to WebAssembly, and sends nothing.
+
+    Parameters
+    ----------
+    thing : law, sum or cascade of laws
+        The model with which the page begins. A law that is not hysim's own needs the extra `export`.
+    path : path
+        The file to write.
+    record : Record, optional
+        Measured samples to show and to compare with; they become part of the file.
+    between : (float, float), optional
+        Lowest and highest input at the start [unit of u]; by default those of the record, of a Preisach law's levels,
+        of twice the largest threshold of plays, or -1 and 1.
+    units : mapping, optional
+        Labels of the units of ``"u"`` and ``"y"``; by default the record's.
+    title : str, optional
+        Heading of the page; by default the name of the law's family.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    TypeError
+        If the thing is no law, and no sum or cascade of laws.
+    ValueError
+        If the page would be larger than 250 KB; the message says what to do.
+    ImportError
+        If the law's step must be compiled and the extra `export` is missing.
+
+    Examples
+    --------
+    >>> import tempfile, pathlib
+    >>> import hysim as hs
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     page = hs.to_page(hs.Dahl(coulomb=0.5), pathlib.Path(folder, "dahl.html"), units={"u": "mm", "y": "N"})
+    ...     page.read_text()[:15]
+    '<!DOCTYPE html>'
+    """
+    name = heading(thing) if title is None else title
+    text = page_text({name: Shown(thing, between, units or {})}, record)
+    size = len(text.encode())
+    if size > LARGEST:
+        samples = "" if record is None else f": give a record of fewer than {len(record)} samples, such as record[::2]"
+        raise ValueError(f"the page would have {size} bytes, more than {LARGEST}{samples}")
+    write_text(path, text)
+    return Path(path)
+
+
+def page_text(models: Mapping[str, Shown], record: Record | None = None, *, title: str = "") -> str:
+    """The page as a text; the same arguments give the same text."""
+    modules: dict[str, bytes] = {}
+    packs: list[str] = []
+    described = [_model(name, shown, Parts(modules, packs), record) for name, shown in models.items()]
+    data = {
+        "models": described,
+        "modules": {name: base64.b64encode(module).decode() for name, module in modules.items()},
+        "record": None if record is None else _record(record),
+    }
+    folder = files("hysim.export").joinpath("page")
+    return Template(folder.joinpath("page.html").read_text(encoding="utf-8")).substitute(
+        title=escape(title or next(iter(models))),
+        version=__version__,
+        style=folder.joinpath("page.css").read_text(encoding="utf-8").strip(),
+        script="\n".join(folder.joinpath(name).read_text(encoding="utf-8").strip() for name in _SCRIPTS),
+        packs=",\n".join(_expression(pack, k) for k, pack in enumerate(packs)),
+        data=_for_script(json.dumps(data, separators=(",", ":"), ensure_ascii=False)),
+    )
+
+
+def _model(name: str, shown: Shown, parts: Parts, record: Record | None) -> dict[str, Any]:
+    thing, units = shown.model, {**({} if record is None else record.units), **shown.units}
+    low, high = shown.between or _between(thing, record)
+    if not low < high:
+        raise ValueError(f"between must be (lowest, highest input), got {(low, high)}")
+    middle, amplitude = 0.5 * (low + high), 0.5 * (high - low)
+    quarters = np.arange(_SAMPLES + 1) / _SAMPLES * 5.0
+    u = middle + amplitude * np.interp(quarters, np.arange(6), [0.0, 1.0, -1.0, 1.0, -0.5, 0.5])
+    node = node_of(thing, u, parts)
+    if shown.stack:
+        parts.controls[:], node["stack"] = _stack(parts.controls, thing), True
+    summary, equation = about(thing)
+    return {
+        "name": name,
+        "about": summary,
+        "equation": equation,
+        "node": node,
+        "values": parts.values,
+        "controls": parts.controls,
+        "inputs": _inputs(amplitude, middle, parts.timed),
+        "kind": "triangle",
+        "timed": parts.timed,
+        "labels": {
+            **{signal: label(units, signal) for signal in ("u", "y")},
+            "unit": {signal: printed(units.get(signal, "")) for signal in ("u", "y")},
+        },
+        "plane": plane_of(node),
+    }
+
+
+def _inputs(amplitude: float, middle: float, timed: bool) -> list[dict[str, Any]]:
+    """Sliders of the input."""
+    sides = {"lower": _short(middle - 2.0 * amplitude), "upper": _short(middle + 2.0 * amplitude)}
+    sliders: list[dict[str, Any]] = [
+        {"name": "amplitude", "value": amplitude, "lower": _short(amplitude / 20.0), "upper": _short(2.0 * amplitude)},
+        {"name": "middle", "value": middle, **sides},
+        {"name": "cycles", "value": 2, "lower": 1, "upper": 6, "whole": True},
+        {"name": "smaller loops", "value": 4, "lower": 0, "upper": 12, "whole": True},
+    ]
+    if timed:
+        sliders.append({"name": "period", "value": 1.0, "lower": 0.01, "upper": 100.0, "log": True, "unit": "s"})
+    return sliders
+
+
+def _stack(controls: list[dict[str, Any]], law: PrandtlIshlinskii) -> list[dict[str, Any]]:
+    """Sliders for number, largest threshold and weights of the plays behind that of threshold zero, and its weight."""
+    places = {name: k for k, name in enumerate(law.scalars)}
+    most, weight = len(law.thresholds) - 1, sum(law.weights[1:])
+    plays = sum(each != 0.0 for each in law.weights[1:])
+    reach = _short(law.thresholds[plays])
+    of = {name: [places[f"{name}[{k + 1}]"] for k in range(most)] for name in ("thresholds", "weights")}
+    ends: list[tuple[str, float, float, float, dict[str, Any]]] = [
+        ("plays", plays, 1, most, {"whole": True, "places": [], "stack": "plays"}),
+        ("largest threshold", reach, 0.1 * reach, 2.5 * reach, {"places": of["thresholds"], "stack": "reach"}),
+        ("weight of all plays", weight, -2.0 * weight, 2.0 * weight, {"places": of["weights"], "stack": "weight"}),
+        ("weight of the input", law.weights[0], -1.0, 2.0, {"places": [places["weights[0]"]]}),
+    ]
+    sliders = [{"name": name, "value": value, "lower": low, "upper": up, **rest} for name, value, low, up, rest in ends]
+    return sliders + [control for control in controls if control["name"] == "offset"]
+
+
+def _between(thing: Any, record: Record | None) -> tuple[float, float]:
+    """Lowest and highest input at the start."""
+    if record is not None:
+        return float(record.u.min()), float(record.u.max())
+    fields = {name: np.asarray(value) for name, value in vars(thing).items() if isinstance(value, tuple) and value}
+    if "levels" in fields:
+        return float(fields["levels"][0]), float(fields["levels"][-1])
+    if "thresholds" in fields and (most := 2.0 * float(fields["thresholds"].max())) > 0.0:
+        return -most, most
+    return -1.0, 1.0
+
+
+def _record(record: Record) -> dict[str, Any]:
+    """A record as the page takes it, with the cycle that is measured."""
+    try:
+        loops = measured_cycles(record.u, 1, TOLERANCE)
+    except ValueError:
+        cycle = None
+    else:
+        last = loops.cycles[0]
+        cuts = [] if loops.places is None else [place for place in loops.places.tolist() if place % 1.0]
+        ranges = {"loading": _ranges(last.loading), "unloading": _ranges(last.unloading)}
+        cycle = {"cuts": cuts, **ranges, "path": [last.path.start, last.path.stop]}
+    return {
+        "name": record.name or "record",
+        "python": 'hs.load("measured.csv")',
+        "u": _packed(record.u),
+        "y": _packed(record.y),
+        "cycle": cycle,
+        "sampleTime": None if record.t is None else float(np.mean(np.diff(record.t))),
+    }
+
+
+def _ranges(samples: Samples) -> list[list[int]]:
+    """First and last but one sample of each run of neighbours."""
+    if isinstance(samples, slice):
+        return [[samples.start, samples.stop]]
+    runs = np.split(samples, np.flatnonzero(np.diff(samples) != 1) + 1)
+    return [[int(run[0]), int(run[-1]) + 1] for run in runs]
+
+
+def _packed(values: FloatArray) -> str:
+    return base64.b64encode(compressed(values.astype("<f8").tobytes())).decode()
+
+
+def _expression(function: str, place: int) -> str:
+    """A function that packs, with its helpers, as one expression of the script."""
+    return f"(() => {{\n{function.strip()}\nreturn pack{place};\n}})()"
+
+
+def _for_script(text: str) -> str:
+    """JSON that no HTML parser takes for the end of its script."""
+    return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.4g}")

@@ -1,0 +1,187 @@
+"""Models as pages compute them: laws by their modules, sums and cascades of them."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from html import escape
+from inspect import getdoc
+from typing import Any
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.export._packing import packing
+from hysim.export._page_controls import Control, by_fields, controls_of, exchanged
+from hysim.export._page_modules import Kernels, kernels_of, module_of
+from hysim.laws.dashpot import Dashpot
+from hysim.laws.operators.rate_dependent_prandtl_ishlinskii import RateDependentPrandtlIshlinskii
+from hysim.laws.static import SingleValued
+from hysim.models.cascade import Cascade
+from hysim.models.law import Law
+from hysim.models.sum import Sum
+
+
+@dataclass
+class Parts:
+    """What the models of a page consist of: modules by name, functions that pack, numbers and sliders."""
+
+    modules: dict[str, bytes] = field(default_factory=dict)
+    packs: list[str] = field(default_factory=list)
+    values: list[float] = field(default_factory=list)
+    controls: list[dict[str, Any]] = field(default_factory=list)
+    timed: bool = False
+
+
+def node_of(thing: Any, u: FloatArray, parts: Parts, prefix: str = "") -> dict[str, Any]:
+    """A model as the page takes it; what it consists of goes into `parts`.
+
+    Raises
+    ------
+    TypeError
+        If it is no law, no sum and no cascade of laws.
+    """
+    if isinstance(thing, Sum):
+        return {"sum": _members(thing.parts, u, parts, prefix)}
+    if isinstance(thing, Cascade):
+        return {"cascade": _members(thing.stages, u, parts, prefix)}
+    first = len(parts.values)
+    if isinstance(thing, SingleValued):
+        return {"knots": [thing.u.tolist(), thing.y.tolist()], "name": "hs.SingleValued", "fields": []}
+    if isinstance(thing, Dashpot):
+        parts.values.append(thing.c)
+        parts.timed = True
+        size = 2.0 * abs(thing.c) or 1.0
+        parts.controls.append(Control("c", thing.c, -size, size, (0,)).to_json(first, prefix))
+        return {"rate": first, "name": "hs.Dashpot", "fields": [["c", first, 1.0]]}
+    if isinstance(thing, RateDependentPrandtlIshlinskii):
+        return _at_sample_time(thing, u, parts, prefix)
+    if not isinstance(thing, Law):
+        raise TypeError(
+            f"a page takes a law, or a sum or cascade of laws, got {type(thing).__name__}: plants and controllers "
+            "are exported by hysim.to_c and hysim.to_fmu"
+        )
+    node = _law(thing, parts, first)
+    names = list(thing.scalars)
+    free = tuple(names[place] for place in node["free"])
+    parts.controls += [control.to_json(first, prefix) for control in controls_of(thing, free, u)]
+    return node
+
+
+def _members(members: tuple[Any, ...], u: FloatArray, parts: Parts, prefix: str) -> list[dict[str, Any]]:
+    """The parts of a sum or the stages of a cascade; their sliders are named by them."""
+    names = [type(member).__name__ for member in members]
+    return [
+        node_of(member, u, parts, f"{prefix}{name}{f' {k + 1}' if names.count(name) > 1 else ''}: ")
+        for k, (member, name) in enumerate(zip(members, names, strict=True))
+    ]
+
+
+def _law(law: Law, parts: Parts, first: int) -> dict[str, Any]:
+    """A law by its module and the function that packs its numbers."""
+    general = _general(law)
+    packed = packing(general)
+    kernels, state = kernels_of(general), general.startable().state
+    if kernels.name not in parts.modules:
+        parts.modules[kernels.name] = module_of(kernels)
+    parts.packs.append(packed.to_js(f"pack{len(parts.packs)}"))
+    names = list(law.scalars)
+    parts.values += [float(value) for value in law.scalars.values()]
+    return {
+        "kind": type(law).__name__,
+        "name": _name(type(law)),
+        "module": kernels.name,
+        "pack": len(parts.packs) - 1,
+        "sizes": [len(packed.parameters), len(packed.memory)],
+        "work": state.size - len(packed.memory),
+        "first": first,
+        "free": [names.index(name) for name in packed.fields],
+        **_printed(law, first),
+    }
+
+
+def steps_of(thing: Any) -> list[Kernels]:
+    """The steps that a page for a model needs."""
+    if isinstance(thing, (Sum, Cascade)):
+        members = thing.parts if isinstance(thing, Sum) else thing.stages
+        return [kernels for member in members for kernels in steps_of(member)]
+    law = thing.at(1.0) if isinstance(thing, RateDependentPrandtlIshlinskii) else thing
+    return [kernels_of(_general(law))] if isinstance(law, Law) else []
+
+
+def _general(law: Law) -> Law:
+    """The law with the step that takes every value of its numbers: one with another exponent than 1 and 2."""
+    for name in law.structural:
+        try:
+            other = exchanged(law, {**law.scalars, name: law.scalars[name] + 0.5})
+        except ValueError:
+            continue
+        law = law if name in other.structural else other
+    return law
+
+
+def _printed(law: Law, first: int) -> dict[str, Any]:
+    """Fields by the places of their numbers, and the values that need not be said; or the law to begin with."""
+    names, defaults = list(law.scalars), law.defaults()
+    if not by_fields(law):
+        return {"fields": [], "base": _in_python(law), "named": [[name, first + k] for k, name in enumerate(names)]}
+    fields: list[list[Any]] = []
+    for name, value in law.arguments.items():
+        places = [first + names.index(f"{name}[{k}]") for k in range(len(value))] if isinstance(value, tuple) else None
+        fields.append([name, first + names.index(name) if places is None else places, defaults.get(name)])
+    return {"fields": fields}
+
+
+def _in_python(law: Law) -> str:
+    """The law's constructor with all its arguments."""
+    plain = {name: np.asarray(value).tolist() for name, value in law.arguments.items()}
+    return f"{_name(type(law))}({', '.join(f'{name}={value!r}' for name, value in plain.items())})"
+
+
+def _at_sample_time(law: RateDependentPrandtlIshlinskii, u: FloatArray, parts: Parts, prefix: str) -> dict[str, Any]:
+    """Plays whose widening is divided by the page's sample time."""
+    first, parts.timed = len(parts.values), True
+    node = _law(law.at(1.0), parts, first)
+    names = list(law.at(1.0).scalars)
+    place = names.index("width")
+    others = tuple(name for name in names if name in law.plays.scalars)
+    parts.controls += [control.to_json(first, prefix) for control in controls_of(law.plays, others, u, names)]
+    size = 4.0 * law.beta or 0.1
+    parts.controls.append(Control("beta", law.beta, 0.0, size, (place,)).to_json(first, prefix))
+    fields = [["beta" if name == "width" else name, *rest] for name, *rest in node["fields"]]
+    return {**node, "kind": type(law).__name__, "name": _name(type(law)), "fields": fields, "per_time": [place]}
+
+
+def _name(family: type) -> str:
+    return f"hs.{family.__name__}" if family.__module__.startswith("hysim.") else family.__name__
+
+
+# ---------------------------------------------------------------------------------- words
+
+
+def about(thing: Any) -> tuple[str, str]:
+    """First sentences about a model's family as markup, and its equation."""
+    if isinstance(thing, (Sum, Cascade)):
+        members = thing.parts if isinstance(thing, Sum) else thing.stages
+        word = "Sum" if isinstance(thing, Sum) else "Cascade"
+        return f"{word} of {', '.join(escape(type(each).__name__) for each in members)}.", ""
+    text = getdoc(type(thing)) or ""
+    summary = escape(text.split("\n\n")[0].replace("\n", " "), quote=False)
+    block = re.search(r"::\n\n((?:    .*\n|\n)+)", text.split("\nParameters\n")[0] + "\n")
+    equation = "" if block is None else "\n".join(line[4:] for line in block.group(1).strip("\n").split("\n"))
+    return re.sub(r"``?([^`]+)``?", r"<code>\1</code>", summary), equation
+
+
+def heading(thing: Any) -> str:
+    """The family of a model in a few words."""
+    if isinstance(thing, (Sum, Cascade)):
+        return about(thing)[0].rstrip(".")
+    words = re.split(r"[,;:.`]", getdoc(type(thing)) or "")[0].strip()
+    return words or type(thing).__name__
+
+
+def plane_of(node: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Places of the levels and weights of a Preisach law."""
+    if node.get("kind") not in ("Preisach", "PreisachRelays"):
+        return None
+    places = {name: place for name, place, _ in node["fields"]}
+    return {"levels": places["levels"], "weights": places["weights"]}

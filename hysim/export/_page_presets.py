@@ -1,0 +1,111 @@
+"""Models with which `hysim explore` begins: one for every family of laws, and some devices."""
+
+import math
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+import hysim as hs
+from hysim._atomic import write_text
+from hysim._frozen import FloatArray
+from hysim.export._page import Shown, page_text
+
+_DAMPER = {"u": "mm", "y": "kN"}
+_UNIT, _WIDE = (-1.0, 1.0), (-2.0, 2.0)
+_MOST_PLAYS = 20
+
+
+def presets() -> dict[str, Shown]:
+    """Names to models."""
+    return {**_differential(), **_operators()}
+
+
+def explorer(path: str | Path) -> Path:
+    """Write the page with a choice of families and devices; OSError if it cannot be written.
+
+    Parameters
+    ----------
+    path : path
+        The file to write.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Examples
+    --------
+    >>> import tempfile, pathlib
+    >>> from hysim.export import explorer
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     "Loop explorer" in explorer(pathlib.Path(folder, "explorer.html")).read_text()
+    True
+    """
+    write_text(path, _text())
+    return Path(path)
+
+
+@lru_cache(maxsize=1)
+def _text() -> str:
+    return page_text(presets(), title="Loop explorer")
+
+
+def _differential() -> dict[str, Shown]:
+    piezo = hs.PolynomialBoucWen(A=1.0, beta=0.05, gamma=-0.03, gain=-0.012, input_coefficients=(0.03, 4e-5))
+    pinching = hs.BoucWenBaberNoori(
+        beta=0.5, gamma=0.3, delta_nu=0.03, delta_eta=0.03, zeta_s=0.8, q=0.1, p=1.0, psi=0.3, lambda_=0.3
+    )
+    friction = hs.Dahl(stiffness=20.0, coulomb=4.0) + hs.Line(slope=0.25)
+    damper = hs.BoucWen(A=10.0, beta=2.0, gamma=2.0, feedthrough=0.2) + hs.Dashpot(c=0.02)
+    skew = hs.GeneralizedBoucWen(beta=0.5, gamma=0.2, b2=0.1, b4=0.1)
+    return {
+        "Bouc-Wen": Shown(hs.BoucWen(beta=0.6, gamma=0.2, feedthrough=0.1), _WIDE),
+        "Prandtl-Ishlinskii": Shown(_stack(6, 1.2), _WIDE, stack=True),
+        "Dahl": Shown(hs.Dahl(stiffness=1.0, coulomb=0.8), _WIDE),
+        "Piezo actuator": Shown(piezo, (0.0, 100.0), {"u": "V", "y": "um"}),
+        "Friction damper and spring": Shown(friction, (-8.0, 8.0), _DAMPER),
+        "Magnetorheological damper": Shown(damper, (-8.0, 8.0), _DAMPER),
+        "Baber-Noori: wear and pinching": Shown(pinching, (-4.0, 4.0), _DAMPER),
+        "Zhu-Wang: asymmetric": Shown(hs.ZhuWangBoucWen(beta=0.5, gamma=0.2, delta=0.15), _WIDE),
+        "Generalised Bouc-Wen": Shown(skew, _WIDE),
+        "Coleman-Hodgdon: magnet": Shown(hs.ColemanHodgdon(), _WIDE),
+        "Duhem": Shown(hs.Duhem(p=np.array([[1.0, -0.5]]), q=np.array([[0.3, -0.2]])), _WIDE),
+    }
+
+
+def _operators() -> dict[str, Shown]:
+    thresholds, weights = (0.0, 0.1, 0.2, 0.35, 0.5, 0.7), (0.4, 0.3, 0.2, 0.2, 0.1, 0.1)
+    bent = hs.ModifiedPrandtlIshlinskii(
+        thresholds=thresholds, weights=weights, dead_zones=(-0.4, 0.0, 0.4), dead_zone_weights=(0.3, 1.0, -0.3)
+    )
+    pushed = hs.GeneralizedPrandtlIshlinskii(thresholds=thresholds, weights=weights, left=(1.2, 1.4, 0.0, 0.0, 0.1))
+    dense = hs.ParametricPrandtlIshlinskii(exponent=-0.3, decay=0.4, weight=0.5, reach=2.0, plays=20.0)
+    timed = hs.RateDependentPrandtlIshlinskii(thresholds=thresholds, weights=weights, beta=0.005)
+    relays = (0.1, 0.1, 0.3, 0.2, 0.3, 0.1, 0.1, 0.2, 0.1, 0.1)
+    return {
+        "Prandtl-Ishlinskii: dead zones": Shown(bent, _UNIT),
+        "Prandtl-Ishlinskii: envelopes": Shown(pushed, _WIDE),
+        "Prandtl-Ishlinskii: density": Shown(dense, _UNIT),
+        "Prandtl-Ishlinskii: with the rate": Shown(timed, _UNIT),
+        "Play": Shown(hs.Play(threshold=0.25), _UNIT),
+        "Stop": Shown(hs.Stop(threshold=0.4), _UNIT),
+        "Maxwell slip": Shown(hs.MaxwellSlip(stiffness=(1.0, 1.0, 1.0), slips=(0.2, 0.5, 0.9)), (-1.5, 1.5)),
+        "Preisach": Shown(hs.Preisach.from_density(np.linspace(-1.0, 1.0, 11), _density), _UNIT),
+        "Preisach relays": Shown(hs.PreisachRelays(levels=(-1.0, -0.5, 0.0, 0.5, 1.0), weights=relays), _UNIT),
+    }
+
+
+def _stack(plays: int, reach: float) -> hs.PrandtlIshlinskii:
+    """Plays with thresholds in even steps and equal weights; the page may add more, whose weights are zero."""
+    steps = np.arange(_MOST_PLAYS + 1)
+    weights = np.where((steps > 0) & (steps <= plays), 1.0 / plays, 0.0)
+    return hs.PrandtlIshlinskii(
+        thresholds=tuple((reach * steps / plays).tolist()), weights=(0.3, *weights[1:].tolist()), z0=(0.0,)
+    )
+
+
+def _density(up: FloatArray, down: FloatArray) -> FloatArray:
+    """Weight of relays: two bells, about the diagonal and about the line where both thresholds are opposite."""
+    width, middle = up - down, 0.5 * (up + down)
+    return np.exp(-4.0 * middle**2) * np.exp(-((width - 0.5) ** 2) / 0.2) / math.sqrt(math.pi)

@@ -1,0 +1,290 @@
+// The page: sliders, their setting in the address, and what follows from it.
+
+const STEPS = 400;  // positions of a slider
+const KINDS = ["triangle", "sine", "fading", "minor loops"];
+const part = (id) => document.getElementById(id);
+
+function element(name, attributes = {}, ...children) {
+  const made = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) {
+    if (value === true) made.setAttribute(key, "");
+    else if (value !== false && value !== undefined) made.setAttribute(key, value);
+  }
+  made.append(...children);
+  return made;
+}
+
+const shortened = (value, digits = 4) => (Number.isFinite(value) ? String(Number(value.toPrecision(digits))).replace("-", "−") : "–");
+
+// A number with a slider and a box for its digits; `changed` is called with the new value.
+class Control {
+  constructor(spec, changed) {
+    Object.assign(this, { spec, changed, value: spec.value });
+    const id = `control-${spec.name.replace(/[^\w-]/g, "_")}`;
+    this.slider = element("input", { type: "range", id, min: 0, max: spec.whole ? spec.upper - spec.lower : STEPS, step: 1, "data-name": spec.name });
+    this.box = element("input", { type: "number", step: "any", "aria-label": `${spec.name}, value` });
+    const label = element("label", { for: id }, spec.label ?? spec.name, ...(spec.unit ? [" ", element("small", {}, spec.unit)] : []));
+    this.element = element("div", { class: "control" }, label, this.box, this.slider);
+    this.slider.addEventListener("input", () => this.set(this.at(Number(this.slider.value)), true));
+    this.box.addEventListener("change", () => {
+      const value = this.box.valueAsNumber;
+      this.set(Number.isFinite(value) ? Math.min(Math.max(value, spec.lower), spec.upper) : this.value, true);
+    });
+    this.show();
+  }
+
+  // Value at a position: of few digits, so that it can be read and copied.
+  at(position) {
+    const { lower, upper, log, whole } = this.spec;
+    if (whole) return lower + position;
+    if (position <= 0) return lower;
+    if (position >= STEPS) return upper;
+    if (log) return Number((lower * (upper / lower) ** (position / STEPS)).toPrecision(4));
+    const digits = Math.min(100, Math.max(0, 2 - Math.floor(Math.log10((upper - lower) / STEPS))));
+    return Number((lower + ((upper - lower) * position) / STEPS).toFixed(digits));
+  }
+
+  position() {
+    const { lower, upper, log, whole } = this.spec;
+    if (whole) return this.value - lower;
+    return STEPS * (log ? Math.log(this.value / lower) / Math.log(upper / lower) : (this.value - lower) / (upper - lower));
+  }
+
+  set(value, tell = false) {
+    this.value = value;
+    this.show();
+    if (tell) this.changed();
+  }
+
+  show() {
+    this.slider.value = this.position();
+    this.slider.setAttribute("aria-valuetext", `${shortened(this.value)} ${this.spec.unit ?? ""}`.trim());
+    this.box.value = Number(this.value.toPrecision(6));
+    this.element.classList.toggle("changed", this.value !== this.spec.value);
+  }
+}
+
+class Page {
+  constructor(data, steps) {
+    Object.assign(this, { data, steps, times: [], controls: [], inputs: [] });
+    this.cycle = data.record && data.record.cycle ? cycleOf(data.record.u, data.record.cycle) : null;
+    part("model").append(...data.models.map((model, k) => element("option", { value: k }, model.name)));
+    part("models").hidden = data.models.length < 2;
+    part("kind").append(...[...(data.record ? ["record"] : []), ...KINDS].map((kind) =>
+      element("option", { value: kind }, kind === "record" ? `measured: ${data.record.name}` : kind)));
+    part("model").addEventListener("change", () => (this.choose(Number(part("model").value)), this.refit(), this.share()));
+    part("kind").addEventListener("change", () => (this.showInputs(), this.refit(), this.share()));
+    part("reset").addEventListener("click", () => (this.choose(this.chosen), this.refit(), this.share()));
+    part("refit").addEventListener("click", () => this.refit());
+    part("link").addEventListener("click", () => this.copy(location.href, part("link")));
+    part("copy").addEventListener("click", () => this.copy(part("code").textContent, part("copy")));
+    window.addEventListener("hashchange", () => (this.read(), this.refit()));
+    new ResizeObserver(() => this.later()).observe(part("loop"));
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.later());
+    this.read();
+    this.refit();
+  }
+
+  get model() {
+    return this.data.models[this.chosen];
+  }
+
+  // A model with its sliders at their first values.
+  choose(k) {
+    this.chosen = k;
+    const { model } = this, changed = () => (this.later(), this.share());
+    part("model").value = k;
+    part("about").innerHTML = model.about;
+    part("equation").textContent = model.equation;
+    part("equation").hidden = !model.equation;
+    this.controls = model.controls.map((spec) => new Control(spec, changed));
+    part("parameters").replaceChildren(...this.controls.map((control) => control.element));
+    this.inputs = model.inputs.map((spec) => new Control(spec, changed));
+    part("inputs").replaceChildren(...this.inputs.map((control) => control.element));
+    part("kind").value = this.data.record ? "record" : model.kind;
+    this.showInputs();
+  }
+
+  showInputs() {
+    const kind = part("kind").value;
+    const used = { amplitude: true, middle: true, cycles: true, "smaller loops": ["fading", "minor loops"].includes(kind), period: this.model.timed };
+    for (const control of this.inputs) control.element.hidden = kind === "record" ? control.spec.name !== "period" || !this.model.timed : !used[control.spec.name];
+  }
+
+  // The setting is what differs from the start, by name.
+  share() {
+    const setting = new URLSearchParams();
+    if (this.chosen) setting.set("model", this.model.name);
+    if (part("kind").value !== (this.data.record ? "record" : this.model.kind)) setting.set("input", part("kind").value);
+    for (const control of [...this.controls, ...this.inputs]) {
+      if (control.value !== control.spec.value) setting.set(control.spec.name, control.value);
+    }
+    const text = `${setting}`;
+    try {
+      history.replaceState(null, "", text ? `#${text}` : "#");
+    } catch {
+      location.hash = text;
+    }
+  }
+
+  read() {
+    const setting = new URLSearchParams(location.hash.slice(1));
+    const named = this.data.models.findIndex((model) => model.name === setting.get("model"));
+    this.choose(Math.max(named, 0));
+    if ([...part("kind").options].some((option) => option.value === setting.get("input"))) part("kind").value = setting.get("input");
+    for (const control of [...this.controls, ...this.inputs]) {
+      const { name, lower, upper } = control.spec, value = Number(setting.get(name));
+      if (setting.has(name) && Number.isFinite(value)) control.set(Math.min(Math.max(value, lower), upper));
+    }
+    this.showInputs();
+  }
+
+  async copy(text, button) {
+    const before = button.textContent;
+    try {
+      await navigator.clipboard.writeText(text);
+    } catch {
+      const area = element("textarea");
+      area.value = text;
+      document.body.append(area);
+      area.select();
+      document.execCommand("copy");
+      area.remove();
+    }
+    button.textContent = "Copied";
+    setTimeout(() => (button.textContent = before), 1200);
+  }
+
+  // ------------------------------------------------------------------------------ what follows from the setting
+
+  numbers(controls = this.controls.map((control) => control.value)) {
+    const values = Float64Array.from(this.model.values);
+    this.model.controls.forEach(({ places, scale, stack }, k) => {
+      for (const place of stack ? [] : places) values[place] = scale ? this.model.values[place] * controls[k] : controls[k];
+    });
+    const stack = Object.fromEntries(this.model.controls.map(({ stack: role, places }, k) => [role, { value: controls[k], places }]));
+    if (stack.plays) {
+      const plays = stack.plays.value;
+      stack.reach.places.forEach((place, k) => (values[place] = Number(((stack.reach.value * (k + 1)) / plays).toPrecision(6))));
+      stack.weight.places.forEach((place, k) => (values[place] = k < plays ? Number((stack.weight.value / plays).toPrecision(6)) : 0));
+    }
+    return values;
+  }
+
+  input() {
+    const kind = part("kind").value, { record } = this.data;
+    const setting = Object.fromEntries(this.inputs.map(({ spec, value }) => [spec.name === "smaller loops" ? "smaller" : spec.name, value]));
+    const key = JSON.stringify([this.chosen, kind, setting]);
+    if (this.drive?.key !== key) {
+      const made = kind === "record" ? { u: record.u, cycle: this.cycle } : generated({ ...setting, kind });
+      if (kind !== "record") made.cycle = cycleOf(made.u, made.cycle);
+      const sampleTime = kind === "record" && record.sampleTime ? record.sampleTime : setting.period / (2 * (made.each ?? SAMPLES / 2));
+      this.drive = { ...made, key, kind, setting, sampleTime };
+      this.drive.first = this.run(this.numbers(this.model.controls.map((control) => control.value)));
+    }
+    return this.drive;
+  }
+
+  run(values) {
+    return response(this.model.node, values, this.drive.u, this.steps, this.drive.sampleTime);
+  }
+
+  later() {
+    this.waiting ??= requestAnimationFrame(() => {
+      this.waiting = undefined;
+      this.draw();
+    });
+  }
+
+  refit() {
+    this.limits = null;
+    this.draw();
+  }
+
+  draw() {
+    const begin = performance.now();
+    const drive = this.input(), values = this.numbers(), y = this.run(values), { record } = this.data;
+    const finite = y.every(Number.isFinite), isMeasured = drive.kind === "record";
+    const measures = finite ? loopMeasures(drive.cycle, y) : null;
+    const fit = finite && isMeasured ? fitMeasures(record.y, y) : null;
+    const outputs = [y, drive.first, ...(isMeasured ? [record.y] : [])].filter((each) => each.every(Number.isFinite));
+    this.limits ??= [padded(range(drive.u)), padded(range(outputs.flatMap((each) => range(each))))];
+    const isFirst = this.controls.every((control) => control.value === control.spec.value);
+    const { labels } = this.model, path = drive.cycle && !drive.cycle.cuts.length ? drive.cycle.path : null;
+    const least = drawLoop(part("loop"), this.limits, {
+      u: drive.u, y, measures, path, first: isFirst ? null : drive.first, measured: isMeasured ? record.y : null,
+      labels: { xlabel: labels.u, ylabel: labels.y },
+    });
+    drawInput(part("input"), this.limits[0], { u: drive.u, path, labels: { ylabel: labels.unit.u || "u" }, least });
+    this.drawMemory(drive.u, values);
+    this.state = { model: this.model.name, values, u: drive.u, y, measures, fit, input: { kind: drive.kind, ...drive.setting } };
+    this.tell(finite, isFirst, isMeasured);
+    this.times.push(performance.now() - begin);
+  }
+
+  drawMemory(u, values) {
+    const { plane, labels } = this.model;
+    part("memory").hidden = !plane;
+    if (!plane) return;
+    const levels = plane.levels.map((place) => values[place]), weights = plane.weights.map((place) => values[place]);
+    drawPlane(part("plane"), { levels, weights, u, labels: { xlabel: "down at", ylabel: "up at" } });
+  }
+
+  tell(finite, isFirst, isMeasured) {
+    const { measures, fit, values } = this.state, { labels, node } = this.model;
+    part("warning").hidden = finite;
+    part("first-key").hidden = isFirst;
+    part("measured-key").hidden = !isMeasured;
+    const outside = finite && [this.state.u, this.state.y].some((signal, k) => {
+      const [low, high] = range(signal);
+      return low < this.limits[k][0] || high > this.limits[k][1] || (high - low) < 0.3 * (this.limits[k][1] - this.limits[k][0]);
+    });
+    part("refit").classList.toggle("wanted", outside);
+    rows(part("loop-rows"), measures ? loopRows(measures, labels.unit) : [["measures", "no complete cycle"]]);
+    rows(part("fit-rows"), fit ? [["fit", `${shortened(fit.fit_percent)} %`], ["rmse", `${shortened(fit.rmse)} ${labels.unit.y}`.trim()]] : []);
+    part("fit").hidden = !fit;
+    const facts = factsOf(node, values);
+    rows(part("law-rows"), facts);
+    part("law").hidden = !facts.length;
+    part("code").textContent = codeOf(this.model, values, this.drive, this.data.record);
+    part("loop").setAttribute("aria-label", described(measures, labels));
+  }
+}
+
+function described(measures, labels) {
+  if (!measures) return `Loop of ${labels.y} over ${labels.u}`;
+  return `Loop of ${labels.y} over ${labels.u}, ${measures.orientation}, largest width ${shortened(measures.max_width)} at ${shortened(measures.max_width_at)}`;
+}
+
+function rows(body, pairs) {
+  body.replaceChildren(...pairs.map(([name, value]) => element("tr", {}, element("th", { scope: "row" }, name), element("td", {}, value))));
+}
+
+const percent = (share) => (Number.isFinite(share) ? `${shortened(100 * share, 3)} %` : "–");
+
+function loopRows(loop, { u, y }) {
+  const both = [y, u].filter(Boolean).join(" ");
+  return [
+    ["largest width", `${shortened(loop.max_width)} ${y}`],
+    ["at the input", `${shortened(loop.max_width_at)} ${u}`],
+    ["relative width", percent(loop.relative_width)],
+    ["mean width", `${shortened(loop.mean_width)} ${y}`],
+    ["area", `${shortened(loop.area)} ${both}`],
+    ["stroke", `${shortened(loop.stroke)} ${y}`],
+    ["orientation", loop.orientation],
+    ["closure gap", `${shortened(Math.abs(loop.closure_gap) < 1e-12 * loop.stroke ? 0 : loop.closure_gap, 2)} ${y}`],
+    ["secant stiffness", shortened(loop.secant_stiffness)],
+    ["equivalent damping", percent(Math.abs(loop.equivalent_damping))],
+  ];
+}
+
+async function opened(data, packs) {
+  for (const model of data.models) for (const law of lawsOf(model.node)) law.packed = packs[law.pack];
+  const names = Object.keys(data.modules);
+  const steps = Object.fromEntries(await Promise.all(names.map(async (name) => [name, await Step.of(data.modules[name])])));
+  if (data.record) {
+    for (const signal of ["u", "y"]) data.record[signal] = new Float64Array(await inflated(data.record[signal]));
+  }
+  window.hysim = new Page(data, steps);
+  document.documentElement.dataset.ready = "yes";
+}

@@ -1,0 +1,61 @@
+// A law's step in WebAssembly, and models made of laws: sums, cascades.
+
+async function inflated(text) {
+  const bytes = Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Response(stream).arrayBuffer();
+}
+
+class Step {
+  constructor(instance) {
+    this.exports = instance.exports;
+    if (this.exports._initialize) this.exports._initialize();
+  }
+
+  static async of(text) {
+    return new Step((await WebAssembly.instantiate(await inflated(text))).instance);
+  }
+
+  // Outputs at the inputs u; memory is the front of the state before the first sample, its first place that of u.
+  outputs(parameters, memory, work, u) {
+    const { memory: linear, __heap_base: base, begin, run } = this.exports;
+    const sizes = [parameters.length, memory.length + work, u.length, u.length];
+    const total = sizes.reduce((sum, size) => sum + size, 0);
+    const first = Math.ceil(base.value / 8) * 8;
+    const lacking = first + 8 * total - linear.buffer.byteLength;
+    if (lacking > 0) linear.grow(Math.ceil(lacking / 65536));
+    const room = new Float64Array(linear.buffer, first, total);
+    const places = sizes.map((_, k) => sizes.slice(0, k).reduce((sum, size) => sum + size, 0));
+    room.set(parameters, 0);
+    room.fill(0, places[1], places[2]);
+    room.set(memory, places[1]);
+    room.set(u, places[2]);
+    const [p, s, x, y] = places.map((place) => first + 8 * place);
+    begin(p, sizes[0], s, sizes[1], u[0]);
+    run(p, sizes[0], s, sizes[1], x, y, u.length);
+    return room.slice(places[3]);
+  }
+}
+
+// Output of a law, a sum or a cascade; values are the numbers of all its laws.
+function response(node, values, u, steps, sampleTime) {
+  if (node.sum) {
+    const terms = node.sum.map((part) => response(part, values, u, steps, sampleTime));
+    return terms[0].map((_, k) => terms.reduce((total, term) => total + term[k], 0));
+  }
+  if (node.cascade) {
+    return node.cascade.reduce((signal, stage) => response(stage, values, signal, steps, sampleTime), u);
+  }
+  if (node.knots) return Float64Array.from(u, (value) => interpolated([value], ...node.knots)[0]);
+  if ("rate" in node) return u.map((value, k) => (values[node.rate] * (value - u[Math.max(k - 1, 0)])) / sampleTime);
+  const { first, free, per_time: perTime = [], sizes } = node;
+  const fields = free.map((place) => values[first + place] / (perTime.includes(place) ? sampleTime : 1));
+  const [parameters, memory] = sizes.map((size) => new Float64Array(size));
+  node.packed(fields, parameters, memory);
+  return steps[node.module].outputs(parameters, memory, node.work, u);
+}
+
+function lawsOf(node) {
+  const parts = node.sum || node.cascade;
+  return parts ? parts.flatMap(lawsOf) : "pack" in node ? [node] : [];
+}

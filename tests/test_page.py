@@ -1,0 +1,423 @@
+"""Pages for a browser: one file that loads nothing, and that computes what Python computes."""
+
+import base64
+import dataclasses
+import gzip
+import json
+import os
+import re
+import shutil
+import subprocess
+import time
+import urllib.request
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hysim as hs
+from hysim.cli import main
+from hysim.export import explorer
+from hysim.export._page import LARGEST, Shown, page_text, to_page
+from hysim.export._page_model import steps_of
+from hysim.export._page_modules import FOLDER, c_source, compiled, module_of
+from hysim.export._page_presets import presets
+from hysim.models.model import every_family
+from hysim.paper.reproduction import browser_page
+
+WASM = Path(hs.__file__).parent / "export" / FOLDER
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+PATIENCE = 60.0  # seconds; nothing waits longer than it must
+LAW = hs.BoucWen(beta=0.03, gamma=0.02, gain=-0.01, feedthrough=0.03)
+
+
+@pytest.fixture(scope="module")
+def models():
+    return presets()
+
+
+@pytest.fixture(scope="module")
+def all_steps(models):
+    return {each.name: each for shown in models.values() for each in steps_of(shown.model)}
+
+
+def data_of(text):
+    """The numbers in a page."""
+    return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)[1])
+
+
+def test_a_page_is_one_small_file_that_loads_nothing(tmp_path):
+    record = hs.datasets.table1()
+    page = to_page(LAW, tmp_path / "law.html", record)
+    text = page.read_text(encoding="utf-8")
+    assert page == tmp_path / "law.html"
+    assert page.stat().st_size < LARGEST
+    assert not re.search(r"https?:|//\w+\.\w|@import|url\(|<link(?! rel=\"icon\" href=\"data:,\")| src=", text)
+    assert "default-src 'none'; connect-src 'none'" in text
+    assert text == page_text({"Symmetric Bouc-Wen law": Shown(LAW)}, record)
+
+
+def test_the_record_is_in_the_page_to_the_last_bit():
+    record = hs.datasets.table1()
+    data = data_of(page_text({"law": Shown(LAW)}, record))
+    for signal, values in (("u", record.u), ("y", record.y)):
+        held = np.frombuffer(gzip.decompress(base64.b64decode(data["record"][signal])), "<f8")
+        np.testing.assert_array_equal(held, values)
+
+
+@pytest.mark.parametrize("name", ["</script><b>", "<!-- <script>", '"&amp;', "\u2028"])
+def test_names_are_text_wherever_they_stand(name):
+    record = dataclasses.replace(hs.datasets.table1(), name=name)
+    text = page_text({name: Shown(LAW)}, record)
+    assert data_of(text)["record"]["name"] == data_of(text)["models"][0]["name"] == name
+    assert text.count("<script") == text.count("</script>") == 2
+    assert "<b>" not in text
+
+
+def test_a_page_that_would_be_too_large_says_what_to_do(tmp_path):
+    u = np.random.default_rng(1).random(20_000)
+    with pytest.raises(ValueError, match=r"the page would have \d+ bytes, more than 250000: .*20000 samples"):
+        to_page(hs.Line(slope=2.0), tmp_path / "law.html", hs.Record(u=u, y=u))
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_is_no_law_is_refused_with_what_takes_it(tmp_path):
+    with pytest.raises(TypeError, match=r"a page takes a law, .* got TransferFunction: plants .* by hysim.to_c"):
+        to_page(hs.TransferFunction(num=(1.0,), den=(1.0, 1.0)), tmp_path / "plant.html")
+    with pytest.raises(ValueError, match=r"between must be \(lowest, highest input\)"):
+        to_page(LAW, tmp_path / "law.html", between=(1.0, 1.0))
+
+
+def test_every_slider_begins_at_the_law_and_ends_inside_what_it_takes(models, tmp_path):
+    data = data_of(explorer(tmp_path / "explorer.html").read_text(encoding="utf-8"))
+    for model in data["models"]:
+        name = model["name"]
+        shown = models[name]
+        assert model["controls"], name
+        names = [control["name"] for control in [*model["controls"], *model["inputs"]]]
+        assert len(set(names)) == len(names), name
+        for control in model["controls"]:
+            assert control["lower"] < control["upper"], (name, control)
+            assert control["lower"] <= control["value"] <= control["upper"], (name, control)
+            assert not control.get("log") or control["lower"] > 0.0, (name, control)
+            scale = control.get("scale")
+            if len(control["places"]) == 1 and not scale and not shown.stack:
+                assert model["values"][control["places"][0]] == control["value"], (name, control)
+
+
+def test_the_explorer_has_every_family_of_laws(models, tmp_path):
+    shown = {type(part).__name__ for each in models.values() for part in _parts(each.model)}
+    laws = {name for name, family in every_family().items() if family.__module__.startswith("hysim.laws.")}
+    assert laws - shown <= {"SingleValued"}  # a curve of knots, which no slider moves
+    assert explorer(tmp_path / "explorer.html").stat().st_size < LARGEST
+
+
+def _parts(model):
+    return [part for each in model.parts for part in _parts(each)] if isinstance(model, hs.Sum) else [model]
+
+
+def test_the_package_has_the_modules_of_all_steps_and_no_others(all_steps):
+    assert {path.name for path in WASM.iterdir()} == {f"{name}.wasm.gz" for name in all_steps}
+
+
+def test_the_command_writes_the_same_page(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    rows = [
+        f"{u},{y}" for u, y in zip(*(hs.datasets.table1()[:].u.tolist(), hs.datasets.table1().y.tolist()), strict=True)
+    ]
+    Path("loop.csv").write_text("\n".join(["voltage [V],displacement [um]", *rows]))
+    hs.save(LAW, "law.json", units={"u": "V", "y": "um"})
+    columns = ("--u", "voltage", "--y", "displacement")
+    assert main(["page", "law.json", "--out", "page.html", "--data", "loop.csv", *columns, "--title", "Mine"]) == 0
+    record = hs.load("loop.csv", u="voltage", y="displacement")
+    assert Path("page.html").read_text(encoding="utf-8") == page_text({"Mine": Shown(LAW)}, record)
+    assert main(["explore", "--no-browser", "--out", "explorer.html"]) == 0
+    assert capsys.readouterr().out == "explorer.html\n"
+    assert main(["page", "law.json", "--out", "no/page.html"]) == 2
+
+
+def test_the_report_has_a_page_of_the_identified_law_on_request(reproduction):
+    findings = reproduction.findings
+    assert "table1.html" not in reproduction.files
+    (name, text), *others = browser_page(findings).items()
+    assert (name, others) == ("table1.html", [])
+    data = data_of(text)
+    law = findings.study.fits["bouc-wen"].model
+    assert data["models"][0]["values"] == list(law.scalars.values())
+    assert data["models"][0]["labels"]["u"] == "Voltage [V]"
+    assert len(text.encode()) < LARGEST
+
+
+# ---------------------------------------------------------------------------------- modules
+
+
+@pytest.mark.extra("wasmtime")
+@pytest.mark.parametrize("name", [name for name in presets() if "rate" not in name])
+def test_modules_compute_what_python_computes(models, name):
+    rng = np.random.default_rng(len(name))
+    shown = models[name]
+    low, high = shown.between
+    u = low + (high - low) * np.concatenate([rng.random(200), np.linspace(0.0, 1.0, 40), np.full(3, 0.5)])
+    for law in _parts(shown.model):
+        if isinstance(law, hs.Dashpot):
+            continue
+        expected = law.response(u)
+        np.testing.assert_allclose(by_module(law, u), expected, rtol=0.0, atol=1e-12 * np.ptp(expected))
+
+
+def by_module(law, u):
+    """Outputs of a law by its module under wasmtime."""
+    import wasmtime
+
+    engine = wasmtime.Engine()
+    store = wasmtime.Store(engine)
+    (kernels,) = steps_of(law)
+    module = wasmtime.Module(engine, gzip.decompress(module_of(kernels)))
+    assert not module.imports
+    exports = wasmtime.Instance(store, module, []).exports(store)
+    general = law if not law.structural or "n" not in law.structural else dataclasses.replace(law, n=1.5)
+    parameters, state = law.startable().parameters, np.zeros(general.startable().state.size)
+    front = law.packed[1]
+    state[: front.size] = front
+    arrays = [np.asarray(parameters), state, u, np.zeros(u.size)]
+    base = (exports["__heap_base"].value(store) + 7) // 8 * 8
+    places = (base + 8 * np.cumsum([0, *(each.size for each in arrays)])).tolist()
+    memory = exports["memory"]
+    if (lacking := places[-1] - memory.data_len(store)) > 0:
+        memory.grow(store, -(-lacking // 65536))
+    memory.write(store, np.concatenate(arrays).tobytes(), base)
+    sizes = [parameters.size, state.size]
+    exports["begin"](store, places[0], sizes[0], places[1], sizes[1], float(u[0]))
+    exports["run"](store, places[0], sizes[0], places[1], sizes[1], places[2], places[3], u.size)
+    return np.frombuffer(bytes(memory.read(store, places[3], places[4])), "<f8")
+
+
+@pytest.mark.extra("ziglang")
+def test_the_modules_of_the_package_are_those_of_the_sources(all_steps):
+    for name in ("clamps_step", "boucwen_linear_step"):
+        assert gzip.decompress(WASM.joinpath(f"{name}.wasm.gz").read_bytes()) == compiled(c_source(all_steps[name])), (
+            f"{name} has changed: python -m hysim.export.build_pages"
+        )
+
+
+@pytest.mark.extra("ziglang")
+def test_a_law_of_the_user_has_a_page(tmp_path):
+    from square_dahl import SquareDahl
+
+    text = to_page(SquareDahl(), tmp_path / "own.html").read_text()
+    assert [control["name"] for control in data_of(text)["models"][0]["controls"]][:2] == ["k", "coulomb"]
+
+
+# ---------------------------------------------------------------------------------- in a browser
+
+
+def wait_for(condition):
+    """The condition's value once it is true."""
+    end = time.monotonic() + PATIENCE
+    while not (value := condition()):
+        assert time.monotonic() < end, "waited too long"
+        time.sleep(0.02)
+    return value
+
+
+def answer(url):
+    """The body at a local address; None while nobody answers."""
+    try:
+        with urllib.request.urlopen(url, timeout=PATIENCE) as response:
+            return response.read()
+    except OSError:
+        return None
+
+
+class Browser:
+    """A page of a browser, over the DevTools protocol."""
+
+    def __init__(self, socket):
+        self.socket, self.count, self.events = socket, 0, []
+
+    def send(self, method, **parameters):
+        self.count += 1
+        self.socket.send(json.dumps({"id": self.count, "method": method, "params": parameters}))
+        while (message := json.loads(self.socket.recv(PATIENCE))).get("id") != self.count:
+            self.events.append(message)
+        return message["result"]
+
+    def value(self, expression):
+        result = self.send("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+        assert "exceptionDetails" not in result, result
+        return result["result"].get("value")
+
+    def open(self, path, fragment=""):
+        self.events.clear()
+        self.send("Page.navigate", url="about:blank")
+        self.send("Page.navigate", url=path.as_uri() + fragment)
+        wait_for(lambda: self.value("document.documentElement?.dataset.ready") == "yes")
+
+    def press(self, slider, key, times=1):
+        """Keys on a slider, and the state of the page once it is drawn again."""
+        self.value(f"document.querySelectorAll('input[type=range]')[{slider}].focus()")
+        for _ in range(times):
+            for kind in ("keyDown", "keyUp"):
+                self.send("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=CODES[key])
+        return self.drawn()
+
+    def choose(self, select, value):
+        self.value(
+            f"(() => {{ const list = document.getElementById('{select}'); list.value = {json.dumps(value)};"
+            " list.dispatchEvent(new Event('change')); })()"
+        )
+        return self.drawn()
+
+    def drawn(self):
+        return self.value(
+            "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => {"
+            " const s = window.hysim.state;"
+            "done({...s, values: Array.from(s.values), u: Array.from(s.u), y: Array.from(s.y),"
+            " code: document.getElementById('code').textContent, address: location.hash}); })))"
+        )
+
+    def requests(self):
+        names = [
+            event["params"]["request"]["url"] for event in self.events if event["method"] == "Network.requestWillBeSent"
+        ]
+        return [name for name in names if not name.startswith(("data:", "about:"))]
+
+
+CODES = {"ArrowRight": 39, "ArrowLeft": 37, "PageUp": 33, "Home": 36, "End": 35}
+
+
+@contextmanager
+def started(folder):
+    """A browser without a window."""
+    from websockets.sync.client import connect
+
+    quiet = [
+        "--headless",
+        "--disable-gpu",
+        "--no-first-run",
+        "--disable-background-networking",
+        "--remote-debugging-port=0",
+    ]
+    if os.geteuid() == 0:
+        quiet.append("--no-sandbox")  # which the browser does not start for root
+    command = [BROWSER, *quiet, f"--user-data-dir={folder}", "about:blank"]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as running:
+        try:
+            port = folder / "DevToolsActivePort"
+            number = wait_for(lambda: port.exists() and port.read_text().split())[0]
+            targets = wait_for(lambda: json.loads(answer(f"http://127.0.0.1:{number}/json") or "[]"))
+            (target,) = [target for target in targets if target["type"] == "page"]
+            with connect(target["webSocketDebuggerUrl"], max_size=None) as tools:
+                browser = Browser(tools)
+                for domain in ("Page", "Network", "Runtime"):
+                    browser.send(f"{domain}.enable")
+                yield browser
+        finally:
+            running.terminate()
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    pytest.importorskip("websockets")
+    if BROWSER is None:
+        pytest.skip("no chromium is installed")
+    with started(tmp_path_factory.mktemp("browser")) as opened:
+        opened.send("Emulation.setDeviceMetricsOverride", width=1280, height=900, deviceScaleFactor=1, mobile=False)
+        yield opened
+
+
+def assert_as_python(state, record=None):
+    """The page's output, its measures and the code that it shows are those of Python."""
+    namespace = {"measured": record}
+    exec(state["code"].replace('hs.load("measured.csv")', "measured"), namespace)
+    y = namespace["y"]
+    span = np.ptp(y)
+    np.testing.assert_allclose(state["y"], y, rtol=0.0, atol=1e-9 * span)
+    loop = hs.loop_metrics(state["u"], y)
+    scale = np.ptp(state["u"]) * span
+    for name in ("max_width", "mean_width", "mid_width", "area", "stroke", "closure_gap", "energy", "secant_stiffness"):
+        assert state["measures"][name] == pytest.approx(vars(loop)[name], rel=1e-9, abs=1e-9 * max(scale, span)), name
+    assert state["measures"]["orientation"] == loop.orientation
+    return y
+
+
+@pytest.mark.browser
+@pytest.mark.extra("websockets")
+def test_every_model_of_the_explorer_follows_its_sliders_as_python_does(browser, models, tmp_path):
+    browser.open(explorer(tmp_path / "explorer.html"))
+    for place, name in enumerate(models):
+        state = browser.choose("model", str(place))
+        assert state["model"] == name
+        assert_as_python(state)
+        sliders = len(browser.value("window.hysim.model.controls.map(control => control.name)"))
+        for slider in range(min(sliders, 4)):
+            moved = browser.press(slider, "ArrowRight", times=7)
+            assert moved["values"] != state["values"], (name, slider)
+        assert_as_python(moved)
+    assert len(browser.requests()) == 1  # the page itself
+
+
+@pytest.mark.browser
+@pytest.mark.extra("websockets")
+def test_a_record_is_compared_and_a_redraw_is_quick(browser, tmp_path):
+    record = hs.datasets.table1()
+    page = to_page(hs.Dahl(stiffness=0.02, coulomb=5.0) + hs.Line(slope=0.01), tmp_path / "page.html", record)
+    browser.open(page)
+    state = browser.press(0, "PageUp", times=2)
+    y = assert_as_python(state, record)
+    assert state["fit"]["fit_percent"] == pytest.approx(hs.metrics.fit_percent(record.y, y), rel=1e-9)
+    assert state["fit"]["rmse"] == pytest.approx(hs.metrics.rmse(record.y, y), rel=1e-9)
+    for kind in ("triangle", "sine", "fading", "minor loops"):
+        assert_as_python(browser.choose("kind", kind))
+    wide = browser.choose("kind", "triangle")
+    assert len(wide["u"]) > 1990
+    browser.value("window.hysim.times.length = 0")
+    browser.press(0, "ArrowRight", times=40)
+    times = browser.value("window.hysim.times")
+    assert np.median(times) <= 8.0, times
+
+
+@pytest.mark.browser
+@pytest.mark.extra("websockets")
+def test_the_address_holds_the_setting_and_reset_takes_it_back(browser, tmp_path):
+    page = to_page(hs.BoucWen(), tmp_path / "page.html")
+    browser.open(page)
+    first = browser.drawn()
+    assert first["address"] == ""
+    browser.choose("kind", "fading")
+    set_ = browser.press(1, "End")
+    browser.open(page, set_["address"])
+    again = browser.drawn()
+    assert again["values"] == set_["values"] != first["values"]
+    assert again["u"] == set_["u"]
+    browser.value("document.getElementById('reset').click()")
+    assert browser.drawn()["values"] == first["values"]
+
+
+@pytest.mark.browser
+@pytest.mark.extra("websockets")
+def test_axes_stay_while_a_slider_moves_until_they_are_fitted(browser, tmp_path):
+    browser.open(to_page(hs.BoucWen(), tmp_path / "page.html"))
+    limits = browser.value("window.hysim.limits")
+    gain = browser.value("window.hysim.model.controls.findIndex(control => control.name === 'gain')")
+    browser.press(gain, "Home")
+    assert browser.value("window.hysim.limits") == limits
+    browser.press(gain, "End")
+    assert browser.value("document.getElementById('refit').className") == "wanted"
+    browser.value("document.getElementById('refit').click()")
+    assert browser.value("window.hysim.limits") != limits
+    assert browser.value("document.getElementById('refit').className") == ""
+
+
+@pytest.mark.browser
+@pytest.mark.extra("websockets")
+@pytest.mark.parametrize("width", [390, 1280])
+def test_nothing_is_wider_than_the_window(browser, tmp_path, width):
+    browser.open(to_page(LAW, tmp_path / "page.html", hs.datasets.table1()))
+    browser.send("Emulation.setDeviceMetricsOverride", width=width, height=844, deviceScaleFactor=1, mobile=width < 500)
+    assert browser.value("document.documentElement.scrollWidth") <= width
+    assert browser.value(
+        "[...document.querySelectorAll('input, select')].every(each => each.labels.length || each.ariaLabel)"
+    )
+    browser.send("Emulation.setDeviceMetricsOverride", width=1280, height=900, deviceScaleFactor=1, mobile=False)
