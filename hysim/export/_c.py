@@ -33,6 +33,16 @@ RESERVED = frozenset(
 )
 """Words that are no names in C."""
 
+MATHEMATICS = frozenset(
+    """
+    acos acosh asin asinh atan atan2 atanh copysign cos cosh erf erfc exp expm1 fabs fmod hypot lgamma log log10 log1p
+    log2 pow sin sinh sqrt tan tanh ceil floor trunc
+    """.split()  # noqa: SIM905
+)
+"""Functions of `math` that C has; the last three are whole numbers in Python, as doubles they do not overflow."""
+TESTS = frozenset(("isfinite", "isinf", "isnan"))
+"""Functions of `math` with a truth value."""
+
 
 def number(value: float) -> str:
     """A double in C, with all its digits."""
