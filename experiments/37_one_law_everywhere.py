@@ -29,7 +29,7 @@ from hysim.kernels.stepping import drive
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from exported_steps import SAMPLE_TIME, THINGS, Array, Case, cases, shape
+from exported_steps import SAMPLE_TIME, THINGS, Array, Case, cases
 from results_folder import write_results
 from step_runners import (
     STRICT,
@@ -39,6 +39,7 @@ from step_runners import (
     checked,
     code_bytes,
     fields_of,
+    fixed_of,
     has_fmpy,
     has_wasm,
     least_seconds,
@@ -148,11 +149,8 @@ def in_units(group: Sequence[Case], version: str, place: Path) -> list[float]:
     found = []
     for each in group:
         is_law = isinstance(each.thing, hs.Law)
-        key = (
-            (tuple(fields_of(each)), each.parameters.size, each.state.size, shape(each.thing))
-            if is_law
-            else id(each.thing)
-        )
+        sizes = each.parameters.size, each.state.size
+        key = (tuple(fields_of(each)), fixed_of(each), sizes) if is_law else id(each.thing)
         if key not in units:
             most = UNITS_OF_A_FAMILY if is_law else UNITS_OF_ONE_THING
             if len(units) == most or (not is_law and units and each.kind == "random"):  # the second one: hostile inputs

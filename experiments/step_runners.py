@@ -12,14 +12,13 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from exported_steps import SAMPLE_TIME, Array, Case
 
 import hysim as hs
-from hysim.export import program_of
-from hysim.export._fmu import Options, archive
+from hysim.export._packing import packing
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-ffp-contract=off", "-O2")
 CHECKED = ("-std=c99", "-ffp-contract=off", "-O1", "-g", "-fsanitize=address,undefined,float-cast-overflow",
@@ -231,21 +230,22 @@ def has_fmpy() -> bool:
 class Unit:
     """A program as a functional mock-up unit in FMPy, validated; laws of one shape are set by its parameters."""
 
-    def __init__(self, case: Case, version: str, target: Path) -> None:
+    def __init__(self, case: Case, version: Literal["2.0", "3.0"], target: Path) -> None:
         import fmpy
         from fmpy.validation import validate_fmu
 
         path = target.with_suffix(".fmu")
-        program = program_of(case.thing, SAMPLE_TIME, tunable=True)
-        path.write_bytes(archive(program, Options("Unit", version, None, {}, 0.0)))
+        hs.to_fmu(case.thing, path, version, SAMPLE_TIME)
         problems = validate_fmu(str(path))
         if problems:
             raise RuntimeError(f"{case.family}, FMI {version}: {problems}")
-        self.scalars = fields_of(case)
-        self.version, self.inputs, self.output = version, program.inputs, program.output
         self.description = fmpy.read_model_description(str(path))
+        variables = self.description.modelVariables
+        self.version = version
+        self.inputs = [each.name for each in variables if each.causality == "input"]
+        (self.output,) = (each.name for each in variables if each.causality == "output")
         self.folder = fmpy.extract(str(path), str(target))
-        self.references = {each.name: each.valueReference for each in self.description.modelVariables}
+        self.references = {each.name: each.valueReference for each in variables}
 
     def outputs(self, case: Case) -> Array:
         """The outputs up to the first one at which the unit reports an error; nan behind it."""
@@ -262,11 +262,7 @@ class Unit:
         inputs, output = [self.references[name] for name in self.inputs], [self.references[self.output]]
         unit.instantiate()
         try:
-            scalars = fields_of(case)
-            fixed = {name: value for name, value in scalars.items() if name not in self.references}
-            if fixed != {name: self.scalars[name] for name in fixed}:
-                raise ValueError(f"{case.family}: {', '.join(fixed)} cannot be set in a unit")
-            fields = {name: value for name, value in scalars.items() if name in self.references}
+            fields = fields_of(case)
             u0 = {"u0": float(case.inputs[0, 0])} if "u0" in self.references else {}
             values = {**fields, **u0}
             set_([self.references[name] for name in values], [float(each) for each in values.values()])
@@ -287,8 +283,18 @@ class Unit:
 
 
 def fields_of(case: Case) -> dict[str, float]:
-    """Tunable parameters of a law; a sum, an inverse or a plant has none."""
-    return dict(case.thing.scalars) if isinstance(case.thing, hs.Law) else {}
+    """Tunable parameters of a law; a sum, an inverse or a plant has none, nor have relays with a past."""
+    law = case.thing
+    try:
+        return {name: law.scalars[name] for name in packing(law).fields} if isinstance(law, hs.Law) else {}
+    except ValueError:
+        return {}
+
+
+def fixed_of(case: Case) -> tuple[float, ...]:
+    """Parameters of a law that cannot be set in a unit."""
+    law, fields = case.thing, fields_of(case)
+    return tuple(v for k, v in law.scalars.items() if k not in fields) if isinstance(law, hs.Law) else ()
 
 
 # ---------------------------------------------------------------------------------- sizes
