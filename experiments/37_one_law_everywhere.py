@@ -80,13 +80,14 @@ def difference(y: Array, case: Case) -> float:
         return 0.0
     known = case.y[np.isfinite(case.y)]
     if case.kind == "random" and known.size == case.y.size:
-        scale = np.full(y.size, np.ptp(known))
+        half = np.full(y.size, 0.5 * np.ptp(known))
     else:
         lowest = np.minimum.accumulate(np.where(np.isfinite(case.y), case.y, np.inf))
         highest = np.maximum.accumulate(np.where(np.isfinite(case.y), case.y, -np.inf))
-        scale = np.maximum(0.5 * highest - 0.5 * lowest, 0.5 * np.maximum(np.abs(lowest), np.abs(highest))) * 2.0
+        half = 0.5 * np.maximum(np.abs(lowest), np.abs(highest))  # a range may be too large for a double, not its half
+        half = np.maximum(half, 0.5 * highest - 0.5 * lowest)
     with np.errstate(all="ignore"):
-        return float(np.max(np.where(same, 0.0, np.abs(y - case.y)) / scale, where=~same, initial=0.0))
+        return float(np.max(np.where(same, 0.0, np.abs(0.5 * y - 0.5 * case.y)) / half, where=~same, initial=0.0))
 
 
 def ended(y: Array, case: Case) -> float:

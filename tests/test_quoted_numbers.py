@@ -264,3 +264,11 @@ def test_more_samples_on_a_branch_change_nothing():
     result = result_of("more_samples")
     assert result["violations"] == 0
     assert max(row["worst"] for row in result["rows"]) <= 1.0
+
+
+def test_a_step_has_the_same_numbers_everywhere():
+    result = result_of("one_law_everywhere")
+    assert result["run"] == ["gcc", "clang", "wasm", "FMI 2.0", "FMI 3.0"]
+    assert all(row[f"worst_{name}"] <= 1e-12 for row in result["rows"] for name in result["run"])
+    assert all(row[f"compared_{name}"] >= 13 for row in result["rows"] for name in result["run"])
+    assert result["general_inverse_ns_most"] <= 1000.0
