@@ -3,7 +3,8 @@
 Every family of laws, its inverse where it has one, sums, cascades, plants and controllers: 20 random things on 2 000
 samples, and 60 hostile inputs each (see `exported_steps`). Each program is compiled once, by gcc and clang without a
 warning, by zig to WebAssembly, and as a unit of FMI 2.0 and 3.0 that FMPy validates and runs; laws of one program are
-set there as tunable parameters. A unit of what has no tunable parameters holds one thing: two of each program are made.
+set there as tunable parameters. At most three units are made of a program, or two where nothing is tunable, so that
+units see a part of the cases; the columns `compared` count them.
 Every program also runs under the sanitizers of addresses and of undefined behaviour, which stop at the first report.
 
 A difference from the compiled step in Python is a part of the range of the outputs. Hostile outputs may stand still, or

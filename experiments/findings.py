@@ -870,10 +870,11 @@ def one_law_everywhere(result: Result) -> list[str]:
         f"{count(int(result['cortex_m7_ram_bytes']))} bytes of state."
     )
     missing = f" Not run: {listed(result['not_run'])}." if result["not_run"] else ""
+    units = sum(int(row[f"compared_{name}"]) for row in rows for name in ran if name.startswith("FMI"))
     ends = listed([f"{error_of(median(values))} and {error_of(max(values))} in {n}" for n, values in worst.items()])
     return [
         f"In {count(int(result['compared']))} comparisons of {len(rows)} families, inverses, plants and controllers "
-        "with Python's compiled step, the largest difference as a part of the range, median and worst of the families, "
+        f"with Python's compiled step ({count(units)} of them in units, each family in part), the largest difference as a part of the range, median and worst of the families, "
         f"is {ends}; no sanitizer reports anything.{missing}",
         f"A sample takes {number(median(column(rows, 'ns_c')), 2)} ns in C in the median and "
         f"{number(slowest['ns_c'], 2)} ns at worst ({slowest['family']}), where numba's pointer takes "
