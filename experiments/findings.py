@@ -852,6 +852,18 @@ def virtual_rig(result: Result) -> list[str]:
     ]
 
 
+def controllers_in_c(result: Result) -> list[str]:
+    """Tracking controllers in C on the measurements of their loops."""
+    equal = sum(row["worst_difference"] == 0.0 for row in result["rows"])
+    most = max(column(result["rows"], "at_limits_percent"))
+    return [
+        f"Of {count(result['laws'])} controllers, each with the inverse of another law and an integral, replayed in C on "
+        f"the {count(result['samples'])} measurements of their own loops, {count(equal)} give the bits of Python, and the "
+        f"worst differs by {number(result['worst_difference'])} of the range. They are at the voltage limits in "
+        f"{result['least_at_limits_percent']:.2g} to {most:.0f} % of the samples.",
+    ]
+
+
 GROUPS: dict[str, tuple[Finding, ...]] = {
     "Evaluation and speed": (exact_step, work_precision, batch, cold_start, more_samples, wear_and_pinching),
     "Identification": (
@@ -877,6 +889,7 @@ GROUPS: dict[str, tuple[Finding, ...]] = {
     "Other families": (extended_plays, preisach, dashpot),
     "Studies and files": (sweep_study, kill_and_resume, scaling, fuzz),
     "Camera": (registration, virtual_rig),
+    "Outside Python": (controllers_in_c,),
 }
 HIGHLIGHTS: tuple[Finding, ...] = (
     closed_loop_speed,
