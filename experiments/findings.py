@@ -858,8 +858,8 @@ def controllers_in_c(result: Result) -> list[str]:
     most = max(column(result["rows"], "at_limits_percent"))
     return [
         f"Of {count(result['laws'])} controllers, each with the inverse of another law and an integral, replayed in C "
-        f"on the {count(result['samples'])} measurements of their own loops, {count(equal)} give the bits of Python, and "
-        f"the worst differs by {number(result['worst_difference'])} of the range. They are at the voltage limits in "
+        f"on the {count(result['samples'])} measurements of their own loops, {count(equal)} give the bits of "
+        f"Python, and the worst differs by {number(result['worst_difference'])} of the range. They are at the voltage limits in "
         f"{result['least_at_limits_percent']:.2g} to {most:.0f} % of the samples.",
     ]
 
