@@ -857,10 +857,10 @@ def controllers_in_c(result: Result) -> list[str]:
     equal = sum(row["worst_difference"] == 0.0 for row in result["rows"])
     most = max(column(result["rows"], "at_limits_percent"))
     return [
-        f"Of {count(result['laws'])} controllers, each with the inverse of another law and an integral, replayed in C "
-        f"on the {count(result['samples'])} measurements of their own loops, {count(equal)} give the bits of "
-        f"Python, and the worst differs by {number(result['worst_difference'])} of the range. They are at the voltage limits in "
-        f"{result['least_at_limits_percent']:.2g} to {most:.0f} % of the samples.",
+        f"{count(result['laws'])} controllers, each with the inverse of another law, were replayed in C on the "
+        f"{count(result['samples'])} measurements of their own loops. In {count(equal)} of them C has the bits of "
+        f"Python, and the worst differs by {number(result['worst_difference'])} of the range. They are at the voltage "
+        f"limits in {result['least_at_limits_percent']:.2g} to {most:.0f} % of the samples.",
     ]
 
 
