@@ -31,9 +31,9 @@ def folder(tmp_path, monkeypatch):
     rows = zip(u.tolist(), law.response(u).tolist(), strict=True)
     (tmp_path / "loop.csv").write_text("voltage,displacement\n" + "".join(f"{a},{b}\n" for a, b in rows))
     hs.save(law, tmp_path / "law.json")
-    for name in ("loop.svg", "loop.json", "loop.c", "loop.h"):
+    for name in ("loop.svg", "loop.json", "loop.c", "loop.h", "loop.html"):
         shutil.copy(tmp_path / "loop.csv", tmp_path / name)
-    for name in ("law.svg", "law.c", "law.h", "law.csv"):
+    for name in ("law.svg", "law.c", "law.h", "law.csv", "law.fmu", "law.html"):
         shutil.copy(tmp_path / "law.json", tmp_path / name)
     (tmp_path / "width.py").write_text("def width(beta):\n    return beta\n")
     (tmp_path / "study.toml").write_text(STUDY)
@@ -66,6 +66,11 @@ CASES = [
     ("control", "law.h", "--sample-time", "0.1", "--range", "0,1", "--c", "law.c"),
     ("control", "law.json", "--sample-time", "0.1", "--record", "loop.csv", *COLUMNS, "--out", "loop.csv"),
     ("control", "law.json", "--sample-time", "0.1", "--range", "0,1", "--reference", "loop.csv", "--out", "loop.csv"),
+    ("c", "law.c", "--out", "law.c"),
+    ("c", "law.h", "--out", "law.c"),
+    ("fmu", "law.fmu", "--out", "law.fmu"),
+    ("page", "law.html", "--out", "law.html"),
+    ("page", "law.json", "--data", "loop.html", *COLUMNS, "--out", "loop.html"),
     ("plot", "loop.svg", *COLUMNS, "--out", "loop.svg"),
     ("plot", "loop.csv", "loop.svg", *COLUMNS, "--out", "loop.svg"),
     ("plot", "loop.csv", *COLUMNS, "--model", "law.svg", "--out", "law.svg"),
@@ -96,7 +101,7 @@ def test_a_result_in_the_place_of_an_input_is_refused(folder, capsys, arguments)
 
 
 def test_every_command_that_reads_files_is_among_them():
-    assert {arguments[0] for arguments in CASES} == COMMANDS.keys() - {"reproduce"}
+    assert {arguments[0] for arguments in CASES} == COMMANDS.keys() - {"reproduce", "explore"}
 
 
 @pytest.mark.parametrize("how", ["spelling", "symbolic", "hard", "upward"])

@@ -303,7 +303,7 @@ def test_division_of_integers_rounds_down(a, b):
 def test_the_steps_of_all_families_compile_without_a_warning(tmp_path):
     """Each with sizes that are known where it runs."""
     for number, family in enumerate(every_family().values()):
-        if not issubclass(family, hs.Law):
+        if not issubclass(family, hs.Law) or not family.__module__.startswith("hysim."):
             continue
         text, has_start = entries(family.step, family.start)
         users = ["double (*a)(const double *, int, double *, int, double) = step;"]

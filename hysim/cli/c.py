@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from hysim._atomic import write_all
-from hysim.cli import models
+from hysim.cli import models, outputs
 from hysim.cli.options import MODEL_IN, Command, positive
 
 
@@ -16,11 +16,13 @@ def run(options: argparse.Namespace) -> int:
     out = Path(options.out)
     if out.suffix != ".c":
         raise ValueError(f"--out is a C source, and its header stands beside it: call the file .c, got {options.out}")
+    paths = {end: str(out.with_name(out.stem + end)) for end in (".h", ".c", "_main.c")}
+    outputs.keep([options.model], paths.values())
     model, _ = models.read(options.model)
     sample_time = None if options.sample_time is None else positive("--sample-time", options.sample_time)
     code = to_c(_inverse(model) if options.inverse else model, sample_time, name=out.stem, u0=options.u0)
     texts = {".h": code.header, ".c": code.source, "_main.c": code.main}
-    write_all({str(out.with_name(out.stem + end)): text for end, text in texts.items()})
+    write_all({paths[end]: text for end, text in texts.items()})
     return 0
 
 
