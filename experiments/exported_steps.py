@@ -25,6 +25,8 @@ Array = np.ndarray[Any, np.dtype[Any]]
 SAMPLE_TIME = 1.0  # of whatever depends on time; the plants and controllers below are drawn for it
 N_SAMPLES, N_HOSTILE_SAMPLES = 2000, 200
 N_LAWS, N_HOSTILE_LAWS = 20, 5
+SLOW, REACH = ("ZhuWangBoucWen", "GeneralizedBoucWen", "BoucWenBaberNoori", "Duhem"), 10.0
+"""Families whose inverse takes seconds for one reference far away, and how far theirs are at most."""
 MOST_SHAPES = 4  # kinds of parts that a sum or a cascade is made of: each is a program of its own
 
 
@@ -88,11 +90,12 @@ HOSTILE: dict[str, Callable[[Rng, float, int], Array]] = {
 
 
 class Drawn(NamedTuple):
-    """A thing, the scale of its input, and the input around which it moves."""
+    """A thing, the scale of its input, the input around which it moves, and how far at most."""
 
     thing: Any
     length: float
     centre: float = 0.0
+    reach: float = np.inf
 
 
 Draw = Callable[[Rng], Drawn]
@@ -190,7 +193,8 @@ def _inverse(family: str) -> Draw:
 
     def drawn(rng: Rng) -> Drawn:
         law = RISING[family](rng)
-        return Drawn(hs.InverseFeedforward(law=law), 1.0, at_rest(law))
+        reach = REACH if family in SLOW else np.inf
+        return Drawn(hs.InverseFeedforward(law=law), 1.0, at_rest(law), reach)
 
     return drawn
 
@@ -299,7 +303,7 @@ def cases(family: str, seed: int, n_laws: int = N_LAWS, n_hostile_laws: int = N_
 def paths(of: Drawn, rng: Rng, path: Callable[[Rng, float, int], Array], n: int) -> Array:
     """The input, or a reference and a measurement."""
     count = 2 - isinstance(of.thing, Stepwise)
-    return np.stack([of.centre + path(rng, of.length, n) for _ in range(count)])
+    return np.stack([of.centre + np.clip(path(rng, of.length, n), -of.reach, of.reach) for _ in range(count)])
 
 
 _ENTRIES: dict[tuple[Any, Any], tuple[str, bool]] = {}
