@@ -33,7 +33,7 @@ _MODE = 0o100644 << 16
 
 
 class Options(NamedTuple):
-    """What a unit is to be: its name, version of FMI, platforms and units, and the input at which it starts."""
+    """Options of a unit: its name, version of FMI, platforms and units, and the input at which it starts."""
 
     name: str
     version: str

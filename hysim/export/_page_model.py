@@ -23,7 +23,7 @@ from hysim.models.sum import Sum
 
 @dataclass
 class Parts:
-    """What the models of a page consist of: modules by name, functions that pack, numbers and sliders."""
+    """Parts of the models of a page: modules by name, functions that pack, numbers and sliders."""
 
     modules: dict[str, bytes] = field(default_factory=dict)
     packs: list[str] = field(default_factory=list)

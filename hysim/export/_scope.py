@@ -52,7 +52,7 @@ class Called(Protocol):
 
 
 class Library(Protocol):
-    """Where functions, tables and helpers are collected."""
+    """Collection of functions, tables and helpers."""
 
     helpers: set[str]
 
