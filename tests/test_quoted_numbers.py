@@ -132,7 +132,7 @@ def test_the_exact_step_is_at_rounding_and_lsoda_at_its_tolerance():
     lsoda = rows_of("exact_step", method="solve_ivp LSODA, 1e-6")
     assert len(own) == len(lsoda) == 3
     assert max(row["error"] for row in own) < 1e-15
-    # Where it steps over a turn depends on the last bits of `pow`: on one machine 1.2e-4, on another 3.9e-4 for n = 1.5.
+    # Its steps over a turn depend on the last bits of `pow`: 1.2e-4 on one machine, 3.9e-4 on another, for n = 1.5.
     assert all(0.5e-4 < row["error"] < 5e-4 for row in lsoda)
 
 
