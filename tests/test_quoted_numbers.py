@@ -132,8 +132,7 @@ def test_the_exact_step_is_at_rounding_and_lsoda_at_its_tolerance():
     lsoda = rows_of("exact_step", method="solve_ivp LSODA, 1e-6")
     assert len(own) == len(lsoda) == 3
     assert max(row["error"] for row in own) < 1e-15
-    # Its steps over a turn depend on the last bits of `pow`: 1.2e-4 on one machine, 3.9e-4 on another, for n = 1.5.
-    assert all(0.5e-4 < row["error"] < 5e-4 for row in lsoda)
+    assert all(0.5e-4 < row["error"] < 2e-4 for row in lsoda)
 
 
 def test_transfer_functions_come_as_near_as_the_noise_allows():
@@ -225,9 +224,7 @@ def test_two_workers_share_kernels_on_threads_and_fits_on_processes():
     shared = {"workers": 2}
     kernels = the("scaling", kind="10 ms in a kernel", executor="threads", **shared)
     fits = the("scaling", kind="fit", executor="processes", **shared)
-    assert kernels["efficiency_percent"] >= 90.0
-    assert fits["efficiency_percent"] >= 80.0  # of 0.12 s: the 10 ms beside each weigh more than when it took 0.21 s
-    assert fits["overhead_microseconds"] < 20_000.0
+    assert min(kernels["efficiency_percent"], fits["efficiency_percent"]) >= 90.0
     assert max(the("scaling", kind=f"laws on Table 1, n = {n}")["seconds"] for n in ("1", "1.5")) < 3.0
 
 
