@@ -131,17 +131,21 @@ def load_ground_motion(
         return begin + sample_times(values.size, sample_time), values
 
 
+def is_at2(path: Source, encoding: str | None = None) -> bool:
+    """Whether a file is a text whose header states NPTS and DT; errors as `hysim.load` has them."""
+    with opened(path) as source, file_named(source):
+        if not isinstance(source.content, (str, bytes)):
+            return False
+        return peer_header(text_of(source.content, source.name, encoding).split("\n", TOP)[:TOP]) is not None
+
+
 def column_names(
     path: Source, *, delimiter: str | None = None, decimal: str | None = None, encoding: str | None = None
-) -> tuple[str, ...] | None:
-    """Names of the columns of a file, None for an AT2 file; errors as `hysim.load` has them."""
-    with opened(path) as source, file_named(source):
-        if isinstance(source.content, (str, bytes)) and peer_header(
-            text_of(source.content, source.name, encoding).split("\n")[:TOP]
-        ):
-            return None
-        with table_of(source, {"delimiter": delimiter, "decimal": decimal, "encoding": encoding}) as table:
-            return tuple(table.labels)
+) -> tuple[str, ...]:
+    """Names of the columns of a file; errors as `hysim.load` has them."""
+    for_text = {"delimiter": delimiter, "decimal": decimal, "encoding": encoding}
+    with opened(path) as source, file_named(source), table_of(source, for_text) as table:
+        return tuple(table.labels)
 
 
 def _check_arguments(
@@ -178,7 +182,8 @@ def _of_text(text: str, choice: _Choice, skip: int, delimiter: str | None, decim
     except ValueError as error:
         if not by_column and (count := _count_in_list(text, decimal, skip)):
             raise UnreadableError(
-                f"{error}; if these are {count} accelerations in reading order, pass their sample_time="
+                f"{error}; if these are {count} accelerations in reading order, pass their sample_time= (on the "
+                "command line --sample-time)"
             ) from None
         raise
     return _of_table(table, choice)
