@@ -2,6 +2,8 @@
 
 import re
 
+import numpy as np
+
 from hysim._frozen import FloatArray
 from hysim.files._table import shown
 
@@ -29,12 +31,13 @@ _ENDS_IN_UNIT = re.compile(r"acc[a-z]*[_ ]+(?:in[_ ]+)?(\S+)", re.IGNORECASE)
 
 
 def in_si(values: FloatArray, unit: str) -> FloatArray:
-    """Accelerations in m/s^2 from those in a unit; ValueError if it is none of acceleration."""
+    """Accelerations in m/s^2, infinite where too large, from those in a unit; ValueError if it is unknown."""
     name = _name(unit)
     if name is None:
         raise ValueError(f"{shown(unit)} is no known unit of acceleration: {_KNOWN}; pass the file's unit as units=")
     factor, divisor = _SCALES[name]
-    return values * factor / divisor
+    with np.errstate(over="ignore"):
+        return np.asarray(values * factor / divisor)
 
 
 def check_unit(unit: str | None) -> None:

@@ -285,11 +285,16 @@ def _of_table(table: Table, choice: _Choice) -> _Motion:
     return _even(table, clock), in_si(values[0], unit)
 
 
+def _signals(table: Table) -> list[str]:
+    """Names of columns that are not the unit of another."""
+    return [name for name in table.labels if not name.endswith("_units")]
+
+
 def _time_column(table: Table, choice: _Choice) -> Column | None:
     """The column of times, None where the caller gives the step instead."""
     if choice.t is not None:
         return table.column(choice.t)
-    names = [name for name in table.labels if _TIME_NAME.fullmatch(name)]
+    names = [name for name in _signals(table) if _TIME_NAME.fullmatch(name)]
     if choice.sample_time is not None:
         require(
             not names or choice.acceleration is not None,
@@ -301,7 +306,7 @@ def _time_column(table: Table, choice: _Choice) -> Column | None:
         return table.column(names[0])
     require(not names, f"several columns may be the time: pass one of {listed(names)} as t=")
     require(
-        len(table.labels) == 2 and choice.acceleration is None,
+        len(_signals(table)) == 2 and choice.acceleration is None,
         f"no column is called t or time, the columns are: {listed(table.labels)}; pass one as t=, or sample_time= if "
         "there is none",
     )
@@ -311,7 +316,7 @@ def _time_column(table: Table, choice: _Choice) -> Column | None:
 def _motion_column(table: Table, choice: _Choice, time: Column | None) -> Column:
     if choice.acceleration is not None:
         return table.column(choice.acceleration)
-    others = [name for name in table.labels if time is None or name != time.label]
+    others = [name for name in _signals(table) if time is None or name != time.label]
     names = [name for name in others if _MOTION_NAME.fullmatch(name)]
     if len(names) == 1 or len(others) == 1:
         return table.column((names or others)[0])

@@ -22,6 +22,7 @@ _NUMBER = re.compile(
 )
 _BETWEEN = re.compile(r"\s*[,;]\s*|\s+")
 _WITH_COMMA = re.compile(r"[+-]?\d*,\d+(?:[EeDd][+-]?\d{1,3})?")
+_BEGIN = "+-.0123456789"  # of a number
 _LOOKED_AT = 1000  # lines for the decimal sign
 _LONGEST = 60  # letters of a line in a message
 
@@ -133,7 +134,8 @@ def _numbers(line: str, number: int) -> list[float]:
         values.append(value)
         between = _BETWEEN.match(text, match.end())
         place = between.end() if between else match.end()
-        if between is None and place < len(text) and (match["whole"] or not (match["exponent"] or text[place] in "+-")):
+        joined = between is None and place < len(text) and text[place] in _BEGIN
+        if joined and (match["whole"] or not (match["exponent"] or text[place] in "+-")):
             raise ValueError(
                 f"line {number}: it is not clear where the numbers end in {shown(text, _LONGEST)}: put blanks between "
                 "them"
