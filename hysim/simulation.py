@@ -63,7 +63,7 @@ class Simulation:
         Examples
         --------
         >>> import hysim as hs
-        >>> law = hs.MaxwellSlip(stiffnesses=(1.0, 2.0), limits=(0.5, 1.0))
+        >>> law = hs.MaxwellSlip(stiffness=(1.0, 2.0), slips=(0.5, 1.0))
         >>> list(hs.simulate(law, None, [0.0, 1.0]).columns)
         ['u', 'y', 'z_0', 'z_1']
         """

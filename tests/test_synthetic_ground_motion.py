@@ -32,7 +32,8 @@ def test_the_density_is_that_of_kanai_tajimi_and_clough_penzien(soil):
 
     The mean of m lines of one periodogram has the relative variance 35 / (18 m): the window correlates neighbouring
     lines by 4 / 9 and 1 / 36, squared amplitudes. So the total has 35 / 18 of the sum of the lines' squared
-    shares; division by it adds this variance, and a bias of the same size. Four standard errors of 120 seeds, and the bias.
+    shares; division by it adds this variance, and a bias of the same size. Four standard errors of 120 seeds and the
+    bias are allowed.
     """
     n, step, n_seeds = 4096, 0.02, 120
     window = np.hanning(n + 1)[:-1]

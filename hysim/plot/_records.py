@@ -152,7 +152,7 @@ def signals(result: Simulation, *names: str, axes: Sequence[Axes] | AxesArray | 
     Examples
     --------
     >>> import hysim as hs
-    >>> law = hs.MaxwellSlip(stiffnesses=(1.0, 2.0), limits=(0.5, 1.0))
+    >>> law = hs.MaxwellSlip(stiffness=(1.0, 2.0), slips=(0.5, 1.0))
     >>> panels = hs.plot.signals(hs.simulate(law, None, [0.0, 1.0, 0.0]), "z", axes=[hs.plot.figure().add_subplot()])
     >>> panels[0].get_ylabel(), len(panels[0].lines)
     ('Memory z', 2)
