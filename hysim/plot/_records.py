@@ -21,7 +21,7 @@ _POINTS: dict[str, Any] = {
     "markerfacecolor": "white",
     "markeredgecolor": MEASURED,
 }
-_MOST_NAMED = 12  # lines of a panel that a legend has room for
+_MOST_NAMED = 8  # lines of a panel that a legend has room for
 _ELEMENTS_IN_A_ROW = 3
 _ARROW = 0.03  # its length along the input, of the span
 
@@ -168,7 +168,7 @@ def signals(result: Simulation, *names: str, axes: Sequence[Axes] | AxesArray | 
                 ax.plot(t, values, label=column, **line(k))
             ax.set_ylabel(_axis_of(name, result.units))
             if 1 < len(columns) <= _MOST_NAMED:
-                ax.legend(ncols=2)
+                ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         panels[-1].set_xlabel("Sample" if result.t is None else label(result.units, "t"))
     return panels
 
