@@ -130,6 +130,15 @@ def test_a_column_u_stays_as_it_is_and_columns_can_be_named(run):
     assert said[1][1].tolist() == (MOTION / 100.0).tolist()
 
 
+def test_a_header_of_numbers_is_skipped(run, tmp_path):
+    (tmp_path / "numbers.txt").write_text("station\n1940 5 18\n0. 1.\n-2. .5\n")
+    options = ["--sample-time", "0.1", "--skip", "2"]
+    assert table_of(run("simulate", "base.json", "numbers.txt", *options)[1])[1][1].tolist() == MOTION.tolist()
+    code, out, err = run("simulate", "base.json", "plain.csv", "--skip", "2")
+    assert (code, out) == (2, "")
+    assert "--skip is for a ground motion" in err
+
+
 def test_a_ground_motion_with_times_is_brought_to_even_steps(run):
     _, values = table_of(run("simulate", "floors:frame", "quake.csv", "--sample-time", "0.05")[1])
     assert values[0] == pytest.approx(np.arange(7) * 0.05)

@@ -48,6 +48,8 @@ OPTIONS_WITH_WEIGHTS = f"""{OPTIONS.rstrip()}
 OPTIONS_OF_AN_INPUT = f"{_FILE}\n\nrecord:\n{_INPUT}{_OTHERS}"
 """Options for a file that needs no column of the output."""
 
+SKIP = "--skip N  number of lines at the top of a ground motion that belong to its header, if it holds lines of numbers"
+
 
 def read(options: argparse.Namespace, file: str | None = None) -> Record:
     """The record that the options describe, or that of another `file`; without an output column, y is u."""
@@ -75,6 +77,8 @@ def read_input(options: argparse.Namespace, *, of_the_ground: bool) -> Record:
             names = ()  # a list, or a fault that is named where the file is read
         if "u" not in names:
             return _ground_motion(options, source)
+    if options.skip is not None:
+        raise ValueError(f"--skip is for a ground motion: begin the lines at the top of {options.file} with #")
     return _read(options, options.file, source(), None, options.resolution)
 
 
@@ -83,6 +87,7 @@ def _ground_motion(options: argparse.Namespace, source: Callable[[], Any]) -> Re
     from hysim.files import load_ground_motion
 
     arguments = {"t": options.t, "units": dict(options.unit).get("u"), **_text_options(options)}
+    arguments["skip"] = options.skip or 0
     if options.sample_time is None:
         return _of_the_ground(*load_ground_motion(source(), **arguments))
     step = positive("--sample-time", options.sample_time)

@@ -352,8 +352,9 @@ def _even(table: Table, times: FloatArray) -> tuple[float, float]:
         k = int(np.argmax(np.abs(steps - usual))) + 1
         raise ValueError(
             f"{table.place(k)}: the time must be evenly spaced, got a step of {steps[k - 1]:.6g} s where most are "
-            f"{usual:.6g} s; interpolate it by hs.load(...).resample({usual:.4g}), or if only the times are wrong, "
-            "name the column of the acceleration and pass sample_time="
+            f"{usual:.6g} s; interpolate it by hs.load(...).resample({usual:.4g}) (on the command line --t, --u and "
+            f"--sample-time {usual:.4g}), or if only the times are wrong, name the column of the acceleration and pass "
+            "sample_time="
         )
     decimal = float(f"{step:.6g}")
     return float(times[0]), decimal if abs(decimal - step) <= _SAME_DECIMAL * step else step

@@ -9,7 +9,7 @@ from hysim._frozen import FloatArray, check_choice, check_not_negative, check_po
 
 ENVELOPES = ("saragoni-hart", "jennings", "none")
 
-_MOST_SAMPLES = 100_000_000  # 0.8 GB, and five times as much on the way
+_MOST_SAMPLES = 10_000_000  # the spectrum of their noise and its inverse take 1.5 GB
 _FEWEST_SAMPLES = 16
 _ROUNDING = 1e-9  # of a number of steps
 
@@ -87,7 +87,7 @@ def ground_motion(
     ValueError
         If a number is not positive and finite, a frequency is not below half the sampling rate, `rise` or `end` is not
         between 0 and 1, rise and plateau leave no time for the end, `envelope` is another word, or there are fewer than
-        16 or more than 1e8 samples.
+        16 or more than 1e7 samples.
 
     References
     ----------
