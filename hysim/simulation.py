@@ -11,8 +11,8 @@ from hysim._printing import extent, printed, summary_text
 from hysim.models.protocols import Remembering, Responding, needs_time
 from hysim.records import check_increasing, even_step
 
-_BY_NODE = frozenset({"displacement", "velocity", "acceleration", "peak_displacement"})
-"""Signals with a column for each mass: masses are nodes 1, 2, ..., because node 0 is the ground."""
+_BY_NODE = frozenset({"displacement", "velocity", "acceleration"})
+"""Signals with a column for each mass, as their peaks: masses are nodes 1, 2, ..., because node 0 is the ground."""
 
 
 @printed
@@ -76,7 +76,7 @@ def columns_of(name: str, values: FloatArray) -> dict[str, FloatArray]:
     """A signal as columns by their names, one of its own name if it has one axis."""
     if values.ndim == 1:
         return {name: values}
-    first = 1 if name in _BY_NODE else 0
+    first = 1 if name.removeprefix("peak_") in _BY_NODE else 0
     return {f"{name}_{first + k}": column for k, column in enumerate(values.T)}
 
 

@@ -25,14 +25,15 @@ class TwoFloors:
 
     def signals(self, u, sample_time):
         floors = np.stack([0.5 * u, 2.0 * u], axis=1)
-        elements = {"drift": floors - 1.0, "force": 3.0 * floors}
+        elements = {"peak_acceleration": floors, "drift": floors - 1.0, "force": 3.0 * floors}
         return {"y": floors[:, 1], "displacement": floors, **elements, "kinetic": u**2}
 
 
 frame = TwoFloors()
 '''
 MOTION = np.array([0.0, 1.0, -2.0, 0.5])
-COLUMNS = ["t", "u", "y", "displacement_1", "displacement_2", "drift_0", "drift_1", "force_0", "force_1", "kinetic"]
+NODES = ["displacement_1", "displacement_2", "peak_acceleration_1", "peak_acceleration_2"]
+COLUMNS = ["t", "u", "y", *NODES, "drift_0", "drift_1", "force_0", "force_1", "kinetic"]
 AT2 = "PEER\nQUAKE, SITE, 0\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS= 4, DT= .1 SEC\n 0. .1E+01-.2E+01\n.5\n"
 G = 9.80665
 
@@ -84,7 +85,7 @@ def test_signals_become_columns_numbered_as_nodes_and_elements_are(simulation):
 
 
 def test_signals_with_columns_are_printed_by_their_number_and_extent(simulation):
-    assert "  drift         2 columns, -5 to 1 m" in str(simulation).splitlines()
+    assert "  drift              2 columns, -5 to 1 m" in str(simulation).splitlines()
     assert repr(simulation) == "<Simulation: 4 samples>"
 
 
@@ -164,7 +165,7 @@ def test_what_moves_nothing_is_one_line_and_exit_2(run, arguments, message):
 @pytest.mark.parametrize("ending", [".npz", ".mat", ".csv"])
 def test_a_table_of_any_format_holds_every_column(run, tmp_path, ending):
     out = tmp_path / f"motion{ending}"
-    assert run("simulate", "floors:frame", "quake.AT2", "--out", out)[0] == 0
+    assert run("simulate", "floors:frame", "quake.AT2", "--out", out) == (0, "", "")
     record = hs.load(out, u="drift_1", y="displacement_2", t="t")
     assert record.y.tolist() == (2.0 * (MOTION * G)).tolist()
     assert record.t.tolist() == [0.0, 0.1, 0.2, 0.3]
@@ -187,7 +188,7 @@ def test_signals_are_drawn_with_a_line_for_each_column(simulation):
     assert drift.lines[1].get_ydata().tolist() == simulation.signals["drift"][:, 1].tolist()
     assert (drift.get_ylabel(), kinetic.get_ylabel(), kinetic.get_xlabel()) == ("Drift [m]", "Kinetic", "Time [s]")
     assert kinetic.get_legend() is None
-    with pytest.raises(ValueError, match=r"give names of signals, of t, u, y, displacement, drift, .* got velocity"):
+    with pytest.raises(ValueError, match=r"give names of signals, of t, u, y, displacement, .* got velocity"):
         hs.plot.signals(simulation, "velocity")
     with pytest.raises(ValueError, match="got none"):
         hs.plot.signals(simulation)

@@ -40,7 +40,9 @@ def run(options: argparse.Namespace) -> int:
         options.out: lambda: outputs.table(options.out, columns, labels),
         options.plot: lambda: outputs.picture_of(simulation),
     }
-    outputs.write(options, files, lambda: outputs.table(records.STANDARD, columns, labels).decode(), document)
+    is_printed = options.out is None or options.json
+    text = (lambda: outputs.table(records.STANDARD, columns, labels).decode()) if is_printed else None
+    outputs.write(options, files, text, document)
     return 0
 
 
