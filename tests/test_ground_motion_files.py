@@ -96,8 +96,9 @@ def test_units_of_any_spelling_are_converted(unit, factor):
     in_header = read(PEER.replace("OF G", f"OF {unit}"))[1]
     as_column = read(TABLE.replace("[g]", f"({unit})"))[1]
     in_title = read(f"RECORD\nvalues in ({unit})\n.1\n.2\n.3\n", sample_time=0.1)[1]
+    in_words = read(f"RECORD OF GAL\nacceleration in {unit}\n.1\n.2\n.3\n", sample_time=0.1)[1]
     said = read(PEER, units=unit)[1]
-    for acceleration in (in_header, as_column, in_title, said):
+    for acceleration in (in_header, as_column, in_title, in_words, said):
         assert acceleration[:2] == pytest.approx(np.array([0.1, 0.2]) * factor, rel=1e-15)  # one rounding
 
 
@@ -174,6 +175,33 @@ def test_a_list_in_reading_order_is_read_to_the_bit(values, per_line, sign):
     assert t.tolist() == hs.signals.sample_times(len(values), 0.02).tolist()
 
 
+COSMOS = """Corrected accelerogram    Station 24278
+ 1940    5   18
+ 1.5 2.5
+    10 points of accel data equally spaced at  .005 sec, in cm/sec2. (8f9.6)
+  .000001 -.000002-1.234567100.00001 1.000000-2.000000 3.000000 4.000000
+ 5.000000-6.000000
+    10 points of veloc data equally spaced at  .005 sec, in cm/sec.  (8f9.6)
+ 9.000000 9.000000
+/&  ---------- End of data for channel  1 ----------
+"""
+
+
+def test_the_accelerations_of_a_cosmos_file_are_read_without_its_velocities():
+    with pytest.raises(ValueError, match="line 5: it is not clear where the numbers end"):
+        read(COSMOS)
+    t, acceleration = read(COSMOS.replace("-1.234567100.00001", "-1.234567 10.00001"))
+    values = [1e-6, -2e-6, -1.234567, 10.00001, 1.0, -2.0, 3.0, 4.0, 5.0, -6.0]
+    assert acceleration.tolist() == [value / 100.0 for value in values]
+    assert t[:3].tolist() == [0.0, 0.005, 0.01]
+    both = COSMOS + COSMOS.replace("-1.234567100.00001", "-1.234567 10.00001")
+    with pytest.raises(ValueError, match=r"holds 2 accelerations, in lines 4, 13: .* as skip="):
+        read(both)
+    assert read(both, skip=9)[1].tolist() == acceleration.tolist()
+    with pytest.raises(ValueError, match="line 4 states 10 values, but 8 follow"):
+        read(COSMOS.replace("-1.234567100.00001", "-1.234567 10.00001").replace(" 5.000000-6.000000\n", ""))
+
+
 def test_a_header_with_numbers_is_skipped_by_its_length():
     text = "2 CORRECTED\nSITE\n 1 2 3 4\n 5.0 6.0\n| units = cm/s2\n 1. 2. 3.\n 4.\n"
     assert read(text, sample_time=0.1, skip=5)[1].tolist() == [0.01, 0.02, 0.03, 0.04]
@@ -191,18 +219,18 @@ def test_a_decimal_comma_is_seen_where_it_can_be_nothing_else():
 @pytest.mark.parametrize(
     ("text", "options", "message"),
     [
-        (PEER.replace("3,", "4,"), {}, "line 4 states NPTS = 4, but 3 values follow"),
-        (PEER + ".4\n", {}, "line 4 states NPTS = 3, but 4 values follow"),
+        (PEER.replace("3,", "4,"), {}, "line 4 states 4 values, but 3 follow"),
+        (PEER + ".4\n", {}, "line 4 states 3 values, but 4 follow"),
         (PEER.replace(".3", "*****"), {}, r"line 6: expected finite numbers, got '\*\*\*\*\*'"),
         (PEER.replace(".3", "nan"), {}, "line 6: expected finite numbers, got 'nan'"),
         (PEER.replace(".3", ".3E999"), {}, "line 6: expected finite numbers, got '.3E999'"),
         (PEER.replace(".3", "1_0"), {}, "line 6: expected finite numbers, got '1_0'"),
         (PEER.replace(" .1 .2", ".1234.5678"), {}, "line 5: it is not clear where the numbers end in '.1234.5678'"),
         (PEER + "END OF DATA\n", {}, "line 7: expected finite numbers, got 'END OF DATA'"),
-        (PEER.replace(".0050", "0.0"), {}, "line 4: DT must be positive, got 0"),
+        (PEER.replace(".0050", "0.0"), {}, "line 4: the step must be positive, got 0"),
         (PEER.replace("ACCELERATION", "VELOCITY"), {}, "the header says VELOCITY"),
         (PEER.replace("OF G", "OF CM/S"), {}, "the header states the unit 'CM/S', which is unknown: pass units="),
-        (PEER, {"sample_time": 0.01}, "line 4 states DT = 0.005: leave out sample_time"),
+        (PEER, {"sample_time": 0.01}, "line 4 states a step of 0.005 s: leave out sample_time"),
         (IN_G + "NPTS= 3, DT= .0050 SEC\n", {}, "there are no numbers below line 4"),
         (IN_G + "NPTS= 1, DT= .0050 SEC\n.1\n", {}, "needs at least 2 samples, there are 1"),
         (PEER.replace(".3", "1.5E308"), {}, "too large for their unit"),

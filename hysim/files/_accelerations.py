@@ -27,6 +27,7 @@ _KNOWN = 'expected "m/s^2", "cm/s^2", "mm/s^2", "gal", "g", "mg", "in/s^2" or "f
 _PER_SECOND_SQUARED = re.compile(r"(/s/s|/\(?s2\)?|s-2|/\(?ss\)?)$")
 _STATED = re.compile(r"\bunits?\b\s*(?:(?:of|are|is|in)\b|[=:])?\s*([^\s,;:=()]+)", re.IGNORECASE)
 _BRACKETS = re.compile(r"[\[(]([^\[\]()]*)[\])]")
+_IN = re.compile(r"\bin\s+([^\s,;:()]+)", re.IGNORECASE)
 _ENDS_IN_UNIT = re.compile(r"acc[a-z]*[_ ]+(?:in[_ ]+)?(\S+)", re.IGNORECASE)
 
 
@@ -49,12 +50,14 @@ def check_unit(unit: str | None) -> None:
 def stated_unit(header: str) -> str | None:
     """The unit that the text above some numbers states, None if it states none; ValueError if it is not understood.
 
-    First the word behind "unit", then what is in brackets, then words that can be nothing else, such as cm/sec2.
+    First the word behind "unit", then what is in brackets or behind "in", then words that can be nothing else, such as
+    cm/sec2.
     """
     behind = [match.strip(".") for match in _STATED.findall(header)]
     words = [word.strip("().:") for word in re.split(r"[\s,;]+", header)]
-    lone = [word for word in words if (name := _name(word)) and name not in ("g", "mg", "%g")]
-    for candidate in (*behind, *_BRACKETS.findall(header), *lone):
+    lone = [word for word in words if (name := _name(word)) and "/s2" in name]
+    after_in = [word.strip(".") for word in _IN.findall(header)]
+    for candidate in (*behind, *_BRACKETS.findall(header), *after_in, *lone):
         if _name(candidate):
             return str(candidate)
     if behind:

@@ -1,7 +1,8 @@
 """The verb `load_ground_motion`: the acceleration of the ground from a file.
 
-A text is one of three things. It is a PEER file if a line near its top says NPTS and DT; with a sample time from the
-caller it is a list of numbers in reading order; else it is a table with a column of times.
+A text is one of four things. It is a PEER file if a line near its top says NPTS and DT, and one of COSMOS if a line
+says how many points of acceleration are below it; with a sample time from the caller it is a list of numbers in reading
+order; else it is a table with a column of times.
 """
 
 import re
@@ -16,8 +17,8 @@ from hysim.files._delimited import delimited
 from hysim.files._layout import COMMENTS, DECIMALS
 from hysim.files._load import file_named, table_of
 from hysim.files._number_lists import NumberList, number_list
-from hysim.files._peer import TOP, PeerHeader, check_quantity, peer_header
 from hysim.files._source import Source, opened
+from hysim.files._stated_values import TOP, StatedValues, block_below, check_quantity, cosmos_blocks, peer_header
 from hysim.files._table import Column, Table, UnreadableError, listed, require, shown
 from hysim.files._text import text_of
 from hysim.records import step_if_even
@@ -51,7 +52,7 @@ def load_ground_motion(
 ) -> tuple[FloatArray, FloatArray]:
     """Load the acceleration of the ground in an earthquake, in m/s^2.
 
-    Three kinds of text are read, and what a file is follows from its content, not from its ending:
+    Four kinds of text are read, and what a file is follows from its content, not from its ending:
 
     - the AT2 files of PEER, whose header states NPTS and DT, in any of its spellings: ``NPTS=  4000, DT= .0050 SEC``,
       ``NPTS=4000,    DT=0.0050SEC``, ``4000    0.0050    NPTS, DT``. Their values are in g unless the header states
@@ -59,6 +60,7 @@ def load_ground_motion(
     - a column of times and one of accelerations, in any layout that `hysim.load` reads, with or without a header. Of
       several columns those called t or time, and acceleration, acc, a, ag or u are taken. So are two arrays of these
       names in an NPZ, MAT or HDF5 file;
+    - a file of COSMOS with one block of accelerations, whose header line states their number, step and unit;
     - with `sample_time`, a list of accelerations in reading order below a text header of any length, one or more to a
       line, as Fortran writes them; numbers may run together (``-.1234E-02-.2345E-02``).
 
@@ -172,7 +174,9 @@ def _of_text(text: str, choice: _Choice, skip: int, delimiter: str | None, decim
     lines = text.split("\n")
     by_column = choice.t is not None or choice.acceleration is not None
     if not by_column and (header := peer_header(lines[: max(TOP, skip)])):
-        return _of_peer(text, header, choice, skip, decimal)
+        return _of_stated(text, header, choice, skip, decimal)
+    if not by_column and (blocks := cosmos_blocks(text, skip)):
+        return _of_cosmos(text, blocks, choice, decimal)
     if not by_column and choice.sample_time is not None:
         return _of_list(text, choice, choice.sample_time, skip, delimiter, decimal)
     below = "\n" * min(skip, len(lines)) + "\n".join(lines[skip:])
@@ -225,23 +229,38 @@ def _count_in_list(text: str, decimal: str | None, skip: int) -> int:
         return 0
 
 
-def _of_peer(text: str, header: PeerHeader, choice: _Choice, skip: int, decimal: str | None) -> _Motion:
+def _of_stated(text: str, header: StatedValues, choice: _Choice, skip: int, decimal: str | None) -> _Motion:
+    """The values below a line that states their number and step, in g if their unit is not stated."""
     require(
-        0.0 < header.step < np.inf, f"line {header.line}: DT must be positive, got {header.step:g}; correct the header"
+        0.0 < header.step < np.inf,
+        f"line {header.line}: the step must be positive, got {header.step:g}; correct the line",
     )
     require(
         choice.sample_time in (None, header.step),
-        f"line {header.line} states DT = {header.step:g}: leave out sample_time, or correct the line",
+        f"line {header.line} states a step of {header.step:g} s: leave out sample_time, or correct the line",
     )
     numbers = number_list(text, decimal, max(skip, header.line))
     check_quantity(numbers.header)
     require(
         numbers.values.size == header.n_values,
-        f"line {header.line} states NPTS = {header.n_values}, but {numbers.values.size} values follow: the file is "
-        "incomplete, or the number is to be corrected",
+        f"line {header.line} states {header.n_values} values, but {numbers.values.size} follow: the file is "
+        "incomplete, or the line is to be corrected",
     )
     unit = choice.units or stated_unit(numbers.header) or "g"
     return (0.0, header.step), in_si(numbers.values, unit)
+
+
+def _of_cosmos(text: str, blocks: list[StatedValues], choice: _Choice, decimal: str | None) -> _Motion:
+    """The only block of accelerations of a file that may hold velocities and displacements too."""
+    first, *others = blocks
+    if others:
+        lines = ", ".join(str(block.line) for block in blocks)
+        raise ValueError(
+            f"the file holds {len(blocks)} accelerations, in lines {lines}: save each to a file, or pass the number of "
+            "lines above the last one as skip="
+        )
+    unit = choice.units or stated_unit(text.split("\n")[first.line - 1])
+    return _of_stated(block_below(text, first.line), first, choice._replace(units=unit), 0, decimal)
 
 
 def _of_list(
