@@ -194,6 +194,8 @@ def test_the_accelerations_of_a_cosmos_file_are_read_without_its_velocities():
     values = [1e-6, -2e-6, -1.234567, 10.00001, 1.0, -2.0, 3.0, 4.0, 5.0, -6.0]
     assert acceleration.tolist() == [value / 100.0 for value in values]
     assert t[:3].tolist() == [0.0, 0.005, 0.01]
+    with pytest.raises(ValueError, match="line 4 states no unit"):
+        read(COSMOS.replace(", in cm/sec2.", ""))
     both = COSMOS + COSMOS.replace("-1.234567100.00001", "-1.234567 10.00001")
     with pytest.raises(ValueError, match=r"holds 2 accelerations, in lines 4, 13: .* as skip="):
         read(both)

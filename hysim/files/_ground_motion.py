@@ -260,6 +260,7 @@ def _of_cosmos(text: str, blocks: list[StatedValues], choice: _Choice, decimal: 
             "lines above the last one as skip="
         )
     unit = choice.units or stated_unit(text.split("\n")[first.line - 1])
+    require(unit is not None, f"line {first.line} states no unit of its accelerations: pass units=")
     return _of_stated(block_below(text, first.line), first, choice._replace(units=unit), 0, decimal)
 
 
