@@ -169,7 +169,8 @@ def test_arrays_with_names_are_read(tmp_path, ending):
 def test_a_list_in_reading_order_is_read_to_the_bit(values, per_line, sign):
     rows = [sign.join(map(repr, values[k : k + per_line])) for k in range(0, len(values), per_line)]
     widths = [len(row.split(sign)) for row in rows]
-    assume(set(widths) != {2} or len(rows) < 3)  # pairs whose first numbers happen to be evenly spaced could be times
+    first = np.diff(values[::per_line])
+    assume(len(set(widths)) > 1 or per_line == 1 or len(rows) < 3 or not (first > 0.0).all())  # they could be times
     t, acceleration = read("A TITLE\nand more of it\n" + "\n".join(rows), sample_time=0.02)
     assert acceleration.tolist() == values
     assert t.tolist() == hs.signals.sample_times(len(values), 0.02).tolist()
@@ -243,8 +244,17 @@ def test_a_decimal_comma_is_seen_where_it_can_be_nothing_else():
         (TABLE.replace("[g]", "[V]"), {}, "'V' is no known unit of acceleration"),
         (TABLE.replace("[s]", "[h]"), {}, "the time must be in s or ms, got the unit 'h'"),
         (TABLE.replace("acceleration [g]", "acc_g"), {}, "column 'acc_g' may be in g: pass units="),
-        (TABLE, {"sample_time": 0.01}, "the first of two columns increases evenly, as times do: leave out sample_time"),
-        ("0 1\n0.01 2\n0.02 3\n", {"sample_time": 0.01}, "the first of two columns increases evenly"),
+        (TABLE, {"sample_time": 0.01}, "the first of 2 columns increases from line to line"),
+        (
+            "0 1\n0.01 2\n0.02 3\n",
+            {"sample_time": 0.01},
+            "the first of 2 columns increases from line to line",
+        ),
+        (
+            "time,x,y\n" + "".join(f"{k**2},5,6\n" for k in range(8)),
+            {"sample_time": 1.0},
+            "the first of 3 columns increases from line to line, as times do",
+        ),
         ("t,acc,accel\n0,1,2\n1,2,3\n", {}, "t, acc, accel; pass that of the acceleration as acceleration="),
         ("t,time,a\n0,1,2\n1,2,3\n", {}, "several columns may be the time: pass one of t, time as t="),
         (".1\n.2\n", {}, "if these are 2 accelerations in reading order, pass their sample_time="),

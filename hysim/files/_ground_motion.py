@@ -26,6 +26,7 @@ from hysim.signals import sample_times
 
 _TIME_NAME = re.compile(r"t|s|sec|seconds?|time\b.*|time_.*|zeit", re.IGNORECASE)
 _MOTION_NAME = re.compile(r"u|a|a_?g|acc.*|ground.?(acc.*|motion)", re.IGNORECASE)
+_FEW_LINES, _MANY_LINES = 3, 8  # 8 numbers without order increase once in 40 000 times
 _SAME_DECIMAL = 1e-9  # of a step: a step with six digits that is as near is the one that was meant
 
 
@@ -276,14 +277,17 @@ def _of_list(
 
 
 def _check_no_times(numbers: NumberList) -> None:
-    """Refuse pairs of numbers of which the first ones increase evenly: they are times."""
-    if set(numbers.widths) == {2} and len(numbers.widths) > 2:
-        first = numbers.values[::2]
-        require(
-            not ((np.diff(first) > 0.0).all() and step_if_even(first)),
-            "the first of two columns increases evenly, as times do: leave out sample_time, or name the column of the "
-            "acceleration",
-        )
+    """Refuse lines whose first numbers increase evenly, or in many lines at all: they are times."""
+    width, n_lines = numbers.widths[0], len(numbers.widths)
+    if width == 1 or numbers.widths[-1] != width or n_lines < _FEW_LINES:
+        return
+    first = numbers.values[::width]
+    increases = bool((np.diff(first) > 0.0).all())
+    require(
+        not (increases and (n_lines >= _MANY_LINES or step_if_even(first))),
+        f"the first of {width} columns increases from line to line, as times do: leave out sample_time, or name the "
+        "column of the acceleration",
+    )
 
 
 def _of_table(table: Table, choice: _Choice) -> _Motion:
