@@ -14,6 +14,8 @@ from hysim.records import check_increasing, even_step
 _BY_NODE = frozenset({"displacement", "velocity", "acceleration"})
 """Signals with a column for each mass, as their peaks: masses are nodes 1, 2, ..., because node 0 is the ground."""
 
+_PEAK = "peak_"
+
 
 @printed
 @frozen
@@ -41,6 +43,12 @@ class Simulation:
     z: FloatArray | None = None
     signals: Mapping[str, FloatArray] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def peaks(self) -> dict[str, FloatArray]:
+        """Largest sizes over the whole run, by the names of the signals that have a ``"peak_..."``."""
+        peaks = {name: values for name, values in self.signals.items() if name.startswith(_PEAK) and len(values)}
+        return {name.removeprefix(_PEAK): values[-1] for name, values in peaks.items()}
 
     def __str__(self) -> str:
         arrays = {"t": self.t, "u": self.u, "y": self.y, "z": self.z, **self.signals}
