@@ -25,6 +25,7 @@ from hysim.plants.structures import assembly
 from hysim.plants.structures.damping import ModalDamping, Rayleigh
 from hysim.plants.structures.element import Element, parted
 from hysim.plants.structures.ensemble import Reduction, responses
+from hysim.plants.structures.parameters import assembled, scalars_of
 
 _OUTPUTS = ("displacement", "velocity", "acceleration", "drift", "force")
 _LOOSEST = 1e-3  # tolerance
@@ -214,6 +215,43 @@ class Structure:
     def kernel_elements(self) -> Elements:
         """The elements as the kernel takes them."""
         return assembly.elements_of(self.laws, self.drift_matrix, self.elastic_slopes)
+
+    @property
+    def scalars(self) -> dict[str, float]:
+        """Every number by name, such as ``"damping"`` and ``"elements.0.beta"``; see `assemble`."""
+        return scalars_of(self)
+
+    def assemble(self, parameters: Mapping[str, float]) -> "Structure":
+        """The structure with some numbers exchanged.
+
+        Parameters
+        ----------
+        parameters : mapping
+            Names in `scalars` to numbers. ``"mass"``, ``"stiffness"`` and ``"damping"`` are the number itself, where
+            the argument is one or a `ModalDamping` of one ratio, and else a factor of the whole, 1 as it is; there
+            are ``"mass[0]"``, ``"damping[1]"`` of several, too, and ``"damping.mass"`` of a `Rayleigh`. The numbers
+            of laws have the laws' own names, ``"elements.0.thresholds[1]"``, those of sums the parts' labels,
+            ``"elements.0.bouc_wen.beta"``; ``"elements.*.beta"`` is one number for all elements with this name.
+
+        Returns
+        -------
+        Structure
+
+        Raises
+        ------
+        ValueError
+            If a name is unknown, or a constructor refuses a number.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> frame = hs.shear_frame([2.0, 2.0], laws=hs.Dahl(), damping=hs.ModalDamping(ratio=0.02))
+        >>> other = frame.assemble({"damping": 0.05, "elements.*.stiffness": 3.0})
+        >>> other.damping.ratio, [element.law.stiffness for element in other.elements]
+        (0.05, [3.0, 3.0])
+        """
+        structure: Structure = assembled(self, parameters)
+        return structure
 
     # ------------------------------------------------------------------------------ small motions
 
