@@ -12,6 +12,7 @@ A drift turns where its velocity changes sign, which is such an event: peaks are
 """
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -275,7 +276,7 @@ class _Motion:
         self.N, self.E = mass.shape[0], directions.shape[0]
         sizes = [group.place.size for group in self.elements.groups]
         ends = 2 * self.N + np.cumsum([0, *sizes])
-        self.parts = [slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+        self.parts = [slice(a, b) for a, b in pairwise(ends)]
         self.work = int(ends[-1])
         self.s = np.ones(self.E)
         self.load = self.load_slope = np.zeros(self.N)
