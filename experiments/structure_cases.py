@@ -5,7 +5,7 @@ under an envelope. A scale is chosen so that a case has its ductility.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -95,14 +95,9 @@ class Case:
             mass=self.mass, damping=self.damping, stiffness=self.stiffness, elements=elements, **options
         )
 
-    def shortened(self, n_samples: int) -> "Case":
-        """The first samples only."""
-        return Case(**{**vars_of(self), "ground": self.ground[:n_samples]})
-
-
-def vars_of(case: Case) -> dict[str, Any]:
-    """The fields of a case, without what was computed from them."""
-    return {name: vars(case)[name] for name in Case.__dataclass_fields__}
+    def window(self, begin: int, end: int) -> "Case":
+        """A stretch of the earthquake only, which begins suddenly."""
+        return replace(self, ground=self.ground[begin:end])
 
 
 def quake(n_samples: int, sample_time: float, seed: int, duration: float) -> Array:

@@ -77,6 +77,7 @@ class Memories:
         self.A, self.beta, self.gamma, self.n, self.gain, self.z0 = np.array(
             [[vars(law)[name] for name in fields] for law in laws]
         ).T
+        self.power = _power(self.n)
         self.side = np.ones(self.place.size)
 
     def start(self) -> Array:
@@ -92,7 +93,7 @@ class Memories:
 
     def rates(self, v: Array, s: Array, z: Array) -> Array:
         bend = self.gamma + self.beta * self.side * s[self.place]
-        return v[self.place] * (self.A - _power(self.side * z, self.n) * bend)
+        return v[self.place] * (self.A - self.power(self.side * z) * bend)
 
     def margins(self, d: Array, s: Array, z: Array) -> Array:
         return self.side * z
@@ -150,6 +151,7 @@ class Worn:
         self.place = np.concatenate([self.of, self.of])
         names = ("A", "beta", "gamma", "n", "delta_a", "delta_nu", "delta_eta", "zeta_s", "q", "p", "psi", "delta_psi")
         self.values = {name: np.array([vars(law)[name] for law in laws]) for name in (*names, "lambda_", "gain", "z0")}
+        self.power = _power(self.values["n"])
         self.side = np.ones(self.of.size)
 
     def start(self) -> Array:
@@ -173,7 +175,7 @@ class Worn:
         width = (k["psi"] + k["delta_psi"] * e) * (k["lambda_"] + depth)
         pinched = 1.0 - depth * np.exp(-(((memory * direction - k["q"] * yielding) / width) ** 2))
         bend = k["gamma"] + k["beta"] * self.side * direction
-        slope = k["A"] - k["delta_a"] * e - strength * _power(self.side * memory, k["n"]) * bend
+        slope = k["A"] - k["delta_a"] * e - strength * self.power(self.side * memory) * bend
         return np.concatenate([speed * pinched * slope / stiffness, speed * memory])
 
     def margins(self, d: Array, s: Array, z: Array) -> Array:
@@ -187,10 +189,15 @@ class Worn:
         return np.concatenate([z, z * d])
 
 
-def _power(w: Array, n: Array) -> Array:
-    """w^n; past an event w is below zero, where a whole power goes on smoothly."""
-    whole = n == np.round(n)
-    return np.where(whole, w**n, np.maximum(w, 0.0) ** n) if np.all(whole) else np.maximum(w, 0.0) ** n
+def _power(n: Array) -> Callable[[Array], Array]:
+    """w^n as a function of w; past an event w is below zero, where a whole power goes on smoothly."""
+    if np.all(n == 1.0):
+        return lambda w: w
+    if np.all(n == 2.0):
+        return lambda w: w * w
+    if np.all(n == np.round(n)):
+        return lambda w: w**n
+    return lambda w: np.maximum(w, 0.0) ** n
 
 
 class Elements(NamedTuple):

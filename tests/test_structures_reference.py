@@ -1,0 +1,112 @@
+"""Structures against an independent integration of their differential equations.
+
+The reference (`experiments/structure_reference.py`) is DOP853 at 1e-12 on pieces between all events; it uses no step of
+hysim. It is itself held to closed forms and to the one-mass oscillator here. Short earthquakes; the whole ones are in
+`experiments/39_structures_work_precision.py`.
+"""
+
+import sys
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import hysim as hs
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "experiments"))
+import structure_cases as cases
+from structure_reference import reference
+
+CASES = {  # strong parts of the earthquakes
+    "one mass": lambda: cases.one_mass().window(150, 300),
+    "three storeys, n = 2": lambda: cases.three_storeys().window(200, 350),
+    "three storeys, n = 1": lambda: cases.three_storeys(1.0).window(200, 350),
+    "bilinear": lambda: cases.yielding_frame().window(200, 350),
+    "pinching": lambda: cases.pinching().window(200, 350),
+    "twenty storeys": lambda: cases.isolated_tower().window(300, 400),
+}
+
+
+@cache
+def case(name):
+    """A short case and its reference, computed once."""
+    made = CASES[name]()
+    return made, made.reference()
+
+
+def largest(array):
+    return float(np.abs(array).max())
+
+
+# ---------------------------------------------------------------------------------- the reference itself
+
+
+def test_the_reference_is_exact_on_a_linear_oscillator():
+    """The exact flow under a load that is linear between samples, by a matrix exponential."""
+    m, c, k, h = 2.0, 0.7, 30.0, 0.05
+    ground = np.random.default_rng(0).normal(size=80)
+    loads = -m * ground[:, None]
+    found = reference(
+        np.eye(1) * m, np.eye(1) * c, np.eye(1) * 10.0, np.eye(1), [hs.Play(threshold=0.0, gain=k - 10.0)], loads, h
+    )
+    augmented = np.zeros((4, 4))
+    augmented[0, 1], augmented[1, :3], augmented[2, 3] = 1.0, (-k / m, -c / m, 1.0), 1.0
+    flow, x = expm(augmented * h), [np.zeros(2)]
+    for a, b in pairwise(ground):
+        x.append((flow @ [*x[-1], -a, (a - b) / h])[:2])
+    exact = np.array(x)
+    # 80 integrations, each to 1e-12
+    assert largest(found.displacement[:, 0] - exact[:, 0]) < 1e-11 * largest(exact[:, 0])
+    assert largest(found.velocity[:, 0] - exact[:, 1]) < 1e-11 * largest(exact[:, 1])
+
+
+def test_the_reference_agrees_with_the_oscillator():
+    """hysim's own scheme for one mass, of order 6, with many substeps; it is another method by other means."""
+    made, exact = case("one mass")
+    (law,) = (law for _, law in made.elements)
+    options = {"mass": made.masses[0], "damping": float(made.damping[0, 0]), "stiffness": 0.0, "law": law}
+    plant = hs.BoucWenOscillator(**options, excitation="base", substeps=32)
+    y = plant.response(made.ground, made.sample_time)
+    assert largest(y - exact.drift[:, 0]) < 3e-12 * largest(y)
+
+
+def test_the_reference_has_converged():
+    made, exact = case("bilinear")
+    coarser = made.reference(1e-10)
+    assert largest(coarser.drift - exact.drift) < 1e-9 * largest(exact.drift)
+    assert largest(coarser.peak_drift / exact.peak_drift - 1.0) < 1e-9
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_energies_of_the_reference_balance(name):
+    made, exact = case(name)
+    kinetic = 0.5 * np.einsum("ni,ij,nj->n", exact.velocity, made.mass, exact.velocity)
+    elastic = 0.5 * np.einsum("ni,ij,nj->n", exact.displacement, made.stiffness, exact.displacement)
+    spent = kinetic + elastic + exact.damping_loss + exact.element_work.sum(axis=1)
+    assert largest(exact.input_work - spent) < 1e-12 * exact.input_work.max()  # six figures are rounding of the sums
+
+
+# ---------------------------------------------------------------------------------- structures
+
+
+FINEST = {  # errors of the drifts with 8 substeps, of the largest drift: four times what was measured
+    "one mass": 1e-9,
+    "three storeys, n = 2": 1e-9,
+    "three storeys, n = 1": 1e-7,
+    "bilinear": 4e-5,
+    "pinching": 1e-9,
+    "twenty storeys": 4e-6,
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_structure_follows_its_differential_equations(name):
+    made, exact = case(name)
+    signals = made.structure(substeps=8).signals(made.ground, made.sample_time)
+    assert largest(signals["drift"] - exact.drift) < FINEST[name] * largest(exact.drift)
+    assert largest(signals["displacement"] - exact.displacement) < FINEST[name] * largest(exact.displacement)
+    assert largest(signals["force"] - exact.force) < 10.0 * FINEST[name] * largest(exact.force)
+    assert largest(signals["velocity"] - exact.velocity) < 10.0 * FINEST[name] * largest(exact.velocity)
