@@ -6,6 +6,7 @@ hysim. It is itself held to closed forms and to the one-mass oscillator here. Sh
 """
 
 import sys
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -102,6 +103,9 @@ FINEST = {  # errors of the drifts with 8 substeps, of the largest drift: four t
 }
 
 
+PEAKS = {name: 1e-6 for name in CASES}
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_a_structure_follows_its_differential_equations(name):
     made, exact = case(name)
@@ -110,3 +114,67 @@ def test_a_structure_follows_its_differential_equations(name):
     assert largest(signals["displacement"] - exact.displacement) < FINEST[name] * largest(exact.displacement)
     assert largest(signals["force"] - exact.force) < 10.0 * FINEST[name] * largest(exact.force)
     assert largest(signals["velocity"] - exact.velocity) < 10.0 * FINEST[name] * largest(exact.velocity)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_peaks_are_those_between_the_samples(name):
+    made, exact = case(name)
+    signals = made.structure().signals(made.ground, made.sample_time)
+    assert (1.0 - np.abs(exact.drift).max(axis=0) / exact.peak_drift).max() > 1e-4  # samples miss them
+    assert largest(signals["peak_drift"][-1] / exact.peak_drift - 1.0) < PEAKS[name]
+    found = hs.simulate(made.structure(), made.times, made.ground).peaks["drift"]
+    assert largest(found / exact.peak_drift - 1.0) < PEAKS[name]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_energies_are_those_of_the_differential_equations(name):
+    made, exact = case(name)
+    signals = made.structure().signals(made.ground, made.sample_time)
+    unit = exact.input_work.max()
+    for energy in ("input_work", "damping_loss", "element_work"):
+        assert largest(signals[energy] - vars_of(exact, energy)) < 1e-6 * unit, energy
+    assert largest(signals["imbalance"]) < 1e-8 * unit
+
+
+def vars_of(exact, name):
+    """A field of the reference by its name."""
+    return exact._asdict()[name]
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8])
+@pytest.mark.parametrize("name", CASES)
+def test_the_tolerance_is_that_of_the_drifts(name, tolerance):
+    made, exact = case(name)
+    signals = made.structure(tolerance=tolerance).signals(made.ground, made.sample_time)
+    # errors of the steps add up; an estimate that sees nothing would miss this by a factor of thousands
+    assert largest(signals["drift"] - exact.drift) < 30.0 * tolerance * largest(exact.drift)
+
+
+# ---------------------------------------------------------------------------------- order of accuracy
+
+
+def errors(made, exact, counts):
+    """Largest errors of the drifts by the number of substeps."""
+    runs = [made.structure(substeps=n).signals(made.ground, made.sample_time)["drift"] for n in counts]
+    return [largest(run - exact.drift) for run in runs]
+
+
+def order(found, counts):
+    """The power of the step with which errors fall."""
+    return -np.polyfit(np.log(counts), np.log(found), 1)[0]
+
+
+def test_the_order_on_a_smooth_branch():
+    """Until the first reversal, under a load that rises smoothly: one long sample after the other."""
+    made = cases.three_storeys()
+    pushed = replace(made, ground=-2.0 * np.linspace(0.0, 1.0, 4) ** 2, sample_time=0.04)
+    exact, counts = pushed.reference(), (1, 2, 4)
+    assert (np.diff(np.abs(exact.drift), axis=0) > 0.0).all()  # nothing turns
+    assert order(errors(pushed, exact, counts), counts) > 3.8
+
+
+@pytest.mark.parametrize("name", ["one mass", "three storeys, n = 2", "pinching"])
+def test_the_order_across_reversals(name):
+    made, exact = case(name)
+    counts = (1, 2, 4, 8)
+    assert order(errors(made, exact, counts), counts) > 3.5
