@@ -918,18 +918,18 @@ def structures_work_precision(result: Result) -> list[str]:
         min(row["times_more_exact"] for row in result["beside_opensees"]) > 1.0, "hysim is more exact at equal cost"
     )
     return [
-        f"Three Bouc-Wen storeys at ductility 5: {error_of(own['error'])} of the largest drift at the default tolerance, "
-        f"{number(own['ns_per_term'])} ns a sample and element; peak drifts to 1e-6 take {number(fast['value'])} ns. "
-        f"OpenSees with 64 steps a sample is {span(column(finest, 'error'), 2)} wrong; hysim with at most its error is "
-        f"{span(column(finest, 'times_faster'), 2)} times faster, and at its cost "
+        f"Three Bouc-Wen storeys at ductility 5: {error_of(own['error'])} of the largest drift at the default "
+        f"tolerance, {number(own['ns_per_term'])} ns a sample and element; peak drifts to 1e-6 take "
+        f"{number(fast['value'])} ns. OpenSees with 64 steps a sample is {span(column(finest, 'error'), 2)} wrong; hysim "
+        f"with at most its error is {span(column(finest, 'times_faster'), 2)} times faster, and at its cost "
         f"{span(column(finest, 'times_more_exact'), 2)} times more exact. With few steps a sample, where OpenSees is "
         f"{error_of(least['error'])} wrong, {number(least['times_faster'], 2)} times faster.",
-        f"To 1e-4 a plain compiled Verlet loop around hysim's laws takes {number(verlet['ns_per_term'])} ns, the faster "
-        f"of SciPy's methods {number(peer['ns_per_term'])} ns and hysim {number(ours['ns_per_term'])} ns.",
-        f"With the same Newmark steps on bilinear storeys OpenSees' Steel01 and hysim's law differ by "
+        f"To 1e-4 a plain compiled Verlet loop around hysim's laws takes {number(verlet['ns_per_term'])} ns, the "
+        f"faster of SciPy's methods {number(peer['ns_per_term'])} ns and hysim {number(ours['ns_per_term'])} ns.",
+        "With the same Newmark steps on bilinear storeys OpenSees' Steel01 and hysim's law differ by "
         f"{error_of(steel['value'])}.",
-        f"Twenty storeys on isolators with Dahl friction, plays and Maxwell slip: drifts {error_of(tower['error'])} wrong, "
-        f"energies balanced to {error_of(tower['imbalance'])} of the input.",
+        f"Twenty storeys on isolators with Dahl friction, plays and Maxwell slip: drifts {error_of(tower['error'])} "
+        f"wrong, energies balanced to {error_of(tower['imbalance'])} of the input.",
         f"Of {len(asked)} figures that were asked for, {len(missed)} are not reached"
         + (f": {'; '.join(missed)}." if missed else "."),
     ]

@@ -103,7 +103,7 @@ FINEST = {  # errors of the drifts with 8 substeps, of the largest drift: four t
 }
 
 
-PEAKS = {name: 1e-6 for name in CASES}
+PEAKS = dict.fromkeys(CASES, 1e-06)
 
 
 @pytest.mark.parametrize("name", CASES)
