@@ -920,8 +920,8 @@ def structures_work_precision(result: Result) -> list[str]:
     return [
         f"Three Bouc-Wen storeys at ductility 5: {error_of(own['error'])} of the largest drift at the default "
         f"tolerance, {number(own['ns_per_term'])} ns a sample and element; peak drifts to 1e-6 take "
-        f"{number(fast['value'])} ns. OpenSees with 64 steps a sample is {span(column(finest, 'error'), 2)} wrong; hysim "
-        f"with at most its error is {span(column(finest, 'times_faster'), 2)} times faster, and at its cost "
+        f"{number(fast['value'])} ns. OpenSees with 64 steps a sample is {span(column(finest, 'error'), 2)} wrong; "
+        f"hysim with at most its error is {span(column(finest, 'times_faster'), 2)} times faster, and at its cost "
         f"{span(column(finest, 'times_more_exact'), 2)} times more exact. With few steps a sample, where OpenSees is "
         f"{error_of(least['error'])} wrong, {number(least['times_faster'], 2)} times faster.",
         f"To 1e-4 a plain compiled Verlet loop around hysim's laws takes {number(verlet['ns_per_term'])} ns, the "

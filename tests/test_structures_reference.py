@@ -19,13 +19,15 @@ import hysim as hs
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "experiments"))
 import structure_cases as cases
+from square_dahl import SquareDahl
 from structure_reference import reference
 
+YIELDING = 2.0 * cases.yielding_frame().ground[200:350]
 CASES = {  # strong parts of the earthquakes
     "one mass": lambda: cases.one_mass().window(150, 300),
     "three storeys, n = 2": lambda: cases.three_storeys().window(200, 350),
     "three storeys, n = 1": lambda: cases.three_storeys(1.0).window(200, 350),
-    "bilinear": lambda: cases.yielding_frame().window(200, 350),
+    "bilinear": lambda: replace(cases.yielding_frame().window(200, 350), ground=YIELDING),
     "pinching": lambda: cases.pinching().window(200, 350),
     "twenty storeys": lambda: cases.isolated_tower().window(300, 400),
 }
@@ -178,3 +180,44 @@ def test_the_order_across_reversals(name):
     made, exact = case(name)
     counts = (1, 2, 4, 8)
     assert order(errors(made, exact, counts), counts) > 3.5
+
+
+# ---------------------------------------------------------------------------------- laws without an equation
+
+
+def central_differences(plant, ground, h, count):
+    """Drifts by a plain loop around the laws' steps, of order 2 with steps of h / count."""
+    M, C, K, B = plant.mass_matrix, plant.damping_matrix, plant.stiffness_matrix, plant.drift_matrix
+    laws = [element.law.compiled() for element in plant.elements]
+    h, inverse = h / count, np.linalg.inv(M + 0.5 * h / count * C)
+    loads, out = -M @ np.ones(len(M)), [np.zeros(len(laws))]
+    x, before = np.zeros(len(M)), -0.5 * h * h * np.ones(len(M)) * ground[0]
+    for shake in np.interp(np.arange((ground.size - 1) * count) / count, np.arange(ground.size), ground):
+        f = [law.step(law.parameters, law.state, d) for law, d in zip(laws, B @ x, strict=True)]
+        right = h * h * (loads * shake - K @ x - f @ B) + 2.0 * M @ x - (M - 0.5 * h * C) @ before
+        before, x = x, inverse @ right
+        out.append(B @ x)
+    return np.array(out)[::count]
+
+
+def test_a_preisach_link_and_a_law_of_the_user():
+    """Their motion is what a plain loop of order 2 converges to, and each further substep comes nearer to it."""
+    levels = np.linspace(-0.04, 0.04, 81)
+    link = hs.Preisach.from_density(levels, lambda a, b: -4e6 * np.exp(-(((a - b) / 0.03) ** 2)))
+    link = replace(link, offset=-float(link.response([0.0])[0]), z0=(-0.04, 0.04, -0.03, 0.02, -0.01, 0.005))
+    link = replace(link, offset=link.offset - float(link.response([0.0])[0]))
+    own = SquareDahl(k=6e4, coulomb=250.0, c=0.0)
+    elements = (hs.Element(own, between=(0, 1)), hs.Element(link, between=(1, 2)))
+    options = {"mass": (100.0, 100.0), "stiffness": np.array([[1.8e5, -8e4], [-8e4, 8e4]]), "damping": 40.0}
+    made = cases.three_storeys().window(200, 300)
+    finest, rough = (
+        hs.Structure(**options, elements=elements, substeps=n).signals(made.ground, made.sample_time)["drift"]
+        for n in (16, 1)
+    )
+    coarse, fine = (
+        central_differences(hs.Structure(**options, elements=elements), made.ground, made.sample_time, n)
+        for n in (8, 16)
+    )
+    assert largest(rough - finest) < 1e-3 * largest(finest)
+    assert largest(coarse - finest) > 2.0 * largest(fine - finest)  # the loop comes nearer
+    assert largest((4.0 * fine - coarse) / 3.0 - finest) < 1e-4 * largest(finest)  # and would end there
