@@ -15,6 +15,7 @@ from hysim import signals as signals
 from hysim import vision as vision
 from hysim.records import Record as Record
 from hysim.files import load as load
+from hysim.files import load_ground_motion as load_ground_motion
 from hysim.files import save_record as save_record
 from hysim.simulation import simulate as simulate
 from hysim.simulation import Simulation as Simulation
@@ -83,6 +84,11 @@ from hysim.models.cascade import Cascade as Cascade
 from hysim.laws.dashpot import Dashpot as Dashpot
 from hysim.laws.custom import CustomLaw as CustomLaw
 from hysim.plants.oscillator import BoucWenOscillator as BoucWenOscillator
+from hysim.plants.structures.structure import Structure as Structure
+from hysim.plants.structures.element import Element as Element
+from hysim.plants.structures.damping import Rayleigh as Rayleigh
+from hysim.plants.structures.damping import ModalDamping as ModalDamping
+from hysim.plants.structures.frames import shear_frame as shear_frame
 from hysim.plants.transfer_function import TransferFunction as TransferFunction
 from hysim.plants.state_space import StateSpace as StateSpace
 from hysim.plants.modes import Modes as Modes

@@ -34,6 +34,7 @@ _QUANTITIES = {
     **dict.fromkeys(("V", "mV", "kV"), "Voltage"),
     **dict.fromkeys(("nm", "um", "µm", "mm", "m"), "Displacement"),
     **dict.fromkeys(("mN", "N", "kN"), "Force"),
+    **dict.fromkeys(("mm/s^2", "cm/s^2", "m/s^2"), "Acceleration"),
     **dict.fromkeys(("us", "µs", "ms", "s"), "Time"),
 }
 _NAMES = {"t": "Time", "u": "Input", "y": "Output", "z": "Memory z"}
@@ -54,5 +55,5 @@ def in_unit(name: str, unit: str) -> str:
 
 
 def printed(unit: str) -> str:
-    """A unit with its micro sign: `µm` for ``"um"``."""
-    return re.sub(r"\bu(?=(m|s|V|A|N)\b)", "µ", unit)
+    """A unit with its micro sign and its square: `µm` for ``"um"``, `m/s²` for ``"m/s^2"``."""
+    return re.sub(r"\bu(?=(m|s|V|A|N)\b)", "µ", unit).replace("^2", "²")

@@ -418,6 +418,20 @@ def even_step(t: FloatArray) -> float:
     if t.size < 2:
         raise ValueError(f"t must hold at least 2 samples, got {t.size}")
     check_increasing(t)
+    step = step_if_even(t)
+    if step is not None:
+        return step
+    steps = np.diff(t)
+    usual = f"{float(np.median(steps)):.4g}"
+    raise ValueError(
+        f"the time must be evenly spaced, got steps from {steps.min()} to {steps.max()}: pass "
+        f"record.resample({usual}), or t = {usual} * np.arange(n) if only the time stamps are wrong; on the command "
+        f"line --sample-time {usual}"
+    )
+
+
+def step_if_even(t: FloatArray) -> float | None:
+    """The constant step of at least 2 increasing times, None if they are not even in the sense of `even_step`."""
     steps = np.diff(t)
     mean = float(steps.mean())
     if np.ptp(steps) <= _SAME_STEP * mean:
@@ -428,12 +442,7 @@ def even_step(t: FloatArray) -> float:
     digit = last_digit(t)
     if (error <= _EVEN * step).all() or (digit <= _COARSEST * step and (error <= _ROUNDED * digit).all()):
         return step
-    usual = f"{float(np.median(steps)):.4g}"
-    raise ValueError(
-        f"the time must be evenly spaced, got steps from {steps.min()} to {steps.max()}: pass "
-        f"record.resample({usual}), or t = {usual} * np.arange(n) if only the time stamps are wrong; on the command "
-        f"line --sample-time {usual}"
-    )
+    return None
 
 
 def last_digit(values: FloatArray) -> float:

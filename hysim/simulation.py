@@ -11,6 +11,11 @@ from hysim._printing import extent, printed, summary_text
 from hysim.models.protocols import Remembering, Responding, needs_time
 from hysim.records import check_increasing, even_step
 
+_BY_NODE = frozenset({"displacement", "velocity", "acceleration"})
+"""Signals with a column for each mass, as their peaks: masses are nodes 1, 2, ..., because node 0 is the ground."""
+
+_PEAK = "peak_"
+
 
 @printed
 @frozen
@@ -26,7 +31,8 @@ class Simulation:
     z : array, shape (n,), or None
         Memory of a law that has one.
     signals : mapping
-        All signals by name, also those above.
+        All signals by name, also those above: of shape (n,), or (n, m) where a plant has m masses, elements or
+        memories.
     units : mapping
         Labels of the units, by the signals' names.
     """
@@ -38,12 +44,54 @@ class Simulation:
     signals: Mapping[str, FloatArray] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
 
+    @property
+    def peaks(self) -> dict[str, FloatArray]:
+        """Largest sizes over the whole run, by the names of the signals that have a ``"peak_..."``."""
+        peaks = {name: values for name, values in self.signals.items() if name.startswith(_PEAK) and len(values)}
+        return {name.removeprefix(_PEAK): values[-1] for name, values in peaks.items()}
+
     def __str__(self) -> str:
         arrays = {"t": self.t, "u": self.u, "y": self.y, "z": self.z, **self.signals}
         return summary_text(
             [f"Simulation: {self.u.size} samples"],
-            {name: extent(values, self.units.get(name, "")) for name, values in arrays.items() if values is not None},
+            {name: self._in_words(name, values) for name, values in arrays.items() if values is not None},
         )
+
+    def _in_words(self, name: str, values: FloatArray) -> str:
+        least_to_largest = extent(values, self.units.get(name, ""))
+        return least_to_largest if values.ndim == 1 else f"{values.shape[1]} columns, {least_to_largest}"
+
+    @property
+    def columns(self) -> dict[str, FloatArray]:
+        """Signals as the columns of a table, each of shape (n,): t, u, y and z first, then the others.
+
+        A signal of shape (n, m) is m columns: ``drift_0``, ``drift_1``, ... for elements and memories, and
+        ``displacement_1``, ``displacement_2``, ... for masses, whose nodes are counted from 1.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> law = hs.MaxwellSlip(stiffness=(1.0, 2.0), slips=(0.5, 1.0))
+        >>> list(hs.simulate(law, None, [0.0, 1.0]).columns)
+        ['u', 'y', 'z_0', 'z_1']
+        """
+        first = {name: self.signals[name] for name in ("t", "u", "y", "z") if name in self.signals}
+        named = {name: columns_of(name, values) for name, values in (first | dict(self.signals)).items()}
+        return {label: column for columns in named.values() for label, column in columns.items()}
+
+
+def columns_of(name: str, values: FloatArray) -> dict[str, FloatArray]:
+    """A signal as columns by their names, one of its own name if it has one axis."""
+    if values.ndim == 1:
+        return {name: values}
+    first = 1 if name.removeprefix("peak_") in _BY_NODE else 0
+    return {f"{name}_{first + k}": column for k, column in enumerate(values.T)}
+
+
+def has_elements(result: Simulation) -> bool:
+    """Whether a simulation has drifts and forces of at least one element."""
+    drift, force = result.signals.get("drift"), result.signals.get("force")
+    return drift is not None and force is not None and drift.ndim == 2 and drift.shape == force.shape and drift.size > 0
 
 
 @runtime_checkable

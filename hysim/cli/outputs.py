@@ -27,6 +27,7 @@ Files = Mapping[str | None, Callable[[], Any]]
 """Functions of the contents of files, which are texts, bytes or figures, by the paths; None stands for no file."""
 
 _ENDINGS = (".svg", ".png", ".pdf")
+_LOOPS_IN_A_ROW = 3
 
 
 def check(options: argparse.Namespace) -> None:
@@ -174,6 +175,22 @@ def loop(*results: "Record | Simulation | Curve") -> "Figure":
     from hysim import plot
 
     return drawn(lambda canvas: plot.loop(*results, ax=canvas.add_subplot()))
+
+
+def picture_of(run: "Simulation") -> "Figure":
+    """Picture of a simulation: the loops of a structure's elements, or the loop of output against input."""
+    from hysim import plot
+    from hysim.simulation import has_elements
+
+    if not has_elements(run):
+        return loop(run)
+    n = run.signals["drift"].shape[1]
+    rows = math.ceil(n / _LOOPS_IN_A_ROW)
+    return drawn(
+        lambda canvas: plot.element_loops(run, plot.panels(canvas, n, columns=min(n, _LOOPS_IN_A_ROW), sharex=False)),
+        width=3.0 * min(n, _LOOPS_IN_A_ROW) + 1.0,
+        height=3.0 * rows,
+    )
 
 
 def loop_of_model(record: "Record", model: Any) -> "Figure":

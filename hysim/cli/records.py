@@ -2,7 +2,9 @@
 
 import argparse
 import io
+import os
 import sys
+from collections.abc import Callable
 from typing import Any
 
 from hysim._frozen import FloatArray
@@ -46,6 +48,8 @@ OPTIONS_WITH_WEIGHTS = f"""{OPTIONS.rstrip()}
 OPTIONS_OF_AN_INPUT = f"{_FILE}\n\nrecord:\n{_INPUT}{_OTHERS}"
 """Options for a file that needs no column of the output."""
 
+SKIP = "--skip N  number of lines at the top of a ground motion that belong to its header, if it holds lines of numbers"
+
 
 def read(options: argparse.Namespace, file: str | None = None) -> Record:
     """The record that the options describe, or that of another `file`; without an output column, y is u."""
@@ -53,18 +57,82 @@ def read(options: argparse.Namespace, file: str | None = None) -> Record:
     return _read(options, path, _source(path), options.y if "y" in options else None, options.resolution)
 
 
+def read_input(options: argparse.Namespace, *, of_the_ground: bool) -> Record:
+    """The input that the options describe, as a record with y = u.
+
+    A ground motion in m/s^2 is read from an AT2 file, and with `of_the_ground` from a file that has no column u where
+    none is named.
+    """
+    from hysim.files import column_names, is_at2
+
+    source = _repeatable(options.file)
+    if is_at2(source(), options.encoding):
+        if options.u is not None or options.t is not None or options.no_t:
+            raise ValueError(f"{options.file} is an AT2 file, which has no columns: leave out --u, --t and --no-t")
+        return _ground_motion(options, source)
+    if of_the_ground and options.u is None and not options.no_t:
+        try:
+            names = column_names(source(), **_text_options(options))
+        except ValueError:
+            names = ()  # a list, or a fault that is named where the file is read
+        if "u" not in names:
+            return _ground_motion(options, source)
+    if options.skip is not None:
+        raise ValueError(f"--skip is for a ground motion: begin the lines at the top of {options.file} with #")
+    return _read(options, options.file, source(), None, options.resolution)
+
+
+def _ground_motion(options: argparse.Namespace, source: Callable[[], Any]) -> Record:
+    """A ground motion; a step is that of a list without times, or new even steps for one with times."""
+    from hysim.files import load_ground_motion
+
+    arguments = {"t": options.t, "units": dict(options.unit).get("u"), **_text_options(options)}
+    arguments["skip"] = options.skip or 0
+    if options.sample_time is None:
+        return _of_the_ground(*load_ground_motion(source(), **arguments))
+    step = positive("--sample-time", options.sample_time)
+    try:
+        motion = load_ground_motion(source(), **arguments)
+    except ValueError:
+        return _of_the_ground(*load_ground_motion(source(), sample_time=step, **arguments))
+    return _of_the_ground(*motion).resample(step)
+
+
+def _of_the_ground(t: FloatArray, acceleration: FloatArray) -> Record:
+    return Record(t=t, u=acceleration, y=acceleration, units={"t": "s", "u": "m/s^2"})
+
+
+def _text_options(options: argparse.Namespace) -> dict[str, Any]:
+    delimiter = _DELIMITERS.get(options.delimiter, options.delimiter)
+    return {"delimiter": delimiter, "decimal": options.decimal, "encoding": options.encoding}
+
+
+def _repeatable(path: str) -> Callable[[], Any]:
+    """A function that returns the file, or all that a stream holds, from its begin each time."""
+    if path != STANDARD and (os.path.isfile(path) or not os.path.exists(path)):
+        return lambda: path
+    if path == STANDARD:
+        content = _source(path).read()
+    else:  # a pipe
+        with open(path, "rb") as pipe:
+            content = pipe.read()
+    content = content.encode() if isinstance(content, str) else content
+
+    def begin() -> Any:
+        stream: Any = io.BytesIO(content)
+        stream.name = "<stdin>" if path == STANDARD else path
+        return stream
+
+    return begin
+
+
 def read_with_weights(options: argparse.Namespace) -> tuple[Record, FloatArray | None]:
     """The record that the options describe, and the column of weights that they name."""
     if options.weights is None:
         return read(options), None
-    source = _source(options.file)
-    if options.file == STANDARD:
-        content = source.read()
-        source = io.BytesIO(content.encode() if isinstance(content, str) else content)
-    record = _read(options, options.file, source, options.y, options.resolution)
-    if options.file == STANDARD:
-        source.seek(0)
-    return record, _read(options, options.file, source, options.weights, None).y
+    source = _repeatable(options.file)
+    record = _read(options, options.file, source(), options.y, options.resolution)
+    return record, _read(options, options.file, source(), options.weights, None).y
 
 
 def _source(path: str) -> Any:
@@ -86,13 +154,11 @@ def _read(options: argparse.Namespace, path: str, source: Any, y: str | None, re
         u=u,
         y=y if "y" in options else u,
         t=False if options.no_t else options.t,
-        delimiter=_DELIMITERS.get(options.delimiter, options.delimiter),
         units=dict(options.unit),
         name="record" if path == STANDARD else None,
         on_missing=options.on_missing,
-        decimal=options.decimal,
-        encoding=options.encoding,
         resolution=resolution,
+        **_text_options(options),
     )
     if options.sample_time is None:
         return record

@@ -1,32 +1,48 @@
-"""`hysim simulate`: a model in a file, driven by an input in a file."""
+"""`hysim simulate`: a model in a file, driven by an input or a ground motion in a file."""
 
 import argparse
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 from hysim.cli import models, outputs, records
 from hysim.cli.options import MODEL_IN, Command
 
 
+@runtime_checkable
+class _Shaken(Protocol):
+    """A plant that a force or its base moves."""
+
+    excitation: str
+
+
 def run(options: argparse.Namespace) -> int:
     """Simulate and write."""
+    from hysim.simulation import columns_of
+
     if options.model == options.file == records.STANDARD:
         raise ValueError("the standard input holds the model or the record, not both")
     model, units = models.read(options.model)
-    record = records.read(options)
-    units |= {signal: unit for signal, unit in record.units.items() if signal != "y"} | dict(options.unit)
+    record = records.read_input(options, of_the_ground=isinstance(model, _Shaken) and model.excitation == "base")
+    units |= dict(options.unit) | {signal: unit for signal, unit in record.units.items() if signal != "y"}
     simulation = models.simulated(model, record, units)
-    signals = simulation.signals
-    columns = {name: signals[name] for name in ("t", "u", "y", "z") if name in signals} | dict(signals)
+    columns = simulation.columns
+    labels = {
+        column: units[name]
+        for name, values in simulation.signals.items()
+        if name in units
+        for column in columns_of(name, values)
+    }
 
     def document() -> dict[str, Any]:
         values = {name: column.tolist() for name, column in columns.items()}
-        return {"units": {name: units[name] for name in columns if name in units}, "columns": values}
+        return {"units": {name: labels[name] for name in columns if name in labels}, "columns": values}
 
     files: outputs.Files = {
-        options.out: lambda: outputs.table(options.out, columns, units),
-        options.plot: lambda: outputs.loop(simulation),
+        options.out: lambda: outputs.table(options.out, columns, labels),
+        options.plot: lambda: outputs.picture_of(simulation),
     }
-    outputs.write(options, files, lambda: outputs.table(records.STANDARD, columns, units).decode(), document)
+    is_printed = options.out is None or options.json
+    text = (lambda: outputs.table(records.STANDARD, columns, labels).decode()) if is_printed else None
+    outputs.write(options, files, text, document)
     return 0
 
 
@@ -34,12 +50,15 @@ COMMAND = Command(
     "simulate",
     "drive a model with the input in a file of your own",
     "Simulate a model in free run, and write its signals as columns: t if there is a time, u, y, the memory z of a law "
-    "and further signals of a plant.",
+    "and further signals of a plant, those of a structure as drift_0, drift_1, ... for its elements and "
+    "displacement_1, ... for its nodes. An AT2 file of PEER is read as the acceleration of the ground in m/s^2; so is, "
+    "for a plant that its base moves, a file without a column u; --unit u=g says the unit if it states none.",
     f"""
 {MODEL_IN}
 {records.OPTIONS_OF_AN_INPUT}
+{records.SKIP}
 --out OUT  the columns (default: the standard output)
---plot LOOP.svg  draw the loop
+--plot LOOP.svg  draw the loop; of a structure, the loops of its elements
 --json  print the columns as JSON, beside a file if --out is used
 """,
     run,

@@ -132,8 +132,8 @@ def load(
     if isinstance(resolution, str) and resolution != "detect":
         raise ValueError(f'resolution must be a number or "detect", got {resolution!r}')
     for_text = {"delimiter": delimiter, "decimal": decimal, "encoding": encoding}
-    with opened(path) as source, _file_named(source):
-        with _table(source, for_text) as table:
+    with opened(path) as source, file_named(source):
+        with table_of(source, for_text) as table:
             columns = _columns(table, {"u": u, "y": y, "t": t})
             labels = _units(table, columns) | dict(units or {})
             values = table.values([*columns.values()])
@@ -152,7 +152,7 @@ def load(
 
 
 @contextmanager
-def _file_named(source: Opened) -> Iterator[None]:
+def file_named(source: Opened) -> Iterator[None]:
     """Make every message about a file one line that begins with its name."""
     try:
         yield
@@ -162,7 +162,7 @@ def _file_named(source: Opened) -> Iterator[None]:
 
 
 @contextmanager
-def _table(source: Opened, for_text: Mapping[str, str | None]) -> Iterator[Table]:
+def table_of(source: Opened, for_text: Mapping[str, str | None]) -> Iterator[Table]:
     """The table that a source holds, open to be read from."""
     if isinstance(source.content, (str, bytes)):
         text = text_of(source.content, source.name, for_text["encoding"])

@@ -33,6 +33,19 @@ def inner(function: F) -> F:
     return _compiled(function, (), **_NO_ENTRY)
 
 
+def uncounted(function: F) -> F:
+    """As `inner`, for a function that allocates nothing: it does not count the owners of arrays, its caller holds them.
+
+    Each array that is taken out of a tuple or cut would otherwise be counted, which takes longer than short loops.
+    """
+    return _compiled(function, (), _nrt=False, **_NO_ENTRY)
+
+
+def unfolded(function: F) -> F:
+    """As `uncounted` and `inlined`: a call with tuples of arrays would copy a hundred numbers."""
+    return _compiled(function, (), _nrt=False, forceinline=True, **_NO_ENTRY)
+
+
 def inlined(function: F) -> F:
     """As `inner`, compiled into each of its callers, which saves the time of a call and costs that of a copy."""
     return _compiled(function, (), forceinline=True, **_NO_ENTRY)

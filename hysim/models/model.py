@@ -5,7 +5,7 @@ compared by value. Evolving state is separate: it is passed in and returned.
 """
 
 import importlib
-from dataclasses import fields
+from dataclasses import field, fields
 from typing import Any, TypeVar, dataclass_transform
 
 import numpy as np
@@ -21,7 +21,7 @@ _ROOMS = ("hysim.models.", "hysim.laws.", "hysim.plants.")  # where hysim's own 
 FAMILIES: dict[str, type] = {}
 
 
-@dataclass_transform(kw_only_default=True, frozen_default=True)
+@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))
 def family(cls: type[T]) -> type[T]:
     """Make `cls` a frozen model, and enter it into the registry of families under its name."""
     specification = checked(cls)
@@ -35,11 +35,11 @@ def _in_words(self: Any) -> str:
     name = type(self).__name__
     plain: list[str] = []
     inside: dict[str, str] = {}
-    for field, value in items(self).items():
-        if models := _models_in(field, value):
+    for parameter, value in items(self).items():
+        if models := _models_in(parameter, value):
             inside |= {place: in_brief(each) for place, each in models.items()}
         elif value is not None:
-            plain.append(f"{field} = {value_in_words(value)}")
+            plain.append(f"{parameter} = {value_in_words(value)}")
     if inside:
         return summary_text([name, wrapped(plain)], inside)
     return summary_text([wrapped(plain, most=9, first=f"{name}: ") or name])
@@ -49,7 +49,7 @@ def in_brief(value: Any) -> str:
     """A model in one line: its family, and the parameters that are not as they are by default."""
     if not _is_model(value):
         return type(value).__name__
-    defaults = {field.name: field.default for field in fields(value)}
+    defaults = {each.name: each.default for each in fields(value)}
     told = [
         f"{name} = {in_brief(each) if _is_model(each) else value_in_words(each)}"
         for name, each in items(value).items()

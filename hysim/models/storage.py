@@ -35,7 +35,7 @@ def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None
     path : path
         The file; it appears whole or not at all.
     units : mapping, optional
-        Labels of the units of ``"t"``, ``"u"`` and ``"y"``.
+        Labels of the units of ``"t"``, ``"u"`` and ``"y"``, and of other signals of a plant.
 
     Raises
     ------

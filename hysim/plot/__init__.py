@@ -18,7 +18,7 @@ from hysim.plot._files import FORMATS, save_svg, to_bytes, to_svg
 from hysim.plot._loops import animate, minor_loops, width
 from hysim.plot._maps import forc, residual_map
 from hysim.plot._outcomes import describing_function, displacement, selection, trade_off
-from hysim.plot._records import history, loop, response, traces
+from hysim.plot._records import element_loops, history, loop, response, signals, traces
 from hysim.plot._style import DIVERGING, SEQUENTIAL, figure, house_style, panels
 from hysim.plot._sweeps import heat_map, parallel_coordinates, quantile_bands, sensitivities
 
@@ -32,6 +32,7 @@ __all__ = [
     "comparison",
     "describing_function",
     "displacement",
+    "element_loops",
     "figure",
     "forc",
     "heat_map",
@@ -50,6 +51,7 @@ __all__ = [
     "save_svg",
     "selection",
     "sensitivities",
+    "signals",
     "to_bytes",
     "to_svg",
     "traces",

@@ -7,10 +7,11 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from hysim._frozen import FloatArray
-from hysim._prefixes import label
+from hysim._prefixes import in_unit, label
 from hysim.control import ClosedLoop
 from hysim.plot._style import MARKERS, MEASURED, POINTS, AxesArray, line, one, several
 from hysim.records import Record
+from hysim.simulation import Simulation, columns_of, has_elements
 
 _DRAWN = {"zoh": "steps-post", "foh": "default"}
 _POINTS: dict[str, Any] = {
@@ -20,6 +21,8 @@ _POINTS: dict[str, Any] = {
     "markerfacecolor": "white",
     "markeredgecolor": MEASURED,
 }
+_MOST_NAMED = 8  # lines of a panel that a legend has room for
+_ELEMENTS_IN_A_ROW = 3
 _ARROW = 0.03  # its length along the input, of the span
 
 
@@ -136,6 +139,73 @@ def history(result: InputOutput, axes: Sequence[Axes] | AxesArray | None = None,
         for ax, signal in zip(panels, "yuz", strict=False):
             ax.set_ylabel(label(units, signal))
         panels[-1].set_xlabel("Sample" if time is None else label(units, "t"))
+    return panels
+
+
+def signals(result: Simulation, *names: str, axes: Sequence[Axes] | AxesArray | None = None) -> AxesArray:
+    """Draw signals of a simulation against time, one panel for each, with a line for each of its columns.
+
+    `result` is a result of `hysim.simulate`, and `names` are names of its signals, such as ``"drift"``; without times
+    they are drawn against the sample's number. A name that is no signal, or no name at all, is a ValueError. The result
+    has shape (n_names,).
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> law = hs.MaxwellSlip(stiffness=(1.0, 2.0), slips=(0.5, 1.0))
+    >>> panels = hs.plot.signals(hs.simulate(law, None, [0.0, 1.0, 0.0]), "z", axes=[hs.plot.figure().add_subplot()])
+    >>> panels[0].get_ylabel(), len(panels[0].lines)
+    ('Memory z', 2)
+    """
+    unknown = [name for name in names if name not in result.signals]
+    if unknown or not names:
+        raise ValueError(f"give names of signals, of {', '.join(result.signals)}; got {', '.join(unknown) or 'none'}")
+    t = np.arange(float(result.u.size)) if result.t is None else result.t
+    with several(axes, len(names), height=1.9) as panels:
+        for ax, name in zip(panels, names, strict=True):
+            columns = columns_of(name, result.signals[name])
+            for k, (column, values) in enumerate(columns.items()):
+                ax.plot(t, values, label=column, **line(k))
+            ax.set_ylabel(_axis_of(name, result.units))
+            if 1 < len(columns) <= _MOST_NAMED:
+                ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        panels[-1].set_xlabel("Sample" if result.t is None else label(result.units, "t"))
+    return panels
+
+
+def _axis_of(name: str, units: Mapping[str, str]) -> str:
+    own = name in ("t", "u", "y", "z")
+    return label(units, name) if own else in_unit(name.replace("_", " ").capitalize(), units.get(name, ""))
+
+
+def element_loops(result: Simulation, axes: Sequence[Axes] | AxesArray | None = None) -> AxesArray:
+    """Draw the force of each element of a structure against its drift, one panel for each.
+
+    `result` is a result of `hysim.simulate` with signals ``"drift"`` and ``"force"`` of the same shape
+    (n, n_elements); otherwise a ValueError is raised. The result has shape (n_elements,).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import hysim as hs
+    >>> u = np.sin(np.linspace(0.0, 10.0, 50))
+    >>> loops = {"drift": np.stack([u, 2.0 * u], axis=1), "force": np.stack([u**3, u], axis=1)}
+    >>> panels = hs.plot.element_loops(hs.Simulation(u=u, y=u, signals=loops), hs.plot.figure().subplots(2))
+    >>> panels[1].get_title()
+    'element 1'
+    """
+    if not has_elements(result):
+        raise ValueError(
+            f"the simulation has no drift and force of elements, it has {', '.join(result.signals)}: simulate a "
+            "structure, or draw the loop of the whole"
+        )
+    drift, force = result.signals["drift"], result.signals["force"]
+    n, units = drift.shape[1], result.units
+    with several(axes, n, height=3.0, columns=min(n, _ELEMENTS_IN_A_ROW), sharex=False) as panels:
+        for k, ax in enumerate(panels):
+            ax.plot(drift[:, k], force[:, k], **line(0))
+            ax.set_title(f"element {k}")
+            ax.set(xlabel=in_unit("Drift", units.get("drift", "")), ylabel=in_unit("Force", units.get("force", "")))
     return panels
 
 

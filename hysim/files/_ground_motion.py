@@ -1,0 +1,384 @@
+"""The verb `load_ground_motion`: the acceleration of the ground from a file.
+
+A text is one of four things. It is a PEER file if a line near its top says NPTS and DT, and one of COSMOS if a line
+says how many points of acceleration are below it; with a sample time from the caller it is a list of numbers in reading
+order; else it is a table with a column of times.
+"""
+
+import re
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim._prefixes import power_of_ten
+from hysim.files._accelerations import check_unit, in_si, stated_unit, unit_of_column
+from hysim.files._delimited import delimited
+from hysim.files._layout import COMMENTS, DECIMALS
+from hysim.files._load import file_named, table_of
+from hysim.files._number_lists import NumberList, number_list
+from hysim.files._source import Source, opened
+from hysim.files._stated_values import TOP, StatedValues, block_below, check_quantity, cosmos_blocks, peer_header
+from hysim.files._table import Column, Table, UnreadableError, listed, require, shown
+from hysim.files._text import text_of
+from hysim.records import step_if_even
+from hysim.signals import sample_times
+
+_TIME_NAME = re.compile(r"t|s|sec|seconds?|time\b.*|time_.*|zeit", re.IGNORECASE)
+_MOTION_NAME = re.compile(r"u|a|a_?g|acc.*|ground.?(acc.*|motion)", re.IGNORECASE)
+_FEW_LINES, _MANY_LINES = 3, 8  # 8 numbers without order increase once in 40 000 times
+_SAME_DECIMAL = 1e-9  # of a step: a step with six digits that is as near is the one that was meant
+
+
+class _Choice(NamedTuple):
+    """Arguments of `load_ground_motion` that say what in the file is what."""
+
+    t: str | int | None
+    acceleration: str | int | None
+    sample_time: float | None
+    units: str | None
+
+
+def load_ground_motion(
+    path: Source,
+    *,
+    sample_time: float | None = None,
+    units: str | None = None,
+    t: str | int | None = None,
+    acceleration: str | int | None = None,
+    skip: int = 0,
+    delimiter: str | None = None,
+    decimal: Literal[".", ","] | None = None,
+    encoding: str | None = None,
+) -> tuple[FloatArray, FloatArray]:
+    """Load the acceleration of the ground in an earthquake, in m/s^2.
+
+    Four kinds of text are read, and what a file is follows from its content, not from its ending:
+
+    - the AT2 files of PEER, whose header states NPTS and DT, in any of its spellings: ``NPTS=  4000, DT= .0050 SEC``,
+      ``NPTS=4000,    DT=0.0050SEC``, ``4000    0.0050    NPTS, DT``. Their values are in g unless the header states
+      another unit;
+    - a column of times and one of accelerations, in any layout that `hysim.load` reads, with or without a header. Of
+      several columns those called t or time, and acceleration, acc, a, ag or u are taken. So are two arrays of these
+      names in an NPZ, MAT or HDF5 file;
+    - a file of COSMOS with one block of accelerations, whose header line states their number, step and unit;
+    - with `sample_time`, a list of accelerations in reading order below a text header of any length, one or more to a
+      line, as Fortran writes them; numbers may run together (``-.1234E-02-.2345E-02``).
+
+    The unit is read from the header: in brackets behind a column's name, or as ``UNITS OF G`` or ``cm/sec2`` in a text.
+    1 g is 9.80665 m/s^2. A file that states no unit is taken to be in m/s^2, an AT2 file in g.
+
+    Times must be evenly spaced; those that are even but for the rounding of their digits are replaced by even ones.
+
+    Parameters
+    ----------
+    path : str, path or open file
+        An open file of text or of bytes is read from its current position.
+    sample_time : float, optional
+        Time between two samples of a file that has neither times nor DT [s].
+    units : str, optional
+        Unit of the file's accelerations, in place of the one that it states: ``"g"``, ``"m/s^2"``, ``"cm/s^2"``,
+        ``"gal"``, ``"mm/s^2"``, ``"mg"``, ``"in/s^2"`` or ``"ft/s^2"``.
+    t, acceleration : str or int, optional
+        Columns of time and acceleration, by name or by number from 0. With `sample_time`, `acceleration` alone.
+    skip : int
+        Number of lines at the top of a text that belong to its header: for headers that hold lines of numbers.
+    delimiter, decimal, encoding : str, optional
+        As in `hysim.load`.
+
+    Returns
+    -------
+    t : array, shape (n,) [s]
+        Evenly spaced times, which begin at the file's first one, or at 0.
+    acceleration : array, shape (n,) [m/s^2]
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    TypeError
+        If `path` is neither a path nor an open file.
+    ValueError
+        If the number of values is not the stated one, a line holds something else than its numbers, times are not
+        even, a value is missing, a unit is unknown, or the file is damaged. The message is one line that names the
+        file, the line and what to do.
+
+    References
+    ----------
+    PEER Strong Motion Database, "Time history" files: four header lines, the last of which states NPTS and DT; the
+    values are read line by line.
+
+    Examples
+    --------
+    >>> import io
+    >>> import hysim as hs
+    >>> header = "RECORD\\nSITE, 180\\nACCELERATION TIME SERIES IN UNITS OF G\\nNPTS=  3, DT= .0050 SEC\\n"
+    >>> t, acceleration = hs.load_ground_motion(io.StringIO(header + " 0. .1E+00-.2E+00\\n"))
+    >>> t.tolist(), acceleration.round(6).tolist()
+    ([0.0, 0.005, 0.01], [0.0, 0.980665, -1.96133])
+    """
+    _check_arguments(sample_time, units, t, skip, delimiter, decimal)
+    choice = _Choice(t, acceleration, sample_time, units)
+    for_text = {"delimiter": delimiter, "decimal": decimal, "encoding": encoding}
+    with opened(path) as source, file_named(source):
+        if isinstance(source.content, (str, bytes)):
+            text = text_of(source.content, source.name, encoding)
+            step, values = _of_text(text, choice, skip, delimiter, decimal)
+        else:
+            require(not skip, f"skip is for text, this is a file of the format {source.format}: leave it out")
+            with table_of(source, for_text) as table:
+                step, values = _of_table(table, choice)
+        require(values.size >= 2, f"a ground motion needs at least 2 samples, there are {values.size}")
+        require(np.isfinite(values).all(), "the accelerations are too large for their unit: correct it by units=")
+        begin, sample_time = step
+        return begin + sample_times(values.size, sample_time), values
+
+
+def is_at2(path: Source, encoding: str | None = None) -> bool:
+    """Whether a file is a text whose header states NPTS and DT; errors as `hysim.load` has them."""
+    with opened(path) as source, file_named(source):
+        if not isinstance(source.content, (str, bytes)):
+            return False
+        return peer_header(text_of(source.content, source.name, encoding).split("\n", TOP)[:TOP]) is not None
+
+
+def column_names(
+    path: Source, *, delimiter: str | None = None, decimal: str | None = None, encoding: str | None = None
+) -> tuple[str, ...]:
+    """Names of the columns of a file; errors as `hysim.load` has them."""
+    for_text = {"delimiter": delimiter, "decimal": decimal, "encoding": encoding}
+    with opened(path) as source, file_named(source), table_of(source, for_text) as table:
+        return tuple(table.labels)
+
+
+def _check_arguments(
+    sample_time: float | None, units: str | None, t: object, skip: int, delimiter: str | None, decimal: str | None
+) -> None:
+    check_unit(units)
+    if sample_time is not None and not 0.0 < sample_time < np.inf:
+        raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
+    if sample_time is not None and t is not None:
+        raise ValueError("give either sample_time or the column t, not both")
+    if skip < 0:
+        raise ValueError(f"skip must not be negative, got {skip}")
+    if delimiter is not None and len(delimiter) != 1:
+        raise ValueError(f"delimiter must be one character, got {delimiter!r}")
+    if decimal is not None and decimal not in DECIMALS:
+        raise ValueError(f'decimal must be "." or ",", got {decimal!r}')
+
+
+_Motion = tuple[tuple[float, float], FloatArray]
+"""First time and step, and the accelerations in m/s^2."""
+
+
+def _of_text(text: str, choice: _Choice, skip: int, delimiter: str | None, decimal: str | None) -> _Motion:
+    lines = text.split("\n")
+    by_column = choice.t is not None or choice.acceleration is not None
+    if not by_column and (header := peer_header(lines[: max(TOP, skip)])):
+        return _of_stated(text, header, choice, skip, decimal)
+    if not by_column and (blocks := cosmos_blocks(text, skip)):
+        return _of_cosmos(text, blocks, choice, decimal)
+    if not by_column and choice.sample_time is not None:
+        return _of_list(text, choice, choice.sample_time, skip, delimiter, decimal)
+    below = "\n" * min(skip, len(lines)) + "\n".join(lines[skip:])
+    try:
+        table = _table_below_titles(below, delimiter, decimal)
+        require(by_column or len(table.labels) > 1, "there is no column of times beside the accelerations")
+    except ValueError as error:
+        if not by_column and (count := _count_in_list(text, decimal, skip)):
+            raise UnreadableError(
+                f"{error}; if these are {count} accelerations in reading order, pass their sample_time= (on the "
+                "command line --sample-time)"
+            ) from None
+        raise
+    return _of_table(table, choice)
+
+
+def _table_below_titles(text: str, delimiter: str | None, decimal: str | None) -> Table:
+    """The table in a text, below any number of lines of text."""
+    try:
+        return delimited(text, delimiter, decimal)
+    except ValueError as error:
+        lines, first_error = text.split("\n"), error
+    titles = _titles(lines)
+    for kept in (2, 1, 0):  # names and units, names, or neither
+        dropped = titles[: max(0, len(titles) - kept)]
+        try:
+            return delimited(
+                "\n".join("" if k in dropped else line for k, line in enumerate(lines)), delimiter, decimal
+            )
+        except ValueError:
+            continue
+    raise first_error
+
+
+def _titles(lines: list[str]) -> list[int]:
+    """Places of the lines of text above the first one that begins with a number."""
+    titles = []
+    for place, line in enumerate(lines):
+        if re.match(r"\s*\"?[+-]?[.,]?\d", line):
+            break
+        if line.strip() and not line.lstrip().startswith(COMMENTS):
+            titles.append(place)
+    return titles
+
+
+def _count_in_list(text: str, decimal: str | None, skip: int) -> int:
+    try:
+        return number_list(text, decimal, skip).values.size
+    except ValueError:
+        return 0
+
+
+def _of_stated(text: str, header: StatedValues, choice: _Choice, skip: int, decimal: str | None) -> _Motion:
+    """The values below a line that states their number and step, in g if their unit is not stated."""
+    require(
+        0.0 < header.step < np.inf,
+        f"line {header.line}: the step must be positive, got {header.step:g}; correct the line",
+    )
+    require(
+        choice.sample_time in (None, header.step),
+        f"line {header.line} states a step of {header.step:g} s: leave out sample_time, or correct the line",
+    )
+    numbers = number_list(text, decimal, max(skip, header.line))
+    check_quantity(numbers.header)
+    require(
+        numbers.values.size == header.n_values,
+        f"line {header.line} states {header.n_values} values, but {numbers.values.size} follow: the file is "
+        "incomplete, or the line is to be corrected",
+    )
+    unit = choice.units or stated_unit(numbers.header) or "g"
+    return (0.0, header.step), in_si(numbers.values, unit)
+
+
+def _of_cosmos(text: str, blocks: list[StatedValues], choice: _Choice, decimal: str | None) -> _Motion:
+    """The only block of accelerations of a file that may hold velocities and displacements too."""
+    first, *others = blocks
+    if others:
+        lines = ", ".join(str(block.line) for block in blocks)
+        raise ValueError(
+            f"the file holds {len(blocks)} accelerations, in lines {lines}: save each to a file, or pass the number of "
+            "lines above the last one as skip="
+        )
+    unit = choice.units or stated_unit(text.split("\n")[first.line - 1])
+    require(unit is not None, f"line {first.line} states no unit of its accelerations: pass units=")
+    return _of_stated(block_below(text, first.line), first, choice._replace(units=unit), 0, decimal)
+
+
+def _of_list(
+    text: str, choice: _Choice, sample_time: float, skip: int, delimiter: str | None, decimal: str | None
+) -> _Motion:
+    require(delimiter is None, "delimiter is for columns: a list of numbers needs none")
+    numbers = number_list(text, decimal, skip)
+    numbers.check_widths()
+    check_quantity(numbers.header)
+    _check_no_times(numbers)
+    return (0.0, sample_time), in_si(numbers.values, choice.units or stated_unit(numbers.header) or "m/s^2")
+
+
+def _check_no_times(numbers: NumberList) -> None:
+    """Refuse lines whose first numbers increase evenly, or in many lines at all: they are times."""
+    width, n_lines = numbers.widths[0], len(numbers.widths)
+    if width == 1 or numbers.widths[-1] != width or n_lines < _FEW_LINES:
+        return
+    first = numbers.values[::width]
+    increases = bool((np.diff(first) > 0.0).all())
+    require(
+        not (increases and (n_lines >= _MANY_LINES or step_if_even(first))),
+        f"the first of {width} columns increases from line to line, as times do: leave out sample_time, or name the "
+        "column of the acceleration",
+    )
+
+
+def _of_table(table: Table, choice: _Choice) -> _Motion:
+    time = _time_column(table, choice)
+    motion = _motion_column(table, choice, time)
+    columns = [motion] if time is None else [motion, time]
+    values = table.values(columns)
+    if np.isnan(values).any():
+        k, j = np.argwhere(np.isnan(values).T)[0]
+        raise ValueError(
+            f"{table.place(k)}, column {shown(columns[j].label)}: the value is missing; fill it in, or delete the "
+            "lines from there on"
+        )
+    notes = table.notes.units
+    unit = choice.units or unit_of_column(motion.label, notes.get(motion.label, motion.unit))
+    if time is None:
+        return (0.0, choice.sample_time or 0.0), in_si(values[0], unit)
+    clock = _in_seconds(values[1], notes.get(time.label, time.unit))
+    return _even(table, clock), in_si(values[0], unit)
+
+
+def _signals(table: Table) -> list[str]:
+    """Names of columns that are not the unit of another."""
+    return [name for name in table.labels if not name.endswith("_units")]
+
+
+def _time_column(table: Table, choice: _Choice) -> Column | None:
+    """The column of times, None where the caller gives the step instead."""
+    if choice.t is not None:
+        return table.column(choice.t)
+    names = [name for name in _signals(table) if _TIME_NAME.fullmatch(name)]
+    if choice.sample_time is not None:
+        require(
+            not names or choice.acceleration is not None,
+            f"there is a column of times, {shown(names[0]) if names else ''}: leave out sample_time, or name the "
+            "column of the acceleration",
+        )
+        return None
+    if len(names) == 1:
+        return table.column(names[0])
+    require(not names, f"several columns may be the time: pass one of {listed(names)} as t=")
+    require(
+        len(_signals(table)) == 2 and choice.acceleration is None,
+        f"no column is called t or time, the columns are: {listed(table.labels)}; pass one as t=, or sample_time= if "
+        "there is none",
+    )
+    return table.column(0)
+
+
+def _motion_column(table: Table, choice: _Choice, time: Column | None) -> Column:
+    if choice.acceleration is not None:
+        return table.column(choice.acceleration)
+    others = [name for name in _signals(table) if time is None or name != time.label]
+    names = [name for name in others if _MOTION_NAME.fullmatch(name)]
+    if len(names) == 1 or len(others) == 1:
+        return table.column((names or others)[0])
+    if names or not others:
+        raise ValueError(f"the columns are: {listed(table.labels)}; pass that of the acceleration as acceleration=")
+    raise ValueError(
+        f"no column is called acceleration, the columns are: {listed(table.labels)}; pass one as acceleration="
+    )
+
+
+def _in_seconds(times: FloatArray, unit: str) -> FloatArray:
+    plain = re.sub(r"^(m|n|u|µ)?(sec(ond)?s?)$", r"\1s", unit.strip().lower()) or "s"
+    try:
+        power = power_of_ten(plain, "s")
+    except ValueError:
+        raise ValueError(f"the time must be in s or ms, got the unit {shown(unit)}: correct the header") from None
+    return times * 10.0**power if power >= 0 else times / 10.0**-power
+
+
+def _even(table: Table, times: FloatArray) -> tuple[float, float]:
+    """First time and step of evenly spaced times; a ValueError names the place where they are not."""
+    require(times.size >= 2, f"a ground motion needs at least 2 samples, there are {times.size}")
+    steps = np.diff(times)
+    if not (steps > 0.0).all():
+        k = int(np.argmax(steps <= 0.0)) + 1
+        raise ValueError(
+            f"{table.place(k)}: time must increase, got {times[k]} after {times[k - 1]}; sort the samples and remove "
+            "repeated ones, or name the column of the acceleration and pass sample_time="
+        )
+    step = step_if_even(times)
+    if step is None:
+        usual = float(np.median(steps))
+        k = int(np.argmax(np.abs(steps - usual))) + 1
+        raise ValueError(
+            f"{table.place(k)}: the time must be evenly spaced, got a step of {steps[k - 1]:.6g} s where most are "
+            f"{usual:.6g} s; interpolate it by hs.load(...).resample({usual:.4g}) (on the command line --t, --u and "
+            f"--sample-time {usual:.4g}), or if only the times are wrong, name the column of the acceleration and pass "
+            "sample_time="
+        )
+    decimal = float(f"{step:.6g}")
+    return float(times[0]), decimal if abs(decimal - step) <= _SAME_DECIMAL * step else step

@@ -1,0 +1,1 @@
+"""Structures: masses on linear and hysteretic elements under a moving base or a force."""

@@ -1,0 +1,440 @@
+"""Masses on linear and hysteretic elements.
+
+    M x'' + C x' + K x + sum over elements of b f(b . x) = -M r a(t)    under the acceleration a of the base,
+                                                         =  r u(t)      under a force u
+
+x are the displacements relative to the ground; b is the direction of an element, f its law for the drift b . x, and r
+the influence. The input is linear between the samples. How it is integrated: `hysim.kernels.structures.path`.
+"""
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import LinAlgError, cholesky, eigh
+
+from hysim._frozen import FloatArray, check_choice, check_whole, read_only
+from hysim._parallel import in_pieces
+from hysim.errors import SimulationError
+from hysim.kernels.structures.path import LEAST_DRIFT, Motion, Tracks, follow, make_room
+from hysim.models.model import family
+from hysim.models.protocols import positive_time
+from hysim.plants.structures import assembly
+from hysim.plants.structures.damping import ModalDamping, Rayleigh
+from hysim.plants.structures.element import Element, parted
+
+_OUTPUTS = ("displacement", "velocity", "acceleration", "drift", "force")
+_LOOSEST = 1e-3  # tolerance
+_WRONG = 0.05  # share of the largest drift by which that of a step may be uncertain
+
+
+class StructureState(NamedTuple):
+    """State of a simulation: what moves along, `started` after the first sample, and the energies at the start."""
+
+    motion: Motion
+    started: bool
+    stored: float
+
+
+@family
+class Structure:
+    """Masses on linear and hysteretic elements, under a moving base or a force.
+
+    ``M x'' + C x' + K x + sum b f(b . x) = -M r a(t)`` or ``= r u(t)``.
+
+    Parameters
+    ----------
+    mass : float or array, shape (n,) or (n, n)
+        Of all masses alike, of each, or a symmetric positive definite matrix [kg].
+    damping : float or array, shape (n,) or (n, n), Rayleigh, or ModalDamping
+        From each mass to the ground, or a symmetric matrix [N s/m].
+    stiffness : float or array, shape (n,) or (n, n)
+        Of linear springs from each mass to the ground, or a symmetric matrix [N/m].
+    elements : sequence of Element
+        Laws between the nodes; their dashpots are a part of the damping.
+    excitation : {"base", "force"}
+        Whether the input is the acceleration of the base [m/s^2] or a force [N].
+    influence : tuple of float
+        Displacement of each mass when the base moves by one, by default 1; or the share of the force at each mass, by
+        default all of it at the last one.
+    output : str
+        Signal that is the output y: ``"displacement"``, ``"velocity"``, ``"acceleration"``, with the number of the
+        mass, such as ``"acceleration.2"``; ``"drift.0"`` or ``"force.0"`` with the place of the element. Without a
+        number the last one.
+    substeps : int, optional
+        Equal steps between two samples, of order 4. By default steps are divided by `tolerance`.
+    tolerance : float
+        Largest disagreement of two sweeps of a step, as a share of the largest drift so far; between 1e-12 and 1e-3.
+        The error of the drifts is about as large.
+    initial_state : tuple of float
+        Displacements and velocities at the first sample, one behind the other; empty for rest.
+
+    Raises
+    ------
+    ValueError
+        If sizes do not fit, a matrix is not symmetric, the mass is not positive definite, a number is not finite, or
+        an option is unknown.
+    TypeError
+        If an element is not an `Element`.
+
+    Examples
+    --------
+    Two storeys on Bouc-Wen columns under a pulse of the ground:
+
+    >>> import numpy as np, hysim as hs
+    >>> column = hs.BoucWen(A=1.0, beta=50.0, gamma=50.0, feedthrough=20.0, gain=180.0)
+    >>> columns = (hs.Element(column, between=(0, 1)), hs.Element(column, between=(1, 2)))
+    >>> frame = hs.Structure(mass=(1.0, 1.0), damping=hs.ModalDamping(ratio=0.02), elements=columns)
+    >>> frame.periods().round(4).tolist()
+    [0.7189, 0.2746]
+    >>> t = np.arange(0.0, 4.0, 0.01)
+    >>> sim = hs.simulate(frame, t, 3.0 * np.sin(9.0 * t) * (t < 1.4))
+    >>> sim.peaks["drift"].shape, bool(abs(sim.signals["imbalance"]).max() < 1e-8 * sim.signals["input_work"].max())
+    ((2,), True)
+    """
+
+    mass: FloatArray
+    damping: Any = 0.0
+    stiffness: FloatArray = 0.0  # type: ignore[assignment]
+    elements: Any = ()
+    excitation: str = "base"
+    influence: tuple[float, ...] = ()
+    output: str = "displacement"
+    substeps: int | None = None
+    tolerance: float = 1e-8
+    initial_state: tuple[float, ...] = ()
+
+    dynamic: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "elements", _elements(self.elements))
+        if not isinstance(self.damping, Rayleigh | ModalDamping):
+            object.__setattr__(self, "damping", read_only(self.damping, "damping"))
+        check_choice("excitation", self.excitation, ("base", "force"))
+        if self.substeps is not None:
+            check_whole(self.substeps, "substeps")
+        if not 1e-12 <= self.tolerance <= _LOOSEST:
+            raise ValueError(f"tolerance must be between 1e-12 and {_LOOSEST:g}, got {self.tolerance:g}")
+        if len(self.influence) not in (0, self.n_nodes):
+            raise ValueError(
+                f"influence must hold one number for each of {self.n_nodes} masses, got {len(self.influence)}"
+            )
+        if len(self.initial_state) not in (0, 2 * self.n_nodes):
+            raise ValueError(
+                f"initial_state must hold {self.n_nodes} displacements and {self.n_nodes} velocities, "
+                f"got {len(self.initial_state)} numbers"
+            )
+        try:
+            cholesky(self.mass_matrix)
+        except LinAlgError:
+            raise ValueError("the mass matrix must be positive definite") from None
+        self._place_of_output()
+        self.matrices  # noqa: B018  # raises what its parts raise
+
+    # ------------------------------------------------------------------------------ what it is made of
+
+    @cached_property
+    def n_nodes(self) -> int:
+        """Number of masses."""
+        damping = () if isinstance(self.damping, Rayleigh | ModalDamping) else np.shape(self.damping)
+        shapes = (np.shape(self.mass), damping, np.shape(self.stiffness))
+        return int(max([1, *(shape[0] for shape in shapes if shape), *(each.highest_node for each in self.elements)]))
+
+    @cached_property
+    def mass_matrix(self) -> FloatArray:
+        """Mass, shape (n, n) [kg]."""
+        return _matrix(self.mass, "mass", self.n_nodes)
+
+    @cached_property
+    def stiffness_matrix(self) -> FloatArray:
+        """Linear stiffness without the elements, shape (n, n) [N/m]."""
+        return _matrix(self.stiffness, "stiffness", self.n_nodes)
+
+    @cached_property
+    def drift_matrix(self) -> FloatArray:
+        """Drifts by displacements, shape (n_elements, n)."""
+        rows = [element.drift_row(self.n_nodes) for element in self.elements]
+        return read_only(np.array(rows).reshape(-1, self.n_nodes))
+
+    @cached_property
+    def laws(self) -> assembly.Laws:
+        """Steps and elastic slopes of the elements, without their dashpots."""
+        return assembly.laws_of([parted(element.law).law for element in self.elements])
+
+    @cached_property
+    def initial_stiffness(self) -> FloatArray:
+        """Stiffness with the elastic slopes of the elements, shape (n, n) [N/m]."""
+        rows = self.drift_matrix
+        return read_only(self.stiffness_matrix + rows.T @ (self.laws.slopes[:, np.newaxis] * rows))
+
+    @cached_property
+    def damping_matrix(self) -> FloatArray:
+        """Damping with the dashpots of the elements, shape (n, n) [N s/m]."""
+        rows = self.drift_matrix
+        if isinstance(self.damping, Rayleigh | ModalDamping):
+            own = self.damping.matrix(self.mass_matrix, self.initial_stiffness)
+        else:
+            own = _matrix(self.damping, "damping", self.n_nodes)
+        viscosities = np.array([parted(element.law).viscosity for element in self.elements])
+        return read_only(own + rows.T @ (viscosities[:, np.newaxis] * rows))
+
+    @cached_property
+    def force_directions(self) -> FloatArray:
+        """Force at each mass under an input of one, shape (1, n)."""
+        if self.excitation == "base":
+            return read_only(-(self.mass_matrix @ np.array(self.influence or np.ones(self.n_nodes)))[np.newaxis])
+        last = np.arange(self.n_nodes) == self.n_nodes - 1
+        return read_only(np.array(self.influence or last.astype(float))[np.newaxis])
+
+    @cached_property
+    def matrices(self) -> assembly.Matrices:
+        """The linear part."""
+        return assembly.Matrices(
+            self.mass_matrix, self.damping_matrix, self.initial_stiffness, self.drift_matrix, self.force_directions
+        )
+
+    # ------------------------------------------------------------------------------ small motions
+
+    def periods(self) -> FloatArray:
+        """Periods of small motions at the start, the longest first, shape (n,) [s]; inf for a mass that is free.
+
+        Raises ValueError if the stiffness at the start is negative.
+        """
+        squares = eigh(self.initial_stiffness, self.mass_matrix, eigvals_only=True)
+        if squares[0] < -1e-9 * np.abs(squares).max():
+            raise ValueError("the stiffness at the start is negative: small motions have no periods")
+        with np.errstate(divide="ignore"):
+            return np.asarray(2.0 * np.pi / np.sqrt(np.maximum(squares, 0.0)))
+
+    def modes(self) -> FloatArray:
+        """Shapes of small motions at the start, one a column, in the order of `periods`, shape (n, n).
+
+        They have modal masses of one; the largest displacement of each is positive.
+        """
+        shapes = eigh(self.initial_stiffness, self.mass_matrix)[1]
+        largest = shapes[np.abs(shapes).argmax(axis=0), np.arange(self.n_nodes)]
+        return np.asarray(shapes * np.sign(largest))
+
+    # ------------------------------------------------------------------------------ motion
+
+    def response(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
+        """Output y at the samples of an input that is linear between them.
+
+        Parameters
+        ----------
+        u : array, shape (n_samples,)
+            Acceleration of the base [m/s^2] or force [N]; at its first sample the structure has the initial state.
+        sample_time : float
+            Time between two samples [s].
+
+        Returns
+        -------
+        array, shape (n_samples,)
+            The signal that `output` names.
+
+        Raises
+        ------
+        SimulationError
+            If the motion diverges, or cannot be resolved; it names the time.
+        ValueError
+            If u is not finite or has not one axis, or the sample time is not positive.
+        """
+        return self.signals(u, sample_time)["y"]
+
+    def signals(self, u: npt.ArrayLike, sample_time: float) -> dict[str, FloatArray]:
+        """Every signal at the samples of `u`, by name; arguments and errors as of `response`.
+
+        Returns
+        -------
+        mapping
+            ``"y"``; ``"displacement"``, ``"velocity"`` (n_samples, n), relative to the ground [m], [m/s];
+            ``"acceleration"``, absolute under a moving base of influence 1 [m/s^2]; ``"drift"``, ``"force"``
+            (n_samples, n_elements) [m], [N]; ``"peak_drift"``, ``"peak_force"``, ``"peak_displacement"``,
+            ``"peak_acceleration"``, the largest sizes so far, those of drifts and displacements also between samples;
+            and energies since the start [J]: ``"kinetic"``, ``"elastic"`` (of `stiffness`), ``"damping_loss"``,
+            ``"input_work"``, ``"element_work"`` (n_samples, n_elements), which is stored and dissipated, and
+            ``"dissipated"``, without what elastic unloading would return, force^2 / (2 k) with the slope k at the
+            start; ``"imbalance"`` is the input less all others, the error of the method.
+        """
+        return self.advance(u, sample_time)[0]
+
+    def advance(
+        self,
+        u: npt.ArrayLike,
+        sample_time: float,
+        state: StructureState | None = None,
+        *,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> tuple[dict[str, FloatArray], StructureState]:
+        """As `signals`, continued from `state`, by default the initial one, and the state after the last sample.
+
+        The bits are those of one uncut input, which goes on from the state's, one sample before the first.
+        ``progress(done, total)`` is called now and then.
+        """
+        inputs = read_only(u, "u", ndim=1)
+        begun, tracks = self._followed(inputs, sample_time, state, progress, with_laws=False)
+        return self._signals(inputs, begun, tracks), begun
+
+    def memories(self, u: npt.ArrayLike, sample_time: float) -> tuple[FloatArray, ...]:
+        """State of each element's law at the samples of `u`, its last input and its memory.
+
+        Parameters
+        ----------
+        u : array, shape (n_samples,)
+            As of `response`.
+        sample_time : float
+            [s]
+
+        Returns
+        -------
+        tuple of arrays, shape (n_samples, n_numbers)
+        """
+        states = self._followed(read_only(u, "u", ndim=1), sample_time, None, None, with_laws=True)[1].laws
+        ends = np.cumsum([each.state.size for each in self.laws.steppers])[:-1]
+        parts = np.split(states, ends, axis=1) if self.elements else []
+        places = [np.concatenate([np.arange(a, a + n) for a, n in each]) for each in self.laws.stretches]
+        return tuple(part[:, place] for part, place in zip(parts, places, strict=True))
+
+    def start(self) -> StructureState:
+        """The state before the first sample."""
+        x = np.array(self.initial_state or np.zeros(2 * self.n_nodes))
+        motion = assembly.motion_at(self.laws, self.drift_matrix, x, len(self.force_directions))
+        return StructureState(motion, False, self._stored(x[np.newaxis])[0])
+
+    def _followed(
+        self, u: FloatArray, sample_time: float, state: StructureState | None,
+        progress: Callable[[int, int], None] | None, *, with_laws: bool,
+    ) -> tuple[StructureState, Tracks]:  # fmt: skip
+        """The state after the samples, and all of them."""
+        positive_time(sample_time)
+        before = state or self.start()
+        motion = Motion(*(part.copy() for part in before.motion))
+        plant = assembly.plant_of(self.matrices, with_energies=True)
+        steps = assembly.steps_of(plant, sample_time, self.substeps, self.tolerance)
+        elements = assembly.elements_of(self.laws, self.drift_matrix)
+        flows = assembly.flows_of(elements, plant, steps)
+        n, m, n_elements = u.size, 2 * self.n_nodes, len(self.elements)
+        tracks = Tracks(
+            np.empty((n, m)), np.empty((n, 5, n_elements)), np.empty((n, motion.peaks.size)),
+            np.empty((n, motion.work.size)), np.empty((n if with_laws else 0, motion.laws.size)),
+        )  # fmt: skip
+        loads, room = np.ascontiguousarray(u[:, np.newaxis]), make_room(n_elements, m, motion.laws.size)
+
+        def run(k: slice) -> int:
+            rows = Tracks(*(part[k] for part in tracks))
+            is_first = k.start == 0 and not before.started
+            lost = int(follow(elements, flows, plant, steps, is_first, loads[k], motion, room, rows))
+            if progress is not None:
+                progress(k.stop, n)
+            return lost
+
+        with np.errstate(all="ignore"):
+            lost = in_pieces(run, n)
+        if lost >= 0:
+            raise SimulationError(f"the motion diverges at t = {lost * sample_time:g}")
+        self._check_resolved(motion)
+        return StructureState(motion, before.started or n > 0, before.stored), tracks
+
+    def _check_resolved(self, motion: Motion) -> None:
+        """Refuse a motion with steps whose sweeps do not agree, which could not be divided further."""
+        n = len(self.elements)
+        sizes = np.maximum(motion.peaks[:n], LEAST_DRIFT * motion.peaks[:n].max(initial=0.0))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            apart = float(np.nan_to_num(motion.carry[4] / sizes, nan=0.0, posinf=np.inf).max(initial=0.0))
+        if not apart <= _WRONG:
+            raise SimulationError(
+                f"the motion is not resolved: the drift of a step is uncertain by {apart:.2g} of the largest one; "
+                + ("use more substeps, or substeps=None" if self.substeps else "use a smaller sample_time")
+            )
+
+    def _stored(self, x: FloatArray) -> FloatArray:
+        """Kinetic and elastic energy of states (k, m), shape (k,)."""
+        kinetic, elastic = self._energies(x)
+        return kinetic + elastic
+
+    def _energies(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        n = self.n_nodes
+        kinetic = 0.5 * np.einsum("ki,ij,kj->k", x[:, n:], self.mass_matrix, x[:, n:])
+        elastic = 0.5 * np.einsum("ki,ij,kj->k", x[:, :n], self.stiffness_matrix, x[:, :n])
+        return kinetic, elastic
+
+    def _signals(self, u: FloatArray, state: StructureState, tracks: Tracks) -> dict[str, FloatArray]:
+        """Signals by name."""
+        n, n_elements = self.n_nodes, len(self.elements)
+        x, (force, _, drift, rate, _) = tracks.x, np.moveaxis(tracks.carry, 1, 0)
+        kinetic, elastic = self._energies(x)
+        work = tracks.work[:, 2:]
+        slopes = self.laws.slopes
+        with np.errstate(divide="ignore", invalid="ignore"):
+            returned = np.where(slopes > 0.0, (force**2 - self._first_forces**2) / (2.0 * slopes), 0.0)
+        imbalance = tracks.work[:, 0] - tracks.work[:, 1] - work.sum(axis=1) - (kinetic + elastic - state.stored)
+        viscous = rate * np.array([parted(element.law).viscosity for element in self.elements])
+        signals = {
+            "displacement": x[:, :n],
+            "velocity": x[:, n:],
+            "acceleration": self._accelerations(x, force, u),
+            "drift": drift,
+            "force": force + viscous,
+            "peak_drift": tracks.peaks[:, :n_elements],
+            "peak_force": tracks.peaks[:, n_elements : 2 * n_elements],
+            "peak_displacement": tracks.peaks[:, 2 * n_elements : 2 * n_elements + n],
+            "peak_acceleration": tracks.peaks[:, 2 * n_elements + n :],
+            "kinetic": kinetic,
+            "elastic": elastic,
+            "damping_loss": tracks.work[:, 1],
+            "input_work": tracks.work[:, 0],
+            "element_work": work,
+            "dissipated": work - returned,
+            "imbalance": imbalance,
+        }
+        name, place = self._place_of_output()
+        arrays = {"y": signals[name][:, place], **signals}
+        return {each: np.ascontiguousarray(values) for each, values in arrays.items()}
+
+    @cached_property
+    def _first_forces(self) -> FloatArray:
+        return np.asarray(self.start().motion.carry[0])
+
+    def _accelerations(self, x: FloatArray, force: FloatArray, u: FloatArray) -> FloatArray:
+        """Accelerations (k, n): under a moving base without that of the base, which is added to have absolute ones."""
+        n = self.n_nodes
+        inner = x[:, :n] @ self.stiffness_matrix.T + x[:, n:] @ self.damping_matrix.T + force @ self.drift_matrix
+        outer = u[:, np.newaxis] * self.force_directions if self.excitation == "force" else 0.0
+        return np.asarray(np.linalg.solve(self.mass_matrix, (outer - inner).T).T)
+
+    def _place_of_output(self) -> tuple[str, int]:
+        """Name and column of the output; ValueError if there is none of this name."""
+        name, _, place = self.output.partition(".")
+        first, count = (0, len(self.elements)) if name in ("drift", "force") else (1, self.n_nodes)
+        if name not in _OUTPUTS or not (place.isdecimal() or not place):
+            raise ValueError(f'output must be a name such as "displacement" or "drift.0", got {self.output!r}')
+        column = int(place) - first if place else count - 1
+        if not 0 <= column < count:
+            raise ValueError(
+                f"output {self.output!r} names none of the {count} {'elements' if not first else 'masses'}"
+            )
+        return name, column
+
+
+def _elements(values: Any) -> tuple[Element, ...]:
+    """The elements as a tuple."""
+    members = (values,) if isinstance(values, Element) else tuple(values)
+    for each in members:
+        if not isinstance(each, Element):
+            raise TypeError(f"elements must hold Elements, got {type(each).__name__}")
+    return members
+
+
+def _matrix(values: FloatArray, name: str, n_nodes: int) -> FloatArray:
+    """A number for each mass, one for all, or a symmetric matrix, as a matrix."""
+    if values.ndim < 2:
+        if values.ndim and values.size != n_nodes:
+            raise ValueError(f"{name} must hold one number for each of {n_nodes} masses, got {values.size}")
+        return read_only(np.diag(np.broadcast_to(values, n_nodes)))
+    if values.shape != (n_nodes, n_nodes):
+        raise ValueError(f"{name} must have the shape ({n_nodes}, {n_nodes}), got {values.shape}")
+    if not np.allclose(values, values.T, rtol=1e-12, atol=1e-12 * np.abs(values).max()):
+        raise ValueError(f"{name} must be a symmetric matrix")
+    return read_only(0.5 * (values + values.T))
