@@ -122,7 +122,7 @@ def test_a_structure_follows_its_differential_equations(name):
 def test_peaks_are_those_between_the_samples(name):
     made, exact = case(name)
     signals = made.structure().signals(made.ground, made.sample_time)
-    assert (1.0 - np.abs(exact.drift).max(axis=0) / exact.peak_drift).max() > 1e-4  # samples miss them
+    assert (1.0 - np.abs(exact.drift).max(axis=0) / exact.peak_drift).max() > 5e-5  # samples miss them
     assert largest(signals["peak_drift"][-1] / exact.peak_drift - 1.0) < PEAKS[name]
     found = hs.simulate(made.structure(), made.times, made.ground).peaks["drift"]
     assert largest(found / exact.peak_drift - 1.0) < PEAKS[name]
