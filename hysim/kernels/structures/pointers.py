@@ -10,7 +10,7 @@ from numba.core import cgutils
 from numba.experimental.function_type import _get_wrapper_address
 from numba.extending import intrinsic
 
-from hysim.kernels.stepping import STEP, Step
+from hysim.kernels.stepping import START, STEP, Start, Step
 
 
 def step_at(step: Any) -> Step:
@@ -18,26 +18,35 @@ def step_at(step: Any) -> Step:
     return step  # type: ignore[no-any-return]  # where nothing is compiled, a step is its own address
 
 
-def _step_at(_: Any, __: Any) -> Any:
-    """Type and code of `step_at`."""
-
-    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        pointer = context.get_value_type(types.voidptr)
-        step = cgutils.create_struct_proxy(STEP)(context, builder)
-        step.c_addr = builder.inttoptr(arguments[0], pointer)
-        step.py_addr = step.jit_addr = cgutils.get_null_value(pointer)
-        return step._getvalue()
-
-    return STEP(int64), code
+def start_at(start: Any) -> Start:
+    """As `step_at`, for a start."""
+    return start  # type: ignore[no-any-return]
 
 
-def addresses(steps: Sequence[Step]) -> Any:
-    """The steps as `step_at` takes them, shape (n,)."""
+def _function_at(kind: Any) -> Any:
+    """Type and code of a function of a kind at an address."""
+
+    def typed(_: Any, __: Any) -> Any:
+        def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            pointer = context.get_value_type(types.voidptr)
+            function = cgutils.create_struct_proxy(kind)(context, builder)
+            function.c_addr = builder.inttoptr(arguments[0], pointer)
+            function.py_addr = function.jit_addr = cgutils.get_null_value(pointer)
+            return function._getvalue()
+
+        return kind(int64), code
+
+    return typed
+
+
+def addresses(functions: Sequence[Any], kind: Any = STEP) -> Any:
+    """Steps, or starts of the kind `START`, as `step_at` and `start_at` take them, shape (n,)."""
     if not _IS_COMPILED:
-        return tuple(steps)
-    return np.array([_get_wrapper_address(step, STEP.signature) for step in steps], dtype=np.int64)
+        return tuple(functions)
+    return np.array([_get_wrapper_address(each, kind.signature) for each in functions], dtype=np.int64)
 
 
 _IS_COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 if _IS_COMPILED:
-    step_at = intrinsic(_step_at)  # type: ignore[assignment]
+    step_at = intrinsic(_function_at(STEP))
+    start_at = intrinsic(_function_at(START))

@@ -1,4 +1,4 @@
-"""A structure as its kernel takes it."""
+"""A structure, or many of one kind, as the kernels take them."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -6,15 +6,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hysim._frozen import FloatArray, read_only
-from hysim.kernels.structures.flows import N_POWERS, fastest, fill_flows
-from hysim.kernels.structures.path import Elements, Flows, Motion, Plant, Steps, project
+from hysim.kernels.stepping import START
+from hysim.kernels.structures.ensembles import fill_slopes, fill_structure, start_motion
+from hysim.kernels.structures.flows import N_POWERS
+from hysim.kernels.structures.path import Elements, Flows, Motion, Plant, Room, Steps, Tracks, make_room
 from hysim.kernels.structures.pointers import addresses
 from hysim.models.compiled_step import startable
-from hysim.models.protocols import CompiledLaw, Startable, Stretched
+from hysim.models.protocols import Startable, Stretched
 
-_PHASE = 2.0  # largest phase of the stiffest mode in a base step: above it the sweeps of a slipping element diverge
-_HALVINGS = 12
-_PROBES = 10.0 ** -np.arange(0.0, 13.0)
+PHASE = 2.0  # largest phase of the fastest mode in a base step: above it the sweeps of a slipping element diverge
+HALVINGS = 12
 
 
 class Laws(NamedTuple):
@@ -22,13 +23,48 @@ class Laws(NamedTuple):
 
     steppers: tuple[Startable, ...]
     stretches: tuple[tuple[tuple[int, int], ...], ...]
-    slopes: FloatArray
+
+    @property
+    def parameters(self) -> FloatArray:
+        """Parameters of all laws, one behind the other."""
+        return read_only(joined([each.parameters for each in self.steppers]), finite=False)
+
+    @property
+    def states(self) -> FloatArray:
+        """States of all laws before their start."""
+        return read_only(joined([each.state for each in self.steppers]), finite=False)
+
+    @property
+    def starts(self) -> Any:
+        """Addresses of the starts."""
+        return addresses([each.start for each in self.steppers], START)
+
+    def slopes(self, parameters: FloatArray, states: FloatArray) -> FloatArray:
+        """Elastic slopes at the start, (n_sets, n_elements), for rows of parameters and states."""
+        slopes = np.zeros((len(parameters), len(self.steppers)))
+        with np.errstate(all="ignore"):
+            fill_slopes(
+                addresses([each.step for each in self.steppers]), self.starts, parameters, self.parameter_ends,
+                states, self.state_ends, slopes,
+            )  # fmt: skip
+        return np.nan_to_num(slopes, nan=0.0, posinf=0.0)
+
+    @property
+    def parameter_ends(self) -> Any:
+        """Places at which the parameters of the laws begin, and the end."""
+        return ends([each.parameters.size for each in self.steppers])
+
+    @property
+    def state_ends(self) -> Any:
+        """Places at which the states of the laws begin, and the end."""
+        return ends([each.state.size for each in self.steppers])
 
 
 class Matrices(NamedTuple):
-    """The linear part: mass, damping and stiffness (n, n), with the elastic slopes of the elements in the last.
+    """Linear parts, one structure a row: mass, damping and stiffness (n_sets, n, n).
 
-    `rows` is (n_elements, n), the drifts; `directions` (n_loads, n), the forces of unit loads.
+    The stiffness has the elastic slopes of the elements. `rows` is (n_elements, n), the drifts; `directions`
+    (n_sets, n_loads, n), the forces of unit loads.
     """
 
     mass: FloatArray
@@ -39,105 +75,116 @@ class Matrices(NamedTuple):
 
 
 def laws_of(models: Sequence[Any]) -> Laws:
-    """Steps, memories and elastic slopes of laws that do not depend on time."""
+    """Steps and memories of laws that do not depend on time."""
     steppers = tuple(startable(model) for model in models)
     stretches = tuple(
         model.memory_places if isinstance(model, Stretched) else ((0, each.state.size),)
         for model, each in zip(models, steppers, strict=True)
     )
-    return Laws(steppers, stretches, np.array([elastic_slope(each) for each in steppers]))
+    return Laws(steppers, stretches)
 
 
-def elastic_slope(law: Startable) -> float:
-    """Slope of a law at its start, zero where there is none: the limit of secants of shorter and shorter strokes."""
-    secants = []
-    for probe in _PROBES:
-        begun = law.started(0.0)
-        with np.errstate(all="ignore"):
-            f0 = begun.step(begun.parameters, begun.state, 0.0)
-            secants.append((begun.step(begun.parameters, begun.state, probe) - f0) / probe)
-    slopes = np.array(secants)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        changes = np.abs(np.diff(slopes)) / np.maximum(np.abs(slopes[1:]), np.abs(slopes[:-1]))
-    changes[(slopes[1:] == 0.0) & (slopes[:-1] == 0.0)] = 0.0
-    if np.isnan(changes).all():
-        return 0.0
-    return max(0.0, float(slopes[1 + np.nanargmin(changes)]))
-
-
-def elements_of(laws: Laws, rows: FloatArray) -> Elements:
+def elements_of(laws: Laws, rows: FloatArray, slopes: FloatArray) -> Elements:
     """The elements as the kernel takes them."""
     nodes = [np.flatnonzero(row) for row in rows]
     stretches = [np.array(each, dtype=np.int64).reshape(-1, 2) for each in laws.stretches]
     return Elements(
-        nodes=_joined(nodes, np.int64),
-        weights=read_only(_joined([row[each] for row, each in zip(rows, nodes, strict=True)], np.float64)),
-        node_ends=_ends([each.size for each in nodes]),
-        k0=read_only(laws.slopes),
+        nodes=joined(nodes, np.int64),
+        weights=read_only(joined([row[each] for row, each in zip(rows, nodes, strict=True)])),
+        node_ends=ends([each.size for each in nodes]),
+        k0=read_only(slopes),
         steps=addresses([each.step for each in laws.steppers]),
-        parameters=read_only(_joined([each.parameters for each in laws.steppers], np.float64), finite=False),
-        parameter_ends=_ends([each.parameters.size for each in laws.steppers]),
-        state_ends=_ends([each.state.size for each in laws.steppers]),
+        parameters=laws.parameters,
+        parameter_ends=laws.parameter_ends,
+        state_ends=laws.state_ends,
         stretches=np.concatenate([np.zeros((0, 2), dtype=np.int64), *stretches]),
-        stretch_ends=_ends([len(each) for each in stretches]),
+        stretch_ends=ends([len(each) for each in stretches]),
     )
 
 
-def _joined(parts: Sequence[Any], kind: Any) -> Any:
+def joined(parts: Sequence[Any], kind: Any = np.float64) -> Any:
+    """Vectors one behind the other."""
     return np.concatenate([np.zeros(0, dtype=kind), *parts]).astype(kind)
 
 
-def _ends(sizes: Sequence[int]) -> Any:
+def ends(sizes: Sequence[int]) -> Any:
+    """Places at which parts of these sizes begin, and the end of the last one."""
     return np.concatenate([[0], np.cumsum(np.array(sizes, dtype=np.int64))]).astype(np.int64)
 
 
-def plant_of(matrices: Matrices, *, with_energies: bool) -> Plant:
-    """The linear part as the kernel takes it."""
-    n = len(matrices.mass)
-    A, loads = np.zeros((2 * n, 2 * n)), np.zeros((len(matrices.directions) + len(matrices.rows), 2 * n))
-    A[:n, n:] = np.eye(n)
-    A[n:, :n] = -np.linalg.solve(matrices.mass, matrices.stiffness)
-    A[n:, n:] = -np.linalg.solve(matrices.mass, matrices.damping)
-    forces = np.concatenate([matrices.directions, matrices.rows])
-    loads[:, n:] = np.linalg.solve(matrices.mass, forces.T).T
-    directions = matrices.directions if with_energies else np.zeros((0, n))
-    return Plant(A, loads, np.ascontiguousarray(matrices.damping), np.ascontiguousarray(directions))
+def linear_parts(matrices: Matrices) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """A (n_sets, 2 n, 2 n), the loads (n_sets, n_loads + n_elements, 2 n), and rates of the fastest modes (n_sets,)."""
+    n_sets, n, _ = matrices.stiffness.shape
+    mass = np.broadcast_to(matrices.mass, (n_sets, n, n))
+    rows = np.broadcast_to(matrices.rows, (n_sets, *matrices.rows.shape))
+    forces = np.concatenate([np.broadcast_to(matrices.directions, (n_sets, *matrices.directions.shape[1:])), rows], 1)
+    A, loads = np.zeros((n_sets, 2 * n, 2 * n)), np.zeros((n_sets, forces.shape[1], 2 * n))
+    A[:, :n, n:] = np.eye(n)
+    A[:, n:, :n] = -np.linalg.solve(mass, matrices.stiffness)
+    A[:, n:, n:] = -np.linalg.solve(mass, np.broadcast_to(matrices.damping, (n_sets, n, n)))
+    loads[:, :, n:] = np.swapaxes(np.linalg.solve(mass, np.swapaxes(forces, 1, 2)), 1, 2)
+    rates = np.abs(np.linalg.eigvals(A)).max(axis=1)
+    return A, loads, rates
 
 
-def steps_of(plant: Plant, sample_time: float, substeps: int | None, tolerance: float) -> Steps:
+def steps_of(rate: float, sample_time: float, substeps: int | None, tolerance: float) -> Steps:
     """How a sample is divided: as told, or by the tolerance from the phase on which the sweeps converge with."""
-    rate = fastest(plant.A)
     if substeps is not None:
         return Steps(sample_time, rate, substeps, 0, tolerance)
-    return Steps(sample_time, rate, max(1, int(np.ceil(sample_time * rate / _PHASE))), _HALVINGS, tolerance)
+    return Steps(sample_time, rate, max(1, int(np.ceil(sample_time * rate / PHASE))), HALVINGS, tolerance)
+
+
+def empty_flows(halvings: int, m: int, n_loads: int, n_elements: int) -> tuple[FloatArray, FloatArray, Flows]:
+    """Room for `fill_structure`: two tables of its own, and the flows."""
+    n_levels, n_free = halvings + 2, m + 2 * n_loads
+    return (
+        np.empty((n_levels, m, m)),
+        np.empty((n_levels, n_loads + n_elements, N_POWERS, m)),
+        Flows(
+            np.empty((n_levels, n_free, m)),
+            np.empty((n_levels, N_POWERS * n_elements, m)),
+            np.empty((n_levels, n_free, 2 * n_elements)),
+            np.empty((n_levels, N_POWERS * n_elements, 2 * n_elements)),
+        ),
+    )
 
 
 def flows_of(elements: Elements, plant: Plant, steps: Steps) -> Flows:
     """The flows over the base step and its parts."""
-    n_levels, m, n_elements = steps.halvings + 2, len(plant.A), elements.k0.size
-    n_loads = len(plant.loads) - n_elements
-    E, P = np.empty((n_levels, m, m)), np.empty((n_levels, len(plant.loads), N_POWERS, m))
-    fill_flows(plant.A, plant.loads, steps.rate, steps.sample_time / steps.base, E, P)
-    free = np.concatenate([E, P[:, :n_loads, :2].reshape(n_levels, -1, m)], axis=1)
-    rests = np.ascontiguousarray(P[:, n_loads:].reshape(n_levels, -1, m))
-    drifts = [np.empty((*columns.shape[:2], 2 * n_elements)) for columns in (free, rests)]
-    for columns, out in zip((free, rests), drifts, strict=True):
-        project(elements, columns, out)
-    return Flows(free, rests, *drifts)
+    n_elements = elements.k0.size
+    E, P, flows = empty_flows(steps.halvings, len(plant.A), len(plant.loads) - n_elements, n_elements)
+    fill_structure(elements, plant.A, plant.loads, steps.rate, steps.sample_time / steps.base, E, P, flows)
+    return flows
 
 
-def motion_at(laws: Laws, rows: FloatArray, x: FloatArray, n_loads: int) -> Motion:
+def empty_motion(m: int, n_state: int, n_elements: int, n_loads: int = 1) -> Motion:
+    """Room for what moves."""
+    return Motion(
+        x=np.zeros(m),
+        laws=np.zeros(n_state),
+        carry=np.zeros((5, n_elements)),
+        peaks=np.zeros(2 * n_elements + m),
+        work=np.zeros(2 + n_elements),
+        division=np.zeros(1),
+        loads=np.zeros(n_loads),
+    )
+
+
+def empty_tracks(n: int, motion: Motion, *, with_laws: bool = False) -> Tracks:
+    """Room for `n` samples."""
+    parts = (motion.x, motion.carry, motion.peaks, motion.work)
+    laws = np.empty((n if with_laws else 0, motion.laws.size))
+    return Tracks(*(np.empty((n, *part.shape)) for part in parts), laws)
+
+
+def room_for(motion: Motion) -> Room:
+    """Room for the work of the kernel."""
+    return make_room(motion.carry.shape[1], motion.x.size, motion.laws.size, motion.loads.size)
+
+
+def motion_at(elements: Elements, laws: Laws, x: FloatArray, n_loads: int) -> Motion:
     """The motion at its start, every law at its first sample."""
-    n_nodes, drifts = len(x) // 2, rows @ x[: len(x) // 2]
-    begun = [law.started(float(drift)) for law, drift in zip(laws.steppers, drifts, strict=True)]
-    forces = [_first_force(law, float(drift)) for law, drift in zip(begun, drifts, strict=True)]
-    zeros = np.zeros(len(rows))
-    carry = np.stack([np.array(forces), zeros, drifts, rows @ x[n_nodes:], zeros])
-    peaks = np.concatenate([np.abs(drifts), np.abs(forces), np.abs(x[:n_nodes]), np.zeros(n_nodes)])
-    states = _joined([law.state for law in begun], np.float64)
-    return Motion(x.copy(), states, carry, peaks, np.zeros(2 + len(rows)), np.zeros(1), np.zeros(n_loads))
-
-
-def _first_force(law: CompiledLaw, drift: float) -> float:
+    motion = empty_motion(len(x), laws.states.size, len(laws.steppers), n_loads)
     with np.errstate(all="ignore"):
-        return float(law.step(law.parameters, law.state, drift))
+        start_motion(elements, laws.starts, laws.states, read_only(x), motion)
+    return motion

@@ -18,7 +18,7 @@ from scipy.linalg import LinAlgError, cholesky, eigh
 from hysim._frozen import FloatArray, check_choice, check_whole, read_only
 from hysim._parallel import in_pieces
 from hysim.errors import SimulationError
-from hysim.kernels.structures.path import LEAST_DRIFT, Motion, Tracks, follow, make_room
+from hysim.kernels.structures.path import LEAST_DRIFT, Elements, Motion, Plant, Tracks, follow
 from hysim.models.model import family
 from hysim.models.protocols import positive_time
 from hysim.plants.structures import assembly
@@ -160,14 +160,20 @@ class Structure:
 
     @cached_property
     def laws(self) -> assembly.Laws:
-        """Steps and elastic slopes of the elements, without their dashpots."""
+        """Steps and memories of the elements, without their dashpots."""
         return assembly.laws_of([parted(element.law).law for element in self.elements])
+
+    @cached_property
+    def elastic_slopes(self) -> FloatArray:
+        """Slope of each element at its start, zero where it is negative, shape (n_elements,) [N/m]."""
+        rows = (read_only(each[np.newaxis], finite=False) for each in (self.laws.parameters, self.laws.states))
+        return read_only(self.laws.slopes(*rows)[0])
 
     @cached_property
     def initial_stiffness(self) -> FloatArray:
         """Stiffness with the elastic slopes of the elements, shape (n, n) [N/m]."""
         rows = self.drift_matrix
-        return read_only(self.stiffness_matrix + rows.T @ (self.laws.slopes[:, np.newaxis] * rows))
+        return read_only(self.stiffness_matrix + rows.T @ (self.elastic_slopes[:, np.newaxis] * rows))
 
     @cached_property
     def damping_matrix(self) -> FloatArray:
@@ -190,10 +196,16 @@ class Structure:
 
     @cached_property
     def matrices(self) -> assembly.Matrices:
-        """The linear part."""
+        """The linear part, as one row."""
+        parts = (self.mass_matrix, self.damping_matrix, self.initial_stiffness)
         return assembly.Matrices(
-            self.mass_matrix, self.damping_matrix, self.initial_stiffness, self.drift_matrix, self.force_directions
+            *(part[np.newaxis] for part in parts), self.drift_matrix, self.force_directions[np.newaxis]
         )
+
+    @cached_property
+    def kernel_elements(self) -> Elements:
+        """The elements as the kernel takes them."""
+        return assembly.elements_of(self.laws, self.drift_matrix, self.elastic_slopes)
 
     # ------------------------------------------------------------------------------ small motions
 
@@ -300,7 +312,7 @@ class Structure:
     def start(self) -> StructureState:
         """The state before the first sample."""
         x = np.array(self.initial_state or np.zeros(2 * self.n_nodes))
-        motion = assembly.motion_at(self.laws, self.drift_matrix, x, len(self.force_directions))
+        motion = assembly.motion_at(self.kernel_elements, self.laws, x, len(self.force_directions))
         return StructureState(motion, False, self._stored(x[np.newaxis])[0])
 
     def _followed(
@@ -311,21 +323,17 @@ class Structure:
         positive_time(sample_time)
         before = state or self.start()
         motion = Motion(*(part.copy() for part in before.motion))
-        plant = assembly.plant_of(self.matrices, with_energies=True)
-        steps = assembly.steps_of(plant, sample_time, self.substeps, self.tolerance)
-        elements = assembly.elements_of(self.laws, self.drift_matrix)
-        flows = assembly.flows_of(elements, plant, steps)
-        n, m, n_elements = u.size, 2 * self.n_nodes, len(self.elements)
-        tracks = Tracks(
-            np.empty((n, m)), np.empty((n, 5, n_elements)), np.empty((n, motion.peaks.size)),
-            np.empty((n, motion.work.size)), np.empty((n if with_laws else 0, motion.laws.size)),
-        )  # fmt: skip
-        loads, room = np.ascontiguousarray(u[:, np.newaxis]), make_room(n_elements, m, motion.laws.size)
+        A, loads, rates = assembly.linear_parts(self.matrices)
+        plant = Plant(A[0], loads[0], np.array(self.damping_matrix), np.array(self.force_directions))
+        steps = assembly.steps_of(float(rates[0]), sample_time, self.substeps, self.tolerance)
+        elements, flows = self.kernel_elements, assembly.flows_of(self.kernel_elements, plant, steps)
+        n, tracks = u.size, assembly.empty_tracks(u.size, motion, with_laws=with_laws)
+        inputs, room = np.ascontiguousarray(u[:, np.newaxis]), assembly.room_for(motion)
 
         def run(k: slice) -> int:
             rows = Tracks(*(part[k] for part in tracks))
             is_first = k.start == 0 and not before.started
-            lost = int(follow(elements, flows, plant, steps, is_first, loads[k], motion, room, rows))
+            lost = int(follow(elements, flows, plant, steps, is_first, inputs[k], motion, room, rows))
             if progress is not None:
                 progress(k.stop, n)
             return lost
@@ -366,7 +374,7 @@ class Structure:
         x, (force, _, drift, rate, _) = tracks.x, np.moveaxis(tracks.carry, 1, 0)
         kinetic, elastic = self._energies(x)
         work = tracks.work[:, 2:]
-        slopes = self.laws.slopes
+        slopes = self.elastic_slopes
         with np.errstate(divide="ignore", invalid="ignore"):
             returned = np.where(slopes > 0.0, (force**2 - self._first_forces**2) / (2.0 * slopes), 0.0)
         imbalance = tracks.work[:, 0] - tracks.work[:, 1] - work.sum(axis=1) - (kinetic + elastic - state.stored)
