@@ -215,15 +215,15 @@ def main(smoke: bool = False) -> list[Row]:
     return rows
 
 
-LOOKS = {  # method's beginning: marker, fill, line, colour; each told apart without its colour
-    "hysim, fixed": ("*", "full", "-", "#0072B2"),
-    "hysim, adaptive": ("*", "none", "--", "#0072B2"),
-    "OpenSees BoucWen, Newmark": ("X", "full", "-", "#CC79A7"),
-    "OpenSees BoucWen, central": ("X", "none", ":", "#CC79A7"),
-    "Newmark": ("s", "full", "--", "#222222"),
-    "Verlet": ("s", "none", ":", "#222222"),
-    "solve_ivp DOP853": ("o", "full", "-", "#D55E00"),
-    "odeint": ("o", "none", "-.", "#D55E00"),
+LOOKS = {  # method's beginning: label, marker, fill, line, colour; each told apart without its colour
+    "hysim, fixed": ("hysim, fixed substeps", "*", "full", "-", "#0072B2"),
+    "hysim, adaptive": ("hysim, by tolerance", "*", "none", "--", "#0072B2"),
+    "OpenSees BoucWen, Newmark": ("OpenSees, Newmark", "X", "full", "-", "#CC79A7"),
+    "OpenSees BoucWen, central": ("OpenSees, central", "X", "none", ":", "#CC79A7"),
+    "Newmark": ("Newmark loop", "s", "full", "--", "#222222"),
+    "Verlet": ("Verlet loop", "s", "none", ":", "#222222"),
+    "solve_ivp DOP853": ("SciPy DOP853", "o", "full", "-", "#D55E00"),
+    "odeint": ("SciPy odeint", "o", "none", "-.", "#D55E00"),
 }
 
 
@@ -232,20 +232,20 @@ def draw(rows: list[Row]) -> Figure:
     canvas = figure(height=7.4)
     axes = canvas.subplots(2, 2, sharex=True, sharey=True)
     for ax, problem in zip(axes.flat, dict.fromkeys(row["problem"] for row in rows), strict=True):
-        for method, (marker, fill, dashes, colour) in LOOKS.items():
+        for method, (label, marker, fill, dashes, colour) in LOOKS.items():
             own = [r for r in rows if r["problem"] == problem and r["method"].startswith(method)]
             if own:
                 look = {"marker": marker, "fillstyle": fill, "color": colour, "ms": 9 if marker == "*" else 5}
                 points = sorted((r["ns_per_term"], r["error"]) for r in own)
-                ax.loglog(*zip(*points, strict=True), ls=dashes, lw=1.1, mew=0.8, label=method, **look)
+                ax.loglog(*zip(*points, strict=True), ls=dashes, lw=1.1, mew=0.8, label=label, **look)
         ax.set_title(f"{str(problem).capitalize()}")
     for ax in axes[-1]:
         ax.set_xlabel("Time a sample and element [ns]")
     for ax in axes[:, 0]:
         ax.set_ylabel("Error of the drifts [largest drift]")
     handles = {label: handle for ax in axes.flat for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-    shown = [method for method in LOOKS if method in handles]
-    canvas.legend([handles[method] for method in shown], shown, loc="outside lower center", ncols=3)
+    shown = [label for label, *_ in LOOKS.values() if label in handles]
+    canvas.legend([handles[label] for label in shown], shown, loc="outside lower center", ncols=3)
     return canvas
 
 
