@@ -923,9 +923,9 @@ def structures_work_precision(result: Result) -> list[str]:
         f"{number(fast['value'])} ns. OpenSees with 64 steps a sample is {span(column(finest, 'error'), 2)} wrong; "
         f"hysim with at most its error is {span(column(finest, 'times_faster'), 2)} times faster, and at its cost "
         f"{span(column(finest, 'times_more_exact'), 2)} times more exact. With few steps a sample, where OpenSees is "
-        f"{error_of(least['error'])} wrong, {number(least['times_faster'], 2)} times faster.",
+        f"{error_of(least['error'])} wrong, {number(least['times_faster'], 2)} times faster. "
         f"To 1e-4 a plain compiled Verlet loop around hysim's laws takes {number(verlet['ns_per_term'])} ns, the "
-        f"faster of SciPy's methods {number(peer['ns_per_term'])} ns and hysim {number(ours['ns_per_term'])} ns.",
+        f"faster of SciPy's methods {number(peer['ns_per_term'])} ns and hysim {number(ours['ns_per_term'])} ns. "
         "With the same Newmark steps on bilinear storeys OpenSees' Steel01 and hysim's law differ by "
         f"{error_of(steel['value'])}.",
         f"Twenty storeys on isolators with Dahl friction, plays and Maxwell slip: drifts {error_of(tower['error'])} "

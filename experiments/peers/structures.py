@@ -230,15 +230,16 @@ def scipy(case: Case, smoke: bool) -> Iterator[Entry]:
     sizes = np.concatenate([np.full(n, reach), np.full(n, 10.0 * reach), np.full(len(laws), 0.01)])
     parts = case.directions, np.linalg.inv(case.mass), case.damping, np.array(case.masses), laws
     arguments = case.sample_time, case.ground, *parts
+    right_side = rates if smoke else compiled_rates
 
     def solve(method: str, rtol: float) -> Array:
         options = {"t_eval": case.times, "rtol": rtol, "atol": rtol * sizes, "args": arguments}
-        y = solve_ivp(compiled_rates, (0.0, case.times[-1]), np.zeros(sizes.size), method, **options).y
+        y = solve_ivp(right_side, (0.0, case.times[-1]), np.zeros(sizes.size), method, **options).y
         return np.asarray(y[:n].T @ case.directions.T)
 
     def lsoda(rtol: float) -> Array:
         options = {"rtol": rtol, "atol": rtol * sizes, "tfirst": True, "mxstep": 10_000}
-        y = odeint(compiled_rates, np.zeros(sizes.size), case.times, arguments, **options)
+        y = odeint(right_side, np.zeros(sizes.size), case.times, arguments, **options)
         return np.asarray(y[:, :n] @ case.directions.T)
 
     for rtol in (1e-4,) if smoke else (1e-4, 1e-6, 1e-8):
@@ -341,8 +342,8 @@ def verlet(
         times(B, x, out[k])
 
 
-def plain(case: Case, loop: Any, count: int, tolerance: float = 1e-10) -> Array:
-    """Drifts at the samples by one of the two loops, with hysim's own step for each law."""
+def plain(case: Case, loop: Any, count: int, tolerance: float = 1e-10, smoke: bool = False) -> Array:
+    """Drifts at the samples by one of the two loops, with hysim's own step for each law; not compiled in smoke mode."""
     laws = [law.compiled() for _, law in case.elements]
     h = case.sample_time / count
     M, C, K, B = case.mass, case.damping, case.stiffness, case.directions
@@ -356,7 +357,7 @@ def plain(case: Case, loop: Any, count: int, tolerance: float = 1e-10) -> Array:
     parameters, states = (np.array([law[k] for law in laws]) for k in (1, 2))
     out = np.zeros((case.ground.size, len(laws)))
     shaken = parameters, states, np.array(matrices), B, -np.array(case.masses), case.ground
-    loop(laws[0].step, *shaken, h, count, tolerance, out)
+    (loop.py_func if smoke else loop)(laws[0].step, *shaken, h, count, tolerance, out)
     return out
 
 
@@ -364,7 +365,7 @@ def loops(case: Case, smoke: bool) -> Iterator[Entry]:
     """What one would write oneself: compiled, with the exact step of the law."""
     for name, loop in (("Newmark", newmark), ("Verlet", verlet)):
         for count in (1,) if smoke else (1, 4, 16, 64):
-            run = lambda loop=loop, n=count: plain(case, loop, n)  # noqa: E731
+            run = lambda loop=loop, n=count: plain(case, loop, n, smoke=smoke)  # noqa: E731
             yield timed("plain loop", f"{name}, compiled", substeps(count), run)
 
 
