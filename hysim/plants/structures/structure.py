@@ -18,7 +18,7 @@ from scipy.linalg import LinAlgError, cholesky, eigh
 from hysim._frozen import FloatArray, check_choice, check_whole, read_only
 from hysim._parallel import in_pieces
 from hysim.errors import SimulationError
-from hysim.kernels.structures.path import LEAST_DRIFT, Elements, Motion, Plant, Tracks, follow
+from hysim.kernels.structures.path import Elements, Motion, Plant, Tracks, follow
 from hysim.models.model import family
 from hysim.models.protocols import positive_time
 from hysim.plants.structures import assembly
@@ -29,7 +29,9 @@ from hysim.plants.structures.parameters import assembled, scalars_of
 
 _OUTPUTS = ("displacement", "velocity", "acceleration", "drift", "force")
 _LOOSEST = 1e-3  # tolerance
-_WRONG = 0.05  # share of the largest drift by which that of a step may be uncertain
+
+
+_IMBALANCE = 0.05  # share of the largest work that may be missing
 
 
 class StructureState(NamedTuple):
@@ -206,10 +208,9 @@ class Structure:
     @cached_property
     def matrices(self) -> assembly.Matrices:
         """The linear part, as one row."""
-        parts = (self.mass_matrix, self.damping_matrix, self.initial_stiffness)
-        return assembly.Matrices(
-            *(part[np.newaxis] for part in parts), self.drift_matrix, self.force_directions[np.newaxis]
-        )
+        parts = (self.mass_matrix, self.damping_matrix, self.initial_stiffness, self.force_directions)
+        mass, damping, stiffness, directions = (part[np.newaxis] for part in parts)
+        return assembly.Matrices(mass, damping, stiffness, self.drift_matrix, directions)
 
     @cached_property
     def kernel_elements(self) -> Elements:
@@ -438,17 +439,16 @@ class Structure:
         with np.errstate(all="ignore"):
             lost = in_pieces(run, n)
         if lost >= 0:
-            raise SimulationError(f"the motion diverges at t = {lost * sample_time:g}")
+            hint = "; if it should not, use more substeps, or substeps=None" if self.substeps else ""
+            raise SimulationError(f"the motion diverges at t = {lost * sample_time:g}{hint}")
         self._check_resolved(motion)
         return StructureState(motion, before.started or n > 0, before.stored), tracks
 
     def _check_resolved(self, motion: Motion) -> None:
         """Refuse a motion with steps whose sweeps do not agree, which could not be divided further."""
-        n = len(self.elements)
-        sizes = np.maximum(motion.peaks[:n], LEAST_DRIFT * motion.peaks[:n].max(initial=0.0))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            apart = float(np.nan_to_num(motion.carry[4] / sizes, nan=0.0, posinf=np.inf).max(initial=0.0))
-        if not apart <= _WRONG:
+        errors, peaks = motion.carry[4][np.newaxis], motion.peaks[np.newaxis, : len(self.elements)]
+        apart = float(assembly.uncertainty(errors, peaks)[0])
+        if not apart <= assembly.LEAST_CERTAIN:
             raise SimulationError(
                 f"the motion is not resolved: the drift of a step is uncertain by {apart:.2g} of the largest one; "
                 + ("use more substeps, or substeps=None" if self.substeps else "use a smaller sample_time")
@@ -494,6 +494,12 @@ class Structure:
             "dissipated": work - returned,
             "imbalance": imbalance,
         }
+        largest = float(np.abs(tracks.work).max(initial=0.0))
+        if (wrong := float(np.abs(imbalance).max(initial=0.0))) > _IMBALANCE * largest:
+            raise SimulationError(
+                f"the motion is not resolved: {wrong / largest:.2g} of the energy is missing; "
+                + ("use more substeps, or substeps=None" if self.substeps else "use a smaller tolerance")
+            )
         name, place = self._place_of_output()
         arrays = {"y": signals[name][:, place], **signals}
         return {each: np.ascontiguousarray(values) for each, values in arrays.items()}
