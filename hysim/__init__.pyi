@@ -49,6 +49,7 @@ from hysim.sweeps import sweep as sweep
 from hysim.sweeps import Sweep as Sweep
 from hysim.sweeps import Sample as Sample
 from hysim.sweeps import response_task as response_task
+from hysim.sweeps import structure_task as structure_task
 from hysim.sweeps import load_sweep as load_sweep
 from hysim.sweeps import sobol_indices as sobol_indices
 from hysim.sweeps import SobolIndices as SobolIndices

@@ -29,6 +29,7 @@ _EASY = 1.0 / 64.0  # share of the tolerance below which steps of twice the leng
 LEAST_DRIFT = 1.0e-4  # share of the displacements: the least drift whose error counts as its own
 _OF_DIVISIONS = 0.1  # share of the tolerance that a divided moment may take
 OF_MOMENTS = 1.0e-9  # tolerance of the moments where the steps have none
+_NEAREST = 1.0e-3  # of the step: a last node closer to its end has no slope but that of rounding
 _TINY = 1.0e-290
 
 
@@ -345,7 +346,9 @@ def take_step(
         state = motion.laws[elements.state_ends[e] : elements.state_ends[e + 1]]
         step, d = step_at(elements.steps[e]), room.drifts[e]
         f = step(parameters, state, d)
-        carry[1, e] = (elements.k0[e] * d - f - sums[e, 3]) / (h * (1.0 - sums[e, 4]))
+        ahead = 1.0 - sums[e, 4]
+        slope = (elements.k0[e] * d - f - sums[e, 3]) / (h * ahead) if ahead > _NEAREST else 0.0
+        carry[1, e] = slope
         end_of_path = room.before[e]
         work[2 + e] += 0.5 * elements.k0[e] * (end_of_path - carry[2, e]) * (end_of_path + carry[2, e]) - sums[e, 1]
         work[2 + e] += f * (d - end_of_path)

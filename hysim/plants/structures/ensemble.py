@@ -21,6 +21,7 @@ Reduction = Literal[
     "peak_drift", "residual_drift", "energy", "peak_force", "peak_displacement", "peak_acceleration"
 ]  # fmt: skip
 
+REDUCTIONS = get_args(Reduction)
 _MATRICES = ("mass", "stiffness", "damping")
 _AT_ONCE = 2_000_000  # samples that a call of the kernel computes, or one structure
 
@@ -44,7 +45,7 @@ def responses(
     workers: int | None,
 ) -> FloatArray:
     """See `hysim.Structure.responses`."""
-    check_choice("reduce", reduce, get_args(Reduction))
+    check_choice("reduce", reduce, REDUCTIONS)
     positive_time(sample_time)
     u = read_only(inputs, "ground_accelerations")
     if u.ndim not in (1, 2) or not u.shape[-1]:
