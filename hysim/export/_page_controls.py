@@ -5,7 +5,7 @@ the law and where the constructor takes them. A number of which only positive va
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +13,6 @@ import numpy as np
 from hysim._frozen import FloatArray
 from hysim.errors import SimulationError
 from hysim.models.law import Law
-from hysim.models.tables import arguments_of
 from hysim.records import Record
 
 _MOST = 3  # elements of a tuple that have a slider each; longer ones have one for all
@@ -71,11 +70,6 @@ def by_fields(law: Law) -> bool:
     return {name.partition("[")[0] for name in law.scalars} <= set(law.arguments)
 
 
-def exchanged(law: Law, scalars: Mapping[str, float]) -> Law:
-    """The law with other numbers; ValueError if the constructor does not take them."""
-    return type(law)(**{**law.arguments, **arguments_of(scalars)}) if by_fields(law) else law.assemble(scalars)
-
-
 class _Reach:
     """How far the numbers of a law can be moved on an input."""
 
@@ -103,9 +97,8 @@ class _Reach:
 
     def _with(self, name: str, value: float) -> Law | None:
         """The law with another value of a number, None where the constructor does not take it."""
-        own = {**self.law.scalars, name: value}
         try:
-            return exchanged(self.law, own)
+            return self.law.with_scalars({name: value})
         except ValueError:
             return None
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.export._packing import packing
-from hysim.export._page_controls import Control, by_fields, controls_of, exchanged
+from hysim.export._page_controls import Control, by_fields, controls_of
 from hysim.export._page_modules import Kernels, kernels_of, module_of
 from hysim.laws.dashpot import Dashpot
 from hysim.laws.operators.rate_dependent_prandtl_ishlinskii import RateDependentPrandtlIshlinskii
@@ -112,7 +112,7 @@ def _general(law: Law) -> Law:
     """The law with the step that takes every value of its numbers: one with another exponent than 1 and 2."""
     for name in law.structural:
         try:
-            other = exchanged(law, {**law.scalars, name: law.scalars[name] + 0.5})
+            other = law.with_scalars({name: law.scalars[name] + 0.5})
         except ValueError:
             continue
         law = law if name in other.structural else other

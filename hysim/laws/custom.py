@@ -139,12 +139,12 @@ class CustomLaw(Law):
         searched += [Parameter(name, affine=True) for name in self.linear]
         return declared_space(searched, (), self.scalars, self.initial, record, freedom)
 
-    def assemble(self, parameters: Mapping[str, float]) -> "CustomLaw":
-        """The law with these parameters and initial values."""
+    def with_scalars(self, scalars: Mapping[str, float]) -> "CustomLaw":
+        """The law with other parameters and initial values."""
         return replace(
             self,
-            parameters={name: parameters.get(name, value) for name, value in self.parameters.items()},
-            state={name: parameters.get(name, value) for name, value in self.state.items()},
+            parameters={name: scalars.get(name, value) for name, value in self.parameters.items()},
+            state={name: scalars.get(name, value) for name, value in self.state.items()},
         )
 
 

@@ -39,6 +39,15 @@ class Dashpot(Identifiable, Composable):
 
     dynamic: ClassVar[bool] = True
 
+    @property
+    def scalars(self) -> dict[str, float]:
+        """The coefficient by its name."""
+        return {"c": self.c}
+
+    def with_scalars(self, scalars: Mapping[str, float]) -> Self:
+        """The damper with another coefficient."""
+        return type(self)(**{**self.scalars, **scalars})
+
     @classmethod
     def candidates(cls) -> dict[str, Any]:
         """None for `hysim.compare`: a dashpot is a part of sums."""
@@ -84,4 +93,4 @@ class Dashpot(Identifiable, Composable):
 
     def assemble(self, parameters: Mapping[str, float]) -> Self:
         """The damper with this parameter."""
-        return type(self)(**parameters)
+        return self.with_scalars(parameters)

@@ -2,17 +2,18 @@
 
 import math
 from abc import abstractmethod
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim.models._parts import compiled_law
+from hysim.models._parts import compiled_law, exchanged, labels, own
 from hysim.models.by_structure import ByStructure
 from hysim.models.composable import Composable
 from hysim.models.inverse_search import inverse_at_rest, inverse_response
-from hysim.models.protocols import CompiledLaw, Continuable, Startable, Stretched, needed_time, needs_time
+from hysim.models.protocols import CompiledLaw, Continuable, Numbered, Startable, Stretched, needed_time, needs_time
 
 State = tuple[Any, ...]
 """The state of each member."""
@@ -75,6 +76,30 @@ class Composite(ByStructure, Composable):
                     places.append((end + first, count))
             end += size
         return tuple(places)
+
+    @property
+    def scalars(self) -> dict[str, float]:
+        """Numbers of the members that have names for them, behind their labels, as in ``"bouc_wen.beta"``."""
+        named = zip(labels(self.members), self.members, strict=True)
+        return {
+            f"{label}.{name}": value
+            for label, member in named
+            if isinstance(member, Numbered)
+            for name, value in member.scalars.items()
+        }
+
+    def with_scalars(self, scalars: Mapping[str, float]) -> Any:
+        """The composite with other numbers, by their names in `scalars`."""
+        numbered = {
+            label: member.with_scalars(others)
+            for label, member in zip(labels(self.members), self.members, strict=True)
+            if isinstance(member, Numbered) and (others := own(scalars, label))
+        }
+        return self.with_members(exchanged(self.members, numbered))
+
+    @abstractmethod
+    def with_members(self, members: tuple[Any, ...]) -> Any:
+        """The composite of other members."""
 
     @property
     @abstractmethod

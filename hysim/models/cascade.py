@@ -88,6 +88,9 @@ class Cascade(Composite):
         """The stages."""
         return self.stages
 
+    def with_members(self, members: tuple[Any, ...]) -> "Cascade":
+        return Cascade(stages=members)
+
     def response(self, u: npt.ArrayLike, sample_time: float | None = None) -> FloatArray:
         return reduce(lambda v, stage: response_of(stage, v, sample_time), self.stages, read_only(u, "u", ndim=1))
 

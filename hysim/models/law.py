@@ -170,6 +170,10 @@ class Law(Composable, ABC):
         """Every number by the name that `hysim.identify` has for it, ``name`` or ``name[k]``."""
         return scalars_of(self.arguments)
 
+    def with_scalars(self, scalars: Mapping[str, float]) -> Self:
+        """The law with other numbers, by their names in `scalars`; ValueError if the constructor refuses them."""
+        return type(self)(**{**items(self), **arguments_of({**self.scalars, **scalars})})
+
     @property
     def stepping(self) -> Stepping:
         """The leanest step of this law: one for its own numbers, where the family has several.
@@ -499,7 +503,7 @@ class Law(Composable, ABC):
 
     def assemble(self, parameters: Mapping[str, float]) -> Self:
         """The law with these parameters, one number for each name; the others are its own."""
-        return type(self)(**{**items(self), **arguments_of({**self.scalars, **parameters})})
+        return self.with_scalars(parameters)
 
     # ------------------------------------------------------------------------------ how it is derived
 

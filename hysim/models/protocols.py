@@ -115,6 +115,18 @@ class Stepwise(Protocol):
 
 
 @runtime_checkable
+class Numbered(Protocol):
+    """A model whose numbers have names."""
+
+    @property
+    def scalars(self) -> Mapping[str, float]:
+        """Every number by name."""
+
+    def with_scalars(self, scalars: Mapping[str, float]) -> Any:
+        """The model with other numbers, by some of these names; ValueError if the constructor refuses them."""
+
+
+@runtime_checkable
 class Stretched(Protocol):
     """A `Steppable` law that says where in its state the memory is, and between which bounds its slope lies."""
 

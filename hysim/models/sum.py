@@ -78,6 +78,9 @@ class Sum(Composite):
         """The parts."""
         return self.parts
 
+    def with_members(self, members: tuple[Any, ...]) -> "Sum":
+        return Sum(parts=members)
+
     def response(self, u: npt.ArrayLike, sample_time: float | None = None) -> FloatArray:
         inputs = read_only(u, "u", ndim=1)
         return _total([response_of(part, inputs, sample_time) for part in self.parts])

@@ -300,6 +300,10 @@ class Duhem(Law):
     def _letter(self) -> str:
         return "z" if self.feedthrough or self.offset or self.p_abs.any() or self.q_abs.any() else "y"
 
+    def with_scalars(self, scalars: Mapping[str, float]) -> Self:
+        """The law with other numbers, by their names in `scalars`."""
+        return self.assemble({**self.scalars, **scalars})
+
     @property
     def scalars(self) -> dict[str, float]:
         return {**self.terms, "feedthrough": self.feedthrough, "offset": self.offset, "y0": self.y0}
