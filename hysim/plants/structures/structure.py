@@ -436,7 +436,7 @@ class Structure:
         """
         inputs = read_only(u, "u", ndim=1)
         begun, tracks = self._followed(inputs, sample_time, state, progress, with_laws=False)
-        return self._signals(inputs, begun, tracks), begun
+        return self.signals_of(inputs, begun, tracks), begun
 
     def memories(self, u: npt.ArrayLike, sample_time: float) -> tuple[FloatArray, ...]:
         """State of each element's law at the samples of `u`, its last input and its memory.
@@ -542,10 +542,10 @@ class Structure:
             lost = in_pieces(run, n)
         if lost >= 0:
             raise SimulationError(f"the motion diverges at t = {lost * sample_time:g}")
-        self._check_resolved(motion)
+        self.check_resolved(motion)
         return StructureState(motion, before.started or n > 0, before.stored), tracks
 
-    def _check_resolved(self, motion: Motion) -> None:
+    def check_resolved(self, motion: Motion) -> None:
         """Refuse a motion with steps whose sweeps do not agree, which could not be divided further."""
         n = len(self.elements)
         sizes = np.maximum(motion.peaks[:n], LEAST_DRIFT * motion.peaks[:n].max(initial=0.0))
@@ -568,8 +568,8 @@ class Structure:
         elastic = 0.5 * np.einsum("ki,ij,kj->k", x[:, :n], self.stiffness_matrix, x[:, :n])
         return kinetic, elastic
 
-    def _signals(self, u: FloatArray, state: StructureState, tracks: Tracks) -> dict[str, FloatArray]:
-        """Signals by name."""
+    def signals_of(self, u: FloatArray, state: StructureState, tracks: Tracks) -> dict[str, FloatArray]:
+        """Signals by name of tracks under the inputs `u`, which end in `state`."""
         n, n_elements = self.n_nodes, len(self.elements)
         x, (force, _, drift, rate, _) = tracks.x, np.moveaxis(tracks.carry, 1, 0)
         kinetic, elastic = self._energies(x)
