@@ -27,8 +27,8 @@ def close(
 ) -> int:  # fmt: skip
     """Run the samples of `inputs`, (n, n_loads): the first one that is not finite, or -1.
 
-    `controller` is an address, see `pointers.controller_at`; its `state` moves along, as `motion` does. The first column
-    of `inputs` is the reference, the others are loads. `samples`, (n, 3), is for command, drive and y.
+    `controller` is an address, see `pointers.controller_at`; its `state` moves along, as `motion` does. The first
+    column of `inputs` is the reference, the others are loads. `samples`, (n, 3), is for command, drive and y.
     """
     step = controller_at(controller)
     m, n_elements, n_loads = motion.x.size, elements.k0.size, inputs.shape[1]
