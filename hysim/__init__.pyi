@@ -90,6 +90,7 @@ from hysim.plants.structures.element import Element as Element
 from hysim.plants.structures.damping import Rayleigh as Rayleigh
 from hysim.plants.structures.damping import ModalDamping as ModalDamping
 from hysim.plants.structures.frames import shear_frame as shear_frame
+from hysim.plants.structures.static import StaticResponse as StaticResponse
 from hysim.plants.transfer_function import TransferFunction as TransferFunction
 from hysim.plants.state_space import StateSpace as StateSpace
 from hysim.plants.modes import Modes as Modes
