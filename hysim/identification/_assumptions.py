@@ -25,15 +25,16 @@ from hysim._repeats import repeated_cycle
 from hysim.errors import SimulationError
 from hysim.identification._budget import Budget
 from hysim.identification._problem import Problem, problem, problems
-from hysim.identification._search import brief_optima, brief_optimum
+from hysim.identification._search import brief_optima, brief_optimum, optima
 from hysim.metrics.criteria import information
-from hysim.models.protocols import LongerPast, Undecided, Variant
+from hysim.models.protocols import LongerPast, Rescalable, Undecided, Variant
 from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record
 
 _STRONG = 10.0  # difference of two BIC
 _IN_VAIN = 2  # longer pasts in a row that are no better: one number more may be of use only with another one
 _ROUNDING = 1e-10  # of the output's size: smaller residuals are those of a perfect fit
+_WEIGHINGS = 2  # searches after which the weights of sensors are taken anew: the second changes them little
 _AT_BOUND = 1e-9  # of the largest linear parameter
 
 _STATES = {
@@ -103,6 +104,27 @@ def quiet_where_better(
         f"the input has noise of about {size} rms: only the {turns} reversals above it are used, and the input is "
         "monotone between them"
     )
+
+
+def in_units_of_noise(problem: Problem, seed: int) -> Problem:
+    """The problem with the outputs of several sensors in units of their noise, which a search says; else itself.
+
+    What was searched is only polished then.
+    """
+    if not all(isinstance(part.record, Rescalable) for part in problem.parts):
+        return problem
+    for _ in range(_WEIGHINGS):
+        if not (reached := optima(problem, seed=seed)):
+            break
+        ends = np.array([each.x for each in reached])
+        residual = problem.y - problem.model(problem.completed(ends[:1]))[0]
+        own = np.split(residual, problem.cuts[1:-1])
+        parts = [
+            replace(part, record=part.record.rescaled(each)) if isinstance(part.record, Rescalable) else part
+            for part, each in zip(problem.parts, own, strict=True)
+        ]
+        problem = replace(problem, parts=tuple(parts), ends=ends)
+    return problem
 
 
 def decided(
