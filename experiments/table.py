@@ -33,7 +33,7 @@ sentence that no longer agrees with its result. Where hysim was told something t
 says so, and it gives the bad end of a distribution beside the median.
 
 ```shell
-pip install -e '.[test,bench,vision,dask,tables,io]'  # bench: the peers of 03; vision: 29 and 30; dask: 28
+pip install -e '.[test,bench,vision,dask,tables,io]'  # bench: the peers of 03, 39; vision: 29, 30; dask: 28
 pip install -e '.[dev,export]'                        # 37, which also looks for gcc and clang
 python experiments/01_exact_step.py                   # measures, prints, and writes results/exact_step
 python experiments/10_sindy_recovery.py resume        # 10 and 33: only what is not stored yet

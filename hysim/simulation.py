@@ -52,14 +52,19 @@ class Simulation:
 
     def __str__(self) -> str:
         arrays = {"t": self.t, "u": self.u, "y": self.y, "z": self.z, **self.signals}
-        return summary_text(
-            [f"Simulation: {self.u.size} samples"],
-            {name: self._in_words(name, values) for name, values in arrays.items() if values is not None},
-        )
+        rows = {
+            name: self._in_words(name, values)
+            for name, values in arrays.items()
+            if values is not None and not (name.startswith(_PEAK) and name.removeprefix(_PEAK) in arrays)
+        }
+        return summary_text([f"Simulation: {self.u.size} samples"], rows)
 
     def _in_words(self, name: str, values: FloatArray) -> str:
         least_to_largest = extent(values, self.units.get(name, ""))
-        return least_to_largest if values.ndim == 1 else f"{values.shape[1]} columns, {least_to_largest}"
+        if values.ndim == 1:
+            return least_to_largest
+        peak = f", peak {self.peaks[name].max():.4g}" if name in self.peaks and values.size else ""
+        return f"{values.shape[1]} columns, {least_to_largest}{peak}"
 
     @property
     def columns(self) -> dict[str, FloatArray]:
@@ -84,7 +89,7 @@ def columns_of(name: str, values: FloatArray) -> dict[str, FloatArray]:
     """A signal as columns by their names, one of its own name if it has one axis."""
     if values.ndim == 1:
         return {name: values}
-    first = 1 if name.removeprefix("peak_") in _BY_NODE else 0
+    first = 1 if name.removeprefix(_PEAK) in _BY_NODE else 0
     return {f"{name}_{first + k}": column for k, column in enumerate(values.T)}
 
 

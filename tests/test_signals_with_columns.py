@@ -192,3 +192,38 @@ def test_signals_are_drawn_with_a_line_for_each_column(simulation):
         hs.plot.signals(simulation, "velocity")
     with pytest.raises(ValueError, match="got none"):
         hs.plot.signals(simulation)
+
+
+@pytest.fixture
+def frame(run, tmp_path):
+    """Two storeys that yield under the motion of the AT2 file, in a file."""
+    laws = [hs.BoucWen(A=stiffness, beta=0.1 * stiffness, gamma=0.1 * stiffness) for stiffness in (900.0, 600.0)]
+    plant = hs.shear_frame([2.0, 1.0], laws=laws, damping=hs.ModalDamping(ratio=0.05))
+    hs.save(plant, tmp_path / "frame.json", units={"y": "m", "drift": "m", "force": "N"})
+    return plant
+
+
+@pytest.mark.parametrize("file", ["quake.AT2", "quake.csv"])
+def test_a_frame_is_moved_by_a_ground_motion_and_all_its_signals_are_written(run, frame, file):
+    simulation = hs.simulate(frame, *hs.load_ground_motion(file))
+    code, out, err = run("simulate", "frame.json", file, "--json")
+    document = json.loads(out)
+    assert (code, err) == (0, "")
+    assert document["units"]["u"] == "m/s^2"
+    assert document["units"]["drift_1"] == "m"
+    assert document["columns"].keys() == simulation.columns.keys()
+    for name, column in (("displacement_2", "y"), ("drift_0", "displacement_1"), ("peak_acceleration_1", None)):
+        assert document["columns"][name] == simulation.columns[name].tolist()
+        assert column is None or document["columns"][name] == simulation.columns[column].tolist()
+    assert np.abs(simulation.signals["force"]).max() > 0.0
+
+
+def test_the_loops_of_a_frame_are_drawn_and_its_signals_printed(run, frame, tmp_path):
+    assert run("simulate", "frame.json", "quake.AT2", "--plot", "frame.svg", "--out", "frame.csv") == (0, "", "")
+    assert "element 1" in (tmp_path / "frame.svg").read_text()
+    simulation = hs.simulate(frame, *hs.load_ground_motion("quake.AT2"))
+    lines = str(simulation).splitlines()
+    drift = next(line for line in lines if line.startswith("  drift"))
+    assert "2 columns" in drift
+    assert drift.endswith(f"peak {simulation.peaks['drift'].max():.4g}")
+    assert len(lines) <= 10

@@ -18,7 +18,7 @@ import math
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import inner, kernel, uncounted
+from hysim.kernels._compile import inner, kernel, unfolded
 
 _SERIES = 0.25  # largest phase of the stiffest mode in the step of the series
 N_POWERS = 4  # of a load's time
@@ -113,7 +113,7 @@ def apply(E: FloatArray, x: FloatArray, out: FloatArray) -> None:
     add_columns(E, x, out)
 
 
-@uncounted
+@unfolded
 def add_columns(columns: FloatArray, weights: FloatArray, out: FloatArray) -> None:
     """Add columns (k, m) with weights (k,) to `out`, (m,); the order of the sums is that of the columns."""
     if out.size <= _SHORT:

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import inlined, uncounted
+from hysim.kernels._compile import inlined, uncounted, unfolded
 from hysim.kernels.stepping import Step
 
 IntArray = npt.NDArray[np.int64]
@@ -93,7 +93,7 @@ def turn(low: float, high: float, end: float, path: Path) -> float:
     return s
 
 
-@uncounted
+@unfolded
 def along(
     step: Step, parameters: FloatArray, state: FloatArray, rule: FloatArray, begin: float, end: float, r: float,
     k0: float, path: Path,
@@ -167,7 +167,7 @@ def copy(stretches: IntArray, source: FloatArray, target: FloatArray) -> None:
             target[q] = source[q]
 
 
-@uncounted
+@unfolded
 def fit_rest(
     step: Step, parameters: FloatArray, state: FloatArray, stretches: IntArray, saved: FloatArray, spare: FloatArray,
     is_fine: bool, allowed: float, k0: float, f0: float, path: Path, middle: float, last: float, rest: FloatArray,

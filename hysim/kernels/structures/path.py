@@ -188,7 +188,7 @@ def project(elements: Elements, columns: FloatArray, drifts: FloatArray) -> None
                 drifts[level, i, n + e] = rate
 
 
-@uncounted
+@unfolded
 def combine(columns: FloatArray, weights: FloatArray, base: FloatArray, out: FloatArray) -> None:
     """The columns by their weights, added to `base`."""
     for q in range(out.size):
@@ -260,7 +260,7 @@ def is_smooth(room: Room) -> bool:
     return smooth
 
 
-@uncounted
+@unfolded
 def halve(rest: FloatArray, half: FloatArray) -> None:
     """The coefficients of cubics over a step as those over its first half."""
     for e in range(rest.size // 4):
@@ -495,7 +495,7 @@ def write(motion: Motion, k: int, tracks: Tracks) -> None:
         put(motion.laws, tracks.laws[min(k, tracks.laws.shape[0] - 1)])
 
 
-@uncounted
+@unfolded
 def put(values: FloatArray, out: FloatArray) -> None:
     """Copy a vector."""
     for q in range(values.size):

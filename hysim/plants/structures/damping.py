@@ -3,7 +3,6 @@
 from typing import Any, Self
 
 import numpy as np
-from scipy.linalg import eigh
 
 from hysim._frozen import FloatArray, check_not_negative, check_positive, read_only
 from hysim.models.model import family
@@ -92,15 +91,22 @@ class ModalDamping:
         object.__setattr__(self, "ratio", tuple(ratios.tolist()) if ratios.ndim else float(ratios))
 
     def matrix(self, mass: FloatArray, stiffness: FloatArray) -> FloatArray:
-        """The damping matrix, shape (n_nodes, n_nodes).
+        """The damping matrix, shape (n_nodes, n_nodes), or many of them for stacks of matrices.
 
-        Raises ValueError if the number of ratios is not that of the modes, or the stiffness is not positive definite.
+        Raises ValueError if the number of ratios is not that of the modes, or the stiffness is negative.
         """
-        squares, modes = eigh(stiffness, mass)
-        if np.ndim(self.ratio) and len(self.ratio) != len(mass):
-            raise ValueError(f"ratio must hold one number for each of {len(mass)} modes, got {len(self.ratio)}")
-        if squares[0] < -1e-9 * abs(squares[-1]):
-            raise ValueError("the stiffness at the start is negative: modal damping needs modes that swing")
-        scaled = mass @ modes
-        weights = 2.0 * np.asarray(self.ratio) * np.sqrt(np.maximum(squares, 0.0))
-        return np.asarray((scaled * weights) @ scaled.T)
+        if np.ndim(self.ratio) and len(self.ratio) != mass.shape[-1]:
+            raise ValueError(f"ratio must hold one number for each of {mass.shape[-1]} modes, got {len(self.ratio)}")
+        return modal_damping(np.asarray(self.ratio), mass, stiffness)
+
+
+def modal_damping(ratios: FloatArray, mass: FloatArray, stiffness: FloatArray) -> FloatArray:
+    """Damping matrices (..., n, n) with the ratios (..., n) of their modes, or one ratio for all."""
+    root = np.linalg.cholesky(mass)
+    half = np.linalg.solve(root, stiffness)
+    squares, shapes = np.linalg.eigh(np.linalg.solve(root, np.swapaxes(half, -1, -2)))
+    if (squares[..., 0] < -1e-9 * np.abs(squares[..., -1])).any():
+        raise ValueError("the stiffness at the start is negative: modal damping needs modes that swing")
+    scaled = root @ shapes
+    weights = 2.0 * ratios * np.sqrt(np.maximum(squares, 0.0))
+    return np.asarray((scaled * weights[..., np.newaxis, :]) @ np.swapaxes(scaled, -1, -2))

@@ -25,6 +25,7 @@ from hysim.models.protocols import positive_time
 from hysim.plants.structures import assembly
 from hysim.plants.structures.damping import ModalDamping, Rayleigh
 from hysim.plants.structures.element import Element, parted
+from hysim.plants.structures.ensemble import Reduction, responses
 from hysim.plants.structures.parameters import assembled, scalars_of
 from hysim.plants.structures.records import OF_ELEMENTS, OF_NODES
 from hysim.plants.structures.search import SearchedStructure
@@ -180,15 +181,22 @@ class Structure(SearchedStructure):
         return read_only(self.stiffness_matrix + rows.T @ (self.elastic_slopes[:, np.newaxis] * rows))
 
     @cached_property
+    def own_damping(self) -> FloatArray:
+        """Damping without the dashpots of the elements, shape (n, n) [N s/m]."""
+        if isinstance(self.damping, Rayleigh | ModalDamping):
+            return read_only(self.damping.matrix(self.mass_matrix, self.initial_stiffness))
+        return _matrix(self.damping, "damping", self.n_nodes)
+
+    @cached_property
+    def viscosities(self) -> FloatArray:
+        """Coefficient of each element's dashpots, shape (n_elements,) [N s/m]."""
+        return read_only([parted(element.law).viscosity for element in self.elements])
+
+    @cached_property
     def damping_matrix(self) -> FloatArray:
         """Damping with the dashpots of the elements, shape (n, n) [N s/m]."""
         rows = self.drift_matrix
-        if isinstance(self.damping, Rayleigh | ModalDamping):
-            own = self.damping.matrix(self.mass_matrix, self.initial_stiffness)
-        else:
-            own = _matrix(self.damping, "damping", self.n_nodes)
-        viscosities = np.array([parted(element.law).viscosity for element in self.elements])
-        return read_only(own + rows.T @ (viscosities[:, np.newaxis] * rows))
+        return read_only(self.own_damping + rows.T @ (self.viscosities[:, np.newaxis] * rows))
 
     @cached_property
     def force_directions(self) -> FloatArray:
@@ -365,6 +373,57 @@ class Structure(SearchedStructure):
         places = [np.concatenate([np.arange(a, a + n) for a, n in each]) for each in self.laws.stretches]
         return tuple(part[:, place] for part, place in zip(parts, places, strict=True))
 
+    def responses(
+        self,
+        parameters_or_scales: Mapping[str, npt.ArrayLike] | npt.ArrayLike,
+        ground_accelerations: npt.ArrayLike,
+        *,
+        sample_time: float,
+        reduce: Reduction = "peak_drift",
+        workers: int | None = None,
+    ) -> FloatArray:
+        """One measure of many structures at once, on all cores.
+
+        Parameters
+        ----------
+        parameters_or_scales : mapping, or array, shape (n_sets,)
+            Names of parameters, as `scalars` has them, to a value for all sets or one for each; ``"scale"`` multiplies
+            the input, and ``"elements.*.beta"`` is that of every element. Or scales of the input alone. What is not
+            named is that of this structure.
+        ground_accelerations : array, shape (n_samples,) or (n_sets, n_samples)
+            Input of all sets, or of each, linear between its samples [m/s^2, or N under a force].
+        sample_time : float
+            Time between two samples [s].
+        reduce : str
+            ``"peak_drift"``, also between samples, ``"residual_drift"`` (after the last sample), ``"peak_force"`` or
+            ``"energy"`` (the work that each element has taken), of each element; ``"peak_displacement"`` or
+            ``"peak_acceleration"`` (absolute, at samples), of each mass.
+        workers : int, optional
+            Number of threads; by default one for each core. The result does not depend on it.
+
+        Returns
+        -------
+        array, shape (n_sets, n_elements) or (n_sets, n)
+            The numbers that `signals` has of each set; inf where the motion diverges or cannot be resolved.
+
+        Raises
+        ------
+        ValueError
+            If a name is unknown, lengths do not fit, or the constructor would refuse a value.
+
+        Examples
+        --------
+        >>> import numpy as np, hysim as hs
+        >>> column = hs.BoucWen(beta=50.0, gamma=50.0, feedthrough=20.0, gain=180.0)
+        >>> frame = hs.shear_frame([1.0, 1.0], laws=column, damping=hs.ModalDamping(ratio=0.02))
+        >>> a = np.sin(9.0 * np.arange(0.0, 4.0, 0.01))
+        >>> frame.responses([0.5, 1.0, 2.0], a, sample_time=0.01).shape
+        (3, 2)
+        >>> frame.responses({"elements.*.beta": [25.0, 50.0]}, a, sample_time=0.01, reduce="energy").shape
+        (2, 2)
+        """
+        return responses(self, parameters_or_scales, ground_accelerations, sample_time, reduce, workers)
+
     def start(self) -> StructureState:
         """The state before the first sample."""
         x = np.array(self.initial_state or np.zeros(2 * self.n_nodes))
@@ -434,7 +493,7 @@ class Structure(SearchedStructure):
         with np.errstate(divide="ignore", invalid="ignore"):
             returned = np.where(slopes > 0.0, (force**2 - self._first_forces**2) / (2.0 * slopes), 0.0)
         imbalance = tracks.work[:, 0] - tracks.work[:, 1] - work.sum(axis=1) - (kinetic + elastic - state.stored)
-        viscous = rate * np.array([parted(element.law).viscosity for element in self.elements])
+        viscous = rate * self.viscosities
         signals = {
             "displacement": x[:, :n],
             "velocity": x[:, n:],

@@ -1,0 +1,228 @@
+"""Many structures that differ in numbers, or in their inputs: one number or a few of each."""
+
+from collections.abc import Mapping
+from typing import Any, Literal, NamedTuple, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, check_choice, read_only
+from hysim._parallel import in_chunks
+from hysim.kernels.structures.ensembles import Results, Sets, follow_each
+from hysim.kernels.structures.path import Plant, Steps
+from hysim.models.compiled_step import compiled_start, compiled_step
+from hysim.models.law import Law
+from hysim.models.protocols import Startable, positive_time
+from hysim.plants.structures import assembly
+from hysim.plants.structures.damping import ModalDamping, Rayleigh, modal_damping
+from hysim.plants.structures.parameters import expanded
+
+Reduction = Literal[
+    "peak_drift", "residual_drift", "energy", "peak_force", "peak_displacement", "peak_acceleration"
+]  # fmt: skip
+
+_MATRICES = ("mass", "stiffness", "damping")
+_AT_ONCE = 2_000_000  # samples that a call of the kernel computes, or one structure
+_WRONG = 0.05  # share of the largest drift by which that of a step may be uncertain
+
+
+class _Stack(NamedTuple):
+    """Structures one a row: their laws' kernels, parameters, states and elastic slopes, and their linear parts."""
+
+    laws: assembly.Laws
+    parameters: FloatArray
+    states: FloatArray
+    slopes: FloatArray
+    matrices: assembly.Matrices
+
+
+def responses(
+    structure: Any,
+    parameters_or_scales: Mapping[str, npt.ArrayLike] | npt.ArrayLike,
+    inputs: npt.ArrayLike,
+    sample_time: float,
+    reduce: Reduction,
+    workers: int | None,
+) -> FloatArray:
+    """See `hysim.Structure.responses`."""
+    check_choice("reduce", reduce, get_args(Reduction))
+    positive_time(sample_time)
+    u = read_only(inputs, "ground_accelerations")
+    if u.ndim not in (1, 2) or not u.shape[-1]:
+        raise ValueError(f"ground_accelerations must have the shape (n,) or (n_sets, n), got {u.shape}")
+    u = u[np.newaxis] if u.ndim == 1 else u
+    values = _values(structure, parameters_or_scales)
+    sizes = {name: column.size for name, column in values.items() if column.size != 1}
+    sizes |= {"ground_accelerations": len(u)} if len(u) > 1 else {}
+    n_sets = next(iter(sizes.values()), 1)
+    if unequal := {name: size for name, size in sizes.items() if size != n_sets}:
+        raise ValueError(f"every parameter needs one value, or one for each of {n_sets} sets, got {unequal}")
+    out = np.empty((n_sets, _width(structure, reduce)))
+
+    def work(start: int, stop: int) -> None:
+        rows = slice(start, stop)
+        chosen = {name: column if column.size == 1 else column[rows] for name, column in values.items()}
+        out[rows] = _reduced(structure, chosen, u[rows] if len(u) > 1 else u, stop - start, sample_time, reduce)
+
+    in_chunks(work, n_sets, workers=workers, minimum=max(1, _AT_ONCE // u.shape[1]), n_samples=u.shape[1])
+    return out
+
+
+def _values(structure: Any, given: Mapping[str, npt.ArrayLike] | npt.ArrayLike) -> dict[str, FloatArray]:
+    """Columns (n_sets,) by names without wildcards."""
+    named = given if isinstance(given, Mapping) else {"scale": given}
+    scales = {name: column for name, column in named.items() if name == "scale"}
+    others = {name: column for name, column in named.items() if name != "scale"}
+    return {
+        name: read_only(np.atleast_1d(np.asarray(column, dtype=float)), name, ndim=1)
+        for name, column in {**scales, **expanded(structure.scalars, others)}.items()
+    }
+
+
+def _width(structure: Any, reduce: Reduction) -> int:
+    return int(structure.n_nodes if reduce in ("peak_displacement", "peak_acceleration") else len(structure.elements))
+
+
+def _reduced(
+    structure: Any, values: Mapping[str, FloatArray], u: FloatArray, n_sets: int, sample_time: float, reduce: Reduction
+) -> FloatArray:
+    """The measure of each set, a row each."""
+    n_elements, n = len(structure.elements), structure.n_nodes
+    results = _computed(structure, values, u, n_sets, sample_time)
+    peaks = results.peaks
+    largest = peaks[:, :n_elements].max(axis=1, initial=0.0, keepdims=True)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        apart = results.errors / np.maximum(peaks[:, :n_elements], 1e-4 * largest)
+    unresolved = (np.nan_to_num(apart, nan=0.0, posinf=np.inf) > _WRONG).any(axis=1)
+    measures = {
+        "peak_drift": peaks[:, :n_elements],
+        "peak_force": peaks[:, n_elements : 2 * n_elements],
+        "peak_displacement": peaks[:, 2 * n_elements : 2 * n_elements + n],
+        "peak_acceleration": peaks[:, 2 * n_elements + n :],
+        "residual_drift": results.drifts,
+        "energy": results.work,
+    }
+    return np.where(unresolved[:, np.newaxis], np.inf, measures[reduce])
+
+
+def _computed(
+    structure: Any, values: Mapping[str, FloatArray], u: FloatArray, n_sets: int, sample_time: float
+) -> Results:
+    """What the kernel computes of the sets of one chunk."""
+    laws, parameters, states, slopes, matrices = _stacked(structure, values, n_sets)
+    A, loads, rates = assembly.linear_parts(matrices)
+    n_elements, m = len(structure.elements), 2 * structure.n_nodes
+    elements = assembly.elements_of(laws, structure.drift_matrix, slopes[0])
+    halvings = 0 if structure.substeps else assembly.HALVINGS
+    steps = Steps(sample_time, 0.0, structure.substeps or 0, halvings, structure.tolerance)
+    motion = assembly.empty_motion(m, states.shape[1], n_elements)
+    E, P, flows = assembly.empty_flows(halvings, m, 1, n_elements)
+    results = Results(np.empty((n_sets, motion.peaks.size)), *(np.empty((n_sets, n_elements)) for _ in range(3)))
+    sets = Sets(
+        A, loads, np.ascontiguousarray(rates), slopes, parameters, states,
+        np.array(np.broadcast_to(values.get("scale", np.ones(1)), n_sets)),
+    )  # fmt: skip
+    plant = Plant(A[0], loads[0], np.zeros((structure.n_nodes, structure.n_nodes)), np.zeros((0, structure.n_nodes)))
+    x = read_only(structure.initial_state or np.zeros(m))
+    with np.errstate(all="ignore"):
+        follow_each(
+            elements, laws.starts, sets, plant, steps, assembly.PHASE, x, np.ascontiguousarray(u), E, P, flows,
+            motion, assembly.room_for(motion), assembly.empty_tracks(1, motion), results,
+        )  # fmt: skip
+    return results
+
+
+def _stacked(structure: Any, values: Mapping[str, FloatArray], n_sets: int) -> _Stack:
+    """All structures: by tables where only laws with tables and the three matrices vary, else one by one."""
+    numbers = {name: column for name, column in values.items() if name != "scale"}
+    places = {name: int(name.split(".")[1]) for name in numbers if name.startswith("elements.")}
+    has_table = all(isinstance(structure.elements[place].law, Law) for place in places.values())
+    if has_table and all(name in places or name in _MATRICES for name in numbers):
+        return _by_tables(structure, numbers, n_sets)
+    return _one_by_one(structure, numbers, n_sets)
+
+
+def _by_tables(structure: Any, numbers: Mapping[str, FloatArray], n_sets: int) -> _Stack:
+    steppers, parameters, states = [], [], []
+    for e, (element, law) in enumerate(zip(structure.elements, structure.laws.steppers, strict=True)):
+        prefix = f"elements.{e}."
+        own = {name.removeprefix(prefix): column for name, column in numbers.items() if name.startswith(prefix)}
+        stepper, constants, memory = _tabled(element.law, own) if own else (law, law.parameters, law.state)
+        steppers.append(stepper)
+        parameters.append(np.broadcast_to(constants, (n_sets, constants.shape[-1])))
+        states.append(np.broadcast_to(memory, (n_sets, memory.shape[-1])))
+    none = np.zeros((n_sets, 0))
+    laws = assembly.Laws(tuple(steppers), structure.laws.stretches)
+    constants = read_only(np.concatenate([none, *parameters], axis=1), finite=False)
+    memories = read_only(np.concatenate([none, *states], axis=1), finite=False)
+    slopes = read_only(laws.slopes(constants, memories))
+    return _Stack(laws, constants, memories, slopes, _matrices(structure, numbers, slopes, n_sets))
+
+
+def _tabled(law: Law, own: Mapping[str, FloatArray]) -> tuple[Startable, FloatArray, FloatArray]:
+    """Laws of one family: their kernels, and the parameters and states, one a row."""
+    kind = type(law)
+    n_sets = max(column.size for column in own.values())
+    tables = law.exchanged({name: column[:, np.newaxis] for name, column in own.items()})
+    wide = {name: np.broadcast_to(table, (n_sets, *table.shape[1:])) for name, table in tables.items()}
+    kind.check(wide := kind.completed(wide))
+    packed = kind.pack(wide)
+    varies = set(own) & set(law.structural)
+    step, start, workspace = (kind.step, kind.start, kind.workspace) if varies else law.stepping
+    states = np.concatenate([packed.memory, np.zeros((len(packed.memory), workspace))], axis=1)
+    stepper = Startable(compiled_step(step), packed.parameters[0], states[0], compiled_start(start))
+    return stepper, packed.parameters, states
+
+
+def _matrices(structure: Any, numbers: Mapping[str, FloatArray], slopes: FloatArray, n_sets: int) -> assembly.Matrices:
+    """Linear parts of structures whose laws have these elastic slopes (n_sets, n_elements)."""
+    one, rows, damping = np.eye(structure.n_nodes), structure.drift_matrix, structure.damping
+
+    def scaled(name: str, value: FloatArray, matrix: FloatArray) -> FloatArray:
+        """A matrix for each set: by its number, or by a factor of the whole."""
+        numbers_of = numbers.get(name)
+        if numbers_of is None:
+            return np.broadcast_to(matrix, (n_sets, *matrix.shape))
+        return numbers_of[:, np.newaxis, np.newaxis] * (matrix if np.ndim(value) else one)
+
+    mass = scaled("mass", structure.mass, structure.mass_matrix)
+    stiffness = scaled("stiffness", structure.stiffness, structure.stiffness_matrix)
+    stiffness = stiffness + np.swapaxes(rows[np.newaxis], 1, 2) @ (slopes[:, :, np.newaxis] * rows)
+    factors = numbers.get("damping", np.ones(1))
+    if isinstance(damping, Rayleigh):
+        tall = factors[:, np.newaxis, np.newaxis]
+        own = (tall * damping.mass) * mass + (tall * damping.stiffness) * stiffness
+    elif isinstance(damping, ModalDamping):
+        several = np.ndim(damping.ratio) or "damping" not in numbers
+        ratios = factors[:, np.newaxis] * np.asarray(damping.ratio) if several else factors[:, np.newaxis]
+        own = modal_damping(ratios, mass, stiffness)
+    else:
+        own = scaled("damping", damping, structure.own_damping)
+    full = own + rows.T @ (structure.viscosities[:, np.newaxis] * rows)
+    directions = structure.force_directions
+    if structure.excitation == "base":
+        directions = -(mass @ np.array(structure.influence or np.ones(structure.n_nodes)))[:, np.newaxis, :]
+    return assembly.Matrices(mass, full, stiffness, rows, np.broadcast_to(directions, (n_sets, 1, structure.n_nodes)))
+
+
+def _one_by_one(structure: Any, numbers: Mapping[str, FloatArray], n_sets: int) -> _Stack:
+    """Structures that are made by themselves, such as those with sums whose parts vary."""
+    made = [
+        structure.assemble({name: float(column[min(i, column.size - 1)]) for name, column in numbers.items()})
+        for i in range(n_sets)
+    ]
+    first = made[0]
+    forms = {tuple((id(law.step), law.parameters.size, law.state.size) for law in each.laws.steppers) for each in made}
+    if len(forms) > 1:
+        raise ValueError(f"{', '.join(numbers)} change the form of a law: compute the sets one after the other")
+    if any(each.initial_state != structure.initial_state for each in made):
+        raise ValueError("all sets begin with the same initial_state")
+    parts = [np.concatenate([part[k] for part in (each.matrices for each in made)]) for k in (0, 1, 2)]
+    directions = np.concatenate([each.matrices.directions for each in made])
+    return _Stack(
+        first.laws,
+        read_only(np.stack([each.laws.parameters for each in made]), finite=False),
+        read_only(np.stack([each.laws.states for each in made]), finite=False),
+        read_only(np.stack([each.elastic_slopes for each in made])),
+        assembly.Matrices(*parts, first.drift_matrix, directions),
+    )
