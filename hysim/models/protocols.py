@@ -240,8 +240,11 @@ class Recorded(Protocol):
 class Rescalable(Protocol):
     """A record whose outputs are of several sensors, in units of their noise."""
 
+    def noise(self, residual: FloatArray) -> FloatArray:
+        """Size of this residual (n,) at each sensor, shape (n_sensors,)."""
+
     def rescaled(self, residual: FloatArray) -> Any:
-        """The record in units of the noise that this residual (n,) shows of each sensor."""
+        """The record in units of that noise."""
 
 
 @runtime_checkable

@@ -127,12 +127,16 @@ class SensorRecord(Record):
         """The input once."""
         return self.u[: self.u.size // len(self.sensors)]
 
+    def noise(self, residual: FloatArray) -> FloatArray:
+        """Size of this residual (n,) at each sensor in its present units, shape (n_sensors,)."""
+        errors = np.sqrt(np.mean(residual.reshape(len(self.sensors), -1) ** 2, axis=1))
+        return np.asarray(np.maximum(errors, _LEAST * np.array(self.sizes) / np.array(self.scales)))
+
     def rescaled(self, residual: FloatArray) -> "SensorRecord":
         """The record in units of the noise that this residual (n,) shows of each sensor."""
-        errors = np.array(self.scales) * np.sqrt(np.mean(residual.reshape(len(self.sensors), -1) ** 2, axis=1))
-        scales = np.maximum(errors, _LEAST * np.array(self.sizes))
-        ratios = np.repeat(np.array(self.scales) / scales, self.input.size)
-        return replace(self, y=self.y * ratios, scales=tuple(scales.tolist()))
+        ratios = self.noise(residual)
+        scales = tuple((np.array(self.scales) * ratios).tolist())
+        return replace(self, y=self.y / np.repeat(ratios, self.input.size), scales=scales)
 
 
 def laid(record: Record | StructureRecord, widths: Mapping[str, int], output: Sensor) -> SensorRecord:

@@ -3,7 +3,7 @@
 Positive numbers are searched on a log scale from a tenth of their start to ten times it, others between plus and minus
 ten times it. Outputs have no derivatives by them: `hysim.identify` takes finite differences of simulations, which have
 equal substeps throughout so that the outputs are smooth: as many as turn the phase of the fastest mode at the start by
-at most 0.5 rad each, whose error is about 1e-6 of the largest acceleration.
+at most 0.8 rad each, whose error is about 1e-5 of the largest acceleration.
 
 Where the periods of the start are wrong, the calculated motion is soon out of step with the measured one, and the sum
 of squares of a whole earthquake has many minima. The search therefore begins with the first motions, which are small
@@ -29,8 +29,8 @@ from hysim.plants.structures.records import OF_NODES, SensorRecord, StructureRec
 from hysim.records import Record
 
 _DECADE = 10.0
-_PHASE = 0.5  # of the fastest mode in a substep [rad]
-_PARTS = (0.01, 0.05, 0.2, 0.5, 1.0)  # of the integral of the squared input
+_PHASE = 0.8  # of the fastest mode in a substep [rad]
+_PARTS = (0.01, 0.05, 0.2, 0.5)  # of the integral of the squared input
 _FEWEST = 30  # samples of a part
 _STEPS = 12  # for each part
 _NEAR = 0.7  # in units of the start: how far from its start a number is expected to be
@@ -87,7 +87,7 @@ class SearchedStructure(Identifiable):
             raise ValueError(f"say which numbers of the structure are free: {_examples(self.scalars)}")
         record.sample_time  # noqa: B018  # raises ValueError if there is none
         known = self._known(freedom)
-        held = freedom.held(known) | {name: known[name] for name in known if name not in freedom.free}
+        held = {name: known[name] for name in known if name not in freedom.free} | freedom.held(known)
         covered = {each for name in freedom.free if is_shared(name) for each in sharing(self.scalars, name)}
         held = {name: value for name, value in held.items() if name not in covered or name in freedom.fixed}
         own = {name: value for name, value in known.items() if name in held or name in freedom.free}
