@@ -86,6 +86,7 @@ from hysim.laws.dashpot import Dashpot as Dashpot
 from hysim.laws.custom import CustomLaw as CustomLaw
 from hysim.plants.oscillator import BoucWenOscillator as BoucWenOscillator
 from hysim.plants.structures.structure import Structure as Structure
+from hysim.plants.structures.records import StructureRecord as StructureRecord
 from hysim.plants.structures.element import Element as Element
 from hysim.plants.structures.damping import Rayleigh as Rayleigh
 from hysim.plants.structures.damping import ModalDamping as ModalDamping

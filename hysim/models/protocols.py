@@ -229,6 +229,25 @@ class Variant(NamedTuple):
 
 
 @runtime_checkable
+class Recorded(Protocol):
+    """A subject of `identify` with records of its own kind beside `Record`."""
+
+    def as_records(self, records: Any) -> Any:
+        """Such records as records of one output; what is none is returned as it is."""
+
+
+@runtime_checkable
+class Rescalable(Protocol):
+    """A record whose outputs are of several sensors, in units of their noise."""
+
+    def noise(self, residual: FloatArray) -> FloatArray:
+        """Size of this residual (n,) at each sensor, shape (n_sensors,)."""
+
+    def rescaled(self, residual: FloatArray) -> Any:
+        """The record in units of that noise."""
+
+
+@runtime_checkable
 class Undecided(Protocol):
     """A family that leaves to the record what a user does not say; `hysim.identify` decides by the BIC."""
 

@@ -8,6 +8,7 @@ the influence. The input is linear between the samples. How it is integrated: `h
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
@@ -26,9 +27,11 @@ from hysim.plants.structures.damping import ModalDamping, Rayleigh
 from hysim.plants.structures.element import Element, parted
 from hysim.plants.structures.ensemble import Reduction, responses
 from hysim.plants.structures.parameters import assembled, scalars_of
+from hysim.plants.structures.records import OF_ELEMENTS, OF_NODES
+from hysim.plants.structures.search import SearchedStructure
 from hysim.plants.structures.static import Frame, StaticResponse, pushed, strokes
 
-_OUTPUTS = ("displacement", "velocity", "acceleration", "drift", "force")
+_OUTPUTS = (*OF_NODES, *OF_ELEMENTS)
 _LOOSEST = 1e-3  # tolerance
 
 
@@ -44,7 +47,7 @@ class StructureState(NamedTuple):
 
 
 @family
-class Structure:
+class Structure(SearchedStructure):
     """Masses on linear and hysteretic elements, under a moving base or a force.
 
     ``M x'' + C x' + K x + sum b f(b . x) = -M r a(t)`` or ``= r u(t)``.
@@ -254,6 +257,21 @@ class Structure:
         """
         structure: Structure = assembled(self, parameters)
         return structure
+
+    def with_substeps(self, substeps: int | None) -> "Structure":
+        return replace(self, substeps=substeps)
+
+    @property
+    def fastest_rate(self) -> float:
+        return float(assembly.linear_parts(self.matrices)[2][0])
+
+    @property
+    def widths(self) -> dict[str, int]:
+        return {name: self._column_count(name) for name in _OUTPUTS}
+
+    @property
+    def sensor(self) -> tuple[str, int]:
+        return self.place_of(self.output)
 
     # ------------------------------------------------------------------------------ small motions
 
@@ -618,10 +636,13 @@ class Structure:
         outer = u[:, np.newaxis] * self.force_directions if self.excitation == "force" else 0.0
         return np.asarray(np.linalg.solve(self.mass_matrix, (outer - inner).T).T)
 
+    def _column_count(self, signal: str) -> int:
+        return len(self.elements) if signal in OF_ELEMENTS else self.n_nodes
+
     def place_of(self, output: str) -> tuple[str, int]:
         """Name and column of an output; ValueError if there is none of this name."""
         name, _, place = output.partition(".")
-        first, count = (0, len(self.elements)) if name in ("drift", "force") else (1, self.n_nodes)
+        first, count = int(name not in OF_ELEMENTS), self._column_count(name)
         if name not in _OUTPUTS or not (place.isdecimal() or not place):
             raise ValueError(f'output must be a name such as "displacement" or "drift.0", got {output!r}')
         column = int(place) - first if place else count - 1
