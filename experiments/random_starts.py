@@ -69,21 +69,37 @@ class Peer(NamedTuple):
         """Whether each parameter is searched by its logarithm, shape (n_parameters,)."""
         return np.array([pair[0] > 0.0 for pair in self.box.values()])
 
+    @property
+    def own(self) -> FloatArray:
+        """The law's own values, shape (n_parameters,)."""
+        return np.array([self.law.scalars[name] for name in self.box])
+
     def from_law(self) -> float:
-        """Sum of squares at the end of a descent from the law's own parameters."""
-        own = np.array([self.law.scalars[name] for name in self.box])
-        return self.descend(np.where(self.logs, np.log(np.where(self.logs, own, 1.0)), own))
+        """Sum of squares at the end of a descent from the law's own parameters.
+
+        One that is searched by its logarithm and is zero in the law begins at its box's lower end.
+        """
+        own, lowest = self.own, np.array([pair[0] for pair in self.box.values()])
+        sizes = np.where(self.logs & (own != 0.0), np.abs(own), np.where(self.logs, lowest, 1.0))
+        return self.descend(np.where(self.logs, np.log(sizes), own), np.where(own < 0.0, -1.0, 1.0))
 
     def from_random_starts(self, rng: np.random.Generator, seconds: float) -> Descents:
-        """The best of `N_STARTS` descents, or of as many as `seconds` are enough for; the last one may be cut off."""
+        """The best of `N_STARTS` descents, or of as many as `seconds` are enough for; the last one may be cut off.
+
+        Where a parameter that is searched by its logarithm is negative in the law, every other descent has its sign.
+        """
         begin, best, n = time.perf_counter(), np.inf, 0
         while n < N_STARTS and time.perf_counter() - begin < seconds:
-            best = min(best, self.descend(rng.uniform(*self.ends), until=begin + seconds))
+            signs = np.where((self.own < 0.0) & (n % 2 == 0), -1.0, 1.0)
+            best = min(best, self.descend(rng.uniform(*self.ends), signs, until=begin + seconds))
             n += 1
         return Descents(best, n, time.perf_counter() - begin)
 
-    def descend(self, x: FloatArray, until: float = np.inf) -> float:
-        """Least sum of squares of all that a descent tried, to its end or until the time is over."""
+    def descend(self, x: FloatArray, signs: FloatArray, until: float = np.inf) -> float:
+        """Least sum of squares of all that a descent tried, to its end or until the time is over.
+
+        `signs` are those of the parameters that are searched by the logarithm.
+        """
         lower, upper = self.ends
         best, known = np.inf, self.law.scalars
 
@@ -91,7 +107,7 @@ class Peer(NamedTuple):
             nonlocal best
             if time.perf_counter() > until:
                 raise TimeoutError
-            values = np.where(self.logs, np.exp(np.where(self.logs, x, 0.0)), x)
+            values = np.where(self.logs, signs * np.exp(np.where(self.logs, x, 0.0)), x)
             try:
                 law = self.law.assemble({**known, **dict(zip(self.box, values.tolist(), strict=True))})
                 difference = law.response(self.u) - self.y
