@@ -27,7 +27,9 @@ from hysim.models.search_space import STATES, STATES_IN_WORDS, Freedom, Paramete
 from hysim.models.stages import BASE, Stage
 from hysim.records import Record
 
-_CHUNK = 200_000  # samples that are evaluated at once, to bound the memory
+# Samples that are evaluated at once: some megabytes of arrays. Of many more, a C library may return the memory to the
+# system after each evaluation, and a new page costs as much as the work in it.
+_CHUNK = 50_000
 _LARGEST = 1e150  # beyond it squares overflow: such a set counts as one that has diverged
 _FEWEST = 2  # samples of a record
 _TURN = 0.01  # of the span: smaller reversals are noise, or change little
