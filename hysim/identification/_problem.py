@@ -179,6 +179,11 @@ class Problem:
         family = self.family.rough() if isinstance(self.family, Staged) else self.family
         return self if family is self.family else replace(self, family=family)
 
+    def close(self) -> "Problem":
+        """This problem with the same outputs to what a search can tell, cheaper to compute."""
+        family = self.family.close() if isinstance(self.family, Staged) else self.family
+        return self if family is self.family else replace(self, family=family)
+
     def completed(self, x: FloatArray) -> FloatArray:
         """Theta (n_sets, n_theta): the coordinates `x` and the best linear parameters."""
         linear = [self._solve(x[part])[0] for part in self._chunks(len(x))]

@@ -218,8 +218,9 @@ def polish(problem: Problem, starts: FloatArray, to: int = FULLY) -> list[Optimu
         reached = _descended(problem, starts, exact=True)
     else:
         gain, steps = (_GAIN, _BRIEF) if to == BRIEFLY else (_PASSED, _PASS)
-        reached = _descended(problem, starts, exact=True, nearly=rough, gain=gain, steps=steps)
-        reached = _amended(problem, rough, reached.theta) if to == FULLY else reached
+        close = problem.close()
+        reached = _descended(close, starts, exact=True, nearly=rough, gain=gain, steps=steps)
+        reached = _amended(close, rough, reached.theta) if to == FULLY else reached
     return _optima(problem, reached)
 
 
@@ -228,8 +229,9 @@ def polish_on(problem: Problem, optima: Sequence[Optimum]) -> list[Optimum]:
     rough = problem.rough()
     if rough is problem or not optima:
         return list(optima)
-    theta = problem.completed(np.array([each.x for each in optima]))
-    return _distinct(_optima(problem, _amended(problem, rough, theta)))
+    close = problem.close()
+    theta = close.completed(np.array([each.x for each in optima]))
+    return _distinct(_optima(problem, _amended(close, rough, theta)))
 
 
 def _optima(problem: Problem, reached: Reached) -> list[Optimum]:
