@@ -5,7 +5,7 @@ projected Levenberg-Marquardt steps in one batch. The best distinct optima desce
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -49,6 +49,7 @@ _PASSED = 1e-6  # share of the sum of squares: a step that gains less ends a pas
 _RIVAL = 20.0  # log-likelihood below the best optimum's, from which on an optimum is not within the noise
 _ROUGH = 0.1  # share of the cost by which the rough law's may differ: beyond, it does not say what stays
 BRIEFLY, NEARLY, FULLY = range(3)  # as far as optima of a law with a rough one are polished
+_CLOSE = 1e-6  # of the output's size: the residual that a close law, good to 1e-9, fits as well as the law
 PERFECT = 1e-14  # smallest sigma, in units of the output's size
 
 
@@ -215,13 +216,14 @@ def polish(problem: Problem, starts: FloatArray, to: int = FULLY) -> list[Optimu
     problem = problem.condensed()
     rough = problem.rough()
     if rough is problem or not len(starts):
-        reached = _descended(problem, starts, exact=True)
-    else:
-        gain, steps = (_GAIN, _BRIEF) if to == BRIEFLY else (_PASSED, _PASS)
-        close = problem.close()
-        reached = _descended(close, starts, exact=True, nearly=rough, gain=gain, steps=steps)
-        reached = _amended(close, rough, reached.theta) if to == FULLY else reached
-    return _optima(problem, reached)
+        return _optima(problem, _descended(problem, starts, exact=True))
+    gain, steps = (_GAIN, _BRIEF) if to == BRIEFLY else (_PASSED, _PASS)
+
+    def ends(law: Problem, x: FloatArray) -> Reached:
+        reached = _descended(law, x, exact=True, nearly=rough, gain=gain, steps=steps)
+        return _amended(law, rough, reached.theta) if to == FULLY else reached
+
+    return _closely(problem, starts, ends)
 
 
 def polish_on(problem: Problem, optima: Sequence[Optimum]) -> list[Optimum]:
@@ -229,9 +231,18 @@ def polish_on(problem: Problem, optima: Sequence[Optimum]) -> list[Optimum]:
     rough = problem.rough()
     if rough is problem or not optima:
         return list(optima)
+    starts = np.array([each.x for each in optima])
+    return _distinct(_closely(problem, starts, lambda law, x: _amended(law, rough, law.completed(x))))
+
+
+def _closely(problem: Problem, starts: FloatArray, ends: Callable[[Problem, FloatArray], Reached]) -> list[Optimum]:
+    """The `ends` of a polish on the close law, and on the law itself where it fits as well as the two laws agree."""
     close = problem.close()
-    theta = close.completed(np.array([each.x for each in optima]))
-    return _distinct(_optima(problem, _amended(close, rough, theta)))
+    found = _optima(problem, ends(close, starts))
+    least = min((each.cost for each in found), default=math.inf)
+    if close is problem or least > problem.y.size * (_CLOSE * problem.scale) ** 2:
+        return found
+    return _optima(problem, ends(problem, np.array([each.x for each in found])))
 
 
 def _optima(problem: Problem, reached: Reached) -> list[Optimum]:

@@ -12,8 +12,10 @@ from hysim._frozen import FloatArray
 from hysim.kernels._compile import inner, kernel
 from hysim.kernels.remainder import FARTHEST, N_TERMS, ROUNDING, fraction
 
-N_OWN = 9  # delta_a, delta_nu, delta_eta, zeta_s, q, p, psi, delta_psi, lambda, before A, beta, gamma, n and tolerance
-STRENGTH, BETA, GAMMA, EXPONENT, TOLERANCE = range(N_OWN, N_OWN + 5)
+N_OWN = 9  # delta_a, delta_nu, delta_eta, zeta_s, q, p, psi, delta_psi, lambda, before A, beta, gamma and n
+STRENGTH, BETA, GAMMA, EXPONENT = range(N_OWN, N_OWN + 4)
+SCALE = EXPONENT + 1  # place of the scales of z and u
+TOLERANCE = SCALE + 2
 
 # Rows of the series; `reach`, `place` and `zero` look at row 1.
 POWER, MEMORY, ENERGY, _BRACKET, _ROOT, _FADED, _DEPTH, _WIDTH, _X, _SQUARE, _BELL, PINCH, SLOPE = range(13)

@@ -159,7 +159,7 @@ class BoucWenBaberNoori(MemoryLaw):
         own = [units.times(tables[name], exponents.get(name, np.zeros(()))) for name in _OWN]
         plain = cls.joined(tables, "A", "beta", "gamma", "n")
         tolerance = np.full((len(plain), 1), cls.tolerance)
-        parameters = np.concatenate([*own, units.shape(tables), tolerance, units.scales, plain], axis=1)
+        parameters = np.concatenate([*own, units.shape(tables), units.scales, tolerance, plain], axis=1)
         return Packed(parameters, cls.initial_memory(tables, further=1))
 
     @classmethod
