@@ -49,7 +49,7 @@ _PASSED = 1e-6  # share of the sum of squares: a step that gains less ends a pas
 _RIVAL = 20.0  # log-likelihood below the best optimum's, from which on an optimum is not within the noise
 _ROUGH = 0.1  # share of the cost by which the rough law's may differ: beyond, it does not say what stays
 BRIEFLY, NEARLY, FULLY = range(3)  # as far as optima of a law with a rough one are polished
-_CLOSE = 1e-6  # of the output's size: the residual that a close law, good to 1e-9, fits as well as the law
+_FAR_FROM_CLOSE = 100.0  # times the accuracy of a close law: a residual of this size is fitted as well by it
 PERFECT = 1e-14  # smallest sigma, in units of the output's size
 
 
@@ -240,7 +240,7 @@ def _closely(problem: Problem, starts: FloatArray, ends: Callable[[Problem, Floa
     close = problem.close()
     found = _optima(problem, ends(close, starts))
     least = min((each.cost for each in found), default=math.inf)
-    if close is problem or least > problem.y.size * (_CLOSE * problem.scale) ** 2:
+    if close is problem or least > problem.y.size * (_FAR_FROM_CLOSE * close.accuracy * problem.scale) ** 2:
         return found
     return _optima(problem, ends(problem, np.array([each.x for each in found])))
 
@@ -336,7 +336,7 @@ def _descended(
     gain: float | None = None,
     hopeless: float = np.inf,
 ) -> Reached:
-    noise, everything = Gaussian(floor=PERFECT * problem.scale), np.ones((1, problem.y.size))
+    noise, everything = Gaussian(floor=max(PERFECT, problem.accuracy) * problem.scale), np.ones((1, problem.y.size))
     descent = Descent(problem, noise, problem.y[np.newaxis], everything, not problem.space.bounds, nearly, amended)
     least, most = (_TOLERANCE, N_POLISHING) if exact else (_GAIN, N_STEPS)
     tolerance = 0.5 * problem.y.size * (gain or least)
