@@ -49,6 +49,7 @@ from hysim.sweeps import sweep as sweep
 from hysim.sweeps import Sweep as Sweep
 from hysim.sweeps import Sample as Sample
 from hysim.sweeps import response_task as response_task
+from hysim.sweeps import structure_task as structure_task
 from hysim.sweeps import load_sweep as load_sweep
 from hysim.sweeps import sobol_indices as sobol_indices
 from hysim.sweeps import SobolIndices as SobolIndices
@@ -85,6 +86,7 @@ from hysim.laws.dashpot import Dashpot as Dashpot
 from hysim.laws.custom import CustomLaw as CustomLaw
 from hysim.plants.oscillator import BoucWenOscillator as BoucWenOscillator
 from hysim.plants.structures.structure import Structure as Structure
+from hysim.plants.structures.records import StructureRecord as StructureRecord
 from hysim.plants.structures.element import Element as Element
 from hysim.plants.structures.damping import Rayleigh as Rayleigh
 from hysim.plants.structures.damping import ModalDamping as ModalDamping

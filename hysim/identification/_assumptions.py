@@ -25,15 +25,17 @@ from hysim._repeats import repeated_cycle
 from hysim.errors import SimulationError
 from hysim.identification._budget import Budget
 from hysim.identification._problem import Problem, problem, problems
-from hysim.identification._search import brief_optima, brief_optimum
+from hysim.identification._search import brief_optima, brief_optimum, optima
 from hysim.metrics.criteria import information
-from hysim.models.protocols import LongerPast, Undecided, Variant
+from hysim.models.protocols import LongerPast, Rescalable, Undecided, Variant
 from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record
 
 _STRONG = 10.0  # difference of two BIC
 _IN_VAIN = 2  # longer pasts in a row that are no better: one number more may be of use only with another one
 _ROUNDING = 1e-10  # of the output's size: smaller residuals are those of a perfect fit
+_WEIGHINGS = 4
+_EVEN = 1.25  # largest noise of a sensor over the smallest, in the units of a search: weights cost < 3 % of precision
 _AT_BOUND = 1e-9  # of the largest linear parameter
 
 _STATES = {
@@ -103,6 +105,31 @@ def quiet_where_better(
         f"the input has noise of about {size} rms: only the {turns} reversals above it are used, and the input is "
         "monotone between them"
     )
+
+
+def in_units_of_noise(problem: Problem, seed: int) -> Problem:
+    """The problem with the outputs of several sensors in units of their noise, the residual of a search; else itself.
+
+    Sensors are weighed anew until a search was made with weights that were nearly right; the search of the problem that
+    is returned only polishes what this one has found.
+    """
+    if not all(isinstance(part.record, Rescalable) for part in problem.parts):
+        return problem
+    for _ in range(_WEIGHINGS):
+        if not (reached := optima(problem, seed=seed)):
+            break
+        ends = np.array([each.x for each in reached])
+        residual = problem.y - problem.model(problem.completed(ends[:1]))[0]
+        measured = [part.record for part in problem.parts if isinstance(part.record, Rescalable)]
+        own = list(zip(measured, np.split(residual, problem.cuts[1:-1]), strict=True))
+        noise = np.concatenate([record.noise(rest) for record, rest in own])
+        parts = [
+            replace(part, record=record.rescaled(rest)) for part, (record, rest) in zip(problem.parts, own, strict=True)
+        ]
+        problem = replace(problem, parts=tuple(parts), ends=ends)
+        if noise.max() <= _EVEN * noise.min():
+            break
+    return problem
 
 
 def decided(

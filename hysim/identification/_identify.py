@@ -12,7 +12,7 @@ from hysim._blas import one_blas_thread
 from hysim._frozen import FloatArray, check_count, read_only
 from hysim._parallel import Progress, at_most
 from hysim.identification import _direct as direct
-from hysim.identification._assumptions import decided, quiet_where_better
+from hysim.identification._assumptions import decided, in_units_of_noise, quiet_where_better
 from hysim.identification._extrapolation import implausible
 from hysim.identification._noise import Gaussian, Noise, Quantised, Robust
 from hysim.identification._problem import Problem
@@ -22,7 +22,7 @@ from hysim.identification._search import PERFECT, chosen, stages_in_words
 from hysim.identification._searched import Search
 from hysim.identification.folds import left_out
 from hysim.identification.swapped import swapped_columns, swapped_for
-from hysim.models.protocols import Direct, Identifiable, needs_time
+from hysim.models.protocols import Direct, Identifiable, Recorded, needs_time
 from hysim.models.search_space import Freedom
 from hysim.records import Record, several
 
@@ -107,7 +107,8 @@ def identify(
     >>> round(fit.estimates["beta"], 6), round(fit.estimates["gain"], 6)
     (0.7, 2.0)
     """
-    records, options = several(record_or_records, "identify"), _freedom(fixed or {}, free, bounds or {})
+    given = model_or_class.as_records(record_or_records) if isinstance(model_or_class, Recorded) else record_or_records
+    records, options = several(given, "identify"), _freedom(fixed or {}, free, bounds or {})
     if intervals not in ("linear", "profile", "bootstrap"):
         raise ValueError(f'intervals must be "linear", "profile" or "bootstrap", got {intervals!r}')
     if noise not in ("gaussian", "quantised", "robust"):
@@ -126,7 +127,8 @@ def identify(
             family = _family(model_or_class)
             paths, noisy = quiet_where_better(family, records, options, initial)
             choice = decided(family, paths, options, initial, shares, max_evaluations)
-            fit = _searched(choice.problems, noise, intervals, left_out(cross_validate, records), seed, progress)
+            searched = [in_units_of_noise(each, seed) for each in choice.problems]
+            fit = _searched(searched, noise, intervals, left_out(cross_validate, records), seed, progress)
             fit = replace(fit, message="; ".join(filter(None, (fit.message, choice.sentence, noisy))))
             first, doubts = choice.problems[0], [swapped_columns(records)]
             if is_partial := first.budget is not None and (first.budget.cut or not fit.success):

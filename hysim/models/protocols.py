@@ -229,6 +229,25 @@ class Variant(NamedTuple):
 
 
 @runtime_checkable
+class Recorded(Protocol):
+    """A subject of `identify` with records of its own kind beside `Record`."""
+
+    def as_records(self, records: Any) -> Any:
+        """Such records as records of one output; what is none is returned as it is."""
+
+
+@runtime_checkable
+class Rescalable(Protocol):
+    """A record whose outputs are of several sensors, in units of their noise."""
+
+    def noise(self, residual: FloatArray) -> FloatArray:
+        """Size of this residual (n,) at each sensor, shape (n_sensors,)."""
+
+    def rescaled(self, residual: FloatArray) -> Any:
+        """The record in units of that noise."""
+
+
+@runtime_checkable
 class Undecided(Protocol):
     """A family that leaves to the record what a user does not say; `hysim.identify` decides by the BIC."""
 
@@ -275,6 +294,9 @@ class Staged(Protocol):
 
     def rough(self) -> Identifiable:
         """A subject with the same search box and nearly the same outputs, cheaper to compute."""
+
+    def close(self) -> Identifiable:
+        """A subject with the same search box and the same outputs to what a search can tell, cheaper to compute."""
 
 
 @runtime_checkable

@@ -8,6 +8,7 @@ the influence. The input is linear between the samples. How it is integrated: `h
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
@@ -18,7 +19,7 @@ from scipy.linalg import LinAlgError, cholesky, eigh
 from hysim._frozen import FloatArray, check_choice, check_whole, read_only
 from hysim._parallel import in_pieces
 from hysim.errors import SimulationError
-from hysim.kernels.structures.path import LEAST_DRIFT, Elements, Motion, Plant, Tracks, follow
+from hysim.kernels.structures.path import Elements, Motion, Plant, Tracks, follow
 from hysim.models.model import family
 from hysim.models.protocols import positive_time
 from hysim.plants.structures import assembly
@@ -26,11 +27,15 @@ from hysim.plants.structures.damping import ModalDamping, Rayleigh
 from hysim.plants.structures.element import Element, parted
 from hysim.plants.structures.ensemble import Reduction, responses
 from hysim.plants.structures.parameters import assembled, scalars_of
+from hysim.plants.structures.records import OF_ELEMENTS, OF_NODES
+from hysim.plants.structures.search import SearchedStructure
 from hysim.plants.structures.static import Frame, StaticResponse, pushed, strokes
 
-_OUTPUTS = ("displacement", "velocity", "acceleration", "drift", "force")
+_OUTPUTS = (*OF_NODES, *OF_ELEMENTS)
 _LOOSEST = 1e-3  # tolerance
-_WRONG = 0.05  # share of the largest drift by which that of a step may be uncertain
+
+
+_IMBALANCE = 0.05  # share of the largest work that may be missing
 
 
 class StructureState(NamedTuple):
@@ -42,7 +47,7 @@ class StructureState(NamedTuple):
 
 
 @family
-class Structure:
+class Structure(SearchedStructure):
     """Masses on linear and hysteretic elements, under a moving base or a force.
 
     ``M x'' + C x' + K x + sum b f(b . x) = -M r a(t)`` or ``= r u(t)``.
@@ -207,10 +212,9 @@ class Structure:
     @cached_property
     def matrices(self) -> assembly.Matrices:
         """The linear part, as one row."""
-        parts = (self.mass_matrix, self.damping_matrix, self.initial_stiffness)
-        return assembly.Matrices(
-            *(part[np.newaxis] for part in parts), self.drift_matrix, self.force_directions[np.newaxis]
-        )
+        parts = (self.mass_matrix, self.damping_matrix, self.initial_stiffness, self.force_directions)
+        mass, damping, stiffness, directions = (part[np.newaxis] for part in parts)
+        return assembly.Matrices(mass, damping, stiffness, self.drift_matrix, directions)
 
     @cached_property
     def kernel_elements(self) -> Elements:
@@ -253,6 +257,21 @@ class Structure:
         """
         structure: Structure = assembled(self, parameters)
         return structure
+
+    def with_substeps(self, substeps: int | None) -> "Structure":
+        return replace(self, substeps=substeps)
+
+    @property
+    def fastest_rate(self) -> float:
+        return float(assembly.linear_parts(self.matrices)[2][0])
+
+    @property
+    def widths(self) -> dict[str, int]:
+        return {name: self._column_count(name) for name in _OUTPUTS}
+
+    @property
+    def sensor(self) -> tuple[str, int]:
+        return self.place_of(self.output)
 
     # ------------------------------------------------------------------------------ small motions
 
@@ -541,17 +560,16 @@ class Structure:
         with np.errstate(all="ignore"):
             lost = in_pieces(run, n)
         if lost >= 0:
-            raise SimulationError(f"the motion diverges at t = {lost * sample_time:g}")
+            hint = "; if it should not, use more substeps, or substeps=None" if self.substeps else ""
+            raise SimulationError(f"the motion diverges at t = {lost * sample_time:g}{hint}")
         self.check_resolved(motion)
         return StructureState(motion, before.started or n > 0, before.stored), tracks
 
     def check_resolved(self, motion: Motion) -> None:
         """Refuse a motion with steps whose sweeps do not agree, which could not be divided further."""
-        n = len(self.elements)
-        sizes = np.maximum(motion.peaks[:n], LEAST_DRIFT * motion.peaks[:n].max(initial=0.0))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            apart = float(np.nan_to_num(motion.carry[4] / sizes, nan=0.0, posinf=np.inf).max(initial=0.0))
-        if not apart <= _WRONG:
+        errors, peaks = motion.carry[4][np.newaxis], motion.peaks[np.newaxis, : len(self.elements)]
+        apart = float(assembly.uncertainty(errors, peaks)[0])
+        if not apart <= assembly.LEAST_CERTAIN:
             raise SimulationError(
                 f"the motion is not resolved: the drift of a step is uncertain by {apart:.2g} of the largest one; "
                 + ("use more substeps, or substeps=None" if self.substeps else "use a smaller sample_time")
@@ -597,6 +615,12 @@ class Structure:
             "dissipated": work - returned,
             "imbalance": imbalance,
         }
+        largest = float(np.abs(tracks.work).max(initial=0.0))
+        if (wrong := float(np.abs(imbalance).max(initial=0.0))) > _IMBALANCE * largest:
+            raise SimulationError(
+                f"the motion is not resolved: {wrong / largest:.2g} of the energy is missing; "
+                + ("use more substeps, or substeps=None" if self.substeps else "use a smaller tolerance")
+            )
         name, place = self.place_of(self.output)
         arrays = {"y": signals[name][:, place], **signals}
         return {each: np.ascontiguousarray(values) for each, values in arrays.items()}
@@ -612,10 +636,13 @@ class Structure:
         outer = u[:, np.newaxis] * self.force_directions if self.excitation == "force" else 0.0
         return np.asarray(np.linalg.solve(self.mass_matrix, (outer - inner).T).T)
 
+    def _column_count(self, signal: str) -> int:
+        return len(self.elements) if signal in OF_ELEMENTS else self.n_nodes
+
     def place_of(self, output: str) -> tuple[str, int]:
         """Name and column of an output; ValueError if there is none of this name."""
         name, _, place = output.partition(".")
-        first, count = (0, len(self.elements)) if name in ("drift", "force") else (1, self.n_nodes)
+        first, count = int(name not in OF_ELEMENTS), self._column_count(name)
         if name not in _OUTPUTS or not (place.isdecimal() or not place):
             raise ValueError(f'output must be a name such as "displacement" or "drift.0", got {output!r}')
         column = int(place) - first if place else count - 1

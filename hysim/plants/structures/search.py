@@ -1,0 +1,250 @@
+"""The search for the parameters of a structure, on which `hysim.identify` calls.
+
+Positive numbers are searched on a log scale from a tenth of their start to ten times it, others between plus and minus
+ten times it. Outputs have no derivatives by them: `hysim.identify` takes finite differences of simulations, which have
+equal substeps throughout so that the outputs are smooth: as many as turn the phase of the fastest mode at the start by
+at most 0.8 rad each, whose error is about 1e-5 of the largest acceleration.
+
+Where the periods of the start are wrong, the calculated motion is soon out of step with the measured one, and the sum
+of squares of a whole earthquake has many minima. The search therefore begins with the first motions, which are small
+and nearly elastic and determine stiffness, and goes on to longer and longer parts of the record; what a part does not
+determine is kept near its start.
+"""
+
+import math
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim._parallel import in_chunks
+from hysim.errors import SimulationError
+from hysim.models.parameters import Coordinate, free_coordinate, space_of
+from hysim.models.protocols import Identifiable
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.plants.structures.parameters import expanded, is_shared, sharing, unknown
+from hysim.plants.structures.records import OF_NODES, SensorRecord, StructureRecord, laid
+from hysim.records import Record
+
+_DECADE = 10.0
+_PHASE = 0.8  # of the fastest mode in a substep [rad]
+_PARTS = (0.01, 0.05, 0.2, 0.5)  # of the integral of the squared input
+_FEWEST = 30  # samples of a part
+_STEPS = 12  # for each part
+_NEAR = 0.7  # in units of the start: how far from its start a number is expected to be
+_MISFIT = 0.05  # of the rms of a part of the record: an error like that is worth one such distance
+_DIFFERENCE = 1e-5  # of a coordinate
+_INSIDE = 1e-9  # coordinates: a descent begins inside the box
+
+
+class SearchedStructure(Identifiable):
+    """Base class of a structure whose named numbers `hysim.identify` searches, beginning with its own."""
+
+    substeps: int | None
+
+    @property
+    @abstractmethod
+    def scalars(self) -> dict[str, float]:
+        """Every number by name."""
+
+    @property
+    @abstractmethod
+    def widths(self) -> dict[str, int]:
+        """Number of columns of each signal."""
+
+    @property
+    @abstractmethod
+    def sensor(self) -> tuple[str, int]:
+        """Signal and column of the output y."""
+
+    @property
+    @abstractmethod
+    def fastest_rate(self) -> float:
+        """Rate of the fastest mode at the start [rad/s]."""
+
+    @abstractmethod
+    def with_substeps(self, substeps: int) -> Any:
+        """The structure with other substeps."""
+
+    @classmethod
+    def candidates(cls) -> dict[str, Any]:
+        """None for `hysim.compare`: a structure begins with its own numbers."""
+        return {}
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """The box around the numbers that are free, and where parts of the record say to begin.
+
+        Raises ValueError if no number is free, a name is unknown, the record has no time, or a number that is zero at
+        the start has no bounds.
+        """
+        if freedom.initial not in (None, "rest"):
+            raise ValueError("a structure begins with its initial_state: leave initial out")
+        if np.ptp(record.u) == 0.0:
+            raise ValueError("the input is constant: nothing can be identified from it")
+        if not freedom.free:
+            raise ValueError(f"say which numbers of the structure are free: {_examples(self.scalars)}")
+        record.sample_time  # noqa: B018  # raises ValueError if there is none
+        known = self._known(freedom)
+        held = {name: known[name] for name in known if name not in freedom.free} | freedom.held(known)
+        covered = {each for name in freedom.free if is_shared(name) for each in sharing(self.scalars, name)}
+        held = {name: value for name, value in held.items() if name not in covered or name in freedom.fixed}
+        own = {name: value for name, value in known.items() if name in held or name in freedom.free}
+        own |= {name: float(value) for name, value in freedom.fixed.items()}
+        box = [self._coordinate(name, own[name], freedom) for name in freedom.free]
+        order = {name: own[name] for name in (*freedom.free, *held)}
+        space = space_of(box, (), order, held, freedom.limits(order, held), screened=0)
+        return space_of(box, (), order, held, freedom.limits(order, held), [self._begun(record, space)], screened=0)
+
+    def _known(self, freedom: Freedom) -> dict[str, float]:
+        """Every number by name; with the star those that the user names, the means of what they stand for."""
+        scalars: dict[str, float] = self.scalars
+        numbers = expanded(scalars, {name: value for name, value in freedom.fixed.items() if is_shared(name)})
+        known = scalars | numbers
+        for name in (*freedom.free, *freedom.fixed, *freedom.bounds):
+            if is_shared(name):
+                known[name] = float(np.mean([known[each] for each in sharing(scalars, name)]))
+            elif name not in scalars:
+                raise unknown(scalars, name)
+        return known
+
+    def _coordinate(self, name: str, start: float, freedom: Freedom) -> Coordinate:
+        if name in freedom.bounds:
+            return free_coordinate(name, *map(float, freedom.bounds[name]))
+        if start == 0.0:
+            raise ValueError(f"{name!r} is free and begins at zero: give bounds={{{name!r}: (lower, upper)}}")
+        if start > 0.0 and not self._may_be(name, -start):
+            return Coordinate(name, start / _DECADE, start * _DECADE, start, log=True)
+        size = abs(start)
+        return Coordinate(name, -_DECADE * size, _DECADE * size, size)
+
+    def _may_be(self, name: str, value: float) -> bool:
+        """Whether a negative number makes sense."""
+        if name.partition("[")[0].partition(".")[0] in ("mass", "stiffness", "damping"):
+            return False
+        try:
+            self.assemble({name: value})
+        except ValueError:
+            return False
+        return True
+
+    def _begun(self, record: Record, space: SearchSpace) -> dict[str, float]:
+        """Numbers at which the parts of the record, one longer than the other, leave the least error."""
+        from scipy.optimize import least_squares
+
+        start = x = space.starts[0]
+        energy = np.cumsum(_input(record) ** 2)
+        for part in _PARTS:
+            n = max(_FEWEST, int(np.searchsorted(energy, part * energy[-1])) + 1)
+            error = _PartError(self, record, space, start, n)
+            if not np.isfinite(error(x)).all():
+                continue
+            inside = np.clip(x, space.lower + _INSIDE, space.upper - _INSIDE)
+            box = (space.lower, space.upper)
+            x = least_squares(error, inside, error.slopes, bounds=box, ftol=1e-3, xtol=1e-4, max_nfev=_STEPS).x
+        return {name: float(np.ravel(value)[0]) for name, value in space.parameters(x[np.newaxis]).items()}
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """The output itself, shape (n_sets, n_samples, 1), sets on threads; inf for a set that diverges."""
+        u = _input(record)
+        return self._outputs(parameters, record, u.size).reshape(-1, len(record), 1)
+
+    def _outputs(self, parameters: Parameters, record: Record, n: int) -> FloatArray:
+        """Outputs of the sensors at the first `n` samples, (n_sets, n_sensors, n)."""
+        own = self.scalars
+        values = np.broadcast_arrays(*(np.atleast_1d(value) for value in parameters.values()))
+        sets = [dict(zip(parameters, row, strict=True)) for row in np.stack(values, axis=1).tolist()]
+        sensors, scales = _sensors(record)
+        outputs = np.full((len(sets), len(sensors), n), np.inf)
+        u, sample_time, substeps = _input(record)[:n], record.sample_time, self.search_substeps(record.sample_time)
+
+        def simulate(begin: int, end: int) -> None:
+            for k in range(begin, end):
+                others = {name: value for name, value in sets[k].items() if own.get(name) != value}
+                try:
+                    signals = self.assemble(others).with_substeps(substeps).signals(u, sample_time)
+                except (SimulationError, ValueError):  # a motion that diverges, or numbers that are no structure
+                    continue
+                for row, (name, column), scale in zip(outputs[k], sensors, scales, strict=True):
+                    row[:] = signals[name] if name == "y" else signals[name][:, column]
+                    row /= scale
+
+        in_chunks(simulate, len(sets), minimum=1)
+        return outputs
+
+    def search_substeps(self, sample_time: float) -> int:
+        """Substeps of the simulations of a search."""
+        if self.substeps is not None:
+            return self.substeps
+        return max(1, math.ceil(sample_time * self.fastest_rate / _PHASE))
+
+    def as_records(self, records: Any) -> Any:
+        """Records of several sensors as such of one output; what is none is returned as it is.
+
+        Raises ValueError if a record has not the columns of this structure.
+        """
+        several = [records] if isinstance(records, Record | StructureRecord) else records
+        if not isinstance(several, Sequence) or not any(isinstance(each, StructureRecord) for each in several):
+            return records
+        return [
+            laid(each, self.widths, self.sensor) if isinstance(each, Record | StructureRecord) else each
+            for each in several
+        ]
+
+    def notes(self, record: Record, model: Any) -> tuple[str, ...]:
+        """The noise of each sensor of the first record, and the steps of the search."""
+        n = self.search_substeps(record.sample_time)
+        steps = (f"the search simulates with {n} equal step{'' if n == 1 else 's'} a sample",)
+        if not isinstance(record, SensorRecord):
+            return steps
+        sensors, scales = _sensors(record)
+        names = (_in_words(name, column) for name, column in sensors)
+        levels = ", ".join(f"{scale:.2g} of {name}" for name, scale in zip(names, scales, strict=True))
+        return (f"residuals are in units of the noise of each sensor, {levels}", *steps)
+
+
+class _PartError:
+    """Error on the first samples of a record, and distances from the start."""
+
+    def __init__(
+        self, structure: SearchedStructure, record: Record, space: SearchSpace, start: FloatArray, n: int
+    ) -> None:
+        self.structure, self.record, self.space, self.start, self.n = structure, record, space, start, n
+        n_sensors = len(_sensors(record)[0])
+        self.measured = record.y.reshape(n_sensors, -1)[:, :n]
+        self.unit = _MISFIT * float(np.sqrt(np.mean(self.measured**2) * self.measured.size)) or 1.0
+
+    def errors(self, x: FloatArray) -> FloatArray:
+        """Errors (n_sets, n_errors) at points (n_sets, n_x)."""
+        outputs = self.structure._outputs(self.space.parameters(x), self.record, self.n)
+        misfit = (outputs - self.measured).reshape(len(x), -1) / self.unit
+        return np.concatenate([np.nan_to_num(misfit, posinf=1e6, neginf=-1e6), (x - self.start) / _NEAR], axis=1)
+
+    def __call__(self, x: FloatArray) -> FloatArray:
+        return np.asarray(self.errors(x[np.newaxis])[0])
+
+    def slopes(self, x: FloatArray) -> FloatArray:
+        """Slopes (n_errors, n_x) at one point (n_x,), by one-sided differences."""
+        steps = np.where(x + _DIFFERENCE > self.space.upper, -_DIFFERENCE, _DIFFERENCE)
+        errors = self.errors(np.concatenate([x[np.newaxis], x + np.diag(steps)]))
+        return np.asarray(((errors[1:] - errors[0]) / steps[:, np.newaxis]).T)
+
+
+def _input(record: Record) -> FloatArray:
+    return record.input if isinstance(record, SensorRecord) else record.u
+
+
+def _sensors(record: Record) -> tuple[tuple[tuple[str, int], ...], tuple[float, ...]]:
+    if isinstance(record, SensorRecord):
+        return tuple(record.sensors), record.scales
+    return (("y", 0),), (1.0,)
+
+
+def _in_words(name: str, column: int) -> str:
+    return f"{name}.{column + (name in OF_NODES)}"
+
+
+def _examples(scalars: Mapping[str, float]) -> str:
+    names = ["damping", *(name for name in scalars if name.startswith("elements."))][:3]
+    return f"free=[{', '.join(repr(name) for name in names)}, ...], names as in Structure.scalars"
