@@ -56,10 +56,10 @@ def test_energies_balance_and_tolerances_agree(name):
     run, loose, tight = (hs.simulate(replace(frame, tolerance=tol), T, QUAKE) for tol in (1e-8, 1e-7, 1e-10))
     imbalance = np.abs(run.signals["imbalance"]).max() / run.signals["input_work"].max()
     assert imbalance < BALANCE.get(name, 1e-8)
-    assert off(loose, tight) < (1e-6 if name in SMOOTH else 5e-4)
-    assert off(run, tight) < (1e-7 if name in SMOOTH else 2e-4)
+    assert off(loose, tight) < (1e-6 if name in SMOOTH else 2e-5)
+    assert off(run, tight) < (1e-7 if name in SMOOTH else 2e-5)
     fixed = hs.simulate(replace(frame, substeps=16), T, QUAKE)
-    assert off(fixed, tight) < (1e-7 if name in SMOOTH else 5e-4)
+    assert off(fixed, tight) < (1e-7 if name in SMOOTH else 3e-6)
 
 
 @pytest.mark.parametrize("name", NAMES)
