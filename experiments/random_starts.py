@@ -2,6 +2,7 @@
 
 The law that it calls is hysim's own, compiled and exact, and the record is scaled for it, the input to a largest value
 of 1. What it does not know is where to begin: its starts are drawn in a box, positive parameters by their logarithm.
+Its seconds are those of the processor, so that other work on the machine takes no starts from it.
 """
 
 import contextlib
@@ -69,29 +70,46 @@ class Peer(NamedTuple):
         """Whether each parameter is searched by its logarithm, shape (n_parameters,)."""
         return np.array([pair[0] > 0.0 for pair in self.box.values()])
 
-    def from_law(self) -> float:
-        """Sum of squares at the end of a descent from the law's own parameters."""
-        own = np.array([self.law.scalars[name] for name in self.box])
-        return self.descend(np.where(self.logs, np.log(np.where(self.logs, own, 1.0)), own))
+    @property
+    def own(self) -> FloatArray:
+        """The law's own values, shape (n_parameters,)."""
+        return np.array([self.law.scalars[name] for name in self.box])
+
+    def from_law(self, seconds: float = np.inf) -> float:
+        """Least sum of squares of a descent from the law's own parameters, to its end or until the time is over.
+
+        One that is searched by its logarithm and is zero in the law begins at its box's lower end.
+        """
+        own, lowest = self.own, np.array([pair[0] for pair in self.box.values()])
+        sizes = np.where(self.logs & (own != 0.0), np.abs(own), np.where(self.logs, lowest, 1.0))
+        x, signs = np.where(self.logs, np.log(sizes), own), np.where(own < 0.0, -1.0, 1.0)
+        return self.descend(x, signs, until=time.process_time() + seconds)
 
     def from_random_starts(self, rng: np.random.Generator, seconds: float) -> Descents:
-        """The best of `N_STARTS` descents, or of as many as `seconds` are enough for; the last one may be cut off."""
-        begin, best, n = time.perf_counter(), np.inf, 0
-        while n < N_STARTS and time.perf_counter() - begin < seconds:
-            best = min(best, self.descend(rng.uniform(*self.ends), until=begin + seconds))
-            n += 1
-        return Descents(best, n, time.perf_counter() - begin)
+        """The best of `N_STARTS` descents, or of as many as `seconds` are enough for; the last one may be cut off.
 
-    def descend(self, x: FloatArray, until: float = np.inf) -> float:
-        """Least sum of squares of all that a descent tried, to its end or until the time is over."""
+        Where a parameter that is searched by its logarithm is negative in the law, every other descent has its sign.
+        """
+        begin, best, n = time.process_time(), np.inf, 0
+        while n < N_STARTS and time.process_time() - begin < seconds:
+            signs = np.where((self.own < 0.0) & (n % 2 == 0), -1.0, 1.0)
+            best = min(best, self.descend(rng.uniform(*self.ends), signs, until=begin + seconds))
+            n += 1
+        return Descents(best, n, time.process_time() - begin)
+
+    def descend(self, x: FloatArray, signs: FloatArray, until: float = np.inf) -> float:
+        """Least sum of squares of all that a descent tried, to its end or until the time is over.
+
+        `signs` are those of the parameters that are searched by the logarithm.
+        """
         lower, upper = self.ends
         best, known = np.inf, self.law.scalars
 
         def residual(x: FloatArray) -> FloatArray:
             nonlocal best
-            if time.perf_counter() > until:
+            if time.process_time() > until:
                 raise TimeoutError
-            values = np.where(self.logs, np.exp(np.where(self.logs, x, 0.0)), x)
+            values = np.where(self.logs, signs * np.exp(np.where(self.logs, x, 0.0)), x)
             try:
                 law = self.law.assemble({**known, **dict(zip(self.box, values.tolist(), strict=True))})
                 difference = law.response(self.u) - self.y

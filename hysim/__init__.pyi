@@ -49,6 +49,7 @@ from hysim.sweeps import sweep as sweep
 from hysim.sweeps import Sweep as Sweep
 from hysim.sweeps import Sample as Sample
 from hysim.sweeps import response_task as response_task
+from hysim.sweeps import structure_task as structure_task
 from hysim.sweeps import load_sweep as load_sweep
 from hysim.sweeps import sobol_indices as sobol_indices
 from hysim.sweeps import SobolIndices as SobolIndices
@@ -90,6 +91,7 @@ from hysim.plants.structures.element import Element as Element
 from hysim.plants.structures.damping import Rayleigh as Rayleigh
 from hysim.plants.structures.damping import ModalDamping as ModalDamping
 from hysim.plants.structures.frames import shear_frame as shear_frame
+from hysim.plants.structures.static import StaticResponse as StaticResponse
 from hysim.plants.transfer_function import TransferFunction as TransferFunction
 from hysim.plants.state_space import StateSpace as StateSpace
 from hysim.plants.modes import Modes as Modes

@@ -154,6 +154,8 @@ def _coercions(cls: type, finite: bool) -> dict[str, Callable[[Any, str], Any]]:
 
 
 def _as_float(value: Any, name: str, *, finite: bool) -> float:
+    if type(value) is float and math.isfinite(value):  # nearly every one; the checks take most of the time of a law
+        return value
     if isinstance(value, (str, bytes, bool, list, tuple, Mapping)) or np.ndim(value) != 0:
         raise TypeError(f"{name} must be a number, got {value!r}")
     if np.ma.is_masked(value):

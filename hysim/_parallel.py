@@ -245,13 +245,14 @@ def second_process() -> Iterator[Executor]:
 def processes(number: int, begin: Callable[..., None], *arguments: Any) -> Iterator[Executor]:
     """Processes that end with the block, at once if it fails, and with this process in whatever way it ends.
 
-    Each calls `begin` first. On Linux they are forked, so that the arguments need not be pickled.
+    Each calls `begin` first. On Linux they are forked, so that the arguments need not be pickled; BLAS then uses one
+    thread in each.
     """
     before = {*multiprocessing.active_children()}
     context = multiprocessing.get_context("fork" if sys.platform.startswith("linux") else None)
     pool = ProcessPoolExecutor(number, context, _begin, (begin, arguments))
     try:
-        with _without_signals():
+        with _one_blas_thread_if_loaded(), _without_signals():
             pool.submit(_do_nothing)  # which starts the processes, where they are forked
         yield pool
     except BaseException:
@@ -264,6 +265,22 @@ def processes(number: int, begin: Callable[..., None], *arguments: Any) -> Itera
 
 def _do_nothing() -> None:
     pass
+
+
+@contextmanager
+def _one_blas_thread_if_loaded() -> Iterator[None]:
+    """Let processes that are forked here have one thread of BLAS for good, if there is a BLAS to limit.
+
+    A forked OpenBLAS would start its threads anew when their number is set, and they wait busily at first: in each
+    process this takes as long as a short task. To load a BLAS for this would take longer.
+    """
+    if "scipy.linalg" not in sys.modules:
+        yield
+        return
+    from hysim._blas import one_blas_thread
+
+    with one_blas_thread():
+        yield
 
 
 @contextmanager

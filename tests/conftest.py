@@ -14,7 +14,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 
 # numba's cache does not see an edit in another file: it is kept apart for each state of the kernels.
-kernels = b"".join(path.read_bytes() for path in sorted((ROOT / "hysim" / "kernels").glob("*.py")))
+kernels = b"".join(path.read_bytes() for path in sorted((ROOT / "hysim" / "kernels").rglob("*.py")))
 os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".numba_cache" / hashlib.sha256(kernels).hexdigest()[:16]))
 os.environ.setdefault("MPLBACKEND", "agg")
 # Workers of the tests share the cores: threads of a BLAS that wait for each other would take most of the time.

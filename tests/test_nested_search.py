@@ -1,5 +1,6 @@
 """A larger family never fits worse than a family that it contains, and says what its stages are good for."""
 
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -152,6 +153,34 @@ def test_amended_slopes_of_the_rough_law_lead_as_low_as_slopes_of_the_law():
     by_law = worn.costs(_descended(worn, starts, exact=True).theta[:, : worn.n_x])
     by_rough = [each.cost for each in polish(worn, starts)]
     assert min(by_rough) <= by_law.min() * (1.0 + ROUNDING)
+
+
+def test_a_polish_takes_the_law_itself_only_for_the_costs_of_its_ends(monkeypatch):
+    _, worn, *_ = problems(hs.BoucWenBaberNoori(), [RECORDS["pinching"]], Freedom(), None)
+    starts = worn.begun(np.array([[0.3, 0.2, np.log(1.2), 0.4], [0.8, -0.3, 0.0, 0.0]])[:, : worn.simpler.n_x])
+    pack, taken = hs.BoucWenBaberNoori.pack.__func__, Counter()
+
+    def counted(cls, tables):
+        taken[cls.__name__] += len(tables["n"])
+        return pack(cls, tables)
+
+    monkeypatch.setattr(hs.BoucWenBaberNoori, "pack", classmethod(counted))
+    assert len(polish(worn, starts)) == len(starts)
+    assert taken["BoucWenBaberNoori"] == len(starts)
+    assert min(taken["_CloseBaberNoori"], taken["_RoughBaberNoori"]) > 10 * len(starts)
+
+
+def test_the_close_law_of_a_search_has_the_output_of_the_law():
+    u = RECORDS["pinching"].u
+    for own in ({"delta_nu": 0.02, "delta_eta": 0.05, "delta_a": 0.01}, {"zeta_s": 0.9, "q": 0.2, "psi": 0.01}):
+        for n in (0.5, 1.0, 2.0, 1.4):
+            law = hs.BoucWenBaberNoori(beta=0.4, gamma=0.3, n=n, **own)
+            y = law.response(u)
+            # series that leave out 1e-9 of the memory, some hundreds of times
+            assert 0.0 < np.abs(law.close().response(u) - y).max() <= 1e-7 * np.ptp(y)
+    held = next(iter(hs.BoucWenBaberNoori.candidates().values()))
+    assert held.close().close() == held.close() != held
+    assert hs.BoucWen().close() == hs.BoucWen()
 
 
 def test_the_rough_law_of_a_search_is_near_the_law():

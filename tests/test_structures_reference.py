@@ -22,14 +22,14 @@ import structure_cases as cases
 from square_dahl import SquareDahl
 from structure_reference import reference
 
-YIELDING = 2.0 * cases.yielding_frame().ground[200:350]
+YIELDING = 2.0 * cases.yielding_frame().ground[210:310]
 CASES = {  # strong parts of the earthquakes
-    "one mass": lambda: cases.one_mass().window(150, 300),
-    "three storeys, n = 2": lambda: cases.three_storeys().window(200, 350),
-    "three storeys, n = 1": lambda: cases.three_storeys(1.0).window(200, 350),
-    "bilinear": lambda: replace(cases.yielding_frame().window(200, 350), ground=YIELDING),
-    "pinching": lambda: cases.pinching().window(200, 350),
-    "twenty storeys": lambda: cases.isolated_tower().window(300, 400),
+    "one mass": lambda: cases.one_mass().window(150, 250),
+    "three storeys, n = 2": lambda: cases.three_storeys().window(210, 310),
+    "three storeys, n = 1": lambda: cases.three_storeys(1.0).window(210, 310),
+    "bilinear": lambda: replace(cases.yielding_frame().window(210, 310), ground=YIELDING),
+    "pinching": lambda: cases.pinching().window(210, 310),
+    "twenty storeys": lambda: cases.isolated_tower().window(330, 380),
 }
 
 
@@ -95,17 +95,15 @@ def test_the_energies_of_the_reference_balance(name):
 # ---------------------------------------------------------------------------------- structures
 
 
-FINEST = {  # errors of the drifts with 8 substeps, of the largest drift: four times what was measured
-    "one mass": 1e-9,
-    "three storeys, n = 2": 1e-9,
-    "three storeys, n = 1": 1e-7,
-    "bilinear": 4e-5,
-    "pinching": 1e-9,
-    "twenty storeys": 4e-6,
+FINEST = {  # errors with 8 substeps, of the largest value: five times what was measured
+    "one mass": 5e-10,
+    "three storeys, n = 2": 5e-10,
+    "three storeys, n = 1": 2e-9,
+    "bilinear": 2e-8,
+    "pinching": 5e-10,
+    "twenty storeys": 4e-9,
 }
-
-
-PEAKS = dict.fromkeys(CASES, 1e-06)
+PEAK = 2e-7  # of a continuous peak drift by default; 1e-6 is what it is for, 4e-8 was measured
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -114,8 +112,8 @@ def test_a_structure_follows_its_differential_equations(name):
     signals = made.structure(substeps=8).signals(made.ground, made.sample_time)
     assert largest(signals["drift"] - exact.drift) < FINEST[name] * largest(exact.drift)
     assert largest(signals["displacement"] - exact.displacement) < FINEST[name] * largest(exact.displacement)
-    assert largest(signals["force"] - exact.force) < 10.0 * FINEST[name] * largest(exact.force)
-    assert largest(signals["velocity"] - exact.velocity) < 10.0 * FINEST[name] * largest(exact.velocity)
+    assert largest(signals["force"] - exact.force) < 2.0 * FINEST[name] * largest(exact.force)
+    assert largest(signals["velocity"] - exact.velocity) < 2.0 * FINEST[name] * largest(exact.velocity)
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -123,9 +121,9 @@ def test_peaks_are_those_between_the_samples(name):
     made, exact = case(name)
     signals = made.structure().signals(made.ground, made.sample_time)
     assert (1.0 - np.abs(exact.drift).max(axis=0) / exact.peak_drift).max() > 5e-5  # samples miss them
-    assert largest(signals["peak_drift"][-1] / exact.peak_drift - 1.0) < PEAKS[name]
+    assert largest(signals["peak_drift"][-1] / exact.peak_drift - 1.0) < PEAK
     found = hs.simulate(made.structure(), made.times, made.ground).peaks["drift"]
-    assert largest(found / exact.peak_drift - 1.0) < PEAKS[name]
+    assert largest(found / exact.peak_drift - 1.0) < PEAK
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -134,13 +132,8 @@ def test_energies_are_those_of_the_differential_equations(name):
     signals = made.structure().signals(made.ground, made.sample_time)
     unit = exact.input_work.max()
     for energy in ("input_work", "damping_loss", "element_work"):
-        assert largest(signals[energy] - vars_of(exact, energy)) < 1e-6 * unit, energy
+        assert largest(signals[energy] - exact._asdict()[energy]) < 1e-7 * unit, energy
     assert largest(signals["imbalance"]) < 1e-8 * unit
-
-
-def vars_of(exact, name):
-    """A field of the reference by its name."""
-    return exact._asdict()[name]
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8])
@@ -149,7 +142,7 @@ def test_the_tolerance_is_that_of_the_drifts(name, tolerance):
     made, exact = case(name)
     signals = made.structure(tolerance=tolerance).signals(made.ground, made.sample_time)
     # errors of the steps add up; an estimate that sees nothing would miss this by a factor of thousands
-    assert largest(signals["drift"] - exact.drift) < 30.0 * tolerance * largest(exact.drift)
+    assert largest(signals["drift"] - exact.drift) < 20.0 * tolerance * largest(exact.drift)
 
 
 # ---------------------------------------------------------------------------------- order of accuracy
@@ -177,9 +170,11 @@ def test_the_order_on_a_smooth_branch():
 
 @pytest.mark.parametrize("name", ["one mass", "three storeys, n = 2", "pinching"])
 def test_the_order_across_reversals(name):
-    made, exact = case(name)
-    counts = (1, 2, 4, 8)
-    assert order(errors(made, exact, counts), counts) > 3.5
+    """With samples four times as long; with short ones the division of moments hides the order below 1e-8."""
+    made, _ = case(name)
+    slower = replace(made, ground=made.ground[::4], sample_time=4.0 * made.sample_time)
+    exact, counts = slower.reference(), (1, 2, 4)
+    assert order(errors(slower, exact, counts), counts) > 3.8
 
 
 # ---------------------------------------------------------------------------------- laws without an equation

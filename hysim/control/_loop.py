@@ -1,4 +1,4 @@
-"""The verb `close_loop`: a sampled controller around a continuous actuator."""
+"""The verb `close_loop`: a sampled controller around a continuous actuator, or around a structure."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -18,6 +18,8 @@ from hysim.models.protocols import CompiledController, Remembering, Responding
 from hysim.plants.actuator import Actuator
 from hysim.plants.actuator import as_actuator as as_actuator
 from hysim.plants.chain import Signals
+from hysim.plants.structures.controlled import Controlled, ControlledStructure
+from hysim.plants.structures.structure import Structure
 from hysim.records import even_step
 
 
@@ -47,6 +49,9 @@ class ClosedLoop:
         noise).
     units : mapping
         Labels of the units of ``"t"``, ``"u"`` and ``"y"``.
+    signals : mapping
+        Signals of a structure, just before each new command, by the names of `Structure.signals`; empty for others. Of
+        a structure u is the force, and conditions and z of stages that it has not are zero or None.
     """
 
     t: FloatArray
@@ -60,6 +65,7 @@ class ClosedLoop:
     measurement: FloatArray
     conditions: Mapping[str, Any] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
+    signals: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def __str__(self) -> str:
         t, u, y = (self.units.get(signal, unit) for signal, unit in (("t", "s"), ("u", ""), ("y", "")))
@@ -90,10 +96,11 @@ def close_loop(
     *,
     u0: float = 0.0,
     substeps: int | None = None,
+    ground_acceleration: npt.ArrayLike | None = None,
     units: Mapping[str, str] | None = None,
     progress: Progress | None = None,
 ) -> ClosedLoop:
-    """Run a sampled controller around an actuator.
+    """Run a sampled controller around an actuator or a structure.
 
     At every sample the controller reads the sensor and sends a command, which is held until the next. The plant
     between the samples is exact; behind an amplifier that takes time it is second order in the sub-step. Model a
@@ -101,8 +108,9 @@ def close_loop(
 
     Parameters
     ----------
-    plant : Actuator, law, linear plant, creep, amplifier, or cascade of laws that ends with a TransferFunction
-        At rest at `u0` before the first sample, creep included.
+    plant : Actuator, law, linear plant, creep, amplifier, cascade of laws that ends with a TransferFunction, Structure
+        At rest at `u0` before the first sample, creep included. A structure with ``excitation="force"`` begins at its
+        initial state; `influence` says where the controller's force acts, `output` what the controller reads.
     controller : PID, TrackingController, InverseFeedforward, or anything with their ``compiled``
         At rest too. With a method ``ahead`` it gets the reference so many samples ahead, and at the end its last value.
     t : array, shape (n,)
@@ -112,7 +120,10 @@ def close_loop(
     u0 : float
         Command before the first sample [unit of u].
     substeps : int, optional
-        Per sample, behind an amplifier that takes time; by default as in `Actuator.response`.
+        Per sample, behind an amplifier that takes time; by default as in `Actuator.response`. A structure has its own.
+    ground_acceleration : array, shape (n,), optional
+        Acceleration of the ground under a structure, linear between the samples; all masses move with the ground
+        [m/s^2].
     units : mapping, optional
         Labels of the units.
     progress : callable, optional
@@ -127,7 +138,8 @@ def close_loop(
     SimulationError
         If the loop diverges; it names the time.
     TypeError, ValueError
-        If the plant is not one, times are uneven, lengths differ, or the plant cannot rest at `u0`.
+        If the plant is not one, times are uneven, lengths differ, the plant cannot rest at `u0`, or options of an
+        actuator are given for a structure, or the other way round.
 
     Examples
     --------
@@ -136,11 +148,32 @@ def close_loop(
     >>> run = hs.close_loop(lag, hs.PID(kp=4.0, ki=4.0), np.arange(0.0, 5.0, 0.01), np.ones(500))
     >>> round(float(run.y[-1]), 3), run.conditions["sample_time"]
     (1.0, 0.01)
+
+    An active damper in an earthquake, which reads the velocity of the floor that it pushes:
+
+    >>> column = hs.BoucWen(beta=15.0, gamma=15.0, feedthrough=20.0, gain=80.0)
+    >>> frame = hs.Structure(
+    ...     mass=1.0, elements=[hs.Element(column, between=(0, 1))], excitation="force", output="velocity"
+    ... )
+    >>> quake = hs.signals.ground_motion(4.0, duration=5.0, sample_time=0.01)
+    >>> still = np.zeros(quake.size)
+    >>> free, damped = (
+    ...     hs.close_loop(frame, hs.PID(kp=kp), 0.01 * np.arange(quake.size), still, ground_acceleration=quake)
+    ...     for kp in (0.0, 5.0)
+    ... )
+    >>> bool(damped.signals["peak_drift"][-1] < 0.7 * free.signals["peak_drift"][-1])
+    True
     """
-    actuator = as_actuator(plant)
     if not is_controller(controller):
         raise TypeError(f"controller must be a PID or the like, got {type(controller).__name__}")
     r, times = read_only(reference, "reference", ndim=1), read_only(t, "t", ndim=1)
+    if isinstance(plant, Structure):
+        if u0 or substeps is not None:
+            raise ValueError("a structure has its own initial_state and substeps: leave out u0 and substeps")
+        return _around_structure(plant, controller, times, r, ground_acceleration, units or {}, progress)
+    actuator = as_actuator(plant)
+    if ground_acceleration is not None:
+        raise ValueError(f"only a Structure stands on the ground, got {type(plant).__name__} and ground_acceleration")
     plant_at_rest = RestingPlant(actuator, sample_time_of(times, r), u0, substeps)
     signals = plant_at_rest.run(controller, r, progress, float(times[0]))
     u = plant_at_rest.voltages(signals)
@@ -184,8 +217,7 @@ class RestingPlant:
     def attempt(self, controller: Controller, reference: FloatArray, progress: Progress | None = None) -> Signals:
         """As `run`; where the loop diverges, the signals name the sample."""
         compiled = CompiledController(*controller.compiled(self.sample_time, self.u0, self.y0))
-        samples = min(preview(controller, self.sample_time), reference.size)
-        ahead = read_only(np.append(reference[samples:], np.full(samples, reference[-1])))
+        ahead = _ahead(controller, self.sample_time, reference)
         return self.chain.run(compiled, self.state, ahead, progress)[0]
 
     def attempt_each(
@@ -210,6 +242,72 @@ class RestingPlant:
 
     def driven(self, u: FloatArray) -> FloatArray:
         return self.chain.driven(u, self.state)[0].y
+
+
+def _ahead(controller: Controller, sample_time: float, reference: FloatArray) -> FloatArray:
+    """The reference as the controller gets it, at the end its last value."""
+    samples = min(preview(controller, sample_time), reference.size)
+    return read_only(np.append(reference[samples:], np.full(samples, reference[-1])))
+
+
+def _around_structure(
+    structure: Structure,
+    controller: Controller,
+    t: FloatArray,
+    reference: FloatArray,
+    ground_acceleration: npt.ArrayLike | None,
+    units: Mapping[str, str],
+    progress: Progress | None,
+) -> ClosedLoop:
+    """The loop around a structure."""
+    sample_time = sample_time_of(t, reference)
+    ground = None if ground_acceleration is None else read_only(ground_acceleration, "ground_acceleration", ndim=1)
+    if ground is not None and ground.size != t.size:
+        raise ValueError(f"ground_acceleration and t must have equal lengths, got {ground.size} and {t.size}")
+    plant = ControlledStructure(structure, sample_time, ground)
+    compiled = CompiledController(*controller.compiled(sample_time, 0.0, plant.y0))
+    run = plant.run(compiled, _ahead(controller, sample_time, reference), progress)
+    if run.lost >= 0:
+        raise SimulationError(f"the loop diverges at t = {t[run.lost]:g}: it is unstable")
+    return ClosedLoop(
+        t=t,
+        reference=reference,
+        error=reference - run.y,
+        command=run.command,
+        drive=run.drive,
+        u=run.drive,
+        z=None,
+        y=run.y,
+        measurement=run.y,
+        conditions=_conditions_of_structure(structure, controller, sample_time, run),
+        units=units,
+        signals={name: values for name, values in run.signals.items() if name != "y"},
+    )
+
+
+def _conditions_of_structure(
+    structure: Structure, controller: Controller, sample_time: float, run: Controlled
+) -> dict[str, Any]:
+    """The conditions of an actuator's loop, those that a structure has not at their value of rest."""
+    return {
+        "plant": structure,
+        "controller": controller,
+        "sample_time": sample_time,
+        "substeps": structure.substeps,
+        "delay": 0.0,
+        "preview": preview(controller, sample_time) * sample_time,
+        "limits": limits_of(controller),
+        "amplifier_limits": None,
+        "sensor_quantum": 0.0,
+        "noise": 0.0,
+        "seed": None,
+        "u0": 0.0,
+        "lowest_u": float(run.drive.min()),
+        "highest_u": float(run.drive.max()),
+        "limited_samples": int(np.count_nonzero(run.drive != run.command)),
+        "voltage_noise_rms": 0.0,
+        "voltage_noise_peak": 0.0,
+    }
 
 
 def sample_time_of(t: FloatArray, reference: FloatArray) -> float:

@@ -27,10 +27,13 @@ from hysim.models.search_space import STATES, STATES_IN_WORDS, Freedom, Paramete
 from hysim.models.stages import BASE, Stage
 from hysim.records import Record
 
-_CHUNK = 200_000  # samples that are evaluated at once, to bound the memory
+# Samples that are evaluated at once: some megabytes of arrays. Of many more, a C library may return the memory to the
+# system after each evaluation, and a new page costs as much as the work in it.
+_CHUNK = 50_000
 _LARGEST = 1e150  # beyond it squares overflow: such a set counts as one that has diverged
 _FEWEST = 2  # samples of a record
 _TURN = 0.01  # of the span: smaller reversals are noise, or change little
+_CLOSE = 1e-8  # accuracy of a close law, at worst
 _DIFFERENCE = 1e-6  # step of a central difference in units of the box: truncation and rounding both ~1e-10
 
 
@@ -61,6 +64,7 @@ class Problem:
     ends: FloatArray | None = None  # (n_sets, n_x), where searches have ended: they are only polished
     settled: Settled | None = None  # rows that may stand for samples, if they are known
     below: Settled | None = None  # rows that do stand for samples, which the parts do not have any more
+    accuracy: float = 0.0  # of the outputs, in units of their size, where the law stands for another
 
     @property
     def n_x(self) -> int:
@@ -176,6 +180,11 @@ class Problem:
         """This problem with nearly the same outputs, cheaper to compute."""
         family = self.family.rough() if isinstance(self.family, Staged) else self.family
         return self if family is self.family else replace(self, family=family)
+
+    def close(self) -> "Problem":
+        """This problem with the same outputs to what a search can tell, cheaper to compute."""
+        family = self.family.close() if isinstance(self.family, Staged) else self.family
+        return self if family is self.family else replace(self, family=family, accuracy=_CLOSE)
 
     def completed(self, x: FloatArray) -> FloatArray:
         """Theta (n_sets, n_theta): the coordinates `x` and the best linear parameters."""

@@ -5,7 +5,7 @@ projected Levenberg-Marquardt steps in one batch. The best distinct optima desce
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -49,6 +49,7 @@ _PASSED = 1e-6  # share of the sum of squares: a step that gains less ends a pas
 _RIVAL = 20.0  # log-likelihood below the best optimum's, from which on an optimum is not within the noise
 _ROUGH = 0.1  # share of the cost by which the rough law's may differ: beyond, it does not say what stays
 BRIEFLY, NEARLY, FULLY = range(3)  # as far as optima of a law with a rough one are polished
+_FAR_FROM_CLOSE = 100.0  # times the accuracy of a close law: a residual of this size is fitted as well by it
 PERFECT = 1e-14  # smallest sigma, in units of the output's size
 
 
@@ -215,12 +216,14 @@ def polish(problem: Problem, starts: FloatArray, to: int = FULLY) -> list[Optimu
     problem = problem.condensed()
     rough = problem.rough()
     if rough is problem or not len(starts):
-        reached = _descended(problem, starts, exact=True)
-    else:
-        gain, steps = (_GAIN, _BRIEF) if to == BRIEFLY else (_PASSED, _PASS)
-        reached = _descended(problem, starts, exact=True, nearly=rough, gain=gain, steps=steps)
-        reached = _amended(problem, rough, reached.theta) if to == FULLY else reached
-    return _optima(problem, reached)
+        return _optima(problem, _descended(problem, starts, exact=True))
+    gain, steps = (_GAIN, _BRIEF) if to == BRIEFLY else (_PASSED, _PASS)
+
+    def ends(law: Problem, x: FloatArray) -> Reached:
+        reached = _descended(law, x, exact=True, nearly=rough, gain=gain, steps=steps)
+        return _amended(law, rough, reached.theta) if to == FULLY else reached
+
+    return _closely(problem, starts, ends)
 
 
 def polish_on(problem: Problem, optima: Sequence[Optimum]) -> list[Optimum]:
@@ -228,8 +231,18 @@ def polish_on(problem: Problem, optima: Sequence[Optimum]) -> list[Optimum]:
     rough = problem.rough()
     if rough is problem or not optima:
         return list(optima)
-    theta = problem.completed(np.array([each.x for each in optima]))
-    return _distinct(_optima(problem, _amended(problem, rough, theta)))
+    starts = np.array([each.x for each in optima])
+    return _distinct(_closely(problem, starts, lambda law, x: _amended(law, rough, law.completed(x))))
+
+
+def _closely(problem: Problem, starts: FloatArray, ends: Callable[[Problem, FloatArray], Reached]) -> list[Optimum]:
+    """The `ends` of a polish on the close law, and on the law itself where it fits as well as the two laws agree."""
+    close = problem.close()
+    found = _optima(problem, ends(close, starts))
+    least = min((each.cost for each in found), default=math.inf)
+    if close is problem or least > problem.y.size * (_FAR_FROM_CLOSE * close.accuracy * problem.scale) ** 2:
+        return found
+    return _optima(problem, ends(problem, np.array([each.x for each in found])))
 
 
 def _optima(problem: Problem, reached: Reached) -> list[Optimum]:
@@ -323,7 +336,7 @@ def _descended(
     gain: float | None = None,
     hopeless: float = np.inf,
 ) -> Reached:
-    noise, everything = Gaussian(floor=PERFECT * problem.scale), np.ones((1, problem.y.size))
+    noise, everything = Gaussian(floor=max(PERFECT, problem.accuracy) * problem.scale), np.ones((1, problem.y.size))
     descent = Descent(problem, noise, problem.y[np.newaxis], everything, not problem.space.bounds, nearly, amended)
     least, most = (_TOLERANCE, N_POLISHING) if exact else (_GAIN, N_STEPS)
     tolerance = 0.5 * problem.y.size * (gain or least)

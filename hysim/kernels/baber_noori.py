@@ -36,8 +36,10 @@ from hysim.kernels.baber_noori_series import (
     N_ROWS,
     PINCH,
     POWER,
+    SCALE,
     SLOPE,
     STRENGTH,
+    TOLERANCE,
     begin,
     expand,
 )
@@ -52,8 +54,7 @@ N_LEAN = _PLAIN + 3  # of a law that needs no charts: one that degrades or pinch
 N_STATE = _PLAIN + N_WORK + 1
 
 MAX_STEPS = 5_000
-_SCALE = EXPONENT + 1  # place of the scales of z and u in the parameters
-_COMMON = _SCALE + 2
+_COMMON = TOLERANCE + 1
 _SMALLEST = 2.0**-1022
 _BEYOND, _BEYOND_POWER = 1e100, 1e200  # a memory, or its power n, that grows from there on has escaped
 _GROWTH = 4.0  # of the length tried, over the last one that served
@@ -67,8 +68,9 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
 
     Its shape is (N_STATE,), or (N_LEAN,) without charts: a law that needs them is then computed by the series, too.
 
-    `parameters` are those of wear and pinching, (A, beta, gamma, n, scale of z, scale of u), and (A, beta, gamma, n,
-    gain, offset, c1, c2, ...). Those before the scales are of the law for z and u times their scales, powers of two;
+    `parameters` are those of wear and pinching, (A, beta, gamma, n, scale of z, scale of u, tolerance), and (A, beta,
+    gamma, n, gain, offset, c1, c2, ...). What a series leaves out is the tolerance beside the memory: a rounding, or
+    more in a search. Those before the scales are of the law for z and u times their scales, powers of two;
     those after them, and the state, are in the user's units.
     """
     common, plain = parameters[_COMMON:], state[_PLAIN : state.size - 1]
@@ -76,7 +78,7 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     if u != last and math.isfinite(z):  # a memory that has diverged remains so
         direction = 1.0 if u > last else -1.0
         series = state[_SERIES:_EXPONENT].reshape((N_ROWS, N_TERMS + 1))
-        of_z, of_u = parameters[_SCALE], parameters[_SCALE + 1]
+        of_z, of_u = parameters[SCALE], parameters[SCALE + 1]
         w, e = advance(direction * z * of_z, e * of_z * of_u, abs(u - last) * of_u, parameters, series)
         state[1], state[2] = direction * w / of_z, e / of_u / of_z
     state[0] = u
@@ -182,8 +184,8 @@ def diverges(w: float, e: float, left: float, parameters: FloatArray, series: Fl
 def nearness(e: float, length: float, parameters: FloatArray, series: FloatArray) -> tuple[float, float, float]:
     """How near to zero w must be to leave out the term with ``|w|^n``, and the order of what w comes to; after `begin`.
 
-    The integral of the term is rounding up to the first distance. w comes to the smaller of the other two: as far as
-    the length goes without the term, and where the term cancels the slope.
+    The integral of the term is within the tolerance up to the first distance. w comes to the smaller of the other two:
+    as far as the length goes without the term, and where the term cancels the slope.
     """
     n, forcing = parameters[EXPONENT], abs(series[SLOPE, 0])
     c = abs(parameters[BETA]) + abs(parameters[GAMMA])
@@ -191,7 +193,7 @@ def nearness(e: float, length: float, parameters: FloatArray, series: FloatArray
     if forcing == 0.0 or factor == 0.0:
         return (0.0 if forcing == 0.0 else math.inf), forcing * length, math.inf
     bent = (forcing / factor) ** (1.0 / n)
-    room = max(_SMALLEST, ROUNDING * min(forcing * length, bent)) * (n + 1.0) * forcing / factor
+    room = max(_SMALLEST, parameters[TOLERANCE] * min(forcing * length, bent)) * (n + 1.0) * forcing / factor
     return float(0.5 * room ** (1.0 / (n + 1.0))), forcing * length, bent
 
 
@@ -226,7 +228,7 @@ def rough_step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     last, z, e = state[0], state[1], state[2]
     if u != last and math.isfinite(z):
         direction = 1.0 if u > last else -1.0
-        of_z, of_u = parameters[_SCALE], parameters[_SCALE + 1]
+        of_z, of_u = parameters[SCALE], parameters[SCALE + 1]
         w, e = rough_advance(direction * z * of_z, e * of_z * of_u, abs(u - last) * of_u, parameters)
         state[1], state[2] = direction * w / of_z, e / of_u / of_z
     state[0] = u

@@ -14,6 +14,8 @@ from hysim.kernels.remainder import FARTHEST, N_TERMS, ROUNDING, fraction
 
 N_OWN = 9  # delta_a, delta_nu, delta_eta, zeta_s, q, p, psi, delta_psi, lambda, before A, beta, gamma and n
 STRENGTH, BETA, GAMMA, EXPONENT = range(N_OWN, N_OWN + 4)
+SCALE = EXPONENT + 1  # place of the scales of z and u
+TOLERANCE = SCALE + 2
 
 # Rows of the series; `reach`, `place` and `zero` look at row 1.
 POWER, MEMORY, ENERGY, _BRACKET, _ROOT, _FADED, _DEPTH, _WIDTH, _X, _SQUARE, _BELL, PINCH, SLOPE = range(13)
@@ -60,7 +62,7 @@ def begin(w: float, e: float, free: bool, parameters: FloatArray, series: FloatA
 def expand(
     w: float, e: float, t: float, free: bool, size: float, parameters: FloatArray, series: FloatArray
 ) -> tuple[int, float]:
-    """Fill the series over a length t until what is left out is rounding beside `size`, or the way that w goes.
+    """Fill the series over a length t until what is left out is within the tolerance of `size`, or the way w goes.
 
     Returns the index of the last term and the fraction of t that the terms serve, 0 where none is known to.
     """
@@ -74,7 +76,7 @@ def expand(
         term = t * series[SLOPE, k - 1] / k
         series[MEMORY, k], series[ENERGY, k] = term, t * series[MEMORY, k - 1] / k
         scale = max(size, abs(term)) if k < 2 else scale
-        if abs(term) <= ROUNDING * scale and k >= tried:
+        if abs(term) <= parameters[TOLERANCE] * scale and k >= tried:
             tried = k + 2
             if ends(k, t, scale, free, pinches, parameters, series):
                 served = clear(k, 1.0, pinches, parameters, series)
@@ -88,9 +90,9 @@ def expand(
 
 @inner
 def ends(k: int, t: float, size: float, free: bool, pinches: bool, parameters: FloatArray, series: FloatArray) -> bool:
-    """Whether the series may end at the term k: whether the terms left out are rounding beside `size`."""
-    room = ROUNDING * size * (k + 1.0)
-    flow = max(abs(series[MEMORY, 1]), ROUNDING * size)
+    """Whether the series may end at the term k: whether the terms left out are within the tolerance of `size`."""
+    room = parameters[TOLERANCE] * size * (k + 1.0)
+    flow = max(abs(series[MEMORY, 1]), parameters[TOLERANCE] * size)
     x, gain, doubling = 2.0, 2.0**k, 2.0**k
     while gain * room < 16.0 * flow and x < LARGEST:
         x, gain = 2.0 * x, doubling * gain
@@ -115,15 +117,15 @@ def serves(t: float, size: float, free: bool, pinches: bool, parameters: FloatAr
         spread = spread_within(N_TERMS, x, _SMOOTH if free else _ALL, pinches, parameters, series)
         share = 0.0
         if spread < math.inf:
-            share = x * reached(spread * t * x, size, abs(series[MEMORY, 1]) * x)
+            share = x * reached(spread * t * x, size, abs(series[MEMORY, 1]) * x, parameters)
         elif not free:
             shorter = x * inside(N_TERMS, x, series)
             smooth = spread_within(N_TERMS, x, _SMOOTH, pinches, parameters, series)
             bend = spread_within(N_TERMS, shorter, _BEND, pinches, parameters, series)
             if smooth < math.inf and bend < math.inf:
                 way = 0.5 * abs(series[MEMORY, 1])
-                share = x * reached(smooth * t * x, 0.5 * size, way * x)
-                share = min(share, shorter * reached(bend * t * shorter, 0.5 * size, way * shorter))
+                share = x * reached(smooth * t * x, 0.5 * size, way * x, parameters)
+                share = min(share, shorter * reached(bend * t * shorter, 0.5 * size, way * shorter, parameters))
         if share >= 1.0:
             return 1.0
         if share < best:
@@ -134,16 +136,17 @@ def serves(t: float, size: float, free: bool, pinches: bool, parameters: FloatAr
 
 
 @inner
-def reached(spread: float, size: float, way: float) -> float:
+def reached(spread: float, size: float, way: float, parameters: FloatArray) -> float:
     """As `fraction`, beside `size` or beside the part of `way` that the memory goes in this fraction.
 
     The way of a whole step that only serves in part is no measure: no memory comes there.
     """
-    room = ROUNDING * way * (1.0 - FARTHEST) * (N_TERMS + 1.0)
+    tolerance = parameters[TOLERANCE]
+    room = tolerance * way * (1.0 - FARTHEST) * (N_TERMS + 1.0)
     along = FARTHEST
     if room < spread:
         along = min(FARTHEST, (room / spread) ** (1.0 / N_TERMS))
-    return float(max(along, fraction(spread, size)))
+    return float(max(along, fraction(spread * (ROUNDING / tolerance), size)))
 
 
 @inner
@@ -239,7 +242,7 @@ def shifts(re: float, parameters: FloatArray, series: FloatArray) -> tuple[float
 
 @inner
 def clear(last: int, served: float, pinches: bool, parameters: FloatArray, series: FloatArray) -> float:
-    """Fraction of a step, no more than `served`, on which a bell that is left out stays rounding; 0 for none."""
+    """Fraction of a step, no more than `served`, on which a bell left out stays within the tolerance; 0 for none."""
     if pinches or parameters[3] == 0.0 or served == 0.0:
         return served
     for _ in range(_MAX_DISCS):
@@ -248,7 +251,7 @@ def clear(last: int, served: float, pinches: bool, parameters: FloatArray, serie
         apart = abs(series[MEMORY, 0] - series[_ROOT, 0]) - rw - farther
         width = abs(series[_WIDTH, 0]) + wider
         depth = abs(series[_DEPTH, 0]) + deeper
-        if apart > _CLEAR * width and depth * math.exp(-((apart / width) ** 2)) <= ROUNDING:
+        if apart > _CLEAR * width and depth * math.exp(-((apart / width) ** 2)) <= parameters[TOLERANCE]:
             return served
         served *= 0.5
     return 0.0

@@ -40,6 +40,11 @@ class Holding(ByStructure):
         rough = self.structure.rough() if isinstance(self.structure, Staged) else self.structure
         return self if rough is self.structure else replace(self, structure=rough)
 
+    def close(self) -> Identifiable:
+        """The structure's close law, with the same parameters held; itself where there is none."""
+        close = self.structure.close() if isinstance(self.structure, Staged) else self.structure
+        return self if close is self.structure else replace(self, structure=close)
+
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         held = {name: value for name, value in self.values.items() if name not in freedom.free}
         return self.structure.search_space(record, replace(freedom, fixed={**held, **freedom.fixed}))

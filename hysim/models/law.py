@@ -438,6 +438,10 @@ class Law(Composable, ABC):
         """A law with nearly the same output, for the first steps of a search; itself where that is cheap enough."""
         return self
 
+    def close(self) -> "Law":
+        """A law with the same output to what a search can tell, cheaper to compute; itself where there is none."""
+        return self
+
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns in which the output is affine, and the rest of it, shape (n_sets, n_samples, n_columns + 1)."""
         zero = {**parameters, **dict.fromkeys(self.columns, 0.0)}

@@ -295,6 +295,9 @@ class Staged(Protocol):
     def rough(self) -> Identifiable:
         """A subject with the same search box and nearly the same outputs, cheaper to compute."""
 
+    def close(self) -> Identifiable:
+        """A subject with the same search box and the same outputs to what a search can tell, cheaper to compute."""
+
 
 @runtime_checkable
 class LinearStage(Protocol):

@@ -29,7 +29,7 @@ def arguments_of(scalars: Mapping[str, float]) -> dict[str, Any]:
     arguments: dict[str, Any] = {}
     for name, value in scalars.items():
         whole, bracket, _ = name.partition("[")
-        number = float(np.asarray(value).item())
+        number = value if type(value) is float else float(np.asarray(value).item())
         arguments[whole] = (*arguments.get(whole, ()), number) if bracket else number
     return arguments
 

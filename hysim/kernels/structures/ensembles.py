@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import inner, kernel
+from hysim.kernels._compile import inner, kernel, pasted
 from hysim.kernels.structures.flows import N_POWERS, fill_flows
 from hysim.kernels.structures.moments import IntArray
 from hysim.kernels.structures.path import (
@@ -140,25 +140,27 @@ def same(one: FloatArray, two: FloatArray) -> bool:
     return equal
 
 
-@inner
+@pasted
 def fill(
     elements: Elements, A: FloatArray, loads: FloatArray, rate: float, h: float, E: FloatArray, P: FloatArray,
     flows: Flows,
 ) -> None:  # fmt: skip
     """Flows of a structure over a base step and its parts."""
-    fill_flows(A, loads, rate, h, E, P)
     m = A.shape[0]
+    spare, past = np.empty((2, m, m)), np.empty((2, loads.shape[0], N_POWERS, m))
+    fill_flows(A, loads, rate, h, E, P, spare, past)
     n_elements = elements.k0.size
     n_loads = loads.shape[0] - n_elements
     for level in range(E.shape[0]):
-        for i in range(m):
-            flows.free[level, i] = E[level, i]
-        for i in range(n_loads):
-            for j in range(2):
-                flows.free[level, m + 2 * i + j] = P[level, i, j]
-        for e in range(n_elements):
-            for j in range(N_POWERS):
-                flows.rests[level, N_POWERS * e + j] = P[level, n_loads + e, j]
+        for q in range(m):
+            for i in range(m):
+                flows.free[level, i, q] = E[level, i, q]
+            for i in range(n_loads):
+                for j in range(2):
+                    flows.free[level, m + 2 * i + j, q] = P[level, i, j, q]
+            for i in range(n_elements):
+                for j in range(N_POWERS):
+                    flows.rests[level, N_POWERS * i + j, q] = P[level, n_loads + i, j, q]
     project(elements, flows.free, flows.free_drifts)
     project(elements, flows.rests, flows.drifts)
 

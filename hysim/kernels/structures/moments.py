@@ -5,8 +5,8 @@
 s is the share of the step. d(s) is the quintic through the drifts and their rates at the begin, the middle and the end;
 f is the law along it, cut where the drift turns. On each monotone stretch the integrals are those of
 Radau, which begin with the known value, with three nodes or four. Where a law has a kink, these two do not agree, or
-the end of the stretch is not where the four nodes lead; the stretch is then divided until Gauss's rule with three
-nodes agrees with that of the halves.
+the end of the stretch is not where the four nodes lead; the stretch is then divided until Lobatto's rule with four
+nodes agrees with that of the halves: it has nodes at the ends, which a kink beside them moves.
 
 The cubic c0 + c1 s + c2 s^2 + c3 s^3 with the first four moments stands for r; in the first sweep, of three nodes, the
 quadratic. Its work is the integral of r d'.
@@ -39,8 +39,13 @@ _RADAU_4 = np.array(
         [0.9114120404872961, 0.2204622111767684, 1.5775376397741954],
     ]
 )
-_GAUSS_3 = np.array(
-    [[0.1127016653792583, 5.0 / 18.0, 0.0], [0.5, 4.0 / 9.0, 0.0], [0.8872983346207417, 5.0 / 18.0, 0.0]]
+_LOBATTO = np.array(
+    [
+        [0.0, 1.0 / 12.0, 0.0],
+        [0.27639320225002106, 5.0 / 12.0, 0.0],
+        [0.7236067977499789, 5.0 / 12.0, 0.0],
+        [1.0, 1.0 / 12.0, 1.0],
+    ]
 )
 _NARROWEST = 2.0**-26  # share of a step: the smallest part that is divided
 _UNSEEN = 0.05  # share of a stretch behind its last node, halved: a kink there is seen at the end alone
@@ -82,7 +87,7 @@ def turn(low: float, high: float, end: float, path: Path) -> float:
     s = 0.5 * (low + high)
     for _ in range(50):
         value = rate_at(s, path)
-        slope = 2.0 * path[2] + s * (6.0 * path[3] + s * (12.0 * path[4] + s * 20.0 * path[5]))
+        slope = bend_at(s, path)
         low, high = (low, s) if value * end > 0.0 else (s, high)
         target = s - value / slope if slope != 0.0 else -1.0
         if not low < target < high:
@@ -93,7 +98,44 @@ def turn(low: float, high: float, end: float, path: Path) -> float:
     return s
 
 
-@unfolded
+@inlined
+def bend_at(s: float, path: Path) -> float:
+    """Second derivative of the path."""
+    return 2.0 * path[2] + s * (6.0 * path[3] + s * (12.0 * path[4] + s * 20.0 * path[5]))
+
+
+@uncounted
+def dip(low: float, high: float, rate: float, path: Path) -> float:
+    """Place at which the slope, of one sign at both ends, comes nearest to zero between them; `high` if it does not."""
+    if not (rate * bend_at(low, path) < 0.0 and rate * bend_at(high, path) > 0.0):
+        return high
+    begin, end = low, high
+    for _ in range(40):
+        s = 0.5 * (begin + end)
+        begin, end = (s, end) if rate * bend_at(s, path) < 0.0 else (begin, s)
+    return begin if rate * rate_at(begin, path) < 0.0 else high
+
+
+@inlined
+def turns(path: Path, middle: float, last: float) -> tuple[float, float, float, float]:
+    """Places of at most four turns, two in each half, in their order; 1 for none."""
+    one = two = three = four = 1.0
+    if middle * last < 0.0:
+        three = turn(0.5, 1.0, last, path)
+    else:
+        lowest = dip(0.5, 1.0, last, path)
+        if lowest < 1.0:
+            three, four = turn(0.5, lowest, -last, path), turn(lowest, 1.0, last, path)
+    if path[1] * middle < 0.0:
+        return turn(0.0, 0.5, middle, path), three, four, 1.0
+    lowest = dip(0.0, 0.5, middle, path)
+    if lowest < 0.5:
+        one, two = turn(0.0, lowest, -middle, path), turn(lowest, 0.5, middle, path)
+        return one, two, three, four
+    return three, four, 1.0, 1.0
+
+
+@uncounted
 def along(
     step: Step, parameters: FloatArray, state: FloatArray, rule: FloatArray, begin: float, end: float, r: float,
     k0: float, path: Path,
@@ -132,30 +174,30 @@ def together(one: Integrals, two: Integrals) -> Integrals:
 @uncounted
 def divided(
     step: Step, parameters: FloatArray, state: FloatArray, stretches: IntArray, saved: FloatArray, begin: float,
-    end: float, allowed: float, k0: float, path: Path,
+    end: float, r: float, allowed: float, k0: float, path: Path,
 ) -> Integrals:  # fmt: skip
-    """Integrals over a monotone stretch, which is divided until its parts agree."""
+    """Integrals over a monotone stretch that begins with `r`, which is divided until its parts agree."""
     total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     low, length, tried = begin, end - begin, 0
     copy(stretches, state, saved)
-    whole = along(step, parameters, state, _GAUSS_3, low, end, 0.0, k0, path)
+    whole = along(step, parameters, state, _LOBATTO, low, end, r, k0, path)
     while True:
         middle, high = low + 0.5 * length, low + length
         copy(stretches, saved, state)
-        one = along(step, parameters, state, _GAUSS_3, low, middle, 0.0, k0, path)
-        two = along(step, parameters, state, _GAUSS_3, middle, high, 0.0, k0, path)
+        one = along(step, parameters, state, _LOBATTO, low, middle, r, k0, path)
+        two = along(step, parameters, state, _LOBATTO, middle, high, one[6], k0, path)
         tried += 1
         agree = abs(one[0] + two[0] - whole[0]) <= allowed or not math.isfinite(one[0] + two[0])
         if not agree and length > _NARROWEST and tried < _MOST_PARTS:
             length, whole = 0.5 * length, one
             continue
         total = together(total, together(one, two))
-        low = high
+        low, r = high, two[6]
         if not low < end:
             break
         length = min(2.0 * length, end - low)
         copy(stretches, state, saved)
-        whole = along(step, parameters, state, _GAUSS_3, low, low + length, 0.0, k0, path)
+        whole = along(step, parameters, state, _LOBATTO, low, low + length, r, k0, path)
     return total
 
 
@@ -180,19 +222,12 @@ def fit_rest(
     and what the rule may have missed behind its nodes. The m0 before is that of the sweep before. The law's memory is
     at the last node, or at the end, afterwards; before a division it is taken from `saved`.
     """
-    first = second = 1.0
-    if middle * last < 0.0:
-        first = turn(0.5, 1.0, last, path)
-    if path[1] * middle < 0.0:
-        first, second = turn(0.0, 0.5, middle, path), first
+    one, two, three, four = turns(path, middle, last)
     rule = _RADAU_4 if is_fine else _RADAU_3
     total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, k0 * path[0] - f0, 0.0)
-    begin = peak = 0.0
-    missed = 0.0
-    for part in range(3):
-        end = first if part == 0 else second if part == 1 else 1.0
-        if not end > begin:
-            continue
+    begin = peak = missed = 0.0
+    for part in range(5):
+        end = one if part == 0 else two if part == 1 else three if part == 2 else four if part == 3 else 1.0
         total = together(total, along(step, parameters, state, rule, begin, end, total[6], k0, path))
         sums[3], sums[4] = total[6], begin + (end - begin) * rule[rule.shape[0] - 1, 0]
         d = drift_at(end, path)
@@ -205,18 +240,15 @@ def fit_rest(
     is_divided = is_fine and not max(abs(total[0] - sums[0]), missed) <= allowed
     if is_divided:
         copy(stretches, saved, state)
-        total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, k0 * path[0] - f0, 0.0)
         begin = 0.0
-        for part in range(3):
-            end = first if part == 0 else second if part == 1 else 1.0
-            if not end > begin:
-                continue
-            part_of_it = divided(step, parameters, state, stretches, spare, begin, end, allowed, k0, path)
+        for part in range(5):
+            end = one if part == 0 else two if part == 1 else three if part == 2 else four if part == 3 else 1.0
+            part_of_it = divided(step, parameters, state, stretches, spare, begin, end, total[6], allowed, k0, path)
             total = together(total, part_of_it)
-            if not end < 1.0:
+            if end == 1.0:
                 break
             begin = end
-            step(parameters, state, drift_at(end, path))
     m0, m1, m2, m3, m4, work, _, _ = total
     if is_fine:
         rest[0] = 16.0 * m0 - 120.0 * m1 + 240.0 * m2 - 140.0 * m3

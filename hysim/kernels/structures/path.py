@@ -28,7 +28,8 @@ _AT_ONCE = 0.1  # share of the tolerance below which the first sweep is the last
 _EASY = 1.0 / 64.0  # share of the tolerance below which steps of twice the length are tried
 LEAST_DRIFT = 1.0e-4  # share of the displacements: the least drift whose error counts as its own
 _OF_DIVISIONS = 0.1  # share of the tolerance that a divided moment may take
-OF_MOMENTS = 1.0e-6  # tolerance of the moments where the steps have none
+OF_MOMENTS = 1.0e-9  # tolerance of the moments where the steps have none
+_NEAREST = 1.0e-3  # of the step: a last node closer to its end has no slope but that of rounding
 _TINY = 1.0e-290
 
 
@@ -75,8 +76,8 @@ class Room(NamedTuple):
     rests; `before` the drifts of the sweep before. `scales` are the sizes of drifts, `own` the drifts by unit rests of
     the same element, `allowed` the errors that their moments may have, `errors` those of the drifts. `rest`,
     (4 n_elements,), are the coefficients of the rests, `half` those for the half of the step; `sums` is
-    (n_elements, 7), see `moments.fit_rest`. `saved` and `spare` are states of the laws, `end` and `point` states of
-    the structure after and in the step; `speeds`, (2, n_nodes), are two derivatives of the velocity; `loads`,
+    (n_elements, 7), see `moments.fit_rest`. `saved` and `spare` are states of the laws, `end`, `point` and `now` states
+    of the structure after and in the step; `speeds`, (2, n_nodes), are two derivatives of the velocity; `loads`,
     (2, n_loads), the rise over a sample, and the loads at the begin of a step.
     """
 
@@ -97,6 +98,7 @@ class Room(NamedTuple):
     spare: FloatArray
     end: FloatArray
     point: FloatArray
+    now: FloatArray
     speeds: FloatArray
     loads: FloatArray
 
@@ -165,14 +167,14 @@ def make_room(n_elements: int, m: int, n_state: int, n_loads: int = 1) -> Room:
         **dict.fromkeys(("rest", "half"), N_POWERS * n_elements),
         "sums": (n_elements, 7),
         **dict.fromkeys(("saved", "spare"), n_state),
-        **dict.fromkeys(("end", "point"), m),
+        **dict.fromkeys(("end", "point", "now"), m),
         "speeds": (2, m // 2),
         "loads": (2, n_loads),
     }
     return Room(**{name: np.zeros(shape) for name, shape in shapes.items()})
 
 
-@kernel
+@uncounted
 def project(elements: Elements, columns: FloatArray, drifts: FloatArray) -> None:
     """Drifts and rates of the drifts, (n_levels, k, 2 n_elements), of columns of states (n_levels, k, m)."""
     n, n_nodes = elements.k0.size, columns.shape[2] // 2
@@ -344,7 +346,9 @@ def take_step(
         state = motion.laws[elements.state_ends[e] : elements.state_ends[e + 1]]
         step, d = step_at(elements.steps[e]), room.drifts[e]
         f = step(parameters, state, d)
-        carry[1, e] = (elements.k0[e] * d - f - sums[e, 3]) / (h * (1.0 - sums[e, 4]))
+        ahead = 1.0 - sums[e, 4]
+        slope = (elements.k0[e] * d - f - sums[e, 3]) / (h * ahead) if ahead > _NEAREST else 0.0
+        carry[1, e] = slope
         end_of_path = room.before[e]
         work[2 + e] += 0.5 * elements.k0[e] * (end_of_path - carry[2, e]) * (end_of_path + carry[2, e]) - sums[e, 1]
         work[2 + e] += f * (d - end_of_path)
@@ -378,9 +382,10 @@ def add_work(flows: Flows, plant: Plant, level: int, h: float, share: float, mot
     add_columns(flows.rests[level + 1], room.half, room.point)
     for i in range(n_loads):
         inputs[m + 2 * i + 1] *= 2.0
-    add_powers(plant, h, share, 0.0, 1.0, x, room, work)
-    add_powers(plant, h, share, 0.5, 0.0, room.point, room, work)
-    add_powers(plant, h, share, 1.0, -1.0, room.end, room, work)
+    for k in range(3):
+        for q in range(m):
+            room.now[q] = x[q] if k == 0 else room.point[q] if k == 1 else room.end[q]
+        add_powers(plant, h, share, 0.5 * k, 1.0 - k, room.now, room, work)
 
 
 @unfolded
@@ -495,7 +500,7 @@ def write(motion: Motion, k: int, tracks: Tracks) -> None:
         put(motion.laws, tracks.laws[min(k, tracks.laws.shape[0] - 1)])
 
 
-@unfolded
+@uncounted
 def put(values: FloatArray, out: FloatArray) -> None:
     """Copy a vector."""
     for q in range(values.size):

@@ -10,6 +10,7 @@ from numba.core import cgutils
 from numba.experimental.function_type import _get_wrapper_address
 from numba.extending import intrinsic
 
+from hysim.kernels.controllers import CONTROLLER, ControllerStep
 from hysim.kernels.stepping import START, STEP, Start, Step
 
 
@@ -21,6 +22,11 @@ def step_at(step: Any) -> Step:
 def start_at(start: Any) -> Start:
     """As `step_at`, for a start."""
     return start  # type: ignore[no-any-return]
+
+
+def controller_at(controller: Any) -> ControllerStep:
+    """As `step_at`, for the step of a controller."""
+    return controller  # type: ignore[no-any-return]
 
 
 def _function_at(kind: Any) -> Any:
@@ -40,7 +46,7 @@ def _function_at(kind: Any) -> Any:
 
 
 def addresses(functions: Sequence[Any], kind: Any = STEP) -> Any:
-    """Steps, or starts of the kind `START`, as `step_at` and `start_at` take them, shape (n,)."""
+    """Functions of a kind, such as `START`, as `step_at` and its like take them, shape (n,)."""
     if not _IS_COMPILED:
         return tuple(functions)
     return np.array([_get_wrapper_address(each, kind.signature) for each in functions], dtype=np.int64)
@@ -50,3 +56,4 @@ _IS_COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 if _IS_COMPILED:
     step_at = intrinsic(_function_at(STEP))
     start_at = intrinsic(_function_at(START))
+    controller_at = intrinsic(_function_at(CONTROLLER))

@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim.kernels import baber_noori as kernels
+from hysim.kernels.remainder import ROUNDING
 from hysim.laws.differential import _boucwen_conversions, _boucwen_search, _power_units, _wear_search
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen import BoucWen
@@ -134,6 +135,7 @@ class BoucWenBaberNoori(MemoryLaw):
     stages = (_WEAR, _PINCHING, _SPREAD)
     step = staticmethod(kernels.step)
     workspace: ClassVar[int] = kernels.N_STATE - 3
+    tolerance: ClassVar[float] = ROUNDING  # of what the series leave out, beside the memory
 
     @classmethod
     def check(cls, tables: Tables) -> None:
@@ -156,7 +158,8 @@ class BoucWenBaberNoori(MemoryLaw):
         }
         own = [units.times(tables[name], exponents.get(name, np.zeros(()))) for name in _OWN]
         plain = cls.joined(tables, "A", "beta", "gamma", "n")
-        parameters = np.concatenate([*own, units.shape(tables), units.scales, plain], axis=1)
+        tolerance = np.full((len(plain), 1), cls.tolerance)
+        parameters = np.concatenate([*own, units.shape(tables), units.scales, tolerance, plain], axis=1)
         return Packed(parameters, cls.initial_memory(tables, further=1))
 
     @classmethod
@@ -274,6 +277,10 @@ class BoucWenBaberNoori(MemoryLaw):
         """The law by Rosenbrock steps, good to a few parts in a thousand."""
         return _RoughBaberNoori(**self.arguments)
 
+    def close(self) -> MemoryLaw:
+        """The law with shorter series, good to 1e-9 of the range."""
+        return _CloseBaberNoori(**self.arguments)
+
     def steady(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
         """Initial memory of a steady cycle; ValueError for a law that degrades or pinches, which has none."""
         values = {**self.scalars, **parameters}
@@ -302,3 +309,9 @@ class _RoughBaberNoori(BoucWenBaberNoori):
 
     step = staticmethod(kernels.rough_step)
     workspace: ClassVar[int] = 0
+
+
+class _CloseBaberNoori(BoucWenBaberNoori):
+    """The law as the later steps of a search take it: its differences over 1e-6 of the box are still good slopes."""
+
+    tolerance: ClassVar[float] = 2.0**-30

@@ -9,13 +9,14 @@ from hysim._frozen import FloatArray, read_only
 from hysim.kernels.stepping import START
 from hysim.kernels.structures.ensembles import fill_slopes, fill_structure, start_motion
 from hysim.kernels.structures.flows import N_POWERS
-from hysim.kernels.structures.path import Elements, Flows, Motion, Plant, Room, Steps, Tracks, make_room
+from hysim.kernels.structures.path import LEAST_DRIFT, Elements, Flows, Motion, Plant, Room, Steps, Tracks, make_room
 from hysim.kernels.structures.pointers import addresses
 from hysim.models.compiled_step import startable
 from hysim.models.protocols import Startable, Stretched
 
 PHASE = 2.0  # largest phase of the fastest mode in a base step: above it the sweeps of a slipping element diverge
 HALVINGS = 12
+LEAST_CERTAIN = 0.05  # share of the largest drift by which that of a step may be uncertain
 
 
 class Laws(NamedTuple):
@@ -172,9 +173,8 @@ def empty_motion(m: int, n_state: int, n_elements: int, n_loads: int = 1) -> Mot
 
 def empty_tracks(n: int, motion: Motion, *, with_laws: bool = False) -> Tracks:
     """Room for `n` samples."""
-    parts = (motion.x, motion.carry, motion.peaks, motion.work)
-    laws = np.empty((n if with_laws else 0, motion.laws.size))
-    return Tracks(*(np.empty((n, *part.shape)) for part in parts), laws)
+    x, carry, peaks, work = (np.empty((n, *part.shape)) for part in (motion.x, motion.carry, motion.peaks, motion.work))
+    return Tracks(x, carry, peaks, work, np.empty((n if with_laws else 0, motion.laws.size)))
 
 
 def room_for(motion: Motion) -> Room:
@@ -188,3 +188,11 @@ def motion_at(elements: Elements, laws: Laws, x: FloatArray, n_loads: int) -> Mo
     with np.errstate(all="ignore"):
         start_motion(elements, laws.starts, laws.states, read_only(x), motion)
     return motion
+
+
+def uncertainty(errors: FloatArray, peaks: FloatArray) -> FloatArray:
+    """Largest error of a drift in one step as a share of its size, (n_sets,), from rows (n_sets, n_elements)."""
+    sizes = np.maximum(peaks, LEAST_DRIFT * peaks.max(axis=1, initial=0.0, keepdims=True))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = np.nan_to_num(errors / sizes, nan=0.0, posinf=np.inf)
+    return np.asarray(shares.max(axis=1, initial=0.0))

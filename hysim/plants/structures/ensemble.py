@@ -21,9 +21,9 @@ Reduction = Literal[
     "peak_drift", "residual_drift", "energy", "peak_force", "peak_displacement", "peak_acceleration"
 ]  # fmt: skip
 
+REDUCTIONS = get_args(Reduction)
 _MATRICES = ("mass", "stiffness", "damping")
 _AT_ONCE = 2_000_000  # samples that a call of the kernel computes, or one structure
-_WRONG = 0.05  # share of the largest drift by which that of a step may be uncertain
 
 
 class _Stack(NamedTuple):
@@ -45,7 +45,7 @@ def responses(
     workers: int | None,
 ) -> FloatArray:
     """See `hysim.Structure.responses`."""
-    check_choice("reduce", reduce, get_args(Reduction))
+    check_choice("reduce", reduce, REDUCTIONS)
     positive_time(sample_time)
     u = read_only(inputs, "ground_accelerations")
     if u.ndim not in (1, 2) or not u.shape[-1]:
@@ -70,7 +70,7 @@ def responses(
 
 def _values(structure: Any, given: Mapping[str, npt.ArrayLike] | npt.ArrayLike) -> dict[str, FloatArray]:
     """Columns (n_sets,) by names without wildcards."""
-    named = given if isinstance(given, Mapping) else {"scale": given}
+    named: Mapping[str, Any] = given if isinstance(given, Mapping) else {"scale": given}
     scales = {name: column for name, column in named.items() if name == "scale"}
     others = {name: column for name, column in named.items() if name != "scale"}
     return {
@@ -90,10 +90,7 @@ def _reduced(
     n_elements, n = len(structure.elements), structure.n_nodes
     results = _computed(structure, values, u, n_sets, sample_time)
     peaks = results.peaks
-    largest = peaks[:, :n_elements].max(axis=1, initial=0.0, keepdims=True)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        apart = results.errors / np.maximum(peaks[:, :n_elements], 1e-4 * largest)
-    unresolved = (np.nan_to_num(apart, nan=0.0, posinf=np.inf) > _WRONG).any(axis=1)
+    unresolved = assembly.uncertainty(results.errors, peaks[:, :n_elements]) > assembly.LEAST_CERTAIN
     measures = {
         "peak_drift": peaks[:, :n_elements],
         "peak_force": peaks[:, n_elements : 2 * n_elements],
@@ -217,12 +214,12 @@ def _one_by_one(structure: Any, numbers: Mapping[str, FloatArray], n_sets: int) 
         raise ValueError(f"{', '.join(numbers)} change the form of a law: compute the sets one after the other")
     if any(each.initial_state != structure.initial_state for each in made):
         raise ValueError("all sets begin with the same initial_state")
-    parts = [np.concatenate([part[k] for part in (each.matrices for each in made)]) for k in (0, 1, 2)]
+    mass, damping, stiffness = (np.concatenate([each.matrices[k] for each in made]) for k in (0, 1, 2))
     directions = np.concatenate([each.matrices.directions for each in made])
     return _Stack(
         first.laws,
         read_only(np.stack([each.laws.parameters for each in made]), finite=False),
         read_only(np.stack([each.laws.states for each in made]), finite=False),
         read_only(np.stack([each.elastic_slopes for each in made])),
-        assembly.Matrices(*parts, first.drift_matrix, directions),
+        assembly.Matrices(mass, damping, stiffness, first.drift_matrix, directions),
     )

@@ -19,7 +19,7 @@ from scipy.linalg import LinAlgError, cholesky, eigh
 from hysim._frozen import FloatArray, check_choice, check_whole, read_only
 from hysim._parallel import in_pieces
 from hysim.errors import SimulationError
-from hysim.kernels.structures.path import LEAST_DRIFT, Elements, Motion, Plant, Tracks, follow
+from hysim.kernels.structures.path import Elements, Motion, Plant, Tracks, follow
 from hysim.models.model import family
 from hysim.models.protocols import positive_time
 from hysim.plants.structures import assembly
@@ -29,10 +29,13 @@ from hysim.plants.structures.ensemble import Reduction, responses
 from hysim.plants.structures.parameters import assembled, scalars_of
 from hysim.plants.structures.records import OF_ELEMENTS, OF_NODES
 from hysim.plants.structures.search import SearchedStructure
+from hysim.plants.structures.static import Frame, StaticResponse, pushed, strokes
 
 _OUTPUTS = (*OF_NODES, *OF_ELEMENTS)
 _LOOSEST = 1e-3  # tolerance
-_WRONG = 0.05  # share of the largest drift by which that of a step may be uncertain
+
+
+_IMBALANCE = 0.05  # share of the largest work that may be missing
 
 
 class StructureState(NamedTuple):
@@ -135,7 +138,7 @@ class Structure(SearchedStructure):
             cholesky(self.mass_matrix)
         except LinAlgError:
             raise ValueError("the mass matrix must be positive definite") from None
-        self._place_of_output()
+        self.place_of(self.output)
         self.matrices  # noqa: B018  # raises what its parts raise
 
     # ------------------------------------------------------------------------------ what it is made of
@@ -209,10 +212,9 @@ class Structure(SearchedStructure):
     @cached_property
     def matrices(self) -> assembly.Matrices:
         """The linear part, as one row."""
-        parts = (self.mass_matrix, self.damping_matrix, self.initial_stiffness)
-        return assembly.Matrices(
-            *(part[np.newaxis] for part in parts), self.drift_matrix, self.force_directions[np.newaxis]
-        )
+        parts = (self.mass_matrix, self.damping_matrix, self.initial_stiffness, self.force_directions)
+        mass, damping, stiffness, directions = (part[np.newaxis] for part in parts)
+        return assembly.Matrices(mass, damping, stiffness, self.drift_matrix, directions)
 
     @cached_property
     def kernel_elements(self) -> Elements:
@@ -269,7 +271,7 @@ class Structure(SearchedStructure):
 
     @property
     def sensor(self) -> tuple[str, int]:
-        return self._place_of_output()
+        return self.place_of(self.output)
 
     # ------------------------------------------------------------------------------ small motions
 
@@ -292,6 +294,108 @@ class Structure(SearchedStructure):
         shapes = eigh(self.initial_stiffness, self.mass_matrix)[1]
         largest = shapes[np.abs(shapes).argmax(axis=0), np.arange(self.n_nodes)]
         return np.asarray(shapes * np.sign(largest))
+
+    # ------------------------------------------------------------------------------ slow motions
+
+    def pushover(self, pattern: npt.ArrayLike, control: npt.ArrayLike, *, at: str = "displacement") -> StaticResponse:
+        """Equilibria under loads that grow slowly, told by a displacement.
+
+        ``K x + sum b f(b . x) = factor pattern``. The factor follows from the control, so that the path goes on where
+        the structure softens. Between two control values each drift moves straight: dashpots and masses do nothing.
+
+        Parameters
+        ----------
+        pattern : array, shape (n_nodes,)
+            Loads at the masses for a factor of one [N].
+        control : array, shape (n,)
+            Displacements of what `at` names, one behind the other; the structure begins at `initial_state` [m].
+        at : str
+            What is controlled: ``"displacement.k"`` of the mass k, by default the last one, or ``"drift.k"``.
+
+        Returns
+        -------
+        StaticResponse
+
+        Raises
+        ------
+        SimulationError
+            If no equilibrium is found, as where the structure would snap through while the control rests; it names the
+            control value.
+        ValueError
+            If the pattern has not one number for each mass or is zero, a number is not finite, or `at` names neither a
+            displacement nor a drift.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> column = hs.MaxwellSlip(stiffness=(90.0,), slips=(0.01,), feedthrough=10.0)
+        >>> frame = hs.shear_frame([1.0, 1.0], laws=column)
+        >>> push = frame.pushover([1.0, 2.0], [0.01, 0.02, 0.04])
+        >>> push.base_shear.round(6).tolist()
+        [0.6, 1.03125, 1.21875]
+        """
+        loads = read_only(pattern, "pattern", ndim=1)
+        if loads.size != self.n_nodes:
+            raise ValueError(f"pattern must hold one number for each of {self.n_nodes} masses, got {loads.size}")
+        values = read_only(control, "control", ndim=1)
+        return pushed(self._at_rest, self._first_displacements, loads, self._controlled(at), lambda begin: values)
+
+    def cyclic(
+        self,
+        protocol: npt.ArrayLike,
+        pattern: npt.ArrayLike | None = None,
+        *,
+        at: str = "displacement",
+        steps: int = 50,
+    ) -> StaticResponse:
+        """Equilibria along slow cycles, as of a test with a jack.
+
+        Parameters
+        ----------
+        protocol : array, shape (n,)
+            Turning points of what `at` names, such as 0, 1, -1, 2, -2, 0 times the displacement at yield [m].
+        pattern : array, shape (n_nodes,), optional
+            Loads at the masses for a factor of one; by default a jack at what is controlled: one newton at the mass,
+            or at both ends of the element.
+        at : str
+            As of `pushover`.
+        steps : int
+            Equal steps of each stroke.
+
+        Returns
+        -------
+        StaticResponse
+            It begins with the displacement of `initial_state`. Errors are those of `pushover`.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> column = hs.MaxwellSlip(stiffness=(90.0,), slips=(0.01,), feedthrough=10.0)
+        >>> test = hs.shear_frame([1.0], laws=column).cyclic([0.02, -0.02, 0.0], steps=2)
+        >>> test.control.tolist(), test.factor.round(6).tolist()
+        ([0.0, 0.01, 0.02, 0.0, -0.02, -0.01, 0.0], [0.0, 1.0, 1.1, -0.9, -1.1, -0.1, 0.9])
+        """
+        check_whole(steps, "steps")
+        turns, row = read_only(protocol, "protocol", ndim=1), self._controlled(at)
+        loads = row if pattern is None else read_only(pattern, "pattern", ndim=1)
+        if loads.size != self.n_nodes:
+            raise ValueError(f"pattern must hold one number for each of {self.n_nodes} masses, got {loads.size}")
+        return pushed(self._at_rest, self._first_displacements, loads, row, lambda begin: strokes(turns, begin, steps))
+
+    @property
+    def _at_rest(self) -> Frame:
+        return Frame(self.stiffness_matrix, self.drift_matrix, self.laws, self.elastic_slopes)
+
+    @property
+    def _first_displacements(self) -> FloatArray:
+        return np.array(self.initial_state[: self.n_nodes] or np.zeros(self.n_nodes))
+
+    def _controlled(self, at: str) -> FloatArray:
+        """Direction of a displacement or a drift, shape (n_nodes,)."""
+        name, place = self.place_of(at)
+        if name not in ("displacement", "drift"):
+            raise ValueError(f'what is controlled must be a "displacement" or a "drift", got {at!r}')
+        return np.asarray(self.drift_matrix[place] if name == "drift" else np.eye(self.n_nodes)[place])
 
     # ------------------------------------------------------------------------------ motion
 
@@ -351,7 +455,7 @@ class Structure(SearchedStructure):
         """
         inputs = read_only(u, "u", ndim=1)
         begun, tracks = self._followed(inputs, sample_time, state, progress, with_laws=False)
-        return self._signals(inputs, begun, tracks), begun
+        return self.signals_of(inputs, begun, tracks), begun
 
     def memories(self, u: npt.ArrayLike, sample_time: float) -> tuple[FloatArray, ...]:
         """State of each element's law at the samples of `u`, its last input and its memory.
@@ -456,17 +560,16 @@ class Structure(SearchedStructure):
         with np.errstate(all="ignore"):
             lost = in_pieces(run, n)
         if lost >= 0:
-            raise SimulationError(f"the motion diverges at t = {lost * sample_time:g}")
-        self._check_resolved(motion)
+            hint = "; if it should not, use more substeps, or substeps=None" if self.substeps else ""
+            raise SimulationError(f"the motion diverges at t = {lost * sample_time:g}{hint}")
+        self.check_resolved(motion)
         return StructureState(motion, before.started or n > 0, before.stored), tracks
 
-    def _check_resolved(self, motion: Motion) -> None:
+    def check_resolved(self, motion: Motion) -> None:
         """Refuse a motion with steps whose sweeps do not agree, which could not be divided further."""
-        n = len(self.elements)
-        sizes = np.maximum(motion.peaks[:n], LEAST_DRIFT * motion.peaks[:n].max(initial=0.0))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            apart = float(np.nan_to_num(motion.carry[4] / sizes, nan=0.0, posinf=np.inf).max(initial=0.0))
-        if not apart <= _WRONG:
+        errors, peaks = motion.carry[4][np.newaxis], motion.peaks[np.newaxis, : len(self.elements)]
+        apart = float(assembly.uncertainty(errors, peaks)[0])
+        if not apart <= assembly.LEAST_CERTAIN:
             raise SimulationError(
                 f"the motion is not resolved: the drift of a step is uncertain by {apart:.2g} of the largest one; "
                 + ("use more substeps, or substeps=None" if self.substeps else "use a smaller sample_time")
@@ -483,8 +586,8 @@ class Structure(SearchedStructure):
         elastic = 0.5 * np.einsum("ki,ij,kj->k", x[:, :n], self.stiffness_matrix, x[:, :n])
         return kinetic, elastic
 
-    def _signals(self, u: FloatArray, state: StructureState, tracks: Tracks) -> dict[str, FloatArray]:
-        """Signals by name."""
+    def signals_of(self, u: FloatArray, state: StructureState, tracks: Tracks) -> dict[str, FloatArray]:
+        """Signals by name of tracks under the inputs `u`, which end in `state`."""
         n, n_elements = self.n_nodes, len(self.elements)
         x, (force, _, drift, rate, _) = tracks.x, np.moveaxis(tracks.carry, 1, 0)
         kinetic, elastic = self._energies(x)
@@ -512,7 +615,13 @@ class Structure(SearchedStructure):
             "dissipated": work - returned,
             "imbalance": imbalance,
         }
-        name, place = self._place_of_output()
+        largest = float(np.abs(tracks.work).max(initial=0.0))
+        if (wrong := float(np.abs(imbalance).max(initial=0.0))) > _IMBALANCE * largest:
+            raise SimulationError(
+                f"the motion is not resolved: {wrong / largest:.2g} of the energy is missing; "
+                + ("use more substeps, or substeps=None" if self.substeps else "use a smaller tolerance")
+            )
+        name, place = self.place_of(self.output)
         arrays = {"y": signals[name][:, place], **signals}
         return {each: np.ascontiguousarray(values) for each, values in arrays.items()}
 
@@ -530,17 +639,15 @@ class Structure(SearchedStructure):
     def _column_count(self, signal: str) -> int:
         return len(self.elements) if signal in OF_ELEMENTS else self.n_nodes
 
-    def _place_of_output(self) -> tuple[str, int]:
-        """Name and column of the output; ValueError if there is none of this name."""
-        name, _, place = self.output.partition(".")
+    def place_of(self, output: str) -> tuple[str, int]:
+        """Name and column of an output; ValueError if there is none of this name."""
+        name, _, place = output.partition(".")
         first, count = int(name not in OF_ELEMENTS), self._column_count(name)
         if name not in _OUTPUTS or not (place.isdecimal() or not place):
-            raise ValueError(f'output must be a name such as "displacement" or "drift.0", got {self.output!r}')
+            raise ValueError(f'output must be a name such as "displacement" or "drift.0", got {output!r}')
         column = int(place) - first if place else count - 1
         if not 0 <= column < count:
-            raise ValueError(
-                f"output {self.output!r} names none of the {count} {'elements' if not first else 'masses'}"
-            )
+            raise ValueError(f"output {output!r} names none of the {count} {'elements' if not first else 'masses'}")
         return name, column
 
 

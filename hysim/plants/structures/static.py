@@ -1,0 +1,255 @@
+"""Quasi-static motion of a structure under displacement control.
+
+    K x + sum over elements of b f(b . x) = factor p,        c . x = control
+
+p is the pattern of the loads, c the direction whose displacement is told. The unknowns of each control value are x and
+the factor, so that the path goes on where the factor falls. Laws move from one control value to the next along straight
+drifts. Newton's method has the slopes of the laws along these strokes, by differences; its steps are shortened until
+the forces out of balance fall, and a stroke on which that does not help is halved.
+"""
+
+import itertools
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hysim._frozen import FloatArray, frozen
+from hysim._printing import extent, printed, summary_text
+from hysim.errors import SimulationError
+from hysim.plants.structures.assembly import Laws
+
+_BALANCED = 1e-12  # force out of balance, as a share of the largest force so far
+_ENOUGH = 1e-10  # as `_BALANCED`, where no further step helps
+_WORST = 1e-8  # as `_BALANCED`, with stiff elements
+_ROUNDING = 8.0 * 2.0**-52  # of displacements, by the largest stiffness: forces cannot be balanced better
+_MOST_STEPS = 40  # of Newton's method
+_MOST_CUTS = 10  # halvings of one of its steps
+_MOST_HALVINGS = 26  # of a stroke
+_DIFFERENCE = 1e-5  # share of a stroke: central differences then err at about 1e-10
+
+
+@printed
+@frozen
+class StaticResponse:
+    """Equilibria of a structure that is pushed slowly.
+
+    Parameters
+    ----------
+    control : array, shape (n,)
+        Displacement that was told [m].
+    factor : array, shape (n,)
+        Loads by the pattern: the forces at the masses are `factor` times `pattern`.
+    pattern : array, shape (n_nodes,)
+        Pattern of the loads [N].
+    displacement : array, shape (n, n_nodes)
+        [m]
+    drift, force : array, shape (n, n_elements)
+        Of the elements [m], [N]; dashpots have none.
+    residual : array, shape (n,)
+        Largest force out of balance, as a share of the largest force so far; at most 1e-10, or what the rounding of
+        displacements comes to with stiff elements.
+    """
+
+    control: FloatArray
+    factor: FloatArray
+    pattern: FloatArray
+    displacement: FloatArray
+    drift: FloatArray
+    force: FloatArray
+    residual: FloatArray
+
+    @property
+    def base_shear(self) -> FloatArray:
+        """Sum of the loads, which the ground takes if every mass moves along one axis, shape (n,) [N]."""
+        return np.asarray(self.factor * self.pattern.sum())
+
+    def __str__(self) -> str:
+        return summary_text(
+            [f"StaticResponse: {self.control.size} equilibria"],
+            {
+                "control": extent(self.control, "m"),
+                "base shear": extent(self.base_shear, "N"),
+                "residual": f"{self.residual.max(initial=0.0):.1e}",
+            },
+        )
+
+
+class Frame(NamedTuple):
+    """What stands still: stiffness (n, n), drifts (n_elements, n), the laws and their slopes at the start."""
+
+    stiffness: FloatArray
+    rows: FloatArray
+    laws: Laws
+    slopes: FloatArray
+
+
+class _Equilibrium(NamedTuple):
+    """Displacements, loads by the pattern, forces of the elements, and the share out of balance."""
+
+    x: FloatArray
+    factor: float
+    force: FloatArray
+    residual: float
+
+
+class _Columns:
+    """The laws of the elements, each after the last equilibrium."""
+
+    def __init__(self, laws: Laws, slopes: FloatArray, drifts: FloatArray) -> None:
+        self.members = [law.started(float(d)) for law, d in zip(laws.steppers, drifts, strict=True)]
+        self.places = [np.concatenate([np.arange(a, a + n) for a, n in each]) for each in laws.stretches]
+        self.slopes, self.drifts = slopes, drifts
+        self.saved = [law.state[place] for law, place in zip(self.members, self.places, strict=True)]
+        self.keep(drifts)
+
+    def force(self, e: int, drift: float) -> float:
+        """Force of an element after a stroke from the last equilibrium."""
+        law = self.members[e]
+        law.state[self.places[e]] = self.saved[e]
+        return float(law.step(law.parameters, law.state, drift))
+
+    def forces(self, drifts: FloatArray) -> FloatArray:
+        """Forces of all elements."""
+        return np.array([self.force(e, float(d)) for e, d in enumerate(drifts)])
+
+    def tangents(self, drifts: FloatArray) -> FloatArray:
+        """Slopes of the forces at the end of strokes."""
+        slopes = self.slopes.copy()
+        for e, (drift, begin) in enumerate(zip(drifts, self.drifts, strict=True)):
+            d = _DIFFERENCE * abs(drift - begin)
+            if drift + d > drift - d:
+                slopes[e] = (self.force(e, drift + d) - self.force(e, drift - d)) / ((drift + d) - (drift - d))
+        return slopes
+
+    def keep(self, drifts: FloatArray) -> None:
+        """Move all laws to an equilibrium."""
+        self.drifts = drifts
+        self.forces(drifts)
+        self.saved = [law.state[place] for law, place in zip(self.members, self.places, strict=True)]
+
+
+class _Push:
+    """A structure that is pushed along."""
+
+    def __init__(self, frame: Frame, x: FloatArray, pattern: FloatArray, row: FloatArray) -> None:
+        self.frame, self.pattern, self.row = frame, pattern, row
+        self.columns = _Columns(frame.laws, frame.slopes, frame.rows @ x)
+        elastic = frame.stiffness + frame.rows.T @ (frame.slopes[:, np.newaxis] * frame.rows)
+        self.unit = float(np.abs(elastic).max()) or 1.0
+        self.direction = self.correction(frame.slopes, np.zeros(x.size), 1.0)[0]
+        self.largest = 0.0
+        self.now = self.balance(x, 0.0)
+
+    def balance(self, x: FloatArray, factor: float) -> _Equilibrium:
+        """Displacements and loads with the forces, and how far these are from balance."""
+        at = _Equilibrium(x, factor, self.columns.forces(self.frame.rows @ x), 0.0)
+        size = self.size(at)
+        return at._replace(residual=float(np.abs(self.out_of_balance(at)).max()) / size) if size else at
+
+    def size(self, at: _Equilibrium) -> float:
+        """The largest force so far: of a load, of linear springs at a mass, or of an element."""
+        parts = (at.factor * self.pattern, self.frame.stiffness @ at.x, at.force)
+        return max(self.largest, *(float(np.abs(part).max(initial=0.0)) for part in parts))
+
+    def allowed(self, at: _Equilibrium) -> float:
+        """Largest residual of an equilibrium."""
+        rounding, size = _ROUNDING * self.unit * float(np.abs(at.x).max()), self.size(at)
+        return min(max(_ENOUGH, rounding / size), _WORST) if size else _ENOUGH
+
+    def out_of_balance(self, at: _Equilibrium) -> FloatArray:
+        """Loads less resisting forces, shape (n,)."""
+        resisted = self.frame.stiffness @ at.x + self.frame.rows.T @ at.force
+        return np.asarray(at.factor * self.pattern - resisted)
+
+    def correction(self, tangents: FloatArray, off: FloatArray, rise: float) -> tuple[FloatArray, float]:
+        """Changes of displacements and factor that balance `off` and raise the control by `rise`."""
+        rows, n = self.frame.rows, off.size
+        matrix = np.zeros((n + 1, n + 1))
+        matrix[:n, :n] = (self.frame.stiffness + rows.T @ (tangents[:, np.newaxis] * rows)) / self.unit
+        largest = np.abs(self.pattern).max() or 1.0
+        matrix[:n, n], matrix[n, :n] = -self.pattern / largest, self.row
+        wanted = np.append(off / self.unit, rise)
+        try:
+            change = np.linalg.solve(matrix, wanted)
+        except np.linalg.LinAlgError:
+            change = np.linalg.lstsq(matrix, wanted)[0]
+        return change[:n], float(change[n] * self.unit / largest)
+
+    def corrected(self, x: FloatArray, factor: float) -> _Equilibrium:
+        """The equilibrium near displacements that have the control value; out of balance where none is found."""
+        at = self.balance(x, factor)
+        for _ in range(_MOST_STEPS):
+            if at.residual <= _BALANCED or not np.isfinite(at.residual):
+                break
+            off = self.out_of_balance(at)
+            change, rise = self.correction(self.columns.tangents(self.frame.rows @ at.x), off, 0.0)
+            size = float(np.abs(off).max())
+            for cut in range(_MOST_CUTS):
+                share = 0.5**cut
+                tried = self.balance(at.x + share * change, at.factor + share * rise)
+                if float(np.abs(self.out_of_balance(tried)).max()) < size:
+                    break
+            else:
+                break
+            at = tried
+        return at
+
+    def to(self, control: float, halvings: int = 0) -> bool:
+        """Move to a control value; whether an equilibrium is there."""
+        begin, rise = self.now, control - float(self.row @ self.now.x)
+        x = begin.x + rise * self.direction
+        best = self.corrected(x, begin.factor)
+        if not best.residual <= self.allowed(best):
+            change, factor = self.correction(self.frame.slopes, np.zeros(x.size), rise)
+            best = self.corrected(begin.x + change, begin.factor + factor)
+        if best.residual <= self.allowed(best):
+            if rise:
+                self.direction = (best.x - begin.x) / rise
+            self.now = best
+            self.largest = self.size(best)
+            self.columns.keep(self.frame.rows @ best.x)
+            return True
+        middle = control - 0.5 * rise
+        if halvings == _MOST_HALVINGS or not min(control, control - rise) < middle < max(control, control - rise):
+            return False
+        return self.to(middle, halvings + 1) and self.to(control, halvings + 1)
+
+
+def pushed(
+    frame: Frame, x: FloatArray, pattern: FloatArray, row: FloatArray, control: Callable[[float], FloatArray]
+) -> StaticResponse:
+    """Equilibria at the values of ``control(begin)``, begun at the displacements `x`.
+
+    Raises ValueError if the pattern is zero, and SimulationError where no equilibrium is found.
+    """
+    if not pattern.any():
+        raise ValueError("pattern must not be zero")
+    push = _Push(frame, x, pattern, row)
+    values, found = control(float(row @ x)), []
+    for k, value in enumerate(values.tolist()):
+        with np.errstate(all="ignore"):
+            reached = push.to(value)
+        if not reached:
+            raise SimulationError(
+                f"no equilibrium was found at control value {k} ({value:g} m): control a displacement that grows all "
+                "along, or use smaller steps"
+            )
+        found.append(push.now)
+    n, n_elements = x.size, len(frame.rows)
+    return StaticResponse(
+        control=values,
+        factor=np.array([each.factor for each in found]),
+        pattern=pattern,
+        displacement=np.array([each.x for each in found]).reshape(len(found), n),
+        drift=np.array([frame.rows @ each.x for each in found]).reshape(len(found), n_elements),
+        force=np.array([each.force for each in found]).reshape(len(found), n_elements),
+        residual=np.array([each.residual for each in found]),
+    )
+
+
+def strokes(turns: Any, begin: float, steps: int) -> FloatArray:
+    """Control values from `begin` along turning points, `steps` of them on each stroke."""
+    points = [begin, *np.asarray(turns, dtype=float).tolist()]
+    parts = [np.linspace(a, b, steps + 1)[1:] for a, b in itertools.pairwise(points) if a != b]
+    return np.concatenate([[begin], *parts])
