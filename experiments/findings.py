@@ -392,8 +392,8 @@ def identified_frame(result: Result) -> list[str]:
         f"{error_of(result['worst_law_error_percent'])} % at worst (`{name}`); all errors are "
         f"{result['rms_error_in_stderr']:.2f} standard errors in the rms.",
         f"A search takes {number(result['median_seconds'], 2)} s in the median and "
-        f"{number(result['worst_seconds'], 2)} s at worst, on two cores; the masses, the form of the law and the motion "
-        "of the ground are told.",
+        f"{number(result['worst_seconds'], 2)} s at worst, on two cores; the masses, the form of the law and the "
+        "motion of the ground are told.",
     ]
 
 
