@@ -50,15 +50,16 @@ def identify(
     ----------
     model_or_class : model, model class or structure
         `hysim.BoucWen`, `hysim.TransferFunction.structure(poles=4, zeros=1)`, ... The search begins at the defaults of
-        a class, or at the values of an instance.
+        a class, or at the values of an instance, such as a `hysim.Structure`.
     record_or_records : Record or sequence of Record
-        Input and output, and for models with dynamics the time. Several records share all parameters but the state at
-        the first sample: where it is free, each has its own, ``z0[0]``, ``z0[1]``, ...
+        Input and output, and for models with dynamics the time; of a `hysim.Structure` also `hysim.StructureRecord`.
+        Several records share all parameters but the state at the first sample: where it is free, each has its own,
+        ``z0[0]``, ``z0[1]``, ...
     fixed : mapping, optional
         Parameters that are not free, and their values.
     free : sequence of str, optional
         Parameters to identify that are held by default. One of each redundant group is held, for Bouc-Wen ``A = 1``,
-        since only the product of A and gain is determined.
+        since only the product of A and gain is determined. Of a `hysim.Structure` all parameters are held but these.
     bounds : mapping, optional
         Name to (lower, upper), in place of the family's own box.
     initial : {"free", "rest", "still", "periodic"}, or one of them for each record, optional
