@@ -162,7 +162,7 @@ def measure(n_sets: int, n_samples: int, n_checked: int, repeats: int) -> list[R
 
 
 def growth(n_sets: int, n_samples: int, repeats: int) -> dict[str, float]:
-    """Powers of the time by the number of oscillators and of samples, and the memory [MB] that four times as many take."""
+    """Powers of the time by number and length, and the further memory [MB] that four times as many oscillators take."""
     a, sets = ground_motion(n_samples), oscillators(n_sets)
     part = {name: values[: n_sets // 4] for name, values in sets.items()}
     quarter, _, _ = timed(lambda: peaks(part, a, 1e-5), repeats)
@@ -206,7 +206,7 @@ def draw(rows: list[Row]) -> Figure:
 if __name__ == "__main__":
     for line in main():
         print(
-            f"{line['method']:26} {line['ns_per_oscillator_sample']:7.0f} ns, a million in {line['million_minutes']:6.1f} min "
-            f"({line['cpu_seconds'] / line['seconds']:.1f} threads), error {line['median_error']:.1e} in the median, "
+            f"{line['method']:26} {line['ns_per_oscillator_sample']:7.0f} ns, a million in "
+            f"{line['million_minutes']:6.1f} min ({line['cpu_seconds'] / line['seconds']:.1f} threads), error {line['median_error']:.1e} in the median, "
             f"{line['worst_error']:.1e} at worst"
         )
