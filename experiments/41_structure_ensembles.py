@@ -207,6 +207,6 @@ if __name__ == "__main__":
     for line in main():
         print(
             f"{line['method']:26} {line['ns_per_oscillator_sample']:7.0f} ns, a million in "
-            f"{line['million_minutes']:6.1f} min ({line['cpu_seconds'] / line['seconds']:.1f} threads), error {line['median_error']:.1e} in the median, "
-            f"{line['worst_error']:.1e} at worst"
+            f"{line['million_minutes']:6.1f} min ({line['cpu_seconds'] / line['seconds']:.1f} threads), "
+            f"error {line['median_error']:.1e} in the median, {line['worst_error']:.1e} at worst"
         )

@@ -141,3 +141,12 @@ def rows_in(path):
         return len(hs.load_sweep(path))
     except (OSError, ValueError):
         return 0
+
+
+def test_the_largest_acceleration_under_a_force_has_the_force():
+    plant = frame(excitation="force", influence=(1.0, 0.5))
+    u = 5.0 * motions(4.0)[0]
+    rows = plant.responses([1.0], u, sample_time=SAMPLE_TIME, reduce="peak_acceleration")
+    sim = hs.simulate(plant, SAMPLE_TIME * np.arange(u.size), u)
+    np.testing.assert_allclose(rows[0], abs(sim.signals["acceleration"]).max(axis=0), rtol=1e-9)
+    np.testing.assert_allclose(sim.peaks["acceleration"], rows[0], rtol=1e-9)

@@ -135,13 +135,14 @@ class Plant(NamedTuple):
     """The linear part: A, (m, m), and the loads, (n_loads + n_elements, m), of s' = A s + loads, for accelerations.
 
     `damping` is (n_nodes, n_nodes) and `directions` (n_loads, n_nodes), for energies; without rows where these are not
-    wanted.
+    wanted. `pushing`, (n_loads,), is 1 for a force, and 0 for a moving base, whose acceleration is not counted.
     """
 
     A: FloatArray
     loads: FloatArray
     damping: FloatArray
     directions: FloatArray
+    pushing: FloatArray
 
 
 class Steps(NamedTuple):
@@ -480,12 +481,14 @@ def move_on(elements: Elements, flows: Flows, plant: Plant, steps: Steps, motion
 
 @unfolded
 def add_accelerations(elements: Elements, plant: Plant, n_loads: int, motion: Motion, peaks: FloatArray) -> None:
-    """Largest accelerations so far by all but the loads: under a moving base they are absolute."""
+    """Largest accelerations so far, absolute ones under a moving base."""
     n, m = elements.k0.size, motion.x.size
     for q in range(m // 2):
         total = 0.0
         for p in range(m):
             total += plant.A[m // 2 + q, p] * motion.x[p]
+        for i in range(n_loads):
+            total += plant.pushing[i] * motion.loads[i] * plant.loads[i, m // 2 + q]
         for e in range(n):
             total += plant.loads[n_loads + e, m // 2 + q] * (elements.k0[e] * motion.carry[2, e] - motion.carry[0, e])
         peaks[q] = max(peaks[q], abs(total))

@@ -125,7 +125,8 @@ def _computed(
         A, loads, np.ascontiguousarray(rates), slopes, parameters, states,
         np.array(np.broadcast_to(values.get("scale", np.ones(1)), n_sets)),
     )  # fmt: skip
-    plant = Plant(A[0], loads[0], np.zeros((structure.n_nodes, structure.n_nodes)), np.zeros((0, structure.n_nodes)))
+    square, none = np.zeros((structure.n_nodes, structure.n_nodes)), np.zeros((0, structure.n_nodes))
+    plant = Plant(A[0], loads[0], square, none, np.array([float(structure.excitation == "force")]))
     x = read_only(structure.initial_state or np.zeros(m))
     with np.errstate(all="ignore"):
         follow_each(
