@@ -6,9 +6,9 @@ equal substeps throughout so that the outputs are smooth: as many as turn the ph
 at most 0.8 rad each, whose error is about 1e-5 of the largest acceleration.
 
 The search begins with the first motions of the record with the largest input, which are small and determine the
-stiffness, and goes on to longer parts of it; what a part does not determine is kept near its start. That costs little,
-since the parts are short: with 14 numbers that are 50 % off the whole search took half as long with it, and ended in the
-same optimum.
+stiffness, and goes on to longer parts of it; what a part does not determine is kept near its start. The
+parts are short and cost little: with 14 numbers 50 % off the whole search took half as long with them, and ended in
+the same optimum.
 """
 
 import math
