@@ -165,6 +165,7 @@ def growth(n_sets: int, n_samples: int, repeats: int) -> dict[str, float]:
     """Powers of the time by number and length, and the further memory [MB] that four times as many oscillators take."""
     a, sets = ground_motion(n_samples), oscillators(n_sets)
     part = {name: values[: n_sets // 4] for name, values in sets.items()}
+    peaks(oscillators(4), a[:100], 1e-5)  # compiles
     quarter, _, _ = timed(lambda: peaks(part, a, 1e-5), repeats)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     whole, _, _ = timed(lambda: peaks(sets, a, 1e-5), repeats)

@@ -966,7 +966,8 @@ def structures_work_precision(result: Result) -> list[str]:
 def structure_ensembles(result: Result) -> list[str]:
     """A million oscillators in an earthquake."""
     rows, grown = result["rows"], result["growth"]
-    own = the(rows, method="hysim, tolerance 1e-05")
+    exact = [row for row in rows if str(row["method"]).startswith("hysim") and row["worst_error"] <= 1e-5]
+    own = min(exact, key=lambda row: row["million_minutes"])
     loose, plain = the(rows, method="hysim, tolerance 0.001"), the(rows, method="Newmark, 8 steps a sample")
     coarse = the(rows, method="Newmark, 1 steps a sample")
     return [
