@@ -184,7 +184,7 @@ def summary(rows: list[Row]) -> dict[str, Any]:
 
 
 def draw(rows: list[Row]) -> Figure:
-    """Errors of the predicted drifts by seed, and of the parameters."""
+    """Errors of the predicted drifts by seed, and of the parameters; lines are 2 %, and the error of the start."""
     canvas = figure(height=3.0)
     left, right = canvas.subplots(1, 2)
     for k, colour in enumerate(("#0072B2", "#D55E00", "#009E73"), 1):
@@ -198,7 +198,7 @@ def draw(rows: list[Row]) -> Figure:
         errors = [abs(row[f"{name}_error_percent"]) for row in rows]
         right.plot(errors, [place] * len(rows), "o", color="#0072B2", markersize=3.0)
     right.axvline(100.0 * AWAY, color="#999999", linewidth=0.8)
-    right.set(xscale="log", xlabel="Error of the parameter [%]; the line is the start's")
+    right.set(xscale="log", xlabel="Error of the parameter [%]")
     right.set_yticks(range(len(FREE)), [name.removeprefix("elements.") for name in FREE], fontsize=7)
     right.invert_yaxis()
     return canvas

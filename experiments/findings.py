@@ -375,7 +375,7 @@ def identified_frame(result: Result) -> list[str]:
     """A frame identified from two earthquakes, and its drifts in a third."""
     require(result["converged"] == result["seeds"], "every search converges")
     require(result["median_peak_drift_error_percent"] < 2.0, "peak drifts within 2 % in the median")
-    require(result["worst_seconds"] < 60.0, "each search takes less than a minute")
+    require(result["median_seconds"] < 60.0, "a search takes less than a minute in the median")
     name = result["worst_law_parameter"]
     return [
         "From floor accelerations of two earthquakes with noise of 2 % of their peak, and a start that is 50 % off in "
@@ -392,8 +392,8 @@ def identified_frame(result: Result) -> list[str]:
         f"{error_of(result['worst_law_error_percent'])} % at worst (`{name}`); all errors are "
         f"{result['rms_error_in_stderr']:.2f} standard errors in the rms.",
         f"A search takes {number(result['median_seconds'], 2)} s in the median and "
-        f"{number(result['worst_seconds'], 2)} s at worst, on two cores; the masses, the form of the law and the motion "
-        "of the ground are told.",
+        f"{number(result['worst_seconds'], 2)} s at worst, on two cores; the masses, the form of the law and the "
+        "motion of the ground are told.",
     ]
 
 
@@ -963,11 +963,31 @@ def structures_work_precision(result: Result) -> list[str]:
     ]
 
 
+def structure_ensembles(result: Result) -> list[str]:
+    """A million oscillators in an earthquake."""
+    rows, grown = result["rows"], result["growth"]
+    own = the(rows, method="hysim, tolerance 1e-05")
+    loose, plain = the(rows, method="hysim, tolerance 0.001"), the(rows, method="Newmark, 8 steps a sample")
+    coarse = the(rows, method="Newmark, 1 steps a sample")
+    return [
+        f"{count(own['sets'])} masses on Bouc-Wen springs under {count(own['samples'])} samples, on "
+        f"{result['threads']} threads; a million would take {number(own['million_minutes'])} min at largest drifts "
+        f"that are {error_of(own['median_error'])} wrong in the median and {error_of(own['worst_error'])} at worst of "
+        f"{result['checked']}, and {number(loose['million_minutes'])} min at {error_of(loose['worst_error'])} at "
+        f"worst. A compiled loop of Newmark's method takes {number(coarse['million_minutes'])} min at "
+        f"{error_of(coarse['worst_error'])} and {number(plain['million_minutes'])} min at "
+        f"{error_of(plain['worst_error'])} at worst. The time grows with number and length by powers of "
+        f"{grown['power_of_number']:.2f} and {grown['power_of_length']:.2f}; four times as many take "
+        f"{grown['further_memory_mb']:.0f} MB more memory.",
+    ]
+
+
 GROUPS: dict[str, tuple[Finding, ...]] = {
     "Evaluation and speed": (
         exact_step,
         work_precision,
         structures_work_precision,
+        structure_ensembles,
         batch,
         cold_start,
         more_samples,

@@ -1,5 +1,6 @@
 """A structure in a closed loop: its own motion under forces that are held, and an earthquake beside them."""
 
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,10 @@ from scipy.linalg import expm
 
 import hysim as hs
 
+pytestmark = pytest.mark.skipif(
+    os.environ.get("NUMBA_DISABLE_JIT", "0") != "0",
+    reason="loops of hundreds of samples, which take minutes uncompiled",
+)
 H = 0.01
 T = H * np.arange(500)
 STEP = np.where(T > 0.1, 1.0, 0.0)

@@ -33,6 +33,9 @@ class Parameter:
     affine: bool = False
 
 
+_ROUNDING = 1e-14  # of a number by way of its logarithm
+
+
 class Coordinate(NamedTuple):
     """A parameter in its box: searched as a multiple of `scale`, or as its logarithm."""
 
@@ -48,8 +51,13 @@ class Coordinate(NamedTuple):
         return np.log(inside) if self.log else inside / self.scale
 
     def decode(self, x: FloatArray) -> FloatArray:
-        """Values of coordinates."""
-        return np.exp(x) if self.log else x * self.scale
+        """Values of coordinates; a side of the box is itself again, without the rounding of its logarithm."""
+        if not self.log:
+            return x * self.scale
+        values = np.exp(x)
+        for side in (self.lower, self.upper):
+            values = np.where(np.abs(values - side) <= _ROUNDING * side, side, values)
+        return np.asarray(values)
 
     def limited(self, limits: Mapping[str, tuple[float, float]]) -> "Coordinate":
         """The coordinate in the user's bounds.

@@ -202,7 +202,7 @@ def follow_each(
         for k in range(row.size):
             loads[k, 0] = sets.scales[i] * row[k]
         begin_motion(one, starts, sets.states[i], x, motion)
-        own = Plant(A, sets.loads[i], plant.damping, plant.directions)
+        own = Plant(A, sets.loads[i], plant.damping, plant.directions, plant.pushing)
         divided = Steps(steps.sample_time, rate, base, steps.halvings, steps.tolerance)
         lost = walk(one, flows, own, divided, True, loads, motion, room, tracks)
         for q in range(motion.peaks.size):

@@ -48,7 +48,7 @@ _LOBATTO = np.array(
     ]
 )
 _NARROWEST = 2.0**-26  # share of a step: the smallest part that is divided
-_UNSEEN = 0.05  # share of a stretch behind its last node, halved: a kink there is seen at the end alone
+UNSEEN = 0.05  # share of a stretch behind its last node, halved: a kink there is seen at the end alone
 _MOST_PARTS = 1000  # that are tried on one stretch
 
 Path = tuple[float, float, float, float, float, float]
@@ -219,7 +219,8 @@ def fit_rest(
 
     `middle` and `last` are the rates there. `rest`, (c0, c1, c2, c3), and `sums` are overwritten: m0, the work of r,
     the largest drift at a turn, r at the last node, the place of that node, what the fit misses of the fifth moment,
-    and what the rule may have missed behind its nodes. The m0 before is that of the sweep before. The law's memory is
+    what the rule may have missed behind its nodes, in a first sweep without the last of them, and the r to which its
+    last nodes lead. The m0 before is that of the sweep before. The law's memory is
     at the last node, or at the end, afterwards; before a division it is taken from `saved`.
     """
     one, two, three, four = turns(path, middle, last)
@@ -229,10 +230,12 @@ def fit_rest(
     for part in range(5):
         end = one if part == 0 else two if part == 1 else three if part == 2 else four if part == 3 else 1.0
         total = together(total, along(step, parameters, state, rule, begin, end, total[6], k0, path))
-        sums[3], sums[4] = total[6], begin + (end - begin) * rule[rule.shape[0] - 1, 0]
+        sums[3], sums[4], sums[7] = total[6], begin + (end - begin) * rule[rule.shape[0] - 1, 0], total[7]
+        if end == 1.0 and not is_fine:
+            break
         d = drift_at(end, path)
         r = k0 * d - step(parameters, state, d)
-        missed += _UNSEEN * (end - begin) * abs(r - total[7])
+        missed += UNSEEN * (end - begin) * abs(r - total[7])
         total = total[0], total[1], total[2], total[3], total[4], total[5], r, 0.0
         if end == 1.0:
             break

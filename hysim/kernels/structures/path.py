@@ -19,7 +19,7 @@ import numpy as np
 from hysim._frozen import FloatArray
 from hysim.kernels._compile import kernel, uncounted, unfolded
 from hysim.kernels.structures.flows import N_POWERS, add_columns
-from hysim.kernels.structures.moments import IntArray, copy, crest, fit_rest, quintic
+from hysim.kernels.structures.moments import UNSEEN, IntArray, copy, crest, fit_rest, quintic
 from hysim.kernels.structures.pointers import step_at
 
 _MOST_SWEEPS = 4
@@ -76,7 +76,7 @@ class Room(NamedTuple):
     rests; `before` the drifts of the sweep before. `scales` are the sizes of drifts, `own` the drifts by unit rests of
     the same element, `allowed` the errors that their moments may have, `errors` those of the drifts. `rest`,
     (4 n_elements,), are the coefficients of the rests, `half` those for the half of the step; `sums` is
-    (n_elements, 7), see `moments.fit_rest`. `saved` and `spare` are states of the laws, `end`, `point` and `now` states
+    (n_elements, 8), see `moments.fit_rest`. `saved` and `spare` are states of the laws, `end`, `point` and `now` states
     of the structure after and in the step; `speeds`, (2, n_nodes), are two derivatives of the velocity; `loads`,
     (2, n_loads), the rise over a sample, and the loads at the begin of a step.
     """
@@ -108,8 +108,8 @@ class Motion(NamedTuple):
 
     `x` is the state (x, v), `laws` are the laws' states, `carry` is (5, n_elements): force, slope of the rest over
     time, drift, its rate, and the largest error of the drift in a step. `peaks` are the largest sizes so far of drifts,
-    forces, displacements and accelerations; `work` is that of the loads, of the damping and of each element.
-    `division`, (1,), is the present number of halvings. `loads` are those of the last sample.
+    forces, displacements and, where there is room, accelerations; `work` is that of the loads, of the damping and of
+    each element. `division`, (1,), is the present number of halvings. `loads` are those of the last sample.
     """
 
     x: FloatArray
@@ -122,7 +122,7 @@ class Motion(NamedTuple):
 
 
 class Tracks(NamedTuple):
-    """Where samples are written, a row each, or only the last one where there is one row; no columns for none."""
+    """Where samples are written, a row each, or only the last one where there is one row, or none."""
 
     x: FloatArray
     carry: FloatArray
@@ -135,13 +135,14 @@ class Plant(NamedTuple):
     """The linear part: A, (m, m), and the loads, (n_loads + n_elements, m), of s' = A s + loads, for accelerations.
 
     `damping` is (n_nodes, n_nodes) and `directions` (n_loads, n_nodes), for energies; without rows where these are not
-    wanted.
+    wanted. `pushing`, (n_loads,), is 1 for a force, and 0 for a moving base, whose acceleration is not counted.
     """
 
     A: FloatArray
     loads: FloatArray
     damping: FloatArray
     directions: FloatArray
+    pushing: FloatArray
 
 
 class Steps(NamedTuple):
@@ -165,7 +166,7 @@ def make_room(n_elements: int, m: int, n_state: int, n_loads: int = 1) -> Room:
         **dict.fromkeys(("free_drifts", "free_middle", "drifts", "middle", "before"), 2 * n_elements),
         **dict.fromkeys(("scales", "own", "allowed", "errors"), n_elements),
         **dict.fromkeys(("rest", "half"), N_POWERS * n_elements),
-        "sums": (n_elements, 7),
+        "sums": (n_elements, 8),
         **dict.fromkeys(("saved", "spare"), n_state),
         **dict.fromkeys(("end", "point", "now"), m),
         "speeds": (2, m // 2),
@@ -254,11 +255,15 @@ def largest_error(tolerance: float, room: Room) -> float:
 
 
 @unfolded
-def is_smooth(room: Room) -> bool:
-    """Whether each rest ends where its first nodes lead, so that no kink behind them is missed."""
+def is_smooth(elements: Elements, motion: Motion, room: Room) -> bool:
+    """Whether each rest ends where its nodes lead, so that no kink behind them is missed; the laws are put there."""
     smooth = True
     for e in range(room.allowed.size):
-        smooth = smooth and room.sums[e, 6] <= room.allowed[e]
+        parameters = elements.parameters[elements.parameter_ends[e] : elements.parameter_ends[e + 1]]
+        state = motion.laws[elements.state_ends[e] : elements.state_ends[e + 1]]
+        f = step_at(elements.steps[e])(parameters, state, room.drifts[e])
+        missed = room.sums[e, 6] + UNSEEN * abs(elements.k0[e] * room.drifts[e] - f - room.sums[e, 7])
+        smooth = smooth and missed <= room.allowed[e]
     return smooth
 
 
@@ -324,7 +329,7 @@ def try_step(
         apart = largest_error(tolerance, room)
         if k > 0 and not (any_divided and apart > 1.0):
             break
-        if apart < _AT_ONCE and is_smooth(room):
+        if apart < _AT_ONCE and is_smooth(elements, motion, room):
             break
     return apart
 
@@ -476,12 +481,14 @@ def move_on(elements: Elements, flows: Flows, plant: Plant, steps: Steps, motion
 
 @unfolded
 def add_accelerations(elements: Elements, plant: Plant, n_loads: int, motion: Motion, peaks: FloatArray) -> None:
-    """Largest accelerations so far by all but the loads: under a moving base they are absolute."""
+    """Largest accelerations so far, absolute ones under a moving base."""
     n, m = elements.k0.size, motion.x.size
     for q in range(m // 2):
         total = 0.0
         for p in range(m):
             total += plant.A[m // 2 + q, p] * motion.x[p]
+        for i in range(n_loads):
+            total += plant.pushing[i] * motion.loads[i] * plant.loads[i, m // 2 + q]
         for e in range(n):
             total += plant.loads[n_loads + e, m // 2 + q] * (elements.k0[e] * motion.carry[2, e] - motion.carry[0, e])
         peaks[q] = max(peaks[q], abs(total))
@@ -489,7 +496,9 @@ def add_accelerations(elements: Elements, plant: Plant, n_loads: int, motion: Mo
 
 @unfolded
 def write(motion: Motion, k: int, tracks: Tracks) -> None:
-    """The present sample into its row, or into the only one."""
+    """The present sample into its row, or into the only one, if there is any."""
+    if tracks.x.shape[0] == 0:
+        return
     row = min(k, tracks.x.shape[0] - 1)
     put(motion.x, tracks.x[row])
     for i in range(motion.carry.shape[0]):
@@ -535,7 +544,8 @@ def walk(
         for i in range(rise.size):
             motion.loads[i] = loads[k, i]
         n, m = elements.k0.size, motion.x.size
-        add_accelerations(elements, plant, rise.size, motion, motion.peaks[2 * n + m // 2 :])
+        if motion.peaks.size > 2 * n + m // 2:
+            add_accelerations(elements, plant, rise.size, motion, motion.peaks[2 * n + m // 2 :])
         write(motion, k, tracks)
         for q in range(m):
             if not math.isfinite(motion.x[q]):

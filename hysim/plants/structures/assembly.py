@@ -158,13 +158,13 @@ def flows_of(elements: Elements, plant: Plant, steps: Steps) -> Flows:
     return flows
 
 
-def empty_motion(m: int, n_state: int, n_elements: int, n_loads: int = 1) -> Motion:
+def empty_motion(m: int, n_state: int, n_elements: int, n_loads: int = 1, *, with_accelerations: bool = True) -> Motion:
     """Room for what moves."""
     return Motion(
         x=np.zeros(m),
         laws=np.zeros(n_state),
         carry=np.zeros((5, n_elements)),
-        peaks=np.zeros(2 * n_elements + m),
+        peaks=np.zeros(2 * n_elements + (m if with_accelerations else m // 2)),
         work=np.zeros(2 + n_elements),
         division=np.zeros(1),
         loads=np.zeros(n_loads),

@@ -44,7 +44,8 @@ class ControlledStructure:
         if ground_acceleration is not None:
             directions.append(-structure.mass_matrix.sum(axis=1))
         A, loads, rates = assembly.linear_parts(structure.matrices._replace(directions=np.array([directions])))
-        self.plant = Plant(A[0], loads[0], np.array(structure.damping_matrix), np.array(directions))
+        pushing = np.array([1.0, 0.0][: len(directions)])
+        self.plant = Plant(A[0], loads[0], np.array(structure.damping_matrix), np.array(directions), pushing)
         self.steps = assembly.steps_of(float(rates[0]), sample_time, structure.substeps, structure.tolerance)
         self.weights = measured(structure)
         before = structure.start()
@@ -82,7 +83,6 @@ class ControlledStructure:
         self.structure.check_resolved(motion)
         state = StructureState(motion, True, self.begin.stored)
         signals = self.structure.signals_of(np.append(0.0, drive[:-1]), state, tracks)
-        signals["peak_acceleration"] = np.maximum.accumulate(np.abs(signals["acceleration"]))
         return Controlled(command, drive, y, signals, lost)
 
 

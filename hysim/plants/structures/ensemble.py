@@ -88,7 +88,7 @@ def _reduced(
 ) -> FloatArray:
     """The measure of each set, a row each."""
     n_elements, n = len(structure.elements), structure.n_nodes
-    results = _computed(structure, values, u, n_sets, sample_time)
+    results = _computed(structure, values, u, n_sets, sample_time, with_accelerations=reduce == "peak_acceleration")
     peaks = results.peaks
     unresolved = assembly.uncertainty(results.errors, peaks[:, :n_elements]) > assembly.LEAST_CERTAIN
     measures = {
@@ -103,7 +103,13 @@ def _reduced(
 
 
 def _computed(
-    structure: Any, values: Mapping[str, FloatArray], u: FloatArray, n_sets: int, sample_time: float
+    structure: Any,
+    values: Mapping[str, FloatArray],
+    u: FloatArray,
+    n_sets: int,
+    sample_time: float,
+    *,
+    with_accelerations: bool,
 ) -> Results:
     """What the kernel computes of the sets of one chunk."""
     laws, parameters, states, slopes, matrices = _stacked(structure, values, n_sets)
@@ -112,19 +118,20 @@ def _computed(
     elements = assembly.elements_of(laws, structure.drift_matrix, slopes[0])
     halvings = 0 if structure.substeps else assembly.HALVINGS
     steps = Steps(sample_time, 0.0, structure.substeps or 0, halvings, structure.tolerance)
-    motion = assembly.empty_motion(m, states.shape[1], n_elements)
+    motion = assembly.empty_motion(m, states.shape[1], n_elements, with_accelerations=with_accelerations)
     E, P, flows = assembly.empty_flows(halvings, m, 1, n_elements)
     results = Results(np.empty((n_sets, motion.peaks.size)), *(np.empty((n_sets, n_elements)) for _ in range(3)))
     sets = Sets(
         A, loads, np.ascontiguousarray(rates), slopes, parameters, states,
         np.array(np.broadcast_to(values.get("scale", np.ones(1)), n_sets)),
     )  # fmt: skip
-    plant = Plant(A[0], loads[0], np.zeros((structure.n_nodes, structure.n_nodes)), np.zeros((0, structure.n_nodes)))
+    square, none = np.zeros((structure.n_nodes, structure.n_nodes)), np.zeros((0, structure.n_nodes))
+    plant = Plant(A[0], loads[0], square, none, np.array([float(structure.excitation == "force")]))
     x = read_only(structure.initial_state or np.zeros(m))
     with np.errstate(all="ignore"):
         follow_each(
             elements, laws.starts, sets, plant, steps, assembly.PHASE, x, np.ascontiguousarray(u), E, P, flows,
-            motion, assembly.room_for(motion), assembly.empty_tracks(1, motion), results,
+            motion, assembly.room_for(motion), assembly.empty_tracks(0, motion), results,
         )  # fmt: skip
     return results
 

@@ -5,10 +5,10 @@ ten times it. Outputs have no derivatives by them: `hysim.identify` takes finite
 equal substeps throughout so that the outputs are smooth: as many as turn the phase of the fastest mode at the start by
 at most 0.8 rad each, whose error is about 1e-5 of the largest acceleration.
 
-Where the periods of the start are wrong, the calculated motion is soon out of step with the measured one, and the sum
-of squares of a whole earthquake has many minima. The search therefore begins with the first motions, which are small
-and nearly elastic and determine stiffness, and goes on to longer and longer parts of the record; what a part does not
-determine is kept near its start.
+The search begins with the first motions of the record with the largest input, which are small and determine the
+stiffness, and goes on to longer parts of it; what a part does not determine is kept near its start. The
+parts are short and cost little: with 14 numbers 50 % off the whole search took half as long with them, and ended in
+the same optimum.
 """
 
 import math
