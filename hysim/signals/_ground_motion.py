@@ -62,11 +62,11 @@ def ground_motion(
         Time between two samples [s].
     seed : int or numpy.random.Generator
         Seed of the noise. The same arguments and seed give the same bits.
-    ground_frequency, corner_frequency : float
-        Circular frequencies of the soil and of the high pass [rad/s]. The defaults are firm soil; Der Kiureghian and
-        Neuenhofer have 15 and 1.5 for firm, 10 and 1 for medium, 5 and 0.5 for soft soil.
-    ground_damping, corner_damping : float
-        Damping ratios: 0.6 for firm, 0.4 for medium and 0.2 for soft soil, and 0.6 for each high pass.
+    ground_frequency, ground_damping : float
+        Circular frequency of the soil [rad/s] and its damping ratio. The defaults are firm soil; Der Kiureghian and
+        Neuenhofer have 15 and 0.6 for firm, 10 and 0.4 for medium, 5 and 0.2 for soft soil.
+    corner_frequency, corner_damping : float
+        Circular frequency of the high pass [rad/s], 1.5, 1 and 0.5 for these soils, and its damping ratio, 0.6 for each.
     envelope : {"saragoni-hart", "jennings", "none"}
         Shape of the motion in time; ``"none"`` cuts a piece out of a stationary motion.
     rise : float

@@ -39,6 +39,7 @@ class StructureRecord:
     drift, force : array, shape (n, n_elements), optional
         Of the elements [m], [N]; likewise.
     name : str, optional
+        Name of the record in tables.
 
     Raises
     ------
