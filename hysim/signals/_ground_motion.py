@@ -66,7 +66,7 @@ def ground_motion(
         Circular frequency of the soil [rad/s] and its damping ratio. The defaults are firm soil; Der Kiureghian and
         Neuenhofer have 15 and 0.6 for firm, 10 and 0.4 for medium, 5 and 0.2 for soft soil.
     corner_frequency, corner_damping : float
-        Circular frequency of the high pass [rad/s], 1.5, 1 and 0.5 for these soils, and its damping ratio, 0.6 for each.
+        Circular frequency of the high pass [rad/s], 1.5, 1 and 0.5 for these soils, and its damping ratio.
     envelope : {"saragoni-hart", "jennings", "none"}
         Shape of the motion in time; ``"none"`` cuts a piece out of a stationary motion.
     rise : float
