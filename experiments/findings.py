@@ -378,7 +378,7 @@ def identified_frame(result: Result) -> list[str]:
     require(result["median_seconds"] < 60.0, "a search takes less than a minute in the median")
     name = result["worst_law_parameter"]
     return [
-        "From floor accelerations of two earthquakes with noise of 2 % of their peak, and a start that is 50 % off in "
+        "From floor accelerations of two synthetic earthquakes with noise of 2 % of their peak, and a start that is 50 % off in "
         f"each of {len(result['parameters'])} numbers, the largest drifts of a third earthquake are predicted to "
         f"{error_of(result['median_peak_drift_error_percent'])} % in the median of {count(result['seeds'])} seeds and "
         f"three storeys, and to {error_of(result['worst_peak_drift_error_percent'])} % at worst; the start is off by "
@@ -387,7 +387,7 @@ def identified_frame(result: Result) -> list[str]:
         f"{error_of(result['worst_damping_error_percent'])} %), its standard error is "
         f"{error_of(result['median_damping_stderr_percent'])} %, and its largest correlation with a number of the laws "
         f"{result['median_correlation_of_damping']:.2f} in the median (worst "
-        f"{result['worst_correlation_of_damping']:.2f}): damping and yielding are told apart.",
+        f"{result['worst_correlation_of_damping']:.2f}): damping and yielding are told apart. "
         f"The numbers of the laws are off by {error_of(result['median_law_error_percent'])} % in the median and "
         f"{error_of(result['worst_law_error_percent'])} % at worst (`{name}`); all errors are "
         f"{result['rms_error_in_stderr']:.2f} standard errors in the rms.",
