@@ -379,8 +379,9 @@ def identified_frame(result: Result) -> list[str]:
     return [
         "From floor accelerations of two synthetic earthquakes with noise of 2 % of their peak, and a start that is "
         f"50 % off in each of {len(result['parameters'])} numbers, the largest drifts of a third earthquake are "
-        f"predicted to {error_of(result['median_peak_drift_error_percent'])} % in the median of {count(result['seeds'])} seeds and "
-        f"three storeys, and to {error_of(result['worst_peak_drift_error_percent'])} % at worst; the start is off by "
+        f"predicted to {error_of(result['median_peak_drift_error_percent'])} % in the median of "
+        f"{count(result['seeds'])} seeds and three storeys, and to "
+        f"{error_of(result['worst_peak_drift_error_percent'])} % at worst; the start is off by "
         f"{number(result['median_peak_drift_error_of_start_percent'], 2)} % in its worst storey.",
         f"The damping is off by {error_of(result['median_damping_error_percent'])} % of itself (worst "
         f"{error_of(result['worst_damping_error_percent'])} %), its standard error is "
