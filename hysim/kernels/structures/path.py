@@ -104,7 +104,7 @@ class Room(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """What moves along.
+    """The state of a simulation, which moves along.
 
     `x` is the state (x, v), `laws` are the laws' states, `carry` is (5, n_elements): force, slope of the rest over
     time, drift, its rate, and the largest error of the drift in a step. `peaks` are the largest sizes so far of drifts,
@@ -122,7 +122,7 @@ class Motion(NamedTuple):
 
 
 class Tracks(NamedTuple):
-    """Where samples are written, a row each, or only the last one where there is one row, or none."""
+    """Tables of the samples, a row each; with one row the last sample only, without rows none."""
 
     x: FloatArray
     carry: FloatArray

@@ -111,7 +111,7 @@ def _computed(
     *,
     with_accelerations: bool,
 ) -> Results:
-    """What the kernel computes of the sets of one chunk."""
+    """Results of the kernel for the sets of one chunk."""
     laws, parameters, states, slopes, matrices = _stacked(structure, values, n_sets)
     A, loads, rates = assembly.linear_parts(matrices)
     n_elements, m = len(structure.elements), 2 * structure.n_nodes

@@ -76,7 +76,7 @@ class StaticResponse:
 
 
 class Frame(NamedTuple):
-    """What stands still: stiffness (n, n), drifts (n_elements, n), the laws and their slopes at the start."""
+    """The constants of slow motions: stiffness (n, n), drifts (n_elements, n), the laws and their slopes at the start."""
 
     stiffness: FloatArray
     rows: FloatArray
