@@ -76,7 +76,7 @@ class StaticResponse:
 
 
 class Frame(NamedTuple):
-    """The constants of slow motions: stiffness (n, n), drifts (n_elements, n), the laws and their slopes at the start."""
+    """Constants of slow motions: stiffness (n, n), drifts (n_elements, n), the laws and their slopes at the start."""
 
     stiffness: FloatArray
     rows: FloatArray
