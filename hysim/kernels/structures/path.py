@@ -15,11 +15,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim.kernels._compile import kernel, uncounted, unfolded
 from hysim.kernels.structures.flows import N_POWERS, add_columns
-from hysim.kernels.structures.moments import UNSEEN, IntArray, copy, crest, fit_rest, quintic
+from hysim.kernels.structures.moments import UNSEEN, IntArray, crest, fit_rest, quintic
 from hysim.kernels.structures.pointers import step_at
 
 _MOST_SWEEPS = 4
@@ -31,6 +32,9 @@ _OF_DIVISIONS = 0.1  # share of the tolerance that a divided moment may take
 OF_MOMENTS = 1.0e-9  # tolerance of the moments where the steps have none
 _NEAREST = 1.0e-3  # of the step: a last node closer to its end has no slope but that of rounding
 _TINY = 1.0e-290
+
+
+BoolArray = npt.NDArray[np.bool_]
 
 
 class Elements(NamedTuple):
@@ -74,11 +78,12 @@ class Room(NamedTuple):
     `inputs`, (m + 2 n_loads,), are the weights of the free flows. `free_drifts` and `free_middle`, (2 n_elements,), are
     the drifts and their rates without the rests after the step and its half; `drifts` and `middle` those with the
     rests; `before` the drifts of the sweep before. `scales` are the sizes of drifts, `own` the drifts by unit rests of
-    the same element, `allowed` the errors that their moments may have, `errors` those of the drifts. `rest`,
-    (4 n_elements,), are the coefficients of the rests, `half` those for the half of the step; `sums` is
-    (n_elements, 8), see `moments.fit_rest`. `saved` and `spare` are states of the laws, `end`, `point` and `now` states
-    of the structure after and in the step; `speeds`, (2, n_nodes), are two derivatives of the velocity; `loads`,
-    (2, n_loads), the rise over a sample, and the loads at the begin of a step.
+    the same element, `allowed` the errors that their moments may have, `errors` those of the drifts. `forces` are
+    those after the step, where `is_at_end`, (1,), says that the laws have been put there. `rest`, (4 n_elements,), are
+    the coefficients of the rests, `half` those for the half of the step; `sums` is (n_elements, 8), see
+    `moments.fit_rest`. `saved` and `spare` are states of the laws, `end`, `point` and `now` states of the structure
+    after and in the step; `speeds`, (2, n_nodes), are two derivatives of the velocity; `loads`, (2, n_loads), the rise
+    over a sample, and the loads at the begin of a step.
     """
 
     inputs: FloatArray
@@ -91,6 +96,8 @@ class Room(NamedTuple):
     own: FloatArray
     allowed: FloatArray
     errors: FloatArray
+    forces: FloatArray
+    is_at_end: BoolArray
     rest: FloatArray
     half: FloatArray
     sums: FloatArray
@@ -164,7 +171,7 @@ def make_room(n_elements: int, m: int, n_state: int, n_loads: int = 1) -> Room:
     shapes = {
         "inputs": m + 2 * n_loads,
         **dict.fromkeys(("free_drifts", "free_middle", "drifts", "middle", "before"), 2 * n_elements),
-        **dict.fromkeys(("scales", "own", "allowed", "errors"), n_elements),
+        **dict.fromkeys(("scales", "own", "allowed", "errors", "forces"), n_elements),
         **dict.fromkeys(("rest", "half"), N_POWERS * n_elements),
         "sums": (n_elements, 8),
         **dict.fromkeys(("saved", "spare"), n_state),
@@ -172,7 +179,8 @@ def make_room(n_elements: int, m: int, n_state: int, n_loads: int = 1) -> Room:
         "speeds": (2, m // 2),
         "loads": (2, n_loads),
     }
-    return Room(**{name: np.zeros(shape) for name, shape in shapes.items()})
+    vectors = {name: np.zeros(shape) for name, shape in shapes.items()}
+    return Room(**vectors, is_at_end=np.zeros(1, dtype=np.bool_))
 
 
 @uncounted
@@ -200,12 +208,11 @@ def combine(columns: FloatArray, weights: FloatArray, base: FloatArray, out: Flo
 
 
 @unfolded
-def keep(elements: Elements, laws: FloatArray, saved: FloatArray) -> None:
-    """Copy all memories."""
-    for e in range(elements.k0.size):
-        begin, end = elements.state_ends[e], elements.state_ends[e + 1]
-        stretches = elements.stretches[elements.stretch_ends[e] : elements.stretch_ends[e + 1]]
-        copy(stretches, laws[begin:end], saved[begin:end])
+def keep(stretches: IntArray, source: FloatArray, target: FloatArray) -> None:
+    """Copy the memories of all laws."""
+    for i in range(stretches.shape[0]):
+        for q in range(stretches[i, 0], stretches[i, 0] + stretches[i, 1]):
+            target[q] = source[q]
 
 
 @unfolded
@@ -213,18 +220,16 @@ def sweep(elements: Elements, h: float, is_fine: bool, motion: Motion, room: Roo
     """The rests along the present paths; whether a stretch was divided."""
     n, carry = elements.k0.size, motion.carry
     any_divided = False
+    keep(elements.stretches, room.saved, motion.laws)
     for e in range(n):
-        begin, end = elements.state_ends[e], elements.state_ends[e + 1]
-        state, saved = motion.laws[begin:end], room.saved[begin:end]
-        stretches = elements.stretches[elements.stretch_ends[e] : elements.stretch_ends[e + 1]]
-        copy(stretches, saved, state)
+        memory = elements.stretches, elements.stretch_ends[e], elements.stretch_ends[e + 1], motion.laws
+        state = motion.laws[elements.state_ends[e] : elements.state_ends[e + 1]]
         parameters = elements.parameters[elements.parameter_ends[e] : elements.parameter_ends[e + 1]]
         middle, last = h * room.middle[n + e], h * room.drifts[n + e]
         path = quintic(carry[2, e], h * carry[3, e], room.middle[e], middle, room.drifts[e], last)
         is_divided = fit_rest(
-            step_at(elements.steps[e]), parameters, state, stretches, saved, room.spare[begin:end],
-            is_fine, room.allowed[e], elements.k0[e], carry[0, e], path, middle, last, room.rest[4 * e : 4 * e + 4],
-            room.sums[e],
+            step_at(elements.steps[e]), parameters, state, memory, room.saved, room.spare, is_fine, room.allowed[e],
+            elements.k0[e], carry[0, e], path, middle, last, e, room.rest, room.sums,
         )  # fmt: skip
         any_divided = any_divided or is_divided
     return any_divided
@@ -262,6 +267,7 @@ def is_smooth(elements: Elements, motion: Motion, room: Room) -> bool:
         parameters = elements.parameters[elements.parameter_ends[e] : elements.parameter_ends[e + 1]]
         state = motion.laws[elements.state_ends[e] : elements.state_ends[e + 1]]
         f = step_at(elements.steps[e])(parameters, state, room.drifts[e])
+        room.forces[e] = f
         missed = room.sums[e, 6] + UNSEEN * abs(elements.k0[e] * room.drifts[e] - f - room.sums[e, 7])
         smooth = smooth and missed <= room.allowed[e]
     return smooth
@@ -316,6 +322,7 @@ def try_step(
     combine(drifts, rest, room.free_drifts, room.drifts)
     set_scales(m // 2, tolerance, drifts, motion.peaks, room)
     apart = 0.0
+    room.is_at_end[0] = False
     for k in range(_MOST_SWEEPS):
         halve(rest, half)
         combine(half_drifts, half, room.free_middle, room.middle)
@@ -330,6 +337,7 @@ def try_step(
         if k > 0 and not (any_divided and apart > 1.0):
             break
         if apart < _AT_ONCE and is_smooth(elements, motion, room):
+            room.is_at_end[0] = True
             break
     return apart
 
@@ -349,8 +357,8 @@ def take_step(
     for e in range(n):
         parameters = elements.parameters[elements.parameter_ends[e] : elements.parameter_ends[e + 1]]
         state = motion.laws[elements.state_ends[e] : elements.state_ends[e + 1]]
-        step, d = step_at(elements.steps[e]), room.drifts[e]
-        f = step(parameters, state, d)
+        d = room.drifts[e]
+        f = room.forces[e] if room.is_at_end[0] else step_at(elements.steps[e])(parameters, state, d)
         ahead = 1.0 - sums[e, 4]
         slope = (elements.k0[e] * d - f - sums[e, 3]) / (h * ahead) if ahead > _NEAREST else 0.0
         carry[1, e] = slope
@@ -370,7 +378,7 @@ def take_step(
         add_work(flows, plant, level, h, share, motion, room)
     for q in range(m):
         x[q] = end[q]
-    keep(elements, motion.laws, room.saved)
+    keep(elements.stretches, motion.laws, room.saved)
 
 
 @unfolded
@@ -535,7 +543,7 @@ def walk(
 ) -> int:  # fmt: skip
     """As `follow`, of arrays that the caller holds."""
     rise = room.loads[0]
-    keep(elements, motion.laws, room.saved)
+    keep(elements.stretches, motion.laws, room.saved)
     for k in range(loads.shape[0]):
         if k > 0 or not is_first:
             for i in range(rise.size):

@@ -88,7 +88,8 @@ def laws_of(models: Sequence[Any]) -> Laws:
 def elements_of(laws: Laws, rows: FloatArray, slopes: FloatArray) -> Elements:
     """The elements as the kernel takes them."""
     nodes = [np.flatnonzero(row) for row in rows]
-    stretches = [np.array(each, dtype=np.int64).reshape(-1, 2) for each in laws.stretches]
+    begins = zip(laws.stretches, laws.state_ends, strict=False)
+    stretches = [np.array([(begin + a, n) for a, n in each], dtype=np.int64).reshape(-1, 2) for each, begin in begins]
     return Elements(
         nodes=joined(nodes, np.int64),
         weights=read_only(joined([row[each] for row, each in zip(rows, nodes, strict=True)])),
