@@ -22,7 +22,7 @@ spec.loader.exec_module(experiment)
 
 N_CASES = 2 if numba.config.DISABLE_JIT else 8
 
-NOT_RATE_INDEPENDENT = {"TransferFunction", "Dashpot", "Actuator", "BoucWenOscillator"}
+NOT_RATE_INDEPENDENT = {"TransferFunction", "Dashpot", "Actuator", "BoucWenOscillator", "Structure"}
 """Between two samples the input of these is held, or goes on a line: with more samples it is another input."""
 INVERSES = {"BoucWenInverse"}  # under the laws that it inverts
 SEARCHED = {"CustomLaw", "Line", "MaxwellSlip", "ParametricPrandtlIshlinskii", "Play", "PreisachRelays", "Stop"}

@@ -290,6 +290,7 @@ def test_the_staircase_divides_the_relays_that_are_up_from_those_that_are_down(u
 
 @given(laws(), short_inputs(1.0))
 def test_the_inverse_undoes_the_response(law, u):
+    u = np.round(u, 100)  # the first input is known to rounding of the levels, 1e-16, not to a share of itself
     y = law.response(u)
     found = law.inverse_response(y)
     assert np.abs(found - u).max() <= 1e-11 * 2.0  # of the span of the levels; the slope is above 0.05
