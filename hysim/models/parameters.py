@@ -51,7 +51,7 @@ class Coordinate(NamedTuple):
         return np.log(inside) if self.log else inside / self.scale
 
     def decode(self, x: FloatArray) -> FloatArray:
-        """Values of coordinates; those at a side of the box equal it, without the rounding of its logarithm."""
+        """Values of coordinates; a value at a bound is exactly the bound, without the rounding of its logarithm."""
         if not self.log:
             return x * self.scale
         values = np.exp(x)

@@ -26,6 +26,11 @@ class Laws(NamedTuple):
     stretches: tuple[tuple[tuple[int, int], ...], ...]
 
     @property
+    def places(self) -> tuple[Any, ...]:
+        """Places of each law's memory in its own state."""
+        return tuple(np.concatenate([np.arange(first, first + n) for first, n in each]) for each in self.stretches)
+
+    @property
     def parameters(self) -> FloatArray:
         """Parameters of all laws, one behind the other."""
         return read_only(joined([each.parameters for each in self.steppers]), finite=False)

@@ -98,7 +98,7 @@ class _Columns:
 
     def __init__(self, laws: Laws, slopes: FloatArray, drifts: FloatArray) -> None:
         self.members = [law.started(float(d)) for law, d in zip(laws.steppers, drifts, strict=True)]
-        self.places = [np.concatenate([np.arange(a, a + n) for a, n in each]) for each in laws.stretches]
+        self.places = laws.places
         self.slopes, self.drifts = slopes, drifts
         self.saved = [law.state[place] for law, place in zip(self.members, self.places, strict=True)]
         self.keep(drifts)

@@ -474,8 +474,7 @@ class Structure(SearchedStructure):
         states = self._followed(read_only(u, "u", ndim=1), sample_time, None, None, with_laws=True)[1].laws
         ends = np.cumsum([each.state.size for each in self.laws.steppers])[:-1]
         parts = np.split(states, ends, axis=1) if self.elements else []
-        places = [np.concatenate([np.arange(a, a + n) for a, n in each]) for each in self.laws.stretches]
-        return tuple(part[:, place] for part, place in zip(parts, places, strict=True))
+        return tuple(part[:, place] for part, place in zip(parts, self.laws.places, strict=True))
 
     def responses(
         self,
