@@ -12,6 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+STRUCTURES = ("test_structure", "plants/structures/", "[structures", "_structures_", "_frame]", "structure_ensembles")
 
 # numba's cache does not see an edit in another file: it is kept apart for each state of the kernels.
 kernels = b"".join(path.read_bytes() for path in sorted((ROOT / "hysim" / "kernels").rglob("*.py")))
@@ -36,13 +37,16 @@ def pytest_xdist_make_scheduler(config, log):
     """Divide the tests among the workers, whatever ``--dist`` says: pytest 9.2 does not see the groups of loadgroup.
 
     The tests of a file run in one worker, because they share fixtures and kernels; the experiments and the pages of
-    the documentation, which take seconds each, are divided one by one. Short files come last and even out the ends.
+    the documentation, which take seconds each, are divided one by one. All that moves structures runs in one worker,
+    whose kernels take half a minute to compile. Short files come last and even out the ends.
     """
     from xdist.scheduler import LoadScopeScheduling
 
     class Files(LoadScopeScheduling):
         def _split_scope(self, nodeid):
             file = nodeid.partition("::")[0]
+            if any(part in nodeid for part in STRUCTURES):
+                return "structures"
             return nodeid if file.endswith(("test_experiments.py", "test_docs.py")) else file
 
     config.option.loadscopereorder = False  # which would put files of many tests before those of long ones
