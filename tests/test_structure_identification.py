@@ -7,6 +7,7 @@ import pytest
 
 import hysim as hs
 from hysim.models.candidates import candidates
+from hysim.models.search_space import Freedom
 
 SAMPLE_TIME = 0.02
 BOUC_WEN = hs.BoucWen(beta=60.0, gamma=40.0, n=1.0, feedthrough=20.0, gain=180.0)
@@ -125,6 +126,19 @@ def test_fixed_numbers_and_bounds_are_kept():
     assert fit.model.elements[0].law.beta == 61.0
     assert fit.estimates["elements.0.gain"] == pytest.approx(170.0, rel=1e-12)  # the bound, by its logarithm
     assert "reached its search bound" in fit.message
+
+
+def test_a_number_stays_positive_whose_negative_would_make_energy():
+    structure = frame()
+    names = ("beta", "gamma", "gain")
+    freedom = Freedom(free=tuple(f"elements.0.{name}" for name in names))
+    space = structure.search_space(structure.as_records(record(structure))[0], freedom)
+    ends = [space.parameters(side[np.newaxis]) for side in (space.lower, space.upper)]
+    lower, upper = ({name: ends[k][f"elements.0.{name}"].item() for name in names} for k in (0, 1))
+    law = structure.elements[0].law
+    assert lower["beta"] == pytest.approx(0.1 * law.beta)
+    assert lower["gain"] == pytest.approx(0.1 * law.gain)
+    assert (lower["gamma"], upper["gamma"]) == pytest.approx((-10.0 * law.gamma, 10.0 * law.gamma))
 
 
 @pytest.mark.parametrize(

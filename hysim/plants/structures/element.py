@@ -6,11 +6,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hysim._frozen import FloatArray, check_whole
+from hysim.errors import SimulationError
 from hysim.laws.dashpot import Dashpot
 from hysim.laws.static import Line
 from hysim.models.model import family
 from hysim.models.protocols import Sampled, Stepwise, needs_time
 from hysim.models.sum import Sum
+from hysim.signals import triangle
+
+_SAMPLES = 200  # of a cycle
+_ROUNDING = 1e-9  # of the work of the whole force along the whole drift: less is none
 
 
 @family
@@ -104,3 +109,14 @@ def parted(law: Any) -> Parted:
     if needs_time(law):
         raise TypeError(f"of what depends on time an element takes dashpots only, got {type(law).__name__}")
     return Parted(law, 0.0)
+
+
+def dissipates(law: Any, stroke: float) -> bool:
+    """Whether the second cycle between plus and minus `stroke` [m], without dashpots, takes energy or none."""
+    drift = stroke * triangle(-1.0, 1.0, cycles=2, samples_per_cycle=_SAMPLES)
+    try:
+        force = parted(law).law.response(drift)
+    except SimulationError:
+        return False
+    work = np.trapezoid(force[-_SAMPLES - 1 :], drift[-_SAMPLES - 1 :])
+    return bool(work >= -_ROUNDING * np.ptp(force) * np.ptp(drift))

@@ -1,9 +1,12 @@
 """The search for the parameters of a structure, on which `hysim.identify` calls.
 
-Positive numbers are searched on a log scale from a tenth of their start to ten times it, others between plus and minus
-ten times it. Outputs have no derivatives by them: `hysim.identify` takes finite differences of simulations, which have
-equal substeps throughout so that the outputs are smooth: as many as turn the phase of the fastest mode at the start by
-at most 0.8 rad each, whose error is about 1e-5 of the largest acceleration.
+Numbers that stay positive are searched on a log scale from a tenth of their start to ten times it, others between plus
+and minus ten times it. A number stays positive where a negative one is refused, or would make an element a source of
+energy: motions of such a structure are chaotic, and a search that met them took eight times as long.
+
+Outputs have no derivatives by the numbers: `hysim.identify` takes finite differences of simulations, which have equal
+substeps throughout so that the outputs are smooth: as many as turn the phase of the fastest mode at the start by at most
+0.8 rad each, whose error is about 1e-5 of the largest acceleration.
 
 The search begins with the first motions of the record with the largest input, which are small and determine the
 stiffness, and goes on to longer parts of it; what a part does not determine is kept near its start. The
@@ -17,6 +20,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim._parallel import in_chunks
@@ -65,6 +69,10 @@ class SearchedStructure(Identifiable):
         """Rate of the fastest mode at the start [rad/s]."""
 
     @abstractmethod
+    def dissipative(self, strokes: FloatArray) -> npt.NDArray[np.bool_]:
+        """Whether each element is no source of energy in cycles between plus and minus its stroke [m]."""
+
+    @abstractmethod
     def with_substeps(self, substeps: int) -> Any:
         """The structure with other substeps."""
 
@@ -92,7 +100,8 @@ class SearchedStructure(Identifiable):
         held = {name: value for name, value in held.items() if name not in covered or name in freedom.fixed}
         own = {name: value for name, value in known.items() if name in held or name in freedom.free}
         own |= {name: float(value) for name, value in freedom.fixed.items()}
-        box = [self._coordinate(name, own[name], freedom) for name in freedom.free]
+        strokes = self._strokes(record)
+        box = [self._coordinate(name, own[name], freedom, strokes) for name in freedom.free]
         order = {name: own[name] for name in (*freedom.free, *held)}
         space = space_of(box, (), order, held, freedom.limits(order, held), screened=0)
         return space_of(box, (), order, held, freedom.limits(order, held), [self._begun(record, space)], screened=0)
@@ -109,25 +118,33 @@ class SearchedStructure(Identifiable):
                 raise unknown(scalars, name)
         return known
 
-    def _coordinate(self, name: str, start: float, freedom: Freedom) -> Coordinate:
+    def _strokes(self, record: Record) -> FloatArray | None:
+        """Largest drift of each element at the start, (n_elements,); None if the motion diverges."""
+        try:
+            structure = self.with_substeps(self.search_substeps(record.sample_time))
+            return np.asarray(np.abs(structure.signals(_input(record), record.sample_time)["drift"]).max(axis=0))
+        except SimulationError:
+            return None
+
+    def _coordinate(self, name: str, start: float, freedom: Freedom, strokes: FloatArray | None) -> Coordinate:
         if name in freedom.bounds:
             return free_coordinate(name, *map(float, freedom.bounds[name]))
         if start == 0.0:
             raise ValueError(f"{name!r} is free and begins at zero: give bounds={{{name!r}: (lower, upper)}}")
-        if start > 0.0 and not self._may_be(name, -start):
+        if start > 0.0 and not self._may_be(name, -start, strokes):
             return Coordinate(name, start / _DECADE, start * _DECADE, start, log=True)
         size = abs(start)
         return Coordinate(name, -_DECADE * size, _DECADE * size, size)
 
-    def _may_be(self, name: str, value: float) -> bool:
+    def _may_be(self, name: str, value: float, strokes: FloatArray | None) -> bool:
         """Whether a negative number makes sense."""
         if name.partition("[")[0].partition(".")[0] in ("mass", "stiffness", "damping"):
             return False
         try:
-            self.assemble({name: value})
+            other = self.assemble({name: value})
         except ValueError:
             return False
-        return True
+        return strokes is None or not (self.dissipative(strokes) & ~other.dissipative(strokes)).any()
 
     def _begun(self, record: Record, space: SearchSpace) -> dict[str, float]:
         """Numbers at which the parts of the record, one longer than the other, leave the least error."""

@@ -24,7 +24,7 @@ from hysim.models.model import family
 from hysim.models.protocols import positive_time
 from hysim.plants.structures import assembly
 from hysim.plants.structures.damping import ModalDamping, Rayleigh
-from hysim.plants.structures.element import Element, parted
+from hysim.plants.structures.element import Element, dissipates, parted
 from hysim.plants.structures.ensemble import Reduction, responses
 from hysim.plants.structures.parameters import assembled, scalars_of
 from hysim.plants.structures.records import OF_ELEMENTS, OF_NODES
@@ -264,6 +264,11 @@ class Structure(SearchedStructure):
     @property
     def fastest_rate(self) -> float:
         return float(assembly.linear_parts(self.matrices)[2][0])
+
+    def dissipative(self, strokes: FloatArray) -> npt.NDArray[np.bool_]:
+        """Whether each element is no source of energy in cycles between plus and minus its stroke [m]."""
+        pairs = zip(self.elements, strokes.tolist(), strict=True)
+        return np.array([dissipates(element.law, stroke) for element, stroke in pairs])
 
     @property
     def widths(self) -> dict[str, int]:
