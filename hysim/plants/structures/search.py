@@ -5,8 +5,8 @@ and minus ten times it. A number stays positive where a negative one is refused,
 energy: motions of such a structure are chaotic, and a search that met them took eight times as long.
 
 Outputs have no derivatives by the numbers: `hysim.identify` takes finite differences of simulations, which have equal
-substeps throughout so that the outputs are smooth: as many as turn the phase of the fastest mode at the start by at most
-0.8 rad each, whose error is about 1e-5 of the largest acceleration.
+substeps throughout so that the outputs are smooth: as many as turn the phase of the fastest mode at the start by at
+most 0.8 rad each, whose error is about 1e-5 of the largest acceleration.
 
 The search begins with the first motions of the record with the largest input, which are small and determine the
 stiffness, and goes on to longer parts of it; what a part does not determine is kept near its start. The
