@@ -127,7 +127,7 @@ def test_an_unknown_command_is_answered_with_the_nearest(run, wrong, near):
     code, out, err = run(wrong, "loop.csv")
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert f"there is no command {wrong!r}: did you mean {near}?" in err
-    assert "there are metrics" in run("xyz")[2]
+    assert "there are example" in run("xyz")[2]
 
 
 def test_nobody_has_to_read_all_of_the_output(folder):

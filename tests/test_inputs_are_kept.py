@@ -101,7 +101,13 @@ def test_a_result_in_the_place_of_an_input_is_refused(folder, capsys, arguments)
 
 
 def test_every_command_that_reads_files_is_among_them():
-    assert {arguments[0] for arguments in CASES} == COMMANDS.keys() - {"reproduce", "explore"}
+    assert {arguments[0] for arguments in CASES} == COMMANDS.keys() - {
+        "reproduce",
+        "explore",
+        "example",
+        "columns",
+        "completion",
+    }
 
 
 @pytest.mark.parametrize("how", ["spelling", "symbolic", "hard", "upward"])

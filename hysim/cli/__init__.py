@@ -15,9 +15,12 @@ from typing import NoReturn
 from hysim import __version__
 from hysim.cli import (
     c,
+    columns,
     compare,
+    completion,
     control,
     discover,
+    example,
     fmu,
     identify,
     measure,
@@ -34,8 +37,28 @@ from hysim.cli import (
 from hysim.cli.options import Command
 from hysim.errors import SimulationError
 
-_MODULES = (metrics, identify, discover, compare, simulate, control, c, fmu, plot, sweep, measure, reproduce)
-_COMMANDS = (*(module.COMMAND for module in _MODULES), page.COMMAND, page.EXPLORE)
+_MODULES = (
+    example,
+    columns,
+    metrics,
+    identify,
+    discover,
+    compare,
+    simulate,
+    control,
+    c,
+    fmu,
+    plot,
+    sweep,
+    measure,
+    reproduce,
+)
+_COMMANDS = (
+    *(module.COMMAND for module in _MODULES),
+    page.COMMAND,
+    page.EXPLORE,
+    completion.command(lambda: parsers()[1]),
+)
 COMMANDS = {command.name: command for command in _COMMANDS}
 """Every command by its name."""
 

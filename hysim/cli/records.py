@@ -19,18 +19,21 @@ DETECT = "detect"
 
 _DELIMITERS = {"tab": "\t", "semicolon": ";", "comma": ",", "blank": " "}
 
-_FILE = "file FILE  text with one sample a line, NPZ, NPY, MAT or HDF5; or - for the standard input"
+FILE = "file FILE  text with one sample a line, NPZ, NPY, MAT or HDF5; or - for the standard input"
 _INPUT = "--u COLUMN  input: name of its column, or its number from 0 (default: u)"
 _OUTPUT = "--y COLUMN  output: name or number of its column (default: y)"
+OF_A_TEXT = f"""--delimiter SIGN  sign between cells of a text, or {", ".join(_DELIMITERS)} (default: detected)
+--decimal .|,  sign before the decimals of a text (default: detected)
+--encoding NAME  encoding of a text, such as latin-1 (default: UTF-8, -16 or -32)"""
+"""Options for a file of text."""
+
 _OTHERS = f"""
 either --t COLUMN  time: name or number of its column (default: t, if there is one)
 or --no-t  read no time from the file
 --sample-time STEP  time between two samples of a file without time [unit of t]; with --t, the record is interpolated
     linearly to even times with this step
 --on-missing error|drop  samples without a value [default: error]
---delimiter SIGN  sign between cells of a text, or {", ".join(_DELIMITERS)} (default: detected)
---decimal .|,  sign before the decimals of a text (default: detected)
---encoding NAME  encoding of a text, such as latin-1 (default: UTF-8, -16 or -32)
+{OF_A_TEXT}
 --resolution QUANTUM  resolution of the output's sensor [unit of y]; or detect: the step of which all outputs are
     multiples
 --unit SIGNAL=UNIT...  unit of t, u or y, as in u=V
@@ -41,11 +44,11 @@ WEIGHTS = (
 OPTIONS_WITHOUT_FILE = f"record:\n{_INPUT}\n{_OUTPUT}{_OTHERS}"
 """Options for a record whose file is named by an option of the command."""
 
-OPTIONS = f"{_FILE}\n\n{OPTIONS_WITHOUT_FILE}"
+OPTIONS = f"{FILE}\n\n{OPTIONS_WITHOUT_FILE}"
 OPTIONS_WITH_WEIGHTS = f"""{OPTIONS.rstrip()}
 --weights COLUMN  weight of each sample in the sum of squares, 0 to leave it out: name or number of its column
 """
-OPTIONS_OF_AN_INPUT = f"{_FILE}\n\nrecord:\n{_INPUT}{_OTHERS}"
+OPTIONS_OF_AN_INPUT = f"{FILE}\n\nrecord:\n{_INPUT}{_OTHERS}"
 """Options for a file that needs no column of the output."""
 
 SKIP = "--skip N  number of lines at the top of a ground motion that belong to its header, if it holds lines of numbers"
@@ -54,7 +57,7 @@ SKIP = "--skip N  number of lines at the top of a ground motion that belong to i
 def read(options: argparse.Namespace, file: str | None = None) -> Record:
     """The record that the options describe, or that of another `file`; without an output column, y is u."""
     path = options.file if file is None else file
-    return _read(options, path, _source(path), options.y if "y" in options else None, options.resolution)
+    return _read(options, path, source_of(path), options.y if "y" in options else None, options.resolution)
 
 
 def read_input(options: argparse.Namespace, *, of_the_ground: bool) -> Record:
@@ -72,7 +75,7 @@ def read_input(options: argparse.Namespace, *, of_the_ground: bool) -> Record:
         return _ground_motion(options, source)
     if of_the_ground and options.u is None and not options.no_t:
         try:
-            names = column_names(source(), **_text_options(options))
+            names = column_names(source(), **text_options(options))
         except ValueError:
             names = ()  # a list, or a fault that is named where the file is read
         if "u" not in names:
@@ -86,7 +89,7 @@ def _ground_motion(options: argparse.Namespace, source: Callable[[], Any]) -> Re
     """A ground motion; a step is that of a list without times, or new even steps for one with times."""
     from hysim.files import load_ground_motion
 
-    arguments = {"t": options.t, "units": dict(options.unit).get("u"), **_text_options(options)}
+    arguments = {"t": options.t, "units": dict(options.unit).get("u"), **text_options(options)}
     arguments["skip"] = options.skip or 0
     if options.sample_time is None:
         return _of_the_ground(*load_ground_motion(source(), **arguments))
@@ -102,7 +105,8 @@ def _of_the_ground(t: FloatArray, acceleration: FloatArray) -> Record:
     return Record(t=t, u=acceleration, y=acceleration, units={"t": "s", "u": "m/s^2"})
 
 
-def _text_options(options: argparse.Namespace) -> dict[str, Any]:
+def text_options(options: argparse.Namespace) -> dict[str, Any]:
+    """The options of `OF_A_TEXT`, as `hysim.load` takes them."""
     delimiter = _DELIMITERS.get(options.delimiter, options.delimiter)
     return {"delimiter": delimiter, "decimal": options.decimal, "encoding": options.encoding}
 
@@ -112,7 +116,7 @@ def _repeatable(path: str) -> Callable[[], Any]:
     if path != STANDARD and (os.path.isfile(path) or not os.path.exists(path)):
         return lambda: path
     if path == STANDARD:
-        content = _source(path).read()
+        content = source_of(path).read()
     else:  # a pipe
         with open(path, "rb") as pipe:
             content = pipe.read()
@@ -135,7 +139,8 @@ def read_with_weights(options: argparse.Namespace) -> tuple[Record, FloatArray |
     return record, _read(options, options.file, source(), options.weights, None).y
 
 
-def _source(path: str) -> Any:
+def source_of(path: str) -> Any:
+    """The path, or the standard input."""
     if path != STANDARD:
         return path
     return sys.stdin.buffer if isinstance(sys.stdin, io.TextIOWrapper) else sys.stdin
@@ -158,7 +163,7 @@ def _read(options: argparse.Namespace, path: str, source: Any, y: str | None, re
         name="record" if path == STANDARD else None,
         on_missing=options.on_missing,
         resolution=resolution,
-        **_text_options(options),
+        **text_options(options),
     )
     if options.sample_time is None:
         return record

@@ -1,8 +1,20 @@
 """Records from files and into files."""
 
+from hysim.files._columns import FileColumn, list_columns
 from hysim.files._ground_motion import column_names, is_at2, load_ground_motion
 from hysim.files._load import load
 from hysim.files._save import ending, packed, save_record
 from hysim.files._table import Notes
 
-__all__ = ["Notes", "column_names", "ending", "is_at2", "load", "load_ground_motion", "packed", "save_record"]
+__all__ = [
+    "FileColumn",
+    "Notes",
+    "column_names",
+    "ending",
+    "is_at2",
+    "list_columns",
+    "load",
+    "load_ground_motion",
+    "packed",
+    "save_record",
+]
