@@ -495,3 +495,57 @@ def test_pictures_of_loops_are_the_same_bytes_and_nothing_is_clipped(record):
             box = ax.get_tightbbox()
             assert inside.contains(box.x0, box.y0), name
             assert inside.contains(box.x1, box.y1), name
+
+
+def noisy(n):
+    rng = np.random.default_rng(0)
+    u = 2.0 * np.sin(np.linspace(0.0, 6.0 * np.pi, n))
+    return hs.Record(u=u, y=LAW.response(u) + 0.01 * rng.standard_normal(n))
+
+
+@pytest.mark.parametrize("n", [300, 301, 20_000])
+def test_a_long_record_is_a_line_under_its_model(n):
+    record = noisy(n)
+    ax = hs.plot.loop(record, hs.simulate(LAW, None, record.u), ax=hs.plot.figure().add_subplot())
+    measured, model = ax.lines
+    assert np.array_equal(measured.get_ydata(), record.y)
+    assert (measured.get_marker() == "None") == (n > 300)
+    assert (measured.get_linewidth() > model.get_linewidth()) == (n > 300)
+    assert bool(measured.get_rasterized()) == (n > 5000)
+
+
+def test_a_long_record_alone_has_arrows():
+    ax = hs.plot.loop(noisy(1000), ax=hs.plot.figure().add_subplot())
+    assert len(ax.texts) == 2
+    assert not hs.plot.loop(noisy(100), ax=hs.plot.figure().add_subplot()).texts
+
+
+def test_a_picture_of_many_samples_is_small_and_keeps_its_texts():
+    record = noisy(100_000)
+    canvas = hs.plot.figure()
+    hs.plot.identification(hs.identify(hs.Line, record), record, canvas.subplots(1, 2))
+    svg = hs.plot.to_svg(canvas)
+    assert len(svg) < 300_000  # 30 bytes a sample would be 6 MB
+    assert "Residual" in svg
+    assert svg == hs.plot.to_svg(canvas)
+
+
+def test_residuals_of_many_samples_are_dots_of_two_colours_with_a_legend_that_is_seen(comparison):
+    record = noisy(1000)
+    (ax,) = hs.plot.residuals(hs.compare({"line": hs.Line}, record), [hs.plot.figure().add_subplot()])
+    handles, names = ax.get_legend_handles_labels()
+    assert names == ["loading", "unloading"]
+    assert handles[0].get_color() != handles[1].get_color()
+    assert min(handle.get_markersize() for handle in handles) > 3.0
+    dots = [each for each in ax.lines if each.get_marker() == "."]
+    assert sum(each.get_xdata().size for each in dots) == 1000
+
+
+def test_cycles_are_coloured_by_their_number():
+    u = hs.signals.triangle(0.0, 1.0, cycles=4, samples_per_cycle=20)
+    ax = hs.plot.cycles(hs.Record(u=u, y=LAW.response(u)), hs.plot.figure().add_subplot())
+    lightness = [np.dot(matplotlib.colors.to_rgb(each.get_color()), (0.2, 0.7, 0.1)) for each in ax.lines]
+    assert len(lightness) == 4
+    assert (np.diff(lightness) > 0.0).all()
+    with pytest.raises(ValueError, match="constant"):
+        hs.plot.cycles(hs.Record(u=[1.0, 1.0], y=[0.0, 0.0]))

@@ -53,6 +53,13 @@ def _history(plot: Any, canvas: "Figure", contents: Contents) -> None:
 def _minor_loops(plot: Any, canvas: "Figure", contents: Contents) -> None:
     for result, ax in zip(contents.results, plot.panels(canvas, len(contents.results)), strict=True):
         plot.minor_loops(result, ax)
+        ax.set_title(result.name)
+
+
+def _cycles(plot: Any, canvas: "Figure", contents: Contents) -> None:
+    for result, ax in zip(contents.results, plot.panels(canvas, len(contents.results)), strict=True):
+        plot.cycles(result, ax)
+        ax.set_title(result.name)
 
 
 def _describing_function(plot: Any, canvas: "Figure", contents: Contents) -> None:
@@ -72,6 +79,7 @@ KINDS = {
         "width of the last cycle against the input",
         lambda plot, canvas, c: plot.width(*c.results, ax=canvas.add_subplot()),
     ),
+    "cycles": Kind("each cycle in a colour, from the first, dark, to the last, light", _cycles),
     "minor-loops": Kind("each cycle as a loop, the smaller the darker", _minor_loops),
     "residual-map": Kind(
         "measured minus model over input and cycles; one file, one model",

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from hysim.plot._comparisons import comparison, identification, loops, residuals, widths
 from hysim.plot._files import FORMATS, save_svg, to_bytes, to_svg
-from hysim.plot._loops import animate, minor_loops, width
+from hysim.plot._loops import animate, cycles, minor_loops, width
 from hysim.plot._maps import forc, residual_map
 from hysim.plot._outcomes import describing_function, displacement, selection, trade_off
 from hysim.plot._records import element_loops, history, loop, response, signals, traces
@@ -30,6 +30,7 @@ __all__ = [
     "Figure",
     "animate",
     "comparison",
+    "cycles",
     "describing_function",
     "displacement",
     "element_loops",

@@ -14,12 +14,12 @@ from hysim._frozen import FloatArray
 from hysim._prefixes import in_unit, label, printed
 from hysim.comparison import Comparison, ComparisonRow
 from hysim.identification import Identification
-from hysim.plot._style import GUIDE, MEASURED, POINTS, AxesArray, line, one, several
+from hysim.plot._style import GUIDE, MANY, MEASURED, POINTS, AxesArray, grid_of, joined, line, one, scattered, several
 from hysim.records import Record
 
-_FILLED: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 3.8, "markeredgewidth": 0.8}
+_FILLED: dict[str, Any] = {"markeredgewidth": 0.8}
 _OPEN = _FILLED | {"markerfacecolor": "white"}
-_DOTS: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 3.8}
+_UNLOADING = "#56B4E9"  # of many samples, which have no open markers
 _TIGHT: dict[str, Any] = {"borderaxespad": 0.1, "columnspacing": 1.0, "handlelength": 1.2, "handletextpad": 0.3}
 _SHOWN = 4  # models in a figure, unless names are chosen
 
@@ -146,7 +146,7 @@ def identification(
         panels[0].set(xlabel=label(records[0].units, "u"), ylabel=label(records[0].units, "y"))
         quanta = fit.residual_quanta
         _draw_guides(panels[1], {} if quanta is None else {1.0: "dashed"})
-        panels[1].plot(u, fit.residual if quanta is None else quanta, color=MEASURED, **_DOTS)
+        panels[1].plot(u, fit.residual if quanta is None else quanta, color=MEASURED, **scattered(u.size))
         unit = records[0].units.get("y", "") if quanta is None else "quanta"
         panels[1].set(xlabel=label(records[0].units, "u"), ylabel=in_unit("Residual", unit))
         panels[1].margins(y=0.15)
@@ -157,14 +157,24 @@ def identification(
 
 def _draw_fit(ax: Axes, u: FloatArray, y: FloatArray, fit: Identification, parts: list[NDArray[np.intp]]) -> None:
     model = y - fit.residual
-    ax.plot(u, y, label="measured", color=POINTS, **_DOTS)
+    _draw_measured(ax, u, y, parts)
     for k, part in enumerate(parts):
         ax.plot(u[part], model[part], label=None if k else f"model, fit {fit.fit_percent:.2f} %", **line(0))
         if np.isfinite(fit.response_stderr[part]).all():
             reach = 2.0 * fit.response_stderr[part]
             corners = np.concatenate([model[part] + reach, (model[part] - reach)[::-1]])
-            ax.fill(np.concatenate([u[part], u[part][::-1]]), corners, color=line(0)["color"], alpha=0.25, linewidth=0)
+            style = {"color": line(0)["color"], "alpha": 0.25, "linewidth": 0, **grid_of(part.size)}
+            ax.fill(np.concatenate([u[part], u[part][::-1]]), corners, **style)
     ax.legend(loc="best")
+
+
+def _draw_measured(ax: Axes, u: FloatArray, y: FloatArray, parts: list[NDArray[np.intp]]) -> None:
+    """Measured samples of some records: dots, or broad lines where there are many."""
+    if u.size <= MANY:
+        ax.plot(u, y, label="measured", color=POINTS, **scattered(u.size, **_FILLED))
+        return
+    for k, part in enumerate(parts):
+        ax.plot(u[part], y[part], label=None if k else "measured", **joined(u.size))
 
 
 def _draw_profiles(ax: Axes, fit: Identification) -> None:
@@ -192,7 +202,7 @@ def _draw_guides(ax: Axes, sizes: dict[float, str]) -> None:
 
 def _draw_loop(ax: Axes, comparison: Comparison, row: ComparisonRow) -> None:
     record = comparison.record
-    ax.plot(record.u, record.y, color=POINTS, label="measured", **_FILLED)
+    _draw_measured(ax, record.u, record.y, [np.arange(len(record))])
     ax.plot(record.u, row.y, label="model", **line(0))
     ax.set(xlabel=label(record.units, "u"), ylabel=label(record.units, "y"))
 
@@ -202,8 +212,14 @@ def _draw_residual(ax: Axes, comparison: Comparison, row: ComparisonRow, quanta:
     quantum, unit = _quantum(record, quanta)
     rising, residual = _rising(record.u), (record.y - row.y) / quantum
     _draw_guides(ax, {0.5: "dotted", 1.0: "dashed"} if record.resolution else {})
-    ax.plot(record.u[rising], residual[rising], color=MEASURED, label="loading", **_FILLED)
-    ax.plot(record.u[~rising], residual[~rising], color=MEASURED, label="unloading", **_OPEN)
+    for name, at, style, colour in (
+        ("loading", rising, _FILLED, MEASURED),
+        ("unloading", ~rising, _OPEN, MEASURED if len(record) <= MANY else _UNLOADING),
+    ):
+        (points,) = ax.plot(record.u[at], residual[at], color=colour, label=name, **scattered(len(record), **style))
+        if len(record) > MANY:  # dots too small for a legend
+            points.set_label("_")
+            ax.plot([], [], color=colour, label=name, **scattered(0, **_FILLED))
     ax.set(xlabel=label(record.units, "u"), ylabel=in_unit("Residual", unit))
     ax.margins(y=0.2)
 
@@ -211,7 +227,8 @@ def _draw_residual(ax: Axes, comparison: Comparison, row: ComparisonRow, quanta:
 def _draw_width(ax: Axes, comparison: Comparison) -> None:
     """The measured width, under the lines of the models."""
     units, loop = comparison.record.units, comparison.loop
-    ax.plot(loop.u, loop.width, color=MEASURED, label="measured", zorder=3, **_FILLED)
+    style = scattered(loop.u.size, **_FILLED) if loop.u.size <= MANY else {"linewidth": 1.8}
+    ax.plot(loop.u, loop.width, color=MEASURED, label="measured", zorder=3 if loop.u.size <= MANY else 1, **style)
     ax.set(xlabel=label(units, "u"), ylabel=in_unit("Loop width", units.get("y", "")))
 
 

@@ -1,6 +1,7 @@
-"""Pictures of loops: the nested loops of a fading input, loop widths, and a point that moves along a loop."""
+"""Pictures of loops: each cycle in a colour, loop widths, and a point that moves along a loop."""
 
 import itertools
+from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.animation import FuncAnimation
@@ -8,13 +9,14 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
+from matplotlib.ticker import MaxNLocator
 
 from hysim._cycles import TOLERANCE, turns
 from hysim._frozen import FloatArray
 from hysim._prefixes import in_unit, label
 from hysim.metrics import LoopMetrics, loop_metrics
 from hysim.plot._records import InputOutput, names_of, times_of, units_of
-from hysim.plot._style import GUIDE, MARKERS, MEASURED, POINTS, SEQUENTIAL, line, one
+from hysim.plot._style import GUIDE, MANY, MARKERS, MEASURED, POINTS, SEQUENTIAL, grid_of, line, one
 from hysim.records import Record
 
 
@@ -38,14 +40,43 @@ def minor_loops(result: InputOutput, ax: Axes | None = None, *, tolerance: float
     cycles = _cycles_up_and_down(result.u, tolerance)
     if not cycles:
         raise ValueError("the input is constant: there is no loop to draw")
-    norm = Normalize(0.0, max(cycles.values()))
+    by_size = dict(sorted(cycles.items(), key=lambda cycle: -cycle[1]))
+    amplitude = in_unit("Amplitude", units_of(result).get("u", ""))
+    return _coloured(result, by_size, Normalize(0.0, max(cycles.values())), amplitude, ax)
+
+
+def cycles(result: InputOutput, ax: Axes | None = None, *, tolerance: float = TOLERANCE) -> Axes:
+    """Draw each cycle of an input in a colour of its own, from the first, dark, to the last, light.
+
+    It shows what changes from cycle to cycle: creep, wear, warming, a mean that drifts. Arguments, and what a cycle is,
+    are those of `minor_loops`.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> u = hs.signals.triangle(0.0, 1.0, cycles=3, samples_per_cycle=40)
+    >>> sim = hs.simulate(hs.BoucWen(beta=2.0), None, u)
+    >>> len(hs.plot.cycles(sim, hs.plot.figure().add_subplot()).lines)
+    3
+    """
+    numbers = {place: float(k) for k, place in enumerate(_cycles_up_and_down(result.u, tolerance), 1)}
+    if not numbers:
+        raise ValueError("the input is constant: there is no loop to draw")
+    return _coloured(result, numbers, Normalize(1.0, max(2.0, len(numbers))), "Cycle", ax)
+
+
+def _coloured(
+    result: InputOutput, cycles: Mapping[tuple[int, int], float], norm: Normalize, name: str, ax: Axes | None
+) -> Axes:
+    """The cycles by first sample and stop, in this order, each in the colour of its value."""
     units = units_of(result)
     with one(ax) as axes:
-        for (first, stop), amplitude in sorted(cycles.items(), key=lambda cycle: -cycle[1]):
-            axes.plot(result.u[first:stop], result.y[first:stop], color=SEQUENTIAL(norm(amplitude)), linewidth=1.2)
+        for (first, stop), value in cycles.items():
+            colour = SEQUENTIAL(norm(value))
+            axes.plot(result.u[first:stop], result.y[first:stop], color=colour, linewidth=1.2, **grid_of(stop - first))
         axes.set(xlabel=label(units, "u"), ylabel=label(units, "y"))
-        amplitudes = in_unit("Amplitude", units.get("u", ""))
-        axes.figure.colorbar(ScalarMappable(norm, SEQUENTIAL), ax=axes, label=amplitudes)
+        ticks = MaxNLocator(integer=True) if name == "Cycle" else None
+        axes.figure.colorbar(ScalarMappable(norm, SEQUENTIAL), ax=axes, label=name, ticks=ticks)
     return axes
 
 
@@ -66,13 +97,15 @@ def width(*results: InputOutput | LoopMetrics, ax: Axes | None = None) -> Axes:
     if not results:
         raise ValueError("there is nothing to draw: give at least one record, simulation or loop")
     units = units_of(*results)
-    points = ({"marker": marker, "linestyle": "none", "color": MEASURED} for marker in itertools.cycle(MARKERS))
+    records = ({"marker": marker, "linestyle": "none", "color": MEASURED} for marker in itertools.cycle(MARKERS))
     lines = map(line, itertools.count())
     with one(ax) as axes:
         axes.axhline(0.0, color=GUIDE, linewidth=0.8)
         for result, name in zip(results, names_of(results), strict=True):
             loop = result if isinstance(result, LoopMetrics) else loop_metrics(result.u, result.y)
-            style = next(points) | {"markersize": 3.8, "zorder": 3} if isinstance(result, Record) else next(lines)
+            is_few = loop.u.size <= MANY
+            points = {"markersize": 3.8, "zorder": 3} if is_few else {"marker": "", "linestyle": "solid"}
+            style = next(records) | points if isinstance(result, Record) else next(lines)
             axes.plot(loop.u, loop.width, label=name, **style)
         axes.set(xlabel=label(units, "u"), ylabel=in_unit("Loop width", units.get("y", "")))
         if len(results) > 1:

@@ -9,18 +9,11 @@ from matplotlib.axes import Axes
 from hysim._frozen import FloatArray
 from hysim._prefixes import in_unit, label
 from hysim.control import ClosedLoop
-from hysim.plot._style import MARKERS, MEASURED, POINTS, AxesArray, line, one, several
+from hysim.plot._style import MANY, MEASURED, AxesArray, joined, line, one, several
 from hysim.records import Record
 from hysim.simulation import Simulation, columns_of, has_elements
 
 _DRAWN = {"zoh": "steps-post", "foh": "default"}
-_POINTS: dict[str, Any] = {
-    "color": POINTS,
-    "linewidth": 0.8,
-    "markersize": 4.0,
-    "markerfacecolor": "white",
-    "markeredgecolor": MEASURED,
-}
 _MOST_NAMED = 8  # lines of a panel that a legend has room for
 _ELEMENTS_IN_A_ROW = 3
 _ARROW = 0.03  # its length along the input, of the span
@@ -82,7 +75,8 @@ def loop(*results: InputOutput, ax: Axes | None = None) -> Axes:
     """Draw outputs against inputs, over each other.
 
     Each of `results` is a Record, drawn as points, a Simulation or anything with arrays `u` and `y`, drawn as a line
-    with an arrow on its last loading and unloading branch. Without a result a ValueError is raised.
+    with an arrow on its last loading and unloading branch. A record of more than 300 samples is a broad grey line
+    under the others, with such arrows where there are only records. Without a result a ValueError is raised.
 
     Examples
     --------
@@ -98,7 +92,9 @@ def loop(*results: InputOutput, ax: Axes | None = None) -> Axes:
     others = [(result, name) for result, name in named if not isinstance(result, Record)]
     with one(ax) as axes:
         for k, (record, name) in enumerate(records):
-            axes.plot(record.u, record.y, label=name, marker=MARKERS[k % len(MARKERS)], **_POINTS)
+            axes.plot(record.u, record.y, label=name, **joined(len(record), k))
+            if len(record) > MANY and not others:
+                _arrows(axes, record, MEASURED)
         for k, (result, name) in enumerate(others):
             (drawn,) = axes.plot(result.u, result.y, label=name, **line(k))
             _arrows(axes, result, drawn.get_color())
@@ -129,7 +125,8 @@ def history(result: InputOutput, axes: Sequence[Axes] | AxesArray | None = None,
     t = np.arange(float(result.u.size)) if time is None else time
     end = 2.0 * t[-1] - t[-2] if t.size > 1 else t[-1]
     units = units_of(result)
-    style = {"marker": "o", **_POINTS} if isinstance(result, Record) else line(0)
+    is_dense = result.u.size > MANY
+    style = joined(result.u.size) | ({"linewidth": 1.2} if is_dense else {}) if isinstance(result, Record) else line(0)
     n = 2 if z is None or (axes is not None and np.size(np.asarray(axes)) == 2) else 3
     with several(axes, n, height=2.1 if n == 2 else 1.9) as panels:
         panels[0].plot(t, result.y, **style)

@@ -27,6 +27,20 @@ GUIDE = "#777777"
 
 MARKERS = "os^D"
 
+MANY = 300
+"""Samples beyond which the markers of a record would cover each other: it is drawn as a line, or as dots."""
+
+_RASTERISED = 5000  # samples beyond which a picture holds dots of a grid in place of every point
+_JOINED: dict[str, Any] = {
+    "color": POINTS,
+    "linewidth": 0.8,
+    "markersize": 4.0,
+    "markerfacecolor": "white",
+    "markeredgecolor": MEASURED,
+}
+_SMALLEST = 1.0  # dot [pt]
+_BROAD = 2.6  # line of a record [pt]: that of a model is seen over it
+
 SEQUENTIAL = ListedColormap(matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, 256)), "hysim_sequential")
 """From dark to light; its light end is still visible on white."""
 
@@ -124,3 +138,24 @@ def line(k: int) -> dict[str, Any]:
     """Colour and dashes of the line with the number `k`."""
     colour, dashes = _LINES[k % len(_LINES)]
     return {"color": colour, "linestyle": dashes}
+
+
+def grid_of(n: int) -> dict[str, Any]:
+    """How a line of `n` samples is kept: as dots of a grid where there are many, else point by point."""
+    return {"rasterized": n > _RASTERISED}
+
+
+def joined(n: int, k: int = 0) -> dict[str, Any]:
+    """Style of `n` measured samples joined by a line: the record with the number `k`."""
+    if n <= MANY:
+        return {"marker": MARKERS[k % len(MARKERS)], **_JOINED}
+    return {"color": POINTS, "linewidth": _BROAD, **grid_of(n)}
+
+
+def scattered(n: int, **style: Any) -> dict[str, Any]:
+    """Style of `n` measured samples that are not joined: markers of a `style`, the smaller the more there are."""
+    if n <= MANY:
+        return {"linestyle": "none", "marker": "o", "markersize": 3.8, **style}
+    size = max(_SMALLEST, 3.8 * math.sqrt(MANY / n))
+    dots = {"linestyle": "none", "marker": ".", "markersize": size, "markeredgewidth": 0.0}
+    return {**dots, **grid_of(n)}
