@@ -350,7 +350,7 @@ def test_errors_of_structures(arguments, kind, message):
         ({"law": hs.Dahl(), "between": (0, -1)}, ValueError, "between must not be negative"),
         ({"law": hs.Dahl(), "between": (0, 0.5)}, TypeError, "between must be a whole number"),
         ({"law": hs.Dahl(), "direction": (0.0, 0.0)}, ValueError, "direction must not be zero"),
-        ({"law": hs.mode(1.0, 0.1), "between": (0, 1)}, TypeError, "takes dashpots only"),
+        ({"law": hs.mode(1.0, 0.1), "between": (0, 1)}, TypeError, "takes friction and dashpots only"),
         ({"law": hs.Dahl, "between": (0, 1)}, TypeError, "an element takes a law"),
         ({"law": hs.SingleValued(u=[0.0, 1.0], y=[0.0, 1.0]), "between": (0, 1)}, TypeError, "that can be stepped"),
         (
