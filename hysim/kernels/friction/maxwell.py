@@ -43,13 +43,17 @@ def move(
     """Sum of the forces after a stroke, along which friction goes evenly from `begin` to `end`.
 
     The forces of the elements stand in the state from the place `first` on, and their directions of slip behind them.
+    A stroke without a duration is a correction, of either direction, after which what slips goes on to slip.
     """
     n = (parameters.size - _N_OTHERS) // 2
     direction = 1.0 if rise > 0.0 else -1.0
     length, attraction = abs(rise), parameters[2 * n + 5]
     force = 0.0
     for i in range(n):
-        if length > 0.0:
+        if duration == 0.0:
+            if state[first + n + i] == 0.0:
+                state[first + i] += parameters[1 + i] * rise
+        elif length > 0.0:
             along, slips = direction * state[first + i], state[first + n + i] * direction > 0.0
             stiffness, weight = parameters[1 + i], parameters[1 + n + i]
             slope = weight * (end - begin) / length
@@ -64,7 +68,7 @@ def move(
                 along = relaxed(along, limit, weight * end, kappa)
                 state[first + n + i] = direction
             state[first + i] = direction * along
-        elif duration > 0.0:
+        else:
             state[first + n + i] = 0.0
         force += state[first + i]
     return force

@@ -230,8 +230,8 @@ def copy(memory: Memory, source: FloatArray, target: FloatArray) -> None:
 @unfolded
 def fit_rest(
     step: Step, parameters: FloatArray, state: FloatArray, duration: float, memory: Memory, saved: FloatArray,
-    spare: FloatArray, is_fine: bool, allowed: float, k0: float, f0: float, path: Path, middle: float, last: float, e: int,
-    rest: FloatArray, sums: FloatArray,
+    spare: FloatArray, is_fine: bool, allowed: float, k0: float, f0: float, path: Path, middle: float, last: float,
+    e: int, rest: FloatArray, sums: FloatArray,
 ) -> bool:  # fmt: skip
     """One sweep of an element: whether its stretches were divided.
 

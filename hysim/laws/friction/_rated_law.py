@@ -126,9 +126,19 @@ class RatedLaw(Identifiable, Composable, ABC):
         return self.at_sample_time(sample_time).advance(u, state)
 
     def memory(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
-        """Memory at the samples of `u`, shape (n_samples,) or (n_samples, n_memory); see `response`."""
-        z = self.at_sample_time(sample_time).remembered(u)
-        return z[:, 0] if z.shape[1] == 1 else z
+        """Memory at the samples of `u`, shape (n_samples,), or (n_samples, n_memory) of a tuple; see `response`.
+
+        The first number of a memory that is no field.
+        """
+        law = self.at_sample_time(sample_time)
+        z = law.remembered(u)[:, : max(1, len(law.initial_names))]
+        return z if any(isinstance(items(self)[name], tuple) for name in self.initial) else z[:, 0]
+
+    def signals(self, u: npt.ArrayLike, sample_time: float) -> dict[str, FloatArray]:
+        """Output ``"y"``, and the memory ``"z"`` of a law that has one, at the samples of `u`; see `response`."""
+        remembers = self.at_sample_time(sample_time).packed[1].size > 1
+        z = {"z": self.memory(u, sample_time)} if remembers else {}
+        return {"y": self.response(u, sample_time), **z}
 
     def startable(self, sample_time: float | None = None) -> Startable:
         """The law at a sample time [s] as a step that runs from any first input, for exports."""
@@ -213,7 +223,8 @@ def _kind_at_sample_time(family: type[RatedLaw]) -> type[Law]:
         **defaults,
         "family": family,
         "step": staticmethod(family.step),
-        **{name: vars(family).get(name, getattr(family, name)) for name in ("initial", "searched", "starts")},
+        "initial": family.initial,
+        "searched": family.searched,
     }
     return checked(type(f"{family.__name__}AtSampleTime", (AtSampleTime,), body))
 

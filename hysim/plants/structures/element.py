@@ -26,7 +26,8 @@ class Element:
     ----------
     law : law
         Force [N] for the drift [m]: any rate-independent law, a `hysim.Dashpot`, or a sum of them; friction, such as
-        `hysim.LuGre`, or `hysim.ElasticBacklash`; a user's own family or `hysim.CustomLaw` too. A positive force resists a positive drift.
+        `hysim.LuGre`, or a `hysim.ElasticBacklash`; a user's own family or `hysim.CustomLaw` too. A positive force
+        resists a positive drift.
     between : (int, int)
         Nodes i and j; the drift is ``x_j - x_i``. Node 0 is the ground, the masses are nodes 1, 2, ...
     direction : tuple of float
