@@ -77,6 +77,7 @@ class StribeckFriction(RatedLaw):
         Parameter("offset", affine=True),
     )
     starts: ClassVar = tuple({"breakaway_velocity": velocity} for velocity in (0.001, 0.01, 0.1))
+    memory = None  # type: ignore[assignment]  # it remembers nothing
 
     @classmethod
     def check(cls, tables: Tables) -> None:
