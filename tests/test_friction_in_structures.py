@@ -2,6 +2,7 @@
 
 import os
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -45,7 +46,7 @@ def reference(law, t, force, stiffness):
         return [v, np.interp(now, t, force) - stiffness * x - friction, bristles]
 
     s, x = np.zeros(3), [0.0]
-    for begin, end in zip(t, t[1:], strict=False):
+    for begin, end in pairwise(t):
         s = solve_ivp(slope, (begin, end), s, method="LSODA", rtol=1e-11, atol=1e-14).y[:, -1]
         x.append(s[0])
     return np.array(x)
@@ -83,7 +84,7 @@ def test_a_mass_on_bristles_moves_as_its_equations_say(name):
 
 def test_the_slips_of_a_pulled_mass_are_those_of_the_equations():
     """The stick-slip motion of Canudas de Wit, Olsson, Astrom and Lischinsky (1995): 1 kg, 2 N/m, 0.1 m/s."""
-    t = 0.01 * np.arange(1601 if COMPILED else 101)
+    t = 0.01 * np.arange(1001 if COMPILED else 101)
     plant = mass_on(ARTICLE, stiffness=2.0, tolerance=1e-10)
     x = plant.response(0.2 * t, 0.01)
     expected = reference(ARTICLE, t, 0.2 * t, 2.0)
@@ -92,7 +93,7 @@ def test_the_slips_of_a_pulled_mass_are_those_of_the_equations():
     if COMPILED:
         velocity = np.diff(x) / 0.01
         sticks = velocity < 1e-3
-        assert 0.4 < sticks.mean() < 0.9
+        assert 0.5 < sticks.mean() < 0.95
         assert velocity.max() > 0.2
 
 
