@@ -12,6 +12,7 @@ from friction_laws import FAMILIES, backlash, decades, drawn, lugre, maxwell, wa
 from scipy.integrate import solve_ivp
 
 import hysim as hs
+from hysim.models.candidates import candidates
 
 compiler = shutil.which("gcc") or shutil.which("clang")
 needs_compiler = pytest.mark.skipif(compiler is None, reason="there is no C compiler here")
@@ -349,3 +350,13 @@ def test_c_computes_the_same(tmp_path):
 def test_what_is_no_friction_is_refused(family, arguments, message):
     with pytest.raises(ValueError, match=message):
         family(**arguments)
+
+
+def test_friction_is_compared_by_name_where_the_record_has_time():
+    t = 0.02 * np.arange(226)
+    u = 0.3 * np.sin(2.0 * np.pi * t / 2.0)
+    y = hs.StribeckFriction(breakaway_velocity=0.1, viscous=0.2).response(u, 0.02)
+    record = hs.Record(t=t, u=u, y=y + 1e-3 * np.random.default_rng(0).normal(size=u.size))
+    table = hs.compare({"curve": hs.StribeckFriction, "line": hs.Line}, record, cross_validate=None)
+    assert table.rows[0].name == "curve"
+    assert not {family.__name__ for family in FAMILIES} & set(candidates())
