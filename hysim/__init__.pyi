@@ -84,6 +84,10 @@ from hysim.laws.differential.coleman_hodgdon import ColemanHodgdon as ColemanHod
 from hysim.models.sum import Sum as Sum
 from hysim.models.cascade import Cascade as Cascade
 from hysim.laws.dashpot import Dashpot as Dashpot
+from hysim.laws.friction.lugre import LuGre as LuGre
+from hysim.laws.friction.stribeck import StribeckFriction as StribeckFriction
+from hysim.laws.friction.maxwell import GeneralizedMaxwellSlip as GeneralizedMaxwellSlip
+from hysim.laws.friction.backlash import ElasticBacklash as ElasticBacklash
 from hysim.laws.custom import CustomLaw as CustomLaw
 from hysim.plants.oscillator import BoucWenOscillator as BoucWenOscillator
 from hysim.plants.structures.structure import Structure as Structure

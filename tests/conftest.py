@@ -12,7 +12,10 @@ from importlib.util import find_spec
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-STRUCTURES = ("test_structure", "plants/structures/", "[structures", "_structures_", "_frame]", "structure_ensembles")
+STRUCTURES = (
+    *("test_structure", "plants/structures/", "[structures", "_structures_", "_frame]", "structure_ensembles"),
+    *("_in_structures", "[friction]"),
+)
 
 # numba's cache does not see an edit in another file: it is kept apart for each state of the kernels.
 kernels = b"".join(path.read_bytes() for path in sorted((ROOT / "hysim" / "kernels").rglob("*.py")))

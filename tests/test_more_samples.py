@@ -22,7 +22,10 @@ spec.loader.exec_module(experiment)
 
 N_CASES = 2 if numba.config.DISABLE_JIT else 8
 
-NOT_RATE_INDEPENDENT = {"TransferFunction", "Dashpot", "Actuator", "BoucWenOscillator", "Structure"}
+NOT_RATE_INDEPENDENT = {
+    *("TransferFunction", "Dashpot", "Actuator", "BoucWenOscillator", "Structure"),
+    *("LuGre", "StribeckFriction", "GeneralizedMaxwellSlip", "ElasticBacklash"),  # test_friction.py has them
+}
 """Between two samples the input of these is held, or goes on a line: with more samples it is another input."""
 INVERSES = {"BoucWenInverse"}  # under the laws that it inverts
 SEARCHED = {"CustomLaw", "Line", "MaxwellSlip", "ParametricPrandtlIshlinskii", "Play", "PreisachRelays", "Stop"}

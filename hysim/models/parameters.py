@@ -79,16 +79,18 @@ def declared_space(
     record: Record,
     freedom: Freedom,
     screened: int | None = None,
+    *,
+    units: Mapping[str, float] | None = None,
 ) -> SearchSpace:
     """The search box on one record.
 
     `starts` are points in the units of the parameters, from which the search begins beside `scalars`, the law's own
     values; `initial` are the fields of its initial memory, held at zero where the record begins at rest. A parameter
-    that is not declared is held, unless it is free and bounded.
+    that is not declared is held, unless it is free and bounded. `units` are the record's, by default its `spans`.
 
     Raises ValueError if the input is constant, `freedom.initial` is unknown, or a name or a bound does not fit.
     """
-    units, first = spans(record), float(record.u[0])
+    units, first = units or spans(record), float(record.u[0])
     declared = {parameter.name: parameter for parameter in parameters}
     of = {name: declared.get(name.partition("[")[0]) for name in scalars}
     resting = tuple(name for name in scalars if name.partition("[")[0] in initial)
@@ -164,6 +166,16 @@ def spans(record: Record) -> dict[str, float]:
     if span == 0.0:
         raise ValueError("the input is constant: nothing can be identified from it")
     return {"u": span, "h": 0.5 * span, "y": float(np.ptp(record.y)) or 1.0, "1": 1.0}
+
+
+def rate_spans(record: Record) -> dict[str, float]:
+    """As `spans`, and ``"v"``, the highest speed of the input, and ``"r"``, the speed of an output that follows it.
+
+    Raises ValueError also if the record has no time, or uneven steps.
+    """
+    units, time = spans(record), record.sample_time
+    speed = float(np.abs(np.diff(record.u)).max()) / time
+    return {**units, "v": speed, "r": units["y"] / units["u"] * speed}
 
 
 def unit_of(unit: str, units: Mapping[str, float]) -> float:

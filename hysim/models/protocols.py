@@ -115,6 +115,18 @@ class Stepwise(Protocol):
 
 
 @runtime_checkable
+class Rated(Protocol):
+    """A law that depends on the rate of its input, as an element of a structure takes it."""
+
+    def rated(self) -> Startable:
+        """The step for strokes of known durations and rates, without a dashpot; see `hysim.kernels.friction.rates`."""
+
+    @property
+    def viscosity(self) -> float:
+        """Coefficient of that dashpot, which the structure takes into its damping."""
+
+
+@runtime_checkable
 class Numbered(Protocol):
     """A model whose numbers have names."""
 

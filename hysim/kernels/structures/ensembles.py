@@ -116,6 +116,8 @@ def begin_motion(elements: Elements, starts: IntArray, state: FloatArray, x: Flo
         law = motion.laws[elements.state_ends[e] : elements.state_ends[e + 1]]
         step, start = step_at(elements.steps[e]), start_at(starts[e])
         start(own, law, drift)
+        if elements.rated[e] > 0.0:
+            law[1], law[2] = 0.0, rate
         force = step(own, law, drift)
         motion.carry[0, e], motion.carry[1, e], motion.carry[2, e] = force, 0.0, drift
         motion.carry[3, e], motion.carry[4, e] = rate, 0.0
@@ -189,8 +191,8 @@ def follow_each(
     loads = np.empty((u.shape[1], 1))
     for i in range(sets.A.shape[0]):
         one = Elements(
-            elements.nodes, elements.weights, elements.node_ends, sets.slopes[i], elements.steps, sets.parameters[i],
-            elements.parameter_ends, elements.state_ends, elements.stretches, elements.stretch_ends,
+            elements.nodes, elements.weights, elements.node_ends, sets.slopes[i], elements.steps, elements.rated,
+            sets.parameters[i], elements.parameter_ends, elements.state_ends, elements.stretches, elements.stretch_ends,
         )  # fmt: skip
         A, rate = sets.A[i], sets.rates[i]
         base = steps.base

@@ -137,19 +137,34 @@ def turns(path: Path, middle: float, last: float) -> tuple[float, float, float, 
     return three, four, 1.0, 1.0
 
 
+@inlined
+def set_clock(state: FloatArray, duration: float, share: float, rate: float) -> None:
+    """Tell a law that depends on the rate how long its next stroke takes, and how it ends.
+
+    `duration` is that of the step, zero for a law that does not depend on the rate; `rate` is for a step of length 1.
+    See `hysim.kernels.friction.rates`.
+    """
+    if duration > 0.0:
+        state[1] = duration * share
+        state[2] = rate / duration
+
+
 @uncounted
 def along(
-    step: Step, parameters: FloatArray, state: FloatArray, rule: FloatArray, begin: float, end: float, r: float,
-    k0: float, path: Path,
+    step: Step, parameters: FloatArray, state: FloatArray, duration: float, rule: FloatArray, begin: float,
+    end: float, r: float, k0: float, path: Path,
 ) -> Integrals:  # fmt: skip
     """Integrals over a monotone part, and the last r; `r` is that at its begin, where the rule has a node."""
+    place = begin
     m0 = m1 = m2 = m3 = m4 = work = ahead = 0.0
     length = end - begin
     for i in range(rule.shape[0]):
         s = begin + length * rule[i, 0]
         d = drift_at(s, path)
         if i > 0 or rule[i, 0] > 0.0:
+            set_clock(state, duration, s - place, rate_at(s, path))
             r = k0 * d - step(parameters, state, d)
+            place = s
         ahead += rule[i, 2] * r
         weight = length * rule[i, 1] * r
         work += weight * rate_at(s, path)
@@ -175,19 +190,19 @@ def together(one: Integrals, two: Integrals) -> Integrals:
 
 @uncounted
 def divided(
-    step: Step, parameters: FloatArray, state: FloatArray, memory: Memory, spare: FloatArray, begin: float,
-    end: float, r: float, allowed: float, k0: float, path: Path,
+    step: Step, parameters: FloatArray, state: FloatArray, duration: float, memory: Memory, spare: FloatArray,
+    begin: float, end: float, r: float, allowed: float, k0: float, path: Path,
 ) -> Integrals:  # fmt: skip
     """Integrals over a monotone stretch that begins with `r`, which is divided until its parts agree."""
     total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     low, length, tried = begin, end - begin, 0
     copy(memory, memory[3], spare)
-    whole = along(step, parameters, state, _LOBATTO, low, end, r, k0, path)
+    whole = along(step, parameters, state, duration, _LOBATTO, low, end, r, k0, path)
     while True:
         middle, high = low + 0.5 * length, low + length
         copy(memory, spare, memory[3])
-        one = along(step, parameters, state, _LOBATTO, low, middle, r, k0, path)
-        two = along(step, parameters, state, _LOBATTO, middle, high, one[6], k0, path)
+        one = along(step, parameters, state, duration, _LOBATTO, low, middle, r, k0, path)
+        two = along(step, parameters, state, duration, _LOBATTO, middle, high, one[6], k0, path)
         tried += 1
         agree = abs(one[0] + two[0] - whole[0]) <= allowed or not math.isfinite(one[0] + two[0])
         if not agree and length > _NARROWEST and tried < _MOST_PARTS:
@@ -199,7 +214,7 @@ def divided(
             break
         length = min(2.0 * length, end - low)
         copy(memory, memory[3], spare)
-        whole = along(step, parameters, state, _LOBATTO, low, low + length, r, k0, path)
+        whole = along(step, parameters, state, duration, _LOBATTO, low, low + length, r, k0, path)
     return total
 
 
@@ -214,16 +229,17 @@ def copy(memory: Memory, source: FloatArray, target: FloatArray) -> None:
 
 @unfolded
 def fit_rest(
-    step: Step, parameters: FloatArray, state: FloatArray, memory: Memory, saved: FloatArray, spare: FloatArray,
-    is_fine: bool, allowed: float, k0: float, f0: float, path: Path, middle: float, last: float, e: int,
-    rest: FloatArray, sums: FloatArray,
+    step: Step, parameters: FloatArray, state: FloatArray, duration: float, memory: Memory, saved: FloatArray,
+    spare: FloatArray, is_fine: bool, allowed: float, k0: float, f0: float, path: Path, middle: float, last: float,
+    e: int, rest: FloatArray, sums: FloatArray,
 ) -> bool:  # fmt: skip
     """One sweep of an element: whether its stretches were divided.
 
-    `middle` and `last` are the rates there. Row e of `rest`, (c0, c1, c2, c3), and of `sums` is overwritten: m0, the
-    work of r, the largest drift at a turn, r at the last node, the place of that node, what the fit misses of the fifth
-    moment, what the rule may have missed behind its nodes, in a first sweep without the last of them, and the r to
-    which its last nodes lead. The m0 before is that of the sweep before. The law's memory is at the last node, or at
+    `duration` is that of the step for a law that depends on the rate, else zero; `middle` and `last` are the rates
+    there. Row e of `rest`, (c0, c1, c2, c3), and of `sums` is overwritten: m0, the work of r, the largest drift at a
+    turn, r at the last node, the place of that node, what the fit misses of the fifth moment, what the rule may have
+    missed behind its nodes, in a first sweep without the last of them, the r to which its last nodes lead, and the
+    place of the memory. The m0 before is that of the sweep before. The law's memory is at the last node, or at
     the end, afterwards; before a division it is taken from `saved`.
     """
     one, two, three, four = turns(path, middle, last)
@@ -232,11 +248,12 @@ def fit_rest(
     begin = peak = missed = 0.0
     for part in range(5):
         end = one if part == 0 else two if part == 1 else three if part == 2 else four if part == 3 else 1.0
-        total = together(total, along(step, parameters, state, rule, begin, end, total[6], k0, path))
+        total = together(total, along(step, parameters, state, duration, rule, begin, end, total[6], k0, path))
         sums[e, 3], sums[e, 4], sums[e, 7] = total[6], begin + (end - begin) * rule[rule.shape[0] - 1, 0], total[7]
         if end == 1.0 and not is_fine:
             break
         d = drift_at(end, path)
+        set_clock(state, duration, end - sums[e, 4], rate_at(end, path))
         r = k0 * d - step(parameters, state, d)
         missed += UNSEEN * (end - begin) * abs(r - total[7])
         total = total[0], total[1], total[2], total[3], total[4], total[5], r, 0.0
@@ -250,7 +267,9 @@ def fit_rest(
         begin = 0.0
         for part in range(5):
             end = one if part == 0 else two if part == 1 else three if part == 2 else four if part == 3 else 1.0
-            part_of_it = divided(step, parameters, state, memory, spare, begin, end, total[6], allowed, k0, path)
+            part_of_it = divided(
+                step, parameters, state, duration, memory, spare, begin, end, total[6], allowed, k0, path
+            )
             total = together(total, part_of_it)
             if end == 1.0:
                 break
@@ -268,6 +287,7 @@ def fit_rest(
         rest[4 * e + 3] = 0.0
     fitted = rest[4 * e + 0] / 5.0 + rest[4 * e + 1] / 6.0 + rest[4 * e + 2] / 7.0 + rest[4 * e + 3] / 8.0
     sums[e, 0], sums[e, 1], sums[e, 2], sums[e, 5], sums[e, 6] = m0, work, peak, abs(m4 - fitted), missed
+    sums[e, 8] = 1.0 if is_fine else sums[e, 4]
     return is_divided
 
 

@@ -20,7 +20,7 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray
 from hysim.kernels._compile import kernel, uncounted, unfolded
 from hysim.kernels.structures.flows import N_POWERS, add_columns
-from hysim.kernels.structures.moments import UNSEEN, IntArray, crest, fit_rest, quintic
+from hysim.kernels.structures.moments import UNSEEN, IntArray, crest, fit_rest, quintic, set_clock
 from hysim.kernels.structures.pointers import step_at
 
 _MOST_SWEEPS = 4
@@ -42,7 +42,8 @@ class Elements(NamedTuple):
 
     Element e has the nodes ``nodes[node_ends[e]:node_ends[e + 1]]`` with the weights of the drift, its elastic slope
     ``k0[e]``, the address of its step in ``steps[e]``; likewise its parameters, its state, and the stretches of the
-    state that are memory.
+    state that are memory. Where ``rated[e]`` is 1 the step depends on the rate of the drift, and its state begins as
+    `hysim.kernels.friction.rates` says; else it is 0.
     """
 
     nodes: IntArray
@@ -50,6 +51,7 @@ class Elements(NamedTuple):
     node_ends: IntArray
     k0: FloatArray
     steps: IntArray
+    rated: FloatArray
     parameters: FloatArray
     parameter_ends: IntArray
     state_ends: IntArray
@@ -80,7 +82,7 @@ class Room(NamedTuple):
     rests; `before` the drifts of the sweep before. `scales` are the sizes of drifts, `own` the drifts by unit rests of
     the same element, `allowed` the errors that their moments may have, `errors` those of the drifts. `forces` are
     those after the step, where `is_at_end`, (1,), says that the laws have been put there. `rest`, (4 n_elements,), are
-    the coefficients of the rests, `half` those for the half of the step; `sums` is (n_elements, 8), see
+    the coefficients of the rests, `half` those for the half of the step; `sums` is (n_elements, 9), see
     `moments.fit_rest`. `saved` and `spare` are states of the laws, `end`, `point` and `now` states of the structure
     after and in the step; `speeds`, (2, n_nodes), are two derivatives of the velocity; `loads`, (2, n_loads), the rise
     over a sample, and the loads at the begin of a step.
@@ -173,7 +175,7 @@ def make_room(n_elements: int, m: int, n_state: int, n_loads: int = 1) -> Room:
         **dict.fromkeys(("free_drifts", "free_middle", "drifts", "middle", "before"), 2 * n_elements),
         **dict.fromkeys(("scales", "own", "allowed", "errors", "forces"), n_elements),
         **dict.fromkeys(("rest", "half"), N_POWERS * n_elements),
-        "sums": (n_elements, 8),
+        "sums": (n_elements, 9),
         **dict.fromkeys(("saved", "spare"), n_state),
         **dict.fromkeys(("end", "point", "now"), m),
         "speeds": (2, m // 2),
@@ -228,7 +230,8 @@ def sweep(elements: Elements, h: float, is_fine: bool, motion: Motion, room: Roo
         middle, last = h * room.middle[n + e], h * room.drifts[n + e]
         path = quintic(carry[2, e], h * carry[3, e], room.middle[e], middle, room.drifts[e], last)
         is_divided = fit_rest(
-            step_at(elements.steps[e]), parameters, state, memory, room.saved, room.spare, is_fine, room.allowed[e],
+            step_at(elements.steps[e]), parameters, state, h * elements.rated[e], memory, room.saved, room.spare,
+            is_fine, room.allowed[e],
             elements.k0[e], carry[0, e], path, middle, last, e, room.rest, room.sums,
         )  # fmt: skip
         any_divided = any_divided or is_divided
@@ -260,12 +263,14 @@ def largest_error(tolerance: float, room: Room) -> float:
 
 
 @unfolded
-def is_smooth(elements: Elements, motion: Motion, room: Room) -> bool:
+def is_smooth(elements: Elements, h: float, motion: Motion, room: Room) -> bool:
     """Whether each rest ends where its nodes lead, so that no kink behind them is missed; the laws are put there."""
     smooth = True
     for e in range(room.allowed.size):
         parameters = elements.parameters[elements.parameter_ends[e] : elements.parameter_ends[e + 1]]
         state = motion.laws[elements.state_ends[e] : elements.state_ends[e + 1]]
+        rate = h * room.drifts[room.allowed.size + e]
+        set_clock(state, h * elements.rated[e], 1.0 - room.sums[e, 8], rate)
         f = step_at(elements.steps[e])(parameters, state, room.drifts[e])
         room.forces[e] = f
         missed = room.sums[e, 6] + UNSEEN * abs(elements.k0[e] * room.drifts[e] - f - room.sums[e, 7])
@@ -336,7 +341,7 @@ def try_step(
         apart = largest_error(tolerance, room)
         if k > 0 and not (any_divided and apart > 1.0):
             break
-        if apart < _AT_ONCE and is_smooth(elements, motion, room):
+        if apart < _AT_ONCE and is_smooth(elements, h, motion, room):
             room.is_at_end[0] = True
             break
     return apart
@@ -358,6 +363,7 @@ def take_step(
         parameters = elements.parameters[elements.parameter_ends[e] : elements.parameter_ends[e + 1]]
         state = motion.laws[elements.state_ends[e] : elements.state_ends[e + 1]]
         d = room.drifts[e]
+        set_clock(state, h * elements.rated[e], 1.0 - sums[e, 8], h * room.drifts[n + e])
         f = room.forces[e] if room.is_at_end[0] else step_at(elements.steps[e])(parameters, state, d)
         ahead = 1.0 - sums[e, 4]
         slope = (elements.k0[e] * d - f - sums[e, 3]) / (h * ahead) if ahead > _NEAREST else 0.0

@@ -12,7 +12,7 @@ from hysim.kernels.structures.flows import N_POWERS
 from hysim.kernels.structures.path import LEAST_DRIFT, Elements, Flows, Motion, Plant, Room, Steps, Tracks, make_room
 from hysim.kernels.structures.pointers import addresses
 from hysim.models.compiled_step import startable
-from hysim.models.protocols import Startable, Stretched
+from hysim.models.protocols import Rated, Startable, Stretched
 
 PHASE = 2.0  # largest phase of the fastest mode in a base step: above it the sweeps of a slipping element diverge
 HALVINGS = 12
@@ -20,10 +20,14 @@ LEAST_CERTAIN = 0.05  # share of the largest drift by which that of a step may b
 
 
 class Laws(NamedTuple):
-    """The laws of a structure; their steps are held here, since the kernel knows the addresses only."""
+    """The laws of a structure; their steps are held here, since the kernel knows the addresses only.
+
+    Those that are `rated` depend on the rate of the drift.
+    """
 
     steppers: tuple[Startable, ...]
     stretches: tuple[tuple[tuple[int, int], ...], ...]
+    rated: tuple[bool, ...]
 
     @property
     def places(self) -> tuple[Any, ...]:
@@ -81,13 +85,14 @@ class Matrices(NamedTuple):
 
 
 def laws_of(models: Sequence[Any]) -> Laws:
-    """Steps and memories of laws that do not depend on time."""
-    steppers = tuple(startable(model) for model in models)
+    """Steps and memories of laws."""
+    rated = tuple(isinstance(model, Rated) for model in models)
+    steppers = tuple(model.rated() if isinstance(model, Rated) else startable(model) for model in models)
     stretches = tuple(
         model.memory_places if isinstance(model, Stretched) else ((0, each.state.size),)
         for model, each in zip(models, steppers, strict=True)
     )
-    return Laws(steppers, stretches)
+    return Laws(steppers, stretches, rated)
 
 
 def elements_of(laws: Laws, rows: FloatArray, slopes: FloatArray) -> Elements:
@@ -101,6 +106,7 @@ def elements_of(laws: Laws, rows: FloatArray, slopes: FloatArray) -> Elements:
         node_ends=ends([each.size for each in nodes]),
         k0=read_only(slopes),
         steps=addresses([each.step for each in laws.steppers]),
+        rated=np.array(laws.rated, dtype=float),
         parameters=laws.parameters,
         parameter_ends=laws.parameter_ends,
         state_ends=laws.state_ends,

@@ -10,7 +10,7 @@ from hysim.errors import SimulationError
 from hysim.laws.dashpot import Dashpot
 from hysim.laws.static import Line
 from hysim.models.model import family
-from hysim.models.protocols import Sampled, Stepwise, needs_time
+from hysim.models.protocols import Rated, Sampled, Stepwise, needs_time
 from hysim.models.sum import Sum
 from hysim.signals import triangle
 
@@ -25,8 +25,9 @@ class Element:
     Parameters
     ----------
     law : law
-        Force [N] for the drift [m]: any rate-independent law, a `hysim.Dashpot`, or a sum of them; a user's own
-        family or `hysim.CustomLaw` too. A positive force resists a positive drift.
+        Force [N] for the drift [m]: any rate-independent law, a `hysim.Dashpot`, or a sum of them; friction, such as
+        `hysim.LuGre`, or a `hysim.ElasticBacklash`; a user's own family or `hysim.CustomLaw` too. A positive force
+        resists a positive drift.
     between : (int, int)
         Nodes i and j; the drift is ``x_j - x_i``. Node 0 is the ground, the masses are nodes 1, 2, ...
     direction : tuple of float
@@ -91,7 +92,7 @@ class Element:
 
 
 class Parted(NamedTuple):
-    """A law as a part that does not depend on time, and the coefficient of its dashpots."""
+    """A law as a part with memory, and the coefficient of its dashpots."""
 
     law: Any
     viscosity: float
@@ -99,15 +100,21 @@ class Parted(NamedTuple):
 
 def parted(law: Any) -> Parted:
     """The dashpots of a law apart from the rest; TypeError if anything else in it depends on time."""
+    if isinstance(law, Rated):
+        return Parted(law, law.viscosity)
     if isinstance(law, Dashpot):
         return Parted(Line(slope=0.0), law.c)
     if isinstance(law, Sum) and law.dynamic:
         parts = [parted(part) for part in law.parts]
+        if rated := [type(part.law).__name__ for part in parts if isinstance(part.law, Rated)]:
+            raise TypeError(f"an element takes a {rated[0]} by itself: put the other parts into an element beside it")
         rests = tuple(each.law for part, each in zip(law.parts, parts, strict=True) if not isinstance(part, Dashpot))
         rest = Line(slope=0.0) if not rests else rests[0] if len(rests) == 1 else Sum(parts=rests)
         return Parted(rest, sum(each.viscosity for each in parts))
     if needs_time(law):
-        raise TypeError(f"of what depends on time an element takes dashpots only, got {type(law).__name__}")
+        raise TypeError(
+            f"of what depends on time an element takes friction and dashpots only, got {type(law).__name__}"
+        )
     return Parted(law, 0.0)
 
 

@@ -156,7 +156,7 @@ def _by_tables(structure: Any, numbers: Mapping[str, FloatArray], n_sets: int) -
         parameters.append(np.broadcast_to(constants, (n_sets, constants.shape[-1])))
         states.append(np.broadcast_to(memory, (n_sets, memory.shape[-1])))
     none = np.zeros((n_sets, 0))
-    laws = assembly.Laws(tuple(steppers), structure.laws.stretches)
+    laws = structure.laws._replace(steppers=tuple(steppers))
     constants = read_only(np.concatenate([none, *parameters], axis=1), finite=False)
     memories = read_only(np.concatenate([none, *states], axis=1), finite=False)
     slopes = read_only(laws.slopes(constants, memories))

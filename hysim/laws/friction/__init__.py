@@ -1,0 +1,1 @@
+"""Friction and backlash, whose force depends on the velocity as well as on the path."""

@@ -1,0 +1,246 @@
+"""The abstract law of a force that depends on the rate of its input.
+
+A family declares its fields and two steps: one for a sample time, along whose samples the input moves evenly, and one
+for the strokes of a structure's element; see `hysim.kernels.friction.rates`. At one sample time it is a `hysim.Law`
+with one field more, from which all else is derived.
+"""
+
+import functools
+from abc import ABC
+from collections.abc import Mapping
+from dataclasses import MISSING, fields
+from typing import Any, ClassVar, Self, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, checked, items, read_only
+from hysim.kernels import stepping
+from hysim.kernels.friction.rates import N_RATED
+from hysim.models.batch import Reduction
+from hysim.models.composable import Composable
+from hysim.models.law import Law, State
+from hysim.models.parameters import Parameter, declared_space, rate_spans
+from hysim.models.protocols import CompiledLaw, Identifiable, Startable, needed_time, positive_time
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.tables import Tables, arguments_of, scalars_of
+from hysim.records import Record
+
+
+class RatedLaw(Identifiable, Composable, ABC):
+    """A law that depends on the rate of its input, and so on time.
+
+    A family is a subclass under the decorator `hysim.family`.
+
+    Attributes
+    ----------
+    step : kernel
+        ``step(parameters, state, u) -> y`` after an even stroke of one sample, the first parameter; the others are the
+        fields but for the initial memory, in their order. The state is the last input and the memory.
+    rated_step : kernel
+        Likewise, the stroke being described in the state; see `hysim.kernels.friction.rates`.
+    initial, searched, starts, screened
+        As of `hysim.Law`; parameters may have the units ``"v"``, the highest speed of the record, and ``"r"``, the
+        speed of an output that follows the input.
+    """
+
+    step: ClassVar[Any]
+    rated_step: ClassVar[Any]
+    initial: ClassVar[tuple[str, ...]] = ("z0",)
+    searched: ClassVar[tuple[Parameter, ...]] = ()
+    starts: ClassVar[tuple[Mapping[str, float], ...]] = ()
+    screened: ClassVar[int | None] = None
+    dynamic: ClassVar[bool] = True
+
+    # ------------------------------------------------------------------------------ what a family may say more
+
+    @classmethod
+    def check(cls, tables: Tables) -> None:
+        """Raise a ValueError where the tables, every field over sets, hold parameters that are no law."""
+
+    @classmethod
+    def further(cls, tables: Tables) -> int:
+        """Numbers of the memory that begin at zero, behind those that are fields."""
+        return 0
+
+    @property
+    def viscosity(self) -> float:
+        """Coefficient of the dashpot that the rated step leaves out."""
+        return 0.0
+
+    @classmethod
+    def candidates(cls) -> dict[str, Any]:
+        """None for `hysim.compare` to try by itself, since friction is no model of an actuator."""
+        return {}
+
+    # ------------------------------------------------------------------------------ simulation
+
+    def __post_init__(self) -> None:
+        self.at_sample_time(1.0)  # which checks the numbers
+
+    @property
+    def scalars(self) -> dict[str, float]:
+        """Every number by the name that `hysim.identify` has for it, ``name`` or ``name[k]``."""
+        return scalars_of(items(self))
+
+    def with_scalars(self, scalars: Mapping[str, float]) -> Self:
+        """The law with other numbers, by their names in `scalars`; ValueError if the constructor refuses them."""
+        return type(self)(**{**items(self), **arguments_of({**self.scalars, **scalars})})
+
+    def at_sample_time(self, sample_time: float) -> Law:
+        """The law for one sample time [s]; ValueError if that is not positive."""
+        positive_time(sample_time)
+        kind: Any = _kind_at_sample_time(type(self))
+        law: Law = kind(sample_time=sample_time, **items(self))
+        return law
+
+    def response(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
+        """Output y at the samples of an input that moves evenly between them.
+
+        Parameters
+        ----------
+        u : array, shape (n_samples,)
+            Input, which rests before the first sample [unit of u].
+        sample_time : float
+            Time between two samples [s].
+
+        Returns
+        -------
+        array, shape (n_samples,)
+            [unit of y]. Where the velocity jumps, at each sample, it is that of the stroke which ends there.
+
+        Raises
+        ------
+        SimulationError
+            If the output diverges; the message names the sample.
+        ValueError
+            If u is not finite or has not one axis, or the sample time is not positive.
+        """
+        return self.at_sample_time(sample_time).response(u)
+
+    def advance(self, u: npt.ArrayLike, sample_time: float, state: State | None = None) -> tuple[FloatArray, State]:
+        """Output continued from `state`, last input and memory, and the state after the last sample.
+
+        The bits are those of one uncut input; arguments and errors are those of `response`.
+        """
+        return self.at_sample_time(sample_time).advance(u, state)
+
+    def memory(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
+        """Memory at the samples of `u`, shape (n_samples,), or (n_samples, n_memory) of a tuple; see `response`.
+
+        The first number of a memory that is no field.
+        """
+        law = self.at_sample_time(sample_time)
+        z = law.remembered(u)[:, : max(1, len(law.initial_names))]
+        return z if any(isinstance(items(self)[name], tuple) for name in self.initial) else z[:, 0]
+
+    def signals(self, u: npt.ArrayLike, sample_time: float) -> dict[str, FloatArray]:
+        """Output ``"y"``, and the memory ``"z"`` of a law that has one, at the samples of `u`; see `response`."""
+        remembers = self.at_sample_time(sample_time).packed[1].size > 1
+        z = {"z": self.memory(u, sample_time)} if remembers else {}
+        return {"y": self.response(u, sample_time), **z}
+
+    def startable(self, sample_time: float | None = None) -> Startable:
+        """The law at a sample time [s] as a step that runs from any first input, for exports."""
+        return self.at_sample_time(needed_time(self, sample_time)).startable()
+
+    def compiled(self, u0: float = 0.0, *, sample_time: float | None = None) -> CompiledLaw:
+        """The law as compiled loops take it, at rest at the input `u0`; ValueError without a sample time [s]."""
+        return self.at_sample_time(needed_time(self, sample_time)).compiled(u0)
+
+    def rated(self) -> Startable:
+        """The law as an element of a structure takes it, without the dashpot of `viscosity`.
+
+        The strokes are slow at first: they take for ever.
+        """
+        parameters, memory = self.at_sample_time(1.0).packed
+        state = np.concatenate([memory[:1], np.zeros(N_RATED - 1), memory[1:]])
+        state[1] = np.inf
+        return Startable(type(self).rated_step, parameters, state, stepping.start)
+
+    @classmethod
+    def responses(
+        cls,
+        parameters: Parameters,
+        u: npt.ArrayLike,
+        sample_time: float,
+        *,
+        reduce: Reduction | None = None,
+        target: npt.ArrayLike | None = None,
+        workers: int | None = None,
+    ) -> FloatArray:
+        """Outputs of many laws at one sample time [s]; else as `hysim.Law.responses`."""
+        positive_time(sample_time)
+        sets = {**parameters, "sample_time": sample_time}
+        return _kind_at_sample_time(cls).responses(sets, u, reduce=reduce, target=target, workers=workers)
+
+    # ------------------------------------------------------------------------------ identification
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """The box that `hysim.identify` searches; ValueError also if the record has no even time."""
+        return declared_space(
+            self.searched, self.starts, self.scalars, self.initial, record, freedom, self.screened,
+            units=rate_spans(record),
+        )  # fmt: skip
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """Columns in which the output is affine, and the rest of it, shape (n_sets, n_samples, n_columns + 1)."""
+        return self.at_sample_time(record.sample_time).regressors(parameters, record)
+
+    def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
+        """Initial memory with which a periodic record ends as it began."""
+        return dict(self.at_sample_time(record.sample_time).steady(parameters, record))
+
+    def assemble(self, parameters: Mapping[str, float]) -> Self:
+        """The law with these parameters, one number for each name; the others are its own."""
+        return self.with_scalars(parameters)
+
+
+class AtSampleTime(Law):
+    """A rate-dependent law at one sample time; `family` says what it is."""
+
+    family: ClassVar[type[RatedLaw]]
+
+    @classmethod
+    def check(cls, tables: Tables) -> None:
+        cls.family.check(tables)
+
+    @classmethod
+    def initial_memory(cls, tables: Tables, *, further: int = 0) -> FloatArray:
+        return super().initial_memory(tables, further=further + cls.family.further(tables))
+
+
+@functools.cache
+def _kind_at_sample_time(family: type[RatedLaw]) -> type[Law]:
+    """The laws of a family at one sample time: its fields behind ``sample_time``."""
+    named: Any = fields(cast(Any, family))
+    defaults = {each.name: each.default for each in named if each.default is not MISSING}
+    body = {
+        "__module__": family.__module__,
+        "__annotations__": {"sample_time": float, **{each.name: each.type for each in named}},
+        "__doc__": f"{family.__name__} at one sample time.",
+        "sample_time": 1.0,
+        **defaults,
+        "family": family,
+        "step": staticmethod(family.step),
+        "initial": family.initial,
+        "searched": family.searched,
+    }
+    return checked(type(f"{family.__name__}AtSampleTime", (AtSampleTime,), body))
+
+
+def check_signs(tables: Tables, *, positive: tuple[str, ...], not_negative: tuple[str, ...] = ()) -> None:
+    """A ValueError for the first field of these with a number that is not positive, or negative."""
+    for name in positive:
+        if not (tables[name] > 0.0).all():
+            raise ValueError(f"{name} must be positive, got {tables[name].min():g}")
+    for name in not_negative:
+        if not (tables[name] >= 0.0).all():
+            raise ValueError(f"{name} must not be negative, got {tables[name].min():g}")
+
+
+def curve(speed: npt.ArrayLike, coulomb: float, breakaway: float, velocity: float, exponent: float) -> FloatArray:
+    """Friction at steady speeds, Stribeck's curve without a viscous part."""
+    ratio = np.abs(read_only(speed, "velocity")) / velocity
+    with np.errstate(over="ignore", under="ignore"):
+        return np.asarray(coulomb + (breakaway - coulomb) * np.exp(-(ratio**exponent)))
