@@ -70,8 +70,10 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     x = (last + state[2]) / a
     if state[2] == 0.0:
         x = first_place(last / a, z, parameters)
-    m = curve(x, parameters[ANISOTROPY])[0]
-    if u != last:
+    m = 0.0
+    if u == last:
+        m = curve(x, parameters[ANISOTROPY])[0]
+    else:
         delta = 1.0 if u > last else -1.0
         share = parameters[FEEDBACK] * parameters[REVERSIBLE]
         of_m, of_z = -parameters[COUPLING] * share, -parameters[COUPLING] * (1.0 - share)

@@ -7,7 +7,7 @@ u is the field H, y the flux density B, and the memory z is M_irr, the irreversi
 """
 
 import math
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -16,14 +16,17 @@ from hysim._frozen import FloatArray, read_only
 from hysim.kernels.magnetics import jiles_atherton as kernels
 from hysim.kernels.magnetics import jiles_atherton_inverse as inverse
 from hysim.laws.magnetic import _jiles_atherton_conversions as conversions
+from hysim.laws.magnetic import _jiles_atherton_search as search
 from hysim.laws.magnetic._jiles_atherton_conversions import MU0
 from hysim.models.law import Law, Packed, State
 from hysim.models.model import family
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
+from hysim.models.parameters import Parameter
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.tables import Tables
+from hysim.records import Record
 
 _POSITIVE = ("Ms", "a", "k")
-_COSINES, _SHARES = np.polynomial.legendre.leggauss(200)
 
 
 @family
@@ -105,7 +108,9 @@ class JilesAtherton(Law):
     offset: float = 0.0
     z0: float = 0.0
 
+    searched = tuple(Parameter(name, affine=True) for name in ("gain", "feedthrough", "offset"))
     step = staticmethod(kernels.step)
+    exact_strokes: ClassVar[bool] = True
 
     @classmethod
     def check(cls, tables: Tables) -> None:
@@ -117,7 +122,7 @@ class JilesAtherton(Law):
             if not ((tables[name] >= 0.0) & (tables[name] <= 1.0)).all():
                 raise ValueError(f"{name} must be between 0 and 1, got {tables[name].ravel().tolist()[0]}")
         coupling = tables["alpha"] * tables["Ms"] / tables["a"]
-        feedback = tables["reversible_feedback"] * tables["c"] * coupling * _initial_slope(tables["anisotropy"])
+        feedback = tables["reversible_feedback"] * tables["c"] * coupling * search.initial_slope(tables["anisotropy"])
         if not (feedback < 1.0).all():
             raise ValueError(
                 "the reversible magnetisation is not unique: reversible_feedback alpha c dM_an/dHe must be below 1 at "
@@ -224,8 +229,15 @@ class JilesAtherton(Law):
             inverse.step, read_only(parameters, finite=False), np.concatenate([[law.state[0], reached], law.state])
         )
 
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """The box in the scales of the record's field and magnetisation."""
+        return search.search_space(self.scalars, self.columns, record, freedom)
 
-def _initial_slope(anisotropy: FloatArray) -> FloatArray:
-    """Slope of the anhysteretic curve at x = 0, the mean square of a moment's cosine."""
-    weights = _SHARES * np.exp(anisotropy[..., np.newaxis] * _COSINES**2 - np.maximum(anisotropy, 0.0)[..., np.newaxis])
-    return np.asarray((weights * _COSINES**2).sum(axis=-1) / weights.sum(axis=-1))
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """Columns M, H, 1 and 0, shape (n_sets, n_samples, 4)."""
+        magnetisation = self.outputs({**parameters, "gain": 1.0, "feedthrough": 0.0, "offset": 0.0}, record.u)
+        field = np.broadcast_to(record.u, magnetisation.shape)
+        return np.stack([magnetisation, field, np.ones_like(field), np.zeros_like(field)], axis=-1)
+
+    def _check_memory_is_its_own(self, parameters: Parameters, u: FloatArray) -> None:
+        """It is: gain, feedthrough and offset stand behind it."""
