@@ -28,6 +28,7 @@ NUMBERS = [
     (hs.Dahl, {"coulomb": 0.7}, "coulomb"),
     (hs.ColemanHodgdon, {"B": 0.7}, "B"),
     (hs.BoucWenBaberNoori, {"delta_nu": 0.2}, "delta_nu"),
+    (hs.JilesAtherton, {"k": 0.2}, "k"),
     (hs.Dashpot, {"c": 0.7}, "c"),
     (hs.TransferFunction, {"num": (1.0,), "den": (1.0, 2.0)}, "den"),
     (hs.BoucWenOscillator, {"mass": 2.0, "damping": 1.0, "stiffness": 3.0, "law": hs.BoucWen()}, "stiffness"),

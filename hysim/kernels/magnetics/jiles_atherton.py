@@ -24,7 +24,8 @@ What is known at a sample, H or B, is a sum of x, m and z,
 and x is its root, by Newton's method inside a bracket. H is of_x = 1, of_m = -A w c, of_z = -A (1 - w c). Its slope must
 be positive along the whole branch, or else the law jumps there; z follows m, so that its slope is never above the
 larger of what it is at the beginning and the steepest slope of m ahead, which settles the question for most branches at
-once; the others are gone in pieces on which it does. A law that jumps is returned as nan.
+once; the others are gone in pieces on which it does. The output of a law that jumps is
+returned as `inf`.
 """
 
 import math
@@ -59,42 +60,37 @@ _PLACES, _SHARES = (
 
 @kernel
 def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
-    """Output at the next field `u`; `state` is (last u, M_irr, He - H), and moves along.
+    """Output at the next field `u`; `state` is (last u, M_irr, x), and moves along.
 
-    He - H is zero before the first sample, where it is not known yet. `parameters` are those named in this module.
+    x = He / a is zero before the first sample, where it is not known yet. It is kept, and not found anew from the last
+    u, so that the stretches of x over which z is averaged leave no gaps. `parameters` are those named in this module.
     """
     a, Ms = parameters[FIELD], parameters[SATURATION]
     last, z = state[0], state[1] / Ms
     if not abs(z) < math.inf:
-        return math.nan
-    x = (last + state[2]) / a
+        return math.inf
     if state[2] == 0.0:
-        x = first_place(last / a, z, parameters)
-    m = 0.0
-    if u == last:
-        m = curve(x, parameters[ANISOTROPY])[0]
-    else:
+        state[2] = first_place(last / a, z, parameters)
+    if u != last:
         delta = 1.0 if u > last else -1.0
         share = parameters[FEEDBACK] * parameters[REVERSIBLE]
         of_m, of_z = -parameters[COUPLING] * share, -parameters[COUPLING] * (1.0 - share)
-        x, after, m = advance(delta * x, delta * z, delta * (u / a), 1.0, of_m, of_z, parameters)
-        x, m = delta * x, delta * m
+        x, after, _ = advance(delta * state[2], delta * z, delta * (u / a), 1.0, of_m, of_z, parameters)
         if after != delta * z:
-            z = delta * after
-            state[1] = Ms * z
-    state[0] = u
-    state[2] = a * x - u
-    if not abs(x) < math.inf:
-        state[1] = math.nan
-    return output(u, m, z, parameters)
+            state[1] = delta * Ms * after
+        state[0], state[2] = u, delta * x
+    return output(state, parameters)
 
 
 @inner
-def output(u: float, m: float, z: float, parameters: FloatArray) -> float:
-    """Output at the field u, where M_an / Ms = m and M_irr / Ms = z."""
+def output(state: FloatArray, parameters: FloatArray) -> float:
+    """Output in a state, infinite after a jump."""
+    if not abs(state[1]) + abs(state[2]) < math.inf:
+        return math.inf
     c = parameters[REVERSIBLE]
-    magnetisation = parameters[SATURATION] * (c * m + (1.0 - c) * z)
-    return float(parameters[OFFSET] + parameters[FEEDTHROUGH] * u + parameters[GAIN] * magnetisation)
+    m, _ = curve(state[2], parameters[ANISOTROPY])
+    magnetisation = c * parameters[SATURATION] * m + (1.0 - c) * state[1]
+    return float(parameters[OFFSET] + parameters[FEEDTHROUGH] * state[0] + parameters[GAIN] * magnetisation)
 
 
 @inner

@@ -29,17 +29,17 @@ def step(parameters: FloatArray, state: FloatArray, y: float) -> float:
     share, gain, feedthrough = own[law.FEEDBACK] * c, abs(own[law.GAIN]) * Ms, abs(own[law.FEEDTHROUGH]) * a
     rising = math.copysign(1.0, own[law.GAIN] + own[law.FEEDTHROUGH])
     delta = rising if y > reached else -rising
-    x, z = (u + copy[2]) / a, copy[1] / Ms
+    z = copy[1] / Ms
     if copy[2] == 0.0:
-        x = law.first_place(u / a, z, own)
+        copy[2] = law.first_place(u / a, z, own)
     of_m, of_z = gain * c - feedthrough * coupling * share, gain * (1.0 - c) - feedthrough * coupling * (1.0 - share)
     target = delta * rising * (y - own[law.OFFSET])
-    x, after, m = law.advance(delta * x, delta * z, target, feedthrough, of_m, of_z, own)
+    x, after, m = law.advance(delta * copy[2], delta * z, target, feedthrough, of_m, of_z, own)
     wanted = delta * a * (x - coupling * (share * m + (1.0 - share) * after))
     end = within_limits(parameters, wanted, delta)
     if end == wanted:
         state[0], state[1] = end, y
-        copy[0], copy[2] = end, delta * a * x - end
+        copy[0], copy[2] = end, delta * x
         if after != delta * z:
             copy[1] = delta * Ms * after
     elif not math.isnan(end):

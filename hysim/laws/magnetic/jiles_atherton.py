@@ -131,7 +131,7 @@ class JilesAtherton(Law):
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
-        """Parameters as `hysim.kernels.magnetics.jiles_atherton.step` takes them, and memory (u, M_irr, He - H)."""
+        """Parameters as `hysim.kernels.magnetics.jiles_atherton.step` takes them, and memory (u, M_irr, He / a)."""
         a, Ms = tables["a"], tables["Ms"]
         scaled = [a, Ms, tables["alpha"] * Ms / a, tables["k"] / a]
         others = ("c", "reversible_feedback", "anisotropy", "gain", "feedthrough", "offset")
