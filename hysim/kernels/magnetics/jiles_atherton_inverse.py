@@ -36,6 +36,8 @@ def step(parameters: FloatArray, state: FloatArray, y: float) -> float:
     target = delta * rising * (y - own[law.OFFSET])
     x, after, m = law.advance(delta * copy[2], delta * z, target, feedthrough, of_m, of_z, own)
     wanted = delta * a * (x - coupling * (share * m + (1.0 - share) * after))
+    if delta * (wanted - u) <= 0.0:
+        return float(u)  # the step is below a rounding of the effective field, and might go the wrong way
     end = within_limits(parameters, wanted, delta)
     if end == wanted:
         state[0], state[1] = end, y
