@@ -44,7 +44,9 @@ _ANGLES, _WEIGHTS = (read_only(0.5 * values) for values in np.polynomial.legendr
 @inner
 def curve(x: float, p: float) -> tuple[float, float]:
     """m(x) and its slope for the anisotropy p."""
-    return aligned(x, p) if p != 0.0 else langevin(x)
+    if p != 0.0:
+        return aligned(x, p)
+    return langevin(x)
 
 
 @inner

@@ -46,11 +46,14 @@ _LOGS = ("Ms", "a", "k")
 _CALLED = {"a": "width", "alpha": "stability"}
 _HELD = ("anisotropy", "reversible_feedback")
 _COLUMNS = ("gain", "feedthrough")
+_LEAST = 1e-12  # of 1 - alpha Ms m0 / a
 _SMALLEST = 1e-3  # of the width: a for a coupling that is given, and nearly as large
 _SCREENED = 1024
 
 
-def search_space(scalars: Mapping[str, float], columns: tuple[str, ...], record: Record, freedom: Freedom) -> SearchSpace:
+def search_space(
+    scalars: Mapping[str, float], columns: tuple[str, ...], record: Record, freedom: Freedom
+) -> SearchSpace:
     """The coordinates, their box and the way back to the user's parameters for one record.
 
     Held by default are gain and feedthrough, of which the first could not be told from Ms, and what makes the law
@@ -141,7 +144,7 @@ class _Chart:
         """Coordinates (n_x,) of one set of parameters."""
         raw = {name: float(parameters[name]) for name in _BOX}
         share = float(initial_slope(np.array([raw["anisotropy"]]))[0]) * raw["Ms"]
-        apart = max(1.0 - raw["alpha"] * share / raw["a"], _SMALLEST)
+        apart = max(1.0 - raw["alpha"] * share / raw["a"], _LEAST)
         own = {
             "Ms": raw["Ms"] / self.magnetisation,
             "a": raw["a"] * apart / self.field,
@@ -155,8 +158,13 @@ class _Chart:
 
 def initial_slope(anisotropy: FloatArray) -> FloatArray:
     """Slope of the anhysteretic curve at x = 0, the mean square of a moment's cosine."""
-    weights = _SHARES * np.exp(anisotropy[..., np.newaxis] * _COSINES**2 - np.maximum(anisotropy, 0.0)[..., np.newaxis])
-    return np.asarray((weights * _COSINES**2).sum(axis=-1) / weights.sum(axis=-1))
+    p = np.asarray(anisotropy)[..., np.newaxis]
+    reach = np.where(p >= 0.0, _DEPTH / np.maximum(p, _DEPTH), np.sqrt(_DEPTH / np.maximum(-p, _DEPTH)))
+    squares = np.where(p >= 0.0, 1.0 - reach * _PLACES, reach * _PLACES) ** 2
+    weights = _SHARES * np.exp(p * (squares - (p >= 0.0)))
+    return np.asarray((weights * squares).sum(axis=-1) / weights.sum(axis=-1))
 
 
-_COSINES, _SHARES = np.polynomial.legendre.leggauss(200)
+_DEPTH = 40.0  # of the exponent: beyond, nothing is left
+_PLACES, _SHARES = np.polynomial.legendre.leggauss(64)
+_PLACES = 0.5 * (1.0 + _PLACES)
