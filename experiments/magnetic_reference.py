@@ -8,6 +8,7 @@ the irreversible part is clipped, M follows from H by a root, and the branch beg
 """
 
 import math
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import mpmath
@@ -157,5 +158,5 @@ def runge_kutta(core: Core, fields: Array, M: float) -> Array:
 
 def strokes(turns: Array, steps: int) -> Array:
     """Fields that go evenly from turning point to turning point, `steps` on each stroke."""
-    pieces = [np.linspace(low, high, steps + 1)[1:] for low, high in zip(turns[:-1], turns[1:], strict=True)]
+    pieces = [np.linspace(low, high, steps + 1)[1:] for low, high in pairwise(turns.tolist())]
     return np.concatenate([turns[:1], *pieces])

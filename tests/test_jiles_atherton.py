@@ -102,10 +102,10 @@ def test_scales_drop_out():
 
 
 def test_a_steady_loop_between_opposite_fields_takes_energy():
-    """Its area, the loss in a cycle, is not negative, and it runs counterclockwise."""
+    """Its area is the loss in a cycle. With H + alpha M_irr as the effective field a loop may give energy."""
     rng, n_steady = np.random.default_rng(3), 0
     for _ in range(30):
-        law = any_law(rng)
+        law = replace(any_law(rng), reversible_feedback=1.0)
         u = 10.0 ** rng.uniform(-1.0, 1.0) * hs.signals.triangle(-1.0, 1.0, cycles=30, samples_per_cycle=200)
         loop = hs.loop_metrics(u, law.response(u))
         if loop.closure_gap > 1e-9 * loop.stroke:  # a wide memory takes more cycles
@@ -247,7 +247,8 @@ def test_periodic_loops_that_begin_anywhere_give_the_constants_back():
         assert fit.estimates[name] == pytest.approx(getattr(truth, name), rel=1e-4)  # noise-free
 
 
-def box(freedom, start=hs.JilesAtherton()):
+def box(freedom):
+    start = hs.JilesAtherton()
     u = 100.0 * np.sin(np.linspace(0.0, 7.0, 50))
     return start.search_space(hs.Record(u=u, y=start.response(u)), freedom)
 

@@ -11,8 +11,8 @@ integrals over an angle, with an easy axis at the angle psi to the field, averag
 w = cos(theta) the mean of their two exponents is this one, and p = K cos(2 psi) / (mu0 Ms a). The slope is never
 negative, highest at x = 0, and falls with |x|.
 
-In the complex plane m has its poles where the second integral vanishes: for p = 0 at i pi, 2 i pi, ...; for p > 0 on the
-imaginary axis from i pi / 2 on (theorem of Lee and Yang); for p < 0 farther than pi from the real axis.
+In the complex plane m has its poles where the second integral vanishes: for p = 0 at i pi, 2 i pi, ...; for p > 0 on
+the imaginary axis from i pi / 2 on (theorem of Lee and Yang); for p < 0 farther than pi from the real axis.
 """
 
 import math
@@ -20,7 +20,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from hysim._frozen import FloatArray, read_only
+from hysim._frozen import read_only
 from hysim.kernels._compile import inner
 from hysim.kernels.elementary import N_TERMS, sum16
 

@@ -5,13 +5,13 @@ slope of M_an / Ms at He = 0 in units of 1 / a (1/3 without anisotropy), the coo
 
     Ms         log(Ms / m), from the amplitude to 30 times it
     stability  t,  alpha = (1 - exp(-t)) a / (Ms m0): 0 for no coupling; alpha Ms m0 / a is below 1 for every t
-    width      log(a exp(-t) / h): Ms m0 / (a exp(-t)) is the slope dM/dH of the anhysteretic curve, which a record shows
+    width      log(a exp(-t) / h): Ms m0 / (a exp(-t)) is the slope dM/dH of the anhysteretic curve
     k          log(k / h)
     c, anisotropy, reversible_feedback    themselves
     z0         z0 / Ms
 
-so that an upright loop is an upright loop whatever the coupling. Laws with alpha Ms m0 >= a, which may jump, are outside.
-A parameter that the user bounds is its own coordinate, between these bounds.
+so that an upright loop is an upright loop whatever the coupling. Laws with alpha Ms m0 >= a, which may jump, are
+outside. A parameter that the user bounds is its own coordinate, between these bounds.
 """
 
 from collections.abc import Mapping

@@ -20,8 +20,8 @@ from hysim.laws.magnetic import _jiles_atherton_search as search
 from hysim.laws.magnetic._jiles_atherton_conversions import MU0
 from hysim.models.law import Law, Packed, State
 from hysim.models.model import family
-from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.parameters import Parameter
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.tables import Tables
 from hysim.records import Record
