@@ -13,9 +13,9 @@ follows m as an exponential average,
 The integral is done by Gauss' rule on panels so short that its remainder is a rounding. A rule of n points on a panel
 of half length r leaves out less than (64 / 15) r max|f| R^(2 - 2 n) / (1 - R^-2) of an integrand f that is analytic
 within the ellipse about the panel of the semi-axes r (R + 1/R) / 2 and r (R - 1/R) / 2 (L. N. Trefethen, Approximation
-Theory and Approximation Practice, theorem 19.3). 4, 8 and 16 points are used up to R = 400, 19.3 and 4.4, where the ellipse
-keeps within 0.8 of the distance of the poles of m from the real axis, and the exponential grows on it by less than a
-factor of 14: 4e-17 is left out.
+Theory and Approximation Practice, theorem 19.3). 4, 8 and 16 points are used up to R = 400, 19.3 and 4.4, where the
+ellipse keeps within 0.8 of the distance of the poles of m from the real axis, and the exponential grows on it by less
+than a factor of 14: 4e-17 is left out.
 
 What is known at a sample, H or B, is a sum of x, m and z,
 
@@ -293,4 +293,4 @@ def panel(x: float, z: float, half: float, first: int, points: int, parameters: 
         place = _PLACES[first + j]
         m = curve(x + half * (1.0 + place), p)[0]
         total += _SHARES[first + j] * (m - z) * math.exp(-decay * (1.0 - place))
-    return decay * total
+    return float(decay * total)

@@ -94,6 +94,7 @@ class JilesAtherton(Law):
     >>> import hysim as hs
     >>> iron = hs.JilesAtherton(Ms=1.6e6, a=1100.0, alpha=1.6e-3, k=400.0, c=0.2)
     >>> iron.response([0.0, 5000.0, 0.0, -5000.0]).round(6).tolist()
+    [0.0, 1.691671, 0.623882, -1.691671]
     """
 
     Ms: float = 1.6e6
