@@ -114,7 +114,7 @@ def cost_rows(smoke: bool) -> list[Row]:
             exact, ends = law.response(fields), law.response(turns)
             inputs = np.tile(fields, max(1, (2_000 if smoke else N_TIMED) // fields.size))
             for method, scheme in {"hysim": None, **SCHEMES}.items():
-                own = law.response if scheme is None else lambda u, scheme=scheme: scheme(core, u, 0.0)
+                own = law.response if scheme is None else lambda u, scheme=scheme, core=core: scheme(core, u, 0.0)
                 errors = own(fields) - exact if scheme is not None else exact[::steps] - ends
                 turn = [(seconds(own, inputs), seconds(law.response, inputs)) for _ in range(1 if smoke else 7)]
                 times = np.array(turn) / inputs.size
