@@ -993,14 +993,14 @@ def jiles_atherton(result: Result) -> list[str]:
     require(there["violations"] == back["violations"] == 0, "more samples change nothing")
     return [
         f"{count(digits['laws'])} laws are {error_of(digits['median'])} of the range wrong in the median and "
-        f"{error_of(digits['worst'])} at worst, against dM/dH integrated with 30 digits. More samples on a branch change "
-        f"{count(there['cases'])} hostile laws and the inverses of as many by at most "
+        f"{error_of(digits['worst'])} at worst, against dM/dH integrated with 30 digits. More samples on a branch "
+        f"change {count(there['cases'])} hostile laws and the inverses of as many by at most "
         f"{number(max(there['worst_share'], back['worst_share']), 2)} of what is allowed, 1e-11 of the range and the "
         f"roundings ({count(there['jumping'])} of the laws jump, in one step and in many); driven by B, "
         f"{count(trip['laws'])} laws return it to {error_of(trip['worst'])} of the range at worst.",
         f"With 200 and 2 000 steps a stroke Runge and Kutta's rule over H is {span(column(coarse, 'error'), 2)} and "
-        f"{span(column(fine, 'error'), 2)} wrong and takes {span(column(coarse + fine, 'times_hysim'), 2)} of hysim's time "
-        f"a sample, Euler's {span(column(euler, 'error'), 2)} and {span(column(many, 'error'), 2)} at "
+        f"{span(column(fine, 'error'), 2)} wrong and takes {span(column(coarse + fine, 'times_hysim'), 2)} of hysim's "
+        f"time a sample, Euler's {span(column(euler, 'error'), 2)} and {span(column(many, 'error'), 2)} at "
         f"{span(column(euler + many, 'times_hysim'), 2)}; hysim has the same output with one step a stroke, to "
         f"{error_of(max(column(own, 'error')))} of the range.",
     ]

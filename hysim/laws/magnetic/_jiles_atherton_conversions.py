@@ -14,8 +14,8 @@ Ours is  He = H + alpha M,  M = c M_an(He) + (1 - c) M_irr,  dM_irr/dHe = (M_an 
 Sources: D. C. Jiles and D. L. Atherton, J. Magn. Magn. Mater. 61 (1986); D. C. Jiles, J. B. Thoelke and M. K. Devine,
 IEEE Trans. Magn. 28 (1992); A. J. Bergqvist, IEEE Trans. Magn. 32 (1996); R. Venkataraman and P. S. Krishnaprasad, IEEE
 Conf. Decision and Control 2000, for the bulk form; R. Szewczyk, JAmodel (github.com/romanszewczyk/JAmodel), ModelType
-2. The form of the circuit simulators is the one that is quoted for PSpice (core, level 2) and Micro-Cap; we have not seen
-their manuals.
+2. The form of the circuit simulators is the one that is quoted for PSpice (core, level 2) and Micro-Cap; we have not
+seen their manuals.
 """
 
 import math

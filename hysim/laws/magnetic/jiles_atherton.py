@@ -18,6 +18,7 @@ from hysim.kernels.magnetics import jiles_atherton_inverse as inverse
 from hysim.laws.magnetic import _jiles_atherton_conversions as conversions
 from hysim.laws.magnetic import _jiles_atherton_search as search
 from hysim.laws.magnetic._jiles_atherton_conversions import MU0
+from hysim.models.inverse_search import first_input
 from hysim.models.law import Law, Packed, State
 from hysim.models.model import family
 from hysim.models.parameters import Parameter
@@ -214,8 +215,6 @@ class JilesAtherton(Law):
             return super().inverse_begun(y, u0, state)
         if state is not None:
             return self._inverse_from(self._begun(state[0], state)[0], UNLIMITED)
-        from hysim.models.inverse_search import first_input
-
         return self.compiled_inverse(first_input(self, float(y[0])) if u0 is None else float(u0))
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
