@@ -19,6 +19,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "experiments"))
 from magnetic_reference import Core, Exact, runge_kutta, strokes
 
 MU0 = 4e-7 * math.pi
+SLOW = numba.config.DISABLE_JIT
 compiler = shutil.which("gcc") or shutil.which("cc")
 STEEL = Core(Ms=1.6e6, a=1100.0, alpha=1.6e-3, k=400.0, c=0.2)
 ROUNDING = 1e-13  # of the range: some roundings of a dozen strokes, amplified by 1 / (1 - alpha dM_an/dHe)
@@ -51,7 +52,7 @@ def initial_slope(p):
 # ---------------------------------------------------------------------------------- against the differential equation
 
 
-@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="20 000 steps a stroke")
+@pytest.mark.skipif(SLOW, reason="20 000 steps a stroke")
 def test_it_is_what_the_runge_kutta_loops_of_other_codes_tend_to():
     turns = 1100.0 * np.array([0.0, 4.0, -4.0, 2.0, -1.0, 5.0])
     fields = strokes(turns, 20_000)
@@ -107,7 +108,7 @@ def test_scales_drop_out():
 def test_a_steady_loop_between_opposite_fields_takes_energy():
     """Its area is the loss in a cycle. With H + alpha M_irr as the effective field a loop may give energy."""
     rng, n_steady = np.random.default_rng(3), 0
-    for _ in range(30):
+    for _ in range(3 if SLOW else 30):
         law = replace(any_law(rng), reversible_feedback=1.0)
         u = 10.0 ** rng.uniform(-1.0, 1.0) * hs.signals.triangle(-1.0, 1.0, cycles=30, samples_per_cycle=200)
         loop = hs.loop_metrics(u, law.response(u))
@@ -115,12 +116,12 @@ def test_a_steady_loop_between_opposite_fields_takes_energy():
             continue
         assert loop.energy <= 0.0, law  # counterclockwise
         n_steady += 1
-    assert n_steady > 10
+    assert n_steady > (0 if SLOW else 10)
 
 
 def test_the_field_for_an_output_is_found_to_the_rounding_of_the_output():
     rng = np.random.default_rng(4)
-    for _ in range(100):
+    for _ in range(5 if SLOW else 100):
         law = replace(any_law(rng), feedthrough=10.0 ** rng.uniform(-6.0, 0.0), offset=rng.normal())
         u = zigzag(rng, 10.0 ** rng.uniform(-1.0, 1.5))
         y = law.response(u)
@@ -176,8 +177,8 @@ def test_a_coupling_that_is_too_strong_jumps_and_stays_so():
 
 def test_whether_it_jumps_does_not_depend_on_the_samples():
     """alpha Ms / a from 2.5 to 12: the steepest place lies inside the stroke."""
-    fine = np.linspace(-4000.0, 4000.0, 4001)
-    for coupling in np.linspace(2.5, 12.0, 39):
+    fine = np.linspace(-4000.0, 4000.0, 401 if SLOW else 4001)
+    for coupling in np.linspace(2.5, 12.0, 5 if SLOW else 39):
         law = magnet(Core(1.6e6, 1100.0, coupling * 1100.0 / 1.6e6, 1500.0, 0.0), z0=-1.2e6)
         rows = [hs.JilesAtherton.responses(law.arguments, u)[0] for u in (fine[[0, -1]], fine)]
         assert np.isfinite(rows[0][-1]) == np.isfinite(rows[1][-1])
@@ -220,13 +221,13 @@ def test_constants_of_other_spellings_come_back():
 def test_the_circuit_form_is_the_same_equation(K, C):
     """dM/dH = (M_an - M)+ / ((1 + C) delta K) + C / (1 + C) dM_an/dH, by 20 000 Euler steps a stroke."""
     law = replace(hs.JilesAtherton.from_circuit(MS=4e5, A=25.0, K=K, C=C), gain=1.0, feedthrough=0.0)
-    fields, M = strokes(np.array([0.0, 80.0, -80.0]), 20_000 if not numba.config.DISABLE_JIT else 2_000), 0.0
+    fields, M = strokes(np.array([0.0, 80.0, -80.0]), 20_000), 0.0
     x = fields[1:] - 0.5 * np.diff(fields)
     for H, h in zip(x, np.diff(fields), strict=True):
         m = 1.0 / math.tanh(H / 25.0) - 25.0 / H
         steep = (25.0 / H) ** 2 - 1.0 / math.sinh(H / 25.0) ** 2
         M += h * (max(math.copysign(1.0, h) * (4e5 * m - M), 0.0) / ((1.0 + C) * K) + C / (1.0 + C) * 16e3 * steep)
-    assert law.response(fields)[-1] == pytest.approx(M, rel=1e-3 if numba.config.DISABLE_JIT else 1e-4)  # Euler's
+    assert law.response([0.0, 80.0, -80.0])[-1] == pytest.approx(M, rel=1e-4)  # Euler's
 
 
 @pytest.mark.parametrize("psi", [0.0, 0.4, 0.5 * math.pi])
@@ -245,6 +246,7 @@ def test_the_anisotropic_curve_is_that_of_jamodel(psi):
 # ---------------------------------------------------------------------------------- identification
 
 
+@pytest.mark.skipif(SLOW, reason="thousands of loops")
 def test_periodic_loops_that_begin_anywhere_give_the_constants_back():
     truth = hs.JilesAtherton(Ms=4e5, a=50.0, alpha=2.5e-4, k=45.0, c=0.6)
     loop = hs.signals.triangle(-1.0, 1.0, cycles=1, samples_per_cycle=32)[:-1]
