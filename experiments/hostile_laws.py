@@ -341,12 +341,14 @@ def jiles_atherton(rng: Rng) -> Drawn:
     """A magnetic core, now and then with a coupling that is strong enough for a jump."""
     field, size = decades(rng, -3.0, 3.0), decades(rng, -3.0, 6.0)
     p = float(rng.choice([0.0, signed(rng, decades(rng, -3.0, 1.5))], p=[0.6, 0.4]))
-    slope = 1.0 / 3.0 if p == 0.0 else max(1.0 / (3.0 + 2.0 * abs(p)), min(1.0, 1.0 / 3.0 + 0.3 * p))
+    cosines, shares = np.polynomial.legendre.leggauss(100)
+    shares = shares * np.exp(p * cosines**2)
+    slope = float(shares @ cosines**2 / shares.sum())
     strength = (0.0, rng.random(), 1.0 - decades(rng, -3.0, 0.0), -decades(rng, -3.0, 1.0), decades(rng, 0.0, 1.0))
     coupling = float(rng.choice(strength, p=[0.1, 0.4, 0.2, 0.2, 0.1])) / slope
     c = float(rng.choice([0.0, rng.random(), decades(rng, -6.0, 0.0)]))
     w = float(rng.choice([1.0, 1.0, 0.0, rng.random()]))
-    c = min(c, 0.3 / max(coupling, 1.0)) if coupling * slope > 0.9 else c
+    c = min(c, 0.9 / (coupling * slope)) if coupling > 0.0 else c
     pinning = field * decades(rng, -3.0, 2.0)
     signs = signed(rng, 1.0)
     constants = {"Ms": size, "a": field, "alpha": coupling * field / size, "k": pinning, "c": c}
