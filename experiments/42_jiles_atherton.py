@@ -172,26 +172,26 @@ def summary(cases: list[tuple[str, float, str]]) -> dict[str, float]:
     }
 
 
-LOOKS = {"hysim": ("*", "-", "#0072B2"), "Euler": ("s", "--", "#D55E00"), "Runge-Kutta 4": ("o", ":", "#222222")}
+LOOKS = {"Euler": ("s", "--", "#D55E00"), "Runge-Kutta 4": ("o", ":", "#222222")}
+OWN = "#0072B2"
 FLOOR = 1e-17  # where an error of zero is drawn
 
 
 def draw(rows: list[Row], digits: list[float]) -> Figure:
-    """Errors of the schemes against their time a stroke; errors of hysim against 30 digits."""
+    """Errors of the schemes by their number of steps; errors of hysim against 30 digits."""
     canvas = figure(height=3.4)
-    ours, sure = canvas.subplots(1, 2)
+    schemes, sure = canvas.subplots(1, 2)
     for method, (marker, dashes, colour) in LOOKS.items():
-        for k, core in enumerate(CORES):
-            if method == "hysim":
-                continue
+        for core in CORES:
             own = [row for row in rows if row["method"] == method and row["core"] == core]
-            x, y = [[row[name] * factor for row in own] for name, factor in (("steps", 1.0), ("error", 1.0))]
-            ours.loglog(x, y, marker=marker, ls=dashes, color=colour, ms=4, lw=1.0, label=method if k == 0 else None)
-    ours.axhline(max(digits), color=LOOKS["hysim"][2], label="hysim, any number")
-    ours.set(xlabel="Steps a stroke", ylabel="Error of M [range]", ylim=(1e-17, 1.0))
-    ours.legend(loc="lower left")
+            steps, errors = ([row[name] for row in own] for name in ("steps", "error"))
+            label = method if core == next(iter(CORES)) else None
+            schemes.loglog(steps, errors, marker=marker, ls=dashes, color=colour, ms=4, lw=1.0, label=label)
+    schemes.axhline(max(digits), color=OWN, label="hysim, any number")
+    schemes.set(xlabel="Steps a stroke", ylabel="Error of M [range]", ylim=(FLOOR, 100.0))
+    schemes.legend(loc="center right")
     share = np.arange(1, len(digits) + 1) / len(digits)
-    sure.step(np.maximum(sorted(digits), FLOOR), share, where="post", color=LOOKS["hysim"][2])
+    sure.step(np.maximum(sorted(digits), FLOOR), share, where="post", color=OWN)
     sure.set(xscale="log", xlabel="Error against 30 digits [range]", ylabel="Share of the laws", ylim=(0.0, 1.02))
     return canvas
 
