@@ -337,6 +337,26 @@ def cascaded(rng: Rng) -> Drawn:
     return Drawn(hs.Cascade(stages=(first, behind.law)), length)
 
 
+def jiles_atherton(rng: Rng) -> Drawn:
+    """A magnetic core, now and then with a coupling that is strong enough for a jump."""
+    field, size = decades(rng, -3.0, 3.0), decades(rng, -3.0, 6.0)
+    p = float(rng.choice([0.0, signed(rng, decades(rng, -3.0, 1.5))], p=[0.6, 0.4]))
+    cosines, shares = np.polynomial.legendre.leggauss(100)
+    shares = shares * np.exp(p * cosines**2)
+    slope = float(shares @ cosines**2 / shares.sum())
+    strength = (0.0, rng.random(), 1.0 - decades(rng, -3.0, 0.0), -decades(rng, -3.0, 1.0), decades(rng, 0.0, 1.0))
+    coupling = float(rng.choice(strength, p=[0.1, 0.4, 0.2, 0.2, 0.1])) / slope
+    c = float(rng.choice([0.0, rng.random(), decades(rng, -6.0, 0.0)]))
+    w = float(rng.choice([1.0, 1.0, 0.0, rng.random()]))
+    c = min(c, 0.9 / (coupling * slope)) if coupling > 0.0 else c
+    pinning = field * decades(rng, -3.0, 2.0)
+    signs = signed(rng, 1.0)
+    constants = {"Ms": size, "a": field, "alpha": coupling * field / size, "k": pinning, "c": c}
+    constants |= {"anisotropy": p, "reversible_feedback": w, "offset": float(rng.choice([0.0, size * rng.normal()]))}
+    output = {"gain": signs * decades(rng, -2.0, 2.0), "feedthrough": signs * size / field * decades(rng, -6.0, 1.0)}
+    return Drawn(hs.JilesAtherton(**constants, **output, z0=min(1.0, rng.random()) * memory(rng, size)), field)
+
+
 DRAWS: dict[str, Callable[..., Drawn]] = {
     "BoucWen": bouc_wen,
     "PolynomialBoucWen": polynomial,
@@ -346,6 +366,7 @@ DRAWS: dict[str, Callable[..., Drawn]] = {
     "Duhem": duhem,
     "ColemanHodgdon": coleman_hodgdon,
     "Dahl": dahl,
+    "JilesAtherton": jiles_atherton,
     "Play": element(hs.Play),
     "Stop": element(hs.Stop),
     "PrandtlIshlinskii": plays,

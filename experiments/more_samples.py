@@ -113,7 +113,7 @@ def places(law: Any) -> tuple[list[int], list[int]]:
         return [], []
     if isinstance(law, hs.PrandtlIshlinskii | hs.GeneralizedPrandtlIshlinskii):
         return [0], list(range(1, 1 + len(law.thresholds)))
-    return [0], [1, 2] if isinstance(law, hs.BoucWenBaberNoori) else [1]
+    return [0], [1, 2] if isinstance(law, hs.BoucWenBaberNoori | hs.JilesAtherton) else [1]
 
 
 def spread(case: Case, off: float = OFF) -> Spread:
@@ -204,6 +204,9 @@ def size(law: Any, before: Array, u: Array, y: Array) -> Array:
         return np.abs(law.offset) + np.abs(law.slope * u)
     if isinstance(law, hs.Duhem):
         return np.abs(y) + 2.0 * (abs(law.offset) + np.abs(law.feedthrough * u))
+    if isinstance(law, hs.JilesAtherton):
+        magnetised = abs(law.gain) * max(law.Ms, abs(law.z0))
+        return np.abs(y) + 2.0 * (abs(law.offset) + np.abs(law.feedthrough * u) + magnetised)
     if isinstance(
         law, hs.BoucWen | hs.PolynomialBoucWen | hs.ZhuWangBoucWen | hs.GeneralizedBoucWen | hs.BoucWenBaberNoori
     ):
@@ -228,7 +231,7 @@ def is_series(law: Any) -> bool:
         return law.n != 1.0
     if isinstance(law, hs.BoucWenBaberNoori):
         return any((law.delta_a, law.delta_nu, law.delta_eta, law.zeta_s))
-    return isinstance(law, hs.Duhem)
+    return isinstance(law, hs.Duhem | hs.JilesAtherton)
 
 
 # ---------------------------------------------------------------------------------- the runs

@@ -113,7 +113,8 @@ def is_odd(case: Case) -> bool:
 ODD: dict[str, tuple[str, ...]] = {
     "BoucWen": ("offset", "z0"), "PolynomialBoucWen": ("offset", "z0"), "ZhuWangBoucWen": ("offset", "z0"),
     "GeneralizedBoucWen": ("offset", "z0", "b4", "b5", "b6"), "ColemanHodgdon": ("offset", "z0"),
-    "Dahl": ("offset", "z0"), "Play": ("offset", "z0"), "Stop": ("offset", "z0"), "MaxwellSlip": ("offset", "z0"),
+    "Dahl": ("offset", "z0"), "JilesAtherton": ("offset", "z0"),
+    "Play": ("offset", "z0"), "Stop": ("offset", "z0"), "MaxwellSlip": ("offset", "z0"),
     "PrandtlIshlinskii": ("offset", "z0"), "Line": ("offset",),
 }  # fmt: skip
 """What changes its sign in the mirrored law."""

@@ -46,7 +46,7 @@ TIMED = "RateDependentPrandtlIshlinskii"
 STEPPED = ("BoucWen", "PolynomialBoucWen", "Dahl", "ColemanHodgdon", "PrandtlIshlinskii")
 INVERTED = (
     "BoucWen", "PolynomialBoucWen", "ZhuWangBoucWen", "GeneralizedBoucWen", "BoucWenBaberNoori", "Duhem", "Dahl",
-    "ColemanHodgdon", *PLAYS, TIMED, "Sum", "Cascade",
+    "ColemanHodgdon", "JilesAtherton", *PLAYS, TIMED, "Sum", "Cascade",
 )  # fmt: skip
 
 
@@ -85,6 +85,8 @@ def monotone_case(family: str, rng: Rng) -> tuple[Case | None, float]:
     case = case._replace(before=case.before[:1], u=pieces(rng, case.before[0], case.before[0] + stride_of(case)))
     if family in (*PLAYS, TIMED):
         return (case, lowest_slope(case.law)) if inside(case) else (None, 0.0)
+    if family == "JilesAtherton":
+        return case, abs(case.law.feedthrough)
     if family == "Dahl":
         law = replace(case.law, z0=0.5 * case.law.coulomb * float(rng.uniform(-1.0, 1.0)))
         length = law.coulomb / law.stiffness

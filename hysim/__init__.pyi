@@ -81,6 +81,7 @@ from hysim.laws.operators.preisach import Preisach as Preisach
 from hysim.laws.operators.preisach import PreisachRelays as PreisachRelays
 from hysim.laws.differential.dahl import Dahl as Dahl
 from hysim.laws.differential.coleman_hodgdon import ColemanHodgdon as ColemanHodgdon
+from hysim.laws.magnetic.jiles_atherton import JilesAtherton as JilesAtherton
 from hysim.models.sum import Sum as Sum
 from hysim.models.cascade import Cascade as Cascade
 from hysim.laws.dashpot import Dashpot as Dashpot

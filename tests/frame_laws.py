@@ -55,6 +55,7 @@ SMOOTH = {
     "Duhem": hs.Duhem.from_terms({"u'": 70.0, "|u'| z": -30.0}, feedthrough=30.0),
     "Dahl": hs.Dahl(stiffness=100.0, coulomb=3.0),
     "ColemanHodgdon": hs.ColemanHodgdon(alpha=30.0, c=30.0, B=100.0),
+    "JilesAtherton": hs.JilesAtherton(Ms=0.03, a=0.02, alpha=-0.5, k=0.03, gain=100.0, feedthrough=50.0),
     "SquareDahl": SquareDahl(k=70.0, coulomb=2.0, c=30.0),
     "Line": hs.Line(slope=100.0),
     "Sum": bouc_wen() + hs.Dahl(stiffness=30.0, coulomb=1.0) + hs.Dashpot(c=0.3),

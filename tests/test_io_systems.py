@@ -50,6 +50,7 @@ AT_ZERO = [
     hs.GeneralizedPrandtlIshlinskii(thresholds=(0.0, 0.2), weights=(1.0, 0.5), left=(1.0, 1.0, 0.0, 0.0, 0.5)),
     hs.ColemanHodgdon(alpha=0.8, c=1.0, B=0.5),
     hs.BoucWenBaberNoori(delta_nu=0.2, delta_eta=0.1),
+    hs.JilesAtherton(Ms=1.0, a=0.4, alpha=0.5, k=0.3, gain=1.0, feedthrough=0.2),
     hs.Dahl() + hs.Line(slope=0.5) + hs.Play(threshold=0.1),
     hs.Play(threshold=0.1) >> hs.Dahl(),
     hs.CustomLaw(step=slipping, parameters={"gain": 2.0, "r": 0.25}, state={"z": 0.0}),

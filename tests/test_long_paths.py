@@ -17,6 +17,7 @@ LAWS = [
     hs.BoucWenBaberNoori(delta_nu=0.1, zeta_s=0.1),
     hs.ColemanHodgdon(alpha=1.0, c=0.1),
     hs.Dahl(stiffness=1.0, coulomb=0.5),
+    hs.JilesAtherton(Ms=1.0, a=0.4, alpha=0.5, k=0.3),
     hs.Duhem.from_terms({"u'": 0.5, "|u'| z": -0.3}, y0=0.1),
     hs.PrandtlIshlinskii(thresholds=(0.0, 0.2), weights=(1.0, 0.5)),
     hs.GeneralizedPrandtlIshlinskii(thresholds=(0.0, 0.2), weights=(1.0, 0.5), left=(1.0, 0.1, 0.0, 0.0, 0.0)),

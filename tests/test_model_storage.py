@@ -32,6 +32,7 @@ MODELS = [
     hs.Dahl(stiffness=1 / 3, coulomb=0.1),
     hs.ColemanHodgdon(alpha=1 / 3, c=0.1),
     hs.BoucWenBaberNoori(delta_nu=1 / 3, zeta_s=0.1, input_coefficients=(0.1, 1e-17)),
+    hs.JilesAtherton(k=1e3 / 3.0, anisotropy=0.1),
     hs.TransferFunction(num=(1 / 3,), den=(1.0, 2.0), delay=0.1, sample="end"),
     hs.BoucWenOscillator(mass=1 / 3, damping=0.1, stiffness=1e-17, law=hs.BoucWen(n=1.7), substeps=3),
     hs.Line(offset=0.1, slope=1e-300),

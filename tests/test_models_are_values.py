@@ -28,6 +28,7 @@ NUMBERS = [
     (hs.Dahl, {"coulomb": 0.7}, "coulomb"),
     (hs.ColemanHodgdon, {"B": 0.7}, "B"),
     (hs.BoucWenBaberNoori, {"delta_nu": 0.2}, "delta_nu"),
+    (hs.JilesAtherton, {"k": 0.2}, "k"),
     (hs.Dashpot, {"c": 0.7}, "c"),
     (hs.LuGre, {"sigma1": 0.7}, "sigma1"),
     (hs.StribeckFriction, {"viscous": 0.7}, "viscous"),

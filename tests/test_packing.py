@@ -38,6 +38,7 @@ LAWS = {
     "Preisach": hs.Preisach(**RELAYS),
     "Dahl": hs.Dahl(),
     "ColemanHodgdon": hs.ColemanHodgdon(),
+    "JilesAtherton": hs.JilesAtherton(),
     "Line": hs.Line(slope=1.0),
 }
 POSITIVE = ("n", "coulomb", "psi", "lambda_", "decay", "reach", "beta", "gamma", "slips", "stiffness", "left")

@@ -21,6 +21,8 @@ FIELD_UNITS: Mapping[str, Mapping[str, str]] = MappingProxyType(
         "Duhem": {"feedthrough": "y/u", "offset": "y", "y0": "y"},
         "Dahl": {"stiffness": "y/u", "coulomb": "y", "offset": "y", "z0": "y"},
         "ColemanHodgdon": {"alpha": "1/u", "c": "y/u", "B": "y/u", "offset": "y", "z0": "y"},
+        "JilesAtherton": {"alpha": "1", "c": "1", "anisotropy": "1", "reversible_feedback": "1", "offset": "y"}
+        | dict.fromkeys(("Ms", "a", "k", "z0"), "u") | dict.fromkeys(("gain", "feedthrough"), "y/u"),
         **dict.fromkeys(("Play", "Stop", "PrandtlIshlinskii"), _PLAY),
         "ModifiedPrandtlIshlinskii": {"thresholds": "u", "offset": "y", "z0": "u"},
         "GeneralizedPrandtlIshlinskii": {"offset": "y"},

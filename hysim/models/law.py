@@ -89,6 +89,9 @@ class Law(Composable, ABC):
     workspace : int
         Further places at the end of the state, zero at first, for what the memory and the parameters determine: work,
         and numbers that are kept since they take long. Trials of an inverse share them; their memory they do not.
+    exact_strokes : bool
+        Whether one step along a monotone stroke leaves the memory of many, to rounding: a steady cycle is then sought
+        at its turning points alone, from the memory after a stroke from the input zero.
     """
 
     step: ClassVar[Any]
@@ -100,6 +103,7 @@ class Law(Composable, ABC):
     contains: ClassVar[Subset | None] = None
     stages: ClassVar[tuple[Stage, ...]] = ()
     workspace: ClassVar[int] = 0
+    exact_strokes: ClassVar[bool] = False
 
     # ------------------------------------------------------------------------------ what a family may say more
 
@@ -465,6 +469,9 @@ class Law(Composable, ABC):
 
         n_sets = max(map(np.size, parameters.values()), default=1)
         few, before = 2 * corners.size < u.size, np.zeros((n_sets, len(names)))
+        if self.exact_strokes:
+            before = np.nan_to_num(through(np.append(0.0, corners))(np.arange(n_sets))(before))
+            return dict(zip(names, fixed_point(through(corners), before).T, strict=True))
         if few:
             before = np.nan_to_num(through(np.tile(corners, _AHEAD))(np.arange(n_sets))(before))
         steady = fixed_point(through(u), before, through(corners) if few else None)

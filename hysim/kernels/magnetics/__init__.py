@@ -1,0 +1,1 @@
+"""Steps of laws of magnetic cores."""

@@ -1,0 +1,170 @@
+"""The box in which the Jiles-Atherton law is searched.
+
+With h half the span of the field, m half the span of the magnetisation (that of the output over the gain), and m0 the
+slope of M_an / Ms at He = 0 in units of 1 / a (1/3 without anisotropy), the coordinates are
+
+    Ms         log(Ms / m), from the amplitude to 30 times it
+    stability  t,  alpha = (1 - exp(-t)) a / (Ms m0): 0 for no coupling; alpha Ms m0 / a is below 1 for every t
+    width      log(a exp(-t) / h): Ms m0 / (a exp(-t)) is the slope dM/dH of the anhysteretic curve
+    k          log(k / h)
+    c, anisotropy, reversible_feedback    themselves
+    z0         z0 / Ms
+
+so that an upright loop is an upright loop whatever the coupling. Laws with alpha Ms m0 >= a, which may jump, are
+outside. A parameter that the user bounds is its own coordinate, between these bounds.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.models.parameters import spans
+from hysim.models.search_space import Freedom, SearchSpace
+from hysim.records import Record
+
+_BOX = {
+    "Ms": (np.log(0.9), np.log(30.0)),
+    "a": (np.log(1e-4), np.log(30.0)),
+    "alpha": (-6.0, 7.0),
+    "k": (np.log(1e-3), np.log(30.0)),
+    "c": (0.0, 0.99),
+    "anisotropy": (-30.0, 30.0),
+    "reversible_feedback": (0.0, 1.0),
+    "z0": (-1.0, 1.0),
+}
+_DRAWN = {
+    "Ms": (np.log(1.0), np.log(4.0)),
+    "a": (np.log(0.01), np.log(3.0)),
+    "alpha": (0.0, 4.0),
+    "k": (np.log(0.01), np.log(3.0)),
+    "c": (0.0, 0.8),
+    "anisotropy": (-10.0, 10.0),
+}
+_LOGS = ("Ms", "a", "k")
+_CALLED = {"a": "width", "alpha": "stability"}
+_HELD = ("anisotropy", "reversible_feedback")
+_COLUMNS = ("gain", "feedthrough")
+_LEAST = 1e-12  # of 1 - alpha Ms m0 / a
+_SMALLEST = 1e-3  # of the width: a for a coupling that is given, and nearly as large
+_SCREENED = 1024
+
+
+def search_space(
+    scalars: Mapping[str, float], columns: tuple[str, ...], record: Record, freedom: Freedom
+) -> SearchSpace:
+    """The coordinates, their box and the way back to the user's parameters for one record.
+
+    Held by default are gain and feedthrough, of which the first could not be told from Ms, and what makes the law
+    another one: an anisotropy that is zero at the start, and reversible_feedback.
+    """
+    further = [name for name in _HELD if name not in freedom.bounds and not (name == "anisotropy" and scalars[name])]
+    alone = tuple((name,) for name in (*_COLUMNS, *further) if name not in freedom.bounds)
+    at_rest = ("z0",) if freedom.starts_at_rest() else ()
+    held = freedom.held(scalars, redundant=alone, at_rest=at_rest)
+    bounds = freedom.limits(scalars, held)
+    limits = {name: pair for name, pair in bounds.items() if name in _BOX}
+    for name, pair in limits.items():
+        if not np.isfinite(pair).all() or (name in _LOGS and pair[0] <= 0.0):
+            raise ValueError(f"bounds of {name!r} must be {'positive and ' * (name in _LOGS)}finite, got {pair}")
+    values = {**scalars, **held}
+    unit = spans(record)
+    chart = _Chart(
+        names=tuple(name for name in _BOX if name not in held),
+        values=values,
+        limits=limits,
+        field=unit["h"],
+        magnetisation=0.5 * unit["y"] / (abs(values["gain"]) or 1.0),
+    )
+    lower, upper = np.array([chart.side(name) for name in chart.names]).reshape(-1, 2).T
+    drawn = np.array([chart.side(name) if name in limits else _DRAWN.get(name, _BOX[name]) for name in chart.names])
+    low, high = np.clip(drawn.reshape(-1, 2).T, lower, upper)
+
+    def encoded(parameters: Mapping[str, float]) -> FloatArray:
+        return np.asarray(np.clip(chart.encode({**values, **parameters}), lower, upper))
+
+    return SearchSpace(
+        coordinates=tuple(name if name in limits else _CALLED.get(name, name) for name in chart.names),
+        lower=lower,
+        upper=upper,
+        starts=encoded({})[np.newaxis],
+        names=tuple(name for name in scalars if name not in held),
+        columns=columns,
+        linear=tuple(name for name in columns if name not in held),
+        held=held,
+        parameters=chart.decode,
+        bounds={name: pair for name, pair in bounds.items() if name in columns},
+        state=("z0",),
+        screened=_SCREENED,
+        drawn=(low, high),
+        encoded=encoded,
+    )
+
+
+@dataclass(frozen=True)
+class _Chart:
+    """Coordinates of the free parameters, and the way there and back."""
+
+    names: tuple[str, ...]
+    values: Mapping[str, float]  # every parameter, where it is not free
+    limits: Mapping[str, tuple[float, float]]  # parameters that are their own coordinates
+    field: float
+    magnetisation: float
+
+    def side(self, name: str) -> tuple[float, float]:
+        """The box of a coordinate."""
+        if name not in self.limits:
+            return _BOX[name]
+        low, high = self.limits[name]
+        return (float(np.log(low)), float(np.log(high))) if name in _LOGS else (low, high)
+
+    def decode(self, x: FloatArray) -> dict[str, FloatArray]:
+        """Parameters that are not linear, each (n_sets,), from coordinates (n_sets, n_x)."""
+        sets = np.atleast_2d(x)
+        raw = dict(zip(self.names, sets.T, strict=True))
+        known = {name: np.full(len(sets), self.values[name]) for name in _BOX} | raw
+        known |= {name: np.exp(raw[name]) for name in _LOGS if name in raw}
+        for name, unit in (("Ms", self.magnetisation), ("k", self.field)):
+            if name in raw and name not in self.limits:
+                known[name] = known[name] * unit
+        stable = raw["alpha"] if "alpha" in raw and "alpha" not in self.limits else None
+        share = initial_slope(known["anisotropy"]) * known["Ms"]
+        if "a" in raw and "a" not in self.limits:
+            width = known["a"] * self.field
+            coupled = width + known["alpha"] * share if stable is None else width * np.exp(stable)
+            known["a"] = np.maximum(coupled, _SMALLEST * width)
+        if stable is not None:
+            known["alpha"] = -np.expm1(-stable) * known["a"] / share
+        if "z0" in raw and "z0" not in self.limits:
+            known["z0"] = raw["z0"] * known["Ms"]
+        return known
+
+    def encode(self, parameters: Mapping[str, float]) -> FloatArray:
+        """Coordinates (n_x,) of one set of parameters."""
+        raw = {name: float(parameters[name]) for name in _BOX}
+        share = float(initial_slope(np.array([raw["anisotropy"]]))[0]) * raw["Ms"]
+        apart = max(1.0 - raw["alpha"] * share / raw["a"], _LEAST)
+        own = {
+            "Ms": raw["Ms"] / self.magnetisation,
+            "a": raw["a"] * apart / self.field,
+            "alpha": -np.log(apart),
+            "k": raw["k"] / self.field,
+            "z0": raw["z0"] / raw["Ms"],
+        }
+        raw |= {name: value for name, value in own.items() if name not in self.limits}
+        return np.array([np.log(raw[name]) if name in _LOGS else raw[name] for name in self.names])
+
+
+def initial_slope(anisotropy: FloatArray) -> FloatArray:
+    """Slope of the anhysteretic curve at x = 0, the mean square of a moment's cosine."""
+    p = np.asarray(anisotropy)[..., np.newaxis]
+    reach = np.where(p >= 0.0, _DEPTH / np.maximum(p, _DEPTH), np.sqrt(_DEPTH / np.maximum(-p, _DEPTH)))
+    squares = np.where(p >= 0.0, 1.0 - reach * _PLACES, reach * _PLACES) ** 2
+    weights = _SHARES * np.exp(p * (squares - (p >= 0.0)))
+    return np.asarray((weights * squares).sum(axis=-1) / weights.sum(axis=-1))
+
+
+_DEPTH = 40.0  # of the exponent: beyond, nothing is left
+_PLACES, _SHARES = np.polynomial.legendre.leggauss(64)
+_PLACES = 0.5 * (1.0 + _PLACES)

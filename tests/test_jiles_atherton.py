@@ -1,0 +1,302 @@
+"""The Jiles-Atherton law against its differential equation in H, and what must hold for every constant."""
+
+import math
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import mpmath
+import numba
+import numpy as np
+import pytest
+
+import hysim as hs
+from hysim.models.search_space import Freedom
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "experiments"))
+from magnetic_reference import Core, Exact, runge_kutta, strokes
+
+MU0 = 4e-7 * math.pi
+SLOW = numba.config.DISABLE_JIT
+compiler = shutil.which("gcc") or shutil.which("cc")
+STEEL = Core(Ms=1.6e6, a=1100.0, alpha=1.6e-3, k=400.0, c=0.2)
+ROUNDING = 1e-13  # of the range: some roundings of a dozen strokes, amplified by 1 / (1 - alpha dM_an/dHe)
+
+
+def magnet(core=STEEL, **others):
+    """The law with M as its output."""
+    return hs.JilesAtherton(**core._asdict(), gain=1.0, feedthrough=0.0, **others)
+
+
+def zigzag(rng, reach, n=12):
+    return np.concatenate([[0.0], rng.uniform(-reach, reach, n)])
+
+
+def any_law(rng, **others):
+    """A law in units of a and Ms that does not jump, of any shape."""
+    p = float(rng.choice([0.0, rng.uniform(-20.0, 20.0)]))
+    slope = initial_slope(p)
+    coupling = float(rng.choice([0.0, rng.uniform(-2.0, 0.9)])) / slope
+    core = Core(Ms=1.0, a=1.0, alpha=coupling, k=10.0 ** rng.uniform(-3.0, 2.0), c=rng.uniform(0.0, 1.0))
+    return magnet(core, anisotropy=p, reversible_feedback=float(rng.choice([0.0, 0.5, 1.0])), **others)
+
+
+def initial_slope(p):
+    w, share = np.polynomial.legendre.leggauss(100)
+    weight = share * np.exp(p * w**2)
+    return float(weight @ w**2 / weight.sum())
+
+
+# ---------------------------------------------------------------------------------- against the differential equation
+
+
+@pytest.mark.skipif(SLOW, reason="20 000 steps a stroke")
+def test_it_is_what_the_runge_kutta_loops_of_other_codes_tend_to():
+    turns = 1100.0 * np.array([0.0, 4.0, -4.0, 2.0, -1.0, 5.0])
+    fields = strokes(turns, 20_000)
+    expected = runge_kutta(STEEL, fields, 0.0)
+    assert np.abs(magnet().response(fields) - expected).max() <= 1e-8 * np.ptp(expected)  # its own, of the kinks
+
+
+@pytest.mark.parametrize("core", [Core(1.0, 1.0, -1.0, 3.0, 0.0), Core(1.0, 1.0, 1.5, 1.0, 0.5)])
+def test_it_has_the_digits_of_an_integration_with_30(core):
+    turns = np.array([0.0, 2.0, -1.5])
+    expected = np.array([float(M) for M in Exact(core).magnetisation(turns)])
+    assert np.abs(magnet(core).response(turns) - expected).max() <= ROUNDING
+
+
+def test_without_coupling_and_reversible_part_it_is_an_average_of_the_anhysteretic_curve():
+    with mpmath.workdps(25):
+        curve = lambda s: (mpmath.coth(s) - 1 / s) * mpmath.exp(s - 3)  # noqa: E731
+        expected = float(mpmath.quad(curve, [mpmath.mpf(10) ** -20, 1, 2, 3]))
+    assert magnet(Core(1.0, 1.0, 0.0, 1.0, 0.0)).response([0.0, 3.0])[-1] == pytest.approx(expected, abs=1e-15)
+
+
+@pytest.mark.parametrize("p", [-300.0, -20.0, -1.0, -1e-8, 1e-8, 0.7, 20.0, 300.0])
+@pytest.mark.parametrize("x", [1e-9, 0.3, 5.0, 39.0, 600.0, 1e5])
+def test_the_anisotropic_curve_is_the_mean_cosine(p, x):
+    """With c = 1 the law is the anhysteretic curve."""
+    with mpmath.workdps(30):
+        top = max(p + x, p - x, -x * x / (4 * p) if p < 0.0 and x < -2.0 * p else -mpmath.inf)
+        density = lambda w: mpmath.exp(x * w + p * w * w - top)  # noqa: E731
+        cuts = [-1, *sorted({min(1.0, x / (-2.0 * p)) if p < 0.0 else 0.0, 1.0 - min(1.9, 30.0 / (x + abs(p)))}), 1]
+        even = mpmath.quad(density, cuts)
+        expected = float(mpmath.quad(lambda w: w * density(w), cuts) / even)
+    assert magnet(Core(1.0, 1.0, 0.0, 1.0, 1.0), anisotropy=p).response([x])[0] == pytest.approx(expected, rel=1e-11)
+
+
+def test_a_strong_easy_axis_is_a_hyperbolic_tangent_and_none_langevins_function():
+    x = np.array([0.1, 1.0, 3.0])
+    free = Core(1.0, 1.0, 0.0, 1.0, 1.0)
+    assert magnet(free, anisotropy=1e9).response(x) == pytest.approx(np.tanh(x), abs=1e-8)  # 1 / p is left
+    assert magnet(free).response(x) == pytest.approx(1.0 / np.tanh(x) - 1.0 / x, abs=1e-15)
+
+
+# ---------------------------------------------------------------------------------- what must hold for all
+
+
+def test_scales_drop_out():
+    """In units of a and Ms the law is the same, so that a record in other units has the same loop."""
+    u = zigzag(np.random.default_rng(0), 5.0)
+    own = magnet(Core(1.0, 1.0, 2.0, 0.5, 0.3)).response(u)
+    scaled = magnet(Core(2e5, 30.0, 2.0 * 30.0 / 2e5, 15.0, 0.3)).response(30.0 * u)
+    assert scaled == pytest.approx(2e5 * own, abs=2e5 * ROUNDING)
+
+
+def test_a_steady_loop_between_opposite_fields_takes_energy():
+    """Its area is the loss in a cycle. With H + alpha M_irr as the effective field a loop may give energy."""
+    rng, n_steady = np.random.default_rng(3), 0
+    for _ in range(3 if SLOW else 30):
+        law = replace(any_law(rng), reversible_feedback=1.0)
+        u = 10.0 ** rng.uniform(-1.0, 1.0) * hs.signals.triangle(-1.0, 1.0, cycles=30, samples_per_cycle=200)
+        loop = hs.loop_metrics(u, law.response(u))
+        if loop.closure_gap > 1e-9 * loop.stroke:  # a wide memory takes more cycles
+            continue
+        assert loop.energy <= 0.0, law  # counterclockwise
+        n_steady += 1
+    assert n_steady > (0 if SLOW else 10)
+
+
+def test_the_field_for_an_output_is_found_to_the_rounding_of_the_output():
+    rng = np.random.default_rng(4)
+    for _ in range(5 if SLOW else 100):
+        law = replace(any_law(rng), feedthrough=10.0 ** rng.uniform(-6.0, 0.0), offset=rng.normal())
+        u = zigzag(rng, 10.0 ** rng.uniform(-1.0, 1.5))
+        y = law.response(u)
+        again = law.inverse_response(y, u0=0.0)
+        assert np.abs(law.response(np.append(0.0, again))[1:] - y).max() <= 1e-12 * np.ptp(y)
+
+
+def test_a_negative_gain_is_inverted_too_and_mixed_signs_by_the_search():
+    law = hs.JilesAtherton()
+    u = 1000.0 * np.array([0.0, 2.0, -1.0, 3.0])
+    fallen = replace(law, gain=-law.gain, feedthrough=-law.feedthrough)
+    assert fallen.inverse_response(-law.response(u)) == pytest.approx(u, abs=1e-9)  # roundings of B over mu0
+    mixed = replace(law, feedthrough=-1e-3 * law.gain)
+    assert not mixed.is_invertible()
+    assert mixed.inverse_response(mixed.response(u), u0=0.0) == pytest.approx(u, abs=1e-6)
+
+
+@pytest.mark.skipif(compiler is None, reason="no C compiler")
+def test_the_inverse_is_the_same_in_c(tmp_path):
+    law = hs.JilesAtherton(Ms=1.0, a=0.4, alpha=0.5, k=0.3, gain=1.0, feedthrough=0.2)
+    program = hs.to_c(hs.InverseFeedforward(law=law), 1.0, name="inverse")
+    (tmp_path / "inverse.c").write_text(program.source)
+    (tmp_path / "inverse.h").write_text(program.header)
+    strict = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-fsyntax-only"]
+    subprocess.run([compiler, *strict, "inverse.c"], cwd=tmp_path, check=True)
+
+
+def test_an_output_beyond_saturation_has_no_input():
+    law = magnet()
+    with pytest.raises(hs.SimulationError, match="no inverse at sample 1"):
+        law.inverse_response([0.0, 1.7e6], u0=0.0)
+
+
+def test_a_core_that_is_cut_by_a_gap_has_alpha_less_the_demagnetising_factor():
+    """H_outer = H + N M: the same material seen from outside."""
+    u = zigzag(np.random.default_rng(5), 3000.0)
+    M = magnet().response(u)
+    outer = u + 5e-3 * M
+    assert magnet(STEEL._replace(alpha=STEEL.alpha - 5e-3)).response(outer) == pytest.approx(M, abs=1e-7 * np.ptp(M))
+
+
+# ---------------------------------------------------------------------------------- jumps, refusals
+
+
+def test_a_coupling_that_is_too_strong_jumps_and_stays_so():
+    law = magnet(STEEL._replace(alpha=8e-3, c=0.0))
+    with pytest.raises(hs.SimulationError, match=r"magnetisation jumps at sample 1 .*alpha Ms / a = 11\.6"):
+        law.response([0.0, 5000.0])
+    assert np.isinf(hs.JilesAtherton.responses({"alpha": [8e-3], "c": 0.0}, [0.0, 5000.0])).all()
+    step, parameters, state = law.compiled(0.0)
+    assert [math.isfinite(step(parameters, state, u)) for u in (5000.0, 4000.0, 0.0)] == [False] * 3
+
+
+def test_whether_it_jumps_does_not_depend_on_the_samples():
+    """alpha Ms / a from 2.5 to 12: the steepest place lies inside the stroke."""
+    fine = np.linspace(-4000.0, 4000.0, 401 if SLOW else 4001)
+    for coupling in np.linspace(2.5, 12.0, 5 if SLOW else 39):
+        law = magnet(Core(1.6e6, 1100.0, coupling * 1100.0 / 1.6e6, 1500.0, 0.0), z0=-1.2e6)
+        rows = [hs.JilesAtherton.responses(law.arguments, u)[0] for u in (fine[[0, -1]], fine)]
+        assert np.isfinite(rows[0][-1]) == np.isfinite(rows[1][-1])
+        if np.isfinite(rows[0][-1]):
+            assert rows[0][-1] == pytest.approx(rows[1][-1], abs=1.6e6 * 1e-11)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("Ms", 0.0, "Ms must be positive"),
+        ("a", -1.0, "a must be positive"),
+        ("k", 0.0, "k must be positive"),
+        ("c", 1.1, "c must be between 0 and 1"),
+        ("reversible_feedback", -0.1, "reversible_feedback must be between 0 and 1"),
+        ("alpha", 0.02, "not unique"),
+    ],
+)
+def test_constants_of_no_material_are_refused(name, value, message):
+    with pytest.raises(ValueError, match=message):
+        hs.JilesAtherton(**{name: value})
+
+
+# ---------------------------------------------------------------------------------- other spellings
+
+
+def test_constants_of_other_spellings_come_back():
+    total = {"Ms": 1.6e6, "a": 1100.0, "alpha": 1.6e-3, "k": 320.0, "c": 0.2}
+    circuit = {"MS": 4e5, "A": 25.0, "K": 20.0, "C": 0.25}
+    model = {"a": 50.0, "k": 20.0, "c": 0.2, "Ms": 1e6, "alpha": 1e-5, "Kan": 100.0, "psi": 0.5 * math.pi}
+    for way, back, constants in (
+        (hs.JilesAtherton.from_total, hs.JilesAtherton.to_total, total),
+        (hs.JilesAtherton.from_circuit, hs.JilesAtherton.to_circuit, circuit),
+        (hs.JilesAtherton.from_jamodel, hs.JilesAtherton.to_jamodel, model),
+    ):
+        assert back(way(**constants)) == pytest.approx(constants)
+
+
+@pytest.mark.parametrize(("K", "C"), [(20.0, 0.25), (5.0, 1.0)])
+def test_the_circuit_form_is_the_same_equation(K, C):
+    """dM/dH = (M_an - M)+ / ((1 + C) delta K) + C / (1 + C) dM_an/dH, by 20 000 Euler steps a stroke."""
+    law = replace(hs.JilesAtherton.from_circuit(MS=4e5, A=25.0, K=K, C=C), gain=1.0, feedthrough=0.0)
+    fields, M = strokes(np.array([0.0, 80.0, -80.0]), 20_000), 0.0
+    x = fields[1:] - 0.5 * np.diff(fields)
+    for H, h in zip(x, np.diff(fields), strict=True):
+        m = 1.0 / math.tanh(H / 25.0) - 25.0 / H
+        steep = (25.0 / H) ** 2 - 1.0 / math.sinh(H / 25.0) ** 2
+        M += h * (max(math.copysign(1.0, h) * (4e5 * m - M), 0.0) / ((1.0 + C) * K) + C / (1.0 + C) * 16e3 * steep)
+    assert law.response([0.0, 80.0, -80.0])[-1] == pytest.approx(M, rel=1e-4)  # Euler's
+
+
+@pytest.mark.parametrize("psi", [0.0, 0.4, 0.5 * math.pi])
+def test_the_anisotropic_curve_is_that_of_jamodel(psi):
+    """Its integrals over the angle, with the mean of both exponents."""
+    constants = {"a": 60.0, "k": 20.0, "c": 1.0, "Ms": 1e6, "alpha": 0.0, "Kan": 300.0, "psi": psi}
+    law = replace(hs.JilesAtherton.from_jamodel(**constants), gain=1.0, feedthrough=0.0)
+    theta = np.linspace(0.0, math.pi, 200_001)
+    for H in (3.0, 40.0, 200.0):
+        sides = 0.5 * (np.sin(psi - theta) ** 2 + np.sin(psi + theta) ** 2)
+        weight = np.exp(H / 60.0 * np.cos(theta) - 300.0 / (MU0 * 1e6 * 60.0) * sides) * np.sin(theta)
+        expected = 1e6 * (weight * np.cos(theta)).sum() / weight.sum()
+        assert law.response([H])[0] == pytest.approx(expected, rel=1e-7)  # of the trapezoidal rule
+
+
+# ---------------------------------------------------------------------------------- identification
+
+
+@pytest.mark.skipif(SLOW, reason="thousands of loops")
+def test_periodic_loops_that_begin_anywhere_give_the_constants_back():
+    truth = hs.JilesAtherton(Ms=4e5, a=50.0, alpha=2.5e-4, k=45.0, c=0.6)
+    loop = hs.signals.triangle(-1.0, 1.0, cycles=1, samples_per_cycle=32)[:-1]
+    records = []
+    for amplitude, first in ((40.0, 5), (110.0, 21)):
+        u = amplitude * np.tile(np.roll(loop, first), 30)
+        records.append(
+            hs.Record(u=u[: loop.size + 1], y=truth.response(u)[-loop.size - 1 :][np.r_[1 : loop.size + 1, 1]])
+        )
+    fit = hs.identify(hs.JilesAtherton, records, initial="periodic")
+    assert fit.free_names == ("Ms", "a", "alpha", "k", "c", "offset")
+    for name in ("Ms", "a", "alpha", "k", "c"):
+        assert fit.estimates[name] == pytest.approx(getattr(truth, name), rel=1e-4)  # noise-free
+
+
+def box(freedom):
+    start = hs.JilesAtherton()
+    u = 100.0 * np.sin(np.linspace(0.0, 7.0, 50))
+    return start.search_space(hs.Record(u=u, y=start.response(u)), freedom)
+
+
+@pytest.mark.parametrize(
+    "freedom",
+    [
+        Freedom(),
+        Freedom(initial="periodic", fixed={"c": 0.1}),
+        Freedom(fixed={"alpha": 1e-4}),
+        Freedom(bounds={"alpha": (-1e-4, 1e-2)}, free=("anisotropy",)),
+        Freedom(bounds={"a": (10.0, 1e4), "k": (1.0, 1e3), "z0": (-1e6, 1e6)}),
+        Freedom(fixed={"Ms": 2e6}, bounds={"gain": (1e-6, 2e-6), "anisotropy": (-1.0, 2.0)}),
+    ],
+)
+def test_coordinates_lead_to_the_parameters_and_back(freedom):
+    space = box(freedom)
+    rng = np.random.default_rng(6)
+    x = rng.uniform(space.lower, space.upper, (200, space.lower.size))
+    parameters = space.parameters(x)
+    known = {**hs.JilesAtherton().scalars, **space.held}
+    for k in range(len(x)):
+        values = {name: float(column[k]) for name, column in parameters.items()}
+        if values["alpha"] * values["Ms"] > -500.0 * values["a"]:  # else a was moved into its range
+            assert space.encoded({**known, **values}) == pytest.approx(x[k], abs=1e-8)
+    assert set(space.names) == set(known) - set(space.held)
+    assert set(space.linear) <= {"gain", "feedthrough", "offset"}
+
+
+@pytest.mark.parametrize(
+    ("bounds", "message"),
+    [({"k": (0.0, 1.0)}, "'k' must be positive and finite"), ({"alpha": (0.0, np.inf)}, "'alpha' must be finite")],
+)
+def test_bounds_that_make_no_box_are_refused(bounds, message):
+    with pytest.raises(ValueError, match=message):
+        box(Freedom(bounds=bounds))
