@@ -83,6 +83,8 @@ from hysim.laws.differential.dahl import Dahl as Dahl
 from hysim.laws.differential.coleman_hodgdon import ColemanHodgdon as ColemanHodgdon
 from hysim.models.sum import Sum as Sum
 from hysim.models.cascade import Cascade as Cascade
+from hysim.models.channels.dependent import Dependent as Dependent
+from hysim.models.channels.polynomial import ChannelPolynomial as ChannelPolynomial
 from hysim.laws.dashpot import Dashpot as Dashpot
 from hysim.laws.custom import CustomLaw as CustomLaw
 from hysim.plants.oscillator import BoucWenOscillator as BoucWenOscillator

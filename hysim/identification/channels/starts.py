@@ -1,0 +1,101 @@
+"""Starts of a search for parameters that depend on channels: short searches of the law itself.
+
+The law without a dependence, on all records, and the law on the records of each value of the channels, one after the
+other; polynomials of least squares through the parameters that these have are the second start.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from hysim._channels import steady
+from hysim.errors import SimulationError
+from hysim.identification._problem import problem
+from hysim.identification._search import brief_optimum
+from hysim.models.channels.dependent import Dependent
+from hysim.models.channels.polynomial import weights
+from hysim.models.channels.structure import DependentStructure
+from hysim.models.search_space import Freedom
+from hysim.records import Record
+
+_MOST_GROUPS = 12
+
+Initial = str | Sequence[str] | None
+
+
+def begun(
+    structure: DependentStructure, records: Sequence[Record], freedom: Freedom, initial: Initial
+) -> DependentStructure:
+    """The structure with starts where short searches of its law end; itself where nothing searched depends."""
+    if all(name in structure.columns for name in structure.at):
+        return structure
+    starts = [_alike(structure, known) for known in _found(structure.law, records, freedom, initial)]
+    groups = _groups(structure, records)
+    if 1 < len(groups) <= _MOST_GROUPS and (through := _through(structure, groups, records, freedom, initial)):
+        starts.insert(0, through)
+    return replace(structure, starts=tuple(starts))
+
+
+def on_record(model: Any, record: Record) -> Any:
+    """A model as it is on a record: of a `Dependent` the law at its channels."""
+    return model.on(record) if isinstance(model, Dependent) else model
+
+
+def _found(law: Any, records: Sequence[Record], freedom: Freedom, initial: Initial) -> list[dict[str, float]]:
+    """The parameters of the law where a short search ends; none if it finds nothing."""
+    try:
+        attempt = problem(law, records, freedom, initial)
+        x, cost = brief_optimum(attempt)
+    except (ValueError, ArithmeticError, SimulationError):  # such as too few samples for the law alone
+        return []
+    return [attempt.estimates(attempt.completed(x[np.newaxis])[0])] if np.isfinite(cost) else []
+
+
+def _groups(structure: DependentStructure, records: Sequence[Record]) -> dict[tuple[float, ...], list[int]]:
+    """Numbers of the records by the values of their channels; none if a channel varies along a record."""
+    channels = sorted({channel for channel, _ in structure.depends.values()})
+    groups: dict[tuple[float, ...], list[int]] = {}
+    for k, record in enumerate(records):
+        values = [steady(record.channels[channel]) for channel in channels]
+        if any(np.ndim(value) for value in values):
+            return {}
+        groups.setdefault(tuple(values), []).append(k)
+    return groups
+
+
+def _through(
+    structure: DependentStructure,
+    groups: Mapping[tuple[float, ...], list[int]],
+    records: Sequence[Record],
+    freedom: Freedom,
+    initial: Initial,
+) -> dict[str, float] | None:
+    """Values of polynomials through the parameters of the law for each group, and medians of the others."""
+    known, first = [], []
+    for numbers in groups.values():
+        own = initial if initial is None or isinstance(initial, str) else [initial[k] for k in numbers]
+        for found in _found(structure.law, [records[k] for k in numbers], freedom, own):
+            known.append(found)
+            first.append(records[numbers[0]])
+    if len(known) < len(groups):
+        return None
+    start = {name: float(np.median([each[name] for each in known])) for name in known[0]}
+    for name, at in structure.at.items():
+        if name in start:
+            channel = structure.depends[name][0]
+            rows = weights(at, [steady(record.channels[channel]) for record in first])
+            values = np.linalg.lstsq(rows, np.array([each[name] for each in known]), rcond=None)[0]
+            start |= dict(zip(structure.names[name], values.tolist(), strict=True))
+            del start[name]
+    return start
+
+
+def _alike(structure: DependentStructure, known: Mapping[str, float]) -> dict[str, float]:
+    """The parameters of the law as a start at which nothing depends on a channel."""
+    start = dict(known)
+    for name, names in structure.names.items():
+        if name in start:
+            start |= dict.fromkeys(names, start.pop(name))
+    return start
