@@ -24,6 +24,7 @@ from hysim.identification import identify as identify
 from hysim.identification import Identification as Identification
 from hysim.identification import select as select
 from hysim.identification import Selection as Selection
+from hysim.identification import estimate_channel as estimate_channel
 from hysim.discovery import discover as discover
 from hysim.discovery import discover_oscillator as discover_oscillator
 from hysim.discovery import Discovery as Discovery

@@ -154,7 +154,9 @@ class Dependent:
         for name, value in channels.items():
             if np.ndim(value):
                 raise ValueError(f"{name} must be one number, got {np.size(value)}: use response(u, channels=...)")
-        return self._constant(self._values(checked_channels(channels, 0)))
+        values = checked_channels(channels, 0)
+        self._warn(values)
+        return self.constant(values)
 
     def response(
         self, u: npt.ArrayLike, sample_time: float | None = None, *, channels: Channels | None = None
@@ -186,9 +188,11 @@ class Dependent:
             If a channel varies and the parameters that depend on it cannot change from sample to sample.
         """
         inputs = read_only(u, "u", ndim=1)
-        values = self._values(checked_channels(channels or {}, inputs.size))
+        given = checked_channels(channels or {}, inputs.size)
+        values = {name: value_in(given, name, "channels") for name in self.channels}
+        self._warn(values)
         if not any(isinstance(value, np.ndarray) for value in values.values()):
-            return response_of(self._constant(values), inputs, sample_time)
+            return response_of(self.constant(values), inputs, sample_time)
         return self._along(inputs, sample_time, values)
 
     def on(self, record: Record) -> Any:
@@ -201,25 +205,27 @@ class Dependent:
             return self.at(**values)
         return AlongRecord(self, record)
 
-    def _constant(self, values: Mapping[str, Any]) -> Any:
+    def constant(self, channels: Mapping[str, float]) -> Any:
+        """As `at`, without a warning; ValueError if a channel is missing."""
+        values = {name: value_in(channels, name, "channels") for name in self.channels}
         numbers = {each.parameter: float(each.value(values[each.channel])) for each in self.polynomials}
         return self.law.with_scalars(numbers)
 
-    def _values(self, channels: Channels) -> dict[str, Any]:
-        """The channels that matter, each a number or an array; warns of an extrapolation."""
-        values = {name: value_in(channels, name, "channels") for name in self.channels}
+    def extrapolation(self, channels: Channels) -> str:
+        """A sentence where a value of some channels is outside the identified range; else the empty text."""
         for each in self.polynomials:
-            if not each.is_known_at(values[each.channel]):
-                low, high = each.span
-                reached = np.asarray(values[each.channel])
+            if each.channel in channels and not each.is_known_at(channels[each.channel]):
+                (low, high), reached = each.span, np.ravel(channels[each.channel])
                 worst = float(reached.max() if reached.max() > high else reached.min())
-                warnings.warn(
+                return (
                     f"{each.channel} = {worst:g} is outside the range {low:g} to {high:g} in which {each.parameter} "
-                    "was identified: the law is an extrapolation",
-                    stacklevel=3,
+                    "was identified: the law is an extrapolation"
                 )
-                break
-        return values
+        return ""
+
+    def _warn(self, channels: Channels) -> None:
+        if doubt := self.extrapolation(channels):
+            warnings.warn(doubt, stacklevel=3)
 
     def _channels_in_words(self) -> str:
         return ", ".join(map(repr, self.channels)) or "no channel"
