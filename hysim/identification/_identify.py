@@ -20,10 +20,10 @@ from hysim.identification._resampling import left_out_errors, rms_of_known
 from hysim.identification._result import Identification
 from hysim.identification._search import PERFECT, chosen, stages_in_words
 from hysim.identification._searched import Search
-from hysim.identification.channels.starts import begun, on_record
+from hysim.identification.channels.starts import begun
 from hysim.identification.folds import left_out
 from hysim.identification.swapped import swapped_columns, swapped_for
-from hysim.models.channels.dependent import Dependent
+from hysim.models.channels.dependent import Dependent, on_record
 from hysim.models.channels.structure import DependentStructure
 from hysim.models.protocols import Direct, Identifiable, Recorded, needs_time
 from hysim.models.search_space import Freedom

@@ -14,7 +14,6 @@ from hysim._channels import steady
 from hysim.errors import SimulationError
 from hysim.identification._problem import problem
 from hysim.identification._search import brief_optimum
-from hysim.models.channels.dependent import Dependent
 from hysim.models.channels.polynomial import weights
 from hysim.models.channels.structure import DependentStructure
 from hysim.models.search_space import Freedom
@@ -36,11 +35,6 @@ def begun(
     if 1 < len(groups) <= _MOST_GROUPS and (through := _through(structure, groups, records, freedom, initial)):
         starts.insert(0, through)
     return replace(structure, starts=tuple(starts))
-
-
-def on_record(model: Any, record: Record) -> Any:
-    """A model as it is on a record: of a `Dependent` the law at its channels."""
-    return model.on(record) if isinstance(model, Dependent) else model
 
 
 def _found(law: Any, records: Sequence[Record], freedom: Freedom, initial: Initial) -> list[dict[str, float]]:

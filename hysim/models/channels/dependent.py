@@ -240,6 +240,11 @@ class Dependent:
         return response_along(constant, {name: each for name, each in series.items() if each.ndim}, u, sample_time)
 
 
+def on_record(model: Any, record: Record) -> Any:
+    """A model as it is on a record: of a `Dependent` the law at its channels."""
+    return model.on(record) if isinstance(model, Dependent) else model
+
+
 @dataclass(frozen=True)
 class AlongRecord:
     """A law on the channels of a record, which vary along it.
