@@ -23,7 +23,7 @@ from hysim.identification import Identification, identify
 from hysim.identification.sharing import sharing
 from hysim.metrics import LoopMetrics, loop_metrics
 from hysim.models.candidates import candidates, is_identifiable, is_searched
-from hysim.models.channels.dependent import Dependent, on_record
+from hysim.models.channels.dependent import on_record
 from hysim.models.protocols import Direct, Responding, needs_time
 from hysim.records import Record, several
 from hysim.simulation import simulate
@@ -271,7 +271,8 @@ def _with_initial_state(record: Record, fitted: Identification, seed: int) -> An
     state = set(space.state) & set(space.names)
     if not state:
         return model
-    known = model.scalars if isinstance(fitted.model, Dependent) else fitted.estimates
+    is_alone = len(fitted.models) == 1 and model is fitted.model
+    known = fitted.estimates if is_alone else model.scalars
     shared = {name: value for name, value in known.items() if name not in state}
     return identify(model, record, fixed=shared, seed=seed).model
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hysim._channels import Channels, checked_channels, taken, value_in
+from hysim._channels import Channels, checked_channels, steady, taken, value_in
 from hysim._frozen import FloatArray, read_only
 from hysim.models._parts import response_of
 from hysim.models.channels.polynomial import ChannelPolynomial
@@ -189,7 +189,7 @@ class Dependent:
         """
         inputs = read_only(u, "u", ndim=1)
         given = checked_channels(channels or {}, inputs.size)
-        values = {name: value_in(given, name, "channels") for name in self.channels}
+        values = self._needed(given)
         self._warn(values)
         if not any(isinstance(value, np.ndarray) for value in values.values()):
             return response_of(self.constant(values), inputs, sample_time)
@@ -207,7 +207,7 @@ class Dependent:
 
     def constant(self, channels: Mapping[str, float]) -> Any:
         """As `at`, without a warning; ValueError if a channel is missing."""
-        values = {name: value_in(channels, name, "channels") for name in self.channels}
+        values = self._needed(channels)
         numbers = {each.parameter: float(each.value(values[each.channel])) for each in self.polynomials}
         return self.law.with_scalars(numbers)
 
@@ -222,6 +222,16 @@ class Dependent:
                     "was identified: the law is an extrapolation"
                 )
         return ""
+
+    def _needed(self, channels: Channels) -> dict[str, Any]:
+        """The channels that matter; ValueError if one is missing."""
+        for name in self.channels:
+            if name not in channels:
+                raise ValueError(
+                    f"the law depends on the channel {name!r}: give response(u, channels={{{name!r}: ...}}), or take "
+                    f"the law at one value, at({name}=...)"
+                )
+        return {name: steady(channels[name]) for name in self.channels}
 
     def _warn(self, channels: Channels) -> None:
         if doubt := self.extrapolation(channels):
