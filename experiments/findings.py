@@ -977,14 +977,15 @@ def channels(result: Result) -> list[str]:
         for row in others
     )
     separate, joint = measured["rmse_of_a_law_each"], measured["rmse_in_the_supply"]
+    own = measured["rmse_of_4_4_by_its_own_law"]
     return [
         f"A simulated damper identified at four supplies is predicted at a fifth to "
         f"{error_of(jointly['median_error_percent'])} % of the range of its force in the median of "
         f"{simulated['seeds']} seeds and {error_of(jointly['worst_error_percent'])} % at worst; without a channel: "
-        f"{beside}. {number(jointly['intervals_that_hold_percent'])} % of {simulated['intervals']} intervals at 95 % hold "
-        f"the truth; the supply of that record is found to {error_of(simulated['supply_error_rms'])} V rms, "
-        f"{simulated['supply_error_in_stderr_rms']:.2f} times its standard error, which leaves out that of the law. A fit "
-        f"takes {number(jointly['seconds_per_fit'], 2)} s of processor time.",
+        f"{beside}. {number(jointly['intervals_that_hold_percent'])} % of {simulated['intervals']} intervals at 95 % "
+        f"hold the truth; the supply of that record is found to {error_of(simulated['supply_error_rms'])} V rms, "
+        f"{simulated['supply_error_in_stderr_rms']:.2f} times its standard error, which leaves out that of the law. A "
+        f"fit takes {number(jointly['seconds_per_fit'], 2)} s of processor time.",
         f"With a temperature that drifts along one record the stack at 40 degC is predicted to "
         f"{error_of(warm['median_error_percent'])} % (worst {error_of(warm['worst_error_percent'])} %), by one law for "
         f"the record to {error_of(stack['one law for the record']['median_error_percent'])} %; "
@@ -994,9 +995,8 @@ def channels(result: Result) -> list[str]:
         f"{number(joint[0])} N and {number(joint[1])} N off, a law for each supply {number(separate[0])} N and "
         f"{number(separate[1])} N: {measured['ratio_of_errors']:.3f} times the error of both together, "
         f"{max(measured['ratio_by_record']):.2f} times in the worse record. The supply of a third record would be "
-        f"{measured['supply_of_4_4']:.2f} V, outside that range, where the law is {number(measured['rmse_of_4_4'])} N off "
-        f"and one of its own {number(measured['rmse_of_4_4_by_its_own_law'])} N. Supplies, law and exponent of the "
-        "simulated damper are told.",
+        f"{measured['supply_of_4_4']:.2f} V, outside that range, where the law is {number(measured['rmse_of_4_4'])} N "
+        f"off and one of its own {number(own)} N. Supplies, law and exponent of the simulated damper are told.",
     ]
 
 
