@@ -279,6 +279,18 @@ def test_a_parameter_is_not_fixed_and_dependent():
         hs.identify(hs.SingleValued, records(), depends={"gain": ("T", 1)})
 
 
+def test_a_parameter_without_a_box_needs_bounds():
+    law = hs.PrandtlIshlinskii(thresholds=(0.0, 0.3), weights=(1.0, 0.5))
+    with pytest.raises(ValueError, match=r"'thresholds\[1\]' is not searched by itself: give bounds="):
+        hs.identify(law, records(), depends={"thresholds[1]": ("T", 1)})
+
+
+def test_a_search_with_few_evaluations_is_partial():
+    fit = hs.identify(hs.Play, records(), depends=DEPENDS, max_evaluations=40)
+    assert not fit.success
+    assert "max_evaluations=40" in fit.message
+
+
 def test_bounds_hold_at_every_place():
     fit = hs.identify(hs.Play, records(), depends=DEPENDS, bounds={"threshold": (0.2, 0.5), "gain": (0.0, 2.0)})
     assert fit.estimates["threshold(T=1)"] == pytest.approx(0.2)

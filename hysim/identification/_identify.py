@@ -138,7 +138,7 @@ def identify(
         else:
             family = _family(model_or_class, depends)
             if isinstance(family, DependentStructure):
-                family = begun(family.over(records), records, options, initial)
+                family = begun(family.over(records), records, options, initial, max_evaluations)
             paths, noisy = quiet_where_better(family, records, options, initial)
             choice = decided(family, paths, options, initial, shares, max_evaluations)
             searched = [in_units_of_noise(each, seed) for each in choice.problems]

@@ -12,6 +12,7 @@ import numpy as np
 
 from hysim._channels import steady
 from hysim.errors import SimulationError
+from hysim.identification._budget import Budget
 from hysim.identification._problem import problem
 from hysim.identification._search import brief_optimum
 from hysim.models.channels.polynomial import weights
@@ -25,26 +26,45 @@ Initial = str | Sequence[str] | None
 
 
 def begun(
-    structure: DependentStructure, records: Sequence[Record], freedom: Freedom, initial: Initial
+    structure: DependentStructure,
+    records: Sequence[Record],
+    freedom: Freedom,
+    initial: Initial,
+    max_evaluations: int | None = None,
 ) -> DependentStructure:
-    """The structure with starts where short searches of its law end; itself where nothing searched depends."""
+    """The structure with starts where short searches of its law end; itself where nothing searched depends.
+
+    All of them together simulate half of `max_evaluations` parameter sets at most.
+    """
     if all(name in structure.columns for name in structure.at):
         return structure
-    starts = [_alike(structure, known) for known in _found(structure.law, records, freedom, initial)]
     groups = _groups(structure, records)
-    if 1 < len(groups) <= _MOST_GROUPS and (through := _through(structure, groups, records, freedom, initial)):
-        starts.insert(0, through)
+    share = None if max_evaluations is None else max_evaluations / (2.0 * (1 + len(groups)))
+
+    def found(chosen: Sequence[int]) -> dict[str, float] | None:
+        own = initial if initial is None or isinstance(initial, str) else [initial[k] for k in chosen]
+        return _found(structure.law, [records[k] for k in chosen], freedom, own, share)
+
+    alike = found(range(len(records)))
+    starts = [] if alike is None else [_alike(structure, alike)]
+    if 1 < len(groups) <= _MOST_GROUPS:
+        known = [each for numbers in groups.values() if (each := found(numbers)) is not None]
+        first = [records[numbers[0]] for numbers in groups.values()]
+        starts[:0] = [_through(structure, first, known)] if len(known) == len(groups) else []
     return replace(structure, starts=tuple(starts))
 
 
-def _found(law: Any, records: Sequence[Record], freedom: Freedom, initial: Initial) -> list[dict[str, float]]:
-    """The parameters of the law where a short search ends; none if it finds nothing."""
+def _found(
+    law: Any, records: Sequence[Record], freedom: Freedom, initial: Initial, share: float | None
+) -> dict[str, float] | None:
+    """The parameters of the law where a short search of so many parameter sets ends; None if it finds nothing."""
+    budget = None if share is None else Budget(share * sum(map(len, records)))
     try:
-        attempt = problem(law, records, freedom, initial)
+        attempt = problem(law, records, freedom, initial).within(budget)
         x, cost = brief_optimum(attempt)
     except (ValueError, ArithmeticError, SimulationError):  # such as too few samples for the law alone
-        return []
-    return [attempt.estimates(attempt.completed(x[np.newaxis])[0])] if np.isfinite(cost) else []
+        return None
+    return attempt.estimates(attempt.completed(x[np.newaxis])[0]) if np.isfinite(cost) else None
 
 
 def _groups(structure: DependentStructure, records: Sequence[Record]) -> dict[tuple[float, ...], list[int]]:
@@ -60,26 +80,14 @@ def _groups(structure: DependentStructure, records: Sequence[Record]) -> dict[tu
 
 
 def _through(
-    structure: DependentStructure,
-    groups: Mapping[tuple[float, ...], list[int]],
-    records: Sequence[Record],
-    freedom: Freedom,
-    initial: Initial,
-) -> dict[str, float] | None:
-    """Values of polynomials through the parameters of the law for each group, and medians of the others."""
-    known, first = [], []
-    for numbers in groups.values():
-        own = initial if initial is None or isinstance(initial, str) else [initial[k] for k in numbers]
-        for found in _found(structure.law, [records[k] for k in numbers], freedom, own):
-            known.append(found)
-            first.append(records[numbers[0]])
-    if len(known) < len(groups):
-        return None
+    structure: DependentStructure, records: Sequence[Record], known: Sequence[Mapping[str, float]]
+) -> dict[str, float]:
+    """Values of polynomials through the `known` parameters of the law on some records, and medians of the others."""
     start = {name: float(np.median([each[name] for each in known])) for name in known[0]}
     for name, at in structure.at.items():
         if name in start:
             channel = structure.depends[name][0]
-            rows = weights(at, [steady(record.channels[channel]) for record in first])
+            rows = weights(at, [steady(record.channels[channel]) for record in records])
             values = np.linalg.lstsq(rows, np.array([each[name] for each in known]), rcond=None)[0]
             start |= dict(zip(structure.names[name], values.tolist(), strict=True))
             del start[name]

@@ -52,7 +52,7 @@ class Dependent:
     >>> stack.at(T=30.0).gain
     1.75
     >>> stack.response([0.0, 1.0, 0.5], channels={"T": [20.0, 30.0, 40.0]}).round(6).tolist()
-    [0.0, 1.106212, 0.198181]
+    [0.0, 1.106211, 0.198181]
     """
 
     law: Any
@@ -147,7 +147,7 @@ class Dependent:
         >>> import hysim as hs
         >>> gain = hs.ChannelPolynomial(parameter="gain", channel="T", at=(20.0, 60.0), values=(2.0, 1.0))
         >>> hs.Dependent(law=hs.Play(), polynomials=(gain,)).at(T=60.0)
-        Play(threshold=0.0, gain=1.0, offset=0.0, z0=0.0)
+        Play(threshold=1.0, gain=1.0, offset=0.0, z0=0.0)
         """
         if unknown := set(channels) - set(self.channels):
             raise ValueError(f"the law depends on {self._channels_in_words()}, got {sorted(unknown)[0]!r}")

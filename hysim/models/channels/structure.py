@@ -109,12 +109,23 @@ class DependentStructure(Identifiable):
         if jointly := [name for name in self.at if name not in {*space.coordinates, *space.columns, *wished.bounds}]:
             wished = replace(wished, bounds={**wished.bounds, **dict.fromkeys(jointly, (-np.inf, np.inf))})
         if wished != freedom:
-            space = self.law.search_space(record, wished)
+            space = self._wished_space(record, wished, jointly)
         if missing := [name for name in self.at if name not in {*space.coordinates, *space.linear}]:
             raise ValueError(
                 f"{missing[0]!r} is not searched by itself: give bounds={{{missing[0]!r}: (lower, upper)}}"
             )
         return expanded(space, self.names, self.starts)
+
+    def _wished_space(self, record: Record, freedom: Freedom, jointly: Sequence[str]) -> SearchSpace:
+        """The law's space with parameters that are not searched by themselves, or not at all, as coordinates."""
+        try:
+            space: SearchSpace = self.law.search_space(record, freedom)
+        except ValueError as error:
+            if not jointly:
+                raise
+            needed = f"bounds={{{jointly[0]!r}: (lower, upper)}}"
+            raise ValueError(f"{jointly[0]!r} is not searched by itself: give {needed} ({error})") from None
+        return space
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """The law's columns at the record's channels, one for each place where a parameter is affine."""
