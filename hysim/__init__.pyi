@@ -24,6 +24,9 @@ from hysim.identification import identify as identify
 from hysim.identification import Identification as Identification
 from hysim.identification import select as select
 from hysim.identification import Selection as Selection
+from hysim.identification import estimate_channel as estimate_channel
+from hysim.identification import parameter_curve as parameter_curve
+from hysim.identification import ParameterCurve as ParameterCurve
 from hysim.discovery import discover as discover
 from hysim.discovery import discover_oscillator as discover_oscillator
 from hysim.discovery import Discovery as Discovery
@@ -84,6 +87,8 @@ from hysim.laws.differential.coleman_hodgdon import ColemanHodgdon as ColemanHod
 from hysim.laws.magnetic.jiles_atherton import JilesAtherton as JilesAtherton
 from hysim.models.sum import Sum as Sum
 from hysim.models.cascade import Cascade as Cascade
+from hysim.models.channels.dependent import Dependent as Dependent
+from hysim.models.channels.polynomial import ChannelPolynomial as ChannelPolynomial
 from hysim.laws.dashpot import Dashpot as Dashpot
 from hysim.laws.friction.lugre import LuGre as LuGre
 from hysim.laws.friction.stribeck import StribeckFriction as StribeckFriction

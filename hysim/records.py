@@ -8,11 +8,13 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from itertools import pairwise
+from types import MappingProxyType
 from typing import Any, Self, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
+from hysim._channels import Channels, along, checked_channels, taken, value_in
 from hysim._cycles import TOLERANCE, complete_cycles, turns
 from hysim._drift import drift
 from hysim._excursions import full_amplitude, protocol
@@ -46,11 +48,14 @@ class Record:
     t : array, shape (n,), optional
         Strictly increasing times of the samples [``units["t"]``]; rate-independent laws need none.
     units : mapping, optional
-        Labels of the units of ``"t"``, ``"u"`` and ``"y"``, which are not checked.
+        Labels of the units of ``"t"``, ``"u"``, ``"y"`` and the channels, which are not checked.
     resolution : float, optional
         Quantum of the output's sensor [unit of y].
     name : str, optional
         Name of the record in tables and figures.
+    channels : mapping, optional
+        Names of further measured quantities, such as a temperature, to one number for the record or to an array of
+        shape (n,) [``units[name]``]. `hysim.identify` takes parameters that depend on them.
 
     Raises
     ------
@@ -65,6 +70,9 @@ class Record:
     >>> rec = hs.Record(u=[0.0, 1.0, 0.0], y=[0.0, 0.9, 0.2], units={"u": "V", "y": "um"})
     >>> len(rec), rec[1:].u.tolist(), rec[1:].units["y"]
     (3, [1.0, 0.0], 'um')
+    >>> warm = hs.Record(u=[0, 1, 0], y=[0, 1, 0], channels={"T": 40.0, "current": [0.1, 0.2, 0.3]})
+    >>> warm[1:].channel("T"), warm[1:].channel("current").tolist()
+    (40.0, [0.2, 0.3])
     """
 
     u: FloatArray
@@ -73,6 +81,7 @@ class Record:
     units: Mapping[str, str] = field(default_factory=dict)
     resolution: float | None = None
     name: str = ""
+    channels: Channels = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, values in self._signals().items():
@@ -84,8 +93,10 @@ class Record:
             raise ValueError(f"a record needs at least 2 samples, got {self.u.size}")
         if self.t is not None:
             check_increasing(self.t)
-        if unknown := set(self.units) - {"t", "u", "y"}:
-            raise ValueError(f'units are labels of "t", "u" and "y", got {sorted(unknown)}')
+        object.__setattr__(self, "channels", MappingProxyType(checked_channels(self.channels, self.u.size)))
+        if unknown := set(self.units) - {"t", "u", "y", *self.channels}:
+            labels = ", ".join(f'"{name}"' for name in ("t", "u", "y", *self.channels))
+            raise ValueError(f"units are labels of {labels}, got {sorted(unknown)}")
         if self.resolution is not None and self.resolution <= 0:
             raise ValueError(f"resolution must be positive, got {self.resolution}")
 
@@ -104,8 +115,13 @@ class Record:
                 "t": time,
                 "u": f"{extent(self.u, u)}, {turns} reversal{'' if turns == 1 else 's'}",
                 "y": extent(self.y, y) + resolution,
+                **{name: self._channel_in_words(name) for name in self.channels},
             },
         )
+
+    def _channel_in_words(self, name: str) -> str:
+        value, unit = self.channel(name), self.units.get(name, "")
+        return extent(value, unit) if isinstance(value, np.ndarray) else quantity(value, unit)
 
     def _step_in_words(self, unit: str) -> str:
         try:
@@ -121,7 +137,16 @@ class Record:
         if not isinstance(samples, slice):
             raise TypeError(f"a record is cut by a slice, got {samples!r}; take single values from its arrays")
         cut: dict[str, Any] = {name: values[samples] for name, values in self._signals().items()}
-        return dataclasses.replace(self, **cut)
+        return dataclasses.replace(self, **cut, channels=taken(self.channels, samples))
+
+    def channel(self, name: str) -> float | FloatArray:
+        """A channel by name: its number, or its values where they vary along the record, shape (n,).
+
+        Raises ValueError if the record has no channel of this name.
+        """
+        owner = f"the record {self.name!r}" if self.name else "the record"
+        value: float | FloatArray = value_in(self.channels, name, owner)
+        return value
 
     @property
     def sample_time(self) -> float:
@@ -211,7 +236,7 @@ class Record:
         return tuple(self[about_level.slices[k]] for k in full_amplitude(self.u, about_level))
 
     def resample(self, sample_time: float) -> Self:
-        """Interpolate the record linearly at even times, from the first time on.
+        """Interpolate the record and its channels linearly at even times, from the first time on.
 
         An extreme of the input between two new samples is lost: choose a step well below the time between reversals.
 
@@ -244,7 +269,8 @@ class Record:
             raise ValueError(f"sample_time must be from {span / _MOST_SAMPLES:g} to {span:g}, got {sample_time}")
         t = self.t[0] + sample_time * np.arange(int(span / sample_time * (1 + _ROUNDING)) + 1)
         u, y = (np.interp(t, self.t, values) for values in (self.u, self.y))
-        return dataclasses.replace(self, t=t, u=u, y=y)
+        varying = {name: np.interp(t, self.t, values) for name, values in along(self.channels).items()}
+        return dataclasses.replace(self, t=t, u=u, y=y, channels={**self.channels, **varying})
 
     def detrend(self, order: int = 1, *, tolerance: float = TOLERANCE) -> Self:
         """Remove the drift of the output, and leave the loop as it is.
@@ -330,7 +356,7 @@ class Record:
         Parameters
         ----------
         units : mapping
-            New units of ``"t"``, ``"u"`` or ``"y"``: ``{"y": "nm"}`` for an output in um.
+            New units of ``"t"``, ``"u"``, ``"y"`` or channels: ``{"y": "nm"}`` for an output in um.
 
         Returns
         -------
@@ -349,15 +375,16 @@ class Record:
         >>> rec.convert({"y": "nm"}).y.tolist(), rec.convert({"y": "nm"}).resolution
         ([0.0, 79.0], 1.0)
         """
-        signals, changes = self._signals(), dict[str, Any](units={**self.units, **units})
+        signals, changes = {**self._signals(), **self.channels}, dict[str, Any](units={**self.units, **units})
+        channels = dict(self.channels)
         for signal, unit in units.items():
             if signal not in signals or signal not in self.units:
                 raise ValueError(f"the record has no {signal!r} with a unit to convert: give it units first")
             power = power_of_ten(self.units[signal], unit)
-            changes[signal] = _scaled(signals[signal], power)
+            (channels if signal in channels else changes)[signal] = _scaled(signals[signal], power)
             if signal == "y" and self.resolution is not None:
                 changes["resolution"] = _scaled(self.resolution, power)
-        return dataclasses.replace(self, **changes)
+        return dataclasses.replace(self, **changes, channels=channels)
 
     def detect_resolution(self) -> float | None:
         """Estimate the quantum of the output from its values [unit of y].

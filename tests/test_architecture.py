@@ -14,7 +14,12 @@ PACKAGE = Path(hysim.__file__).parent
 RANKS = (
     ("_names", "_release"),
     ("_frozen", "_atomic", "_blas", "_printing", "_versions", "errors"),  # they know nothing of hysteresis
-    ("_cycles", "_resolution", "_prefixes"),  # the turning points of an input, the quantum of a sensor, units
+    (
+        "_channels",
+        "_cycles",
+        "_resolution",
+        "_prefixes",
+    ),  # the turning points of an input, the quantum of a sensor, units
     (
         "_drift",
         "_excursions",

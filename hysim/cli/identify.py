@@ -11,6 +11,7 @@ SUCCESS, NOT_CONVERGED = 0, 1
 def run(options: argparse.Namespace) -> int:
     """Identify, write the files that are asked for, and print the result."""
     from hysim.identification import identify
+    from hysim.models.channels.dependent import on_record
     from hysim.models.storage import to_json
 
     model = models.to_identify(options)
@@ -21,6 +22,7 @@ def run(options: argparse.Namespace) -> int:
         fixed=dict(options.fix),
         free=tuple(options.free),
         bounds=dict(options.bounds),
+        depends=dict(options.depends) or None,
         weights=weights,
         progress=outputs.progress(),
         **outputs.fields_of(options, ("initial", "noise", "intervals", "cross_validate", "max_evaluations", "seed")),
@@ -32,7 +34,7 @@ def run(options: argparse.Namespace) -> int:
     )  # fmt: skip
     files: outputs.Files = {
         options.out: lambda: to_json(fit.model, units=record.units),
-        options.plot: lambda: outputs.loop_of_model(record, fit.model),
+        options.plot: lambda: outputs.loop_of_model(record, on_record(fit.model, record)),
     }
     family = {"family": type(fit.model).__name__}
     outputs.write(options, files, fit.summary, lambda: family | outputs.fields_of(fit, names))
@@ -50,6 +52,7 @@ COMMAND = Command(
 --fix NAME=VALUE...  parameter that is not free: n=1 [unit of the parameter]
 --free NAME...  parameter that is free, where it is fixed by default
 --bounds NAME=LOW:HIGH...  bounds of a parameter: beta=0:2 [unit of the parameter]
+--depends NAME=CHANNEL:DEGREE...  parameter that is a polynomial in a channel: gain=T:1
 --initial free|rest|still|periodic  state at the first sample (default: chosen by the BIC, or free)
 --noise gaussian|quantised|robust  noise of the output; quantised needs --resolution [default: gaussian]
 --intervals linear|profile|bootstrap  method of the 95 % intervals [default: linear]

@@ -159,6 +159,32 @@ def unit(text: str) -> tuple[str, str]:
     return signal, label
 
 
+def named(form: str, read: Callable[[str], Any]) -> Callable[[str], tuple[str, Any]]:
+    """A reader of a name and a value of some other reader, in a form such as ``NAME=COLUMN``."""
+
+    def read_both(text: str) -> tuple[str, Any]:
+        name, equals, value = text.partition("=")
+        try:
+            return name, read(value if equals and name else "")
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"expected {form}, got {text!r}") from None
+
+    return read_both
+
+
+def _some_column(text: str) -> str | int:
+    if not text:
+        raise ValueError("no column")
+    return column(text)
+
+
+def _channel_and_degree(text: str) -> tuple[str, int]:
+    channel, _, degree = text.rpartition(":")
+    if not channel:
+        raise ValueError("no channel")
+    return channel, int(degree)
+
+
 def library(text: str) -> str | list[str]:
     """The name of a library, or its terms."""
     names = [name.strip() for name in text.split(",")]
@@ -178,6 +204,8 @@ READERS: dict[str, Callable[[str], Any]] = {
     "T,B,L,R": numbers("T,B,L,R", int),
     "PLATFORMS": platforms,
     "COLUMN": column,
+    "CHANNEL=COLUMN": named("CHANNEL=COLUMN", _some_column),
+    "NAME=CHANNEL:DEGREE": named("NAME=CHANNEL:DEGREE, such as gain=T:1", _channel_and_degree),
     "SIGNAL=UNIT": unit,
     "NAME|TERMS": library,
     "QUANTUM": word_or_number("a number or detect", "detect", number=float),

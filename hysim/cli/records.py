@@ -47,6 +47,8 @@ OPTIONS_WITHOUT_FILE = f"record:\n{_INPUT}\n{_OUTPUT}{_OTHERS}"
 OPTIONS = f"{FILE}\n\n{OPTIONS_WITHOUT_FILE}"
 OPTIONS_WITH_WEIGHTS = f"""{OPTIONS.rstrip()}
 --weights COLUMN  weight of each sample in the sum of squares, 0 to leave it out: name or number of its column
+--channel CHANNEL=COLUMN...  further quantity, such as a temperature, and its column: T=temp (default: those of a file
+    that hysim has saved)
 """
 OPTIONS_OF_AN_INPUT = f"{FILE}\n\nrecord:\n{_INPUT}{_OTHERS}"
 """Options for a file that needs no column of the output."""
@@ -163,6 +165,7 @@ def _read(options: argparse.Namespace, path: str, source: Any, y: str | None, re
         name="record" if path == STANDARD else None,
         on_missing=options.on_missing,
         resolution=resolution,
+        channels=dict(options.channel) or None if "channel" in options else None,
         **text_options(options),
     )
     if options.sample_time is None:

@@ -5,9 +5,9 @@ simulated in free run and judged by the measures of `hysim.metrics`: the fit of 
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 
@@ -16,14 +16,16 @@ from hysim._cycles import TOLERANCE
 from hysim._excursions import measured_cycles
 from hysim._frozen import FloatArray
 from hysim._parallel import Progress, map_on_threads
+from hysim.comparison._records import OneByOne, Result, model_of, models_on, together
 from hysim.comparison._result import Comparison, ComparisonRow
 from hysim.errors import SimulationError
 from hysim.identification import Identification, identify
 from hysim.identification.sharing import sharing
 from hysim.metrics import LoopMetrics, loop_metrics
 from hysim.models.candidates import candidates, is_identifiable, is_searched
+from hysim.models.channels.dependent import on_record
 from hysim.models.protocols import Direct, Responding, needs_time
-from hysim.records import Record
+from hysim.records import Record, several
 from hysim.simulation import simulate
 
 _SHORT = 200  # samples; leaving one out at a time costs as many fits as there are samples
@@ -35,7 +37,7 @@ _FAILURES = (ValueError, TypeError, ArithmeticError, SimulationError)
 
 def compare(
     models: Mapping[str, Any] | str | None,
-    record: Record,
+    record_or_records: Record | Sequence[Record],
     *,
     cross_validate: str | int | None = "auto",
     test: Record | int | None = None,
@@ -45,16 +47,18 @@ def compare(
     progress: Progress | None = None,
     announce: Callable[[str], None] | None = None,
 ) -> Comparison:
-    """Compare models on a record.
+    """Compare models on a record, or on several.
 
     Parameters
     ----------
     models : mapping, "all" or None
-        Name to a model; to a result of `identify` or `discover`; or to a class or structure, which is identified on the
-        record. ``"all"``, or None, is every family that can be identified without further arguments; those that cannot
-        be identified on this record are listed with the reason.
-    record : Record
-        With at least one complete cycle of the input.
+        Name to a model; to a result of `identify` or `discover`; to a class or structure, which is identified on the
+        record; or, with several records, to a list of models or results, one for each of them. ``"all"``, or None, is
+        every family that can be identified without further arguments; those that cannot be identified on this record
+        are listed with the reason.
+    record_or_records : Record or sequence of Record
+        With at least one complete cycle of the input. Of several, which may differ in their channels, fit, rmse and
+        criteria are those of all; loops are compared on the last one, which alone `Comparison.record` holds.
     cross_validate : {"auto", "loo", "cycles", None} or int
         Cross-validation of the classes and structures; see `identify`. ``"auto"`` leaves out one sample at a time on
         records of up to 200 samples, and one of 10 blocks on longer ones.
@@ -93,14 +97,14 @@ def compare(
     >>> [row.name for row in tab.rows], round(tab["truth"].fit_percent, 3)
     (['line', 'truth'], 100.0)
     """
-    if not isinstance(record, Record):
-        raise TypeError(f"compare takes a Record, got {type(record).__name__}: hs.Record(u=u, y=y)")
-    subjects = _subjects(models)
-    trial = _trial(record, test)
-    training = trial.training if trial else record
+    records = several(record_or_records, "compare")
+    subjects = _subjects(models, len(records))
+    trial = _trial(records, test)
+    records = (*records[:-1], trial.training) if trial else records
+    training = records[-1]
     if cross_validate == "auto":
-        cross_validate = "loo" if len(training) <= _SHORT else _BLOCKS
-    protocol = _Protocol(training, _last_loop(training), cross_validate, seed, trial, max_evaluations, announce)
+        cross_validate = "loo" if sum(map(len, records)) <= _SHORT else _BLOCKS
+    protocol = _Protocol(records, _last_loop(training), cross_validate, seed, trial, max_evaluations, announce)
     names = list(subjects)
     with sharing():
         results = map_on_threads(
@@ -123,15 +127,6 @@ def _last_loop(record: Record) -> LoopMetrics:
         raise ValueError(f"compare judges models by the loop of the record, and it has none: {error}") from None
 
 
-@runtime_checkable
-class _Result(Protocol):
-    """A result of `identify` or `discover`."""
-
-    model: Any
-    n_parameters: int
-    cv_rmse: float
-
-
 @dataclass(frozen=True)
 class _Trial:
     """A test: the record for the fits, the record that drives the models, and the first sample that is judged."""
@@ -151,7 +146,7 @@ class _Trial:
 class _Protocol:
     """The treatment of every model."""
 
-    record: Record
+    records: tuple[Record, ...]
     measured: LoopMetrics
     cross_validate: str | int | None
     seed: int
@@ -168,7 +163,7 @@ class _Protocol:
             if identified_here:
                 subject = identify(
                     subject,
-                    self.record,
+                    self.records,
                     cross_validate=self.cross_validate,
                     max_evaluations=self.max_evaluations,
                     seed=self.seed,
@@ -178,12 +173,15 @@ class _Protocol:
             return " ".join(str(error).split())
 
     def _measured_row(self, name: str, subject: Any, identified_here: bool) -> ComparisonRow:
-        record, measured, model = self.record, self.measured, _model_of(subject)
-        y = simulate(model, record.t, record.u).y
-        loop, residual, rmse = _loop(model, record, y), record.y - y, metrics.rmse(record.y, y)
+        record, measured, own = self.records[-1], self.measured, models_on(subject, self.records)
+        outputs = [simulate(each, rec.t, rec.u).y for each, rec in zip(own, self.records, strict=True)]
+        model, y, every = own[-1], outputs[-1], np.concatenate([each.y for each in self.records])
+        simulated = np.concatenate(outputs)
+        loop, residual, rmse = _loop(model, record, y), every - simulated, metrics.rmse(every, simulated)
         fitted: dict[str, Any] = {"n_parameters": 0, "cv_rmse": rmse, "cv_residual": residual}
         fitted |= dict.fromkeys(_CRITERIA, math.nan)
-        if isinstance(subject, _Result):
+        subject = together(subject) if isinstance(subject, list | tuple) else subject
+        if isinstance(subject, Result):
             d = int(subject.n_parameters)
             fitted = {"n_parameters": d, "cv_rmse": float(subject.cv_rmse), "cv_residual": np.empty(0)}
             fitted |= {name: criterion(residual, d) for name, criterion in _CRITERIA.items()}
@@ -195,8 +193,8 @@ class _Protocol:
         test_fit, test_rmse = self._test_errors(subject, model, identified_here)
         return ComparisonRow(
             name=name,
-            model=model,
-            fit_percent=metrics.fit_percent(record.y, y),
+            model=model_of(subject),
+            fit_percent=metrics.fit_percent(every, simulated),
             rmse=rmse,
             max_residual=float(np.abs(residual).max()),
             max_width=loop.max_width,
@@ -216,16 +214,17 @@ class _Protocol:
 
     def _test_errors(self, subject: Any, model: Any, identified_here: bool) -> tuple[float, float]:
         """Fit and rmse on the test."""
-        if self.trial is None:
+        if self.trial is None or isinstance(subject, OneByOne):
             return math.nan, math.nan
         drive, test = self.trial.drive, self.trial.record
         if self.trial.own_state and identified_here:
             model = _with_initial_state(drive, subject, self.seed)
+        model = on_record(model, drive)
         y = simulate(model, drive.t, drive.u).y[self.trial.begin :]
         return metrics.fit_percent(test.y, y), metrics.rmse(test.y, y)
 
 
-def _subjects(models: Mapping[str, Any] | str | None) -> dict[str, Any]:
+def _subjects(models: Mapping[str, Any] | str | None, n_records: int) -> dict[str, Any]:
     if models is None or (isinstance(models, str) and models == "all"):
         return candidates()
     if not isinstance(models, Mapping):
@@ -233,14 +232,20 @@ def _subjects(models: Mapping[str, Any] | str | None) -> dict[str, Any]:
     if not models:
         raise ValueError("there is nothing to compare: give at least one model by name")
     for name, subject in models.items():
-        if not (is_identifiable(subject) or isinstance(_model_of(subject), Responding)):
+        if isinstance(subject, list | tuple) and len(subject) != n_records:
+            raise ValueError(
+                f"{name}: give one model or result for each of the {n_records} records, got {len(subject)}"
+            )
+        members = subject if isinstance(subject, list | tuple) else [subject]
+        if not all(is_identifiable(each) or isinstance(model_of(each), Responding) for each in members):
             raise TypeError(f"compare takes a model, a result, a model class or a structure, got {subject!r} as {name}")
     return dict(models)
 
 
-def _trial(record: Record, test: Record | int | None) -> _Trial | None:
+def _trial(records: Sequence[Record], test: Record | int | None) -> _Trial | None:
     if test is None:
         return None
+    record = records[-1]
     if isinstance(test, Record):
         return _Trial(record, test, begin=0, own_state=True)
     if not isinstance(test, int) or isinstance(test, bool):
@@ -254,23 +259,21 @@ def _trial(record: Record, test: Record | int | None) -> _Trial | None:
 
 def _is_family(subject: Any) -> bool:
     """Whether the subject is a class or a structure, to be identified."""
-    return isinstance(subject, type) or not isinstance(subject, Responding | _Result)
-
-
-def _model_of(subject: Any) -> Any:
-    return subject.model if isinstance(subject, _Result) else subject
+    return isinstance(subject, type) or not isinstance(subject, Responding | Result | list | tuple)
 
 
 def _with_initial_state(record: Record, fitted: Identification, seed: int) -> Any:
     """The identified model, with the initial state that fits another record best."""
-    model = fitted.model
+    model = on_record(fitted.model, record)
     if not is_searched(model):
         return model
     space = model.search_space(record)
     state = set(space.state) & set(space.names)
     if not state:
         return model
-    shared = {name: value for name, value in fitted.estimates.items() if name not in state}
+    is_alone = len(fitted.models) == 1 and model is fitted.model
+    known = fitted.estimates if is_alone else model.scalars
+    shared = {name: value for name, value in known.items() if name not in state}
     return identify(model, record, fixed=shared, seed=seed).model
 
 

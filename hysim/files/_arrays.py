@@ -2,7 +2,8 @@
 
 A column is an array with one axis that is longer than one; of an array with more, the columns are those along its
 first axis: ``x[2]`` of shape (n, 3), ``x[0,1]`` of shape (n, 3, 2). A name leads into structs and groups with a
-point or a slash. Text arrays ``u_units`` and ``name`` and a number `resolution` hold what is known beside the columns.
+point or a slash. Text arrays ``u_units``, ``name`` and ``channels`` and a number `resolution` hold what is known
+beside the columns.
 """
 
 import math
@@ -16,14 +17,16 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
-from hysim.files._table import Column, Notes, damaged, listed, number_of, positive, require, shown
+from hysim.files._table import Column, Notes, channels_in, damaged, listed, number_of, positive, require, shown
 
 MOST_BYTES = 2_000_000_000
 """Most bytes of one array's numbers; a larger one is refused before it is read."""
 
 _INDEXED = re.compile(r"(.+)\[(\d{1,9}(?:, ?\d{1,9})*)\]", re.DOTALL)
 _LONGEST_TEXT = 10_000  # bytes of a unit or a name
-_UNITS = "_units"  # ends the name of a text that is the unit of an array
+UNITS = "_units"
+"""Ends the name of a text that is the unit of an array."""
+
 
 NUMBERS, TEXT = "numbers", "text"
 KINDS = {
@@ -32,7 +35,7 @@ KINDS = {
 }  # fmt: skip
 """Contents of an array by the kind of its NumPy type."""
 
-NOTES = ("name", "resolution")
+NOTES = ("name", "resolution", "channels")
 """Arrays or attributes that hold a note about the record."""
 
 
@@ -155,9 +158,9 @@ def with_notes(arrays: list[Array], form: str, attributes: Mapping[str, Any] | N
     notes = dict(attributes or {})
     with damaged(form):
         for array in arrays:
-            if array.label in NOTES or array.label.endswith(_UNITS):
+            if array.label in NOTES or array.label.endswith(UNITS):
                 notes.setdefault(array.label, _short_value(array))
-    units = {name.removesuffix(_UNITS): text for name, text in notes.items() if name.endswith(_UNITS)}
+    units = {name.removesuffix(UNITS): text for name, text in notes.items() if name.endswith(UNITS)}
     units |= {array.label: array.unit for array in arrays if array.unit is not None}
     name, resolution = notes.get("name"), notes.get("resolution")
     return Arrays(
@@ -166,6 +169,7 @@ def with_notes(arrays: list[Array], form: str, attributes: Mapping[str, Any] | N
             units={label: unit for label, unit in units.items() if isinstance(unit, str)},
             resolution=positive(resolution) if isinstance(resolution, float) else None,
             name=name if isinstance(name, str) else None,
+            channels=channels_in(notes.get("channels")),
         ),
         form,
     )

@@ -12,11 +12,11 @@ import numpy as np
 from hysim._frozen import FloatArray
 from hysim.files._cells import numbers, parse, plain_numbers
 from hysim.files._layout import COMMENTS, Layout, layout
-from hysim.files._table import Column, Notes, listed, number_of, positive
+from hysim.files._table import Column, Notes, channels_in, listed, number_of, positive
 
 T = TypeVar("T")
 
-_NOTE = re.compile(r"[#%] *(name|resolution|units) *:")
+_NOTE = re.compile(r"[#%] *(name|resolution|units|channels) *:")
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def delimited(text: str, delimiter: str | None, decimal: str | None) -> Delimite
 
 
 def _notes(text: str) -> Notes:
-    """The name, resolution and units in the comments above a text, as `hysim.save_record` writes them."""
+    """The name, resolution, units and channels in the comments above a text, as `hysim.save_record` writes them."""
     notes: dict[str, str] = {}
     start = 0
     while text.startswith(COMMENTS, start):
@@ -78,6 +78,7 @@ def _notes(text: str) -> Notes:
         units={str(signal): str(unit) for signal, unit in units.items()},
         resolution=positive(parse(notes.get("resolution", ""), ".")),
         name=_json(notes.get("name", ""), str) or notes.get("name"),
+        channels=channels_in(notes.get("channels")),
     )
 
 

@@ -26,8 +26,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._versions import optional
-from hysim.files._arrays import KINDS, MOST_BYTES, NOTES, TEXT, Array, Arrays, with_notes
-from hysim.files._table import UnreadableError, damaged, require
+from hysim.files._arrays import KINDS, MOST_BYTES, NOTES, TEXT, UNITS, Array, Arrays, with_notes
+from hysim.files._table import UnreadableError, channels_in, damaged, require
 
 MOST_SEARCHED = 500_000_000
 """Most bytes of a file whose heaps are looked for; in longer ones texts of variable length are left unread."""
@@ -54,6 +54,8 @@ def hdf5(file: BinaryIO, path: Path | None, *, matlab: bool) -> Iterator[Arrays]
             reader = _Reader(h5py, matlab, texts and root.id.get_create_plist().get_sizes() == _WORDS)
             arrays = [reader.array(label, dataset) for label, dataset in reader.datasets(root, "", set())]
             notes = {name: reader.attribute(root, name) for name in (*NOTES, "t_units")}
+            units = (f"{name}{UNITS}" for name in channels_in(notes["channels"]))
+            notes |= {name: reader.attribute(root, name) for name in units}
             table = with_notes(arrays, form, {name: value for name, value in notes.items() if value is not None})
         yield table
 

@@ -4,7 +4,7 @@ A file is read in three steps: its first bytes say its format; the format gives 
 numbers of the chosen columns become a record, or several, with gaps where a value is missing.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Literal, TypedDict, Unpack, overload
@@ -40,6 +40,7 @@ class _Options(TypedDict, total=False):
     units: Mapping[str, str] | None
     resolution: float | Literal["detect"] | None
     name: str | None
+    channels: Sequence[str] | Mapping[str, str | int | float] | None
 
 
 @overload
@@ -59,6 +60,7 @@ def load(
     units: Mapping[str, str] | None = None,
     resolution: float | Literal["detect"] | None = None,
     name: str | None = None,
+    channels: Sequence[str] | Mapping[str, str | int | float] | None = None,
 ) -> Record | tuple[Record, ...]:
     """Load a record from a file: text, NPZ, NPY, MAT or HDF5.
 
@@ -93,11 +95,15 @@ def load(
     encoding : str, optional
         Encoding of a text; by default UTF-8, or UTF-16 or UTF-32 after their byte order mark.
     units : mapping, optional
-        Labels of the units of ``"t"``, ``"u"`` and ``"y"``; they replace those of the file.
+        Labels of the units of ``"t"``, ``"u"``, ``"y"`` and the channels; they replace those of the file.
     resolution : float or "detect", optional
         Quantum of the output's sensor [unit of y], in place of the file's; or ``"detect"`` it from the values.
     name : str, optional
         Name of the record; by default the one in the file, or the file's name without its ending.
+    channels : sequence of str, or mapping, optional
+        Further columns by their names, or names of channels to columns, by name or by number; a float is the value of a
+        channel that is constant: ``{"T": "temp", "current": 0.5}``. By default those that the file of
+        `hysim.save_record` names.
 
     Returns
     -------
@@ -135,7 +141,10 @@ def load(
     with opened(path) as source, file_named(source):
         with table_of(source, for_text) as table:
             columns = _columns(table, {"u": u, "y": y, "t": t})
-            labels = _units(table, columns) | dict(units or {})
+            signals, places = [*columns], _channels(table, channels)
+            constants = {label: place for label, place in places.items() if isinstance(place, float)}
+            columns |= {label: place for label, place in places.items() if isinstance(place, Column)}
+            labels = _units(table, columns, constants) | dict(units or {})
             values = table.values([*columns.values()])
         parts = _parts(table, columns, values, on_missing)
         if resolution == "detect":
@@ -145,7 +154,7 @@ def load(
         if name is None:
             name = Path(source.name).stem if table.notes.name is None else table.notes.name
         records = tuple(
-            Record(**dict(zip(columns, values[:, part], strict=True)), units=labels, resolution=resolution, name=name)
+            _record(signals, places, dict(zip(columns, values[:, part], strict=True)), labels, resolution, name)
             for part in parts
         )
     return records if on_missing == "split" else records[0]
@@ -218,7 +227,7 @@ def _parts(
         raise ValueError(f"a record needs at least 2 samples, there are {longest}{' in a row' if is_cut else ''}")
     if "t" in columns:
         for part in long_enough:
-            _check_time(table, values[-1], part)
+            _check_time(table, values[[*columns].index("t")], part)
     return long_enough
 
 
@@ -232,9 +241,40 @@ def _check_time(table: Table, times: FloatArray, part: npt.NDArray[np.intp]) -> 
         )
 
 
-def _units(table: Table, columns: Mapping[str, Column]) -> dict[str, str]:
-    """Units of the signals where the file states them."""
+def _channels(
+    table: Table, channels: Sequence[str] | Mapping[str, str | int | float] | None
+) -> dict[str, Column | float]:
+    """The column of each channel, or its number where it is constant; by default those that the file names."""
+    if channels is None:
+        keys: Mapping[str, str | int | float] = table.notes.channels
+    elif isinstance(channels, Mapping):
+        keys = channels
+    else:
+        keys = dict(zip(*[(channels,) if isinstance(channels, str) else channels] * 2, strict=True))
+    return {label: key if isinstance(key, float) else table.column(key) for label, key in keys.items()}
+
+
+def _record(
+    signals: Sequence[str],
+    channels: Mapping[str, Column | float],
+    values: Mapping[str, FloatArray],
+    units: Mapping[str, str],
+    resolution: float | None,
+    name: str,
+) -> Record:
+    return Record(
+        **{signal: values[signal] for signal in signals},
+        channels={label: values.get(label, place) for label, place in channels.items()},
+        units=units,
+        resolution=resolution,
+        name=name,
+    )
+
+
+def _units(table: Table, columns: Mapping[str, Column], constants: Iterable[str]) -> dict[str, str]:
+    """Units of the signals and channels where the file states them."""
     units = {signal: table.notes.units.get(c.label, c.unit or None) for signal, c in columns.items()}
+    units |= {label: table.notes.units.get(label) for label in constants}
     if "t" not in columns and "t" not in table.labels:
         units["t"] = table.notes.units.get("t")
     return {signal: unit for signal, unit in units.items() if unit is not None}

@@ -3,7 +3,7 @@
 import io
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,25 +11,33 @@ from typing import Any
 import numpy as np
 
 from hysim._atomic import write_all
+from hysim._channels import along
 from hysim._frozen import FloatArray
 from hysim._printing import csv_text
 from hysim._versions import optional
+from hysim.files._arrays import NOTES, UNITS
 from hysim.files._table import Notes
 from hysim.records import Record
 
+_VARIABLE = re.compile(r"[A-Za-z]\w{0,30}", re.ASCII)  # of MATLAB
+_PLAIN_NAME = re.compile(r"[^\W\d][\w.-]*(?: [\w.-]+)*")
 _PLAIN_UNIT = re.compile(r"[^\[\]()\s,;\"#%]+(?: [^\[\]()\s,;\"#%]+)*")
 
 
 def save_record(record: Record, path: str | Path) -> None:
     """Save a record to a file, in the format that its ending names.
 
-    The file holds the arrays to the last bit, and units, resolution and name; `hysim.load` returns an equal record. It
-    is written completely or not at all, with the same bytes each time.
+    The file holds the arrays to the last bit, channels, units, resolution and name; `hysim.load` returns an equal
+    record. It is written completely or not at all, with the same bytes each time.
 
-    - ``.csv``, ``.tsv``: a header ``t [s],u [V],y [um]``, below comments ``# name:`` and ``# resolution:``;
-    - ``.npz``: arrays `t`, `u`, `y`, `resolution`, and texts `name`, ``u_units`` and so on;
+    - ``.csv``, ``.tsv``: a header ``t [s],u [V],y [um]``, below comments ``# name:``, ``# resolution:`` and
+      ``# channels:``;
+    - ``.npz``: arrays `t`, `u`, `y`, `resolution`, and texts `name`, `channels`, ``u_units`` and so on;
     - ``.mat``: the same as variables, numbers in columns, compressed; version 5, which MATLAB and Octave load;
-    - ``.h5``, ``.hdf5``: datasets with an attribute `units`; attributes `resolution` and `name` of the file.
+    - ``.h5``, ``.hdf5``: datasets with an attribute `units`; attributes `resolution`, `name` and `channels` of the
+      file.
+
+    A channel that varies is a column or array of its own; one that is constant stands as a number among the channels.
 
     Parameters
     ----------
@@ -61,8 +69,22 @@ def save_record(record: Record, path: str | Path) -> None:
     """
     if not isinstance(record, Record):
         raise TypeError(f"save_record takes a Record, got {type(record).__name__}")
-    columns = {"u": record.u, "y": record.y} if record.t is None else {"t": record.t, "u": record.u, "y": record.y}
-    write_all({path: packed(columns, path, Notes(record.units, record.resolution, record.name))})
+    varying = along(record.channels)
+    columns = {} if record.t is None else {"t": record.t}
+    columns |= {"u": record.u, "y": record.y, **varying}
+    _check_columns(varying, path)
+    channels = {name: name if name in varying else value for name, value in record.channels.items()}
+    write_all({path: packed(columns, path, Notes(record.units, record.resolution, record.name, channels))})
+
+
+def _check_columns(names: Iterable[str], path: str | Path) -> None:
+    """Refuse channels whose names a file of this ending has no place for, or would read in another way."""
+    form = _VARIABLE if ending(path) == ".mat" else _PLAIN_NAME
+    for name in names:
+        if not form.fullmatch(name) or name in NOTES or name.endswith(UNITS):
+            raise ValueError(
+                f"{Path(path).name}: a column cannot be called {name!r}; rename the channel, with letters, digits and _"
+            )
 
 
 def packed(columns: Mapping[str, FloatArray], path: str | Path, notes: Notes) -> bytes:
@@ -86,6 +108,7 @@ def _text(columns: Mapping[str, FloatArray], notes: Notes, *, delimiter: str) ->
     plain = {label: unit for label, unit in notes.units.items() if label in columns and _PLAIN_UNIT.fullmatch(unit)}
     comments: dict[str, Any] = {"name": notes.name, "resolution": notes.resolution}
     comments["units"] = dict(notes.units) if dict(notes.units) != plain else None
+    comments["channels"] = dict(notes.channels)
     header = [f"{label} [{plain[label]}]" if label in plain else label for label in columns]
     rows = zip(*(values.tolist() for values in columns.values()), strict=True)
     lines = "".join(f"# {name}: {json.dumps(value)}\n" for name, value in comments.items() if value)
@@ -99,6 +122,8 @@ def _arrays(columns: Mapping[str, FloatArray], notes: Notes) -> dict[str, Any]:
         others["name"] = notes.name
     if notes.resolution is not None:
         others["resolution"] = np.asarray(notes.resolution)
+    if notes.channels:
+        others["channels"] = json.dumps(dict(notes.channels))
     return {**columns, **others}
 
 

@@ -1,5 +1,6 @@
 """Columns with names, whose numbers are read when they are chosen: common to all formats."""
 
+import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -21,11 +22,15 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True)
 class Notes:
-    """Units, resolution and name of a record, as a file states them."""
+    """Units, resolution, name and channels of a record, as a file states them.
+
+    `channels` are names to columns, or to the numbers of those that are constant.
+    """
 
     units: Mapping[str, str] = field(default_factory=dict)
     resolution: float | None = None
     name: str | None = None
+    channels: Mapping[str, str | float] = field(default_factory=dict)
 
 
 class Table(Protocol):
@@ -97,6 +102,16 @@ def listed(names: Sequence[str], most: int = 20) -> str:
     """Names from a file, in one line."""
     plain = [name if name.isprintable() and len(name) <= 80 else shown(name, 80) for name in names[:most]]
     return ", ".join(plain) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
+def channels_in(text: Any) -> dict[str, str | float]:
+    """The channels that a text in JSON names; none if it does not."""
+    try:
+        channels = json.loads(text)
+    except (TypeError, ValueError, RecursionError):
+        return {}
+    known = isinstance(channels, dict) and all(type(each) in (str, int, float) for each in channels.values())
+    return {name: each if isinstance(each, str) else float(each) for name, each in channels.items()} if known else {}
 
 
 def positive(value: float | None) -> float | None:

@@ -8,5 +8,18 @@ from hysim.identification._identify import identify
 from hysim.identification._profile import Profile
 from hysim.identification._result import Candidate, Identification, Width
 from hysim.identification._select import Selection, select
+from hysim.identification.channels.curve import ParameterCurve, parameter_curve
+from hysim.identification.channels.unknown import estimate_channel
 
-__all__ = ["Candidate", "Identification", "Profile", "Selection", "Width", "identify", "select"]
+__all__ = [
+    "Candidate",
+    "Identification",
+    "ParameterCurve",
+    "Profile",
+    "Selection",
+    "Width",
+    "estimate_channel",
+    "identify",
+    "parameter_curve",
+    "select",
+]

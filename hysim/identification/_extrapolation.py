@@ -15,6 +15,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.errors import SimulationError
+from hysim.models.channels.dependent import AlongRecord
 from hysim.models.protocols import Responding, needs_time
 from hysim.records import Record
 
@@ -31,12 +32,12 @@ _REPEATED = 5
 def implausible(models: Sequence[Any], records: Sequence[Record]) -> str:
     """A sentence where a trial of the models, one for each record, leaves the record's range; else the empty text.
 
-    It is empty too where a model depends on time, or no input turns back.
+    It is empty too where a model depends on time or on a channel that varies, or no input turns back.
     """
     k = max(range(len(records)), key=lambda k: float(np.ptp(records[k].u)))
     model, record = models[k], records[k]
     turning = record.reversals(tolerance=_TURN)
-    if needs_time(model) or not isinstance(model, Responding) or not turning.size:
+    if needs_time(model) or isinstance(model, AlongRecord) or not isinstance(model, Responding) or not turning.size:
         return ""
     line, low, high = _band(records)
     if high == low:

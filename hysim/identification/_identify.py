@@ -20,8 +20,11 @@ from hysim.identification._resampling import left_out_errors, rms_of_known
 from hysim.identification._result import Identification
 from hysim.identification._search import PERFECT, chosen, stages_in_words
 from hysim.identification._searched import Search
+from hysim.identification.channels.starts import begun
 from hysim.identification.folds import left_out
 from hysim.identification.swapped import swapped_columns, swapped_for
+from hysim.models.channels.dependent import Dependent, on_record
+from hysim.models.channels.structure import DependentStructure
 from hysim.models.protocols import Direct, Identifiable, Recorded, needs_time
 from hysim.models.search_space import Freedom
 from hysim.records import Record, several
@@ -34,6 +37,7 @@ def identify(
     fixed: Mapping[str, float] | None = None,
     free: Sequence[str] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
+    depends: Mapping[str, tuple[str, int]] | None = None,
     initial: str | Sequence[str] | None = None,
     noise: str = "gaussian",
     intervals: str = "linear",
@@ -62,6 +66,12 @@ def identify(
         since only the product of A and gain is determined. Of a `hysim.Structure` all parameters are held but these.
     bounds : mapping, optional
         Name to (lower, upper), in place of the family's own box.
+    depends : mapping, optional
+        Name of a parameter to (channel, degree): the parameter is a polynomial of this degree in a channel of the
+        records, ``{"gain": ("T", 1)}``. It is identified by its values at degree + 1 places of the channel's range,
+        such as ``gain(T=20)`` and ``gain(T=60)``, each in the parameter's own box. The model is then a
+        `hysim.Dependent`. Where a channel varies along a record, each branch between two samples has the parameters of
+        the sample at its end.
     initial : {"free", "rest", "still", "periodic"}, or one of them for each record, optional
         Whether the state at the first sample is identified, is rest at zero, is that of an input which stood still at
         its first value, or is what the cycle leaves behind with which the record begins. By default a single memory is
@@ -95,7 +105,8 @@ def identify(
     ------
     ValueError
         If a name or an option is unknown, nothing is free, the record is too short for the parameters, its input
-        is constant, it has no resolution for quantised noise, or weights are negative or of another length.
+        is constant, it has no resolution for quantised noise, weights are negative or of another length, or a record
+        has not the channel that a parameter depends on, or the records too few different values of it.
     TypeError
         If the first argument is not something that can be identified.
 
@@ -120,12 +131,14 @@ def identify(
     if max_evaluations is not None:
         check_count("max_evaluations", max_evaluations)
     with at_most(workers), one_blas_thread():
-        if isinstance(model_or_class, Direct):
+        if isinstance(model_or_class, Direct) and depends is None:
             direct.refuse(model_or_class, options, noise, intervals, shares)
             fit = direct.identified(model_or_class, records, left_out(cross_validate, records), seed)
             doubts = [swapped_columns(records)]
         else:
-            family = _family(model_or_class)
+            family = _family(model_or_class, depends)
+            if isinstance(family, DependentStructure):
+                family = begun(family.over(records), records, options, initial, max_evaluations)
             paths, noisy = quiet_where_better(family, records, options, initial)
             choice = decided(family, paths, options, initial, shares, max_evaluations)
             searched = [in_units_of_noise(each, seed) for each in choice.problems]
@@ -137,7 +150,8 @@ def identify(
                 fit = replace(fit, success=False, message=f"{stopped}, better parameters may exist; {fit.message}")
             if not any(doubts) and not is_partial and not needs_time(fit.model):
                 doubts = [swapped_for(first.family, records, options, initial, 1.0 - fit.fit_percent / 100.0)]
-            doubts.append(implausible(fit.models, records))
+            on_their_records = [on_record(each, record) for each, record in zip(fit.models, records, strict=True)]
+            doubts.append(implausible(on_their_records, records))
         warnings = (*fit.warnings, *filter(None, doubts))
         return replace(fit, warnings=warnings) if any(doubts) else fit
 
@@ -197,9 +211,11 @@ def _freedom(fixed: Mapping[str, float], free: Sequence[str], bounds: Mapping[st
     return Freedom(fixed, (free,) if isinstance(free, str) else tuple(free), bounds)
 
 
-def _family(model_or_class: Any) -> Identifiable:
+def _family(model_or_class: Any, depends: Mapping[str, tuple[str, int]] | None) -> Identifiable:
     """The object that declares the search; a class stands for the model with its defaults."""
     family: Any = model_or_class
+    if isinstance(family, Direct) and depends is not None:
+        raise TypeError(f"depends is for laws and sums of them, got {family!r}")
     if not isinstance(family, Identifiable):
         raise TypeError(f"identify takes a model, a model class or a structure, got {model_or_class!r}")
     belongs_to_the_class = inspect.ismethod(family.search_space)
@@ -211,7 +227,7 @@ def _family(model_or_class: Any) -> Identifiable:
                 "or use discover"
             )
         family = model_or_class()
-    return family  # type: ignore[no-any-return]
+    return family if depends is None else Dependent.structure(family, depends)
 
 
 def _density(noise: str, problem: Problem) -> Noise:

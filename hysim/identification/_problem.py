@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hysim._channels import taken
 from hysim._frozen import FloatArray
 from hysim._repeats import repeated_cycle
 from hysim.identification._budget import Budget
@@ -333,7 +334,13 @@ def _thinned(part: Part, samples: int) -> Part:
     record = part.record
     evenly = np.linspace(0, len(record) - 1, min(samples, len(record))).round().astype(np.intp)
     chosen = np.union1d(evenly, record.reversals(tolerance=_TURN))
-    short = Record(u=record.u[chosen], y=record.y[chosen], units=record.units, resolution=record.resolution)
+    short = Record(
+        u=record.u[chosen],
+        y=record.y[chosen],
+        units=record.units,
+        resolution=record.resolution,
+        channels=taken(record.channels, chosen),
+    )
     return replace(part, record=short, weights=None if part.weights is None else part.weights[chosen])
 
 

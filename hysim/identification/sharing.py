@@ -13,6 +13,8 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any, TypeVar
 
+import numpy as np
+
 from hysim._frozen import FloatArray
 from hysim._parallel import awaited
 from hysim.identification._problem import Problem
@@ -75,6 +77,7 @@ def _contents(problem: Problem) -> Hashable:
     for part in problem.parts:
         before = None if part.before is None else part.before.u
         arrays += [part.record.u, part.record.y, part.record.t, part.weights, before]
+        arrays += [np.asarray(values) for _, values in sorted(part.record.channels.items())]
     for values in arrays:
         digest.update(b"none" if values is None else repr(values.shape).encode() + values.tobytes())
     freedom = (space.coordinates, space.names, space.linear, space.screened)

@@ -373,6 +373,12 @@ def start(parameters: FloatArray, state: FloatArray, u0: float) -> None:
 
 
 @kernel
+def resume(parameters: FloatArray, before: FloatArray, state: FloatArray) -> None:
+    """Make a state ready for other parameters than those `before`: a new exponent needs new charts."""
+    prepare(parameters[0], parameters[1], parameters[2], parameters[3], before[3], state)
+
+
+@kernel
 def linear_step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """As `step` for n = 1, without a workspace."""
     z, du = state[1], u - state[0]

@@ -25,9 +25,11 @@ VECTOR = types.Array(float64, 1, "C")
 CONSTANTS = types.Array(float64, 1, "C", readonly=True)
 STEP = types.FunctionType(float64(CONSTANTS, VECTOR, float64))
 START = types.FunctionType(void(CONSTANTS, VECTOR, float64))
+RESUME = types.FunctionType(void(CONSTANTS, CONSTANTS, VECTOR))
 
 Step = Callable[[FloatArray, FloatArray, float], float]
 Start = Callable[[FloatArray, FloatArray, float], None]
+Resume = Callable[[FloatArray, FloatArray, FloatArray], None]
 
 
 @signed_kernel(int64(STEP, CONSTANTS, VECTOR, CONSTANTS, VECTOR))
@@ -62,6 +64,11 @@ def dashpot(parameters: FloatArray, state: FloatArray, u: float) -> float:
 def start(parameters: FloatArray, state: FloatArray, u0: float) -> None:
     """The last input is the first one: all that most laws need."""
     state[0] = u0
+
+
+@signed_kernel(RESUME.signature)
+def unchanged(parameters: FloatArray, before: FloatArray, state: FloatArray) -> None:
+    """Nothing: no place of the state depends on the parameters."""
 
 
 @signed_kernel(START.signature)

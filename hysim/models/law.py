@@ -92,6 +92,9 @@ class Law(Composable, ABC):
     exact_strokes : bool
         Whether one step along a monotone stroke leaves the memory of many, to rounding: a steady cycle is then sought
         at its turning points alone, from the memory after a stroke from the input zero.
+    resume : staticmethod, optional
+        A kernel ``resume(parameters, before, state)`` that makes a workspace ready for other parameters than those
+        `before`; by default it is made anew by the start.
     """
 
     step: ClassVar[Any]
@@ -104,6 +107,7 @@ class Law(Composable, ABC):
     stages: ClassVar[tuple[Stage, ...]] = ()
     workspace: ClassVar[int] = 0
     exact_strokes: ClassVar[bool] = False
+    resume: ClassVar[Any] = None
 
     # ------------------------------------------------------------------------------ what a family may say more
 
@@ -448,10 +452,16 @@ class Law(Composable, ABC):
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns in which the output is affine, and the rest of it, shape (n_sets, n_samples, n_columns + 1)."""
+        return self.columns_by(self.outputs, parameters, record.u)
+
+    def columns_by(
+        self, outputs: Callable[[Parameters, FloatArray], FloatArray], parameters: Parameters, u: FloatArray
+    ) -> FloatArray:
+        """As `regressors`, by a function from parameters and an input to outputs (n_sets, n_samples)."""
         zero = {**parameters, **dict.fromkeys(self.columns, 0.0)}
-        rest = self.outputs(zero, record.u)
+        rest = outputs(zero, u)
         with np.errstate(invalid="ignore"):
-            added = [self.outputs({**zero, name: 1.0}, record.u) - rest for name in self.columns]
+            added = [outputs({**zero, name: 1.0}, u) - rest for name in self.columns]
         return np.stack([*added, rest], axis=-1)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:

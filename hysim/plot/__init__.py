@@ -13,6 +13,7 @@ Nothing here changes matplotlib's settings outside its own calls.
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from hysim.plot._channels import parameter
 from hysim.plot._comparisons import comparison, identification, loops, residuals, widths
 from hysim.plot._files import FORMATS, save_svg, to_bytes, to_svg
 from hysim.plot._loops import animate, cycles, minor_loops, width
@@ -45,6 +46,7 @@ __all__ = [
     "minor_loops",
     "panels",
     "parallel_coordinates",
+    "parameter",
     "quantile_bands",
     "residual_map",
     "residuals",

@@ -33,6 +33,7 @@ class BoucWenStep(Law):
 
     step = staticmethod(kernels.step)
     start = staticmethod(kernels.start)
+    resume = staticmethod(kernels.resume)
     workspace: ClassVar[int] = N_WORK - 2
 
     @classmethod

@@ -149,8 +149,10 @@ class MemoryLaw(Law):
 
         return passed
 
-    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+    def columns_by(
+        self, outputs: Callable[[Parameters, FloatArray], FloatArray], parameters: Parameters, u: FloatArray
+    ) -> FloatArray:
         """Columns u, u^2, ..., z, 1, 0 of the output, shape (n_sets, n_samples, n_columns + 1)."""
-        z = self.outputs({**parameters, **self.memory_only}, record.u)
-        powers = [np.broadcast_to(record.u**k, z.shape) for k in range(1, len(self.coefficient_names) + 1)]
+        z = outputs({**parameters, **self.memory_only}, u)
+        powers = [np.broadcast_to(u**k, z.shape) for k in range(1, len(self.coefficient_names) + 1)]
         return np.stack([*powers, z, np.ones_like(z), np.zeros_like(z)], axis=-1)

@@ -3,6 +3,7 @@
 Sources: M. A. Krasnosel'skii and A. V. Pokrovskii, Systems with Hysteresis, 1989.
 """
 
+from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
@@ -12,7 +13,6 @@ from hysim.laws.operators._clamps import ClampLaw
 from hysim.models.model import family
 from hysim.models.parameters import Parameter
 from hysim.models.search_space import Parameters
-from hysim.records import Record
 
 
 class _Element(ClampLaw):
@@ -33,9 +33,11 @@ class _Element(ClampLaw):
     starts = tuple({"threshold": share, "z0": 0.0} for share in (0.1, 0.3, 0.6))
     screened = 256
 
-    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+    def columns_by(
+        self, outputs: Callable[[Parameters, FloatArray], FloatArray], parameters: Parameters, u: FloatArray
+    ) -> FloatArray:
         """Columns z (or u - z), 1 and 0 of the output, shape (n_sets, n_samples, 3)."""
-        element = self.outputs({**parameters, "gain": 1.0, "offset": 0.0}, record.u)
+        element = outputs({**parameters, "gain": 1.0, "offset": 0.0}, u)
         return np.stack([element, np.ones_like(element), np.zeros_like(element)], axis=-1)
 
 

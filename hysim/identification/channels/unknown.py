@@ -1,0 +1,165 @@
+"""The verb `estimate_channel`: the value of a channel on a record, by an identified law that depends on it.
+
+The law is what it was identified to be; only the channel, and the state at the first sample, are searched. The standard
+error is that of the noise of this record: the law's own uncertainty is not in it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from hysim._channels import value_in
+from hysim._frozen import FloatArray
+from hysim.identification._identify import identify
+from hysim.identification._result import Identification
+from hysim.models.channels.dependent import Dependent
+from hysim.models.parameters import Coordinate, space_of
+from hysim.models.protocols import Identifiable
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.records import Record
+
+_SCREENED = 64
+_STARTS = (0.25, 0.5, 0.75)  # of the channel's range
+
+
+def estimate_channel(
+    fit_or_model: Identification | Dependent,
+    record: Record,
+    channel: str,
+    *,
+    bounds: tuple[float, float] | None = None,
+    initial: str | None = None,
+    seed: int = 0,
+) -> Identification:
+    """Estimate one number, the constant value of a channel on a record, such as an unknown supply.
+
+    Parameters
+    ----------
+    fit_or_model : Identification or Dependent
+        A result of `hysim.identify` with `depends`, or its model.
+    record : Record
+        Input and output, and the other channels of the model, constant.
+    channel : str
+        The channel whose value is not known; a value in the record is ignored.
+    bounds : (float, float), optional
+        Lowest and highest value; by default the range in which the parameters were identified.
+    initial : str, optional
+        As in `hysim.identify`; by default the state at the first sample is identified too.
+    seed : int
+        As in `hysim.identify`.
+
+    Returns
+    -------
+    Identification
+        With the channel among `estimates`, `stderr` and `intervals`; its model is the ordinary law at this value. The
+        interval is for the noise of this record alone, as if the law were known exactly.
+
+    Raises
+    ------
+    TypeError
+        If the model does not depend on channels.
+    ValueError
+        If it does not depend on this one, or the record lacks another one.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> gain = hs.ChannelPolynomial(parameter="gain", channel="T", at=(20.0, 60.0), values=(2.0, 1.0))
+    >>> stack = hs.Dependent(law=hs.BoucWen(beta=2.0), polynomials=(gain,))
+    >>> u = hs.signals.triangle(-1.0, 1.0, cycles=1, samples_per_cycle=40)
+    >>> fit = hs.estimate_channel(stack, hs.Record(u=u, y=stack.at(T=42.5).response(u)), "T")
+    >>> round(fit.estimates["T"], 6)
+    42.5
+    """
+    model = fit_or_model.model if isinstance(fit_or_model, Identification) else fit_or_model
+    if not isinstance(model, Dependent):
+        raise TypeError(f"estimate_channel takes a law that depends on channels, got {type(model).__name__}")
+    if channel not in model.channels:
+        raise ValueError(f"the law depends on {', '.join(map(repr, model.channels))}, not on {channel!r}")
+    others = {}
+    for name in model.channels:
+        if name != channel:
+            others[name] = value_in(record.channels, name, "the record")
+            if np.ndim(others[name]):
+                raise ValueError(f"{name!r} varies along the record; one number can be estimated where it is constant")
+    low, high = model.channels[channel] if bounds is None else bounds
+    if not np.isfinite([low, high]).all() or not low < high:
+        raise ValueError(f"bounds of {channel!r} must be finite, (lower, upper) with lower < upper, got {(low, high)}")
+    space = model.law.search_space(record)
+    state = tuple(name for name in space.state if name in space.coordinates)
+    subject = _UnknownChannel(model, channel, others, (float(low), float(high)), space.columns, state)
+    fit = identify(subject, record, initial=initial, seed=seed)
+    doubt = model.extrapolation({channel: fit.estimates[channel]})
+    return replace(fit, warnings=(*fit.warnings, doubt)) if doubt else fit
+
+
+@dataclass(frozen=True)
+class _UnknownChannel(Identifiable):
+    """A law with one number to be found, the value of a channel, beside its state at the first sample."""
+
+    model: Dependent
+    channel: str
+    others: Mapping[str, float]
+    bounds: tuple[float, float]
+    columns: tuple[str, ...]  # in which the law's output is affine
+    state: tuple[str, ...]  # the law's numbers that are searched beside the channel
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """The channel's range, and the law's box of the state."""
+        law = self.model.law
+        fixed = {name: value for name, value in law.scalars.items() if name not in self.state}
+        own = law.search_space(record, replace(freedom, fixed=fixed))
+        low, high = self.bounds
+        place = Coordinate(self.channel, low, high, max(abs(low), abs(high)))
+        points = [{self.channel: low + share * (high - low)} for share in _STARTS]
+        alone = space_of([place], (), points[0], {}, {}, points)
+        starts = own.starts[:1] if own.coordinates else np.empty((1, 0))
+        held = {name: value for name, value in own.held.items() if name in self.state}
+        joint: SearchSpace = replace(
+            own,
+            held=held,
+            coordinates=(self.channel, *own.coordinates),
+            lower=np.append(alone.lower, own.lower),
+            upper=np.append(alone.upper, own.upper),
+            starts=np.concatenate([alone.starts, np.repeat(starts, len(alone.starts), axis=0)], axis=1),
+            names=(self.channel, *own.names),
+            columns=(),
+            linear=(),
+            parameters=lambda x: {
+                **{name: values for name, values in own.parameters(x[:, 1:]).items() if name in self.state},
+                **alone.parameters(x[:, :1]),
+            },
+            regions={},
+            drawn=None,
+            encoded=None,
+            screened=_SCREENED,
+        )
+        return joint
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """The output itself, shape (n_sets, n_samples, 1)."""
+        numbers = {**self.model.law.scalars, **self._numbers(parameters)}
+        columns = np.asarray(self.model.law.regressors(numbers, record))
+        output = columns[..., -1]
+        for k, name in enumerate(self.columns):
+            output = output + np.reshape(numbers[name], (-1, 1)) * columns[..., k]
+        return np.asarray(output)[..., np.newaxis]
+
+    def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
+        """The parameters with the law's state in the steady cycle."""
+        own = self._numbers(parameters)
+        state = self.model.law.steady({**self.model.law.scalars, **own}, record)
+        return {**parameters, **{name: state[name] for name in self.state}}
+
+    def _numbers(self, parameters: Parameters) -> dict[str, Any]:
+        """The law's numbers that are searched, and those that depend on channels, (n_sets,) each."""
+        values = dict(parameters)
+        channels: dict[str, Any] = {**self.others, self.channel: np.atleast_1d(values.pop(self.channel))}
+        return values | {each.parameter: each.value(channels[each.channel]) for each in self.model.polynomials}
+
+    def assemble(self, parameters: Mapping[str, float]) -> Any:
+        """The ordinary law at a value of the channel."""
+        law = self.model.constant({**self.others, self.channel: parameters[self.channel]})
+        return law.with_scalars({name: parameters[name] for name in self.state})

@@ -1,0 +1,1 @@
+"""Laws whose parameters change from sample to sample."""

@@ -1,0 +1,277 @@
+"""A law whose parameters are polynomials of channels, such as a temperature or a supply.
+
+At one value of each channel it is an ordinary law, `Dependent.at`. Along an input on which a channel varies the
+parameters change from sample to sample (`hysim.models.channels.varying`).
+"""
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._channels import Channels, checked_channels, steady, taken, value_in
+from hysim._frozen import FloatArray, read_only
+from hysim.models._parts import response_of
+from hysim.models.channels.polynomial import ChannelPolynomial
+from hysim.models.channels.structure import DependentStructure
+from hysim.models.channels.varying import response_along
+from hysim.models.model import family
+from hysim.models.protocols import Numbered, Responding, needs_time
+from hysim.records import Record
+
+_ROUNDING = 1e-9  # of a sample's number
+
+
+@family
+class Dependent:
+    """A law, some of whose parameters are polynomials of channels.
+
+    Parameters
+    ----------
+    law : model
+        A law, or a sum of laws and dashpots, with the other parameters; those that depend on a channel have any value
+        with which it is a law.
+    polynomials : tuple of ChannelPolynomial
+        One for each parameter that depends on a channel.
+
+    Raises
+    ------
+    TypeError
+        If the law has no named numbers and response.
+    ValueError
+        If a parameter is unknown or has two polynomials, or a value at a place makes no law.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> gain = hs.ChannelPolynomial(parameter="gain", channel="T", at=(20.0, 60.0), values=(2.0, 1.0))
+    >>> stack = hs.Dependent(law=hs.BoucWen(), polynomials=(gain,))
+    >>> stack.at(T=30.0).gain
+    1.75
+    >>> stack.response([0.0, 1.0, 0.5], channels={"T": [20.0, 30.0, 40.0]}).round(6).tolist()
+    [0.0, 1.106211, 0.198181]
+    """
+
+    law: Any
+    polynomials: tuple[ChannelPolynomial, ...]
+
+    def __post_init__(self) -> None:
+        law = self.law
+        if isinstance(law, type) or not isinstance(law, Numbered) or not isinstance(law, Responding):
+            raise TypeError(f"law must be a model with named numbers and a response, got {law!r}")
+        if not isinstance(self.polynomials, tuple | list):
+            raise TypeError(f"polynomials must be a tuple of ChannelPolynomial, got {self.polynomials!r}")
+        object.__setattr__(self, "polynomials", tuple(self.polynomials))
+        for each in self.polynomials:
+            if not isinstance(each, ChannelPolynomial):
+                raise TypeError(f"polynomials must hold ChannelPolynomial, got {each!r}")
+            if each.parameter not in law.scalars:
+                known = ", ".join(law.scalars)
+                raise ValueError(f"the law has no parameter {each.parameter!r}; its parameters are {known}")
+            for value in each.values:
+                law.with_scalars({each.parameter: value})
+        named = [each.parameter for each in self.polynomials]
+        if twice := [name for name in named if named.count(name) > 1]:
+            raise ValueError(f"{twice[0]!r} has two polynomials; it depends on one channel only")
+
+    @classmethod
+    def candidates(cls) -> dict[str, Any]:
+        """None for `hysim.compare`: what depends on which channel is the user's to say."""
+        return {}
+
+    @classmethod
+    def structure(cls, law: Any, depends: Mapping[str, tuple[str, int]]) -> DependentStructure:
+        """A law and what depends on which channel, for `hysim.select` and `hysim.compare`.
+
+        Parameters
+        ----------
+        law : model, class or structure
+            As `hysim.identify` takes it, which has the same by its argument `depends`.
+        depends : mapping
+            Parameter to (channel, degree).
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> u = hs.signals.triangle(-1.0, 1.0, cycles=1, samples_per_cycle=40)
+        >>> recs = [hs.Record(u=u, y=T * hs.Play(threshold=0.2).response(u), channels={"T": T}) for T in (1.0, 2.0)]
+        >>> fit = hs.identify(hs.Dependent.structure(hs.Play, {"gain": ("T", 1)}), recs)
+        >>> round(fit.model.at(T=1.5).gain, 6)
+        1.5
+        """
+        return DependentStructure(law=law() if isinstance(law, type) else law, depends=depends, model=cls)
+
+    @property
+    def dynamic(self) -> bool:
+        """Whether the law depends on time."""
+        return needs_time(self.law)
+
+    @property
+    def channels(self) -> dict[str, tuple[float, float]]:
+        """Channels by name, and the range in which all polynomials of each are known."""
+        ranges: dict[str, tuple[float, float]] = {}
+        for each in self.polynomials:
+            low, high = ranges.get(each.channel, (-np.inf, np.inf))
+            ranges[each.channel] = (max(low, each.span[0]), min(high, each.span[1]))
+        return ranges
+
+    @property
+    def scalars(self) -> dict[str, float]:
+        """The law's constant numbers, and the values of the polynomials, by name."""
+        dependent = {each.parameter for each in self.polynomials}
+        numbers = {name: value for name, value in self.law.scalars.items() if name not in dependent}
+        return numbers | {
+            name: value for each in self.polynomials for name, value in zip(each.names, each.values, strict=True)
+        }
+
+    def at(self, **channels: float) -> Any:
+        """The ordinary law at one value of each channel.
+
+        A value outside the identified range of a channel is an extrapolation, and warned of.
+
+        Parameters
+        ----------
+        **channels : float
+            Values of the channels by name.
+
+        Raises
+        ------
+        ValueError
+            If a channel is missing or unknown, or the polynomials there make no law.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> gain = hs.ChannelPolynomial(parameter="gain", channel="T", at=(20.0, 60.0), values=(2.0, 1.0))
+        >>> hs.Dependent(law=hs.Play(), polynomials=(gain,)).at(T=60.0)
+        Play(threshold=1.0, gain=1.0, offset=0.0, z0=0.0)
+        """
+        if unknown := set(channels) - set(self.channels):
+            raise ValueError(f"the law depends on {self._channels_in_words()}, got {sorted(unknown)[0]!r}")
+        for name, value in channels.items():
+            if np.ndim(value):
+                raise ValueError(f"{name} must be one number, got {np.size(value)}: use response(u, channels=...)")
+        values = checked_channels(channels, 0)
+        self._warn(values)
+        return self.constant(values)
+
+    def response(
+        self, u: npt.ArrayLike, sample_time: float | None = None, *, channels: Channels | None = None
+    ) -> FloatArray:
+        """Output at the samples of an input; `sample_time` [s] where the law depends on time.
+
+        Where a channel varies, each branch between two samples has the parameters of the sample at its end, and the
+        memory is kept from sample to sample.
+
+        Parameters
+        ----------
+        u : array, shape (n,)
+            Input [unit of u].
+        sample_time : float, optional
+            Time between two samples [s].
+        channels : mapping
+            Name of each channel to one number, or to values of shape (n,); further channels are ignored.
+
+        Returns
+        -------
+        array, shape (n,)
+            [unit of y].
+
+        Raises
+        ------
+        ValueError
+            If a channel is missing, not finite, or has another length, or the polynomials make no law there.
+        TypeError
+            If a channel varies and the parameters that depend on it cannot change from sample to sample.
+        """
+        inputs = read_only(u, "u", ndim=1)
+        given = checked_channels(channels or {}, inputs.size)
+        values = self._needed(given)
+        self._warn(values)
+        if not any(isinstance(value, np.ndarray) for value in values.values()):
+            return response_of(self.constant(values), inputs, sample_time)
+        return self._along(inputs, sample_time, values)
+
+    def on(self, record: Record) -> Any:
+        """The law with the channels of a record: an ordinary one where they are constant, else an `AlongRecord`.
+
+        Raises ValueError if the record has not all channels.
+        """
+        values = {name: value_in(record.channels, name, "the record") for name in self.channels}
+        if not any(isinstance(value, np.ndarray) for value in values.values()):
+            return self.at(**values)
+        return AlongRecord(self, record)
+
+    def constant(self, channels: Mapping[str, float]) -> Any:
+        """As `at`, without a warning; ValueError if a channel is missing."""
+        values = self._needed(channels)
+        numbers = {each.parameter: float(each.value(values[each.channel])) for each in self.polynomials}
+        return self.law.with_scalars(numbers)
+
+    def extrapolation(self, channels: Channels) -> str:
+        """A sentence where a value of some channels is outside the identified range; else the empty text."""
+        for each in self.polynomials:
+            if each.channel in channels and not each.is_known_at(channels[each.channel]):
+                (low, high), reached = each.span, np.ravel(channels[each.channel])
+                worst = float(reached.max() if reached.max() > high else reached.min())
+                return (
+                    f"{each.channel} = {worst:g} is outside the range {low:g} to {high:g} in which {each.parameter} "
+                    "was identified: the law is an extrapolation"
+                )
+        return ""
+
+    def _needed(self, channels: Channels) -> dict[str, Any]:
+        """The channels that matter; ValueError if one is missing."""
+        for name in self.channels:
+            if name not in channels:
+                raise ValueError(
+                    f"the law depends on the channel {name!r}: give response(u, channels={{{name!r}: ...}}), or take "
+                    f"the law at one value, at({name}=...)"
+                )
+        return {name: steady(channels[name]) for name in self.channels}
+
+    def _warn(self, channels: Channels) -> None:
+        if doubt := self.extrapolation(channels):
+            warnings.warn(doubt, stacklevel=3)
+
+    def _channels_in_words(self) -> str:
+        return ", ".join(map(repr, self.channels)) or "no channel"
+
+    def _along(self, u: FloatArray, sample_time: float | None, values: Mapping[str, Any]) -> FloatArray:
+        """Output where a channel varies."""
+        series = {each.parameter: each.value(values[each.channel]) for each in self.polynomials}
+        for name, each in series.items():
+            for value in (float(each.min()), float(each.max())):
+                self.law.with_scalars({name: value})  # which refuses what makes no law
+        constant = self.law.with_scalars({name: float(each) for name, each in series.items() if not each.ndim})
+        return response_along(constant, {name: each for name, each in series.items() if each.ndim}, u, sample_time)
+
+
+def on_record(model: Any, record: Record) -> Any:
+    """A model as it is on a record: of a `Dependent` the law at its channels."""
+    return model.on(record) if isinstance(model, Dependent) else model
+
+
+@dataclass(frozen=True)
+class AlongRecord:
+    """A law on the channels of a record, which vary along it.
+
+    Each branch of the record, also one that is cut into several here, has the parameters of the sample at its end.
+    """
+
+    model: Dependent
+    record: Record
+
+    @property
+    def dynamic(self) -> bool:
+        """Whether the law depends on time."""
+        return self.model.dynamic
+
+    def response(self, u: npt.ArrayLike, sample_time: float | None = None) -> FloatArray:
+        """Output at the samples of an input over the branches of the record, equally many for each."""
+        inputs = read_only(u, "u", ndim=1)
+        ends = np.ceil(np.linspace(0, len(self.record) - 1, inputs.size) - _ROUNDING).astype(np.intp)
+        return self.model.response(inputs, sample_time, channels=taken(self.record.channels, ends))

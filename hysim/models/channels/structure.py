@@ -1,0 +1,243 @@
+"""The search for a law whose parameters are polynomials of channels, on which `hysim.identify` calls.
+
+A parameter that is searched has one coordinate for each place of its polynomial (`hysim.models.channels.polynomial`),
+each in the box and on the scale that the family gives the parameter; what its box depends on otherwise has the mean of
+these coordinates. A polynomial whose values have one sign does not come nearer to zero between the places than a tenth
+of the smallest: a law needs some of its parameters positive. A parameter in which the output is affine remains so,
+
+    y = ... + p(T) c = ... + sum_k p_k l_k(T) c,
+
+and its values are solved for.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._channels import value_in
+from hysim._frozen import FloatArray, checked
+from hysim.models.channels.polynomial import ChannelPolynomial, names_of, places, weights
+from hysim.models.channels.space import expanded
+from hysim.models.channels.varying import check_memory_is_its_own, columns_along
+from hysim.models.protocols import Identifiable, Recorded, Staged, Undecided, Variant
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.stages import Simpler, Stage
+from hysim.records import Record
+
+Places = Mapping[str, tuple[float, ...]]
+"""Places of the polynomial by parameter."""
+
+_NEAR_ZERO = 0.1  # of the smallest value at a place
+_GRID = 33  # values of the channel at which a polynomial is looked at
+
+
+@checked
+class DependentStructure(Identifiable):
+    """A law to be identified, some of whose parameters depend on channels; see `hysim.Dependent.structure`."""
+
+    law: Any
+    depends: Mapping[str, tuple[str, int]]
+    model: type
+    spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # by parameter, once records are known
+    columns: tuple[str, ...] = ()
+    starts: tuple[Mapping[str, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        law, depends = self.law, self.depends
+        if not isinstance(law, Identifiable) or isinstance(law, type | Recorded):
+            raise TypeError(f"depends is for laws and sums of them, got {law!r}")
+        if not depends:
+            raise ValueError('depends names no parameter: give a mapping such as {"gain": ("T", 1)}')
+        for name, pair in depends.items():
+            if not isinstance(pair, tuple | list) or len(pair) != 2 or not isinstance(pair[0], str):
+                raise TypeError(f'depends must hold (channel, degree) such as ("T", 1), got {pair!r} for {name!r}')
+            if isinstance(pair[1], bool) or not isinstance(pair[1], int) or pair[1] < 0:
+                raise ValueError(f"the degree must be a whole number from 0 on, got {pair[1]!r} for {name!r}")
+
+    def over(self, records: Sequence[Record]) -> "DependentStructure":
+        """The structure for these records, whose channels say where the polynomials have their places.
+
+        Raises ValueError if a parameter or a channel is unknown, or a channel has fewer different values than a
+        polynomial has coefficients.
+        """
+        space = self.law.search_space(max(records, key=lambda record: float(np.ptp(record.u))))
+        spans = {}
+        for name, (channel, degree) in self.depends.items():
+            if name not in (known := (*space.names, *space.held)):
+                raise ValueError(f"depends names {name!r}; the parameters are {', '.join(known)}")
+            if name in space.state:
+                raise ValueError(f"{name!r} is the state at the first sample of a record, and depends on no channel")
+            owners = [f"record {k}" if len(records) > 1 else "the record" for k in range(len(records))]
+            values = [value_in(record.channels, channel, owner) for record, owner in zip(records, owners, strict=True)]
+            different = np.unique(np.concatenate([np.ravel(each) for each in values]))
+            if different.size <= degree:
+                raise ValueError(
+                    f"{name!r} of degree {degree} in {channel!r} needs {degree + 1} different values of the channel, "
+                    f"the records have {different.size}"
+                )
+            spans[name] = (float(different[0]), float(different[-1]))
+        structure = replace(self, spans=spans, columns=space.columns)
+        for record in records:
+            structure._check_may_vary(record)
+        return structure
+
+    def _check_may_vary(self, record: Record) -> None:
+        affine = [name for name in self.at if name in self.columns and self._channel(name, record).ndim]
+        check_memory_is_its_own(self.law, affine, record)
+
+    @cached_property
+    def at(self) -> Places:
+        """Places of the polynomials of degree 1 and more."""
+        return {name: places(*self.spans[name], degree) for name, (_, degree) in self.depends.items() if degree}
+
+    @cached_property
+    def names(self) -> Mapping[str, tuple[str, ...]]:
+        """Names of the values at the places, by parameter."""
+        return {name: names_of(name, self.depends[name][0], at) for name, at in self.at.items()}
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """The law's space with a coordinate, or a column, for each place of a polynomial."""
+        for name in self.at:
+            if name in freedom.fixed:
+                raise ValueError(f"{name!r} is fixed and depends on {self.depends[name][0]!r}")
+        space = self.law.search_space(record, freedom)
+        wished = replace(freedom, free=(*freedom.free, *(name for name in self.at if name in space.held)))
+        if jointly := [name for name in self.at if name not in {*space.coordinates, *space.columns, *wished.bounds}]:
+            wished = replace(wished, bounds={**wished.bounds, **dict.fromkeys(jointly, (-np.inf, np.inf))})
+        if wished != freedom:
+            space = self._wished_space(record, wished, jointly)
+        if missing := [name for name in self.at if name not in {*space.coordinates, *space.linear}]:
+            raise ValueError(
+                f"{missing[0]!r} is not searched by itself: give bounds={{{missing[0]!r}: (lower, upper)}}"
+            )
+        return expanded(space, self.names, self.starts)
+
+    def _wished_space(self, record: Record, freedom: Freedom, jointly: Sequence[str]) -> SearchSpace:
+        """The law's space with parameters that are not searched by themselves, or not at all, as coordinates."""
+        try:
+            space: SearchSpace = self.law.search_space(record, freedom)
+        except ValueError as error:
+            if not jointly:
+                raise
+            needed = f"bounds={{{jointly[0]!r}: (lower, upper)}}"
+            raise ValueError(f"{jointly[0]!r} is not searched by itself: give {needed} ({error})") from None
+        return space
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """The law's columns at the record's channels, one for each place where a parameter is affine."""
+        constant, varying, diverged = self._of_record(parameters, record)
+        columns = columns_along(self.law, constant, varying, record)
+        if diverged is not None and diverged.any():
+            columns = np.where(diverged[:, np.newaxis, np.newaxis], np.inf, columns)
+        blocks = []
+        for k, name in enumerate(self.columns):
+            block = columns[..., k, np.newaxis]
+            blocks.append(block * self._weights(name, record) if name in self.at else block)
+        return np.concatenate([*blocks, columns[..., -1:]], axis=-1)
+
+    def _of_record(
+        self, parameters: Parameters, record: Record
+    ) -> tuple[dict[str, Any], dict[str, FloatArray], npt.NDArray[np.bool_] | None]:
+        """The law's parameters on a record: constant ones, those along it, and which sets come too near to zero."""
+        of_places = {name for names in self.names.values() for name in names}
+        constant = {name: value for name, value in parameters.items() if name not in of_places}
+        varying: dict[str, FloatArray] = {}
+        diverged: npt.NDArray[np.bool_] | None = None
+        for name, at in self.at.items():
+            if name in self.columns:
+                continue
+            values = np.stack([np.atleast_1d(parameters[each]) for each in self.names[name]], axis=-1)
+            is_near = _comes_near_zero(at, values)
+            diverged = is_near if diverged is None else diverged | is_near
+            values = np.where(is_near[:, np.newaxis], values.mean(axis=1, keepdims=True), values)
+            along = values @ self._weights(name, record).T
+            if self._channel(name, record).ndim:
+                varying[name] = along
+            else:
+                constant[name] = along[:, 0]
+        return constant, varying, diverged
+
+    def _channel(self, name: str, record: Record) -> FloatArray:
+        return np.asarray(value_in(record.channels, self.depends[name][0], "the record"))
+
+    def _weights(self, name: str, record: Record) -> FloatArray:
+        """Weights of the places (n_samples, n_places), or (1, n_places) where the channel is constant."""
+        return np.atleast_2d(weights(self.at[name], self._channel(name, record)))
+
+    def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
+        """The parameters with the law's state in the steady cycle at the record's channels.
+
+        Raises ValueError if a channel varies along the record.
+        """
+        constant, varying, _ = self._of_record(parameters, record)
+        if varying:
+            raise ValueError(f'{next(iter(varying))} varies along the record, which has no steady cycle: use "free"')
+        state = self.law.steady(constant, record)
+        return {**parameters, **{name: value for name, value in state.items() if name not in self.at}}
+
+    def assemble(self, parameters: Mapping[str, float]) -> Any:
+        """The law with its polynomials."""
+        polynomials, rest = [], dict(parameters)
+        for name, (channel, _) in self.depends.items():
+            at = self.at.get(name, places(*self.spans[name], 0))
+            values = tuple(rest.pop(each) for each in names_of(name, channel, at))
+            polynomials.append(
+                ChannelPolynomial(parameter=name, channel=channel, at=at, values=values, span=self.spans[name])
+            )
+        middle = {each.parameter: float(each.value(np.mean(each.span))) for each in polynomials}
+        return self.model(law=self.law.assemble({**rest, **middle}), polynomials=tuple(polynomials))
+
+    def notes(self, record: Record, model: Any) -> tuple[str, ...]:
+        """Remarks on the law in the middle of the channels' ranges."""
+        return tuple(self.law.notes(record, model.law))
+
+    # ------------------------------------------------------------------------------ what the law says of its search
+
+    @property
+    def scalars(self) -> Mapping[str, float]:
+        """Every parameter of the law by name, as the search begins."""
+        return dict(self.law.scalars) if isinstance(self.law, Staged) else {}
+
+    @property
+    def stages(self) -> tuple[Stage, ...]:
+        """The law's stages, where nothing depends on a channel; else none."""
+        return self.law.stages if isinstance(self.law, Staged) and not self.at else ()
+
+    def simpler(self) -> Simpler | None:
+        """The law's simpler family, where nothing depends on a channel."""
+        return self.law.simpler() if isinstance(self.law, Staged) and not self.at else None
+
+    def rough(self) -> "DependentStructure":
+        """The structure of the law's rough law; itself where there is none."""
+        return self._with(self.law.rough()) if isinstance(self.law, Staged) else self
+
+    def close(self) -> "DependentStructure":
+        """The structure of the law's close law; itself where there is none."""
+        return self._with(self.law.close()) if isinstance(self.law, Staged) else self
+
+    def assumed_states(self, record: Record) -> tuple[str, ...]:
+        """Values of `initial` that the record decides."""
+        return self.law.assumed_states(record) if isinstance(self.law, Undecided) else ()
+
+    def variants(self) -> tuple[Variant, ...]:
+        """The law's choices."""
+        variants = self.law.variants() if isinstance(self.law, Undecided) else ()
+        return tuple(each._replace(family=self._with(each.family)) for each in variants)
+
+    def _with(self, law: Any) -> "DependentStructure":
+        return self if law is self.law else replace(self, law=law)
+
+
+def _comes_near_zero(at: tuple[float, ...], values: FloatArray) -> npt.NDArray[np.bool_]:
+    """Whether polynomials with `values` (n_sets, n_places) of one sign nearly reach zero between them, (n_sets,)."""
+    if len(at) < 3:
+        return np.zeros(len(values), dtype=bool)
+    between = values @ weights(at, np.linspace(at[0], at[-1], _GRID)).T
+    sign = np.sign(values[:, 0])
+    one_sign = (values * sign[:, np.newaxis] > 0.0).all(axis=1)
+    least = _NEAR_ZERO * np.abs(values).min(axis=1)
+    return np.asarray(one_sign & ((between * sign[:, np.newaxis]).min(axis=1) < least))
