@@ -35,6 +35,15 @@ def coefficients(n: int) -> Box:
     return {f"input_coefficients[{k}]": (-5.0, 5.0) for k in range(n)}
 
 
+RATES: Box = {"delta_nu": (1e-3, 1.0), "delta_eta": (1e-3, 1.0)} | coefficients(1)
+PINCH: Box = {"zeta_s": (0.01, 0.99), "q": (-0.5, 0.5), "p": (0.01, 10.0), "psi": (0.01, 2.0)}
+PLAYS_WITH_DENSITY: Box = (
+    {"exponent": (-0.9, 4.0), "decay": (0.01, 10.0), "weight": (-5.0, 5.0), "weight_slope": (-5.0, 5.0)}
+    | coefficients(3)
+    | OFFSET
+)
+
+
 def reaches(fit: hs.Identification, cost: float, least: float, n_parameters: int) -> bool:
     """Whether a default call's sum of squares is as good as another's with `n_parameters`: to 1 %, or by the BIC.
 
