@@ -50,7 +50,7 @@ from random_starts import (
 from results_folder import write_results
 
 RESULTS = Path(__file__).parent / "results" / "measured_records"
-LONGEST = 20.0  # seconds of the random starts of a case
+LONGEST = 10.0  # seconds of the random starts of a case
 SHORTEST = 0.5
 PLAYS = 10
 LIMITS: Box = {"n": (0.5, 10.0), "exponent": (-0.95, 4.0)}  # of hysim's searches: beyond is another problem

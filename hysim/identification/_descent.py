@@ -21,16 +21,16 @@ import numpy as np
 from hysim._frozen import FloatArray
 from hysim.identification._noise import Noise
 from hysim.identification._problem import Problem
-from hysim.identification.marquardt import Evaluated, Flags, Schedule, Sets, Trial, bounded_steps, descend
+from hysim.identification.marquardt import Evaluated, Flags, Sets, Trial, bounded_steps, descend
 
 N_STEPS = 60
 _TRIALS = 3  # sets that a step tries, for the budget
 _RESTORING = 12
 _ON_CONSTRAINT = 1e-11  # relative error of the constrained value
 _LARGEST = 1e150  # beyond it squares overflow
-_CHANGE = 1e-7  # largest relative change of the outputs by which slopes are taken: truncation and rounding stay small
-_CHANGE_OF_CLOSE = 1e3  # likewise in units of the accuracy of a law that stands for another
-_SCHEDULE = Schedule(success=0.3, failure=3.0)
+_STIFF = 1e-5  # relative change of the outputs by a difference, from which on a slope is taken by a shorter one
+_CHANGE = 1e-7  # likewise by the shorter one: truncation and rounding stay small
+_CHANGE_OF_CLOSE = 1e3  # likewise at least, in units of the accuracy of a law that stands for another
 
 
 class Constraint(NamedTuple):
@@ -86,9 +86,7 @@ class Descent:
         if (budget := self.problem.budget) is not None:
             steps = budget.steps(steps, len(theta) * (self.problem.n_x + _TRIALS), self.problem.y.size)
         bend = sets.bent if self.nearly is None and constraint is None else None
-        reached = descend(
-            sets, theta, tolerance=tolerance, steps=steps, hopeless=hopeless, schedule=_SCHEDULE, bend=bend
-        )
+        reached = descend(sets, theta, tolerance=tolerance, steps=steps, hopeless=hopeless, bend=bend)
         return Reached(reached.x, reached.loss, reached.evaluated[2][:, 0], reached.at_rest)
 
     def box(self) -> tuple[FloatArray, FloatArray]:
@@ -118,12 +116,12 @@ class Descent:
         return np.concatenate([by_x.transpose(0, 2, 1), columns], axis=2)
 
     def _stiff(self, changes: FloatArray, outputs: FloatArray) -> tuple[Flags, FloatArray]:
-        """Rows whose change is too large for a slope, and by which factors shorter steps change as much as allowed."""
-        allowed = max(_CHANGE, _CHANGE_OF_CLOSE * self.problem.accuracy)
+        """Rows whose change is too large for a slope, and the shares of their distances that are short enough."""
+        wanted = max(_CHANGE, _CHANGE_OF_CLOSE * self.problem.accuracy)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             sizes = np.linalg.norm(changes, axis=1) / np.linalg.norm(outputs, axis=1)
-        stiff = np.isfinite(sizes) & (sizes > allowed)
-        return stiff, allowed / sizes[stiff]
+        stiff = np.isfinite(sizes) & (sizes > max(_STIFF, wanted))
+        return stiff, wanted / sizes[stiff]
 
     def pivots(self, theta: FloatArray, constraint: Constraint) -> tuple[Sets, FloatArray]:
         """Element of theta that each constraint is solved for, and d theta_pivot / d theta_others on it."""

@@ -21,7 +21,7 @@ Sets = npt.NDArray[np.intp]
 _LEAST_DAMPING = 1e-9  # in norms of columns: keeps a number where it is that has no effect
 _LEAST_RIDGE = 1e-15  # likewise, in squared norms of columns
 _PASSES = 4
-_STRAIGHT = 10  # steps before any is bent: those that most descents need
+_STRAIGHT = 20  # steps before any is bent: those that most descents need
 _CENTRAL = 1e-6  # truncation and rounding of a central difference are both near 1e-10
 _ONE_SIDED = 1e-7  # those of a one-sided one near 1e-7, at half the cost
 
@@ -52,6 +52,9 @@ class Trial(NamedTuple):
     aim: FloatArray
     end: FloatArray
     evaluated: Evaluated
+
+
+_BENT = Schedule(success=0.3, failure=3.0)  # of steps that are bent: the damping stays near what the valley allows
 
 
 class Problem(Protocol):
@@ -119,6 +122,7 @@ def descend(
         aim = trial.copy()
         losses, evaluated_there = problem.evaluate(trial, sets)
         if bend is not None and steps - remaining > _STRAIGHT:
+            schedule = _BENT
             begin, straight = tuple(each[sets] for each in evaluated), Trial(aim, trial, evaluated_there)
             bent = bend(x[sets], sets, jacobian[sets], dampings, begin, straight)
             bent_losses, evaluated_bent = problem.evaluate(bent, sets)
