@@ -100,11 +100,13 @@ def descend(
 
     A set also ends where the remaining steps, each as good as the last one, would not bring it below `hopeless`. After
     the first steps, `bend` is called with points, sets, J, dampings, what was evaluated at the points, and the trials:
-    it returns other ends of the steps, and the better ones count.
+    it returns other ends of the steps, and the better ones count. From then on a set that no step lowers is not at
+    rest: its slopes are not good enough.
     """
     x, every, factors = x.copy(), np.arange(len(x)), np.array(schedule.factors)
     loss, evaluated = problem.evaluate(x, every)
     damping, is_stale = np.full(len(x), schedule.first), np.ones(len(x), dtype=bool)
+    stuck = np.zeros(len(x), dtype=bool)
     moving = every[np.isfinite(loss)]
     jacobian = goal = np.empty(0)
     for remaining in range(steps - 1, -1, -1):
@@ -141,8 +143,10 @@ def descend(
         lowered = np.clip(dampings[best] * schedule.success, schedule.least, schedule.most)
         damping[moving] = np.where(is_better, lowered, damping[moving] * schedule.failure)
         rests = (gained <= tolerance + relative * before) | (before - (1 + remaining) * gained > hopeless)
-        moving = moving[~(is_better & rests | (damping[moving] > schedule.most))]
-    return Reached(x, loss, evaluated, ~np.isin(every, moving))
+        is_stuck = damping[moving] > schedule.most
+        stuck[moving] = is_stuck & (schedule is _BENT)
+        moving = moving[~(is_better & rests | is_stuck)]
+    return Reached(x, loss, evaluated, ~(np.isin(every, moving) | stuck))
 
 
 def bounded_steps(
