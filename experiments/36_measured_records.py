@@ -14,7 +14,7 @@ that suit it. Sums of squares stand beside each other, of the same family:
 
 No truth is known. Whether a case is reached is judged as in experiment 35: no other method has less than 99 % of the
 default's sum of squares, or the default's law has fewer parameters and a BIC that is no higher. All seconds are those
-of the processor. Each case is stored as it is done, and `resume` goes on after those that are stored:
+of the processor. Each case is stored as it is done, and `resume` adds those that are not stored yet:
 
     python experiments/36_measured_records.py FOLDER [resume]
 """
@@ -169,10 +169,11 @@ def main(smoke: bool = False, folder: Path | None = None, resume: bool = False) 
         device, record, families = stand_in()
         return [case(device, record, families[0])]
     stored = RESULTS / "cases.jsonl"
-    rows: list[Row] = []
-    if resume and stored.exists():
-        rows = [json.loads(line) for line in stored.read_text(encoding="utf-8").splitlines()]
+    rows = stored_rows(stored) if resume else []
+    stored.unlink(missing_ok=True)
     RESULTS.mkdir(parents=True, exist_ok=True)
+    for row in rows:
+        append(stored, row)
     done = {(row["device"], row["record"], row["family"]) for row in rows}
     for device, record, families in measured(folder):
         for family in families:
@@ -181,14 +182,27 @@ def main(smoke: bool = False, folder: Path | None = None, resume: bool = False) 
             begin = time.process_time()
             rows.append({**case(device, record, family), "total_seconds": time.process_time() - begin})
             print(line_of(rows[-1]), flush=True)
-            with stored.open("w" if len(rows) == 1 else "a", encoding="utf-8") as file:
-                file.write(json.dumps(rows[-1]) + "\n")
+            append(stored, rows[-1])
     numbers = summary(rows)
     for name, value in numbers.items():
         print(name, value)
     write_results(RESULTS, rows, draw, numbers)
     stored.unlink()
     return rows
+
+
+def stored_rows(stored: Path) -> list[Row]:
+    """Cases of a run that was stopped, or else of the last one that ended."""
+    if stored.exists():
+        return [json.loads(line) for line in stored.read_text(encoding="utf-8").splitlines()]
+    result = RESULTS / "result.json"
+    return list(json.loads(result.read_text(encoding="utf-8"))["rows"]) if result.exists() else []
+
+
+def append(stored: Path, row: Row) -> None:
+    """Store one case."""
+    with stored.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(row) + "\n")
 
 
 def line_of(row: Row) -> str:
