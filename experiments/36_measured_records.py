@@ -14,9 +14,10 @@ that suit it. Sums of squares stand beside each other, of the same family:
 
 No truth is known. Whether a case is reached is judged as in experiment 35: no other method has less than 99 % of the
 default's sum of squares, or the default's law has fewer parameters and a BIC that is no higher. All seconds are those
-of the processor. Each case is stored as it is done, and `resume` adds those that are not stored yet:
+of the processor. Each case is stored as it is done, and `resume` adds those that are not stored yet;
+`report` writes the results of those that are:
 
-    python experiments/36_measured_records.py FOLDER [resume]
+    python experiments/36_measured_records.py FOLDER [resume | report]
 """
 
 import json
@@ -163,27 +164,29 @@ def case(device: str, record: hs.Record, family: str, seed: int = 0) -> Row:
     }
 
 
-def main(smoke: bool = False, folder: Path | None = None, resume: bool = False) -> list[Row]:
+def main(smoke: bool = False, folder: Path | None = None, resume: bool = False, only_report: bool = False) -> list[Row]:
     """Run all cases, store each as it is done, print, and write table, figure and result."""
     if smoke or folder is None:
         device, record, families = stand_in()
         return [case(device, record, families[0])]
     stored = RESULTS / "cases.jsonl"
-    rows = stored_rows(stored) if resume else []
+    rows = stored_rows(stored) if resume or only_report else []
     stored.unlink(missing_ok=True)
     RESULTS.mkdir(parents=True, exist_ok=True)
     for row in rows:
         append(stored, row)
     done = {(row["device"], row["record"], row["family"]) for row in rows}
-    for device, record, families in measured(folder):
-        for family in families:
-            if (device, record.name, family) in done:
-                continue
-            begin = time.process_time()
-            rows.append({**case(device, record, family), "total_seconds": time.process_time() - begin})
-            print(line_of(rows[-1]), flush=True)
-            append(stored, rows[-1])
-    numbers = summary(rows)
+    cases = [(device, record, family) for device, record, families in measured(folder) for family in families]
+    missing = [
+        (device, record, family) for device, record, family in cases if (device, record.name, family) not in done
+    ]
+    for device, record, family in () if only_report else missing:
+        begin = time.process_time()
+        rows.append({**case(device, record, family), "total_seconds": time.process_time() - begin})
+        print(line_of(rows[-1]), flush=True)
+        append(stored, rows[-1])
+    left_out = dict.fromkeys(f"{device} {record.name}" for device, record, _ in missing) if only_report else {}
+    numbers = {**summary(rows), "cases_left_out": len(cases) - len(rows), "records_left_out": list(left_out)}
     for name, value in numbers.items():
         print(name, value)
     write_results(RESULTS, rows, draw, numbers)
@@ -276,5 +279,5 @@ def draw(rows: list[Row]) -> Figure:
 
 if __name__ == "__main__":
     if len(sys.argv) < 2:
-        raise SystemExit("usage: python experiments/36_measured_records.py FOLDER [resume]")
-    main(folder=Path(sys.argv[1]), resume="resume" in sys.argv[2:])
+        raise SystemExit("usage: python experiments/36_measured_records.py FOLDER [resume | report]")
+    main(folder=Path(sys.argv[1]), resume="resume" in sys.argv[2:], only_report="report" in sys.argv[2:])

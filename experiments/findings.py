@@ -386,6 +386,11 @@ def measured_records(result: Result) -> list[str]:
     if lost := result["lost"]:
         named = [f"{each['record']} ({each['family']}, {number(each['over_best_known'])} times)" for each in lost]
         sentences.append(f"Lost: {listed(named)} the best sum of squares known.")
+    if result["cases_left_out"]:
+        sentences.append(
+            f"{count(result['cases_left_out'])} further cases are not run yet, among them slow ones: "
+            f"{listed(result['records_left_out'])}."
+        )
     return sentences
 
 
