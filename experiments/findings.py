@@ -381,11 +381,11 @@ def measured_records(result: Result) -> list[str]:
         f"{number(result['longest_scipy_seconds'])} s (which ended it in {percent(result['shortened_scipy_percent'])} "
         f"of cases), beats it by more in {percent(result['beaten_by_scipy_percent'])}.",
         f"It takes {result['median_seconds']:.2f} s of processor time in the median and {result['worst_seconds']:.0f} "
-        f"s at worst; {count(result['not_converged'])} of the searches say that they did not converge.",
+        f"s at worst; {count(result['not_converged'])} of the calls said that the search did not converge.",
     ]
     if lost := result["lost"]:
-        named = [f"{each['record']} ({each['family']}, {number(each['over_best_known'])} times)" for each in lost]
-        sentences.append(f"Lost: {listed(named)} the best sum of squares known.")
+        named = [f"{each['family']} on {each['record']} ({number(each['over_best_known'])} times)" for each in lost]
+        sentences.append(f"Lost, with the sum of squares over the best known: {listed(named)}.")
     if result["cases_left_out"]:
         sentences.append(
             f"{count(result['cases_left_out'])} further cases are not run yet, among them slow ones: "
