@@ -383,14 +383,17 @@ def measured_records(result: Result) -> list[str]:
         f"It takes {result['median_seconds']:.2f} s of processor time in the median and {result['worst_seconds']:.0f} "
         f"s at worst; {count(result['not_converged'])} of the calls said that the search did not converge.",
     ]
-    if lost := result["lost"]:
-        named = [f"{each['family']} on {each['record']} ({number(each['over_best_known'])} times)" for each in lost]
-        sentences.append(f"Lost, with the sum of squares over the best known: {listed(named)}.")
+    named = [
+        f"{each['family']} on {each['record']} ({number(each['over_best_known'])} times)" for each in result["lost"]
+    ]
+    remarks = [f"lost, with the sum of squares over the best known: {listed(named)}"] if named else []
     if result["cases_left_out"]:
-        sentences.append(
-            f"{count(result['cases_left_out'])} further cases are not run yet, among them slow ones: "
-            f"{listed(result['records_left_out'])}."
+        remarks.append(
+            f"{count(result['cases_left_out'])} further cases are not run yet, among them the slowest, on "
+            f"{listed(result['records_left_out'])}"
         )
+    if remarks:
+        sentences.append(f"Still open: {'; '.join(remarks)}.")
     return sentences
 
 
