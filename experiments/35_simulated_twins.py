@@ -37,6 +37,9 @@ from random_starts import (
     OFFSET,
     OUTPUT,
     PATIENCE,
+    PINCH,
+    PLAYS_WITH_DENSITY,
+    RATES,
     REACHED,
     Box,
     Peer,
@@ -182,10 +185,6 @@ def shape_memory(rng: np.random.Generator) -> Twin:
     return Twin(law, u, box | OFFSET, np.zeros(u.size), hs.Preisach.structure(intervals=INTERVALS))
 
 
-RATES: Box = {"delta_nu": (1e-3, 1.0), "delta_eta": (1e-3, 1.0)} | coefficients(1)
-PINCH: Box = {"zeta_s": (0.01, 0.99), "q": (-0.5, 0.5), "p": (0.01, 10.0), "psi": (0.01, 2.0)}
-
-
 def pinching_column(rng: np.random.Generator) -> Twin:
     """A column of concrete whose cycles grow: its law loses strength and stiffness, and pinches."""
     law = hs.BoucWenBaberNoori(
@@ -229,8 +228,7 @@ def magnet(rng: np.random.Generator) -> Twin:
         z0=(1.0, -1.0),
     )
     u = np.concatenate([np.linspace(-1.0, 1.0, 60), np.linspace(1.0, -1.0, 60)[1:], -stairs(200, 5, growing=False)])
-    box: Box = {"exponent": (-0.9, 4.0), "decay": (0.01, 10.0), "weight": (-5.0, 5.0), "weight_slope": (-5.0, 5.0)}
-    return Twin(law, u, box | coefficients(3) | OFFSET, np.zeros(u.size))
+    return Twin(law, u, PLAYS_WITH_DENSITY, np.zeros(u.size))
 
 
 DEVICES: dict[str, Callable[[np.random.Generator], Twin]] = {

@@ -7,6 +7,8 @@ Its seconds are those of the processor, so that other work on the machine takes 
 
 import contextlib
 import time
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,6 +37,15 @@ def coefficients(n: int) -> Box:
     return {f"input_coefficients[{k}]": (-5.0, 5.0) for k in range(n)}
 
 
+RATES: Box = {"delta_nu": (1e-3, 1.0), "delta_eta": (1e-3, 1.0)} | coefficients(1)
+PINCH: Box = {"zeta_s": (0.01, 0.99), "q": (-0.5, 0.5), "p": (0.01, 10.0), "psi": (0.01, 2.0)}
+PLAYS_WITH_DENSITY: Box = (
+    {"exponent": (-0.9, 4.0), "decay": (0.01, 10.0), "weight": (-5.0, 5.0), "weight_slope": (-5.0, 5.0)}
+    | coefficients(3)
+    | OFFSET
+)
+
+
 def reaches(fit: hs.Identification, cost: float, least: float, n_parameters: int) -> bool:
     """Whether a default call's sum of squares is as good as another's with `n_parameters`: to 1 %, or by the BIC.
 
@@ -53,17 +64,31 @@ class Descents(NamedTuple):
 
 
 class Peer(NamedTuple):
-    """A law that is fitted to a scaled record; parameters without a box stay as they are in `law`."""
+    """A law that is fitted to a scaled record; parameters without a box stay as they are in `law`.
+
+    A descent may leave the box of its start by the width of the box, but not the `limits`.
+    """
 
     law: Any
     box: Box
     u: FloatArray
     y: FloatArray
+    limits: Mapping[str, tuple[float, float]] = MappingProxyType({})
 
     @property
     def ends(self) -> FloatArray:
         """Both ends of the box, shape (2, n_parameters), by the logarithm where the lower is positive."""
         return np.array([np.log(pair) if pair[0] > 0.0 else pair for pair in self.box.values()]).T
+
+    @property
+    def outermost(self) -> FloatArray:
+        """Both limits of each parameter, shape (2, n_parameters), by the logarithm where the box is."""
+        pairs = [
+            self.limits.get(name, (0.0 if log else -np.inf, np.inf))
+            for name, log in zip(self.box, self.logs, strict=True)
+        ]
+        with np.errstate(divide="ignore"):
+            return np.array([np.log(pair) if log else pair for pair, log in zip(pairs, self.logs, strict=True)]).T
 
     @property
     def logs(self) -> npt.NDArray[np.bool_]:
@@ -118,7 +143,8 @@ class Peer(NamedTuple):
             best = min(best, float(np.sum(difference**2)))
             return np.asarray(difference)
 
-        wide = np.maximum(upper - lower, 1e-9)
+        wide, (lowest, highest) = np.maximum(upper - lower, 1e-9), self.outermost
+        bounds = np.maximum(np.minimum(lower, x - wide), lowest), np.minimum(np.maximum(upper, x + wide), highest)
         with contextlib.suppress(TimeoutError):
-            least_squares(residual, x, bounds=(np.minimum(lower, x - wide), np.maximum(upper, x + wide)), x_scale="jac")
+            least_squares(residual, np.clip(x, *bounds), bounds=bounds, x_scale="jac")
         return best

@@ -8,6 +8,7 @@ import hysim as hs
 from hysim.identification._descent import Constraint, Descent
 from hysim.identification._noise import Gaussian
 from hysim.identification._problem import problem
+from hysim.identification._search import polish
 from hysim.identification.marquardt import bounded_steps
 from hysim.models.search_space import Freedom
 
@@ -89,3 +90,18 @@ def test_sets_descend_together_as_each_does_alone(descent):
         alone = descent.run(theta[k : k + 1])
         assert together.theta[k] == pytest.approx(alone.theta[0], rel=1e-9)  # sums of a batch are rounded otherwise
         assert bool(together.at_rest[k]) == bool(alone.at_rest[0])
+
+
+def test_a_narrow_bent_valley_is_followed_to_its_end():
+    """A saturating loop is fitted by memories that nearly diverge: the curvatures of the cost differ by 1e9.
+
+    The start is where straight steps, with slopes over a millionth of the box, lower the cost by 2 % in 200 steps.
+    """
+    u = np.concatenate([np.linspace(1.0, -1.0, 64), np.linspace(-1.0, 1.0, 64)[1:]])
+    direction = np.sign(np.diff(u, prepend=2.0))
+    record = hs.Record(u=u, y=np.tanh((u - 0.2 * direction) / 0.3))
+    whole = problem(hs.BoucWen(), [record], Freedom({}, (), {}), None)
+    start = np.array([[2.348185, -2.371288, 0.636117, 0.17317]])
+    (end,) = polish(whole, start)
+    assert end.converged
+    assert end.cost < 0.02 * whole.costs(start)[0]

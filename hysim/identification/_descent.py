@@ -5,7 +5,10 @@ the loss in the model's output m, and the best sigma for the residuals at hand, 
 
     minimise  1/2 || W^(1/2) J d + W^(-1/2) g ||^2 + damping || D d ||^2
 
-(`hysim.identification.marquardt`; the loss is linear in no other way in b, whose part of the step is not damped). A
+(`hysim.identification.marquardt`; the loss is linear in no other way in b, whose part of the step is not damped). Laws
+that nearly forget a parameter, or nearly diverge, have sums of squares like narrow bent valleys, with curvatures that
+differ by 1e9: there steps are bent (M. K. Transtrum and J. P. Sethna, arXiv:1201.5885, 2012), and the slopes of stiff
+coordinates are taken over shorter distances. A
 constraint "this parameter has that value" is kept by eliminating one coordinate, the pivot, from the step, and by
 bringing the pivot back onto the constraint after it.
 """
@@ -18,13 +21,16 @@ import numpy as np
 from hysim._frozen import FloatArray
 from hysim.identification._noise import Noise
 from hysim.identification._problem import Problem
-from hysim.identification.marquardt import Flags, Sets, bounded_steps, descend
+from hysim.identification.marquardt import Evaluated, Flags, Sets, Trial, bounded_steps, descend
 
 N_STEPS = 60
 _TRIALS = 3  # sets that a step tries, for the budget
 _RESTORING = 12
 _ON_CONSTRAINT = 1e-11  # relative error of the constrained value
 _LARGEST = 1e150  # beyond it squares overflow
+_STIFF = 1e-5  # relative change of the outputs by a difference, from which on a slope is taken by a shorter one
+_CHANGE = 1e-7  # likewise by the shorter one: truncation and rounding stay small
+_CHANGE_OF_CLOSE = 1e3  # likewise at least, in units of the accuracy of a law that stands for another
 
 
 class Constraint(NamedTuple):
@@ -79,7 +85,8 @@ class Descent:
             theta = self.restored(theta, constraint, self.pivots(theta, constraint)[0])
         if (budget := self.problem.budget) is not None:
             steps = budget.steps(steps, len(theta) * (self.problem.n_x + _TRIALS), self.problem.y.size)
-        reached = descend(sets, theta, tolerance=tolerance, steps=steps, hopeless=hopeless)
+        bend = sets.bent if self.nearly is None and constraint is None else None
+        reached = descend(sets, theta, tolerance=tolerance, steps=steps, hopeless=hopeless, bend=bend)
         return Reached(reached.x, reached.loss, reached.evaluated[2][:, 0], reached.at_rest)
 
     def box(self) -> tuple[FloatArray, FloatArray]:
@@ -91,16 +98,30 @@ class Descent:
         n_sets, n_x = len(theta), self.problem.n_x
         if not n_x:
             return columns
-        ends, steps = self.problem.beside(theta[:, :n_x])
-        there = np.repeat(theta, n_x, axis=0)
-        there[:, :n_x] = ends.reshape(-1, n_x)
+        x = theta[:, :n_x]
+        ends, steps = self.problem.beside(x)
+        every: Sets = np.indices(steps.shape).reshape(2, -1)
         if self.nearly is not None:
-            outputs = self.nearly.model(theta)
-        displaced = (self.nearly or self.problem).model(there).reshape(n_sets, n_x, -1)
+            changes = _changes(self.nearly, theta, self.nearly.model(theta), ends, every)
+        else:
+            changes = _changes(self.problem, theta, outputs, ends, every)
+            stiff, shares = self._stiff(changes, outputs[every[0]])
+            places = every[:, stiff]
+            ends[tuple(places)] = x[places[0]] + shares[:, np.newaxis] * (ends[tuple(places)] - x[places[0]])
+            steps[tuple(places)] = ends[(*places, places[1])] - x[tuple(places)]
+            changes[stiff] = _changes(self.problem, theta, outputs, ends, places)
         with np.errstate(over="ignore", invalid="ignore"):
-            by_x = (displaced - outputs[:, np.newaxis]) / steps[..., np.newaxis]
+            by_x = changes.reshape(n_sets, n_x, -1) / steps[..., np.newaxis]
         by_x[~np.isfinite(by_x)] = 0.0
         return np.concatenate([by_x.transpose(0, 2, 1), columns], axis=2)
+
+    def _stiff(self, changes: FloatArray, outputs: FloatArray) -> tuple[Flags, FloatArray]:
+        """Rows whose change is too large for a slope, and the shares of their distances that are short enough."""
+        wanted = max(_CHANGE, _CHANGE_OF_CLOSE * self.problem.accuracy)
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            sizes = np.linalg.norm(changes, axis=1) / np.linalg.norm(outputs, axis=1)
+        stiff = np.isfinite(sizes) & (sizes > max(_STIFF, wanted))
+        return stiff, wanted / sizes[stiff]
 
     def pivots(self, theta: FloatArray, constraint: Constraint) -> tuple[Sets, FloatArray]:
         """Element of theta that each constraint is solved for, and d theta_pivot / d theta_others on it."""
@@ -167,12 +188,15 @@ class _Sets:
     def linearised(self, x: FloatArray, sets: Sets, evaluated: tuple[FloatArray, ...]) -> tuple[FloatArray, FloatArray]:
         outputs, columns, sigma = evaluated
         _, slope, curvature = self.descent.noise.terms(self.targets[sets] - outputs, sigma)
-        root = np.sqrt(self.weights[sets] * np.maximum(curvature, 1e-12 / sigma**2))
+        root = self._root(sets, curvature, sigma)
         goal = -self.weights[sets] * slope / np.where(root > 0.0, root, 1.0)
         slopes = self.descent.slopes(x, outputs, columns)
         if self.descent.amended is not None:
             slopes[:, :, : self.descent.problem.n_x] += self.descent.amended[sets]
         return root[..., np.newaxis] * slopes, goal
+
+    def _root(self, sets: Sets, curvature: FloatArray, sigma: FloatArray) -> FloatArray:
+        return np.asarray(np.sqrt(self.weights[sets] * np.maximum(curvature, 1e-12 / sigma**2)))
 
     def stepped(
         self, x: FloatArray, sets: Sets, jacobian: FloatArray, goal: FloatArray, damping: FloatArray
@@ -191,10 +215,38 @@ class _Sets:
         steps[rows, pivot] = np.sum(shares * steps, axis=1)
         return self.descent.restored(np.clip(x + steps, lower, upper), constraint, pivot)
 
+    def bent(
+        self, x: FloatArray, sets: Sets, jacobian: FloatArray, damping: FloatArray, begin: Evaluated, straight: Trial
+    ) -> FloatArray:
+        """Points (n_sets, n_x) at the ends of `straight` steps from `x` that are bent along the curvature of outputs.
+
+        The second derivative of the outputs along a step is known from its two ends.
+        """
+        (lower, upper), n_x = self.descent.box(), self.descent.problem.n_x
+        outputs, _, sigma = begin
+        ahead, columns, _ = straight.evaluated
+        curvature = self.descent.noise.terms(self.targets[sets] - outputs, sigma).curvature
+        with np.errstate(over="ignore", invalid="ignore"):
+            ahead = ahead + (columns @ (straight.aim - straight.end)[:, n_x:, np.newaxis])[..., 0]
+            beyond = self._root(sets, curvature, sigma) * (ahead - outputs)
+            beyond -= (jacobian @ (straight.aim - x)[..., np.newaxis])[..., 0]
+        beyond[~(np.abs(beyond) < _LARGEST).all(axis=1)] = 0.0
+        at_bound = (straight.aim == lower) | (straight.aim == upper)
+        room = (np.where(at_bound, 0.0, side - straight.aim) for side in (lower, upper))
+        return np.asarray(straight.aim + bounded_steps(jacobian, -beyond, damping, *room, n_damped=n_x))
+
     def _constraint(self, sets: Sets) -> Constraint | None:
         if self.constraint is None:
             return None
         return Constraint(self.constraint.place[sets], self.constraint.value[sets])
+
+
+def _changes(law: Problem, theta: FloatArray, outputs: FloatArray, ends: FloatArray, places: Sets) -> FloatArray:
+    """Changes (n, n_samples) of the `outputs` of sets where a coordinate moves to its end; `places` (2, n) are both."""
+    there = theta[places[0]]
+    there[:, : law.n_x] = ends[tuple(places)]
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.asarray(law.model(there) - outputs[places[0]])
 
 
 def named_slopes(problem: Problem, theta: FloatArray) -> FloatArray:

@@ -27,6 +27,7 @@ N_DESCENDING_BESIDE = 32  # on a record that is not short, where the optima of a
 N_STEPS = 40
 N_POLISHED = 8
 N_POLISHING = 200
+N_POLISHING_ALONE = 1000  # of the best optimum, where it is not at rest
 N_NESTED = 3  # optima of a simpler family that are starts
 N_STAGED = 3  # points of a stage that are polished
 N_POLISHED_WHOLE = 3  # optima of a thinned record that descend on all samples
@@ -216,7 +217,11 @@ def polish(problem: Problem, starts: FloatArray, to: int = FULLY) -> list[Optimu
     problem = problem.condensed()
     rough = problem.rough()
     if rough is problem or not len(starts):
-        return _optima(problem, _descended(problem, starts, exact=True))
+        reached = _descended(problem, starts, exact=True)
+        if len(starts) and not reached.at_rest[best := int(reached.loss.argmin())]:
+            alone = reached.theta[[best], : problem.n_x]
+            _replace(reached, [best], _descended(problem, alone, exact=True, steps=N_POLISHING_ALONE))
+        return _optima(problem, reached)
     gain, steps = (_GAIN, _BRIEF) if to == BRIEFLY else (_PASSED, _PASS)
 
     def ends(law: Problem, x: FloatArray) -> Reached:

@@ -21,6 +21,7 @@ Sets = npt.NDArray[np.intp]
 _LEAST_DAMPING = 1e-9  # in norms of columns: keeps a number where it is that has no effect
 _LEAST_RIDGE = 1e-15  # likewise, in squared norms of columns
 _PASSES = 4
+_STRAIGHT = 20  # steps before any is bent: those that most descents need
 _CENTRAL = 1e-6  # truncation and rounding of a central difference are both near 1e-10
 _ONE_SIDED = 1e-7  # those of a one-sided one near 1e-7, at half the cost
 
@@ -39,6 +40,21 @@ class Schedule:
     first: float = 1e-3
     least: float = 0.0
     most: float = 1e7
+
+
+Evaluated = tuple[FloatArray, ...]
+"""What was evaluated at points, arrays of n rows."""
+
+
+class Trial(NamedTuple):
+    """Points that were aimed at (n, n_x), the same as they were evaluated, and what was evaluated there."""
+
+    aim: FloatArray
+    end: FloatArray
+    evaluated: Evaluated
+
+
+_BENT = Schedule(success=0.3, failure=3.0)  # of steps that are bent: the damping stays near what the valley allows
 
 
 class Problem(Protocol):
@@ -78,14 +94,19 @@ def descend(
     relative: float = 0.0,
     hopeless: float = np.inf,
     schedule: Schedule = Schedule(),
+    bend: Callable[[FloatArray, Sets, FloatArray, FloatArray, Evaluated, Trial], FloatArray] | None = None,
 ) -> Reached:
     """Descend from `x` (n_sets, n_x) until a step lowers the loss by at most `tolerance` + `relative` times the loss.
 
-    A set also ends where the remaining steps, each as good as the last one, would not bring it below `hopeless`.
+    A set also ends where the remaining steps, each as good as the last one, would not bring it below `hopeless`. After
+    the first steps, `bend` is called with points, sets, J, dampings, what was evaluated at the points, and the trials:
+    it returns other ends of the steps, and the better ones count. From then on a set that no step lowers is not at
+    rest: its slopes are not good enough.
     """
     x, every, factors = x.copy(), np.arange(len(x)), np.array(schedule.factors)
     loss, evaluated = problem.evaluate(x, every)
     damping, is_stale = np.full(len(x), schedule.first), np.ones(len(x), dtype=bool)
+    stuck = np.zeros(len(x), dtype=bool)
     moving = every[np.isfinite(loss)]
     jacobian = goal = np.empty(0)
     for remaining in range(steps - 1, -1, -1):
@@ -100,7 +121,18 @@ def descend(
         sets = np.repeat(moving, factors.size)
         dampings = np.outer(damping[moving], factors).ravel()
         trial = problem.stepped(x[sets], sets, jacobian[sets], goal[sets], dampings)
+        aim = trial.copy()
         losses, evaluated_there = problem.evaluate(trial, sets)
+        if bend is not None and steps - remaining > _STRAIGHT:
+            schedule = _BENT
+            begin, straight = tuple(each[sets] for each in evaluated), Trial(aim, trial, evaluated_there)
+            bent = bend(x[sets], sets, jacobian[sets], dampings, begin, straight)
+            bent_losses, evaluated_bent = problem.evaluate(bent, sets)
+            is_lower = bent_losses < losses
+            for values, others in zip(
+                (trial, losses, *evaluated_there), (bent, bent_losses, *evaluated_bent), strict=True
+            ):
+                values[is_lower] = others[is_lower]
         best = losses.reshape(-1, factors.size).argmin(axis=1) + factors.size * np.arange(moving.size)
         before, gained = loss[moving], loss[moving] - losses[best]
         is_better = losses[best] < before
@@ -111,8 +143,10 @@ def descend(
         lowered = np.clip(dampings[best] * schedule.success, schedule.least, schedule.most)
         damping[moving] = np.where(is_better, lowered, damping[moving] * schedule.failure)
         rests = (gained <= tolerance + relative * before) | (before - (1 + remaining) * gained > hopeless)
-        moving = moving[~(is_better & rests | (damping[moving] > schedule.most))]
-    return Reached(x, loss, evaluated, ~np.isin(every, moving))
+        is_stuck = damping[moving] > schedule.most
+        stuck[moving] = is_stuck & (schedule is _BENT)
+        moving = moving[~(is_better & rests | is_stuck)]
+    return Reached(x, loss, evaluated, ~(np.isin(every, moving) | stuck))
 
 
 def bounded_steps(

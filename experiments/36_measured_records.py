@@ -1,0 +1,283 @@
+"""Does a default call of `identify` find the optimum on records that were measured?
+
+The records are public, and are not part of hysim: a mirror on piezo stacks, a magnetorheological damper, loops of
+magnets, and steel coupons under cyclic strain, in a folder that the command names. Each is identified by the families
+that suit it. Sums of squares stand beside each other, of the same family:
+
+- the default call's,
+- that of a second call with another seed, on the record in other units,
+- that of `scipy.optimize.least_squares` from the end of this second call, the best start that is known,
+- the best of `scipy.optimize.least_squares` from 20 random starts in a box, as long as ten times the time that the
+  default call took, and at most `LONGEST` seconds. The record is scaled for it, the state before the record and the
+  thresholds that the second call decided are told to it, and the law that it calls is hysim's own, compiled and exact.
+  It has hysim's bounds of exponents.
+
+No truth is known. Whether a case is reached is judged as in experiment 35: no other method has less than 99 % of the
+default's sum of squares, or the default's law has fewer parameters and a BIC that is no higher. All seconds are those
+of the processor. Each case is stored as it is done, and `resume` adds those that are not stored yet;
+`report` writes the results of those that are:
+
+    python experiments/36_measured_records.py FOLDER [resume | report]
+"""
+
+import json
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import hysim as hs
+from hysim.plot import Figure, figure
+
+sys.path.insert(0, str(Path(__file__).parent))
+from random_starts import (
+    COLEMAN_HODGDON,
+    DAHL,
+    MEMORY,
+    OUTPUT,
+    PATIENCE,
+    PINCH,
+    PLAYS_WITH_DENSITY,
+    RATES,
+    REACHED,
+    Box,
+    Peer,
+    coefficients,
+    reaches,
+)
+from results_folder import write_results
+
+RESULTS = Path(__file__).parent / "results" / "measured_records"
+LONGEST = 10.0  # seconds of the random starts of a case
+SHORTEST = 0.5
+PLAYS = 10
+LIMITS: Box = {"n": (0.5, 10.0), "exponent": (-0.95, 4.0)}  # of hysim's searches: beyond is another problem
+WIDE: Box = MEMORY | OUTPUT | {"gain": (-20.0, 20.0), "feedthrough": (-5.0, 5.0)} | coefficients(5)
+FAMILIES: dict[str, tuple[Any, Box]] = {
+    "Bouc-Wen": (hs.BoucWen, WIDE),
+    "polynomial Bouc-Wen": (hs.PolynomialBoucWen, WIDE),
+    "Zhu-Wang": (hs.ZhuWangBoucWen, WIDE | {"delta": (-2.0, 2.0)}),
+    "generalised Bouc-Wen": (hs.GeneralizedBoucWen, WIDE | {f"b{k}": (-0.5, 0.5) for k in range(2, 7)}),
+    "Baber-Noori": (hs.BoucWenBaberNoori, WIDE | RATES | PINCH),
+    "Dahl": (hs.Dahl, DAHL | {"feedthrough": (-5.0, 5.0)}),
+    "Coleman-Hodgdon": (hs.ColemanHodgdon, COLEMAN_HODGDON),
+    "parametric plays": (hs.ParametricPrandtlIshlinskii, PLAYS_WITH_DENSITY),
+    "ten plays": (
+        hs.PrandtlIshlinskii.structure(plays=PLAYS),
+        {f"weights[{k}]": (-5.0, 5.0) for k in range(PLAYS)} | {"offset": (-3.0, 3.0)},
+    ),
+}
+MAGNET = ("Bouc-Wen", "Coleman-Hodgdon", "parametric plays", "ten plays")
+DAMPER = ("Bouc-Wen", "polynomial Bouc-Wen", "Dahl", "ten plays")
+STEEL = ("Bouc-Wen", "generalised Bouc-Wen", "Zhu-Wang", "Baber-Noori")
+MIRROR = ("Bouc-Wen", "Zhu-Wang", "ten plays")
+
+Row = dict[str, Any]
+
+
+class Measured(NamedTuple):
+    """A record and the families by which it is identified."""
+
+    device: str
+    record: hs.Record
+    families: tuple[str, ...]
+
+
+def measured(folder: Path) -> Iterator[Measured]:
+    """The records of a folder, those of few samples first."""
+    for material, amplitudes in (("MnZn_ferrite", 3), ("M130_27s", 3), ("amorf", 1)):
+        for k in range(amplitudes):
+            place = f"[{k}]" if amplitudes > 1 else ""
+            field, flux = (
+                _column(folder / "magnetic_jamodel" / f"{x}_{material}.mat", f"{x}measT{place}") for x in "HB"
+            )
+            yield Measured("magnet", hs.Record(u=field, y=flux, name=f"{material} {k + 1}"), MAGNET)
+    for k in (1, 2, 3):
+        path = folder / "steel_resspylab" / f"example_{k}.csv"
+        record = hs.load(path, u="e_true", y="Sigma_true", name=f"coupon {k}")
+        yield Measured("steel", record, STEEL)
+    for k in (1, 2, 4):
+        path = folder / "mr_damper_labcontrol" / f"data_simulation_4.{k}_MRdamper.mat"
+        motion, velocity, force = (_column(path, f"x_F[{place}]") for place in range(3))
+        yield Measured("damper", hs.Record(u=motion, y=force, name=f"4.{k} over displacement"), DAMPER)
+        yield Measured("damper", hs.Record(u=velocity, y=force, name=f"4.{k} over velocity"), ("Bouc-Wen",))
+    for level in (100, 300):
+        path, place = folder / "fsm_cubespec" / "fsm_subset.npz", f"{level}mV_train[0,0,0]"
+        record = hs.load(path, u=f"u_{place}", y=f"y_{place}", t=False, name=f"{level} mV")
+        yield Measured("mirror", record, MIRROR)
+
+
+def _column(path: Path, name: str) -> Any:
+    return hs.load(path, u=name, y=name, t=False).u
+
+
+def stand_in() -> Measured:
+    """A simulated record in place of measured ones."""
+    u = hs.signals.triangle(-3.0, 3.0, cycles=2, samples_per_cycle=60)
+    y = 5.0 * hs.Dahl(stiffness=4.0, coulomb=1.5).response(u) + 0.1 * np.sin(40.0 * u)
+    return Measured("stand-in", hs.Record(u=u, y=y, name="triangle"), ("Dahl",))
+
+
+def case(device: str, record: hs.Record, family: str, seed: int = 0) -> Row:
+    """One record and family: sums of squares over each other, and seconds of the processor."""
+    subject, ranges = FAMILIES[family]
+    few = slice(None, None, max(1, len(record) // 60))
+    hs.identify(subject, hs.Record(u=record.u[few], y=record.y[few]))  # which compiles what the clock is not for
+    begin = time.process_time()
+    fit = hs.identify(subject, record)
+    seconds = time.process_time() - begin
+    unit = float(np.abs(record.y).max())
+    cost = float(np.sum((fit.residual / unit) ** 2))
+
+    scaled = hs.Record(u=record.u / np.abs(record.u).max(), y=record.y / unit)
+    again = hs.identify(subject, scaled, seed=seed + 1)
+    box = {name: pair for name, pair in ranges.items() if name in again.model.scalars}
+    patience = max(SHORTEST, PATIENCE * seconds)
+    peer = Peer(again.model, box, scaled.u, scaled.y, LIMITS)
+    second = float(np.sum(again.residual**2))
+    start = min(second, peer.from_law(min(patience, LONGEST)))
+    scipy = peer.from_random_starts(np.random.default_rng(seed), min(patience, LONGEST))
+    least = min(start, scipy.cost)
+    return {
+        "device": device,
+        "record": record.name,
+        "family": family,
+        "samples": len(record),
+        "parameters": len(box),
+        "kept": fit.n_parameters,
+        "seconds": seconds,
+        "error_percent": 100.0 - fit.fit_percent,
+        "success": fit.success,
+        "at_bound": "search bound" in fit.message,
+        "over_best_known": cost / min(cost, least),
+        "over_second_call": cost / second,
+        "over_best_start": cost / start,
+        "over_scipy": cost / scipy.cost if np.isfinite(scipy.cost) else None,
+        "scipy_starts": scipy.n,
+        "scipy_seconds": scipy.seconds,
+        "scipy_is_shortened": patience > LONGEST and scipy.seconds >= LONGEST,
+        "reached": reaches(fit, cost, least, len(box)),
+        "beaten_by_scipy": not reaches(fit, cost, scipy.cost, len(box)),
+    }
+
+
+def main(smoke: bool = False, folder: Path | None = None, resume: bool = False, only_report: bool = False) -> list[Row]:
+    """Run all cases, store each as it is done, print, and write table, figure and result."""
+    if smoke or folder is None:
+        device, record, families = stand_in()
+        return [case(device, record, families[0])]
+    stored = RESULTS / "cases.jsonl"
+    rows = stored_rows(stored) if resume or only_report else []
+    stored.unlink(missing_ok=True)
+    RESULTS.mkdir(parents=True, exist_ok=True)
+    for row in rows:
+        append(stored, row)
+    done = {(row["device"], row["record"], row["family"]) for row in rows}
+    cases = [(device, record, family) for device, record, families in measured(folder) for family in families]
+    missing = [
+        (device, record, family) for device, record, family in cases if (device, record.name, family) not in done
+    ]
+    for device, record, family in () if only_report else missing:
+        begin = time.process_time()
+        rows.append({**case(device, record, family), "total_seconds": time.process_time() - begin})
+        print(line_of(rows[-1]), flush=True)
+        append(stored, rows[-1])
+    left_out = dict.fromkeys(f"{device} {record.name}" for device, record, _ in missing) if only_report else {}
+    numbers = {**summary(rows), "cases_left_out": len(cases) - len(rows), "records_left_out": list(left_out)}
+    for name, value in numbers.items():
+        print(name, value)
+    write_results(RESULTS, rows, draw, numbers)
+    stored.unlink()
+    return rows
+
+
+def stored_rows(stored: Path) -> list[Row]:
+    """Cases of a run that was stopped, or else of the last one that ended."""
+    if stored.exists():
+        return [json.loads(line) for line in stored.read_text(encoding="utf-8").splitlines()]
+    result = RESULTS / "result.json"
+    return list(json.loads(result.read_text(encoding="utf-8"))["rows"]) if result.exists() else []
+
+
+def append(stored: Path, row: Row) -> None:
+    """Store one case."""
+    with stored.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(row) + "\n")
+
+
+def line_of(row: Row) -> str:
+    """A case as it is printed."""
+    scipy = "-" if row["over_scipy"] is None else f"{row['over_scipy']:.4f}"
+    return (
+        f"{row['device']:<7} {row['record']:<22} {row['family']:<20} {row['seconds']:6.2f} s "
+        f"{row['error_percent']:8.4f} %  over best known {row['over_best_known']:.6f}, over SciPy {scipy} "
+        f"({row['scipy_starts']} starts){'' if row['reached'] else ', NOT reached'}"
+    )
+
+
+def summary(rows: list[Row]) -> dict[str, Any]:
+    """The numbers that are quoted."""
+    return {
+        "cases": len(rows),
+        "records": len({(row["device"], row["record"]) for row in rows}),
+        "reached_percent": _share(rows, "reached"),
+        "beaten_by_scipy_percent": _share(rows, "beaten_by_scipy"),
+        "shortened_scipy_percent": _share(rows, "scipy_is_shortened"),
+        "longest_scipy_seconds": LONGEST,
+        "not_converged": sum(not row["success"] for row in rows),
+        "worst_over_best_known": max(row["over_best_known"] for row in rows),
+        "total_seconds": sum(row["total_seconds"] for row in rows),
+        **_seconds(rows),
+        "lost": [
+            {name: row[name] for name in ("device", "record", "family", "over_best_known", "over_scipy", "at_bound")}
+            for row in rows
+            if not row["reached"]
+        ],
+        "families": {
+            family: {
+                "cases": len(own),
+                "reached_percent": _share(own, "reached"),
+                "worst_over_best_known": max(row["over_best_known"] for row in own),
+                **_seconds(own),
+            }
+            for family in FAMILIES
+            if (own := [row for row in rows if row["family"] == family])
+        },
+    }
+
+
+def _share(rows: list[Row], name: str) -> float:
+    return 100.0 * float(np.mean([row[name] for row in rows]))
+
+
+def _seconds(rows: list[Row]) -> dict[str, float]:
+    seconds = [row["seconds"] for row in rows]
+    return {"median_seconds": float(np.median(seconds)), "worst_seconds": max(seconds)}
+
+
+def draw(rows: list[Row]) -> Figure:
+    """Cost over the best known, and seconds, by family."""
+    canvas = figure(height=5.6)
+    names = [family for family in FAMILIES if any(row["family"] == family for row in rows)]
+    above, below = canvas.subplots(2, 1, sharex=True)
+    for x, name in enumerate(names):
+        own = [row for row in rows if row["family"] == name]
+        for k, row in enumerate(own):
+            place = x + 0.6 * ((k + 0.5) / len(own) - 0.5)
+            mark = {"marker": "o", "markersize": 3.5, "color": "#0072B2" if row["reached"] else "#D55E00"}
+            above.plot(place, max(row["over_best_known"] - 1.0, 1e-12), **mark)
+            below.plot(place, row["seconds"], **mark)
+    above.axhline(REACHED - 1.0, color="#999999", linewidth=0.8)
+    above.set(yscale="log", ylabel="Sum of squares over\nthe best known, less 1")
+    below.set(yscale="log", ylabel="Default call [CPU s]")
+    below.set_xticks(range(len(names)), names, rotation=20, ha="right")
+    return canvas
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 2:
+        raise SystemExit("usage: python experiments/36_measured_records.py FOLDER [resume | report]")
+    main(folder=Path(sys.argv[1]), resume="resume" in sys.argv[2:], only_report="report" in sys.argv[2:])
