@@ -122,8 +122,9 @@ def reversible(low: float, high: float, target: float, of_x: float, of_m: float,
         trial = x + error / rise if rise > 0.0 else math.nan
         if not low <= trial <= high or (i % 8 == 7 and high < math.inf):
             trial = 0.5 * (low + high) if high < math.inf else 2.0 * abs(x) + 1.0
-        if abs(trial - x) <= 2.0 * _EPSILON * abs(x) or abs(error) <= _EPSILON * abs(of_m * m):
-            return trial
+        noise = 2.0 * _EPSILON * (abs(of_x * x) + abs(of_m * m) + abs(target))
+        if abs(trial - x) <= 2.0 * _EPSILON * abs(x) or abs(error) <= noise:
+            return x + error / rise if rise > 0.0 else x
         x = trial
     return x
 
