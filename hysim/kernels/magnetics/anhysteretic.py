@@ -116,7 +116,7 @@ def field_of(m: float, p: float) -> float:
         trial = x + (wanted - value) / slope if slope > 0.0 else math.nan
         if not low <= trial <= high:
             trial = 0.5 * (low + high) if high < math.inf else 2.0 * x
-        if abs(trial - x) <= 4.0e-16 * x or abs(wanted - value) <= 1.2e-16:
+        if abs(trial - x) <= 4.0e-16 * x or abs(wanted - value) <= 1.2e-16 * wanted:
             break
         x = trial
     return math.copysign(x, m)

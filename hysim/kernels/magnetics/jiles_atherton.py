@@ -41,6 +41,7 @@ FIELD, SATURATION, COUPLING, PINNING, REVERSIBLE, FEEDBACK, ANISOTROPY, GAIN, FE
 
 _EPSILON = 2.0**-52
 _CLOSE = 1e-8  # of the shorter of a and k: from here on Newton's next place is the last one
+_NEARLY = 1e-5  # likewise of the stroke
 _ROUNDINGS = 8.0  # of the target: no closer can the root be known
 _MAX_NEWTON = 100
 _MAX_PIECES = 20_000
@@ -113,16 +114,17 @@ def reversible(low: float, high: float, target: float, of_x: float, of_m: float,
     x = low
     if high < math.inf and of_x > 0.0:
         x = min(max(target / of_x, low), high)
-    for _ in range(_MAX_NEWTON):
+    for i in range(_MAX_NEWTON):
         m, slope = curve(x, p)
         error = target - of_x * x - of_m * m
         low, high = (x, high) if error > 0.0 else (low, x)
         rise = of_x + of_m * slope
         trial = x + error / rise if rise > 0.0 else math.nan
-        if not low <= trial <= high:
+        if not low <= trial <= high or (i % 8 == 7 and high < math.inf):
             trial = 0.5 * (low + high) if high < math.inf else 2.0 * abs(x) + 1.0
-        if abs(trial - x) <= 2.0 * _EPSILON * abs(x) or abs(error) <= _EPSILON * abs(of_m * m):
-            return trial
+        noise = 2.0 * _EPSILON * (abs(of_x * x) + abs(of_m * m) + abs(target))
+        if abs(trial - x) <= 2.0 * _EPSILON * abs(x) or abs(error) <= noise:
+            return x + error / rise if rise > 0.0 else x
         x = trial
     return x
 
@@ -206,8 +208,11 @@ def solve(
     rise = of_x + of_m * slope + of_z * (m - z) / kappa
     error = target - of_x * x - of_m * m - of_z * z
     trial = predicted(x, (m - z) / kappa, error, rise, slope, of_x, of_m, of_z, parameters)
-    for _ in range(_MAX_NEWTON):
-        if not low < trial < high:
+    if not error > 0.0 or trial == x:  # nothing that could be told from a rounding
+        return x, z, m
+    start = x
+    for i in range(_MAX_NEWTON):
+        if not low < trial < high or (i % 3 == 2 and high < math.inf):  # else it might go from side to side
             trial = 0.5 * (low + high) if high < math.inf else low + 2.0 * (x - low) + kappa
         moved = trial - x
         if abs(moved) <= min(_FEW_DECAY * kappa, 2.0 * _FEW_REACH):
@@ -219,9 +224,10 @@ def solve(
         steepness = (m - z) / kappa
         error = target - of_x * x - of_m * m - of_z * z
         rise = of_x + of_m * slope + of_z * steepness
-        terms = abs(of_x * x) + abs(of_m) + abs(of_z)
+        terms = abs(of_x * x) + abs(of_m * m) + abs(of_z * z)
         left = error / rise if rise > 0.0 else math.nan
-        if abs(left) <= max(_CLOSE * min(1.0, kappa), _ROUNDINGS * _EPSILON * terms / rise):
+        close = min(_CLOSE * min(1.0, kappa), _NEARLY * abs(x - start))
+        if abs(left) <= max(close, _ROUNDINGS * _EPSILON * terms / rise):
             z += left * (steepness + 0.5 * left * (slope - steepness) / kappa)
             return x + left, z, m + left * slope
         if error > 0.0:
