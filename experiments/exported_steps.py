@@ -178,6 +178,17 @@ RISING: dict[str, Callable[[Rng], Any]] = {
         exponent=-0.5, decay=0.3, weight=0.4 * rng.random(), weight_slope=0.1, input_coefficients=(1.0, 0.0, 0.05),
         reach=2.0,
     ),
+    "Tellinen": lambda rng: hs.Tellinen(
+        saturation=rng.uniform(1.0, 3.0), coercivity=rng.uniform(0.2, 1.0), squareness=rng.uniform(0.2, 0.8),
+        feedthrough=rng.uniform(0.3, 1.0),
+    ),
+    "Chan": lambda rng: hs.Chan(
+        saturation=rng.uniform(1.0, 3.0), coercivity=rng.uniform(0.2, 1.0), squareness=rng.uniform(0.2, 0.8),
+        feedthrough=rng.uniform(0.3, 1.0), gap=rng.uniform(0.0, 0.5),
+    ),
+    "EnergyPlays": lambda rng: hs.EnergyPlays(
+        thresholds=(0.0, *_thresholds(rng)), weights=_weights(rng), field=1.0, feedthrough=rng.uniform(0.3, 1.0)
+    ),
     "MaxwellSlip": lambda rng: hs.MaxwellSlip(stiffness=(1.0, rng.random()), slips=(50.0, 0.4)),
     "Preisach": lambda rng: hs.Preisach.from_density(
         np.linspace(-9.0, 9.0, 12), lambda a, b: 1.0 + 0.1 * (a - b)

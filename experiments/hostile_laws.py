@@ -281,6 +281,50 @@ def relays(kind: type) -> Callable[[Rng], Drawn]:
     return draw
 
 
+# ---------------------------------------------------------------------------------- cores
+
+
+def core(kind: type) -> Callable[[Rng], Drawn]:
+    """A law between two branches, from nearly straight to nearly a relay."""
+
+    def draw(rng: Rng) -> Drawn:
+        length, saturation = decades(rng, -3.0, 3.0), decades(rng, -3.0, 3.0)
+        squareness = float(
+            rng.choice([rng.uniform(0.05, 0.95), decades(rng, -6.0, -1.0), 1.0 - decades(rng, -6.0, -1.0)])
+        )
+        others = {"feedthrough": float(rng.choice([0.0, rng.random()])) * saturation / length}
+        if kind is hs.Chan:
+            others["gap"] = float(rng.choice([0.0, decades(rng, -3.0, 3.0)])) * length / saturation
+        else:
+            saturation = signed(rng, saturation)
+        z0 = float(rng.choice([-1.0, 0.0, 1.0, rng.uniform(-1.0, 1.0)]))
+        offset = float(rng.choice([0.0, rng.normal()])) * saturation
+        law = kind(saturation=saturation, coercivity=length, squareness=squareness, offset=offset, z0=z0, **others)
+        return Drawn(law, length)
+
+    return draw
+
+
+def tellinen_table(rng: Rng) -> Drawn:
+    """Branches that are level, steep, far apart or closed, of six points."""
+    length, saturation = decades(rng, -3.0, 3.0), decades(rng, -3.0, 3.0)
+    inputs = length * (np.sort(rng.uniform(-1.0, 1.0, 6)) + 1e-6 * np.arange(6.0))
+    lower = saturation * np.cumsum(rng.random(6) * (rng.random(6) < 0.7))
+    upper = np.maximum.accumulate(lower + saturation * rng.random(6) * (rng.random(6) < 0.8))
+    z0 = float(rng.choice([-1.0, 0.0, 1.0, rng.uniform(-1.0, 1.0)]))
+    table = {"inputs": tuple(inputs), "lower": tuple(lower), "upper": tuple(upper)}
+    line = {"feedthrough": rng.random() * saturation / length, "offset": rng.normal() * saturation, "z0": z0}
+    return Drawn(hs.TellinenTable(**table, **line), length)
+
+
+def energy_plays(rng: Rng) -> Drawn:
+    """Plays behind an anhysteretic curve, from nearly straight to nearly a sign."""
+    r, length = thresholds(rng)
+    field = length * decades(rng, -4.0, 4.0)
+    line = {"feedthrough": float(rng.normal()), "offset": float(rng.normal()), "z0": positions(rng, length, 4)}
+    return Drawn(hs.EnergyPlays(thresholds=r, weights=weights(rng, one_signed=False), field=field, **line), length)
+
+
 # ---------------------------------------------------------------------------------- others
 
 
@@ -377,6 +421,10 @@ DRAWS: dict[str, Callable[..., Drawn]] = {
     "MaxwellSlip": maxwell_slip,
     "Preisach": relays(hs.Preisach),
     "PreisachRelays": relays(hs.PreisachRelays),
+    "Tellinen": core(hs.Tellinen),
+    "TellinenTable": tellinen_table,
+    "Chan": core(hs.Chan),
+    "EnergyPlays": energy_plays,
     "Sum": summed,
     "Cascade": cascaded,
     "CustomLaw": custom,

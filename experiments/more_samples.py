@@ -40,7 +40,8 @@ UNIT = 2.0**-53
 SMALLEST = 2.0**-1022
 PEAK_ROUNDS, PEAK_PIECES = 40, 8
 BITS = ("Play", "Stop", "PrandtlIshlinskii", "ModifiedPrandtlIshlinskii", "MaxwellSlip",
-        "ParametricPrandtlIshlinskii", "Preisach", "PreisachRelays", "CustomLaw", "Line", "SingleValued")  # fmt: skip
+        "ParametricPrandtlIshlinskii", "EnergyPlays", "Preisach", "PreisachRelays", "CustomLaw", "Line",
+        "SingleValued")  # fmt: skip
 
 
 class Case(NamedTuple):
@@ -113,6 +114,8 @@ def places(law: Any) -> tuple[list[int], list[int]]:
         return [], []
     if isinstance(law, hs.PrandtlIshlinskii | hs.GeneralizedPrandtlIshlinskii):
         return [0], list(range(1, 1 + len(law.thresholds)))
+    if isinstance(law, hs.Chan):
+        return [0], [1, 2, 3]
     return [0], [1, 2] if isinstance(law, hs.BoucWenBaberNoori | hs.JilesAtherton) else [1]
 
 
@@ -202,6 +205,10 @@ def size(law: Any, before: Array, u: Array, y: Array) -> Array:
         return np.full(u.size, abs(law.offset) + float(np.abs(law.weights).sum()))
     if isinstance(law, hs.Line):
         return np.abs(law.offset) + np.abs(law.slope * u)
+    if isinstance(law, hs.Tellinen | hs.Chan):
+        return np.abs(law.offset) + abs(law.saturation) + np.abs(law.feedthrough * u)
+    if isinstance(law, hs.TellinenTable):
+        return np.abs(law.offset) + float(np.abs([law.lower, law.upper]).max()) + np.abs(law.feedthrough * u)
     if isinstance(law, hs.Duhem):
         return np.abs(y) + 2.0 * (abs(law.offset) + np.abs(law.feedthrough * u))
     if isinstance(law, hs.JilesAtherton):

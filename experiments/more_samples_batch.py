@@ -115,7 +115,8 @@ ODD: dict[str, tuple[str, ...]] = {
     "GeneralizedBoucWen": ("offset", "z0", "b4", "b5", "b6"), "ColemanHodgdon": ("offset", "z0"),
     "Dahl": ("offset", "z0"), "JilesAtherton": ("offset", "z0"),
     "Play": ("offset", "z0"), "Stop": ("offset", "z0"), "MaxwellSlip": ("offset", "z0"),
-    "PrandtlIshlinskii": ("offset", "z0"), "Line": ("offset",),
+    "PrandtlIshlinskii": ("offset", "z0"), "Line": ("offset",), "Tellinen": ("offset", "z0"),
+    "EnergyPlays": ("offset", "z0"),
 }  # fmt: skip
 """What changes its sign in the mirrored law."""
 

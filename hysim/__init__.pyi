@@ -61,6 +61,8 @@ from hysim.metrics import loop_metrics as loop_metrics
 from hysim.metrics import LoopMetrics as LoopMetrics
 from hysim.metrics import cycle_metrics as cycle_metrics
 from hysim.metrics import CycleMetrics as CycleMetrics
+from hysim.metrics import magnetic_metrics as magnetic_metrics
+from hysim.metrics import MagneticMetrics as MagneticMetrics
 from hysim.models.law import Law as Law
 from hysim.models.model import family as family
 from hysim.models.parameters import Parameter as Parameter
@@ -85,6 +87,10 @@ from hysim.laws.operators.preisach import PreisachRelays as PreisachRelays
 from hysim.laws.differential.dahl import Dahl as Dahl
 from hysim.laws.differential.coleman_hodgdon import ColemanHodgdon as ColemanHodgdon
 from hysim.laws.magnetic.jiles_atherton import JilesAtherton as JilesAtherton
+from hysim.laws.magnetic.tellinen import Tellinen as Tellinen
+from hysim.laws.magnetic.tellinen_table import TellinenTable as TellinenTable
+from hysim.laws.magnetic.chan import Chan as Chan
+from hysim.laws.operators.energy_plays import EnergyPlays as EnergyPlays
 from hysim.models.sum import Sum as Sum
 from hysim.models.cascade import Cascade as Cascade
 from hysim.models.channels.dependent import Dependent as Dependent
@@ -94,6 +100,7 @@ from hysim.laws.friction.lugre import LuGre as LuGre
 from hysim.laws.friction.stribeck import StribeckFriction as StribeckFriction
 from hysim.laws.friction.maxwell import GeneralizedMaxwellSlip as GeneralizedMaxwellSlip
 from hysim.laws.friction.backlash import ElasticBacklash as ElasticBacklash
+from hysim.laws.magnetic.excess_loss import ExcessLoss as ExcessLoss
 from hysim.laws.custom import CustomLaw as CustomLaw
 from hysim.plants.oscillator import BoucWenOscillator as BoucWenOscillator
 from hysim.plants.structures.structure import Structure as Structure

@@ -56,6 +56,7 @@ SMOOTH = {
     "Dahl": hs.Dahl(stiffness=100.0, coulomb=3.0),
     "ColemanHodgdon": hs.ColemanHodgdon(alpha=30.0, c=30.0, B=100.0),
     "JilesAtherton": hs.JilesAtherton(Ms=0.03, a=0.02, alpha=-0.5, k=0.03, gain=100.0, feedthrough=50.0),
+    "Tellinen": hs.Tellinen(saturation=2.0, coercivity=0.01, squareness=0.4, feedthrough=30.0),
     "SquareDahl": SquareDahl(k=70.0, coulomb=2.0, c=30.0),
     "Line": hs.Line(slope=100.0),
     "Sum": bouc_wen() + hs.Dahl(stiffness=30.0, coulomb=1.0) + hs.Dashpot(c=0.3),
@@ -83,6 +84,14 @@ KINKED = {
         z0=(0.0,),
     ),
     "MaxwellSlip": hs.MaxwellSlip(stiffness=(40.0, 40.0), slips=(0.01, 0.03), feedthrough=20.0),
+    "TellinenTable": hs.TellinenTable(
+        inputs=(-0.1, -0.02, 0.0, 0.02, 0.1),
+        lower=(-1.0, -0.9, -0.3, 0.7, 1.0),
+        upper=(-1.0, -0.7, 0.3, 0.9, 1.0),
+        feedthrough=30.0,
+    ),
+    "Chan": hs.Chan(saturation=1.0, coercivity=0.01, squareness=0.3, feedthrough=30.0),
+    "EnergyPlays": hs.EnergyPlays(thresholds=(0.0, 0.01), weights=(1.0, 2.0), field=0.02, feedthrough=30.0),
     "Preisach": hs.Preisach(levels=LEVELS, weights=RELAYS) + SPRING,
     "CustomLaw": hs.CustomLaw(step=stable_play, parameters={"k": 70.0, "slip": 0.02, "c": 30.0}, state={"z": 0.0}),
 }

@@ -43,6 +43,8 @@ AT_ZERO = [
     hs.Stop(threshold=0.2),
     hs.PrandtlIshlinskii(thresholds=(0.0, 0.1, 0.4), weights=(1.0, 0.5, 0.3)),
     hs.MaxwellSlip(stiffness=(1.0, 0.5), slips=(0.1, 0.4)),
+    hs.Tellinen(coercivity=0.3),
+    hs.EnergyPlays(thresholds=(0.0, 0.2), weights=(1.0, 0.5), field=0.3),
     hs.ParametricPrandtlIshlinskii(exponent=-0.5, decay=0.3, weight=0.4, weight_slope=0.1, reach=2.0),
     hs.ModifiedPrandtlIshlinskii(
         thresholds=(0.0, 0.2), weights=(1.0, 0.5), dead_zones=(0.0, 0.3), dead_zone_weights=(1.0, 0.4)
@@ -62,6 +64,7 @@ ELSEWHERE = [
     hs.Duhem.from_terms({"u'": 0.9, "|u'| y": -0.3}, y0=0.1),
     hs.Preisach(levels=(-2.0, -0.5, 1.0, 3.0), weights=(1.0, 0.5, 1.0, 0.2, 0.3, 0.4)),
     hs.PreisachRelays(levels=(-1.0, 0.5, 1.0), weights=(1.0, 0.5, 1.0)),
+    hs.Chan(coercivity=0.3, gap=0.1),
 ]
 
 

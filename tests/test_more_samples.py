@@ -23,12 +23,13 @@ spec.loader.exec_module(experiment)
 N_CASES = 2 if numba.config.DISABLE_JIT else 8
 
 NOT_RATE_INDEPENDENT = {
-    *("TransferFunction", "Dashpot", "Actuator", "BoucWenOscillator", "Structure", "Dependent"),
+    *("TransferFunction", "Dashpot", "ExcessLoss", "Actuator", "BoucWenOscillator", "Structure", "Dependent"),
     *("LuGre", "StribeckFriction", "GeneralizedMaxwellSlip", "ElasticBacklash"),  # test_friction.py has them
 }
 """Between two samples the input of these, or a channel, is held, or goes on a line: with more it is another input."""
 INVERSES = {"BoucWenInverse"}  # under the laws that it inverts
-SEARCHED = {"CustomLaw", "Line", "MaxwellSlip", "ParametricPrandtlIshlinskii", "Play", "PreisachRelays", "Stop"}
+SEARCHED = {"Chan", "CustomLaw", "EnergyPlays", "Line", "MaxwellSlip", "ParametricPrandtlIshlinskii", "Play",
+            "PreisachRelays", "Stop", "Tellinen", "TellinenTable"}  # fmt: skip
 """Laws whose only inverse is the search on their step, as a sum's is; `test_inverse_of_every_law.py` has them."""
 
 

@@ -36,12 +36,16 @@ LAWS = {
     "MaxwellSlip": hs.MaxwellSlip(stiffness=(1.0, 0.5), slips=(9.0, 0.4)),
     "PreisachRelays": hs.PreisachRelays(**RELAYS),
     "Preisach": hs.Preisach(**RELAYS),
+    "Tellinen": hs.Tellinen(),
+    "TellinenTable": hs.TellinenTable(),
+    "Chan": hs.Chan(gap=0.2),
+    "EnergyPlays": hs.EnergyPlays(**PLAYS, field=0.3),
     "Dahl": hs.Dahl(),
     "ColemanHodgdon": hs.ColemanHodgdon(),
     "JilesAtherton": hs.JilesAtherton(),
     "Line": hs.Line(slope=1.0),
 }
-POSITIVE = ("n", "coulomb", "psi", "lambda_", "decay", "reach", "beta", "gamma", "slips", "stiffness", "left")
+POSITIVE = ("n", "coulomb", "psi", "lambda_", "decay", "reach", "beta", "gamma", "slips", "stiffness", "left", "field")
 SIZES = (1e-300, 1e-150, 1e-20, 1e-3, 1.0, 1e3, 1e20, 1e150, 1e300)
 CLOSE = 1e-13  # functions of another library: a rounding each
 

@@ -42,7 +42,15 @@ MIX = frame_of([LAWS[name] for name in MIXED])
 
 
 def test_every_law_that_an_element_takes_is_tried():
-    laws = {"TransferFunction", "Creep", "Amplifier", "Actuator", "StateSpace", "Modes"}  # plants, which take time
+    laws = {
+        "TransferFunction",
+        "Creep",
+        "Amplifier",
+        "Actuator",
+        "StateSpace",
+        "Modes",
+        "ExcessLoss",
+    }  # which take time
     for name, family in every_family().items():
         if name in laws or not issubclass(family, Stepwise) or not family.__module__.startswith("hysim."):
             continue

@@ -11,6 +11,9 @@ from hysim.models.law import Law
 _PLAY = {"threshold": "u", "thresholds": "u", "gain": "y/u", "weights": "y/u", "offset": "y", "z0": "u"}
 _PLANE = {"levels": "u", "weights": "y", "offset": "y", "z0": "u"}
 _OF_MEMORY = {"n": "1", "offset": "y"}
+_CORE = {
+    "saturation": "y", "coercivity": "u", "squareness": "1", "feedthrough": "y/u", "offset": "y", "z0": "1",
+}  # fmt: skip
 _BOUC_WEN = _OF_MEMORY | {"feedthrough": "y/u"}
 
 FIELD_UNITS: Mapping[str, Mapping[str, str]] = MappingProxyType(
@@ -32,6 +35,14 @@ FIELD_UNITS: Mapping[str, Mapping[str, str]] = MappingProxyType(
         },
         "MaxwellSlip": {"stiffness": "y/u", "slips": "u", "feedthrough": "y/u", "offset": "y", "z0": "u"},
         **dict.fromkeys(("Preisach", "PreisachRelays"), _PLANE),
+        "Tellinen": _CORE,
+        "TellinenTable": {
+            "inputs": "u", "lower": "y", "upper": "y", "feedthrough": "y/u", "offset": "y", "z0": "1",
+        },
+        "Chan": _CORE | {"gap": "u/y"},
+        "EnergyPlays": {
+            "thresholds": "u", "weights": "y", "field": "u", "feedthrough": "y/u", "offset": "y", "z0": "u",
+        },
         "Line": {"offset": "y", "slope": "y/u"},
     }
 )  # fmt: skip

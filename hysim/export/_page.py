@@ -27,7 +27,7 @@ from hysim.export._page_modules import compressed
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.records import Record
 
-LARGEST = 250_000
+LARGEST = 300_000
 """Most bytes of a page."""
 
 _SCRIPTS = ("step.js", "inputs.js", "measures.js", "draw.js", "code.js", "page.js")
@@ -86,7 +86,7 @@ def to_page(
     TypeError
         If the thing is no law, and no sum or cascade of laws.
     ValueError
-        If the page would be larger than 250 KB; the message says what to do.
+        If the page would be larger than 300 KB; the message says what to do.
     ImportError
         If the law's step must be compiled and the extra `export` is missing.
 

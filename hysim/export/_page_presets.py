@@ -82,6 +82,10 @@ def _operators() -> dict[str, Shown]:
     pushed = hs.GeneralizedPrandtlIshlinskii(thresholds=thresholds, weights=weights, left=(1.2, 1.4, 0.0, 0.0, 0.1))
     dense = hs.ParametricPrandtlIshlinskii(exponent=-0.3, decay=0.4, weight=0.5, reach=2.0, plays=20.0)
     timed = hs.RateDependentPrandtlIshlinskii(thresholds=thresholds, weights=weights, beta=0.005)
+    core = hs.EnergyPlays(thresholds=(0.0, 0.2, 0.5), weights=(0.2, 0.6, 0.4), field=0.15)
+    table = hs.TellinenTable(
+        inputs=(-2.0, -1.0, 0.0, 1.0, 2.0), lower=(-1.0, -0.9, -0.5, 0.6, 1.0), upper=(-1.0, -0.6, 0.5, 0.9, 1.0)
+    )
     relays = (0.1, 0.1, 0.3, 0.2, 0.3, 0.1, 0.1, 0.2, 0.1, 0.1)
     return {
         "Prandtl-Ishlinskii: dead zones": Shown(bent, _UNIT),
@@ -91,6 +95,13 @@ def _operators() -> dict[str, Shown]:
         "Play": Shown(hs.Play(threshold=0.25), _UNIT),
         "Stop": Shown(hs.Stop(threshold=0.4), _UNIT),
         "Maxwell slip": Shown(hs.MaxwellSlip(stiffness=(1.0, 1.0, 1.0), slips=(0.2, 0.5, 0.9)), (-1.5, 1.5)),
+        "Magnetic core: Jiles-Atherton": Shown(
+            hs.JilesAtherton(Ms=1.0, a=0.3, alpha=0.1, k=0.4, gain=1.0, feedthrough=0.0), _WIDE
+        ),
+        "Magnetic core: Tellinen": Shown(hs.Tellinen(coercivity=0.4, squareness=0.7), _WIDE),
+        "Magnetic core: Tellinen's branches from a table": Shown(table, _WIDE),
+        "Magnetic core: Chan": Shown(hs.Chan(coercivity=0.4, squareness=0.5), _WIDE),
+        "Magnetic core: energy-based plays": Shown(core, _WIDE),
         "Preisach": Shown(hs.Preisach.from_density(np.linspace(-1.0, 1.0, 11), _density), _UNIT),
         "Preisach relays": Shown(hs.PreisachRelays(levels=(-1.0, -0.5, 0.0, 0.5, 1.0), weights=relays), _UNIT),
     }

@@ -1,23 +1,15 @@
 """A viscous damper, the part of a force that depends on the velocity."""
 
-from collections.abc import Mapping
-from typing import Any, ClassVar, Self
+from typing import Self
 
-import numpy as np
-import numpy.typing as npt
-
-from hysim._frozen import FloatArray, read_only
+from hysim._frozen import FloatArray, check_not_negative
 from hysim.kernels import stepping
-from hysim.laws.static import linear_space
-from hysim.models.composable import Composable
+from hysim.laws._rate_part import RatePart
 from hysim.models.model import family
-from hysim.models.protocols import CompiledLaw, Identifiable, Startable, needed_time, positive_time
-from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
-from hysim.records import Record
 
 
 @family
-class Dashpot(Identifiable, Composable):
+class Dashpot(RatePart):
     """Viscous damper, ``y = c u'``.
 
     Between the samples of an input that is linear there, u' is constant. At a sample the output is that of the stroke
@@ -37,60 +29,41 @@ class Dashpot(Identifiable, Composable):
 
     c: float = 1.0
 
-    dynamic: ClassVar[bool] = True
+    step = staticmethod(stepping.dashpot)
 
-    @property
-    def scalars(self) -> dict[str, float]:
-        """The coefficient by its name."""
-        return {"c": self.c}
-
-    def with_scalars(self, scalars: Mapping[str, float]) -> Self:
-        """The damper with another coefficient."""
-        return type(self)(**{**self.scalars, **scalars})
+    @staticmethod
+    def of_velocity(velocity: FloatArray) -> FloatArray:
+        """The velocity itself."""
+        return velocity
 
     @classmethod
-    def candidates(cls) -> dict[str, Any]:
-        """None for `hysim.compare`: a dashpot is a part of sums."""
-        return {}
+    def eddy_currents(cls, *, conductivity: float, thickness: float) -> Self:
+        """The field of classical eddy currents in a lamination by its flux density, ``H = sigma d^2 / 12 dB/dt``.
 
-    def response(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
-        """Output (n,) at the samples of `u` (n,), which rests before the first of them, every `sample_time` [s].
+        It holds where the field in the lamination is even, that is where the skin depth is large beside d.
 
-        Raises ValueError if `u` is not finite or has not one axis, or the sample time is not positive.
+        Parameters
+        ----------
+        conductivity : float
+            sigma, not negative [S/m].
+        thickness : float
+            d of the lamination, not negative [m].
+
+        Returns
+        -------
+        Dashpot
+            From the flux density [T] to the field [A/m].
+
+        Raises
+        ------
+        ValueError
+            If a number is negative.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> round(hs.Dashpot.eddy_currents(conductivity=2e6, thickness=0.3e-3).c, 6)
+        0.015
         """
-        return self.advance(u, sample_time)[0]
-
-    def advance(
-        self, u: npt.ArrayLike, sample_time: float, state: float | None = None
-    ) -> tuple[FloatArray, float | None]:
-        """Output continued from `state`, the last input, and the state after it; the same bits as uncut."""
-        inputs = read_only(u, "u", ndim=1)
-        positive_time(sample_time)
-        if not inputs.size:
-            return inputs, state
-        before = inputs[0] if state is None else state
-        return self.c * (np.diff(inputs, prepend=before) / sample_time), float(inputs[-1])
-
-    def startable(self, sample_time: float | None = None) -> Startable:
-        """The damper at a sample time [s] as a step that runs from any first input, for exports."""
-        parameters = read_only([self.c, positive_time(needed_time(self, sample_time))])
-        return Startable(stepping.dashpot, parameters, np.zeros(1), stepping.start)
-
-    def compiled(self, u0: float = 0.0, *, sample_time: float | None = None) -> CompiledLaw:
-        """The damper as compiled loops take it, at rest at the input `u0`; ValueError without a sample time [s]."""
-        return self.startable(sample_time).started(u0)
-
-    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """Nothing to search: the output is linear in c."""
-        if not record.sample_time or np.ptp(record.u) == 0.0:
-            raise ValueError("the input is constant: nothing can be identified from it")
-        return linear_space({"c": self.c}, freedom)
-
-    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """Columns u', 0, shape (1, n_samples, 2)."""
-        velocity = Dashpot(c=1.0).response(record.u, record.sample_time)
-        return np.stack([velocity, np.zeros_like(velocity)], axis=-1)[np.newaxis]
-
-    def assemble(self, parameters: Mapping[str, float]) -> Self:
-        """The damper with this parameter."""
-        return self.with_scalars(parameters)
+        check_not_negative(conductivity=conductivity, thickness=thickness)
+        return cls(c=conductivity * thickness**2 / 12.0)

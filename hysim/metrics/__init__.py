@@ -4,6 +4,7 @@ from hysim.metrics._cycle_table import CycleMetrics, cycle_metrics
 from hysim.metrics._describing import describing_function
 from hysim.metrics._fit import aic, bic, fit_percent, fpe, nrmse, rmse
 from hysim.metrics._loop import LoopMetrics, loop_metrics, width_rmse
+from hysim.metrics._magnetic import MagneticMetrics, magnetic_metrics
 from hysim.metrics._steps import (
     StepMetrics,
     VibrationReduction,
@@ -15,6 +16,7 @@ from hysim.metrics._steps import (
 __all__ = [
     "CycleMetrics",
     "LoopMetrics",
+    "MagneticMetrics",
     "StepMetrics",
     "VibrationReduction",
     "aic",
@@ -24,6 +26,7 @@ __all__ = [
     "fit_percent",
     "fpe",
     "loop_metrics",
+    "magnetic_metrics",
     "nrmse",
     "reduction_percent",
     "rmse",

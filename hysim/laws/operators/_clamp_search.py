@@ -72,6 +72,10 @@ class Pushing:
         """Positions (n_sets, n_samples, n_plays) for thresholds and initial positions (n_sets, n_plays)."""
         return positions(thresholds, z0, record.u)
 
+    def outputs(self, z: FloatArray, parameters: Parameters) -> FloatArray:
+        """Outputs of plays of the weight one at the positions `z`, (n_sets, n_samples, n_plays)."""
+        return z
+
     def arguments(self, parameters: Mapping[str, float]) -> dict[str, Any]:
         """The constructor's arguments beside those of every bank."""
         return {}
@@ -87,6 +91,7 @@ class ClampStructure(Identifiable, Composable):
     one_signed: bool | None = None
     against: bool = False  # whether weights of one sign turn against the loop of the record
     turns: int = 1  # former turning points that describe a free memory
+    spacing: float = 1.0  # power of the even steps at which free thresholds lie
     pushing: Pushing = Pushing()
 
     def __post_init__(self) -> None:
@@ -143,7 +148,8 @@ class ClampStructure(Identifiable, Composable):
         """One column for each element, the input where there is a feedthrough, 1 and 0."""
         thresholds, z0 = self._elements(parameters)
         z = self.pushing.positions(parameters, thresholds, z0, record)
-        elements: FloatArray = record.u[:, np.newaxis] - z if self.law.stops else z
+        outputs = self.pushing.outputs(z, parameters)
+        elements: FloatArray = record.u[:, np.newaxis] - z if self.law.stops else outputs
         ones = np.ones((*z.shape[:2], 1))
         static = [record.u[:, np.newaxis] * ones] if _has_feedthrough(self.law) else []
         return np.concatenate([elements, *static, ones, np.zeros_like(ones)], axis=-1)
@@ -193,11 +199,11 @@ class ClampStructure(Identifiable, Composable):
         return int(np.count_nonzero(moved <= widest * (1.0 + _ROUNDING)))
 
     def _thresholds(self, half: float) -> FloatArray:
-        """The structure's own, or even steps: from zero for plays, up to the end for stops, which vanish at zero."""
+        """The structure's own, or powers of even steps: from zero for plays, up to the end for stops."""
         if self.thresholds:
             return np.array(self.thresholds)
         steps = np.arange(self.plays) + float(self.law.stops)
-        return np.asarray(half * steps / (self.plays + float(self.law.stops)))
+        return np.asarray(half * (steps / (self.plays + float(self.law.stops))) ** self.spacing)
 
     def _names(self, what: str, count: int) -> tuple[str, ...]:
         own = {"thresholds": self.law.thresholds_name, "weights": self.law.weights_name}

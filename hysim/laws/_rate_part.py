@@ -1,0 +1,85 @@
+"""Base of the parts that are a function of the velocity of the input, times one coefficient."""
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, items, read_only
+from hysim.kernels import stepping
+from hysim.laws.static import linear_space
+from hysim.models.composable import Composable
+from hysim.models.protocols import CompiledLaw, Identifiable, Startable, needed_time, positive_time
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.records import Record
+
+
+class RatePart(Identifiable, Composable):
+    """A part ``y = c f(u')``; a family has the field c, its step and f."""
+
+    dynamic: ClassVar[bool] = True
+    step: ClassVar[Any]
+    c: float
+
+    @staticmethod
+    @abstractmethod
+    def of_velocity(velocity: FloatArray) -> FloatArray:
+        """The function f of the velocity."""
+
+    @property
+    def scalars(self) -> dict[str, float]:
+        """The coefficient by its name."""
+        return {"c": self.c}
+
+    def with_scalars(self, scalars: Mapping[str, float]) -> Self:
+        """The part with another coefficient."""
+        return type(self)(**{**items(self), **scalars})
+
+    @classmethod
+    def candidates(cls) -> dict[str, Any]:
+        """None for `hysim.compare`: it is a part of sums."""
+        return {}
+
+    def response(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
+        """Output (n,) at the samples of `u` (n,), which rests before the first of them, every `sample_time` [s].
+
+        Raises ValueError if `u` is not finite or has not one axis, or the sample time is not positive.
+        """
+        return self.advance(u, sample_time)[0]
+
+    def advance(
+        self, u: npt.ArrayLike, sample_time: float, state: float | None = None
+    ) -> tuple[FloatArray, float | None]:
+        """Output continued from `state`, the last input, and the state after it; the same bits as uncut."""
+        inputs = read_only(u, "u", ndim=1)
+        positive_time(sample_time)
+        if not inputs.size:
+            return inputs, state
+        before = inputs[0] if state is None else state
+        return self.c * self.of_velocity(np.diff(inputs, prepend=before) / sample_time), float(inputs[-1])
+
+    def startable(self, sample_time: float | None = None) -> Startable:
+        """The part at a sample time [s] as a step that runs from any first input, for exports."""
+        parameters = read_only([self.c, positive_time(needed_time(self, sample_time))])
+        return Startable(self.step, parameters, np.zeros(1), stepping.start)
+
+    def compiled(self, u0: float = 0.0, *, sample_time: float | None = None) -> CompiledLaw:
+        """The part as compiled loops take it, at rest at the input `u0`; ValueError without a sample time [s]."""
+        return self.startable(sample_time).started(u0)
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """Nothing to search: the output is linear in c."""
+        if not record.sample_time or np.ptp(record.u) == 0.0:
+            raise ValueError("the input is constant: nothing can be identified from it")
+        return linear_space({"c": self.c}, freedom)
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """Columns f(u'), 0, shape (1, n_samples, 2)."""
+        of_one = self.with_scalars({"c": 1.0}).response(record.u, record.sample_time)
+        return np.stack([of_one, np.zeros_like(of_one)], axis=-1)[np.newaxis]
+
+    def assemble(self, parameters: Mapping[str, float]) -> Self:
+        """The part with this parameter."""
+        return self.with_scalars(parameters)

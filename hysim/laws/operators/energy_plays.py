@@ -1,0 +1,206 @@
+"""Energy-based plays: cells of dry friction behind an anhysteretic curve."""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, checked, read_only
+from hysim.kernels.magnetics import energy_plays as kernels
+from hysim.laws.operators._clamp_search import Axis, ClampStructure, Pushing
+from hysim.laws.operators._clamps import Bank
+from hysim.models.by_structure import ByStructure
+from hysim.models.law import Packed
+from hysim.models.model import family
+from hysim.models.parameters import spans
+from hysim.models.search_space import Parameters
+from hysim.models.tables import Tables
+from hysim.records import Record
+
+_FIELDS = (3e-3, 3.0)  # of the anhysteretic curve, in half spans of the input
+_STARTS = (0.1, 0.03, 0.01, 0.3, 1.0)
+_SPACING = 2.0  # of the thresholds: finer towards zero
+
+
+@family
+class EnergyPlays(ByStructure, Bank):
+    """Energy-based plays, ``y = offset + feedthrough u + sum_i w_i L(z_i / field)`` over plays of the thresholds r_i.
+
+    ``z_i(k) = min(max(z_i(k-1), u_k - r_i), u_k + r_i)`` is the reversible field of cell i, what a pinning force r_i
+    leaves of the input, and ``L(x) = coth x - 1 / x`` the anhysteretic curve of all cells. u is the field H and y the
+    flux density B. A cell dissipates r_i per unit of its magnetisation, whatever the path: with weights that are not
+    negative no cycle yields energy, see `dissipated`. Inner loops are closed and wiped out, as those of plays.
+    Sources: A. Bergqvist, Physica B 233 (1997) 342; F. Henrotte, A. Nicolet and K. Hameyer, COMPEL 25 (2006) 71.
+
+    Parameters
+    ----------
+    thresholds : sequence of float, length n_plays
+        Pinning force r_i of each cell, not negative and increasing [unit of u].
+    weights : sequence of float, length n_plays
+        Saturation w_i of each cell [unit of y].
+    field : float
+        Scale of the anhysteretic curve, positive [unit of u].
+    feedthrough : float
+        Slope dy/du at saturation [unit of y / unit of u]: the magnetic constant where y is a flux density.
+    offset : float
+        Output at rest at u = 0 [unit of y].
+    z0 : float or sequence of float, length n_plays
+        Reversible fields before the first sample, which pushes them [unit of u].
+
+    Raises
+    ------
+    ValueError
+        If lengths differ, a number is not finite, the field is not positive, or the thresholds are negative or do not
+        increase.
+
+    Notes
+    -----
+    A law without cells, the default, is a line; as a start of `hysim.identify` it leaves the cells to the record, as
+    ``EnergyPlays.structure()`` does.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> core = hs.EnergyPlays(thresholds=(0.0, 20.0, 60.0), weights=(0.2, 0.7, 0.6), field=15.0)
+    >>> core.response([0.0, 200.0, 0.0, -200.0]).round(4).tolist()
+    [0.0, 1.3624, 0.7299, -1.3624]
+    """
+
+    ordered: ClassVar[bool] = True
+
+    thresholds: tuple[float, ...] = ()
+    weights: tuple[float, ...] = ()
+    field: float = 1.0
+    feedthrough: float = 0.0
+    offset: float = 0.0
+    z0: tuple[float, ...] = (0.0,)
+
+    step = staticmethod(kernels.step)
+
+    @classmethod
+    def check(cls, tables: Tables) -> None:
+        """Refuse elements that are no cells, and a field that is not positive."""
+        super().check(tables)
+        if not (tables["field"] > 0.0).all():
+            raise ValueError(f"field must be positive, got {tables['field'].min()}")
+
+    @classmethod
+    def pack(cls, tables: Tables) -> Packed:
+        """Parameters (offset, feedthrough, field, thresholds, weights), and the memory (u, positions)."""
+        names = ("offset", "feedthrough", "field", "thresholds", "weights")
+        return Packed(np.concatenate([tables[name] for name in names], axis=1), cls.initial_memory(tables))
+
+    @classmethod
+    def structure(cls, *, plays: int = 20, thresholds: npt.ArrayLike = ()) -> ClampStructure:
+        """Cells for `hysim.identify`, whose weights have one sign: how many, or where.
+
+        Parameters
+        ----------
+        plays : int
+            Number of cells, with thresholds at the squares of even steps from zero up to half the span of the input.
+        thresholds : sequence of float, optional
+            The thresholds themselves [unit of u].
+
+        Returns
+        -------
+        ClampStructure
+            The field is searched; weights, feedthrough and offset are solved for.
+
+        Raises
+        ------
+        ValueError, TypeError
+            If the number is not a positive int, or a threshold is not a finite number.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> u = hs.signals.triangle(-100.0, 100.0, cycles=2, samples_per_cycle=60)
+        >>> core = hs.EnergyPlays(thresholds=(0.0, 25.0), weights=(0.2, 1.0), field=15.0)
+        >>> fit = hs.identify(hs.EnergyPlays.structure(plays=4), hs.Record(u=u, y=core.response(u)))
+        >>> round(fit.estimates["field"], 3)
+        15.0
+        """
+        return _structure(cls, tuple(read_only(thresholds, "thresholds", ndim=1).tolist()), plays)
+
+    def as_structure(self) -> ClampStructure:
+        """The structure with the thresholds of this law, its field first, or that by default where it has none."""
+        return _structure(type(self), self.thresholds, 20, self.field) if self.thresholds else self.structure()
+
+    @property
+    def saturation(self) -> float:
+        """Sum of the weights [unit of y]."""
+        return sum(self.weights)
+
+    @property
+    def known_slopes(self) -> tuple[float, float]:
+        """From all cells of negative weight at their steepest to all those of positive weight."""
+        steepest = [weight / (3.0 * self.field) for weight in self.weights]
+        low, high = (sum(side(slope, 0.0) for slope in steepest) for side in (min, max))
+        return self.feedthrough + low, self.feedthrough + high
+
+    def dissipated(self, u: npt.ArrayLike) -> FloatArray:
+        """Energy that the cells have turned into heat since the first sample, ``sum_i r_i w_i |dL_i|``.
+
+        Parameters
+        ----------
+        u : array, shape (n_samples,)
+            Input [unit of u], monotone between the samples.
+
+        Returns
+        -------
+        array, shape (n_samples,)
+            [unit of u times unit of y]; of a steady cycle the increase is its area. Never falls where no weight is
+            negative.
+
+        Raises
+        ------
+        ValueError
+            If u is not finite or has not one axis.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> core = hs.EnergyPlays(thresholds=(20.0,), weights=(1.0,), field=15.0)
+        >>> core.dissipated([0.0, 100.0, -100.0]).round(3).tolist()
+        [0.0, 16.251, 48.753]
+        """
+        thresholds, weights, _ = self.elements
+        curves = _anhysteretic(self.remembered(u) / self.field)
+        moved = np.abs(np.diff(curves, axis=0, prepend=curves[:1]))
+        return np.asarray(np.cumsum(moved, axis=0) @ (thresholds * weights))
+
+
+@checked
+class AnhystereticCurve(Pushing):
+    """The search for the scale of the curve behind the plays."""
+
+    first: tuple[float, ...] = ()  # scale from which the search begins
+
+    def axes(self, record: Record) -> dict[str, Axis]:
+        """The field."""
+        half = spans(record)["h"]
+        starts = (*self.first, *(half * start for start in _STARTS))
+        return {"field": Axis(_FIELDS[0] * half, _FIELDS[1] * half, starts, half)}
+
+    def outputs(self, z: FloatArray, parameters: Parameters) -> FloatArray:
+        """The curve at the positions (n_sets, n_samples, n_plays)."""
+        return _anhysteretic(z / np.reshape(parameters["field"], (-1, 1, 1)))
+
+    def arguments(self, parameters: Mapping[str, float]) -> dict[str, Any]:
+        """The field."""
+        return {"field": parameters["field"]}
+
+
+def _structure(law: type, thresholds: tuple[float, ...], plays: int, *first: float) -> ClampStructure:
+    """A structure of cells; `first` is the field from which the search begins."""
+    curve = AnhystereticCurve(first=first)
+    return ClampStructure(law=law, thresholds=thresholds, plays=plays, one_signed=True, pushing=curve, spacing=_SPACING)
+
+
+def _anhysteretic(x: FloatArray) -> FloatArray:
+    """Langevin's function of numbers of any shape."""
+    flat = read_only(x).ravel()
+    values = np.empty_like(flat)
+    kernels.anhysteretic(flat, values)
+    return values.reshape(x.shape)

@@ -1,0 +1,123 @@
+"""Measures of magnetic loops and the parts of core loss, by closed forms."""
+
+import numpy as np
+import pytest
+from scipy.special import beta
+
+import hysim as hs
+from hysim.metrics import magnetic_metrics
+
+MU0 = 1.25663706212e-6
+
+
+def parallelogram(Hc=2.0, slope=3.0, peak=10.0, n=200):
+    """A play: H and B = slope (H -+ Hc), flat after each turn."""
+    H = hs.signals.triangle(-peak, peak, cycles=2, samples_per_cycle=n)
+    return H, slope * hs.Play(threshold=Hc, z0=-(peak - Hc)).response(H)
+
+
+def test_measures_of_a_parallelogram():
+    loop = magnetic_metrics(*parallelogram())
+    assert loop.energy == pytest.approx(4.0 * 3.0 * 2.0 * (10.0 - 2.0), rel=1e-13)
+    assert loop.coercivity == pytest.approx(2.0, rel=1e-13)
+    assert loop.remanence == pytest.approx(6.0, rel=1e-13)
+    assert loop.peak_field == pytest.approx(10.0, rel=1e-13)
+    assert loop.peak_induction == pytest.approx(24.0, rel=1e-13)
+    assert loop.amplitude_permeability * MU0 == pytest.approx(2.4, rel=1e-13)
+    assert loop.largest_permeability * MU0 == pytest.approx(3.0, rel=1e-12)
+    assert np.isnan([loop.initial_permeability, loop.maximum_permeability]).all()
+
+
+def test_a_clockwise_loop_has_a_negative_energy_and_remanence():
+    H, B = parallelogram()
+    assert magnetic_metrics(H, -B).energy == pytest.approx(-192.0, rel=1e-13)
+    assert magnetic_metrics(H, -B).remanence == pytest.approx(-6.0, rel=1e-13)
+
+
+@pytest.mark.parametrize("family", [hs.Tellinen, hs.Chan])
+def test_the_limiting_loop_has_four_times_saturation_times_coercivity(family):
+    law = family(saturation=1.5, coercivity=40.0, squareness=0.6)
+    H = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=4000)
+    H = 400.0 * np.sinh(8.0 * H) / np.sinh(1.0)  # dense about zero, and far out
+    loop = magnetic_metrics(H, law.response(H), cycles=1)
+    # Chan's branches close like 1 / H, and the chords of 2 000 samples cut their bends
+    assert loop.energy == pytest.approx(4.0 * 1.5 * 40.0, rel=1e-3)
+    assert loop.remanence == pytest.approx(law.remanence, rel=1e-3)
+    assert loop.coercivity == pytest.approx(40.0, rel=1e-3)
+
+
+def test_measures_of_the_initial_curve():
+    law = hs.Chan(coercivity=1.0, squareness=0.5)
+    H = np.concatenate([np.linspace(0.0, 5.0, 501), -hs.signals.triangle(-5.0, 5.0, cycles=1, samples_per_cycle=40)])
+    loop = magnetic_metrics(H, law.response(H), mu0=1.0)
+    ratios = law.response(H[1:501]) / H[1:501]
+    assert loop.initial_permeability == pytest.approx(0.25, rel=1e-2)  # knee / (coercivity + knee)^2 at H = 0
+    assert loop.maximum_permeability > loop.initial_permeability
+    assert loop.maximum_permeability == pytest.approx(ratios.max(), rel=1e-15)
+    assert "initial curve" in str(loop)
+    assert set(loop.to_dict()) >= {"energy", "coercivity", "maximum_permeability"}
+
+
+def test_what_does_not_cross_an_axis_has_no_measure_there():
+    H, B = parallelogram()
+    away = magnetic_metrics(H + 100.0, B + 100.0)
+    assert np.isnan([away.remanence, away.coercivity]).all()
+    assert away.energy == pytest.approx(192.0, rel=1e-11)
+
+
+@pytest.mark.parametrize(("arguments", "message"), [({"mu0": 0.0}, "mu0 must be positive"), ({"cycles": 9}, "cycle")])
+def test_a_loop_that_cannot_be_measured_is_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        magnetic_metrics(*parallelogram(), **arguments)
+
+
+# ---------------------------------------------------------------------------------- losses
+
+
+def loss(part, B, sample_time):
+    """Energy per cycle of a part along a periodic flux density: the rate is constant between samples."""
+    H = part.response(np.append(B, B[1]), sample_time)[1:]
+    return float(H @ np.diff(np.append(B, B[1])))
+
+
+@pytest.mark.parametrize("frequency", [1.0, 50.0])
+def test_losses_of_a_triangular_flux(frequency):
+    B = 1.5 * hs.signals.triangle(-1.0, 1.0, cycles=1, samples_per_cycle=40)
+    rate, path, sample_time = 4.0 * 1.5 * frequency, 4.0 * 1.5, 1.0 / (40 * frequency)
+
+    def per_cycle(part):
+        return float(part.response(B, sample_time)[1:] @ np.diff(B))
+
+    assert per_cycle(hs.Dashpot(c=0.02)) == pytest.approx(0.02 * rate * path, rel=1e-12)
+    assert per_cycle(hs.ExcessLoss(c=0.5)) == pytest.approx(0.5 * np.sqrt(rate) * path, rel=1e-12)
+
+
+def test_excess_loss_of_a_sinusoidal_flux_is_bertottis():
+    """W = 4 c B^(3/2) (2 pi f)^(1/2) times the integral of cos^(3/2) over a quarter, 8.76 c B^(3/2) f^(1/2)."""
+    n, frequency = 4000, 50.0
+    B = 1.2 * np.sin(2.0 * np.pi * np.arange(n + 1) / n)
+    H = hs.ExcessLoss(c=0.5).response(B, 1.0 / (n * frequency))
+    quarter = 0.5 * beta(1.25, 0.5)
+    expected = 0.5 * 4.0 * quarter * 1.2**1.5 * np.sqrt(2.0 * np.pi * frequency)
+    assert 4.0 * quarter * np.sqrt(2.0 * np.pi) == pytest.approx(8.76, abs=5e-3)
+    assert float(H[1:] @ np.diff(B)) == pytest.approx(expected, rel=1e-5)  # velocities by 4 000 chords
+
+
+def test_excess_loss_steps_and_continues_as_it_responds():
+    u, part = np.random.default_rng(1).normal(size=30), hs.ExcessLoss(c=0.7)
+    y = part.response(u, 0.1)
+    step, parameters, state = part.compiled(u[0], sample_time=0.1)
+    assert [step(parameters, state, value) for value in u] == y.tolist()
+    head, state = part.advance(u[:11], 0.1)
+    assert [*head, *part.advance(u[11:], 0.1, state)[0]] == y.tolist()
+    assert part.response(-u, 0.1).tolist() == (-y).tolist()
+
+
+def test_the_parts_beside_a_line_are_identified_together():
+    t = np.linspace(0.0, 0.1, 200)
+    B = np.sin(2.0 * np.pi * 50.0 * t) + 0.2 * np.sin(2.0 * np.pi * 230.0 * t)
+    parts = hs.Dashpot(c=0.01), hs.ExcessLoss(c=0.4)
+    record = hs.Record(u=B, y=3.0 * B + sum(part.response(B, t[1]) for part in parts), t=t)
+    fit = hs.identify(hs.Sum.structure(hs.Line, hs.Dashpot, hs.ExcessLoss), record)
+    assert fit.estimates["dashpot.c"] == pytest.approx(0.01, rel=1e-6)
+    assert fit.estimates["excess_loss.c"] == pytest.approx(0.4, rel=1e-6)
