@@ -1091,9 +1091,9 @@ def jiles_atherton(result: Result) -> list[str]:
         f"{count(digits['laws'])} laws are {error_of(digits['median'])} of the range wrong in the median and "
         f"{error_of(digits['worst'])} at worst, against dM/dH integrated with 30 digits. More samples on a branch "
         f"change {wrong[0]} of {count(there['cases'])} hostile laws, and {wrong[1]} of the inverses of as many, by "
-        f"more than 1e-11 of the range and the roundings, at worst by {number(max(there['worst_share'], 1.0), 2)} and "
-        f"{number(max(back['worst_share'], 1.0), 2)} times that ({count(there['jumping'])} of the laws jump, in one step "
-        "and in many); driven by B, "
+        "more than 1e-11 of the range and the roundings, at worst by "
+        f"{number(max(there['worst_share'], 1.0), 2)} and {number(max(back['worst_share'], 1.0), 2)} times that "
+        f"({count(there['jumping'])} of the laws jump, in one step and in many); driven by B, "
         f"{count(trip['laws'])} laws return it to {error_of(trip['worst'])} of the range at worst.",
         f"With 200 and 2 000 steps a stroke Runge and Kutta's rule over H is {span(column(coarse, 'error'), 2)} and "
         f"{span(column(fine, 'error'), 2)} wrong and takes {span(column(coarse + fine, 'times_hysim'), 2)} of hysim's "
