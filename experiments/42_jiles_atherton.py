@@ -189,7 +189,7 @@ def draw(rows: list[Row], digits: list[float]) -> Figure:
             schemes.loglog(steps, errors, marker=marker, ls=dashes, color=colour, ms=4, lw=1.0, label=label)
     schemes.axhline(max(digits), color=OWN, label="hysim, any number")
     schemes.set(xlabel="Steps a stroke", ylabel="Error of M [range]", ylim=(FLOOR, 100.0))
-    schemes.legend(loc="center right")
+    schemes.legend(loc="lower left", bbox_to_anchor=(0.0, 0.12))
     share = np.arange(1, len(digits) + 1) / len(digits)
     sure.step(np.maximum(sorted(digits), FLOOR), share, where="post", color=OWN)
     sure.set(xscale="log", xlabel="Error against 30 digits [range]", ylabel="Share of the laws", ylim=(0.0, 1.02))

@@ -266,8 +266,10 @@ def allowed(wanted: Wanted, u: Array, errors: Spread) -> tuple[Array, Array]:
     law, case = wanted.law, Case(wanted.law, np.array([wanted.u0]), u, wanted.kept)
     before = np.array([wanted.y0])
     own = size(law, case.before, u, wanted.y) + np.abs(wanted.y) + abs(wanted.y0)
-    if isinstance(law, hs.JilesAtherton):  # the field is what is left of the effective field without alpha M
-        own = own + abs(law.feedthrough * law.alpha) * max(law.Ms, abs(law.z0))
+    if isinstance(law, hs.JilesAtherton):  # the field is what is left of the effective field without alpha M, and
+        most = law.Ms + abs(law.z0)  # a rounding of it moves M by up to most / k
+        field = np.maximum(np.abs(u), abs(wanted.u0)) + abs(law.alpha) * most
+        own = own + abs(law.feedthrough * law.alpha) * most + abs(law.gain) * most * field / law.k / SOLVED
     at_y = (SOLVED + LAST_SUM) * UNIT * own
     rounded_u = LAST_SUM * UNIT * np.maximum(np.abs(u), abs(wanted.u0))
     if isinstance(law, hs.PrandtlIshlinskii | hs.ModifiedPrandtlIshlinskii | hs.RateDependentPrandtlIshlinskii):
