@@ -10,6 +10,36 @@ from square_dahl import SquareDahl
 
 import hysim as hs
 
+
+@hs.family
+class Slider(hs.Law):
+    """A law that works out a number from its parameters, and whose start moves the memory, as that of Duhem's does."""
+
+    k: float = 2.0
+    z0: float = 0.1
+
+    workspace = 1
+
+    @classmethod
+    def candidates(cls):
+        """None: it is for this file."""
+        return {}
+
+    @staticmethod
+    def start(parameters, state, u0):
+        """Complete a state (u, z, 1/k)."""
+        state[0] = u0
+        state[1] -= 0.5 * u0
+        state[2] = 1.0 / parameters[0]
+
+    @staticmethod
+    def step(parameters, state, u):
+        """Output z after a stroke to `u`."""
+        state[1] += (u - state[0]) * state[2]
+        state[0] = u
+        return state[1]
+
+
 U = hs.signals.triangle(-1.0, 1.0, cycles=1, samples_per_cycle=40) * 1.0
 SUPPLIES = (1.0, 2.0, 4.0)
 DEPENDS = {"threshold": ("T", 1), "gain": ("T", 2)}
@@ -150,8 +180,10 @@ def transcribed(law_at, u, channel):
         (hs.Play(z0=0.4), (polynomial("threshold", 0.0, 0.9),)),
         (hs.Dahl(), (polynomial("coulomb", 0.1, 2.0), polynomial("stiffness", 5.0, 1.0))),
         (SquareDahl(), (polynomial("k", 0.5, 9.0), polynomial("c", 0.0, 1.0))),
+        (hs.MaxwellSlip(stiffness=(1.0, 2.0), slips=(0.2, 0.5)), (polynomial("slips[0]", 0.1, 0.3),)),
+        (Slider(), (polynomial("k", 0.5, 3.0),)),
     ],
-    ids=["BoucWen", "exponent", "Play", "Dahl", "SquareDahl"],
+    ids=["BoucWen", "exponent", "Play", "Dahl", "SquareDahl", "MaxwellSlip", "Slider"],
 )
 def test_parameters_along_an_input_are_those_of_the_sample_at_the_end_of_each_branch(law, polynomials):
     rng = np.random.default_rng(5)
