@@ -124,6 +124,19 @@ def test_a_channel_that_varies_along_one_record_determines_the_polynomials():
     np.testing.assert_allclose(rec.y - fit.residual, truth.response(u, channels={"T": T}), atol=1e-12)
 
 
+@pytest.mark.parametrize("name", ["a", "alpha", "Ms", "gain"])
+def test_the_magnetisation_is_kept_where_a_constant_of_a_core_changes(name):
+    law = hs.JilesAtherton()
+    u, T = 3000.0 * np.sin(np.linspace(0.0, 12.0, 60)), np.linspace(20.0, 80.0, 60)
+    value = law.scalars[name]
+    core = hs.Dependent(law=law, polynomials=(polynomial(name, value, 1.2 * value, at=(20.0, 80.0)),))
+    y, (field, magnetisation) = [], (u[0], law.z0)
+    for k in range(u.size):
+        output, state = core.at(T=float(T[k])).advance(u[k : k + 1], (field, magnetisation, 0.0))
+        (field, magnetisation), _ = state[:2], y.append(output[0])
+    np.testing.assert_allclose(core.response(u, channels={"T": T}), y, rtol=0.0, atol=1e-13 * np.ptp(y))
+
+
 def test_weights_leave_a_record_out():
     wrong = record(hs.Play(threshold=0.9, gain=-3.0), 3.0)
     every = [*records(), wrong]

@@ -93,8 +93,8 @@ class Law(Composable, ABC):
         Whether one step along a monotone stroke leaves the memory of many, to rounding: a steady cycle is then sought
         at its turning points alone, from the memory after a stroke from the input zero.
     resume : staticmethod, optional
-        A kernel ``resume(parameters, before, state)`` that makes a workspace ready for other parameters than those
-        `before`; by default it is made anew by the start.
+        A kernel ``resume(parameters, before, state)`` that makes the state ready for other parameters than those
+        `before`; by default a workspace is made anew by the start.
     """
 
     step: ClassVar[Any]

@@ -83,6 +83,14 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     return output(state, parameters)
 
 
+@kernel
+def resume(parameters: FloatArray, before: FloatArray, state: FloatArray) -> None:
+    """Make the state ready for other parameters: M_irr stays, and He is that of the last field."""
+    for k in (FIELD, COUPLING, REVERSIBLE, FEEDBACK, ANISOTROPY):
+        if parameters[k] != before[k]:
+            state[2] = 0.0
+
+
 @inner
 def output(state: FloatArray, parameters: FloatArray) -> float:
     """Output in a state, infinite after a jump."""

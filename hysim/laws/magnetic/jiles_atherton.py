@@ -112,6 +112,7 @@ class JilesAtherton(Law):
 
     searched = tuple(Parameter(name, affine=True) for name in ("gain", "feedthrough", "offset"))
     step = staticmethod(kernels.step)
+    resume = staticmethod(kernels.resume)
     exact_strokes: ClassVar[bool] = True
 
     @classmethod
