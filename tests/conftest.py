@@ -13,7 +13,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 STRUCTURES = (
-    *("test_structure", "plants/structures/", "[structures", "_structures_", "_frame]", "structure_ensembles"),
+    *("test_structure", "plants/structures/", "[structures", "[friction]", "_structures", "_frame]", "structure_ensembles"),
     *("_in_structures", "[friction]"),
 )
 

@@ -77,7 +77,7 @@ def test_names_are_text_wherever_they_stand(name):
 
 def test_a_page_that_would_be_too_large_says_what_to_do(tmp_path):
     u = np.random.default_rng(1).random(20_000)
-    with pytest.raises(ValueError, match=r"the page would have \d+ bytes, more than 250000: .*20000 samples"):
+    with pytest.raises(ValueError, match=r"the page would have \d+ bytes, more than 300000: .*20000 samples"):
         to_page(hs.Line(slope=2.0), tmp_path / "law.html", hs.Record(u=u, y=u))
     assert not list(tmp_path.iterdir())
 
