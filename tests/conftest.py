@@ -13,8 +13,13 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 STRUCTURES = (
-    *("test_structure", "plants/structures/", "[structures", "[friction]", "_structures", "_frame]", "structure_ensembles"),
-    *("_in_structures", "[friction]"),
+    "test_structure",
+    "plants/structures/",
+    "[structures",
+    "_structures",
+    "_frame]",
+    "_ensembles]",
+    "[friction]",
 )
 
 # numba's cache does not see an edit in another file: it is kept apart for each state of the kernels.
