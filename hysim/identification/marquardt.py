@@ -43,7 +43,7 @@ class Schedule:
 
 
 Evaluated = tuple[FloatArray, ...]
-"""What was evaluated at points, arrays of n rows."""
+"""Values at points, arrays of n rows."""
 
 
 class Trial(NamedTuple):

@@ -86,7 +86,7 @@ def gap_part(u: float, rise: float, b: float, duration: float, time: float, gap:
 
 @inlined
 def torque(x: float, rate: float, b: float, stiffness: float, damping: float, gap: float) -> float:
-    """What the shaft carries: nothing in the gap, and no side pulls."""
+    """Torque of the shaft: zero in the gap, and neither side pulls the other."""
     load = stiffness * x + damping * rate
     if (b >= gap and load > 0.0) or (b <= -gap and load < 0.0):
         return load
