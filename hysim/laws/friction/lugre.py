@@ -130,7 +130,7 @@ class LuGre(RatedLaw):
 
         For a constant sigma1 the condition sigma2 >= sigma1 (breakaway / coulomb - 1) is necessary and sufficient (N.
         Barabanov and R. Ortega, IEEE Trans. Automatic Control 45, 2000, 2028-2032). With a damping_velocity it is
-        sufficient that sigma1(v) |v| <= 4 coulomb at every speed, which False does not deny.
+        sufficient that ``sigma1(v) |v| <= 4 coulomb`` at every speed, which False does not deny.
 
         Examples
         --------

@@ -24,7 +24,7 @@ _SAME = 1e-9  # relative difference of numbers that are the same
 
 @family
 class Chan(BranchLaw):
-    """Chan's law of magnetic cores, that of LTspice's inductors: branches of x / (|x| + knee), translated vertically.
+    """Chan's law of magnetic cores, that of LTspice's inductors: hyperbolic branches, translated vertically.
 
     ::
 

@@ -137,6 +137,11 @@ class Dependent:
         **channels : float
             Values of the channels by name.
 
+        Returns
+        -------
+        law
+            Of the class of `law`, with the parameters there.
+
         Raises
         ------
         ValueError
