@@ -124,6 +124,13 @@ def test_a_channel_that_varies_along_one_record_determines_the_polynomials():
     np.testing.assert_allclose(rec.y - fit.residual, truth.response(u, channels={"T": T}), atol=1e-12)
 
 
+def test_a_batch_starts_each_law_as_one_alone():
+    sets = {"k": [1.0, 2.0, 5.0], "z0": [0.1, 0.2, -0.3]}
+    rows = Slider.responses(sets, U)
+    for k, (stiffness, z0) in enumerate(zip(*sets.values(), strict=True)):
+        assert np.array_equal(rows[k], Slider(k=stiffness, z0=z0).response(U))
+
+
 @pytest.mark.parametrize("name", ["a", "alpha", "Ms", "gain"])
 def test_the_magnetisation_is_kept_where_a_constant_of_a_core_changes(name):
     law = hs.JilesAtherton()

@@ -13,7 +13,7 @@ from numba import float64, int64, types, void
 
 from hysim._frozen import FloatArray
 from hysim.kernels._compile import inlined, signed_kernel
-from hysim.kernels.stepping import STEP, Step, drive
+from hysim.kernels.stepping import START, STEP, Start, Step, drive
 
 TABLE = types.Array(float64, 2, "C", readonly=True)
 ROWS = types.Array(float64, 2, "C")
@@ -29,9 +29,10 @@ def begin(state: FloatArray, memory: FloatArray, first: float) -> None:
     state[0] = first
 
 
-@signed_kernel(void(STEP, TABLE, TABLE, int64, TABLE, ROWS, int64, int64))
+@signed_kernel(void(STEP, START, TABLE, TABLE, int64, TABLE, ROWS, int64, int64))
 def drive_each(
     step: Step,
+    begun: Start,
     parameters: FloatArray,
     memory: FloatArray,
     scratch: int,
@@ -40,12 +41,13 @@ def drive_each(
     start: int,
     stop: int,
 ) -> None:
-    """Outputs of the laws `start` to `stop - 1`; one that diverges is a row of inf."""
+    """Outputs of the laws `start` to `stop - 1`, which `begun` starts; one that diverges is a row of inf."""
     state = np.zeros(memory.shape[1] + scratch)
     for i in range(start, stop):
         row = u[min(i, u.shape[0] - 1)]
         if row.size == 0:
             continue
         begin(state, memory[i], row[0])
+        begun(parameters[i], state, row[0])
         if drive(step, parameters[i], state, row, out[i]) >= 0:
             out[i] = math.inf

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, checked, read_only
 from hysim.models.batch import Reduction
-from hysim.models.compiled_step import compiled_step
+from hysim.models.compiled_step import compiled_start, compiled_step
 from hysim.models.law import Law, Packed, rows_by_step
 from hysim.models.parameters import Parameter, declared_space
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
@@ -116,7 +116,7 @@ class CustomLaw(Law):
         return Packed(constants, np.concatenate(memory, axis=1))
 
     def rows(self, tables: Tables, u: FloatArray, y: FloatArray) -> None:  # type: ignore[override]
-        rows_by_step(compiled_step(self.step), self.pack(tables), 0, u, y)
+        rows_by_step(compiled_step(self.step), compiled_start(self.start), self.pack(tables), 0, u, y)
 
     def responses(  # type: ignore[override]
         self,

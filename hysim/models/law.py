@@ -22,7 +22,7 @@ from hysim._frozen import FloatArray, items, read_only
 from hysim._parallel import in_pieces
 from hysim.errors import SimulationError
 from hysim.kernels import stepping
-from hysim.kernels.stepping import Step, drive
+from hysim.kernels.stepping import Start, Step, drive
 from hysim.models.batch import Batch, Reduction, Sets
 from hysim.models.compiled_step import compiled_start, compiled_step
 from hysim.models.composable import Composable
@@ -73,7 +73,8 @@ class Law(Composable, ABC):
         ``step(parameters, state, u) -> y``, a plain function that numba can compile, or a kernel.
     start : staticmethod
         ``start(parameters, state, u0)``, likewise, which completes for a first input the state that `pack` has and the
-        workspace behind it; by default the last input is the first one.
+        workspace behind it, whatever is there; by default the last input is the first one. A steady cycle is computed
+        without it.
     initial : tuple of str
         Fields that are the initial memory; they stand in the state behind the last input. By default ``("z0",)``.
     searched : tuple of Parameter
@@ -140,7 +141,7 @@ class Law(Composable, ABC):
 
         `u` is (1, n_samples) or (n_sets, n_samples).
         """
-        rows_by_step(compiled_step(cls.step), cls.pack(tables), cls.workspace, u, y)
+        rows_by_step(compiled_step(cls.step), compiled_start(cls.start), cls.pack(tables), cls.workspace, u, y)
 
     @classmethod
     def order(cls, tables: Tables) -> npt.NDArray[np.intp] | None:
@@ -605,10 +606,10 @@ def _batch(
     return Batch(compute, len(next(iter(tables.values()))), u, order)
 
 
-def rows_by_step(step: Step, laws: Packed, workspace: int, u: FloatArray, y: FloatArray) -> None:
+def rows_by_step(step: Step, start: Start, laws: Packed, workspace: int, u: FloatArray, y: FloatArray) -> None:
     """Outputs of many laws into `y`, sample by sample; see `Law.rows`."""
     from hysim.kernels.batches import drive_each  # compiled where it is needed
 
     parameters, memory = (read_only(table, finite=False) for table in laws)
     with np.errstate(all="ignore"):
-        drive_each(step, parameters, memory, workspace, u, y, 0, len(y))
+        drive_each(step, start, parameters, memory, workspace, u, y, 0, len(y))
