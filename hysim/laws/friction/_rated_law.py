@@ -151,7 +151,7 @@ class RatedLaw(Identifiable, Composable, ABC):
     def rated(self) -> Startable:
         """The law as an element of a structure takes it, without the dashpot of `viscosity`.
 
-        The strokes are slow at first: they take for ever.
+        Before the first stroke its duration is infinite: the law is at rest.
         """
         parameters, memory = self.at_sample_time(1.0).packed
         state = np.concatenate([memory[:1], np.zeros(N_RATED - 1), memory[1:]])
