@@ -314,14 +314,17 @@ class Problem:
         return np.asarray(least_squares(normalised, target) / norms)
 
     def _bounded(self, columns: FloatArray, target: FloatArray, norms: FloatArray) -> FloatArray:
+        """Solutions within the bounds: the free ones where they are, for they are best; else by active bounds."""
         from scipy.optimize import lsq_linear
 
         lower, upper = self.linear_box()
-        solutions = [
-            lsq_linear(one, goal, bounds=(lower * norm, upper * norm), method="bvls").x / norm
-            for one, goal, norm in zip(*triangle(columns, target), norms, strict=True)
-        ]
-        return np.array(solutions).reshape(len(columns), lower.size)
+        rows, goals = triangle(columns, target)
+        solutions = np.asarray(least_squares(rows, goals) / norms)
+        outside = np.flatnonzero(((solutions < lower) | (solutions > upper)).any(axis=1))
+        for k in outside:
+            box = lower * norms[k], upper * norms[k]
+            solutions[k] = lsq_linear(rows[k], goals[k], bounds=box, method="bvls").x / norms[k]
+        return solutions
 
     def linear_box(self) -> tuple[FloatArray, FloatArray]:
         limits = [self.space.bounds.get(name, (-np.inf, np.inf)) for name in self.space.linear]
