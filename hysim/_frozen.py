@@ -59,9 +59,7 @@ def read_only(
     array = _as_float_array(values, name)
     if ndim is not None and array.ndim != ndim:
         raise ValueError(
-            f"{name} must have {ndim} axis, got shape {array.shape}"
-            if ndim == 1
-            else f"{name} must have {ndim} axes, got shape {array.shape}"
+            wrong_axes(name, array) if ndim == 1 else f"{name} must have {ndim} axes, got shape {array.shape}"
         )
     if finite and not np.isfinite(array).all():
         place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
@@ -69,6 +67,12 @@ def read_only(
         raise ValueError(f"{name} must be finite, got {array[place]} at index {index}")
     array.setflags(write=False)
     return array
+
+
+def wrong_axes(name: str, array: npt.NDArray[Any]) -> str:
+    """Message for an array in place of a vector, with what to do where it has rows and columns."""
+    mend = "np.ravel makes it flat" if 1 in array.shape else f"take one column, {name}[:, 0]"
+    return f"{name} must have 1 axis, got shape {array.shape}{f': {mend}' if array.ndim == 2 else ''}"
 
 
 def vectors(**values: npt.ArrayLike) -> list[FloatArray]:

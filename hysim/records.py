@@ -18,7 +18,7 @@ from hysim._channels import Channels, along, checked_channels, taken, value_in
 from hysim._cycles import TOLERANCE, complete_cycles, turns
 from hysim._drift import drift
 from hysim._excursions import full_amplitude, protocol
-from hysim._frozen import FloatArray, checked
+from hysim._frozen import FloatArray, checked, wrong_axes
 from hysim._prefixes import power_of_ten
 from hysim._printing import extent, printed, quantity, summary_text
 from hysim._resolution import output_quantum
@@ -86,7 +86,7 @@ class Record:
     def __post_init__(self) -> None:
         for name, values in self._signals().items():
             if values.ndim != 1:
-                raise ValueError(f"{name} must have one axis, got shape {values.shape}")
+                raise ValueError(wrong_axes(name, values))
             if values.size != self.u.size:
                 raise ValueError(f"u and {name} must have equal lengths, got {self.u.size} and {values.size}")
         if self.u.size < 2:
