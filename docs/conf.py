@@ -12,11 +12,13 @@ sys.path[:0] = [str(HERE), str(HERE.parent / "experiments")]
 
 from findings import lag_of_equation_1, preisach  # noqa: E402  from experiments
 from front_door import families, write_reference  # noqa: E402  from beside this file
+from gallery import DRAWN, draw_families, family_cards, picture_cards, plant_cards  # noqa: E402
 from table import answer  # noqa: E402  from experiments
 
 project = "hysim"
 version = release = hysim.__version__
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "mathml"]
+html_math_renderer = "mathml"
 exclude_patterns = ["_build"]
 templates_path = ["_templates"]
 default_role = "py:obj"
@@ -29,7 +31,6 @@ html_show_copyright = False
 html_static_path = ["_static"]
 html_css_files = ["page.css"]
 
-autosummary_generate = True
 autodoc_typehints = "none"  # the docstrings say types with shapes and units
 numpydoc_show_class_members = False  # the class template lists them, inherited ones too
 numpydoc_xref_param_type = False
@@ -40,7 +41,7 @@ numpydoc_validation_checks = {"all", *_LEFT_OUT}
 # Without a Parameters section a docstring says in its sentences what goes in and comes out; with one it says all.
 numpydoc_validation_overrides = {check: [r"\A(?![\s\S]*Parameters\n *---)"] for check in ("PR01", "RT01")}
 
-myst_enable_extensions = ["substitution", "deflist"]
+myst_enable_extensions = ["substitution", "deflist", "dollarmath", "colon_fence"]
 myst_heading_anchors = 3
 
 
@@ -102,6 +103,9 @@ def table1_models() -> str:
 
 myst_substitutions = {
     "families": families(),
+    "gallery_families": family_cards(),
+    "gallery_plants": plant_cards(),
+    "gallery_pictures": picture_cards(),
     "table1_models": table1_models(),
     "recovery_figure": shown(
         {
@@ -130,4 +134,5 @@ myst_substitutions = {
     ),
 }
 
-write_reference(HERE / "reference")
+autosummary_generate = write_reference(HERE / "reference")
+draw_families(HERE / DRAWN)

@@ -1,9 +1,10 @@
-"""The API reference from the front door: every public name, in the order and grouping of `hysim.__all__`.
+"""The API reference from the front door: every public name, grouped by what it is for.
 
 A name that is added there appears here without an edit.
 """
 
 import inspect
+import re
 from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
@@ -15,33 +16,73 @@ from hysim.models.law import Law
 from hysim.models.model import every_family
 from hysim.models.protocols import Invertible, StepwiseInvertible
 
+GROUPS = {
+    "Records and files": ("records", "files"),
+    "Simulation and measures": ("simulation", "metrics"),
+    "Identification": ("identification",),
+    "Comparison": ("comparison",),
+    "Discovery": ("discovery",),
+    "Bouc-Wen, Duhem and other differential laws": ("laws.differential",),
+    "Plays, stops and relays": ("laws.operators",),
+    "Friction, backlash and dashpots": ("laws.friction", "laws.dashpot"),
+    "Magnetic cores": ("laws.magnetic", "laws.operators.energy_plays"),
+    "Laws without memory": ("laws.static",),
+    "Laws of your own": ("laws.custom", "models.law", "models.model", "models.parameters"),
+    "Sums, cascades and channels": ("models",),
+    "Actuators and linear plants": ("plants",),
+    "Structures": ("plants.structures",),
+    "Control": ("control",),
+    "Files of models, C, FMU and pages": ("models.storage", "export"),
+    "Studies": ("sweeps",),
+    "Errors and versions": ("errors", "_versions"),
+}
+"""Headings of the reference, and the parts of hysim that hold what stands under them; the longest part decides."""
 
-def write_reference(folder: Path) -> None:
-    """Write `index.rst`, from which autosummary makes a page for each name."""
+
+def write_reference(folder: Path) -> list[str]:
+    """Write `index.rst` and a page for each group; return these, from which autosummary makes a page for each name."""
+    pages = {_file_of(heading): _page(heading, text) for heading, text in _groups().items()}
+    listed = "".join(f"   {name}\n" for name in pages)
+    head = "``import hysim as hs`` loads nothing but the standard library; each name is loaded when it is first used.\n"
+    pages["index"] = _page("Reference", f"{head}\n.. toctree::\n   :maxdepth: 2\n\n{listed}")
+    folder.mkdir(exist_ok=True)
+    files = {folder / f"{name}.rst": text for name, text in pages.items()}
+    if any(not file.exists() or file.read_text() != text for file, text in files.items()):  # else nothing is built anew
+        for old in folder.glob("*.rst"):  # of names that are no more
+            old.unlink()
+        for file, text in files.items():
+            file.write_text(text)
+    return [f"{folder.name}/{file.name}" for file in files]
+
+
+def _groups() -> dict[str, str]:
+    """What stands under each heading; public modules have one of their own, for what the front door does not have."""
     public = {name: getattr(hysim, name) for name in hysim.__all__ if not name.startswith("_")}
     modules = {name: value for name, value in public.items() if inspect.ismodule(value)}
     names = {name: value for name, value in public.items() if name not in modules}
-    parts = [
-        _heading("Reference", "="),
-        "``import hysim as hs`` loads nothing but the standard library; each name is loaded when it is first used.\n",
-        ".. currentmodule:: hysim\n",
-    ]
-    for home in dict.fromkeys(map(_home, names.values())):
-        parts += [_heading(home.capitalize(), "-"), _summary(name for name in names if _home(names[name]) == home)]
+    headings = {name: heading_of(value) for name, value in names.items()}
+    order = [heading for heading in dict.fromkeys([*GROUPS, *headings.values()]) if heading in headings.values()]
+    groups = {heading: _summary(name for name in names if headings[name] == heading) for heading in order}
     for name, module in modules.items():
         members = [member for member in _members(module) if getattr(module, member) not in names.values()]
-        parts += [_heading(f"hysim.{name}", "-"), _first_line(module), _summary(f"{name}.{each}" for each in members)]
-    folder.mkdir(exist_ok=True)
-    page, text = folder / "index.rst", "\n".join(parts)
-    if not page.exists() or page.read_text() != text:  # an unchanged page is not built anew
-        for old in folder.glob("*.rst"):  # of names that are no more
-            old.unlink()
-        page.write_text(text)
+        groups[f"hysim.{name}"] = f"{_first_line(module)}\n{_summary(f'{name}.{each}' for each in members)}"
+    return groups
 
 
-def _home(value: Any) -> str:
-    """Second part of the module's name: hysim.identification._identify is of the identification."""
-    return str(value.__module__).split(".")[1].strip("_")
+def heading_of(value: Any) -> str:
+    """The heading of the longest part of hysim that holds a value; for a part that is not listed, its name."""
+    home = str(value.__module__).removeprefix("hysim.")
+    listed = {part: heading for heading, parts in GROUPS.items() for part in parts}
+    holding = [part for part in listed if f"{home}.".startswith(f"{part}.")]
+    return listed[max(holding, key=len)] if holding else home.split(".")[0].strip("_").capitalize()
+
+
+def _file_of(heading: str) -> str:
+    return "group-" + re.sub(r"\W+", "-", heading.lower())
+
+
+def _page(heading: str, text: str) -> str:
+    return f"{_heading(heading, '=')}\n.. currentmodule:: hysim\n\n{text}"
 
 
 def _members(module: ModuleType) -> Iterable[str]:

@@ -1,0 +1,168 @@
+"""The gallery: a loop of every family of laws, and the pages' figures of every plant and of every picture.
+
+Nothing is listed here. The families are those of the registry, each as its docstring's example makes it, or as the
+explorer shows it; the figures of the others are what the first block of a page that calls them has drawn.
+"""
+
+import ast
+import doctest
+import inspect
+import re
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from front_door import GROUPS, heading_of
+from numpy.typing import NDArray
+
+import hysim as hs
+from hysim.export._page_presets import presets
+from hysim.models.model import every_family
+
+HERE = Path(__file__).parent
+DRAWN = "gallery_figures"  # beside this file, not kept
+
+_AMPLITUDES = np.geomspace(1e-6, 1e3, 19)
+_PERIOD = 1.0  # s, where a law asks for a sample time
+_PART = re.compile(r"^```python\n(.*?)^```|!\[[^\]]*\]\((figures/[\w-]+\.(?:svg|gif))\)", re.MULTILINE | re.DOTALL)
+
+
+def families() -> dict[str, type]:
+    """The laws of the registry, by their names."""
+    return {name: each for name, each in every_family().items() if each.__module__.startswith("hysim.laws")}
+
+
+def plants() -> dict[str, type]:
+    """What moves in time, by its public name: the plants of the registry that respond to an input."""
+    registered = every_family().items()
+    return {
+        name: each
+        for name, each in registered
+        if each.__module__.startswith("hysim.plants") and hasattr(each, "response")
+    }
+
+
+def pictures() -> dict[str, Any]:
+    """Functions of `hs.plot` that draw a result, by their names: those with an argument `ax` or `axes`."""
+    public = {name: getattr(hs.plot, name) for name in hs.plot.__all__}
+    return {
+        name: each
+        for name, each in public.items()
+        if inspect.isfunction(each) and {"ax", "axes"} & inspect.signature(each).parameters.keys()
+    }
+
+
+def draw_families(folder: Path) -> None:
+    """Draw a loop of every family, a file for each."""
+    folder.mkdir(exist_ok=True)
+    for name in families():
+        law, between, units = _shown(name)
+        u, y = _loop(law, between)
+        with hs.plot.house_style():
+            canvas = hs.plot.figure(3.2, 2.4)
+            hs.plot.loop(hs.Simulation(u=u, y=y, units=units), ax=canvas.add_subplot())
+        hs.plot.save_svg(canvas, folder / f"{name}.svg")
+
+
+def family_cards() -> str:
+    """A card for each family, under the headings of the reference: its loop, its name and what it is."""
+    headings = {name: heading_of(each) for name, each in families().items()}
+    groups = [heading for heading in GROUPS if heading in headings.values()]
+    return "\n\n".join(
+        f"**{group}**\n\n"
+        + _cards(
+            (f"{DRAWN}/{name}.svg", f"hysim.{name}", name, each)
+            for name, each in families().items()
+            if headings[name] == group
+        )
+        for group in groups
+    )
+
+
+def plant_cards() -> str:
+    """A card for each plant that a page has drawn."""
+    return _cards((_figure(f"hs.{name}"), f"hysim.{name}", name, each) for name, each in plants().items())
+
+
+def picture_cards() -> str:
+    """A card for each picture."""
+    return _cards((_figure(f"hs.plot.{name}"), f"hysim.plot.{name}", name, each) for name, each in pictures().items())
+
+
+def _cards(entries: Iterable[tuple[str, str, str, Any]]) -> str:
+    cards = [
+        f":::{{container}} card\n[![{name}]({figure})](reference/{page}.rst)\n\n"
+        f"[{name}](reference/{page}.rst): {_first_sentence(value)}\n:::"
+        for figure, page, name, value in entries
+    ]
+    return "\n".join(["::::{container} gallery", *cards, "::::"])
+
+
+def _first_sentence(value: Any) -> str:
+    return f"{inspect.getdoc(value)}".split("\n\n")[0].replace("\n", " ").replace("``", "`")
+
+
+def _figure(call: str) -> str:
+    """The first figure that a page has drawn with this call; LookupError where there is none."""
+    for code, figure in figures_by_code():
+        if re.search(rf"{re.escape(call)}\b", code):
+            return figure
+    raise LookupError(f"no page of docs/ has a figure of {call}: draw one, in plots.md for instance")
+
+
+@cache
+def figures_by_code() -> list[tuple[str, str]]:
+    """For each figure of a page, the code since the figure before it; the page on plots comes first."""
+    found = []
+    for page in sorted(HERE.glob("*.md"), key=lambda page: (page.stem != "plots", page)):
+        code = ""
+        for block, figure in _PART.findall(page.read_text()):
+            code += block
+            if figure:
+                found.append((code, figure))
+                code = ""
+    return found
+
+
+def _shown(name: str) -> tuple[Any, tuple[float, float] | None, dict[str, str]]:
+    """A law of a family, the input between which it shows its loop, if that is known, and units."""
+    for each in presets().values():
+        if type(each.model).__name__ == name:
+            return each.model, each.between, dict(each.units)
+    return _example(name), None, {}
+
+
+def _example(name: str) -> Any:
+    """What the example of a docstring makes by the constructor of its family."""
+    examples = doctest.DocTestParser().get_examples(f"{inspect.getdoc(getattr(hs, name))}")
+    tree = ast.parse("".join(each.source for each in examples))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == f"hs.{name}":
+            return eval(ast.unparse(node), {"hs": hs, "np": np})
+    raise LookupError(f"no example of {name} calls hs.{name}")
+
+
+def _loop(law: Any, between: tuple[float, float] | None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """A fading input, and what a law makes of it."""
+    low, high = between or _telling(law)
+    u = hs.signals.decaying_sine(0.5 * (high - low), mean=0.5 * (low + high), cycles=4, samples_per_cycle=100)
+    return u, _response(law, u)
+
+
+def _telling(law: Any) -> tuple[float, float]:
+    """The amplitude, of two in each decade, at which the shape of the loop changes most; 1 where it never does."""
+    phase = np.sin(np.linspace(0.0, 4.0 * np.pi, 201))
+    loops = np.array([_response(law, amplitude * phase) for amplitude in _AMPLITUDES])[:, 101:]
+    strokes = np.ptp(loops, axis=1)
+    shapes = (loops - loops.mean(axis=1, keepdims=True)) / np.where(strokes > 0.0, strokes, np.inf)[:, None]
+    changes = np.where(strokes[:-1] > 0.0, np.abs(np.diff(shapes, axis=0)).max(axis=1), 0.0)  # not out of a gap
+    best = float(_AMPLITUDES[changes.argmax() + 1]) if changes.max() > 0.01 else 1.0
+    return -best, best
+
+
+def _response(law: Any, u: NDArray[np.float64]) -> NDArray[np.float64]:
+    if "sample_time" in inspect.signature(law.response).parameters:
+        return np.asarray(law.response(u, _PERIOD / 100.0))
+    return np.asarray(law.response(u))
