@@ -17,7 +17,13 @@ from table import answer  # noqa: E402  from experiments
 
 project = "hysim"
 version = release = hysim.__version__
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "mathml"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "numpydoc",
+    "mathml",
+]
 html_math_renderer = "mathml"
 exclude_patterns = ["_build"]
 templates_path = ["_templates"]
@@ -36,10 +42,25 @@ numpydoc_show_class_members = False  # the class template lists them, inherited 
 numpydoc_xref_param_type = False
 # Every check of a docstring but those for sections that only some names need, and for layout that is ours:
 # "[V]" alone may describe a parameter, and "As in the constructor." several without their types.
-_LEFT_OUT = ("ES01", "EX01", "GL01", "GL02", "GL08", "PR04", "PR08", "PR09", "RT03", "SA01", "SS05", "YD01")
+_LEFT_OUT = (
+    "ES01",
+    "EX01",
+    "GL01",
+    "GL02",
+    "GL08",
+    "PR04",
+    "PR08",
+    "PR09",
+    "RT03",
+    "SA01",
+    "SS05",
+    "YD01",
+)
 numpydoc_validation_checks = {"all", *_LEFT_OUT}
 # Without a Parameters section a docstring says in its sentences what goes in and comes out; with one it says all.
-numpydoc_validation_overrides = {check: [r"\A(?![\s\S]*Parameters\n *---)"] for check in ("PR01", "RT01")}
+numpydoc_validation_overrides = {
+    check: [r"\A(?![\s\S]*Parameters\n *---)"] for check in ("PR01", "RT01")
+}
 
 myst_enable_extensions = ["substitution", "deflist", "dollarmath", "colon_fence"]
 myst_heading_anchors = 3
@@ -49,7 +70,9 @@ def shown(experiments: dict[str, str]) -> str:
     """The figure of the first of these experiments that has committed one, above what it shows."""
     for name, caption in experiments.items():
         if (RESULTS / name / "figure.svg").exists():
-            return f"![{caption}](../experiments/results/{name}/figure.svg)\n\n*{caption}*"
+            return (
+                f"![{caption}](../experiments/results/{name}/figure.svg)\n\n*{caption}*"
+            )
     raise FileNotFoundError(f"no figure of {', '.join(experiments)} in {RESULTS}")
 
 
@@ -72,16 +95,24 @@ def benchmark() -> str:
         f"{format(row['seconds'], '.1f') if 'seconds' in row else ''} |"
         for row in [*result["published"], *result["summary"]]
     ]
-    return "\n".join(["| | multisine [m] | sweep [m] | time [s] |", "|---|---|---|---|", *lines])
+    return "\n".join(
+        ["| | multisine [m] | sweep [m] | time [s] |", "|---|---|---|---|", *lines]
+    )
 
 
 def benchmark_errors() -> str:
     """Errors of the parameters in percent, beside those of the published white-box fit, as a table."""
     result = json.loads((RESULTS / "benchmark_bouc_wen" / "result.json").read_text())
-    asked, published = result["asked"]["error_percent"], result["white_box"]["error_percent"]
+    asked, published = (
+        result["asked"]["error_percent"],
+        result["white_box"]["error_percent"],
+    )
     lines = []
     for name in asked:
-        own = [f"{row[f'{name}_error_percent']:.3f} ({row[f'{name}_stderr_percent']:.3f})" for row in result["summary"]]
+        own = [
+            f"{row[f'{name}_error_percent']:.3f} ({row[f'{name}_stderr_percent']:.3f})"
+            for row in result["summary"]
+        ]
         lines.append(f"| {name} | {' | '.join(own)} | {published[name]:g} |")
     heads = [row["method"] for row in result["summary"]]
     first = f"| error (standard error) [%] | {' | '.join(heads)} | {result['white_box']['method']} |"

@@ -27,7 +27,12 @@ GROUPS = {
     "Friction, backlash and dashpots": ("laws.friction", "laws.dashpot"),
     "Magnetic cores": ("laws.magnetic", "laws.operators.energy_plays"),
     "Laws without memory": ("laws.static",),
-    "Laws of your own": ("laws.custom", "models.law", "models.model", "models.parameters"),
+    "Laws of your own": (
+        "laws.custom",
+        "models.law",
+        "models.model",
+        "models.parameters",
+    ),
     "Sums, cascades and channels": ("models",),
     "Actuators and linear plants": ("plants",),
     "Structures": ("plants.structures",),
@@ -41,13 +46,19 @@ GROUPS = {
 
 def write_reference(folder: Path) -> list[str]:
     """Write `index.rst` and a page for each group; return these, from which autosummary makes a page for each name."""
-    pages = {_file_of(heading): _page(heading, text) for heading, text in _groups().items()}
+    pages = {
+        _file_of(heading): _page(heading, text) for heading, text in groups().items()
+    }
     listed = "".join(f"   {name}\n" for name in pages)
     head = "``import hysim as hs`` loads nothing but the standard library; each name is loaded when it is first used.\n"
-    pages["index"] = _page("Reference", f"{head}\n.. toctree::\n   :maxdepth: 2\n\n{listed}")
+    pages["index"] = _page(
+        "Reference", f"{head}\n.. toctree::\n   :maxdepth: 2\n\n{listed}"
+    )
     folder.mkdir(exist_ok=True)
     files = {folder / f"{name}.rst": text for name, text in pages.items()}
-    if any(not file.exists() or file.read_text() != text for file, text in files.items()):  # else nothing is built anew
+    if any(
+        not file.exists() or file.read_text() != text for file, text in files.items()
+    ):  # else nothing is built anew
         for old in folder.glob("*.rst"):  # of names that are no more
             old.unlink()
         for file, text in files.items():
@@ -55,18 +66,33 @@ def write_reference(folder: Path) -> list[str]:
     return [f"{folder.name}/{file.name}" for file in files]
 
 
-def _groups() -> dict[str, str]:
+def groups() -> dict[str, str]:
     """What stands under each heading; public modules have one of their own, for what the front door does not have."""
-    public = {name: getattr(hysim, name) for name in hysim.__all__ if not name.startswith("_")}
+    public = {
+        name: getattr(hysim, name) for name in hysim.__all__ if not name.startswith("_")
+    }
     modules = {name: value for name, value in public.items() if inspect.ismodule(value)}
     names = {name: value for name, value in public.items() if name not in modules}
     headings = {name: heading_of(value) for name, value in names.items()}
-    order = [heading for heading in dict.fromkeys([*GROUPS, *headings.values()]) if heading in headings.values()]
-    groups = {heading: _summary(name for name in names if headings[name] == heading) for heading in order}
+    order = [
+        heading
+        for heading in dict.fromkeys([*GROUPS, *headings.values()])
+        if heading in headings.values()
+    ]
+    found = {
+        heading: _summary(name for name in names if headings[name] == heading)
+        for heading in order
+    }
     for name, module in modules.items():
-        members = [member for member in _members(module) if getattr(module, member) not in names.values()]
-        groups[f"hysim.{name}"] = f"{_first_line(module)}\n{_summary(f'{name}.{each}' for each in members)}"
-    return groups
+        members = [
+            member
+            for member in _members(module)
+            if getattr(module, member) not in names.values()
+        ]
+        found[f"hysim.{name}"] = (
+            f"{_first_line(module)}\n{_summary(f'{name}.{each}' for each in members)}"
+        )
+    return found
 
 
 def heading_of(value: Any) -> str:
@@ -74,7 +100,11 @@ def heading_of(value: Any) -> str:
     home = str(value.__module__).removeprefix("hysim.")
     listed = {part: heading for heading, parts in GROUPS.items() for part in parts}
     holding = [part for part in listed if f"{home}.".startswith(f"{part}.")]
-    return listed[max(holding, key=len)] if holding else home.split(".")[0].strip("_").capitalize()
+    return (
+        listed[max(holding, key=len)]
+        if holding
+        else home.split(".")[0].strip("_").capitalize()
+    )
 
 
 def _file_of(heading: str) -> str:
@@ -87,10 +117,14 @@ def _page(heading: str, text: str) -> str:
 
 def _members(module: ModuleType) -> Iterable[str]:
     """Functions and classes of a public module that are hysim's own."""
-    names = getattr(module, "__all__", [name for name in vars(module) if not name.startswith("_")])
+    names = getattr(
+        module, "__all__", [name for name in vars(module) if not name.startswith("_")]
+    )
     for name in names:
         value = getattr(module, name)
-        if (inspect.isroutine(value) or inspect.isclass(value)) and value.__module__.startswith(module.__name__):
+        if (
+            inspect.isroutine(value) or inspect.isclass(value)
+        ) and value.__module__.startswith(module.__name__):
             yield name
 
 
@@ -100,11 +134,16 @@ def families() -> str:
     for name, family in every_family().items():
         if family.__module__.startswith("hysim.laws"):
             summary = (
-                f"{inspect.getdoc(family)}".split("\n\n")[0].replace("\n", " ").replace("``", "`").replace("|", r"\|")
+                f"{inspect.getdoc(family)}".split("\n\n")[0]
+                .replace("\n", " ")
+                .replace("``", "`")
+                .replace("|", r"\|")
             )
             inverse = _inverse(family)
             identified = "yes" if is_identifiable(family) else ""
-            lines.append(f"| [{name}](reference/hysim.{name}.rst) | {summary} | {identified} | {inverse} |")
+            lines.append(
+                f"| [{name}](reference/hysim.{name}.rst) | {summary} | {identified} | {inverse} |"
+            )
     return "\n".join(lines)
 
 
@@ -112,7 +151,10 @@ def _inverse(family: type) -> str:
     """How the inverse of a law is computed."""
     if not isinstance(family, Invertible):
         return ""
-    own = isinstance(family, StepwiseInvertible) and family.compiled_inverse is not Law.compiled_inverse
+    own = (
+        isinstance(family, StepwiseInvertible)
+        and family.compiled_inverse is not Law.compiled_inverse
+    )
     return "closed form" if own else "search on the step"
 
 
@@ -125,4 +167,6 @@ def _first_line(value: Any) -> str:
 
 
 def _summary(names: Iterable[str]) -> str:
-    return ".. autosummary::\n   :toctree: .\n   :nosignatures:\n\n" + "".join(f"   {name}\n" for name in names)
+    return ".. autosummary::\n   :toctree: .\n   :nosignatures:\n\n" + "".join(
+        f"   {name}\n" for name in names
+    )

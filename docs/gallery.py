@@ -26,12 +26,19 @@ DRAWN = "gallery_figures"  # beside this file, not kept
 
 _AMPLITUDES = np.geomspace(1e-6, 1e3, 19)
 _PERIOD = 1.0  # s, where a law asks for a sample time
-_PART = re.compile(r"^```python\n(.*?)^```|!\[[^\]]*\]\((figures/[\w-]+\.(?:svg|gif))\)", re.MULTILINE | re.DOTALL)
+_PART = re.compile(
+    r"^```python\n(.*?)^```|!\[[^\]]*\]\((figures/[\w-]+\.(?:svg|gif))\)",
+    re.MULTILINE | re.DOTALL,
+)
 
 
 def families() -> dict[str, type]:
     """The laws of the registry, by their names."""
-    return {name: each for name, each in every_family().items() if each.__module__.startswith("hysim.laws")}
+    return {
+        name: each
+        for name, each in every_family().items()
+        if each.__module__.startswith("hysim.laws")
+    }
 
 
 def plants() -> dict[str, type]:
@@ -50,7 +57,8 @@ def pictures() -> dict[str, Any]:
     return {
         name: each
         for name, each in public.items()
-        if inspect.isfunction(each) and {"ax", "axes"} & inspect.signature(each).parameters.keys()
+        if inspect.isfunction(each)
+        and {"ax", "axes"} & inspect.signature(each).parameters.keys()
     }
 
 
@@ -58,8 +66,8 @@ def draw_families(folder: Path) -> None:
     """Draw a loop of every family, a file for each."""
     folder.mkdir(exist_ok=True)
     for name in families():
-        law, between, units = _shown(name)
-        u, y = _loop(law, between)
+        law, between, units = shown(name)
+        u, y = loop(law, between)
         with hs.plot.house_style():
             canvas = hs.plot.figure(3.2, 2.4)
             hs.plot.loop(hs.Simulation(u=u, y=y, units=units), ax=canvas.add_subplot())
@@ -83,12 +91,18 @@ def family_cards() -> str:
 
 def plant_cards() -> str:
     """A card for each plant that a page has drawn."""
-    return _cards((_figure(f"hs.{name}"), f"hysim.{name}", name, each) for name, each in plants().items())
+    return _cards(
+        (figure_of(f"hs.{name}"), f"hysim.{name}", name, each)
+        for name, each in plants().items()
+    )
 
 
 def picture_cards() -> str:
     """A card for each picture."""
-    return _cards((_figure(f"hs.plot.{name}"), f"hysim.plot.{name}", name, each) for name, each in pictures().items())
+    return _cards(
+        (figure_of(f"hs.plot.{name}"), f"hysim.plot.{name}", name, each)
+        for name, each in pictures().items()
+    )
 
 
 def _cards(entries: Iterable[tuple[str, str, str, Any]]) -> str:
@@ -101,15 +115,19 @@ def _cards(entries: Iterable[tuple[str, str, str, Any]]) -> str:
 
 
 def _first_sentence(value: Any) -> str:
-    return f"{inspect.getdoc(value)}".split("\n\n")[0].replace("\n", " ").replace("``", "`")
+    return (
+        f"{inspect.getdoc(value)}".split("\n\n")[0].replace("\n", " ").replace("``", "`")
+    )
 
 
-def _figure(call: str) -> str:
+def figure_of(call: str) -> str:
     """The first figure that a page has drawn with this call; LookupError where there is none."""
     for code, figure in figures_by_code():
         if re.search(rf"{re.escape(call)}\b", code):
             return figure
-    raise LookupError(f"no page of docs/ has a figure of {call}: draw one, in plots.md for instance")
+    raise LookupError(
+        f"no page of docs/ has a figure of {call}: draw one, in plots.md for instance"
+    )
 
 
 @cache
@@ -126,7 +144,7 @@ def figures_by_code() -> list[tuple[str, str]]:
     return found
 
 
-def _shown(name: str) -> tuple[Any, tuple[float, float] | None, dict[str, str]]:
+def shown(name: str) -> tuple[Any, tuple[float, float] | None, dict[str, str]]:
     """A law of a family, the input between which it shows its loop, if that is known, and units."""
     for each in presets().values():
         if type(each.model).__name__ == name:
@@ -136,7 +154,9 @@ def _shown(name: str) -> tuple[Any, tuple[float, float] | None, dict[str, str]]:
 
 def _example(name: str) -> Any:
     """What the example of a docstring makes by the constructor of its family."""
-    examples = doctest.DocTestParser().get_examples(f"{inspect.getdoc(getattr(hs, name))}")
+    examples = doctest.DocTestParser().get_examples(
+        f"{inspect.getdoc(getattr(hs, name))}"
+    )
     tree = ast.parse("".join(each.source for each in examples))
     for node in ast.walk(tree):
         if isinstance(node, ast.Call) and ast.unparse(node.func) == f"hs.{name}":
@@ -144,20 +164,30 @@ def _example(name: str) -> Any:
     raise LookupError(f"no example of {name} calls hs.{name}")
 
 
-def _loop(law: Any, between: tuple[float, float] | None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def loop(
+    law: Any, between: tuple[float, float] | None
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """A fading input, and what a law makes of it."""
-    low, high = between or _telling(law)
-    u = hs.signals.decaying_sine(0.5 * (high - low), mean=0.5 * (low + high), cycles=4, samples_per_cycle=100)
+    low, high = between or telling(law)
+    u = hs.signals.decaying_sine(
+        0.5 * (high - low), mean=0.5 * (low + high), cycles=4, samples_per_cycle=100
+    )
     return u, _response(law, u)
 
 
-def _telling(law: Any) -> tuple[float, float]:
+def telling(law: Any) -> tuple[float, float]:
     """The amplitude, of two in each decade, at which the shape of the loop changes most; 1 where it never does."""
     phase = np.sin(np.linspace(0.0, 4.0 * np.pi, 201))
-    loops = np.array([_response(law, amplitude * phase) for amplitude in _AMPLITUDES])[:, 101:]
+    loops = np.array([_response(law, amplitude * phase) for amplitude in _AMPLITUDES])[
+        :, 101:
+    ]
     strokes = np.ptp(loops, axis=1)
-    shapes = (loops - loops.mean(axis=1, keepdims=True)) / np.where(strokes > 0.0, strokes, np.inf)[:, None]
-    changes = np.where(strokes[:-1] > 0.0, np.abs(np.diff(shapes, axis=0)).max(axis=1), 0.0)  # not out of a gap
+    shapes = (loops - loops.mean(axis=1, keepdims=True)) / np.where(
+        strokes > 0.0, strokes, np.inf
+    )[:, None]
+    changes = np.where(
+        strokes[:-1] > 0.0, np.abs(np.diff(shapes, axis=0)).max(axis=1), 0.0
+    )  # not out of a gap
     best = float(_AMPLITUDES[changes.argmax() + 1]) if changes.max() > 0.01 else 1.0
     return -best, best
 

@@ -18,13 +18,17 @@ _PRIMES = re.compile("'+")
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Make MathML what formulas become in HTML."""
-    app.add_html_math_renderer("mathml", inline_renderers=(_inline, None), block_renderers=(_block, None))
+    app.add_html_math_renderer(
+        "mathml", inline_renderers=(_inline, None), block_renderers=(_block, None)
+    )
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
 def mathml(tex: str, *, as_block: bool = False) -> str:
     """A formula as a `math` element; MathError for a command that is not known."""
-    primed = _PRIMES.sub(lambda primes: "^{" + r"\prime" * len(primes[0]) + "}", tex)  # else they are apostrophes
+    primed = _PRIMES.sub(
+        lambda primes: "^{" + r"\prime" * len(primes[0]) + "}", tex
+    )  # else they are apostrophes
     return str(tex2mathml(primed, as_block=as_block))
 
 
@@ -34,7 +38,9 @@ def _inline(translator: HTML5Translator, node: nodes.math) -> None:
 
 
 def _block(translator: HTML5Translator, node: nodes.math_block) -> None:
-    opening = translator.starttag(node, "div", CLASS="math-block", tabindex="0")  # it can be scrolled by keys
+    opening = translator.starttag(
+        node, "div", CLASS="math-block", tabindex="0"
+    )  # it can be scrolled by keys
     translator.body.append(f"{opening}{_converted(node, as_block=True)}</div>\n")
     raise nodes.SkipNode
 

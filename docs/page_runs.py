@@ -21,7 +21,9 @@ import hysim as hs
 
 HERE = Path(__file__).parent
 
-_BLOCK = re.compile(r"^```python\n(.*?)^```\n(?:\n```text\n(.*?)^```\n)?", flags=re.MULTILINE | re.DOTALL)
+_BLOCK = re.compile(
+    r"^```python\n(.*?)^```\n(?:\n```text\n(.*?)^```\n)?", flags=re.MULTILINE | re.DOTALL
+)
 _FIGURE = re.compile(r"!\[[^\]]*\]\((figures/([\w-]+\.(?:svg|gif)))\)")
 _PART = re.compile(f"{_BLOCK.pattern}|{_FIGURE.pattern}", flags=re.MULTILINE | re.DOTALL)
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?!\w)")
@@ -59,7 +61,10 @@ def labels(drawing: Path) -> list[str]:
     """What is written in a figure, but for numbers; of a GIF nothing."""
     if drawing.suffix == ".gif":
         return []
-    texts = [" ".join(words_and_numbers(text)[0]) for text in _TEXT.findall(drawing.read_text())]
+    texts = [
+        " ".join(words_and_numbers(text)[0])
+        for text in _TEXT.findall(drawing.read_text())
+    ]
     return [text for text in texts if text != "#"]
 
 

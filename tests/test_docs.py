@@ -1,18 +1,32 @@
 """The Python blocks of the documentation run, page by page, without what builds the pages."""
 
 import importlib.util
+import inspect
+import re
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import hysim as hs
+
 DOCS = Path(__file__).parent.parent / "docs"
 PAGES = sorted(DOCS.glob("*.md"))
 NEEDS = {"camera": pytest.mark.extra("skimage")}
 
-_spec = importlib.util.spec_from_file_location("page_runs", DOCS / "page_runs.py")
-page_runs = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(page_runs)
+WITHOUT_FIGURE = {"scope", "versions"}  # a list of what is not there, and a table of versions
+
+
+def loaded(name):
+    """A module of the documentation."""
+    spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+page_runs = loaded("page_runs")
 
 
 @pytest.mark.parametrize("page", [pytest.param(page, id=page.stem, marks=NEEDS.get(page.stem, ())) for page in PAGES])
@@ -28,3 +42,62 @@ def test_python_blocks_of_a_page_run_in_order_and_print_and_draw_what_it_shows(p
             np.testing.assert_allclose(numbers, shown_numbers, rtol=1e-2, atol=1e-9)  # other machines round otherwise
     for name, figure in page_runs.figures_of(page).items():
         assert page_runs.labels(tmp_path / name) == page_runs.labels(figure)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_a_page_has_a_figure_and_code_of_at_most_90_columns(page):
+    text = page.read_text()
+    assert re.search(r"!\[[^]]+\]\(|\{\{ \w*figure|\{\{ accuracy", text) or page.stem in WITHOUT_FIGURE
+    for language, code in re.findall(r"^```(\w+)\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL):
+        wide = [line for line in code.splitlines() if len(line) > 90]
+        assert not wide or language == "text", wide  # a text is what a block prints
+
+
+def test_the_page_on_installation_explains_every_extra():
+    extras = tomllib.loads((DOCS.parent / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    rows = re.findall(r"^\| `(\w+)` \|", (DOCS / "installation.md").read_text(), flags=re.MULTILINE)
+    assert sorted(rows) == sorted(extras)
+
+
+@pytest.fixture(scope="module")
+def gallery():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(DOCS)
+        yield loaded("gallery")
+
+
+def test_the_gallery_has_every_law_every_plant_and_every_picture(gallery):
+    drawn = gallery.family_cards(), gallery.plant_cards(), gallery.picture_cards()
+    assert {"LuGre", "BoucWen", "Preisach"} <= gallery.families().keys()
+    assert {"loop", "forc", "heat_map"} <= gallery.pictures().keys()
+    names = [*gallery.families(), *gallery.plants(), *(f"plot.{name}" for name in gallery.pictures())]
+    assert all("".join(drawn).count(f"(reference/hysim.{name}.rst):") == 1 for name in names)
+    figures = re.findall(r"\]\((figures/[^)]+)\)\]", "".join(drawn))
+    assert len(figures) == len(gallery.plants()) + len(gallery.pictures())
+    assert all((DOCS / figure).exists() for figure in figures)
+
+
+def test_a_law_of_the_gallery_shows_a_loop_where_its_shape_changes(gallery):
+    for name in ("LuGre", "GeneralizedMaxwellSlip", "ElasticBacklash", "BoucWen"):
+        law, between, _ = gallery.shown(name)
+        y = gallery.loop(law, between)[1]
+        assert type(law) is getattr(hs, name)
+        assert np.isfinite(y).all()
+        assert np.ptp(y) > 0.0
+    assert gallery.telling(hs.ElasticBacklash(half_gap=0.1))[1] > 0.1
+    assert gallery.telling(hs.Line()) == (-1.0, 1.0)
+
+
+def test_a_picture_that_no_page_draws_is_named(gallery):
+    with pytest.raises(LookupError, match=r"no page of docs/ has a figure of hs\.plot\.nothing"):
+        gallery.figure_of("hs.plot.nothing")
+
+
+def test_every_public_name_stands_in_the_reference_once():
+    front_door = loaded("front_door")
+    listed = re.findall(r"^   (\w\S*)$", "\n".join(front_door.groups().values()), flags=re.MULTILINE)
+    names = [name for name in hs.__all__ if name[0] != "_" and not inspect.ismodule(getattr(hs, name))]
+    assert sorted(name for name in listed if "." not in name) == sorted(names)
+    assert len(set(listed)) == len(listed)
+    assert front_door.heading_of(hs.LuGre) == "Friction, backlash and dashpots"
+    assert front_door.heading_of(hs.Structure) == "Structures"

@@ -378,7 +378,7 @@ def test_the_commands_of_the_documentation_run_in_order(run, folder, monkeypatch
     (folder / "my_laws.py").write_text("import hysim as hs\nMyLaw = hs.Line\nmy_law = hs.Line(slope=0.02)\n")
     monkeypatch.syspath_prepend(folder)
     for block in re.findall(r"^```shell\n(.*?)^```", page, flags=re.MULTILINE | re.DOTALL):
-        for line in block.splitlines():
+        for line in block.replace("\\\n", "").splitlines():
             piped = None
             for command in line.split(" | "):
                 code, piped, err = run(*command.split()[1:], stdin=piped)
