@@ -4,7 +4,11 @@ import json
 import sys
 from pathlib import Path
 
+from sphinx.application import Sphinx
+from sphinx.errors import ExtensionError
+
 import hysim
+from hysim.export import explorer
 
 HERE = Path(__file__).parent
 RESULTS = HERE.parent / "experiments" / "results"
@@ -17,6 +21,16 @@ from table import answer  # noqa: E402  from experiments
 
 project = "hysim"
 version = release = hysim.__version__
+FINDABLE = (
+    "earthquake",
+    "creep",
+    "backlash",
+    "S-function",
+    "piezo actuator",
+    "magnetorheological damper",
+)
+"""Words that the search must find; the glossary explains them."""
+
 extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
@@ -132,7 +146,10 @@ def table1_models() -> str:
     return "\n".join([head, "|---" * 9 + "|", *lines])
 
 
+EXPLORER = "explorer.html"  # beside the pages, of which it needs nothing
+
 myst_substitutions = {
+    "explorer": f'<a href="{EXPLORER}">Open the explorer of all families.</a>',
     "families": families(),
     "gallery_families": family_cards(),
     "gallery_plants": plant_cards(),
@@ -167,3 +184,26 @@ myst_substitutions = {
 
 autosummary_generate = write_reference(HERE / "reference")
 draw_families(HERE / DRAWN)
+
+
+def setup(app: Sphinx) -> None:
+    """Beside the pages: the explorer, and a look at what the search finds."""
+    app.connect("build-finished", _finish)
+
+
+def _finish(app: Sphinx, exception: Exception | None) -> None:
+    if exception is None and app.builder.name == "html":
+        explorer(Path(app.outdir) / EXPLORER)
+        if missing := [
+            word for word in FINDABLE if not found_by_search(Path(app.outdir), word)
+        ]:
+            raise ExtensionError(
+                f"the search finds no {', '.join(missing)}: add the word to glossary.md"
+            )
+
+
+def found_by_search(folder: Path, word: str) -> bool:
+    """Whether the search of built pages leads to a word: as an entry of the index, of which the glossary makes one."""
+    text = (folder / "searchindex.js").read_text()
+    entries = json.loads(text[text.index("(") + 1 : text.rindex(")")])["indexentries"]
+    return word.lower() in entries
