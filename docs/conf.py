@@ -198,7 +198,7 @@ def _finish(app: Sphinx, exception: Exception | None) -> None:
             word for word in FINDABLE if not found_by_search(Path(app.outdir), word)
         ]:
             raise ExtensionError(
-                f"the search finds no {', '.join(missing)}: add the word to glossary.md"
+                f"the search finds no {', '.join(missing)}: add it to glossary.md, or build anew with -E"
             )
 
 
