@@ -101,3 +101,15 @@ def test_every_public_name_stands_in_the_reference_once():
     assert len(set(listed)) == len(listed)
     assert front_door.heading_of(hs.LuGre) == "Friction, backlash and dashpots"
     assert front_door.heading_of(hs.Structure) == "Structures"
+
+
+@pytest.mark.extra("sphinx")
+def test_every_formula_of_the_pages_becomes_mathml():
+    mathml = loaded("mathml")
+    prose = [re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.MULTILINE | re.DOTALL) for page in PAGES]
+    blocks = [tex for text in prose for tex in re.findall(r"^\$\$\n(.*?)\n\$\$$", text, flags=re.MULTILINE | re.DOTALL)]
+    assert len(blocks) > 20
+    assert all(mathml.mathml(tex, as_block=True).startswith("<math") for tex in blocks)
+    assert mathml.mathml("z''").count("′") == 2
+    with pytest.raises(mathml.MathError, match="foo"):
+        mathml.mathml(r"\foo")
