@@ -53,6 +53,11 @@ def test_a_page_has_a_figure_and_code_of_at_most_90_columns(page):
         assert not wide or language == "text", wide  # a text is what a block prints
 
 
+def test_every_stored_figure_is_on_a_page():
+    text = "".join(page.read_text() for page in [*PAGES, DOCS.parent / "README.md"])
+    assert [path.name for path in (DOCS / "figures").iterdir() if f"figures/{path.name})" not in text] == []
+
+
 def test_the_page_on_installation_explains_every_extra():
     extras = tomllib.loads((DOCS.parent / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     rows = re.findall(r"^\| `(\w+)` \|", (DOCS / "installation.md").read_text(), flags=re.MULTILINE)
