@@ -14,6 +14,7 @@ from sphinx.writers.html5 import HTML5Translator
 
 _LOG = logging.getLogger(__name__)
 _PRIMES = re.compile("'+")
+_BAR = re.compile(r"<mo([^>]*)>\|</mo>")
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
@@ -25,11 +26,13 @@ def setup(app: Sphinx) -> dict[str, bool]:
 
 
 def mathml(tex: str, *, as_block: bool = False) -> str:
-    """A formula as a `math` element; MathError for a command that is not known."""
-    primed = _PRIMES.sub(
-        lambda primes: "^{" + r"\prime" * len(primes[0]) + "}", tex
-    )  # else they are apostrophes
-    return str(tex2mathml(primed, as_block=as_block))
+    """A formula as a `math` element; MathError for a command that is not known.
+
+    Primes would be apostrophes, and bars would stand apart from what they enclose, as signs of a condition do.
+    """
+    primed = _PRIMES.sub(lambda primes: "^{" + r"\prime" * len(primes[0]) + "}", tex)
+    converted = str(tex2mathml(primed, as_block=as_block))
+    return _BAR.sub(r'<mo\1 lspace="0" rspace="0">|</mo>', converted)
 
 
 def _inline(translator: HTML5Translator, node: nodes.math) -> None:

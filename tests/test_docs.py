@@ -116,5 +116,6 @@ def test_every_formula_of_the_pages_becomes_mathml():
     assert len(blocks) > 20
     assert all(mathml.mathml(tex, as_block=True).startswith("<math") for tex in blocks)
     assert mathml.mathml("z''").count("′") == 2
+    assert mathml.mathml("|z|").count('lspace="0" rspace="0">|</mo>') == 2
     with pytest.raises(mathml.MathError, match="foo"):
         mathml.mathml(r"\foo")
