@@ -16,7 +16,14 @@ sys.path[:0] = [str(HERE), str(HERE.parent / "experiments")]
 
 from findings import lag_of_equation_1, preisach  # noqa: E402  from experiments
 from front_door import families, write_reference  # noqa: E402  from beside this file
-from gallery import DRAWN, draw_families, family_cards, picture_cards, plant_cards  # noqa: E402
+from gallery import (  # noqa: E402
+    DRAWN,
+    EXPLORER,
+    draw_families,
+    family_cards,
+    picture_cards,
+    plant_cards,
+)
 from table import answer  # noqa: E402  from experiments
 
 project = "hysim"
@@ -145,8 +152,6 @@ def table1_models() -> str:
     head = "| model | parameters | fit [%] | leave-one-out rmse | largest residual | width | at [V] | BIC | as asked |"
     return "\n".join([head, "|---" * 9 + "|", *lines])
 
-
-EXPLORER = "explorer.html"  # beside the pages, of which it needs nothing
 
 myst_substitutions = {
     "explorer": f'<a href="{EXPLORER}">Open the explorer of all families.</a>',

@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlencode
 
 import numpy as np
 from front_door import GROUPS, heading_of
@@ -23,6 +24,7 @@ from hysim.models.model import every_family
 
 HERE = Path(__file__).parent
 DRAWN = "gallery_figures"  # beside this file, not kept
+EXPLORER = "explorer.html"  # beside the built pages, of which it needs nothing
 
 _AMPLITUDES = np.geomspace(1e-6, 1e3, 19)
 _PERIOD = 1.0  # s, where a law asks for a sample time
@@ -77,11 +79,12 @@ def draw_families(folder: Path) -> None:
 def family_cards() -> str:
     """A card for each family, under the headings of the reference: its loop, its name and what it is."""
     headings = {name: heading_of(each) for name, each in families().items()}
-    groups = [heading for heading in GROUPS if heading in headings.values()]
+    order = dict.fromkeys([*GROUPS, *headings.values()])
+    groups = [heading for heading in order if heading in headings.values()]
     return "\n\n".join(
         f"**{group}**\n\n"
         + _cards(
-            (f"{DRAWN}/{name}.svg", f"hysim.{name}", name, each)
+            (f"{DRAWN}/{name}.svg", f"hysim.{name}", name, each, _sliders(name))
             for name, each in families().items()
             if headings[name] == group
         )
@@ -92,7 +95,7 @@ def family_cards() -> str:
 def plant_cards() -> str:
     """A card for each plant that a page has drawn."""
     return _cards(
-        (figure_of(f"hs.{name}"), f"hysim.{name}", name, each)
+        (figure_of(f"hs.{name}"), f"hysim.{name}", name, each, "")
         for name, each in plants().items()
     )
 
@@ -100,18 +103,26 @@ def plant_cards() -> str:
 def picture_cards() -> str:
     """A card for each picture."""
     return _cards(
-        (figure_of(f"hs.plot.{name}"), f"hysim.plot.{name}", name, each)
+        (figure_of(f"hs.plot.{name}"), f"hysim.plot.{name}", name, each, "")
         for name, each in pictures().items()
     )
 
 
-def _cards(entries: Iterable[tuple[str, str, str, Any]]) -> str:
+def _cards(entries: Iterable[tuple[str, str, str, Any, str]]) -> str:
     cards = [
         f":::{{container}} card\n[![{name}]({figure})](reference/{page}.rst)\n\n"
-        f"[{name}](reference/{page}.rst): {_first_sentence(value)}\n:::"
-        for figure, page, name, value in entries
+        f"[{name}](reference/{page}.rst): {_first_sentence(value)}{more}\n:::"
+        for figure, page, name, value, more in entries
     ]
     return "\n".join(["::::{container} gallery", *cards, "::::"])
+
+
+def _sliders(name: str) -> str:
+    """A link to the explorer with this family, if it is there."""
+    for preset, each in presets().items():
+        if type(each.model).__name__ == name:
+            return f' <a href="{EXPLORER}#{urlencode({"model": preset})}">Sliders.</a>'
+    return ""
 
 
 def _first_sentence(value: Any) -> str:
