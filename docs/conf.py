@@ -17,8 +17,8 @@ sys.path[:0] = [str(HERE), str(HERE.parent / "experiments")]
 from findings import lag_of_equation_1, preisach  # noqa: E402  from experiments
 from front_door import families, write_reference  # noqa: E402  from beside this file
 from gallery import (  # noqa: E402
-    DRAWN,
     EXPLORER,
+    LOOP_FOLDER,
     draw_families,
     family_cards,
     picture_cards,
@@ -28,7 +28,7 @@ from table import answer  # noqa: E402  from experiments
 
 project = "hysim"
 version = release = hysim.__version__
-FINDABLE = (
+SEARCHED = (
     "earthquake",
     "creep",
     "backlash",
@@ -188,7 +188,7 @@ myst_substitutions = {
 }
 
 autosummary_generate = write_reference(HERE / "reference")
-draw_families(HERE / DRAWN)
+draw_families(HERE / LOOP_FOLDER)
 
 
 def setup(app: Sphinx) -> None:
@@ -200,7 +200,7 @@ def _finish(app: Sphinx, exception: Exception | None) -> None:
     if exception is None and app.builder.name == "html":
         explorer(Path(app.outdir) / EXPLORER)
         if missing := [
-            word for word in FINDABLE if not found_by_search(Path(app.outdir), word)
+            word for word in SEARCHED if not found_by_search(Path(app.outdir), word)
         ]:
             raise ExtensionError(
                 f"the search finds no {', '.join(missing)}: add it to glossary.md, or build anew with -E"

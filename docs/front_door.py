@@ -56,9 +56,8 @@ def write_reference(folder: Path) -> list[str]:
     )
     folder.mkdir(exist_ok=True)
     files = {folder / f"{name}.rst": text for name, text in pages.items()}
-    if any(
-        not file.exists() or file.read_text() != text for file, text in files.items()
-    ):  # else nothing is built anew
+    written = {file: file.read_text() for file in files if file.exists()}
+    if written != files:  # else nothing is built anew
         for old in folder.glob("*.rst"):  # of names that are no more
             old.unlink()
         for file, text in files.items():
@@ -79,7 +78,7 @@ def groups() -> dict[str, str]:
         for heading in dict.fromkeys([*GROUPS, *headings.values()])
         if heading in headings.values()
     ]
-    found = {
+    texts = {
         heading: _summary(name for name in names if headings[name] == heading)
         for heading in order
     }
@@ -89,10 +88,10 @@ def groups() -> dict[str, str]:
             for member in _members(module)
             if getattr(module, member) not in names.values()
         ]
-        found[f"hysim.{name}"] = (
+        texts[f"hysim.{name}"] = (
             f"{_first_line(module)}\n{_summary(f'{name}.{each}' for each in members)}"
         )
-    return found
+    return texts
 
 
 def heading_of(value: Any) -> str:

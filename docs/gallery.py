@@ -23,7 +23,7 @@ from hysim.export._page_presets import presets
 from hysim.models.model import every_family
 
 HERE = Path(__file__).parent
-DRAWN = "gallery_figures"  # beside this file, not kept
+LOOP_FOLDER = "gallery_figures"  # beside this file, not kept
 EXPLORER = "explorer.html"  # beside the built pages, of which it needs nothing
 
 _AMPLITUDES = np.geomspace(1e-6, 1e3, 19)
@@ -68,7 +68,7 @@ def draw_families(folder: Path) -> None:
     """Draw a loop of every family, a file for each."""
     folder.mkdir(exist_ok=True)
     for name in families():
-        law, between, units = shown(name)
+        law, between, units = example_of(name)
         u, y = loop(law, between)
         with hs.plot.house_style():
             canvas = hs.plot.figure(3.2, 2.4)
@@ -84,7 +84,7 @@ def family_cards() -> str:
     return "\n\n".join(
         f"**{group}**\n\n"
         + _cards(
-            (f"{DRAWN}/{name}.svg", f"hysim.{name}", name, each, _sliders(name))
+            (f"{LOOP_FOLDER}/{name}.svg", f"hysim.{name}", name, each, _sliders(name))
             for name, each in families().items()
             if headings[name] == group
         )
@@ -144,18 +144,18 @@ def figure_of(call: str) -> str:
 @cache
 def figures_by_code() -> list[tuple[str, str]]:
     """For each figure of a page, the code since the figure before it; the page on plots comes first."""
-    found = []
+    figures = []
     for page in sorted(HERE.glob("*.md"), key=lambda page: (page.stem != "plots", page)):
         code = ""
         for block, figure in _PART.findall(page.read_text()):
             code += block
             if figure:
-                found.append((code, figure))
+                figures.append((code, figure))
                 code = ""
-    return found
+    return figures
 
 
-def shown(name: str) -> tuple[Any, tuple[float, float] | None, dict[str, str]]:
+def example_of(name: str) -> tuple[Any, tuple[float, float] | None, dict[str, str]]:
     """A law of a family, the input between which it shows its loop, if that is known, and units."""
     for each in presets().values():
         if type(each.model).__name__ == name:
@@ -165,9 +165,8 @@ def shown(name: str) -> tuple[Any, tuple[float, float] | None, dict[str, str]]:
 
 def _example(name: str) -> Any:
     """What the example of a docstring makes by the constructor of its family."""
-    examples = doctest.DocTestParser().get_examples(
-        f"{inspect.getdoc(getattr(hs, name))}"
-    )
+    docstring = f"{inspect.getdoc(getattr(hs, name))}"
+    examples = doctest.DocTestParser().get_examples(docstring)
     tree = ast.parse("".join(each.source for each in examples))
     for node in ast.walk(tree):
         if isinstance(node, ast.Call) and ast.unparse(node.func) == f"hs.{name}":
@@ -179,26 +178,22 @@ def loop(
     law: Any, between: tuple[float, float] | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """A fading input, and what a law makes of it."""
-    low, high = between or telling(law)
-    u = hs.signals.decaying_sine(
-        0.5 * (high - low), mean=0.5 * (low + high), cycles=4, samples_per_cycle=100
-    )
+    low, high = between or amplitudes_of(law)
+    half, mean = 0.5 * (high - low), 0.5 * (low + high)
+    u = hs.signals.decaying_sine(half, mean=mean, cycles=4, samples_per_cycle=100)
     return u, _response(law, u)
 
 
-def telling(law: Any) -> tuple[float, float]:
+def amplitudes_of(law: Any) -> tuple[float, float]:
     """The amplitude, of two in each decade, at which the shape of the loop changes most; 1 where it never does."""
-    phase = np.sin(np.linspace(0.0, 4.0 * np.pi, 201))
-    loops = np.array([_response(law, amplitude * phase) for amplitude in _AMPLITUDES])[
-        :, 101:
-    ]
-    strokes = np.ptp(loops, axis=1)
-    shapes = (loops - loops.mean(axis=1, keepdims=True)) / np.where(
-        strokes > 0.0, strokes, np.inf
-    )[:, None]
-    changes = np.where(
-        strokes[:-1] > 0.0, np.abs(np.diff(shapes, axis=0)).max(axis=1), 0.0
-    )  # not out of a gap
+    cycles = np.sin(np.linspace(0.0, 4.0 * np.pi, 201))
+    outputs = np.array([_response(law, amplitude * cycles) for amplitude in _AMPLITUDES])
+    last = outputs[:, 101:]
+    strokes = np.ptp(last, axis=1)
+    moving = np.where(strokes > 0.0, strokes, np.inf)
+    shapes = (last - last.mean(axis=1, keepdims=True)) / moving[:, np.newaxis]
+    changes = np.abs(np.diff(shapes, axis=0)).max(axis=1)
+    changes[strokes[:-1] == 0.0] = 0.0  # the first motion out of a gap has no shape yet
     best = float(_AMPLITUDES[changes.argmax() + 1]) if changes.max() > 0.01 else 1.0
     return -best, best
 

@@ -84,13 +84,13 @@ def test_the_gallery_has_every_law_every_plant_and_every_picture(gallery):
 
 def test_a_law_of_the_gallery_shows_a_loop_where_its_shape_changes(gallery):
     for name in ("LuGre", "GeneralizedMaxwellSlip", "ElasticBacklash", "BoucWen"):
-        law, between, _ = gallery.shown(name)
+        law, between, _ = gallery.example_of(name)
         y = gallery.loop(law, between)[1]
         assert type(law) is getattr(hs, name)
         assert np.isfinite(y).all()
         assert np.ptp(y) > 0.0
-    assert gallery.telling(hs.ElasticBacklash(half_gap=0.1))[1] > 0.1
-    assert gallery.telling(hs.Line()) == (-1.0, 1.0)
+    assert gallery.amplitudes_of(hs.ElasticBacklash(half_gap=0.1))[1] > 0.1
+    assert gallery.amplitudes_of(hs.Line()) == (-1.0, 1.0)
 
 
 def test_a_picture_that_no_page_draws_is_named(gallery):
