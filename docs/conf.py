@@ -154,7 +154,7 @@ def table1_models() -> str:
 
 
 myst_substitutions = {
-    "explorer": f'<a href="{EXPLORER}">Open the explorer of all families.</a>',
+    "explorer": f'<a href="{EXPLORER}">Open the explorer.</a>',
     "families": families(),
     "gallery_families": family_cards(),
     "gallery_plants": plant_cards(),
