@@ -17,12 +17,22 @@ compiled = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is
 SOURCE = """
 from numba import float64
 
-from hysim.kernels._compile import kernel, signed_kernel
+from hysim.kernels._compile import inner, kernel, signed_kernel
+
+
+@inner
+def times(x, k, doubled):
+    return 2.0 * k * x if doubled else k * x
 
 
 @kernel
 def twice(x):
     return 2.0 * x
+
+
+@kernel
+def halved(x):
+    return 0.5 * times(x, 1, False) + 0.0 * times(x, 2, True)
 
 
 @signed_kernel(float64(float64))
@@ -51,6 +61,32 @@ def kernels(tmp_path, monkeypatch):
 
 def hits(module):
     return [sum(each.stats.cache_hits.values()) for each in (module.twice, module.thrice)]
+
+
+@compiled
+def test_constants_among_the_arguments_make_no_code_of_their_own(kernels):
+    module = kernels()
+    assert module.halved(3.0) == 1.5
+    assert len(module.times.signatures) == 1
+
+
+@compiled
+@pytest.mark.parametrize("pointer_first", [True, False])
+def test_a_pointer_and_a_call_find_the_same_code(kernels, pointer_first):
+    pointer = numba.float64(numba.float64)
+    ways = [lambda halved: halved.get_compile_result(pointer), lambda halved: halved(3.0)]
+    first, second = ways if pointer_first else reversed(ways)
+    first(kernels().halved)
+    other = kernels().halved
+    second(other)
+    assert sum(other.stats.cache_hits.values()) == 1
+
+
+@compiled
+def test_a_pointer_gets_no_code_with_another_result(kernels):
+    kernels().halved.compile(numba.float32(numba.float64))
+    found = kernels().halved.get_compile_result(numba.float64(numba.float64))
+    assert found.signature.return_type == numba.float64
 
 
 @compiled

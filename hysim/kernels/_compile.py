@@ -8,13 +8,14 @@ they return codes.
 
 import contextlib
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
 import numba
 from numba.core import cgutils, types
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
+from numba.core.sigutils import normalize_signature
 from numba.experimental.function_type import _get_wrapper_address
 from numba.extending import intrinsic
 
@@ -39,6 +40,11 @@ def uncounted(function: F) -> F:
     Each array that is taken out of a tuple or cut would otherwise be counted, which takes longer than short loops.
     """
     return _compiled(function, (), _nrt=False, **_NO_ENTRY)
+
+
+def uncounted_kernel(function: F) -> F:
+    """As `kernel` and as `uncounted`: Python calls it, too, or a kernel by its address."""
+    return _compiled(function, (), _nrt=False)
 
 
 def unfolded(function: F) -> F:
@@ -93,7 +99,7 @@ def by_address(function: F, signature: Any) -> F:
 
 
 def signed_inlined(*signatures: Any) -> Callable[[F], F]:
-    """As `inlined` for these signatures only; otherwise each constant among the arguments makes one of its own."""
+    """As `inlined` for these signatures only, compiled at once."""
     return lambda function: _compiled(function, list(signatures), forceinline=True, **_NO_ENTRY)
 
 
@@ -102,6 +108,7 @@ def _compiled(function: F, signatures: Sequence[Any] = (), **others: Any) -> F:
     compiled: Any = compiler(nogil=True, error_model="numpy", **others)(function)
     is_compiled = isinstance(compiled, Dispatcher)  # and not the function, where numba is told to compile nothing
     if is_compiled:
+        compiled.get_call_template = _without_constants(compiled.get_call_template)
         with contextlib.suppress(OSError, RuntimeError):  # numba found no writable folder
             compiled._cache = _cache(function)
         for signature in signatures:
@@ -112,28 +119,43 @@ def _compiled(function: F, signatures: Sequence[Any] = (), **others: Any) -> F:
     return result
 
 
+def _without_constants(template_of: Callable[..., Any]) -> Callable[..., Any]:
+    """Types for a call from a kernel, where numba would compile the callee once more for each constant it is given."""
+
+    def template(arguments: Sequence[Any], keywords: Mapping[str, Any]) -> Any:
+        named = {name: types.unliteral(kind) for name, kind in keywords.items()}
+        return template_of(tuple(types.unliteral(kind) for kind in arguments), named)
+
+    return template
+
+
 def _cache(function: Any) -> Any:
     """numba's cache of a function, which is as if it were empty where it cannot be read, and is left where it is full.
 
-    In place of numba's own ``cache=True``, which ends in an error there.
+    In place of numba's own ``cache=True``, which ends in an error there. What is compiled is found by the types of its
+    arguments, as in one process: numba's key has the type of the result where a pointer asks for it, so that another
+    process would compile the function once more for a call.
     """
     maker: Any = FunctionCache
     cache = maker(function)
     load, save = cache.load_overload, cache.save_overload
 
     def loaded(signature: Any, context: Any) -> Any:
+        arguments, result = normalize_signature(signature)
         try:
-            return load(signature, context)
+            data = load(arguments, context)
         except Exception:  # what unpickling raises depends on where the file was cut
             return None
+        return data if data is None or result in (None, data.signature.return_type) else None
 
     def saved(signature: Any, data: Any) -> None:
+        arguments, _ = normalize_signature(signature)
         with contextlib.suppress(Exception):
             try:
-                save(signature, data)
+                save(arguments, data)
             except Exception:
                 cache.flush()  # a damaged index, to which nothing can be added
-                save(signature, data)
+                save(arguments, data)
 
     cache.load_overload, cache.save_overload = loaded, saved
     return cache
