@@ -9,6 +9,7 @@ from frame_laws import bouc_wen
 from scipy.linalg import expm
 
 import hysim as hs
+from hysim.kernels.structures.path import follow
 
 pytestmark = pytest.mark.skipif(
     os.environ.get("NUMBA_DISABLE_JIT", "0") != "0",
@@ -29,6 +30,16 @@ CONTROLLERS = {
     ),
     "InverseFeedforward": hs.InverseFeedforward(law=hs.Line(slope=0.02)),
 }
+
+
+def test_one_compiled_motion_serves_responses_ensembles_and_loops():
+    """It takes half a minute to compile."""
+    frame = replace(FRAME, excitation="base")
+    assert (frame.response(QUAKE, 1) == frame.response(QUAKE, 1.0)).all()
+    frame.responses([1.0, 2.0], QUAKE, sample_time=1)
+    hs.close_loop(FRAME, hs.PID(kp=1.0), T, STEP, ground_acceleration=QUAKE)
+    hs.close_loop(hs.Structure(mass=2.0, stiffness=50.0, excitation="force"), hs.PID(kp=1.0), T, STEP)
+    assert len(follow.signatures) == 1
 
 
 @pytest.mark.parametrize("controller", CONTROLLERS.values(), ids=CONTROLLERS)

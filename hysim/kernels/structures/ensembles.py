@@ -1,26 +1,16 @@
 """Many structures of one kind at once: their peaks, and their last sample."""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import inner, kernel, pasted
+from hysim.kernels._compile import inner, kernel, pasted, uncounted
 from hysim.kernels.structures.flows import N_POWERS, fill_flows
+from hysim.kernels.structures.layout import Elements, Flows, Motion, Plant, Room, Steps, Tracks
 from hysim.kernels.structures.moments import IntArray
-from hysim.kernels.structures.path import (
-    Elements,
-    Flows,
-    Motion,
-    Plant,
-    Room,
-    Steps,
-    Tracks,
-    project,
-    walk,
-)
-from hysim.kernels.structures.pointers import start_at, step_at
+from hysim.kernels.structures.pointers import follow_at, start_at, step_at
 
 _PROBES = 13  # strokes of 1, 0.1, 0.01, ...
 
@@ -142,6 +132,22 @@ def same(one: FloatArray, two: FloatArray) -> bool:
     return equal
 
 
+@uncounted
+def project(elements: Elements, columns: FloatArray, drifts: FloatArray) -> None:
+    """Drifts and rates of the drifts, (n_levels, k, 2 n_elements), of columns of states (n_levels, k, m)."""
+    n, n_nodes = elements.k0.size, columns.shape[2] // 2
+    for level in range(columns.shape[0]):
+        for i in range(columns.shape[1]):
+            for e in range(n):
+                drift = rate = 0.0
+                for q in range(elements.node_ends[e], elements.node_ends[e + 1]):
+                    node, weight = elements.nodes[q], elements.weights[q]
+                    drift += weight * columns[level, i, node]
+                    rate += weight * columns[level, i, n_nodes + node]
+                drifts[level, i, e] = drift
+                drifts[level, i, n + e] = rate
+
+
 @pasted
 def fill(
     elements: Elements, A: FloatArray, loads: FloatArray, rate: float, h: float, E: FloatArray, P: FloatArray,
@@ -178,16 +184,16 @@ def fill_structure(
 
 @kernel
 def follow_each(
-    elements: Elements, starts: IntArray, sets: Sets, plant: Plant, steps: Steps, phase: float, x: FloatArray,
-    u: FloatArray, E: FloatArray, P: FloatArray, flows: Flows, motion: Motion, room: Room, tracks: Tracks,
-    results: Results,
+    follow: Any, elements: Elements, starts: IntArray, sets: Sets, plant: Plant, steps: Steps, phase: float,
+    x: FloatArray, u: FloatArray, E: FloatArray, P: FloatArray, flows: Flows, motion: Motion, room: Room,
+    tracks: Tracks, results: Results,
 ) -> None:  # fmt: skip
     """Results of every set; inf where the motion diverges.
 
-    `u` is (1, n_samples) or (n_sets, n_samples). Base steps without a number, ``steps.base`` 0, are as many as have at
-    most the given phase of the fastest mode.
+    `follow` is the address of `path.follow`. `u` is (1, n_samples) or (n_sets, n_samples). Base steps without a number,
+    ``steps.base`` 0, are as many as have at most the given phase of the fastest mode.
     """
-    n = elements.k0.size
+    n, walk = elements.k0.size, follow_at(follow)
     loads = np.empty((u.shape[1], 1))
     for i in range(sets.A.shape[0]):
         one = Elements(

@@ -15,22 +15,22 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.kernels._compile import kernel
-from hysim.kernels.structures.path import Elements, Flows, Motion, Plant, Room, Steps, Tracks, walk
-from hysim.kernels.structures.pointers import controller_at
+from hysim.kernels.structures.layout import Elements, Flows, Motion, Plant, Room, Steps, Tracks
+from hysim.kernels.structures.pointers import controller_at, follow_at
 
 
 @kernel
 def close(
-    controller: Any, parameters: FloatArray, state: FloatArray, elements: Elements, flows: Flows, plant: Plant,
-    steps: Steps, is_first: bool, weights: FloatArray, inputs: FloatArray, motion: Motion, room: Room,
+    controller: Any, parameters: FloatArray, state: FloatArray, follow: Any, elements: Elements, flows: Flows,
+    plant: Plant, steps: Steps, is_first: bool, weights: FloatArray, inputs: FloatArray, motion: Motion, room: Room,
     samples: FloatArray, tracks: Tracks,
 ) -> int:  # fmt: skip
     """Run the samples of `inputs`, (n, n_loads): the first one that is not finite, or -1.
 
-    `controller` is an address, see `pointers.controller_at`; its `state` moves along, as `motion` does. The first
-    column of `inputs` is the reference, the others are loads. `samples`, (n, 3), is for command, drive and y.
+    `controller` and `follow` are addresses, see `pointers`; the controller's `state` moves along, as `motion` does. The
+    first column of `inputs` is the reference, the others are loads. `samples`, (n, 3), is for command, drive and y.
     """
-    step = controller_at(controller)
+    step, walk = controller_at(controller), follow_at(follow)
     m, n_elements, n_loads = motion.x.size, elements.k0.size, inputs.shape[1]
     loads = np.empty((1, n_loads))
     for k in range(inputs.shape[0]):

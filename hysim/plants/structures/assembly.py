@@ -9,8 +9,10 @@ from hysim._frozen import FloatArray, read_only
 from hysim.kernels.stepping import START
 from hysim.kernels.structures.ensembles import fill_slopes, fill_structure, start_motion
 from hysim.kernels.structures.flows import N_POWERS
-from hysim.kernels.structures.path import LEAST_DRIFT, Elements, Flows, Motion, Plant, Room, Steps, Tracks, make_room
-from hysim.kernels.structures.pointers import addresses
+from hysim.kernels.structures.layout import Elements, Flows, Motion, Plant, Room, Steps, Tracks, make_room
+from hysim.kernels.structures.path import follow
+from hysim.kernels.structures.pointers import FOLLOW, addresses
+from hysim.kernels.structures.sweeps import LEAST_DRIFT
 from hysim.models.compiled_step import startable
 from hysim.models.protocols import Rated, Startable, Stretched
 
@@ -140,11 +142,17 @@ def linear_parts(matrices: Matrices) -> tuple[FloatArray, FloatArray, FloatArray
     return A, loads, rates
 
 
+def follow_address() -> Any:
+    """The address of `hysim.kernels.structures.path.follow`, which is compiled where it has not been yet."""
+    (address,) = addresses([follow], FOLLOW)
+    return address
+
+
 def steps_of(rate: float, sample_time: float, substeps: int | None, tolerance: float) -> Steps:
     """How a sample is divided: as told, or by the tolerance from the phase on which the sweeps converge with."""
     if substeps is not None:
-        return Steps(sample_time, rate, substeps, 0, tolerance)
-    return Steps(sample_time, rate, max(1, int(np.ceil(sample_time * rate / PHASE))), HALVINGS, tolerance)
+        return Steps(float(sample_time), rate, substeps, 0, tolerance)
+    return Steps(float(sample_time), rate, max(1, int(np.ceil(sample_time * rate / PHASE))), HALVINGS, tolerance)
 
 
 def empty_flows(halvings: int, m: int, n_loads: int, n_elements: int) -> tuple[FloatArray, FloatArray, Flows]:

@@ -7,13 +7,14 @@ import numpy as np
 from hysim._frozen import FloatArray
 from hysim._parallel import Progress, in_pieces
 from hysim.kernels.controllers import CONTROLLER
+from hysim.kernels.structures.layout import Motion, Plant, Tracks
 from hysim.kernels.structures.loop import close
-from hysim.kernels.structures.path import Motion, Plant, Tracks
 from hysim.kernels.structures.pointers import addresses
 from hysim.models.protocols import CompiledController
 from hysim.plants.structures import assembly
+from hysim.plants.structures._moving import StructureState
 from hysim.plants.structures.element import parted
-from hysim.plants.structures.structure import Structure, StructureState
+from hysim.plants.structures.structure import Structure
 
 
 class Controlled(NamedTuple):
@@ -62,13 +63,13 @@ class ControlledStructure:
         n, motion = reference.size, Motion(*(part.copy() for part in self.begin.motion))
         elements, room = self.structure.kernel_elements, assembly.room_for(motion)
         flows = assembly.flows_of(elements, self.plant, self.steps)
-        (address,) = addresses([controller.step], CONTROLLER)
+        (address,), follow = addresses([controller.step], CONTROLLER), assembly.follow_address()
         inputs = np.column_stack([reference] if self.ground is None else [reference, self.ground])
         samples, tracks = np.empty((n, 3)), assembly.empty_tracks(n, motion)
 
         def run(k: slice) -> int:
             lost = close(
-                address, controller.parameters, controller.state, elements, flows, self.plant, self.steps,
+                address, controller.parameters, controller.state, follow, elements, flows, self.plant, self.steps,
                 k.start == 0, self.weights, inputs[k], motion, room, samples[k], Tracks(*(part[k] for part in tracks)),
             )  # fmt: skip
             if progress is not None:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, check_choice, read_only
 from hysim._parallel import in_chunks
 from hysim.kernels.structures.ensembles import Results, Sets, follow_each
-from hysim.kernels.structures.path import Plant, Steps
+from hysim.kernels.structures.layout import Plant, Steps
 from hysim.models.compiled_step import compiled_start, compiled_step
 from hysim.models.law import Law
 from hysim.models.protocols import Startable, positive_time
@@ -117,7 +117,7 @@ def _computed(
     n_elements, m = len(structure.elements), 2 * structure.n_nodes
     elements = assembly.elements_of(laws, structure.drift_matrix, slopes[0])
     halvings = 0 if structure.substeps else assembly.HALVINGS
-    steps = Steps(sample_time, 0.0, structure.substeps or 0, halvings, structure.tolerance)
+    steps = Steps(float(sample_time), 0.0, structure.substeps or 0, halvings, structure.tolerance)
     motion = assembly.empty_motion(m, states.shape[1], n_elements, with_accelerations=with_accelerations)
     E, P, flows = assembly.empty_flows(halvings, m, 1, n_elements)
     results = Results(np.empty((n_sets, motion.peaks.size)), *(np.empty((n_sets, n_elements)) for _ in range(3)))
@@ -130,8 +130,9 @@ def _computed(
     x = read_only(structure.initial_state or np.zeros(m))
     with np.errstate(all="ignore"):
         follow_each(
-            elements, laws.starts, sets, plant, steps, assembly.PHASE, x, np.ascontiguousarray(u), E, P, flows,
-            motion, assembly.room_for(motion), assembly.empty_tracks(0, motion), results,
+            assembly.follow_address(), elements, laws.starts, sets, plant, steps, assembly.PHASE, x,
+            np.ascontiguousarray(u), E, P, flows, motion, assembly.room_for(motion), assembly.empty_tracks(0, motion),
+            results,
         )  # fmt: skip
     return results
 

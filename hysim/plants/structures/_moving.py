@@ -1,0 +1,219 @@
+"""The motion of a structure: the kernel's tables of its samples, and the signals that follow from them."""
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, read_only
+from hysim._parallel import in_pieces
+from hysim.errors import SimulationError
+from hysim.kernels.structures.layout import Motion, Plant, Tracks
+from hysim.kernels.structures.path import follow
+from hysim.models.protocols import positive_time
+from hysim.plants.structures import assembly
+from hysim.plants.structures._assembled import AssembledStructure
+
+_IMBALANCE = 0.05  # share of the largest work that may be missing
+
+
+class StructureState(NamedTuple):
+    """State of a simulation: what moves along, `started` after the first sample, and the energies at the start."""
+
+    motion: Motion
+    started: bool
+    stored: float
+
+
+class MovingStructure(AssembledStructure):
+    """A structure that moves sample by sample."""
+
+    tolerance: float
+
+    def response(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
+        """Output y at the samples of an input that is linear between them.
+
+        Parameters
+        ----------
+        u : array, shape (n_samples,)
+            Acceleration of the base [m/s^2] or force [N]; at its first sample the structure has the initial state.
+        sample_time : float
+            Time between two samples [s].
+
+        Returns
+        -------
+        array, shape (n_samples,)
+            The signal that `output` names.
+
+        Raises
+        ------
+        SimulationError
+            If the motion diverges, or cannot be resolved; it names the time.
+        ValueError
+            If u is not finite or has not one axis, or the sample time is not positive.
+        """
+        return self.signals(u, sample_time)["y"]
+
+    def signals(self, u: npt.ArrayLike, sample_time: float) -> dict[str, FloatArray]:
+        """Every signal at the samples of `u`, by name; arguments and errors as of `response`.
+
+        Returns
+        -------
+        mapping
+            ``"y"``; ``"displacement"``, ``"velocity"`` (n_samples, n), relative to the ground [m], [m/s];
+            ``"acceleration"``, absolute under a moving base of influence 1 [m/s^2]; ``"drift"``, ``"force"``
+            (n_samples, n_elements) [m], [N]; ``"peak_drift"``, ``"peak_force"``, ``"peak_displacement"``,
+            ``"peak_acceleration"``, the largest sizes so far, those of drifts and displacements also between samples;
+            and energies since the start [J]: ``"kinetic"``, ``"elastic"`` (of `stiffness`), ``"damping_loss"``,
+            ``"input_work"``, ``"element_work"`` (n_samples, n_elements), which is stored and dissipated, and
+            ``"dissipated"``, without what elastic unloading would return, force^2 / (2 k) with the slope k at the
+            start; ``"imbalance"`` is the input less all others, the error of the method.
+        """
+        return self.advance(u, sample_time)[0]
+
+    def memories(self, u: npt.ArrayLike, sample_time: float) -> tuple[FloatArray, ...]:
+        """State of each element's law at the samples of `u`, its last input and its memory.
+
+        Parameters
+        ----------
+        u : array, shape (n_samples,)
+            As of `response`.
+        sample_time : float
+            [s]
+
+        Returns
+        -------
+        tuple of arrays, shape (n_samples, n_numbers)
+        """
+        states = self._followed(read_only(u, "u", ndim=1), sample_time, None, None, with_laws=True)[1].laws
+        ends = np.cumsum([each.state.size for each in self.laws.steppers])[:-1]
+        parts = np.split(states, ends, axis=1) if self.elements else []
+        return tuple(part[:, place] for part, place in zip(parts, self.laws.places, strict=True))
+
+    def start(self) -> StructureState:
+        """The state before the first sample."""
+        x = np.array(self.initial_state or np.zeros(2 * self.n_nodes))
+        motion = assembly.motion_at(self.kernel_elements, self.laws, x, len(self.force_directions))
+        return StructureState(motion, False, self._stored(x[np.newaxis])[0])
+
+    def advance(
+        self,
+        u: npt.ArrayLike,
+        sample_time: float,
+        state: StructureState | None = None,
+        *,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> tuple[dict[str, FloatArray], StructureState]:
+        """As `signals`, continued from `state`, by default the initial one, and the state after the last sample.
+
+        The bits are those of one uncut input, which goes on from the state's, one sample before the first.
+        ``progress(done, total)`` is called now and then.
+        """
+        inputs = read_only(u, "u", ndim=1)
+        begun, tracks = self._followed(inputs, sample_time, state, progress, with_laws=False)
+        return self.signals_of(inputs, begun, tracks), begun
+
+    def _followed(
+        self, u: FloatArray, sample_time: float, state: StructureState | None,
+        progress: Callable[[int, int], None] | None, *, with_laws: bool,
+    ) -> tuple[StructureState, Tracks]:  # fmt: skip
+        """The state after the samples, and all of them."""
+        positive_time(sample_time)
+        before = state or self.start()
+        motion = Motion(*(part.copy() for part in before.motion))
+        A, loads, rates = assembly.linear_parts(self.matrices)
+        pushing = np.array([float(self.excitation == "force")])
+        plant = Plant(A[0], loads[0], np.array(self.damping_matrix), np.array(self.force_directions), pushing)
+        steps = assembly.steps_of(float(rates[0]), sample_time, self.substeps, self.tolerance)
+        elements, flows = self.kernel_elements, assembly.flows_of(self.kernel_elements, plant, steps)
+        n, tracks = u.size, assembly.empty_tracks(u.size, motion, with_laws=with_laws)
+        inputs, room = np.ascontiguousarray(u[:, np.newaxis]), assembly.room_for(motion)
+
+        def run(k: slice) -> int:
+            rows = Tracks(*(part[k] for part in tracks))
+            is_first = k.start == 0 and not before.started
+            lost = int(follow(elements, flows, plant, steps, is_first, inputs[k], motion, room, rows))
+            if progress is not None:
+                progress(k.stop, n)
+            return lost
+
+        with np.errstate(all="ignore"):
+            lost = in_pieces(run, n)
+        if lost >= 0:
+            hint = "; if it should not, use more substeps, or substeps=None" if self.substeps else ""
+            raise SimulationError(f"the motion diverges at t = {lost * sample_time:g}{hint}")
+        self.check_resolved(motion)
+        return StructureState(motion, before.started or n > 0, before.stored), tracks
+
+    def check_resolved(self, motion: Motion) -> None:
+        """Refuse a motion with steps whose sweeps do not agree, which could not be divided further."""
+        errors, peaks = motion.carry[4][np.newaxis], motion.peaks[np.newaxis, : len(self.elements)]
+        apart = float(assembly.uncertainty(errors, peaks)[0])
+        if not apart <= assembly.LEAST_CERTAIN:
+            raise SimulationError(
+                f"the motion is not resolved: the drift of a step is uncertain by {apart:.2g} of the largest one; "
+                + ("use more substeps, or substeps=None" if self.substeps else "use a smaller sample_time")
+            )
+
+    def signals_of(self, u: FloatArray, state: StructureState, tracks: Tracks) -> dict[str, FloatArray]:
+        """Signals by name of tracks under the inputs `u`, which end in `state`."""
+        n, n_elements = self.n_nodes, len(self.elements)
+        x, (force, _, drift, rate, _) = tracks.x, np.moveaxis(tracks.carry, 1, 0)
+        kinetic, elastic = self._energies(x)
+        work = tracks.work[:, 2:]
+        slopes = self.elastic_slopes
+        with np.errstate(divide="ignore", invalid="ignore"):
+            returned = np.where(slopes > 0.0, (force**2 - self._first_forces**2) / (2.0 * slopes), 0.0)
+        imbalance = tracks.work[:, 0] - tracks.work[:, 1] - work.sum(axis=1) - (kinetic + elastic - state.stored)
+        viscous = rate * self.viscosities
+        signals = {
+            "displacement": x[:, :n],
+            "velocity": x[:, n:],
+            "acceleration": self._accelerations(x, force, u),
+            "drift": drift,
+            "force": force + viscous,
+            "peak_drift": tracks.peaks[:, :n_elements],
+            "peak_force": tracks.peaks[:, n_elements : 2 * n_elements],
+            "peak_displacement": tracks.peaks[:, 2 * n_elements : 2 * n_elements + n],
+            "peak_acceleration": tracks.peaks[:, 2 * n_elements + n :],
+            "kinetic": kinetic,
+            "elastic": elastic,
+            "damping_loss": tracks.work[:, 1],
+            "input_work": tracks.work[:, 0],
+            "element_work": work,
+            "dissipated": work - returned,
+            "imbalance": imbalance,
+        }
+        largest = float(np.abs(tracks.work).max(initial=0.0))
+        if (wrong := float(np.abs(imbalance).max(initial=0.0))) > _IMBALANCE * largest:
+            raise SimulationError(
+                f"the motion is not resolved: {wrong / largest:.2g} of the energy is missing; "
+                + ("use more substeps, or substeps=None" if self.substeps else "use a smaller tolerance")
+            )
+        name, place = self.place_of(self.output)
+        arrays = {"y": signals[name][:, place], **signals}
+        return {each: np.ascontiguousarray(values) for each, values in arrays.items()}
+
+    def _stored(self, x: FloatArray) -> FloatArray:
+        """Kinetic and elastic energy of states (k, m), shape (k,)."""
+        kinetic, elastic = self._energies(x)
+        return kinetic + elastic
+
+    def _energies(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        n = self.n_nodes
+        kinetic = 0.5 * np.einsum("ki,ij,kj->k", x[:, n:], self.mass_matrix, x[:, n:])
+        elastic = 0.5 * np.einsum("ki,ij,kj->k", x[:, :n], self.stiffness_matrix, x[:, :n])
+        return kinetic, elastic
+
+    @cached_property
+    def _first_forces(self) -> FloatArray:
+        return np.asarray(self.start().motion.carry[0])
+
+    def _accelerations(self, x: FloatArray, force: FloatArray, u: FloatArray) -> FloatArray:
+        """Accelerations (k, n): under a moving base without that of the base, which is added to have absolute ones."""
+        n = self.n_nodes
+        inner = x[:, :n] @ self.stiffness_matrix.T + x[:, n:] @ self.damping_matrix.T + force @ self.drift_matrix
+        outer = u[:, np.newaxis] * self.force_directions if self.excitation == "force" else 0.0
+        return np.asarray(np.linalg.solve(self.mass_matrix, (outer - inner).T).T)
