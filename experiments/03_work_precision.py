@@ -53,7 +53,7 @@ def spread(name: str, values: np.ndarray) -> dict[str, float]:
 
 def drive(n: float, most: int, folder: Path, smoke: bool) -> tuple[list[Row], Ratio, float | None]:
     """The driven law: rows, cost in times of `np.exp`, and how far 30 digits are from 45 on the first samples."""
-    t = np.arange(201.0 if smoke else 20_001.0)
+    t = np.arange(21.0 if smoke else 20_001.0)
     u, problem = driven.two_tone(t), f"driven, n = {n:g}"
     law = driven.law(n)
     own = lambda: law.memory(u)  # noqa: E731

@@ -36,7 +36,7 @@ def main(smoke: bool = False) -> list[Row]:
     clean = TRUE.response(u, SAMPLE_TIME)
     fits: dict[float, np.ndarray] = {}
     rows = []
-    for snr in ASKED:
+    for snr in list(ASKED)[: 2 if smoke else None]:
         fits[snr], row = study(u, clean, snr, 1 if math.isinf(snr) else draws)
         rows.append(row)
     if not smoke:

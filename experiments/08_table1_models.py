@@ -126,7 +126,7 @@ def main(smoke: bool = False) -> list[Row]:
     }
     rows = sorted((row(name, fit) for name, fit in fits.items()), key=lambda line: line["bic"])
     best = rows[0]["model"]
-    seeds = same_from_seeds(*chosen[best], 2 if smoke else 50)
+    seeds = same_from_seeds(*chosen[best], 1 if smoke else 50)
     tables = {} if smoke else intervals(*chosen[best])
     close = [line["model"] for line in rows if line["bic"] - rows[0]["bic"] <= CLOSE]
     show(rows, seeds, tables, close)
