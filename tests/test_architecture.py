@@ -45,10 +45,17 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 
 
 @cache
+def nodes(path: Path) -> list[ast.AST]:
+    """All of a file's syntax tree that some test looks at."""
+    kinds = (ast.Import, ast.ImportFrom, ast.ClassDef, ast.Call)
+    return [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, kinds)]
+
+
+@cache
 def imported(path: Path) -> list[str]:
     """Every module that a file imports, at its top or inside a function."""
     names = []
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in nodes(path):
         if isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
@@ -84,7 +91,7 @@ def test_a_library_is_imported_in_its_own_place_only(library):
 def test_kernels_know_no_class():
     for path in (PACKAGE / "kernels").glob("*.py"):
         if path.name != "_compile.py":  # which says how numba compiles them
-            assert not any(isinstance(node, ast.ClassDef) for node in ast.walk(ast.parse(path.read_text()))), path
+            assert not any(isinstance(node, ast.ClassDef) for node in nodes(path)), path
         own = [name for name in imported(path) if name.startswith("hysim.")]
         assert all(part(name) in ("kernels", "_frozen") for name in own), path
 
@@ -132,7 +139,7 @@ def test_abilities_are_asked_for_by_protocols_and_not_by_names():
     calls = [
         str(path.relative_to(PACKAGE))
         for path in MODULES
-        for node in ast.walk(ast.parse(path.read_text()))
+        for node in nodes(path)
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("getattr", "hasattr")
     ]
     assert sorted(set(calls)) == ["_frozen.py", "plants/state_space.py", "sweeps/_identity.py"]
