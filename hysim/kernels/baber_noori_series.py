@@ -9,7 +9,7 @@ all its terms underflow; there it is left out, and a step ends before the bell c
 import math
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import inner, kernel
+from hysim.kernels._compile import inner, kernel, pasted
 from hysim.kernels.remainder import FARTHEST, N_TERMS, ROUNDING, fraction
 
 N_OWN = 9  # delta_a, delta_nu, delta_eta, zeta_s, q, p, psi, delta_psi, lambda, before A, beta, gamma and n
@@ -296,7 +296,7 @@ def extend(k: int, side: float, free: bool, pinches: bool, parameters: FloatArra
     series[SLOPE, k] = (driven - parameters[2] * product(series, ENERGY, SLOPE, k, 1)) / eta
 
 
-@inner
+@pasted
 def product(series: FloatArray, a: int, b: int, k: int, first: int) -> float:
     """Sum of a_j b_(k-j) from j = `first` on: the term k of a product, or what of it does not hold a_0."""
     total = 0.0
@@ -305,7 +305,7 @@ def product(series: FloatArray, a: int, b: int, k: int, first: int) -> float:
     return total
 
 
-@inner
+@pasted
 def weighted(series: FloatArray, a: int, b: int, k: int) -> float:
     """Sum of j a_j b_(k-j): k times what a' b gives."""
     total = 0.0
