@@ -1,12 +1,14 @@
 """How exact is the Jiles-Atherton law, forwards and driven by B, and what does a sample cost beside explicit schemes?
 
-Four questions, one run:
+Five questions, one run:
 
 30 digits   Laws with an effective field H + alpha M, three strokes each, against an integration of dM/dH over H to
             30 digits (`magnetic_reference`), which shares nothing with hysim's step. Errors in units of the range.
 invariant   More samples on a branch change nothing: hostile laws (`hostile_laws`), anisotropic ones and those that
             jump among them, and their inverses, by the tests of `more_samples`: roundings, and 1e-11 of the range.
 round trip  Laws driven by B: the field is found for given outputs, and the law's response to it compared with them.
+spellings   Laws by the constants of circuit simulators and of JAmodel, against the equations of these programs by the
+            classical Runge-Kutta rule over H with 20 000 steps a stroke.
 cost        Nanoseconds a sample of hysim, of Euler's rule and of the classical Runge-Kutta rule, as circuit codes
             integrate over H, all compiled by numba, with 200 and 2 000 steps a stroke. Times are processor times in
             turns with hysim's on the same samples. Errors are against hysim with these samples, which the first two
@@ -24,7 +26,18 @@ from typing import Any
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from magnetic_reference import Core, Exact, euler, runge_kutta, strokes
+from magnetic_reference import (
+    Circuit,
+    Core,
+    Exact,
+    JAmodel,
+    euler,
+    of_circuit,
+    of_jamodel,
+    runge_kutta,
+    spelled,
+    strokes,
+)
 from more_samples import draw_case, judged, response_run, runs, spread
 from more_samples_inverse import inputs_for, inverse_verdict, wanted_case
 from results_folder import write_results
@@ -36,11 +49,21 @@ RESULTS = Path(__file__).parent / "results" / "jiles_atherton"
 N_DIGITS, N_INVARIANT, N_ROUND = 200, 10_000, 1_000
 CHUNK = 250
 STEPS = (20, 200, 2_000, 20_000)
+TURNS = 5.0 * np.array([0.0, 1.0, -1.0, 0.6, -0.3, 1.0])  # in units of a
 N_TIMED = 40_000  # samples of a timed run, at least
 CORES = {
     "steel of 1986": Core(Ms=1.6e6, a=1100.0, alpha=1.6e-3, k=400.0, c=0.2),
     "ferrite": Core(Ms=4e5, a=50.0, alpha=2.8e-4, k=47.0, c=0.7),
     "upright": Core(Ms=1.3e6, a=60.0, alpha=1.3e-4, k=40.0, c=0.1),
+}
+SPELLINGS = {
+    "circuit simulators": (of_circuit, Circuit(MS=4e5, A=25.0, K=20.0, C=0.25), hs.JilesAtherton.from_circuit),
+    "JAmodel": (of_jamodel, JAmodel(60.0, 20.0, 0.2, 1e6, 1e-5, 0.0, 0.0), hs.JilesAtherton.from_jamodel),
+    "JAmodel, anisotropic": (
+        of_jamodel,
+        JAmodel(60.0, 20.0, 0.2, 1e6, 1e-5, 300.0, 0.4),
+        hs.JilesAtherton.from_jamodel,
+    ),
 }
 SCHEMES = {"Euler": euler, "Runge-Kutta 4": runge_kutta}
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -100,6 +123,19 @@ def round_trip(count: int) -> Array:
     return errors
 
 
+# ---------------------------------------------------------------------------------- spellings
+
+
+def spelling_errors(steps: int) -> dict[str, float]:
+    """Largest distance of hysim's M from that of the other program's equation, in units of the range."""
+    errors = {}
+    for name, (slope, core, law_from) in SPELLINGS.items():
+        fields = strokes((core.A if isinstance(core, Circuit) else core.a) * TURNS, steps)
+        M = law_from(**core._asdict()).magnetisation(fields)
+        errors[name] = float(np.abs(spelled(slope, core, fields) - M).max() / np.ptp(M))
+    return errors
+
+
 # ---------------------------------------------------------------------------------- cost
 
 
@@ -108,7 +144,7 @@ def cost_rows(smoke: bool) -> list[Row]:
     rows = []
     for name, core in list(CORES.items())[: 1 if smoke else None]:
         law = law_of(core)
-        turns = core.a * 5.0 * np.array([0.0, 1.0, -1.0, 0.6, -0.3, 1.0])
+        turns = core.a * TURNS
         for steps in STEPS[:1] if smoke else STEPS:
             fields = strokes(turns, steps)
             exact, ends = law.response(fields), law.response(turns)
@@ -143,6 +179,7 @@ def main(smoke: bool = False) -> list[Row]:
     rows = cost_rows(smoke)
     if smoke:
         digits, cases, trips = [digits_error(3)], invariant(0, 2), round_trip(2)
+        spelling_errors(2)
     else:
         with ProcessPoolExecutor() as pool:
             digits = list(pool.map(digits_error, range(N_DIGITS)))
@@ -154,6 +191,7 @@ def main(smoke: bool = False) -> list[Row]:
             "digits": {"laws": len(digits), "median": float(np.median(digits)), "worst": max(digits)},
             "digits_errors": sorted(digits),
             "invariant": {way: summary([each for each in cases if each[0] == way]) for way in ("forwards", "inverse")},
+            "spellings": {"steps": STEPS[-1], "errors": spelling_errors(STEPS[-1])},
             "round_trip": {"laws": trips.size, "median": float(np.median(trips)), "worst": float(trips.max())},
         }
         write_results(RESULTS, rows, lambda rows: draw(rows, digits), numbers)

@@ -2,7 +2,8 @@
 
     dM/dH = chi / (1 - alpha chi),    chi = c dM_an/dHe + (M_an(He) - M)+ / (delta k),    He = H + alpha M
 
-Nothing here uses hysim, its effective field or its closed forms: M is integrated over H. The reference extrapolates the
+and in the spellings of circuit simulators and of JAmodel, each with its own constants. Nothing here uses hysim, its
+effective field or its closed forms: M is integrated over H. The reference extrapolates the
 modified midpoint rule (Gragg, Bulirsch, Stoer) in mpmath, with steps that are halved until two columns agree. Where
 the irreversible part is clipped, M follows from H by a root, and the branch begins anew where M_an = M.
 """
@@ -110,17 +111,19 @@ class Exact:
 
 
 @njit
+def langevin(x: float) -> tuple[float, float]:
+    """coth x - 1 / x and its slope as the codes have them."""
+    if abs(x) < 1e-3:
+        return x / 3.0 - x**3 / 45.0, 1.0 / 3.0 - x * x / 15.0
+    steep = 1.0 / (x * x) - 1.0 / math.sinh(x) ** 2 if abs(x) < 300.0 else 1.0 / x**2
+    return 1.0 / math.tanh(x) - 1.0 / x, steep
+
+
+@njit
 def susceptibility(core: Core, H: float, M: float, delta: float) -> float:
     """dM/dH as the codes have it."""
     Ms, a, alpha, k, c = core
-    x = (H + alpha * M) / a
-    if abs(x) < 1e-3:
-        m, steep = x / 3.0 - x**3 / 45.0, 1.0 / 3.0 - x * x / 15.0
-    else:
-        m, steep = (
-            1.0 / math.tanh(x) - 1.0 / x,
-            1.0 / (x * x) - 1.0 / math.sinh(x) ** 2 if abs(x) < 300.0 else 1.0 / x**2,
-        )
+    m, steep = langevin((H + alpha * M) / a)
     chi = c * Ms / a * steep + max(delta * (Ms * m - M), 0.0) / k
     return chi / (1.0 - alpha * chi)
 
@@ -152,6 +155,74 @@ def runge_kutta(core: Core, fields: Array, M: float) -> Array:
             third = susceptibility(core, H + 0.5 * h, M + 0.5 * h * second, delta)
             fourth = susceptibility(core, H + h, M + h * third, delta)
             M += h / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)
+        found[k] = M
+    return found
+
+
+# ---------------------------------------------------------------------------------- other spellings
+
+
+class Circuit(NamedTuple):
+    """Constants of the circuit simulators' law, which has no alpha."""
+
+    MS: float
+    A: float
+    K: float
+    C: float
+
+
+class JAmodel(NamedTuple):
+    """Constants of JAmodel's bulk law, with an easy axis of the energy Kan at the angle psi."""
+
+    a: float
+    k: float
+    c: float
+    Ms: float
+    alpha: float
+    Kan: float
+    psi: float
+
+
+@njit
+def of_circuit(core: Circuit, H: float, M: float, delta: float) -> float:
+    """dM/dH = (M_an - M)+ / ((1 + C) delta K) + C / (1 + C) dM_an/dH."""
+    MS, A, K, C = core
+    m, steep = langevin(H / A)
+    return max(delta * (MS * m - M), 0.0) / ((1.0 + C) * K) + C / (1.0 + C) * MS / A * steep
+
+
+@njit
+def of_jamodel(core: JAmodel, H: float, M: float, delta: float) -> float:
+    """The bulk form, with M_an as a mean over the angle theta of a moment to the field."""
+    a, k, c, Ms, alpha, Kan, psi = core
+    x, q = (H + alpha * M) / a, Kan / (4e-7 * math.pi * Ms * a)
+    even, odd, square = 0.0, 0.0, 0.0
+    for j in range(_ANGLES.size):
+        theta = 0.5 * math.pi * (1.0 + _ANGLES[j])
+        sides = 0.5 * (math.sin(psi - theta) ** 2 + math.sin(psi + theta) ** 2)
+        share = _SHARES[j] * math.exp(x * math.cos(theta) - q * sides) * math.sin(theta)
+        even += share
+        odd += share * math.cos(theta)
+        square += share * math.cos(theta) ** 2
+    m = odd / even
+    chi = c * Ms / a * (square / even - m * m) + max(delta * (Ms * m - M), 0.0) / k
+    return chi / (1.0 - alpha * chi)
+
+
+_ANGLES, _SHARES = np.polynomial.legendre.leggauss(40)
+
+
+@njit
+def spelled(slope: Any, core: Any, fields: Array) -> Array:
+    """M of a demagnetised core at the fields, by the classical rule of order 4, one step from each to the next."""
+    found, M = np.zeros(fields.size), 0.0
+    for k in range(1, fields.size):
+        H, h = fields[k - 1], fields[k] - fields[k - 1]
+        delta = 1.0 if h > 0.0 else -1.0
+        first = slope(core, H, M, delta)
+        second = slope(core, H + 0.5 * h, M + 0.5 * h * first, delta)
+        third = slope(core, H + 0.5 * h, M + 0.5 * h * second, delta)
+        M += h / 6.0 * (first + 2.0 * second + 2.0 * third + slope(core, H + h, M + h * third, delta))
         found[k] = M
     return found
 

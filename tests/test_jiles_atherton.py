@@ -16,6 +16,7 @@ import hysim as hs
 from hysim.models.search_space import Freedom
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "experiments"))
+from magnetic_evolution import loop_of, steady_cycle
 from magnetic_reference import Core, Exact, runge_kutta, strokes
 
 MU0 = 4e-7 * math.pi
@@ -103,6 +104,16 @@ def test_scales_drop_out():
     own = magnet(Core(1.0, 1.0, 2.0, 0.5, 0.3)).response(u)
     scaled = magnet(Core(2e5, 30.0, 2.0 * 30.0 / 2e5, 15.0, 0.3)).response(30.0 * u)
     assert scaled == pytest.approx(2e5 * own, abs=2e5 * ROUNDING)
+
+
+@pytest.mark.parametrize("step", [1e-14, 1e-12, 1e-11, 1e-10])
+def test_a_step_below_the_rounding_of_the_effective_field_is_not_lost(step):
+    """He / a is 140 here, with roundings of 3e-14, and M_irr moves 650 times as fast: by 2e-11 from one to the next."""
+    law = magnet(Core(1.0, 1.0, -8.5, 0.027, 0.0), z0=17.7)
+    turns, end = [7.2, 9.1], 8.0
+    once = law.response([*turns, end - step])
+    twice = law.response([*turns, end, end - step])
+    assert abs(twice[-1] - once[-1]) <= 1e-11 * np.ptp(once[1:])
 
 
 def test_a_steady_loop_between_opposite_fields_takes_energy():
@@ -258,6 +269,27 @@ def test_periodic_loops_that_begin_anywhere_give_the_constants_back():
         )
     fit = hs.identify(hs.JilesAtherton, records, initial="periodic")
     assert fit.free_names == ("Ms", "a", "alpha", "k", "c", "offset")
+    for name in ("Ms", "a", "alpha", "k", "c"):
+        assert fit.estimates[name] == pytest.approx(getattr(truth, name), rel=1e-4)  # noise-free
+
+
+@pytest.mark.skipif(SLOW, reason="20 cycles of 200 steps a branch")
+def test_the_evolution_has_the_steady_loops_of_the_law():
+    H = 3000.0 * np.cos(np.linspace(0.0, 2.0 * np.pi, 41))
+    expected = magnet().response(np.append(0.0, np.tile(H, 20)))[-H.size :]
+    loop = loop_of(H, expected)
+    assert loop.steps == 10
+    assert np.abs(steady_cycle(STEEL, loop.H, loop.steps) - expected).max() < 1e-5 * np.ptp(expected)  # Runge-Kutta's
+
+
+@pytest.mark.skipif(SLOW, reason="thousands of loops")
+def test_a_core_that_only_its_pinning_keeps_from_jumping_is_found():
+    """alpha Ms / (3 a) is 1.2."""
+    truth = magnet(Core(Ms=1.0, a=1.0, alpha=3.6, k=4.0, c=0.2))
+    u = 12.0 * np.cos(np.linspace(0.0, 2.0 * np.pi, 41))
+    y = truth.response(np.append(0.0, np.tile(u, 20)))[-u.size :]
+    start = {"gain": 1.0, "feedthrough": 0.0}
+    fit = hs.identify(hs.JilesAtherton(**start), hs.Record(u=u, y=np.append(y[:-1], y[0])), initial="periodic")
     for name in ("Ms", "a", "alpha", "k", "c"):
         assert fit.estimates[name] == pytest.approx(getattr(truth, name), rel=1e-4)  # noise-free
 

@@ -22,7 +22,7 @@ PLACES = {
     hs.BoucWenBaberNoori(n=1.5, delta_nu=0.1): 332,
     hs.BoucWenBaberNoori(n=1.5): 5328,
     hs.Dahl(): 2,
-    hs.JilesAtherton(): 3,
+    hs.JilesAtherton(): 4,
     hs.ColemanHodgdon(): 2,
     hs.Play(): 2,
     hs.Line(): 1,

@@ -62,7 +62,12 @@ def test_a_finding_is_a_few_sentences_that_follow_the_numbers(finding):
     sentences = finding(result)
     assert 1 <= len(sentences) <= 3
     kinds = {int} if finding.__name__ in ("fuzz", "kill_and_resume") else {float}  # these two count
-    if finding.__name__ in ("exact_step", "batch", "transfer_functions"):  # twice their numbers are no longer true
+    if finding.__name__ in (
+        "exact_step",
+        "batch",
+        "transfer_functions",
+        "magnetic_loops",
+    ):  # twice their numbers are no longer true
         with pytest.raises(ValueError, match="no longer supports"):
             finding(scaled(result, 2, kinds))
     else:
@@ -264,6 +269,17 @@ def test_more_samples_on_a_branch_change_nothing():
     result = result_of("more_samples")
     assert result["violations"] == 0
     assert max(row["worst"] for row in result["rows"]) <= 1.0
+
+
+def test_a_default_call_finds_the_best_law_of_each_measured_core():
+    sets = result_of("magnetic_loops")["sets"]
+    assert len(sets) == 6
+    assert max(each["default_over_evolution_exactly"] for each in sets.values()) <= 1.001
+    assert max(each["default_over_refined"] for each in sets.values()) <= 1.01
+
+
+def test_other_programs_have_the_same_loops():
+    assert max(result_of("jiles_atherton")["spellings"]["errors"].values()) < 1e-6
 
 
 def test_a_step_has_the_same_numbers_everywhere():

@@ -31,7 +31,7 @@ from hysim.models.parameters import Parameter, declared_space
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, Startable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.stages import Simpler, Stage, Subset
-from hysim.models.steady_cycle import PassOf, fixed_point
+from hysim.models.steady_cycle import Pass, PassOf, fixed_point
 from hysim.models.tables import Tables, arguments_of, scalars_of, table_of_one, tables_of
 from hysim.records import Record
 
@@ -476,7 +476,7 @@ class Law(Composable, ABC):
         self._check_memory_is_its_own(parameters, corners)
 
         def through(path: FloatArray) -> PassOf:
-            return lambda sets: self._one_pass(_of_sets(parameters, sets), path)
+            return self._passes(parameters, path)
 
         n_sets = max(map(np.size, parameters.values()), default=1)
         few, before = 2 * corners.size < u.size, np.zeros((n_sets, len(names)))
@@ -493,31 +493,36 @@ class Law(Composable, ABC):
         others = [name for name in self.columns if name not in self.initial_names]
         affine = {name: self.scalars[name] + k for k, name in enumerate(others, 1)}
         before = np.zeros((1, len(self.initial_names)))
-        first = _of_sets(parameters, np.array([0]))
+        first, one = of_sets(parameters, np.array([0])), np.array([0])
         if affine and not np.array_equal(
-            self._one_pass(first, u)(before), self._one_pass({**first, **affine}, u)(before), equal_nan=True
+            self._passes(first, u)(one)(before), self._passes({**first, **affine}, u)(one)(before), equal_nan=True
         ):
             raise ValueError(
                 f"a {type(self).__name__} has no steady cycle that could be computed, since {' or '.join(affine)} "
                 'moves its memory: use initial="free"'
             )
 
-    def _one_pass(self, parameters: Parameters, u: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        """A function from the memory before the input `u` to that after it, (n_sets, n_memory)."""
+    def _passes(self, parameters: Parameters, u: FloatArray) -> PassOf:
+        """Functions from the memory before the input `u` to that after it, (n_sets, n_memory)."""
         from hysim.kernels.memories import drive_to_end  # compiled where it is needed
 
         tables, inputs = tables_of(type(self).__name__, self.arguments, parameters, u)
-        constants, memory = (read_only(table, finite=False) for table in self.pack(self.completed(tables)))
+        constants, memory = self.pack(self.completed(tables))
         place, step, y = slice(1, 1 + len(self.initial_names)), compiled_step(self.step), np.empty(u.size)
 
-        def passed(z: FloatArray) -> FloatArray:
-            begin, ends = memory.copy(), np.empty(memory.shape)
-            begin[:, place] = np.nan_to_num(z, posinf=0.0, neginf=0.0)
-            with np.errstate(all="ignore"):
-                drive_to_end(step, constants, read_only(begin), self.workspace, inputs[0], y, ends)
-            return np.where(np.isfinite(z), ends[:, place], np.nan)
+        def of(sets: npt.NDArray[np.intp]) -> Pass:
+            own, begin = read_only(constants[sets], finite=False), memory[sets]
 
-        return passed
+            def passed(z: FloatArray) -> FloatArray:
+                ends = np.empty(begin.shape)
+                begin[:, place] = np.nan_to_num(z, posinf=0.0, neginf=0.0)
+                with np.errstate(all="ignore"):
+                    drive_to_end(step, own, read_only(begin, finite=False), self.workspace, inputs[0], y, ends)
+                return np.where(np.isfinite(z), ends[:, place], np.nan)
+
+            return passed
+
+        return of
 
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
         """Remarks on the identified model, as phrases."""
@@ -582,7 +587,7 @@ def _first(u: FloatArray) -> float:
     return float(u[0]) if u.size else 0.0
 
 
-def _of_sets(parameters: Parameters, sets: npt.NDArray[np.intp]) -> dict[str, Any]:
+def of_sets(parameters: Parameters, sets: npt.NDArray[np.intp]) -> dict[str, Any]:
     """The parameters of some sets; a single value is that of all."""
     return {name: value if np.size(value) == 1 else np.asarray(value)[sets] for name, value in parameters.items()}
 

@@ -4,6 +4,9 @@ One pass through the cycle contracts the memory, componentwise by the secant met
 through the turning points alone, which cost next to nothing and for a law that is exact on monotone stretches leave the
 memory of a full pass. The last ones go through all samples, so that any other law is steady too: for an exact law it
 is one pass, which changes nothing.
+
+The secant method alone would also find cycles that lead away from themselves, in which no repetition of the input ends.
+It is used where a memory that is off is less so after a pass, and elsewhere the pass itself.
 """
 
 from collections.abc import Callable
@@ -20,6 +23,7 @@ PassOf = Callable[[npt.NDArray[np.intp]], Pass]
 """The pass of some of the sets, by their numbers."""
 
 _COARSE, _FULL = 20, 8  # passes at most
+_OVERSHOOTING = -2.0  # slope of the drift from which on a pass leads farther away, to the other side
 _STILL = 1e-13  # of the largest memory met: a change by a pass that is rounding
 
 
@@ -37,7 +41,7 @@ def fixed_point(passes: PassOf, before: FloatArray, coarse: PassOf | None = None
 
 
 def _secant(passes: PassOf, before: FloatArray, most: int) -> FloatArray:
-    """The secant method on each component; a set takes part until a pass changes nothing."""
+    """The secant method on each component where passes contract; a set takes part until a pass changes nothing."""
     moving = np.arange(len(before))
     result = passes(moving)(before)
     z, drift_before = result, result - before
@@ -51,7 +55,8 @@ def _secant(passes: PassOf, before: FloatArray, most: int) -> FloatArray:
             moving = moving[still_moves]
             after = passes(moving)(z)
             drift = after - z
-            secant = z - drift * (z - before) / (drift - drift_before)
+            slope = (drift - drift_before) / (z - before)
+            secant = np.where((slope < 0.0) & (slope > _OVERSHOOTING), z - drift / slope, after)
             size = np.fmax(size, np.abs(after))
         before, drift_before, z = z, drift, np.where(np.isfinite(secant), secant, after)
         result[moving] = z

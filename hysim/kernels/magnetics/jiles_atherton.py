@@ -61,25 +61,27 @@ _PLACES, _SHARES = (
 
 @kernel
 def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
-    """Output at the next field `u`; `state` is (last u, M_irr, x), and moves along.
+    """Output at the next field `u`; `state` is (last u, M_irr, x, rest), and moves along.
 
     x = He / a is zero before the first sample, where it is not known yet. It is kept, and not found anew from the last
-    u, so that the stretches of x over which z is averaged leave no gaps. `parameters` are those named in this module.
+    u, so that the stretches of x over which z is averaged leave no gaps. The rest is what the rounding of x leaves out:
+    where kappa is small, z moves by many of its roundings along it. `parameters` are those named in this module.
     """
     a, Ms = parameters[FIELD], parameters[SATURATION]
     last, z = state[0], state[1] / Ms
     if not abs(z) < math.inf:
         return math.inf
     if state[2] == 0.0:
-        state[2] = first_place(last / a, z, parameters)
+        state[2], state[3] = first_place(last / a, z, parameters), 0.0
     if u != last:
         delta = 1.0 if u > last else -1.0
         share = parameters[FEEDBACK] * parameters[REVERSIBLE]
         of_m, of_z = -parameters[COUPLING] * share, -parameters[COUPLING] * (1.0 - share)
-        x, after, _ = advance(delta * state[2], delta * z, delta * (u / a), 1.0, of_m, of_z, parameters)
+        x, rest = delta * state[2], delta * state[3]
+        x, rest, after, _ = advance(x, rest, delta * z, delta * (u / a), 1.0, of_m, of_z, parameters)
         if after != delta * z:
             state[1] = delta * Ms * after
-        state[0], state[2] = u, delta * x
+        state[0], state[2], state[3] = u, delta * x, delta * rest
     return output(state, parameters)
 
 
@@ -139,25 +141,27 @@ def reversible(low: float, high: float, target: float, of_x: float, of_m: float,
 
 @inner
 def advance(
-    x: float, z: float, target: float, of_x: float, of_m: float, of_z: float, parameters: FloatArray
-) -> tuple[float, float, float]:
-    """x, z and m(x) at the first place ahead with of_x x + of_m m + of_z z = `target`; nan if there is none."""
-    p = parameters[ANISOTROPY]
+    x: float, rest: float, z: float, target: float, of_x: float, of_m: float, of_z: float, parameters: FloatArray
+) -> tuple[float, float, float, float]:
+    """x, its rest, z and m at the first place ahead with of_x x + of_m m + of_z z = `target`; nan if there is none."""
+    p, kappa = parameters[ANISOTROPY], parameters[PINNING]
     m, slope = curve(x, p)
     if z > m:
         end = max(x, field_of(z, p))
         at_end = of_x * end + (of_m + of_z) * z
         if end == math.inf or at_end >= target:
             x = reversible(x, end, target - of_z * z, of_x, of_m, p)
-            return x, z, curve(x, p)[0]
+            return x, 0.0, z, curve(x, p)[0]
         x, m = end, z
         slope = curve(x, p)[1]
+    else:
+        z -= rest * (m - z) / kappa  # from where x was to its rounding
     if of_x == 0.0 and not target < of_m + of_z:
-        return math.nan, math.nan, math.nan
+        return math.nan, math.nan, math.nan, math.nan
     steepest = curve(0.0, p)[1] if x < 0.0 else slope
     if is_steady(m - z, steepest, steepest, parameters):
         return solve(x, z, m, slope, math.inf, target, of_x, of_m, of_z, parameters)
-    length, kappa = 0.5, parameters[PINNING]
+    length = 0.5
     for _ in range(_MAX_PIECES):
         length = steady_length(x, m - z, slope, length, parameters)
         if length == 0.0:
@@ -169,7 +173,7 @@ def advance(
             return solve(x, z, m, slope, end, target, of_x, of_m, of_z, parameters)
         x, z, m, slope = end, z_end, m_end, slope_end
         length = min(2.0 * length, max(1.0, kappa))
-    return math.nan, math.nan, math.nan
+    return math.nan, math.nan, math.nan, math.nan
 
 
 @inner
@@ -209,15 +213,17 @@ def solve(
     of_m: float,
     of_z: float,
     parameters: FloatArray,
-) -> tuple[float, float, float]:
+) -> tuple[float, float, float, float]:
     """As `advance`, for a place up to `end` on a branch along which z follows m, and the sum rises."""
     kappa, p = parameters[PINNING], parameters[ANISOTROPY]
     low, z_low, high = x, z, end
     rise = of_x + of_m * slope + of_z * (m - z) / kappa
     error = target - of_x * x - of_m * m - of_z * z
     trial = predicted(x, (m - z) / kappa, error, rise, slope, of_x, of_m, of_z, parameters)
-    if not error > 0.0 or trial == x:  # nothing that could be told from a rounding
-        return x, z, m
+    if not error > 0.0 or trial == x:  # the place is within a rounding of x
+        left = error / rise if rise > 0.0 else 0.0
+        start, rest = landed(x, left)
+        return start, rest, z + left * (m - z) / kappa, m
     start = x
     for i in range(_MAX_NEWTON):
         if not low < trial < high or (i % 3 == 2 and high < math.inf):  # else it might go from side to side
@@ -234,16 +240,25 @@ def solve(
         rise = of_x + of_m * slope + of_z * steepness
         terms = abs(of_x * x) + abs(of_m * m) + abs(of_z * z)
         left = error / rise if rise > 0.0 else math.nan
-        close = min(_CLOSE * min(1.0, kappa), _NEARLY * abs(x - start))
+        close = max(min(_CLOSE * min(1.0, kappa), _NEARLY * abs(x - start)), 2.0 * _EPSILON * abs(x))
         if abs(left) <= max(close, _ROUNDINGS * _EPSILON * terms / rise):
             z += left * (steepness + 0.5 * left * (slope - steepness) / kappa)
-            return x + left, z, m + left * slope
+            m += left * slope
+            x, rest = landed(x, left)
+            return x, rest, z, m
         if error > 0.0:
             low, z_low = x, z
         else:
             high = x
         trial = x + left
-    return x, z, m
+    return x, 0.0, z, m
+
+
+@inner
+def landed(x: float, left: float) -> tuple[float, float]:
+    """x + left, and what its rounding leaves out."""
+    end = x + left
+    return end, left - (end - x)
 
 
 @inner

@@ -31,17 +31,18 @@ def step(parameters: FloatArray, state: FloatArray, y: float) -> float:
     delta = rising if y > reached else -rising
     z = copy[1] / Ms
     if copy[2] == 0.0:
-        copy[2] = law.first_place(u / a, z, own)
+        copy[2], copy[3] = law.first_place(u / a, z, own), 0.0
     of_m, of_z = gain * c - feedthrough * coupling * share, gain * (1.0 - c) - feedthrough * coupling * (1.0 - share)
     target = delta * rising * (y - own[law.OFFSET])
-    x, after, m = law.advance(delta * copy[2], delta * z, target, feedthrough, of_m, of_z, own)
+    x, rest = delta * copy[2], delta * copy[3]
+    x, rest, after, m = law.advance(x, rest, delta * z, target, feedthrough, of_m, of_z, own)
     wanted = delta * a * (x - coupling * (share * m + (1.0 - share) * after))
     if delta * (wanted - u) <= 0.0:
         return float(u)  # the step is below a rounding of the effective field, and might go the wrong way
     end = within_limits(parameters, wanted, delta)
     if end == wanted:
         state[0], state[1] = end, y
-        copy[0], copy[2] = end, delta * x
+        copy[0], copy[2], copy[3] = end, delta * x, delta * rest
         if after != delta * z:
             copy[1] = delta * Ms * after
     elif not math.isnan(end):

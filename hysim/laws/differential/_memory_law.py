@@ -16,9 +16,10 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim.laws.differential import _boucwen_search, boucwen_inverse
-from hysim.models.law import Law, State
+from hysim.models.law import Law, State, of_sets
 from hysim.models.protocols import CompiledLaw
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.steady_cycle import Pass, PassOf
 from hysim.models.tables import Tables
 from hysim.records import Record
 
@@ -141,13 +142,18 @@ class MemoryLaw(Law):
     def _check_memory_is_its_own(self, parameters: Parameters, u: FloatArray) -> None:
         """It is: the polynomial and the gain stand behind it."""
 
-    def _one_pass(self, parameters: Parameters, u: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        def passed(z: FloatArray) -> FloatArray:
-            sets = {**parameters, **self.memory_only, "z0": np.nan_to_num(z[:, 0], posinf=0.0, neginf=0.0)}
-            end = self.outputs_of(sets, u).reduced("final", None, None)[:, np.newaxis]
-            return np.where(np.isfinite(z) & np.isfinite(end), end, np.nan)
+    def _passes(self, parameters: Parameters, u: FloatArray) -> PassOf:
+        def of(sets: npt.NDArray[np.intp]) -> Pass:
+            own = {**of_sets(parameters, sets), **self.memory_only}
 
-        return passed
+            def passed(z: FloatArray) -> FloatArray:
+                begun = {**own, "z0": np.nan_to_num(z[:, 0], posinf=0.0, neginf=0.0)}
+                end = self.outputs_of(begun, u).reduced("final", None, None)[:, np.newaxis]
+                return np.where(np.isfinite(z) & np.isfinite(end), end, np.nan)
+
+            return passed
+
+        return of
 
     def columns_by(
         self, outputs: Callable[[Parameters, FloatArray], FloatArray], parameters: Parameters, u: FloatArray

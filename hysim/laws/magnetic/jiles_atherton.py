@@ -134,12 +134,12 @@ class JilesAtherton(Law):
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
-        """Parameters as `hysim.kernels.magnetics.jiles_atherton.step` takes them, and memory (u, M_irr, He / a)."""
+        """Parameters as `hysim.kernels.magnetics.jiles_atherton.step` takes them; memory (u, M_irr, He / a, rest)."""
         a, Ms = tables["a"], tables["Ms"]
         scaled = [a, Ms, tables["alpha"] * Ms / a, tables["k"] / a]
         others = ("c", "reversible_feedback", "anisotropy", "gain", "feedthrough", "offset")
         parameters = np.concatenate([*scaled, *(tables[name] for name in others)], axis=1)
-        return Packed(parameters, cls.initial_memory(tables, further=1))
+        return Packed(parameters, cls.initial_memory(tables, further=2))
 
     @classmethod
     def from_total(cls, *, Ms: float, a: float, alpha: float, k: float, c: float) -> Self:
@@ -162,7 +162,7 @@ class JilesAtherton(Law):
         """The spelling of circuit simulators, ``dM/dH = (M_an - M) / ((1 + C) delta K) + C / (1 + C) dM_an/dH``.
 
         It has no coupling alpha. Where the simulator's anhysteretic curve is ``MS H / (|H| + A)`` (PSpice, level 2),
-        the law here differs in this curve.
+        the law here differs in this curve. ngspice (version 39) has no Jiles-Atherton law.
 
         Examples
         --------
