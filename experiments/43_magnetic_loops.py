@@ -253,14 +253,11 @@ def line_of(row: Row) -> str:
 
 
 SHOWN = (OWN, "energy-based plays", "Tellinen")
-MEASURED, FITTED = (
-    {"ls": "", "marker": ".", "markevery": 4, "ms": 1.5, "color": "#D55E00"},
-    {"color": "#0072B2", "lw": 0.9},
-)
+FITTED = {"color": "#0072B2", "lw": 0.9}
 
 
 def draw(rows: list[Row], sets: dict[str, Records], models: Mapping[Any, Any], numbers: Mapping[str, Any]) -> Figure:
-    """Loops of three laws on the three materials, with the largest error of an amplitude; how the evolution falls."""
+    """Fitted loops of three laws, with the largest error of an amplitude; how the evolution falls."""
     canvas = figure(height=8.0)
     grid = canvas.add_gridspec(4, 3)
     for line, law in enumerate(SHOWN):
@@ -268,7 +265,6 @@ def draw(rows: list[Row], sets: dict[str, Records], models: Mapping[Any, Any], n
             axes = canvas.add_subplot(grid[line, place])
             residuals = parts_of(models[name, law].residual, sets[name])
             for record, residual in zip(sets[name], residuals, strict=True):
-                axes.plot(record.u, record.y, **MEASURED)
                 axes.plot(record.u, record.y - residual, **FITTED)
             (row,) = (each for each in rows if each["set"] == name and each["law"] == law)
             axes.text(0.05, 0.93, f"{row['worst_error_percent']:.2g} %", transform=axes.transAxes, va="top", fontsize=8)
