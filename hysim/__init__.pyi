@@ -17,6 +17,7 @@ from hysim.records import Record as Record
 from hysim.files import load as load
 from hysim.files import list_columns as list_columns
 from hysim.files import load_ground_motion as load_ground_motion
+from hysim.files import join_records as join_records
 from hysim.files import save_record as save_record
 from hysim.simulation import simulate as simulate
 from hysim.simulation import Simulation as Simulation

@@ -11,7 +11,7 @@ import pytest
 
 import hysim as hs
 from hysim.cli import COMMANDS, main, parsers
-from hysim.cli.completion import bash, fish, zsh
+from hysim.cli.shell.completion import bash, fish, zsh
 from hysim.files import FileColumn
 
 

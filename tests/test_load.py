@@ -107,6 +107,27 @@ def test_time_may_begin_again_after_a_gap():
         load(text, t="t", on_missing="drop")
 
 
+@pytest.mark.parametrize("mark", [".", "'", "\u2019", " ", "\u00a0", "\u202f"])
+def test_thousands_are_read_where_they_can_mean_nothing_else(mark):
+    rec = load(f"u;y\n-1{mark}000,5;1\n999,5;2\n12{mark}345{mark}678;3\n")
+    assert rec.u.tolist() == [-1000.5, 999.5, 12345678.0]
+
+
+def test_a_comma_between_thousands_is_read_where_it_can_mean_nothing_else():
+    assert load('u,y\n"1,000.5",1\n2.5,3\n').u.tolist() == [1000.5, 2.5]
+
+
+@pytest.mark.parametrize(("sign", "decimal"), [(".", ","), (",", ".")])
+def test_one_sign_is_between_thousands_only_if_it_is_said_to_be(sign, decimal):
+    text = f"u;y\n1{sign}000;1\n2{sign}500{decimal}5;2\n12;3\n"
+    assert load(text, thousands=sign).u.tolist() == [1000.0, 2500.5, 12.0]
+    assert load(f"u;y\n1{sign}000;1\n2{sign}500;2\n").u.tolist() == [1.0, 2.5]
+    with pytest.raises(ValueError, match="thousands must be a point, a comma, an apostrophe or a space that is not"):
+        load(text, thousands=sign, decimal=sign)
+    with pytest.raises(ValueError, match="got '_'"):
+        load(text, thousands="_")
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -117,7 +138,9 @@ def test_time_may_begin_again_after_a_gap():
         ("u,y,y\n0,1,2\n", "2 columns are called 'y': choose one of the numbers 1, 2"),
         ("u,y\n0,1\n2,high\n", "line 3, column 'y': expected a finite number, got 'high'"),
         ("u;y\n0.5;1\n2;3,5\n", r"line 3, column 'y': .* got '3,5' \(pass decimal=\",\""),
-        ("u;y\n0,5;1\n2,5;1.234,5\n", r"line 3, column 'y': .* got '1.234,5' \(pass decimal=\".\""),
+        ("u;y\n0,5;1\n2,5;1.234\n", r"line 3, column 'y': .* got '1.234' \(pass decimal=\"\.\" .*, thousands=\"\.\""),
+        ("u;y\n0,5;1\n2,5;1.23,5\n", r"line 3, column 'y': expected a finite number, got '1.23,5'$"),
+        ("u;y\n0.5;1\n2.5;12'34\n", r"line 3, column 'y': expected a finite number, got \"12'34\"$"),
         ("u,y\n0,1\nx,2\n3,4\n", "line 3, column 'u': expected a finite number, got 'x'"),
         ("0,x\n1,2\n3,4\n", "line 1 is half a header: column 0 holds the number '0', column 1 the text 'x'"),
         ("u,v\n1,2,3\n4,5,6\n", "line 1 names 2 columns, most lines below have 3 cells"),

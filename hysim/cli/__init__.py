@@ -8,16 +8,14 @@ import argparse
 import os
 import signal
 import sys
-from collections.abc import Sequence
-from difflib import get_close_matches
-from typing import NoReturn
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 
 from hysim import __version__
 from hysim.cli import (
     c,
     columns,
     compare,
-    completion,
     control,
     discover,
     example,
@@ -25,55 +23,34 @@ from hysim.cli import (
     identify,
     measure,
     metrics,
-    models,
     outputs,
     page,
     plot,
     reproduce,
-    signals,
     simulate,
     sweep,
 )
 from hysim.cli.options import Command
+from hysim.cli.shell import completion, signals
+from hysim.cli.shell.parser import BAD_INPUT, Parser, in_groups, one_line, unexpected
+from hysim.cli.shell.words import in_shell_words, suggestion
 from hysim.errors import SimulationError
 
-_MODULES = (
-    example,
-    columns,
-    metrics,
-    identify,
-    discover,
-    compare,
-    simulate,
-    control,
-    c,
-    fmu,
-    plot,
-    sweep,
-    measure,
-    reproduce,
-)
-_COMMANDS = (
-    *(module.COMMAND for module in _MODULES),
-    page.COMMAND,
-    page.EXPLORE,
-    completion.command(lambda: parsers()[1]),
-)
-COMMANDS = {command.name: command for command in _COMMANDS}
+GROUPS: Mapping[str, Sequence[Command]] = {
+    "look at a file": (example.COMMAND, columns.COMMAND, metrics.COMMAND, plot.COMMAND),
+    "from a file to a model": (identify.COMMAND, compare.COMMAND, discover.COMMAND),
+    "use a model": (simulate.COMMAND, control.COMMAND, page.COMMAND),
+    "take a model elsewhere": (c.COMMAND, fmu.COMMAND),
+    "many simulations": (sweep.COMMAND,),
+    "camera frames": (measure.COMMAND,),
+    "learn and set up": (page.EXPLORE, reproduce.COMMAND, completion.command(lambda: parsers()[1])),
+}
+"""Every command, in groups as the help shows them."""
+
+COMMANDS = {command.name: command for commands in GROUPS.values() for command in commands}
 """Every command by its name."""
 
-DONE, BAD_INPUT = 0, 2
-
-
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        self.exit(BAD_INPUT, f"{self.prog}: error: {_one_line(message)} (see {self.prog} --help)\n")
-
-    def format_help(self) -> str:
-        command: Command | None = self.get_default("command")
-        if command is not None and models.FORMS in command.options:  # here, since loading every family takes seconds
-            self.epilog = f"Names of models: {', '.join(models.names())}."
-        return super().format_help()
+DONE = 0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -106,9 +83,14 @@ def _ended(request: "KeyboardInterrupt | signals.Ended") -> int:
 
 def parsers(only: str | None = None) -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParser]]:
     """The parser of the whole command line, and the parsers of each command, or of one command only."""
-    parser = _Parser(prog="hysim", description="Simulate, identify, discover, compare and compensate hysteresis.")
+    parser = Parser(
+        prog="hysim",
+        usage="hysim COMMAND ...",
+        description="Simulate, identify, discover, compare and compensate hysteresis.",
+        epilog=f"{in_groups(GROUPS)}\n\nEach command has its own help: hysim COMMAND --help. To begin: hysim example.",
+    )
     parser.add_argument("--version", action="version", version=f"hysim {__version__}")
-    commands = parser.add_subparsers(title="commands", metavar="COMMAND")
+    commands = parser.add_subparsers(prog="hysim", metavar="COMMAND", help=argparse.SUPPRESS)
     for name, command in COMMANDS.items():
         if only in (None, name):
             command.add_to(commands)
@@ -117,20 +99,30 @@ def parsers(only: str | None = None) -> tuple[argparse.ArgumentParser, dict[str,
 
 def _run(arguments: list[str]) -> int:
     named = next((argument for argument in arguments if not argument.startswith("-")), None)
-    parser, _ = parsers(named if named in COMMANDS and arguments[0] == named else None)
+    parser, of_commands = parsers(named if named in COMMANDS and arguments[0] == named else None)
     if named is not None and named not in COMMANDS:
-        near = get_close_matches(named, COMMANDS, n=1)
-        advice = f"did you mean {near[0]}?" if near else f"there are {', '.join(COMMANDS)}"
+        advice = suggestion(named, COMMANDS) or f"there are {', '.join(COMMANDS)}"
         parser.error(f"there is no command {named!r}: {advice}")
-    options = parser.parse_args(arguments)
+    options, unknown = parser.parse_known_args(arguments)
     if named is None:
         parser.print_help(sys.stderr)
         return BAD_INPUT
+    if unknown:
+        of_commands[named].error(unexpected(unknown, of_commands[named]))
     import numpy as np
 
-    with np.errstate(all="ignore"):  # an overflow is inf or nan in the result, and null in JSON
+    with np.errstate(all="ignore"), _told_in_shell_words(options):  # an overflow is inf or nan, and null in JSON
         outputs.check(options)
         return int(options.command.run(options))
+
+
+@contextmanager
+def _told_in_shell_words(options: argparse.Namespace) -> Iterator[None]:
+    """Raise an error of the library again as one that names options in place of arguments."""
+    try:
+        yield
+    except (ValueError, TypeError, SimulationError) as error:
+        raise ValueError(in_shell_words(str(error) or type(error).__name__, options.flags)) from error
 
 
 def _failed(code: int, text: str) -> int:
@@ -152,10 +144,5 @@ def _discard(code: int) -> int:
 
 def _line(error: BaseException) -> str:
     if isinstance(error, OSError) and error.strerror:
-        return _one_line(f"{error.filename}: {error.strerror}" if error.filename else error.strerror)
-    return _one_line(str(error)) or type(error).__name__
-
-
-def _one_line(text: str) -> str:
-    """The text in one line; characters that a terminal would obey are printed as their codes."""
-    return "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in " ".join(text.split()))
+        return one_line(f"{error.filename}: {error.strerror}" if error.filename else error.strerror)
+    return one_line(str(error)) or type(error).__name__

@@ -46,4 +46,8 @@ COMMAND = Command(
 --u0 VALUE  input at rest, at which an inverse starts [unit of u] [default: 0]
 """,
     run,
+    """
+hysim c law.json --out law.c
+hysim c law.json --inverse --out inverse.c
+""",
 )

@@ -55,4 +55,9 @@ text:
 {JSON}
 """,
     run,
+    """
+hysim columns loop.csv
+hysim columns rig.mat
+hysim columns export.csv --encoding latin-1
+""",
 )

@@ -20,7 +20,7 @@ def run(options: argparse.Namespace) -> int:
 
     record, test = records.read(options), options.test_cycles
     if options.test is not None:
-        test = records.read(options, options.test)
+        test = records.read(options, options.test, uncut=True)
     subjects: dict[str, Any] = {}
     for name in options.model:
         subjects |= _subjects(name)
@@ -115,4 +115,9 @@ or --test-cycles N  keep the last N cycles for the test
 {JSON}
 """,
     run,
+    """
+hysim compare loop.csv
+hysim compare loop.csv --model bouc-wen --model preisach --model law.json --test-cycles 1
+hysim compare loop.csv --csv table.csv --plot loops.svg --out best.json
+""",
 )

@@ -143,4 +143,9 @@ task of the loop:
 {JSON}
 """,
     run,
+    """
+hysim control law.json --record loop.csv --sample-time 1e-4
+hysim control law.json --limits 0,100 --sample-time 1e-4 --mode 300,0.02 --controller tracking --out c.json
+hysim control law.json --limits 0,100 --sample-time 1e-4 --controller inverse --c stage.c
+""",
 )

@@ -75,4 +75,8 @@ COMMAND = Command(
 {JSON}
 """,
     run,
+    """
+hysim discover loop.csv --plot law.svg
+hysim discover test.csv --route oscillator --mass 2.5
+""",
 )

@@ -39,4 +39,8 @@ COMMAND = Command(
     (default: this machine, if it has a C compiler)
 """,
     run,
+    """
+hysim fmu law.json --out law.fmu
+hysim fmu actuator.json --sample-time 1e-4 --version 3.0 --out actuator.fmu
+""",
 )

@@ -1,9 +1,13 @@
 """`hysim identify`: the parameters of a model from a record in a file."""
 
 import argparse
+from typing import TYPE_CHECKING, Any
 
-from hysim.cli import models, outputs, records
+from hysim.cli import models, outputs, records, sensors
 from hysim.cli.options import JSON, MODEL_OUT, SEED, Command
+
+if TYPE_CHECKING:
+    from hysim.plot import Figure
 
 SUCCESS, NOT_CONVERGED = 0, 1
 
@@ -13,12 +17,14 @@ def run(options: argparse.Namespace) -> int:
     from hysim.identification import identify
     from hysim.models.channels.dependent import on_record
     from hysim.models.storage import to_json
+    from hysim.simulation import simulate
 
     model = models.to_identify(options)
     record, weights = records.read_with_weights(options)
+    measured: Any = sensors.of_structure(model, record, dict(options.sensor)) if options.sensor else record
     fit = identify(
         model,
-        record,
+        measured,
         fixed=dict(options.fix),
         free=tuple(options.free),
         bounds=dict(options.bounds),
@@ -32,10 +38,13 @@ def run(options: argparse.Namespace) -> int:
         "fit_percent", "rmse", "cv_rmse", "fpe", "aic", "bic", "whiteness", "seed", "success", "message",
         "warnings",
     )  # fmt: skip
-    files: outputs.Files = {
-        options.out: lambda: to_json(fit.model, units=record.units),
-        options.plot: lambda: outputs.loop_of_model(record, on_record(fit.model, record)),
-    }
+
+    def picture() -> "Figure":
+        if options.sensor:  # the record of one sensor is not the output of the structure
+            return outputs.picture_of(simulate(fit.model, record.t, record.u))
+        return outputs.loop_of_model(record, on_record(fit.model, record))
+
+    files: outputs.Files = {options.out: lambda: to_json(fit.model, units=record.units), options.plot: picture}
     family = {"family": type(fit.model).__name__}
     outputs.write(options, files, fit.summary, lambda: family | outputs.fields_of(fit, names))
     return SUCCESS if fit.success else NOT_CONVERGED
@@ -49,6 +58,9 @@ COMMAND = Command(
     f"""
 {records.OPTIONS_WITH_WEIGHTS}
 {models.OPTIONS}
+--sensor SENSOR=COLUMN...  what a sensor on a structure measured, by the names of hysim simulate, and its column:
+    drift_0, or acceleration_2=roof (default: the structure's own output, in the column --y)
+
 --fix NAME=VALUE...  parameter that is not free: n=1 [unit of the parameter]
 --free NAME...  parameter that is free, where it is fixed by default
 --bounds NAME=LOW:HIGH...  bounds of a parameter: beta=0:2 [unit of the parameter]
@@ -64,4 +76,11 @@ COMMAND = Command(
 {JSON}
 """,
     run,
+    """
+hysim identify loop.csv --model bouc-wen --out law.json --plot fit.svg
+hysim identify loop.csv --u voltage --y displacement --model bouc-wen --fix n=1
+hysim identify drive.csv --y-file sensor.csv --model prandtl-ishlinskii --plays 8
+hysim identify test.csv --model oscillator --excitation base
+hysim identify quake.csv --model frame.json --free damping --sensor acceleration_2
+""",
 )

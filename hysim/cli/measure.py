@@ -119,4 +119,8 @@ voltages:
 {JSON}
 """,
     run,
+    """
+hysim measure frames --scale 0.25 --out motion.csv
+hysim measure film.avi --scale 0.25 --frame-rate 30 --voltage log.csv --u voltage --t time --out loop.csv
+""",
 )

@@ -90,4 +90,9 @@ COMMAND = Command(
 {JSON}
 """,
     run,
+    """
+hysim metrics loop.csv --u voltage --y displacement
+hysim metrics damper.csv --cycles --csv cycles.csv
+hysim metrics loop.csv --from 2s --to 4s --plot loop.svg
+""",
 )

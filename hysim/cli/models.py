@@ -1,21 +1,29 @@
 """Models of the command line: families by name, models in files, and laws of the user by import path."""
 
 import argparse
+import inspect
 import os
 import pkgutil
 import re
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import hysim
 from hysim.cli.records import STANDARD
+from hysim.cli.shell.words import suggestion
 
 FORMS = "name of a family, such as bouc-wen; MODEL.json; or module:name of your own"
 """Values of an option for models."""
 
 OPTIONS = f"""
 --model MODEL  {FORMS}; an unknown name lists the names [required]
+
+structure of the model:
+--plays COUNT  number of plays, or of a Maxwell-slip model's elements
+--relay-intervals COUNT  number of intervals between the levels of a Preisach model
+--one-signed yes|no  whether the weights of plays or relays have one sign (default: chosen by the BIC)
+--degree COUNT  degree of a Duhem law's polynomials
 
 transfer function:
 --poles N  number of poles
@@ -26,17 +34,29 @@ transfer function and oscillator:
 --hold zoh|foh|band-limited  input between samples: held (zoh), linear (foh), or of an oscillator the sum of the lines
     below half the record's rate
 
-oscillator: the model bouc-wen-oscillator
+oscillator: the model oscillator, a mass on a Bouc-Wen spring
 --oversampling N  steps of the simulation between two samples
 --period N  samples of a period, with --initial periodic
 --excitation force|base  whether the input is a force, or the acceleration of the base
 """
 """The choice of a family and the options of its structure."""
 
-_SHORT = {"zhu-wang": "ZhuWangBoucWen", "baber-noori": "BoucWenBaberNoori"}
-_OF_TRANSFER_FUNCTION = ("poles", "zeros", "hold", "sample")
-_OF_OSCILLATOR = ("hold", "oversampling", "period", "excitation")
-_NEEDED = ("poles", "zeros")
+_SHORT = {"zhu-wang": "ZhuWangBoucWen", "baber-noori": "BoucWenBaberNoori", "oscillator": "BoucWenOscillator"}
+_STRUCTURAL = (
+    "plays", "relay_intervals", "one_signed", "degree", "poles", "zeros", "sample", "hold", "oversampling", "period",
+    "excitation",
+)  # fmt: skip
+_ARGUMENTS = {"plays": ("plays", "elements"), "relay_intervals": ("intervals",)}
+"""Arguments of a structure that an option of another name stands for."""
+
+_NEEDED = ("poles", "zeros", "degree")
+
+
+@runtime_checkable
+class _Structured(Protocol):
+    """A family that `identify` takes through a structure."""
+
+    structure: Any
 
 
 def names() -> list[str]:
@@ -55,7 +75,9 @@ def family(name: str) -> Any:
     public = {_hyphenated(each): each for each in hysim.__all__ if each[0].isupper()} | _SHORT
     law = resolved(f"hysim:{public[name]}") if name in public else None
     if law is None or FAMILIES.get(public[name]) is not law:
-        raise ValueError(f"there is no model {name!r}: give MODEL.json, module:name, or one of {', '.join(names())}")
+        known = [*names(), "oscillator"]
+        near = suggestion(name, known) or f"one of {', '.join(known)}"
+        raise ValueError(f"there is no model {name!r}: {near} (models of your own: MODEL.json or module:name)")
     return law
 
 
@@ -111,19 +133,32 @@ def to_identify(options: argparse.Namespace) -> Any:
     A ValueError is raised if there is no such model, an option belongs to another one, or one that this model needs is
     missing.
     """
-    own = {"transfer-function": _OF_TRANSFER_FUNCTION, "bouc-wen-oscillator": _OF_OSCILLATOR}.get(options.model, ())
-    every = dict.fromkeys((*_OF_TRANSFER_FUNCTION, *_OF_OSCILLATOR))
-    structure = {name: vars(options)[name] for name in every if vars(options)[name] is not None}
-    if foreign := [name for name in structure if name not in own]:
-        raise ValueError(f"--{foreign[0]} is no option of the model {options.model}")
-    if options.model == "bouc-wen-oscillator":
-        begin, options.initial = options.initial, None  # its structure says how the record begins
-        return hysim.BoucWenOscillator.structure(**structure, **({} if begin is None else {"initial": begin}))
-    if options.model != "transfer-function":
-        return model_or_family(options.model)
-    if missing := [name for name in _NEEDED if name not in structure]:
-        raise ValueError(f"the model transfer-function needs --{missing[0]}")
-    return hysim.TransferFunction.structure(**structure)
+    from hysim.models.model import FAMILIES
+
+    model = model_or_family(options.model)
+    oscillator, linear = (FAMILIES.get(name) for name in ("BoucWenOscillator", "TransferFunction"))  # if it is loaded
+    if oscillator is not None and isinstance(model, oscillator):  # its numbers are searched anew, in the same setting
+        for name in ("excitation", "hold"):
+            setattr(options, name, vars(options)[name] or vars(model)[name])
+        model = oscillator
+    used = {name: vars(options)[name] for name in _STRUCTURAL if vars(options)[name] is not None}
+    taken = {name: argument for name in _STRUCTURAL if (argument := _argument(model, name))}
+    if foreign := [name for name in used if name not in taken]:
+        raise ValueError(f"--{foreign[0].replace('_', '-')} is no option of the model {options.model}")
+    if missing := [name for name in _NEEDED if name in taken and name not in used]:
+        raise ValueError(f"the model {options.model} needs --{missing[0]}")
+    structure = {taken[name]: value == "yes" if name == "one_signed" else value for name, value in used.items()}
+    if model is oscillator and options.initial is not None:
+        structure["initial"], options.initial = options.initial, None  # its structure says how the record begins
+    return model.structure(**structure) if structure or model in (oscillator, linear) else model
+
+
+def _argument(model: Any, option: str) -> str | None:
+    """The argument of a family's structure for which an option stands; None if it takes none such."""
+    if not (isinstance(model, type) and isinstance(model, _Structured)):
+        return None
+    arguments = inspect.signature(model.structure).parameters
+    return next((name for name in _ARGUMENTS.get(option, (option,)) if name in arguments), None)
 
 
 def read(path: str) -> tuple[Any, dict[str, str]]:

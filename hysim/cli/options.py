@@ -26,7 +26,7 @@ INPUT, RESULT, PRINTED, PICTURE, TABLE = "input", "result", "printed result", "p
 """Roles of files: read, written, written with what is printed too, drawn, and written as columns."""
 
 _ROLES = {"PATH": RESULT, "COPY": PRINTED, "OUT": TABLE}
-_ROLES |= dict.fromkeys(("FILE", "MODEL", "FRAMES", "DATABASE", "STUDY.toml", "triangle|step|FILE"), INPUT)
+_ROLES |= dict.fromkeys(("FILE", "FILE_OF_Y", "MODEL", "FRAMES", "DATABASE", "STUDY.toml", "triangle|step|FILE"), INPUT)
 _FORMS = {
     PICTURE: "; written as SVG, PNG or PDF by its ending; - writes SVG to the standard output",
     TABLE: "; written as .csv, .tsv, .npz, .mat or .h5 by its ending; - writes CSV to the standard output",
@@ -41,19 +41,24 @@ JSON = "--json  print the result as JSON"
 
 
 class Command(NamedTuple):
-    """A command of the command line; `run` takes the values of the options, and returns the exit code."""
+    """A command of the command line; `run` takes the values of the options, and returns the exit code.
+
+    `examples` are lines as they are typed, which stand at the end of the help.
+    """
 
     name: str
     help: str
     description: str
     options: str
     run: Callable[[argparse.Namespace], int]
+    examples: str = ""
 
     def add_to(self, commands: Any) -> Any:
         """Add the command to those of a parser."""
-        parser = commands.add_parser(self.name, help=self.help, description=self.description)
+        parser = commands.add_parser(self.name, description=self.description)
         roles = dict(_declare(parser, self.options))
-        parser.set_defaults(command=self, roles=roles)
+        flags = {action.dest: action.option_strings[0] for action in parser._actions if action.option_strings}
+        parser.set_defaults(command=self, roles=roles, flags=flags)
         return parser
 
 
@@ -159,6 +164,31 @@ def unit(text: str) -> tuple[str, str]:
     return signal, label
 
 
+class Place(NamedTuple):
+    """A place in a record: the number of a sample from 0 if there is no unit, else a time."""
+
+    value: float
+    unit: str
+
+
+def place(text: str) -> Place:
+    """A place in a record, such as ``100`` or ``2.5s``."""
+    number, unit = re.fullmatch(r"(.*?)([a-z]*)", text, re.DOTALL).groups()  # type: ignore[union-attr]
+    try:
+        if unit in _TIMES:
+            return Place(float(number), unit)
+        if not unit and int(number) >= 0:
+            return Place(int(number), "")
+    except ValueError:
+        pass
+    raise argparse.ArgumentTypeError(
+        f"expected the number of a sample from 0, or a time with its unit such as 2.5s or 300ms, got {text!r}"
+    )
+
+
+_TIMES = ("s", "ms", "us", "ns")
+
+
 def named(form: str, read: Callable[[str], Any]) -> Callable[[str], tuple[str, Any]]:
     """A reader of a name and a value of some other reader, in a form such as ``NAME=COLUMN``."""
 
@@ -176,6 +206,14 @@ def _some_column(text: str) -> str | int:
     if not text:
         raise ValueError("no column")
     return column(text)
+
+
+def sensor(text: str) -> tuple[str, str | int]:
+    """A signal of a structure and its column, of the same name unless another one is given."""
+    name, equals, key = text.partition("=")
+    if not name or (equals and not key):
+        raise argparse.ArgumentTypeError(f"expected SENSOR=COLUMN, or the name of both, got {text!r}")
+    return name, column(key) if equals else name
 
 
 def _channel_and_degree(text: str) -> tuple[str, int]:
@@ -201,6 +239,9 @@ READERS: dict[str, Callable[[str], Any]] = {
     **dict.fromkeys(("N", "NUMBER", "DEGREE"), int),
     **dict.fromkeys(REAL, float),
     **{form: numbers(form) for form in ("LOW,HIGH", "FREQUENCY,DAMPING", "NAME=VALUE", "NAME=LOW:HIGH")},
+    "PLACE": place,
+    "COUNT": word_or_number("a number from 1 on", least=1),
+    "SENSOR=COLUMN": sensor,
     "T,B,L,R": numbers("T,B,L,R", int),
     "PLATFORMS": platforms,
     "COLUMN": column,

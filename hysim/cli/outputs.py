@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from hysim._atomic import write_all
 from hysim.cli.options import INPUT, PICTURE, PRINTED, TABLE
 from hysim.cli.records import STANDARD
+from hysim.cli.shell.words import in_shell_words
 
 if TYPE_CHECKING:
     from hysim._frozen import FloatArray
@@ -112,8 +113,10 @@ def _encoded(path: str, content: "str | bytes | Figure") -> bytes:
 def printed(
     options: argparse.Namespace, text: Callable[[], str], document: Callable[[], Mapping[str, Any]] | None
 ) -> str:
-    """The result as a text, or with ``--json`` as a document if there is one."""
-    return to_json(document()) if document is not None and options.json else text().rstrip("\n") + "\n"
+    """The result as a text in the words of the shell, or with ``--json`` as a document if there is one."""
+    if document is not None and options.json:
+        return to_json(document())
+    return in_shell_words(text(), options.flags).rstrip("\n") + "\n"
 
 
 def to_json(document: Mapping[str, Any]) -> str:

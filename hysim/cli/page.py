@@ -57,6 +57,10 @@ COMMAND = Command(
 {records.OPTIONS_WITHOUT_FILE}
 """,
     run,
+    """
+hysim page law.json --out law.html
+hysim page law.json --data loop.csv --out law.html
+""",
 )
 
 EXPLORE = Command(
@@ -68,4 +72,8 @@ EXPLORE = Command(
 --no-browser  write it, and open no browser
 """,
     explore,
+    """
+hysim explore
+hysim explore --no-browser --out explorer.html
+""",
 )

@@ -136,4 +136,9 @@ others FILE...  more files with the same columns
 --out LOOP.svg  the picture [required]
 """,
     run,
+    """
+hysim plot loop.csv --u voltage --y displacement --out loop.svg
+hysim plot loop.csv --model law.json --out both.pdf
+hysim plot curves.csv --kind forc --out forc.svg
+""",
 )

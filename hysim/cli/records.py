@@ -9,6 +9,7 @@ from typing import Any
 
 from hysim._frozen import FloatArray
 from hysim.cli.options import positive
+from hysim.cli.ranges import cut
 from hysim.records import Record
 
 STANDARD = "-"
@@ -24,6 +25,7 @@ _INPUT = "--u COLUMN  input: name of its column, or its number from 0 (default: 
 _OUTPUT = "--y COLUMN  output: name or number of its column (default: y)"
 OF_A_TEXT = f"""--delimiter SIGN  sign between cells of a text, or {", ".join(_DELIMITERS)} (default: detected)
 --decimal .|,  sign before the decimals of a text (default: detected)
+--thousands SIGN  sign between thousands of a text (default: none, but where a number can mean nothing else)
 --encoding NAME  encoding of a text, such as latin-1 (default: UTF-8, -16 or -32)"""
 """Options for a file of text."""
 
@@ -37,11 +39,16 @@ or --no-t  read no time from the file
 --resolution QUANTUM  resolution of the output's sensor [unit of y]; or detect: the step of which all outputs are
     multiples
 --unit SIGNAL=UNIT...  unit of t, u or y, as in u=V
+--from PLACE  first sample to use: its number from 0, or its time with a unit, as in 2.5s
+--to PLACE  first sample behind those to use, likewise
+--every COUNT  use each N-th of these samples only: a turn between two of them is lost
 """
 WEIGHTS = (
     "--weights COLUMN  weight of each sample in the sum of squares, 0 to leave it out: name or number of its column"
 )
-OPTIONS_WITHOUT_FILE = f"record:\n{_INPUT}\n{_OUTPUT}{_OTHERS}"
+_SECOND = """--y-file FILE_OF_Y  file of the output, if the first holds the input only; if both have a time, the input
+    is interpolated linearly at the times of the output"""
+OPTIONS_WITHOUT_FILE = f"record:\n{_INPUT}\n{_OUTPUT}\n{_SECOND}{_OTHERS}"
 """Options for a record whose file is named by an option of the command."""
 
 OPTIONS = f"{FILE}\n\n{OPTIONS_WITHOUT_FILE}"
@@ -56,10 +63,14 @@ OPTIONS_OF_AN_INPUT = f"{FILE}\n\nrecord:\n{_INPUT}{_OTHERS}"
 SKIP = "--skip N  number of lines at the top of a ground motion that belong to its header, if it holds lines of numbers"
 
 
-def read(options: argparse.Namespace, file: str | None = None) -> Record:
-    """The record that the options describe, or that of another `file`; without an output column, y is u."""
+def read(options: argparse.Namespace, file: str | None = None, *, uncut: bool = False) -> Record:
+    """The record that the options describe, or that of another `file`; without an output column, y is u.
+
+    With `uncut` all samples are used, whatever `--from`, `--to` and `--every` say.
+    """
     path = options.file if file is None else file
-    return _read(options, path, source_of(path), options.y if "y" in options else None, options.resolution)
+    y = options.y if "y" in options else None
+    return _read(options, path, source_of(path), y, options.resolution, uncut=uncut)
 
 
 def read_input(options: argparse.Namespace, *, of_the_ground: bool) -> Record:
@@ -74,14 +85,14 @@ def read_input(options: argparse.Namespace, *, of_the_ground: bool) -> Record:
     if is_at2(source(), options.encoding):
         if options.u is not None or options.t is not None or options.no_t:
             raise ValueError(f"{options.file} is an AT2 file, which has no columns: leave out --u, --t and --no-t")
-        return _ground_motion(options, source)
+        return cut(_ground_motion(options, source), options)
     if of_the_ground and options.u is None and not options.no_t:
         try:
             names = column_names(source(), **text_options(options))
         except ValueError:
             names = ()  # a list, or a fault that is named where the file is read
         if "u" not in names:
-            return _ground_motion(options, source)
+            return cut(_ground_motion(options, source), options)
     if options.skip is not None:
         raise ValueError(f"--skip is for a ground motion: begin the lines at the top of {options.file} with #")
     return _read(options, options.file, source(), None, options.resolution)
@@ -92,6 +103,7 @@ def _ground_motion(options: argparse.Namespace, source: Callable[[], Any]) -> Re
     from hysim.files import load_ground_motion
 
     arguments = {"t": options.t, "units": dict(options.unit).get("u"), **text_options(options)}
+    del arguments["thousands"]
     arguments["skip"] = options.skip or 0
     if options.sample_time is None:
         return _of_the_ground(*load_ground_motion(source(), **arguments))
@@ -110,7 +122,7 @@ def _of_the_ground(t: FloatArray, acceleration: FloatArray) -> Record:
 def text_options(options: argparse.Namespace) -> dict[str, Any]:
     """The options of `OF_A_TEXT`, as `hysim.load` takes them."""
     delimiter = _DELIMITERS.get(options.delimiter, options.delimiter)
-    return {"delimiter": delimiter, "decimal": options.decimal, "encoding": options.encoding}
+    return {"delimiter": delimiter, **{name: vars(options)[name] for name in ("decimal", "thousands", "encoding")}}
 
 
 def _repeatable(path: str) -> Callable[[], Any]:
@@ -133,7 +145,13 @@ def _repeatable(path: str) -> Callable[[], Any]:
 
 
 def read_with_weights(options: argparse.Namespace) -> tuple[Record, FloatArray | None]:
-    """The record that the options describe, and the column of weights that they name."""
+    """The record that the options describe, and the column of weights that they name.
+
+    Columns of sensors are channels of the record, the first of them the output unless another one is named.
+    """
+    for name, column in options.sensor:
+        options.channel = [*options.channel, (name, column)]
+        options.y = column if options.y is None else options.y
     if options.weights is None:
         return read(options), None
     source = _repeatable(options.file)
@@ -148,18 +166,32 @@ def source_of(path: str) -> Any:
     return sys.stdin.buffer if isinstance(sys.stdin, io.TextIOWrapper) else sys.stdin
 
 
-def _read(options: argparse.Namespace, path: str, source: Any, y: str | None, resolution: Any) -> Record:
+def _read(
+    options: argparse.Namespace, path: str, source: Any, y: str | None, resolution: Any, *, uncut: bool = False
+) -> Record:
     from dataclasses import replace
 
     import numpy as np
 
+    u = options.u if "y" in options or options.u is not None else "u"
+    if "y_file" in options and options.y_file is not None:
+        record = _from_two_files(options, path, source, y, resolution)
+    else:
+        record = _loaded(options, path, source, u, y if "y" in options else u, resolution)
+    step = None if options.sample_time is None else positive("--sample-time", options.sample_time)
+    if step is not None and record.t is None:
+        record, step = replace(record, t=step * np.arange(float(len(record)))), None
+    record = record if uncut else cut(record, options)
+    return record if step is None else record.resample(step)
+
+
+def _loaded(options: argparse.Namespace, path: str, source: Any, u: Any, y: Any, resolution: Any) -> Record:
     from hysim.files import load
 
-    u = options.u if "y" in options or options.u is not None else "u"
     record: Record = load(
         source,
         u=u,
-        y=y if "y" in options else u,
+        y=y,
         t=False if options.no_t else options.t,
         units=dict(options.unit),
         name="record" if path == STANDARD else None,
@@ -168,7 +200,23 @@ def _read(options: argparse.Namespace, path: str, source: Any, y: str | None, re
         channels=dict(options.channel) or None if "channel" in options else None,
         **text_options(options),
     )
-    if options.sample_time is None:
-        return record
-    step = positive("--sample-time", options.sample_time)
-    return replace(record, t=step * np.arange(float(len(record)))) if record.t is None else record.resample(step)
+    return record
+
+
+def _from_two_files(options: argparse.Namespace, path: str, source: Any, y: Any, resolution: Any) -> Record:
+    """The record of an input in one file and an output in another; a file's only column need not be named."""
+    from hysim.files import join_records
+
+    first, second = _repeatable(path) if path == STANDARD else lambda: source, _repeatable(options.y_file)
+    u = _only_column(options, first(), "u") if options.u is None else options.u
+    y = _only_column(options, second(), "y") if y is None else y
+    drive = _loaded(options, path, first(), u, u, None)
+    return join_records(drive, _loaded(options, options.y_file, second(), y, y, resolution))
+
+
+def _only_column(options: argparse.Namespace, source: Any, name: str) -> str:
+    """The name of the only column beside the time, or else this one."""
+    from hysim.files import column_names
+
+    others = [each for each in column_names(source, **text_options(options)) if each not in ("t", options.t)]
+    return others[0] if len(others) == 1 else name

@@ -68,4 +68,8 @@ COMMAND = Command(
 --json  print summary.json instead of the short table
 """,
     run,
+    """
+hysim reproduce --quick
+hysim reproduce --out report --page
+""",
 )

@@ -62,4 +62,9 @@ COMMAND = Command(
 --json  print the columns as JSON, beside a file if --out is used
 """,
     run,
+    """
+hysim simulate law.json drive.csv --out response.csv
+hysim simulate frame.json quake.at2 --out response.csv --plot loops.svg
+hysim simulate law.json loop.csv | hysim plot - --out loop.svg
+""",
 )

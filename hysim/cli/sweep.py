@@ -62,8 +62,10 @@ def _picture(result: "Sweep", output: str | None) -> "Figure":
 def _computed(options: argparse.Namespace) -> Any:
     from hysim.sweeps import sweep
 
-    if not options.study or not options.out:
-        raise ValueError("give a study and --out RESULTS.sqlite, or --show RESULTS.sqlite")
+    if not options.study:
+        raise ValueError("give a study, such as study.toml, and --out RESULTS.sqlite, or --show RESULTS.sqlite")
+    if not options.out:
+        raise ValueError(f"the rows are kept in a database: give --out {Path(options.study).stem}.sqlite")
     if Path(options.out).exists() and not options.resume:
         raise ValueError(f"{options.out} exists: continue it with --resume, or give another --out")
     task, space, seed, files = studies.read(options.study)
@@ -104,4 +106,9 @@ or --dask ADDRESS  a dask cluster: address of its scheduler, or scheduler file
 {JSON}
 """,
     run,
+    """
+hysim sweep study.toml --out rows.sqlite --csv rows.csv --plot rows.svg
+hysim sweep study.toml --out rows.sqlite --resume
+hysim sweep --show rows.sqlite
+""",
 )

@@ -5,6 +5,7 @@ from hysim.files._ground_motion import column_names, is_at2, load_ground_motion
 from hysim.files._load import load
 from hysim.files._save import ending, packed, save_record
 from hysim.files._table import Notes
+from hysim.files._two_files import join_records
 
 __all__ = [
     "FileColumn",
@@ -12,6 +13,7 @@ __all__ = [
     "column_names",
     "ending",
     "is_at2",
+    "join_records",
     "list_columns",
     "load",
     "load_ground_motion",

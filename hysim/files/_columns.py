@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hysim.files._arrays import NUMBERS, Array, Arrays
-from hysim.files._load import file_named, table_of
+from hysim.files._load import check_thousands, file_named, table_of
 from hysim.files._source import Source, opened
 from hysim.files._table import Table
 
@@ -33,7 +33,12 @@ class FileColumn(NamedTuple):
 
 
 def list_columns(
-    path: Source, *, delimiter: str | None = None, decimal: str | None = None, encoding: str | None = None
+    path: Source,
+    *,
+    delimiter: str | None = None,
+    decimal: str | None = None,
+    thousands: str | None = None,
+    encoding: str | None = None,
 ) -> tuple[FileColumn, ...]:
     """List the columns of a file that `hysim.load` reads.
 
@@ -41,7 +46,7 @@ def list_columns(
     ----------
     path : str, path or open file
         As of `hysim.load`.
-    delimiter, decimal, encoding : str, optional
+    delimiter, decimal, thousands, encoding : str, optional
         As of `hysim.load`, for a text.
 
     Returns
@@ -62,7 +67,8 @@ def list_columns(
     >>> [(each.name, each.unit, each.highest) for each in hs.list_columns(text)]
     [('t', 's', 1.0), ('voltage', 'V', 5.0), ('note', '', nan)]
     """
-    for_text = {"delimiter": delimiter, "decimal": decimal, "encoding": encoding}
+    check_thousands(thousands, decimal)
+    for_text = {"delimiter": delimiter, "decimal": decimal, "thousands": thousands, "encoding": encoding}
     with opened(path) as source, file_named(source), table_of(source, for_text) as table:
         return tuple(_column(table, name, number) for name, number in _keys(table))
 

@@ -10,7 +10,7 @@ from typing import TypeVar
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.files._cells import numbers, parse, plain_numbers
+from hysim.files._cells import Signs, numbers, parse, plain_numbers
 from hysim.files._layout import COMMENTS, Layout, layout
 from hysim.files._table import Column, Notes, channels_in, listed, number_of, positive
 
@@ -45,23 +45,21 @@ class Delimited:
 
     def values(self, columns: list[Column]) -> FloatArray:
         """The numbers of the columns, shape (n_columns, n_samples), nan where one is missing."""
-        lines, delimiter, decimal = self.layout.lines, self.layout.delimiter, self.layout.decimal
-        values = plain_numbers(lines, [column.place for column in columns], delimiter, decimal)
+        lines, delimiter, signs = self.layout.lines, self.layout.delimiter, self.layout.signs
+        values = plain_numbers(lines, [column.place for column in columns], delimiter, signs)
         if values is not None:
             return values
         rows = self.layout.rows()
-        return np.stack(
-            [numbers([row[c.place] for row in rows], self.layout.numbers, c.label, decimal) for c in columns]
-        )
+        return np.stack([numbers([row[c.place] for row in rows], self.layout.numbers, c.label, signs) for c in columns])
 
     def place(self, sample: int) -> str:
         """The sample's line."""
         return f"line {self.layout.numbers[sample]}"
 
 
-def delimited(text: str, delimiter: str | None, decimal: str | None) -> Delimited:
+def delimited(text: str, delimiter: str | None, decimal: str | None, thousands: str | None = None) -> Delimited:
     """The table that a text holds; ValueError with the number of the line if it holds none."""
-    return Delimited(layout(text, delimiter, decimal), _notes(text))
+    return Delimited(layout(text, delimiter, decimal, thousands), _notes(text))
 
 
 def _notes(text: str) -> Notes:
@@ -76,7 +74,7 @@ def _notes(text: str) -> Notes:
     units = _json(notes.get("units", ""), dict) or {}
     return Notes(
         units={str(signal): str(unit) for signal, unit in units.items()},
-        resolution=positive(parse(notes.get("resolution", ""), ".")),
+        resolution=positive(parse(notes.get("resolution", ""), Signs("."))),
         name=_json(notes.get("name", ""), str) or notes.get("name"),
         channels=channels_in(notes.get("channels")),
     )

@@ -142,11 +142,9 @@ def is_at2(path: Source, encoding: str | None = None) -> bool:
         return peer_header(text_of(source.content, source.name, encoding).split("\n", TOP)[:TOP]) is not None
 
 
-def column_names(
-    path: Source, *, delimiter: str | None = None, decimal: str | None = None, encoding: str | None = None
-) -> tuple[str, ...]:
-    """Names of the columns of a file; errors as `hysim.load` has them."""
-    for_text = {"delimiter": delimiter, "decimal": decimal, "encoding": encoding}
+def column_names(path: Source, **for_text: str | None) -> tuple[str, ...]:
+    """Names of the columns of a file, with the options for texts and the errors of `hysim.load`."""
+    for_text = {**dict.fromkeys(("delimiter", "decimal", "encoding")), **for_text}
     with opened(path) as source, file_named(source), table_of(source, for_text) as table:
         return tuple(table.labels)
 
@@ -376,9 +374,8 @@ def _even(table: Table, times: FloatArray) -> tuple[float, float]:
         k = int(np.argmax(np.abs(steps - usual))) + 1
         raise ValueError(
             f"{table.place(k)}: the time must be evenly spaced, got a step of {steps[k - 1]:.6g} s where most are "
-            f"{usual:.6g} s; interpolate it by hs.load(...).resample({usual:.4g}) (on the command line --t, --u and "
-            f"--sample-time {usual:.4g}), or if only the times are wrong, name the column of the acceleration and pass "
-            "sample_time="
+            f"{usual:.6g} s; interpolate it by hs.load(...).resample({usual:.4g}), or if only the times are wrong, "
+            "name the column of the acceleration and pass sample_time="
         )
     decimal = float(f"{step:.6g}")
     return float(times[0]), decimal if abs(decimal - step) <= _SAME_DECIMAL * step else step

@@ -14,7 +14,7 @@ import re
 from collections import Counter
 from typing import NamedTuple, TypeVar
 
-from hysim.files._cells import MISSING, parse
+from hysim.files._cells import MISSING, Signs, parse
 from hysim.files._table import Column, require
 
 DELIMITERS = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "white space"}
@@ -29,11 +29,11 @@ _WORD = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\[\]()]*[\])])?|\S+")
 
 
 class Layout(NamedTuple):
-    """The columns of a file, its delimiter and decimal sign, and the samples' lines with their numbers."""
+    """The columns of a file, its delimiter, the signs in its numbers, and the samples' lines with their numbers."""
 
     columns: list[Column]
     delimiter: str
-    decimal: str
+    signs: Signs
     numbers: list[int]
     lines: list[str]
 
@@ -50,29 +50,29 @@ class Layout(NamedTuple):
         return [line.count(self.delimiter) + 1 for line in self.lines]
 
 
-def layout(text: str, delimiter: str | None, decimal: str | None) -> Layout:
+def layout(text: str, delimiter: str | None, decimal: str | None, thousands: str | None = None) -> Layout:
     """Detect the layout of a text with one sample a line; ValueError if it has none."""
     every = text.split("\n")
     numbers = [k for k, line in enumerate(every, start=1) if line.strip() and not line.lstrip().startswith(COMMENTS)]
     require(numbers, "the file is empty, there is no header and no sample")
     lines = [every[k - 1] for k in numbers]
-    delimiter, decimal = _signs(lines, delimiter, decimal)
+    delimiter, signs = _signs(lines, delimiter, decimal, thousands)
     top = _rows(lines[:2], numbers, delimiter)
     below = _rows(_spread(lines[1:]), _spread(numbers[1:]), delimiter)
     width = _most_common([len(row) for row in [top[0], *below]])
-    has_header, has_units = _heads(top, [row for row in below if len(row) == width], numbers[0], width, decimal)
+    has_header, has_units = _heads(top, [row for row in below if len(row) == width], numbers[0], width, signs)
     first = has_header + has_units
     require(first < len(lines), "there is a header, but no sample")
     if has_header:
         names = _names(lines[0], delimiter)
     else:
-        names = _commented(every[: numbers[0] - 1], delimiter, width, decimal) or [str(k) for k in range(width)]
+        names = _commented(every[: numbers[0] - 1], delimiter, width, signs) or [str(k) for k in range(width)]
     is_named = len(names) == width
     require(is_named, f"line {numbers[0]} names {len(names)} columns, most lines below have {width} cells")
     columns = [_column(place, label) for place, label in enumerate(names)]
     if has_units:
         columns = [c._replace(unit=c.unit or _unit(cell)) for c, cell in zip(columns, top[1], strict=True)]
-    result = Layout(columns, delimiter, decimal, numbers[first:], lines[first:])
+    result = Layout(columns, delimiter, signs, numbers[first:], lines[first:])
     for number, cells in zip(result.numbers, result.widths(), strict=True):
         if cells != width:
             between = DELIMITERS.get(delimiter, repr(delimiter))
@@ -83,31 +83,31 @@ def layout(text: str, delimiter: str | None, decimal: str | None) -> Layout:
     return result
 
 
-def _signs(lines: list[str], delimiter: str | None, decimal: str | None) -> tuple[str, str]:
-    """The delimiter and the decimal sign, detected where they are None."""
+def _signs(lines: list[str], delimiter: str | None, decimal: str | None, thousands: str | None) -> tuple[str, Signs]:
+    """The delimiter and the signs in numbers; delimiter and decimal sign are detected where they are None."""
     sample = _spread(lines)
     quoted = any('"' in line for line in sample)
     candidates = [
-        (between, point)
+        (between, Signs(point, thousands))
         for between in ([delimiter] if delimiter else DELIMITERS)
         for point in ([decimal] if decimal else DECIMALS)
-        if between != point or quoted
+        if (between != point or quoted) and point != thousands
     ]
     require(candidates, f"delimiter and decimal sign must differ, both are {delimiter!r}")
     best = max(candidates, key=lambda signs: _score(sample, *signs))
     if _score(sample, *best) == 0.0 and delimiter is None:
         present = (between for between in DELIMITERS if any(between in line.strip() for line in sample))
-        return next(present, " "), decimal or "."
+        return next(present, " "), candidates[0][1]
     return best
 
 
-def _score(lines: list[str], delimiter: str, decimal: str) -> float:
+def _score(lines: list[str], delimiter: str, signs: Signs) -> float:
     rows = [_cells(line, delimiter, strict=False) for line in lines]
     width = _most_common([len(row) for row in rows])
     if width < 2:
         return 0.0
     cells = [cell for row in rows for cell in row]
-    plain = sum(_kind(cell, decimal) != "text" for cell in cells)
+    plain = sum(_kind(cell, signs) != "text" for cell in cells)
     return sum(len(row) == width for row in rows) / len(rows) * plain / len(cells)
 
 
@@ -139,15 +139,15 @@ def _names(line: str, delimiter: str) -> list[str]:
     return _WORD.findall(line) if delimiter == " " and '"' not in line else _cells(line, delimiter, strict=False)
 
 
-def _heads(rows: list[list[str]], below: list[list[str]], line: int, width: int, decimal: str) -> tuple[bool, bool]:
+def _heads(rows: list[list[str]], below: list[list[str]], line: int, width: int, signs: Signs) -> tuple[bool, bool]:
     """Whether the first line is a header, and whether the second one holds units."""
-    columns = [[_kind(row[place], decimal) for row in below] for place in range(width)]
+    columns = [[_kind(row[place], signs) for row in below] for place in range(width)]
     numeric = {place for place, kinds in enumerate(columns) if kinds.count("number") >= max(1, kinds.count("text"))}
     if not numeric:  # nothing below to compare with
-        kinds_above = [_kind(cell, decimal) for cell in rows[0]]
+        kinds_above = [_kind(cell, signs) for cell in rows[0]]
         return "text" in kinds_above or "number" not in kinds_above, False
     kinds_of = [
-        {place: _kind(cell, decimal) for place, cell in enumerate(row) if len(row) != width or place in numeric}
+        {place: _kind(cell, signs) for place, cell in enumerate(row) if len(row) != width or place in numeric}
         for row in rows
     ]
     texts, counts = ([place for place, kind in kinds_of[0].items() if kind == one] for one in ("text", "number"))
@@ -160,17 +160,17 @@ def _heads(rows: list[list[str]], below: list[list[str]], line: int, width: int,
     return bool(texts), has_units
 
 
-def _kind(cell: str, decimal: str) -> str:
-    return "missing" if cell.strip().lower() in MISSING else "text" if parse(cell, decimal) is None else "number"
+def _kind(cell: str, signs: Signs) -> str:
+    return "missing" if cell.strip().lower() in MISSING else "text" if parse(cell, signs) is None else "number"
 
 
-def _commented(above: list[str], delimiter: str, width: int, decimal: str) -> list[str] | None:
+def _commented(above: list[str], delimiter: str, width: int, signs: Signs) -> list[str] | None:
     """Names in the last comment above the samples, if they are as many as the columns."""
     comments = [line.strip() for line in above if line.strip()]
     if not comments:
         return None
     names = _names(comments[-1].lstrip("".join(COMMENTS)), delimiter)
-    is_named = len(names) == width and all(_kind(name, decimal) == "text" for name in names)
+    is_named = len(names) == width and all(_kind(name, signs) == "text" for name in names)
     return names if is_named else None
 
 

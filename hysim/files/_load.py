@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, check_choice
 from hysim._resolution import output_quantum
+from hysim.files._cells import THOUSANDS
 from hysim.files._delimited import delimited
 from hysim.files._hdf5 import hdf5
 from hysim.files._layout import DECIMALS
@@ -36,6 +37,7 @@ class _Options(TypedDict, total=False):
     t: str | int | None
     delimiter: str | None
     decimal: Literal[".", ","] | None
+    thousands: str | None
     encoding: str | None
     units: Mapping[str, str] | None
     resolution: float | Literal["detect"] | None
@@ -56,6 +58,7 @@ def load(
     on_missing: Literal["error", "drop", "split"] = "error",
     delimiter: str | None = None,
     decimal: Literal[".", ","] | None = None,
+    thousands: str | None = None,
     encoding: str | None = None,
     units: Mapping[str, str] | None = None,
     resolution: float | Literal["detect"] | None = None,
@@ -91,7 +94,10 @@ def load(
         One character between the cells of a text, or a blank for any white space; by default tab, semicolon, comma or
         white space is detected.
     decimal : {".", ","}, optional
-        Decimal sign of a text; detected by default. There is no sign between thousands.
+        Decimal sign of a text; detected by default.
+    thousands : str, optional
+        Sign between thousands in a text. It need not be given if it is an apostrophe or a space, nor where a number can
+        mean nothing else: ``1.000,5`` is 1000.5, but ``1.000`` is one unless ``thousands="."``.
     encoding : str, optional
         Encoding of a text; by default UTF-8, or UTF-16 or UTF-32 after their byte order mark.
     units : mapping, optional
@@ -135,9 +141,10 @@ def load(
         raise ValueError(f"delimiter must be one character, got {delimiter!r}")
     if decimal is not None and decimal not in DECIMALS:
         raise ValueError(f'decimal must be "." or ",", got {decimal!r}')
+    check_thousands(thousands, decimal)
     if isinstance(resolution, str) and resolution != "detect":
         raise ValueError(f'resolution must be a number or "detect", got {resolution!r}')
-    for_text = {"delimiter": delimiter, "decimal": decimal, "encoding": encoding}
+    for_text = {"delimiter": delimiter, "decimal": decimal, "thousands": thousands, "encoding": encoding}
     with opened(path) as source, file_named(source):
         with table_of(source, for_text) as table:
             columns = _columns(table, {"u": u, "y": y, "t": t})
@@ -160,6 +167,15 @@ def load(
     return records if on_missing == "split" else records[0]
 
 
+def check_thousands(thousands: str | None, decimal: str | None) -> None:
+    """Raise a ValueError unless the sign between thousands is a known one, and not the decimal sign."""
+    if thousands is not None and (thousands not in tuple(THOUSANDS) or thousands == decimal):
+        raise ValueError(
+            "thousands must be a point, a comma, an apostrophe or a space that is not the decimal sign, got "
+            f"{thousands!r}"
+        )
+
+
 @contextmanager
 def file_named(source: Opened) -> Iterator[None]:
     """Make every message about a file one line that begins with its name."""
@@ -175,7 +191,7 @@ def table_of(source: Opened, for_text: Mapping[str, str | None]) -> Iterator[Tab
     """The table that a source holds, open to be read from."""
     if isinstance(source.content, (str, bytes)):
         text = text_of(source.content, source.name, for_text["encoding"])
-        yield delimited(text, for_text["delimiter"], for_text["decimal"])
+        yield delimited(text, for_text["delimiter"], for_text["decimal"], for_text.get("thousands"))
         return
     for argument, value in for_text.items():
         if value is not None:

@@ -42,7 +42,7 @@ class NumberList(NamedTuple):
             if width > first or (width < first and line != self.lines[-1]):
                 raise ValueError(
                     f"line {line}: expected {first} numbers as in line {self.lines[0]}, got {width}; if the lines "
-                    f"above belong to the header, pass skip={line - 1} (--skip)"
+                    f"above belong to the header, pass skip={line - 1}"
                 )
 
 
@@ -129,7 +129,7 @@ def _numbers(line: str, number: int) -> list[float]:
         if match is None or not math.isfinite(value):
             raise ValueError(
                 f"line {number}: expected finite numbers, got {shown(text, _LONGEST)}; correct the line, or if it "
-                f"belongs to the header, pass skip={number} (--skip)"
+                f"belongs to the header, pass skip={number}"
             )
         values.append(value)
         between = _BETWEEN.match(text, match.end())

@@ -26,6 +26,7 @@ _COORDINATES: dict[str, tuple[_Place, tuple[str, str]]] = {
     "thresholds": (lambda a, b: (b, a), ("Lower threshold b", "Upper threshold a")),
     "centre": (lambda a, b: (0.5 * (a - b), 0.5 * (a + b)), ("Half the distance (a - b)/2", "Middle (a + b)/2")),
 }
+_FEWEST_CURVES = 3  # below it the map has no shape
 
 
 def residual_map(
@@ -117,6 +118,11 @@ def forc(
     if isinstance(source, Record):
         turning_points = [branch.u[0] for branch in source.branches(tolerance) if branch.u[-1] < branch.u[0]]
         levels = np.unique([source.u.min(), *turning_points])
+        if levels.size <= _FEWEST_CURVES:
+            raise ValueError(
+                f"a density needs at least {_FEWEST_CURVES} reversal curves from different levels, the record has "
+                f"{levels.size - 1}: measure along hysim.signals.reversal_curves"
+            )
         law: PreisachRelays | Preisach = Preisach.from_reversal_curves(source, levels=levels, tolerance=tolerance)
         labels = source.units if units is None else units
     else:

@@ -38,6 +38,10 @@ def command(parsers: Parsers) -> Command:
         "hysim completion fish | source; for all: write it to a file where the shell looks for such scripts.",
         "shell bash|zsh|fish  shell",
         run,
+        """
+hysim completion bash
+hysim completion fish
+""",
     )
 
 

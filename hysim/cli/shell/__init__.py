@@ -1,0 +1,1 @@
+"""The command line's dealings with the shell: completion, signals, and messages in its words."""
