@@ -4,13 +4,15 @@ import io
 import json
 import math
 import re
+import shlex
 import subprocess
 
 import numpy as np
 import pytest
 
 import hysim as hs
-from hysim.cli import COMMANDS, main, parsers
+from hysim.cli import COMMANDS, GROUPS, main, parsers
+from hysim.cli.example import DEVICES
 from hysim.cli.shell.completion import bash, fish, zsh
 from hysim.files import FileColumn
 
@@ -121,3 +123,33 @@ def test_every_option_is_in_the_script_of_each_shell(script):
 
 def test_the_command_prints_the_script(run):
     assert run("completion", "bash")[1] == bash(parsers()[1]) + "\n"
+
+
+def test_each_device_has_an_example_whose_tries_are_commands(run, tmp_path):
+    for name, device in DEVICES.items():
+        assert run("example", "--device", name)[0] == 0
+        record = hs.load(tmp_path / f"{name}.csv")
+        assert len(record) == len(device.record())
+        assert "y" in record.units
+        for line in device.tries:
+            parsers()[0].parse_args(line.format(f"{name}.csv").split())
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_examples_in_each_help_are_commands(name):
+    parser, of_commands = parsers()
+    lines = COMMANDS[name].examples.strip().splitlines()
+    assert lines
+    assert of_commands[name].format_help().endswith("".join(f"  {line}\n" for line in lines))
+    for line in lines:
+        for command in line.split(" | "):
+            words = shlex.split(command)
+            assert words[0] == "hysim"
+            assert parser.parse_args(words[1:]).command.name in (name, "plot")
+
+
+def test_the_help_shows_every_command_in_a_group(run):
+    text = parsers()[0].format_help()
+    assert all(f"\n{title}:\n  " in text for title in GROUPS)
+    assert all(f"\n  {name} " in text for name in COMMANDS)
+    assert sum(map(len, GROUPS.values())) == len(COMMANDS)

@@ -81,7 +81,7 @@ def test_a_study_of_data_executes_no_code(run, tmp_path):
         ("my_laws:number", "my_laws:number is no law: expected a model, or a class of models, with a response; got 3"),
         ("my_laws:controller", "my_laws:controller is no law"),
         ("broken_laws:law", "No module named 'a_module_that_nobody_has'"),
-        ("my_laws", "there is no model 'my_laws': give MODEL.json, module:name, or one of bouc-wen, "),
+        ("my_laws", "there is no model 'my_laws': give one of bouc-wen, "),
         ("record", "there is no model 'record'"),
     ],
 )

@@ -224,7 +224,7 @@ def test_every_name_of_a_model_stands_for_something_that_can_be_identified(run):
     for name in names:
         family = models.family(name)
         assert is_identifiable(family) or (name, family) == ("transfer-function", hs.TransferFunction)
-    text = run("identify", "--help")[1].partition("Names of models: ")[2]
+    text = run("identify", "--help")[1].partition("Names of models: ")[2].partition("\n\n")[0]
     assert "".join(text.split()) == f"{','.join(names)}."  # lines may be broken at hyphens
 
 
@@ -303,7 +303,7 @@ CORPUS = {
     "duplicate columns": (b"u,y,y\n0,1,1\n1,2,2\n", "2 columns are called 'y'"),
     "unknown column": (b"u,x\n0,1\n1,2\n", "no column 'y', the columns are: u, x"),
     "one row": (b"u,y\n0,1\n", "at least 2 samples, there are 1"),
-    "wrong encoding": ("u,y [µm]\n0,1\n".encode("latin-1"), 'encoding="latin-1"'),
+    "wrong encoding": ("u,y [µm]\n0,1\n".encode("latin-1"), "pass its encoding, for instance --encoding latin-1"),
     "constant input": (b"u,y\n1,0\n1,1\n1,2\n1,3\n", "the input is constant"),
 }
 

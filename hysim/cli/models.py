@@ -76,7 +76,7 @@ def family(name: str) -> Any:
     law = resolved(f"hysim:{public[name]}") if name in public else None
     if law is None or FAMILIES.get(public[name]) is not law:
         known = [*names(), "oscillator"]
-        near = suggestion(name, known) or f"one of {', '.join(known)}"
+        near = suggestion(name, known) or f"give one of {', '.join(known)}"
         raise ValueError(f"there is no model {name!r}: {near} (models of your own: MODEL.json or module:name)")
     return law
 

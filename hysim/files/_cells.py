@@ -97,6 +97,10 @@ def _advice(cell: str, signs: Signs) -> str:
     thousands = (
         f'thousands="{other}" if the {name} stands between thousands' if number and number["mark"] == other else ""
     )
-    decimal = f'decimal="{other}" if the {name} is the decimal sign' if cell.count(other) == 1 else ""
+    decimal = (
+        f'decimal="{other}" if the {name} is the decimal sign'
+        if cell.count(other) == 1 and signs.decimal not in cell
+        else ""
+    )
     advice = ", ".join(filter(None, (decimal, thousands)))
     return f" (pass {advice})" if advice and parse(cell.replace(other, ""), signs) is not None else ""

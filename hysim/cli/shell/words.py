@@ -30,7 +30,7 @@ _PHRASES = (
 )
 _RESAMPLED = re.compile(r"hs\.load\(\.\.\.\)\.resample\(([^)]*)\)")
 _CALL = re.compile(r"\b[A-Za-z_]\w*\((?:[^()]|\([^()]*\))*\)")
-_VALUE = r"""("[^"]*"|'[^']*'|\[[^\]]*\]|\{[^}]*\}|False|True|-?\d[\w.+-]*[\w]|\d)?"""
+_VALUE = r"""(?:("[^"]*"|'[^']*'|\[[^\]]*\]|\{[^}]*\}|False|True|-?\d(?:[\w.+-]*\w)?)|(?!\w))"""
 _ITEM = re.compile(r"""['"]([^'"]+)['"]""")
 _PAIR = re.compile(r"""['"]?([\w.\[\]*]+)['"]?\s*:\s*(\([^)]*\)|[^,}]+)""")
 _BEGIN = r"(?P<before>^(?:\S+: )?)(?P<name>{})(?= (?:must|is|are|has|takes|names|needs|cannot)\b)"
@@ -57,7 +57,7 @@ def _translated(text: str, options: Mapping[str, str], is_first: bool) -> str:
     if not names:
         return text
     assigned = re.compile(rf"(?<![\w.\"'-])({names})={_VALUE}")
-    text = assigned.sub(lambda match: _option(match[1], match[2], options[match[1]]), text)
+    text = assigned.sub(lambda match: _option(match, options[match[1]]), text)
     if is_first:
         long = "|".join(name for name in options if len(name) > 1) or "-"
         text = re.sub(_BEGIN.format(long), lambda match: match["before"] + options[match["name"]], text)
@@ -65,10 +65,11 @@ def _translated(text: str, options: Mapping[str, str], is_first: bool) -> str:
     return re.sub(rf"(?<![\w.\"'-])({compound})\b(?!=)", lambda m: options[m[1]], text) if compound else text
 
 
-def _option(name: str, value: str | None, flag: str) -> str:
-    """The option with its value, as it is typed."""
-    if (name, value) == ("t", "False"):
-        return "--no-t"
+def _option(argument: re.Match[str], flag: str) -> str:
+    """The option with its value, as it is typed; a signal with a value is no argument, but as in ``--unit u=V``."""
+    name, value = argument.groups()
+    if len(name) == 1 and value is not None:
+        return "--no-t" if (name, value) == ("t", "False") else argument[0]
     prefix = {"units": "u=", "channels": "CHANNEL="}.get(name, "")
     if value is None:
         return f"{flag} {prefix}{'UNIT' if name == 'units' else 'COLUMN'}" if prefix else flag

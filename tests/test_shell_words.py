@@ -1,0 +1,140 @@
+"""Errors and warnings name options as a shell takes them, and suggest the one that was meant."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+import hysim as hs
+from hysim.cli import main, parsers
+from hysim.cli.shell.words import OTHER_NAMES, in_shell_words, suggestion
+
+FLAGS = {
+    action.dest: action.option_strings[0]
+    for parser in parsers()[1].values()
+    for action in parser._actions
+    if action.option_strings
+}
+PACKAGE = Path(hs.__file__).parent
+PYTHON_ONLY = (
+    "paper",
+    "export",
+    "sweeps",
+    "rig",
+    "vision",
+    "plot",
+    "structures",
+    "control",
+    "plants",
+    "cli",
+    "channels",
+)
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch, capsys):
+    """Run a command in a folder with a loop: exit code, standard output, standard error."""
+    monkeypatch.chdir(tmp_path)
+    rows = "".join(f"{k},{u},{2 * u}\n" for k, u in enumerate([0, 1, 2, 1, 0]))
+    (tmp_path / "loop.csv").write_text(f"t,u,y\n{rows}")
+    (tmp_path / "latin.csv").write_bytes("u,y [µm]\n0,1\n1,2\n".encode("latin-1"))
+
+    def command(*arguments):
+        try:
+            code = main([*arguments])
+        except SystemExit as exit_:
+            code = exit_.code
+        return code, *capsys.readouterr()
+
+    return command
+
+
+@pytest.mark.parametrize(
+    ("message", "words"),
+    [
+        ('pass its encoding, for instance encoding="latin-1"', "pass its encoding, for instance --encoding latin-1"),
+        ('pass decimal="," or delimiter=";"', "pass --decimal , or --delimiter ';'"),
+        ("a.csv: resolution must be positive", "a.csv: --resolution must be positive"),
+        ("max_evaluations must be at least 1", "--max-evaluations must be at least 1"),
+        ('cross_validate must be "loo"', '--cross-validate must be "loo"'),
+        ("load without time: t=False", "load without time: --no-t"),
+        ("widen it with bounds=", "widen it with --bounds"),
+        ("give bounds={'k': (lower, upper)}", "give --bounds k=LOWER:UPPER"),
+        ("identify with fixed={'a': 0.5}", "identify with --fix a=0.5"),
+        ("free=['damping', 'mass', ...], names", "--free damping --free mass ..., names"),
+        ("give channels={'T': ...}", "give --channel T=COLUMN"),
+        ('pass units="cm/s^2", or units=', "pass --unit u=cm/s^2, or --unit u=UNIT"),
+        ("pass skip=3", "pass --skip 3"),
+        ("got BoucWen(n=1.0, free=['n']) and seed=3", "got BoucWen(n=1.0, free=['n']) and --seed 3"),
+        ("Record(resolution=...)", "--resolution"),
+        ("interpolate it by hs.load(...).resample(0.1), or", "interpolate it by --t, --u and --sample-time 0.1, or"),
+        ("the tolerance is small, and loops=3", "the tolerance is small, and loops=3"),
+        ("--unit u=V, u='V' and x.seed=1", "--unit u=V, u='V' and x.seed=1"),
+        ("--noise=gaussian or noise=gaussian", "--noise=gaussian or noise=gaussian"),
+    ],
+)
+def test_an_argument_of_the_library_becomes_an_option(message, words):
+    assert in_shell_words(message, FLAGS) == words
+
+
+def test_a_command_without_options_leaves_the_message_as_it_is():
+    assert in_shell_words("pass encoding=", {}) == "pass encoding="
+
+
+def texts(path):
+    """Literal parts of the strings of a module that are no docstrings, as they may be in a message."""
+    tree = ast.parse(path.read_text())
+    docs = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr):
+            docs.update(map(id, node.values))
+            yield "".join(part.value if isinstance(part, ast.Constant) else "0" for part in node.values)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docs:
+            yield node.value
+
+
+def test_no_message_of_the_library_keeps_an_argument_that_is_an_option():
+    names = "|".join(name for name in (*FLAGS, *OTHER_NAMES) if len(name) > 1)
+    named = re.compile(rf"(?<![\w.-])({names})=")
+    changed = 0
+    for path in PACKAGE.rglob("*.py"):
+        if any(part in PYTHON_ONLY for part in path.relative_to(PACKAGE).parts):
+            continue  # their messages do not reach a command, or name methods of Python that have no option
+        for text in texts(path):
+            if " " in text and named.search(text):
+                words = re.sub(r"\w+\([^()]*\)", "", in_shell_words(text, FLAGS))
+                assert not named.search(words), (path, text, words)
+                changed += 1
+    assert changed > 20
+
+
+def test_errors_of_the_library_name_options(run):
+    assert run("metrics", "latin.csv")[2].endswith("for instance --encoding latin-1\n")
+    assert "larger --tolerance if" in run("metrics", "loop.csv", "--cycles", "9")[2]
+    assert run("identify", "loop.csv", "--model", "line", "--resolution", "0")[2].endswith(
+        "loop.csv: --resolution must be positive, got 0.0\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("metrics", "--U", "u", "loop.csv"), "there is no option --U: did you mean --u? (see hysim metrics --help)"),
+        (("identify", "loop.csv", "--model", "line", "--fixed", "a=1"), "no option --fixed: did you mean --fix?"),
+        (("identify", "loop.csv", "--model", "line", "--sampletime=1"), "did you mean --sample-time?"),
+        (("plot", "loop.csv", "--out", "a.svg", "loop.csv"), "unexpected argument 'loop.csv': names of files"),
+        (("identify", "loop.csv", "--model", "boucwen"), "did you mean bouc-wen? (models of your own: MODEL.json"),
+        (("identify", "loop.csv", "--model", "Oscilator"), "did you mean oscillator?"),
+        (("metrics", "loop.csv", "--qqq", "1"), "there is no option --qqq (see hysim metrics --help)"),
+    ],
+)  # fmt: skip
+def test_a_typo_is_answered_with_what_was_meant(run, arguments, message):
+    code, out, err = run(*arguments)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert message in err
+
+
+def test_the_nearest_name_is_found_whatever_the_spelling():
+    assert suggestion("BoucWen", ["line", "bouc-wen"]) == "did you mean bouc-wen?"
+    assert suggestion("zzz", ["line", "bouc-wen"]) == ""
