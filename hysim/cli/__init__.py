@@ -143,6 +143,18 @@ def _discard(code: int) -> int:
 
 
 def _line(error: BaseException) -> str:
+    if isinstance(error, FileNotFoundError) and error.filename and (near := _near_file(str(error.filename))):
+        return one_line(f"{error.filename}: {error.strerror}: {near}")
     if isinstance(error, OSError) and error.strerror:
         return one_line(f"{error.filename}: {error.strerror}" if error.filename else error.strerror)
     return one_line(str(error)) or type(error).__name__
+
+
+def _near_file(path: str) -> str:
+    """``did you mean FILE?`` for the nearest file in the same folder, an empty text if none is near."""
+    folder, name = os.path.split(path)
+    try:
+        near = suggestion(name, os.listdir(folder or "."))
+    except OSError:
+        return ""
+    return near and f"did you mean {os.path.join(folder, near.removeprefix('did you mean '))}"

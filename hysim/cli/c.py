@@ -23,6 +23,10 @@ def run(options: argparse.Namespace) -> int:
     code = to_c(_inverse(model) if options.inverse else model, sample_time, name=out.stem, u0=options.u0)
     texts = {".h": code.header, ".c": code.source, "_main.c": code.main}
     write_all({paths[end]: text for end, text in texts.items()})
+    compiled = f"cc -std=c99 -O2 -ffp-contract=off {paths['.c']} {paths['_main.c']} -lm -o {out.with_suffix('')}"
+    print(
+        f"wrote {', '.join(paths.values())}; a program that reads one input in each line is compiled by\n  {compiled}"
+    )
     return 0
 
 

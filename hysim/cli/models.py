@@ -72,13 +72,18 @@ def family(name: str) -> Any:
     """The family with a name such as ``bouc-wen``; a ValueError, which lists the names, if there is none."""
     from hysim.models.model import FAMILIES
 
-    public = {_hyphenated(each): each for each in hysim.__all__ if each[0].isupper()} | _SHORT
+    public = _public()
     law = resolved(f"hysim:{public[name]}") if name in public else None
     if law is None or FAMILIES.get(public[name]) is not law:
         known = [*names(), "oscillator"]
         near = suggestion(name, known) or f"give one of {', '.join(known)}"
         raise ValueError(f"there is no model {name!r}: {near} (models of your own: MODEL.json or module:name)")
     return law
+
+
+def _public() -> dict[str, str]:
+    """Names of classes by their names on the command line."""
+    return {_hyphenated(each): each for each in hysim.__all__ if each[0].isupper()} | _SHORT
 
 
 def _hyphenated(name: str) -> str:
@@ -124,7 +129,11 @@ def model_or_family(text: str) -> Any:
     """The family or model that ``--model`` names: a family's name, a JSON file, or an import path."""
     if Path(text).suffix == ".json":
         return read(text)[0]
-    return imported(text) if is_import_path(text) else family(text)
+    if is_import_path(text):
+        return imported(text)
+    if Path(text).is_file():
+        raise ValueError(f"the file {text} is no model: give the name of a family, or of a model file, MODEL.json")
+    return family(text)
 
 
 def to_identify(options: argparse.Namespace) -> Any:
@@ -176,6 +185,8 @@ def read(path: str) -> tuple[Any, dict[str, str]]:
             raise ValueError(f"{path} needs values for its parameters: give an instance ({error})") from None
     if path == STANDARD:
         return from_json(sys.stdin.read(), "the standard input")
+    if path in _public() and not Path(path).exists():
+        raise ValueError(f"{path} is a family without numbers: write a model of it by hysim identify --out {path}.json")
     return from_json(Path(path).read_bytes(), path)
 
 

@@ -22,8 +22,8 @@ import re
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-INPUT, RESULT, PRINTED, PICTURE, TABLE = "input", "result", "printed result", "picture", "table"
-"""Roles of files: read, written, written with what is printed too, drawn, and written as columns."""
+INPUT, RESULT, PRINTED, PICTURE, TABLE, MODEL = "input", "result", "printed result", "picture", "table", "model"
+"""Roles of files: read, written, written with what is printed too, drawn, written as columns, written as a model."""
 
 _ROLES = {"PATH": RESULT, "COPY": PRINTED, "OUT": TABLE}
 _ROLES |= dict.fromkeys(("FILE", "FILE_OF_Y", "MODEL", "FRAMES", "DATABASE", "STUDY.toml", "triangle|step|FILE"), INPUT)
@@ -103,7 +103,9 @@ def _settings(name: str, value: str | None, default: str | None, is_required: bo
 def _role(value: str) -> str:
     if value.endswith(".svg"):
         return PICTURE
-    return RESULT if value.endswith((".json", ".csv", ".c", ".fmu", ".html", ".sqlite")) else _ROLES.get(value, "")
+    if value.endswith(".json"):
+        return MODEL
+    return RESULT if value.endswith((".csv", ".c", ".fmu", ".html", ".sqlite")) else _ROLES.get(value, "")
 
 
 def word_or_number(
@@ -118,7 +120,7 @@ def word_or_number(
             value = number(text)
         except ValueError:
             value = None
-        if value is None or value < least:
+        if value is None or value < least:  # nan is a number here, and refused where it is used
             raise argparse.ArgumentTypeError(f"expected {expected}, got {text!r}")
         return value
 
@@ -236,8 +238,8 @@ def platforms(text: str) -> tuple[str, ...]:
 
 REAL = ("STEP", "TIME", "RMS", "PERCENT", "BOUND", "HERTZ", "HEIGHT", "VALUE", "SHARE", "LENGTH")
 READERS: dict[str, Callable[[str], Any]] = {
-    **dict.fromkeys(("N", "NUMBER", "DEGREE"), int),
-    **dict.fromkeys(REAL, float),
+    **dict.fromkeys(("N", "NUMBER", "DEGREE"), word_or_number("a whole number")),
+    **dict.fromkeys(REAL, word_or_number("a number without a unit", number=float)),
     **{form: numbers(form) for form in ("LOW,HIGH", "FREQUENCY,DAMPING", "NAME=VALUE", "NAME=LOW:HIGH")},
     "PLACE": place,
     "COUNT": word_or_number("a number from 1 on", least=1),

@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hysim._atomic import write_all
-from hysim.cli.options import INPUT, PICTURE, PRINTED, TABLE
+from hysim.cli.options import INPUT, MODEL, PICTURE, PRINTED, TABLE
 from hysim.cli.records import STANDARD
 from hysim.cli.shell.words import in_shell_words
 
@@ -63,6 +63,8 @@ def _check_path(path: str, role: str) -> None:
         from hysim.files import ending
 
         ending(path)
+    if role == MODEL and Path(path).suffix != ".json":
+        raise ValueError(f"models are JSON: call the file .json, got {path}")
     if role == PICTURE and Path(path).suffix.lower() not in _ENDINGS:
         raise ValueError(f"pictures are SVG, PNG or PDF: call the file .svg, .png or .pdf, got {path}")
 

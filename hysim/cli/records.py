@@ -38,7 +38,7 @@ or --no-t  read no time from the file
 {OF_A_TEXT}
 --resolution QUANTUM  resolution of the output's sensor [unit of y]; or detect: the step of which all outputs are
     multiples
---unit SIGNAL=UNIT...  unit of t, u or y, as in u=V
+--unit SIGNAL=UNIT...  label of the unit of t, u or y, as in u=V; no value is converted
 --from PLACE  first sample to use: its number from 0, or its time with a unit, as in 2.5s
 --to PLACE  first sample behind those to use, likewise
 --every COUNT  use each N-th of these samples only: a turn between two of them is lost
@@ -95,6 +95,8 @@ def read_input(options: argparse.Namespace, *, of_the_ground: bool) -> Record:
             return cut(_ground_motion(options, source), options)
     if options.skip is not None:
         raise ValueError(f"--skip is for a ground motion: begin the lines at the top of {options.file} with #")
+    if options.u is None:
+        options.u = _only_column(options, source(), "u")
     return _read(options, options.file, source(), None, options.resolution)
 
 
@@ -177,6 +179,9 @@ def _read(
     if "y_file" in options and options.y_file is not None:
         record = _from_two_files(options, path, source, y, resolution)
     else:
+        names = ("u" if u is None else u, "y" if y is None else y)
+        if "y" in options and names[0] == names[1]:
+            raise ValueError(f"the input and the output are both the column {names[0]}: name them by --u and --y")
         record = _loaded(options, path, source, u, y if "y" in options else u, resolution)
     step = None if options.sample_time is None else positive("--sample-time", options.sample_time)
     if step is not None and record.t is None:
@@ -215,8 +220,12 @@ def _from_two_files(options: argparse.Namespace, path: str, source: Any, y: Any,
 
 
 def _only_column(options: argparse.Namespace, source: Any, name: str) -> str:
-    """The name of the only column beside the time, or else this one."""
+    """This name, or that of the only column beside the time; a ValueError if there are several others."""
     from hysim.files import column_names
 
     others = [each for each in column_names(source, **text_options(options)) if each not in ("t", options.t)]
-    return others[0] if len(others) == 1 else name
+    if name in others or not others:
+        return name
+    if len(others) > 1:
+        raise ValueError(f"no column is called {name}, the columns are: {', '.join(others)}; name it by --{name}")
+    return others[0]

@@ -20,6 +20,8 @@ def run(options: argparse.Namespace) -> int:
 
     if options.model == options.file == records.STANDARD:
         raise ValueError("the standard input holds the model or the record, not both")
+    if options.file.endswith(".json") and options.model.endswith((".csv", ".tsv", ".txt", ".npz", ".mat", ".h5")):
+        raise ValueError(f"the model stands before the record: hysim simulate {options.file} {options.model}")
     model, units = models.read(options.model)
     record = records.read_input(options, of_the_ground=isinstance(model, _Shaken) and model.excitation == "base")
     units |= dict(options.unit) | {signal: unit for signal, unit in record.units.items() if signal != "y"}

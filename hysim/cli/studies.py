@@ -91,7 +91,7 @@ def _response(table: Mapping[str, Any], folder: Path) -> Any:
     if table["record"] == "table1":
         record = hysim.datasets.table1()
     else:
-        record = hysim.load(folder / table["record"], u=table["u"], y=table["y"])
+        record = hysim.load(folder / table["record"], u=table.get("u"), y=table.get("y"))
     measure = table.get("measure", "rmse")
     return hysim.response_task(law, record.u, record.y if measure in ("rmse", "sse") else None, measure)
 

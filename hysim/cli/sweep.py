@@ -15,6 +15,18 @@ if TYPE_CHECKING:
     from hysim.plot import Figure
     from hysim.sweeps import Sweep
 
+_STUDY = """
+
+  seed = 1
+  [response]
+  law = "law.json"
+  record = "loop.csv"
+  [sample]
+  method = "latin_hypercube"
+  n = 1000
+  distributions.beta = [0.0, 0.1]
+"""
+
 SUCCESS, SOME_FAILED = 0, 1
 
 
@@ -90,7 +102,8 @@ COMMAND = Command(
     "sweep",
     "compute a study over many parameters, or continue one",
     "Compute a task for many sets of parameters, as a TOML file says, and keep every finished row in a database. An "
-    "interrupted study continues with --resume. Exit code 1: some tasks failed.",
+    "interrupted study continues with --resume. Exit code 1: some tasks failed. A study of the error of a law on a "
+    "record, beside both files:" + _STUDY,
     f"""
 study [STUDY.toml]  description of the study; see the page on studies
 --out RESULTS.sqlite  database of the rows

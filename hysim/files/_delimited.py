@@ -12,7 +12,7 @@ import numpy as np
 from hysim._frozen import FloatArray
 from hysim.files._cells import Signs, numbers, parse, plain_numbers
 from hysim.files._layout import COMMENTS, Layout, layout
-from hysim.files._table import Column, Notes, channels_in, listed, number_of, positive
+from hysim.files._table import Column, Notes, channels_in, listed, nearest, number_of, positive
 
 T = TypeVar("T")
 
@@ -37,7 +37,9 @@ class Delimited:
         if isinstance(key, str):
             number = number_of(key, "columns", self.labels, [f"{column.label} [{column.unit}]" for column in columns])
             if number is None:
-                raise ValueError(f"no column {key!r}, the columns are: {listed(self.labels)}")
+                raise ValueError(
+                    f"no column {key!r}, the columns are: {listed(self.labels)}{nearest(key, self.labels)}"
+                )
             return columns[number]
         if not 0 <= operator.index(key) < len(columns):
             raise ValueError(f"no column {key}, there are columns 0 to {len(columns) - 1}")

@@ -5,6 +5,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from typing import Any, NamedTuple, Protocol
 
 from hysim._frozen import FloatArray
@@ -102,6 +103,13 @@ def listed(names: Sequence[str], most: int = 20) -> str:
     """Names from a file, in one line."""
     plain = [name if name.isprintable() and len(name) <= 80 else shown(name, 80) for name in names[:most]]
     return ", ".join(plain) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
+def nearest(key: str, names: Sequence[str]) -> str:
+    """The name that may be meant by a key, as the end of a message; an empty text if none is near."""
+    folded = {name.casefold(): name for name in names}
+    near = get_close_matches(key.casefold(), folded, n=1)
+    return f"; did you mean {shown(folded[near[0]])}?" if near else ""
 
 
 def channels_in(text: Any) -> dict[str, str | float]:
