@@ -135,6 +135,45 @@ def test_a_typo_is_answered_with_what_was_meant(run, arguments, message):
     assert message in err
 
 
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("metrics", "lopo.csv"), "lopo.csv: No such file or directory: did you mean loop.csv?"),
+        (("metrics", "none/loop.csv"), "none/loop.csv: No such file or directory\n"),
+        (
+            ("metrics", "weg.csv", "--u", "weg", "--y", "y"),
+            "no column 'weg', the columns are: Weg, y; did you mean 'Weg'?",
+        ),
+        (
+            ("metrics", "loop.csv", "--u", "y"),
+            "the input and the output are both the column y: name them by --u and --y",
+        ),
+        (("simulate", "loop.csv", "law.json"), "the model stands before the record: hysim simulate law.json loop.csv"),
+        (("simulate", "law.json", "weg.csv"), "no column is called u, the columns are: Weg, y; name it by --u"),
+        (("simulate", "line", "loop.csv"), "write a model of it by hysim identify --out line.json"),
+        (("identify", "loop.csv", "--model", "weg.csv"), "the file weg.csv is no model: give the name of a family"),
+        (("identify", "loop.csv", "--model", "line", "--out", "law"), "models are JSON: call the file .json, got law"),
+        (("identify", "loop.csv", "--model", "line", "--sample-time", "1ms"), "a number without a unit, got '1ms'"),
+        (("identify", "loop.csv", "--model", "line", "--seed", "1.5"), "expected a whole number, got '1.5'"),
+        (("plot", "loop.csv", "--kind", "forc", "--out", "f.svg"), "at least 3 reversal curves from different levels"),
+        (("sweep", "study.toml"), "the rows are kept in a database: give --out study.sqlite"),
+        (("example", "loop.csv"), "loop.csv is there already: give another name, as in hysim example mine.csv"),
+    ],
+)
+def test_a_wrong_step_is_answered_with_the_right_one(run, tmp_path, arguments, message):
+    (tmp_path / "weg.csv").write_text("Weg,y\n0,1\n1,2\n")
+    hs.save(hs.Line(slope=2.0), "law.json")
+    code, out, err = run(*arguments)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert message in err
+
+
+def test_the_only_column_of_a_file_is_the_input_of_a_simulation(run, tmp_path):
+    hs.save(hs.Line(slope=2.0), "law.json")
+    (tmp_path / "inputs.txt").write_text("1\n3\n")
+    assert run("simulate", "law.json", "inputs.txt") == (0, "u,y\n1.0,2.0\n3.0,6.0\n", "")
+
+
 def test_the_nearest_name_is_found_whatever_the_spelling():
     assert suggestion("BoucWen", ["line", "bouc-wen"]) == "did you mean bouc-wen?"
     assert suggestion("zzz", ["line", "bouc-wen"]) == ""

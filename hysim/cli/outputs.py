@@ -52,6 +52,9 @@ def check(options: argparse.Namespace) -> None:
     if len({os.path.realpath(path) for path, _ in results}) < len(results):
         raise ValueError(f"two results would go to one file, {results[0][0]}")
     keep([path for path, role in files if role == INPUT], [path for path, _ in results])
+    for path, role in results:
+        if role == MODEL and path != STANDARD and Path(path).suffix != ".json":
+            raise ValueError(f"models are JSON: call the file .json, got {path}")
 
 
 def _check_path(path: str, role: str) -> None:
@@ -63,8 +66,6 @@ def _check_path(path: str, role: str) -> None:
         from hysim.files import ending
 
         ending(path)
-    if role == MODEL and Path(path).suffix != ".json":
-        raise ValueError(f"models are JSON: call the file .json, got {path}")
     if role == PICTURE and Path(path).suffix.lower() not in _ENDINGS:
         raise ValueError(f"pictures are SVG, PNG or PDF: call the file .svg, .png or .pdf, got {path}")
 
