@@ -126,6 +126,7 @@ def test_errors_of_the_library_name_options(run):
         (("plot", "loop.csv", "--out", "a.svg", "loop.csv"), "unexpected argument 'loop.csv': names of files"),
         (("identify", "loop.csv", "--model", "boucwen"), "did you mean bouc-wen? (models of your own: MODEL.json"),
         (("identify", "loop.csv", "--model", "Oscilator"), "did you mean oscillator?"),
+        (("--verson",), "there is no option --verson: did you mean --version? (see hysim --help)"),
         (("metrics", "loop.csv", "--qqq", "1"), "there is no option --qqq (see hysim metrics --help)"),
     ],
 )  # fmt: skip

@@ -104,11 +104,12 @@ def _run(arguments: list[str]) -> int:
         advice = suggestion(named, COMMANDS) or f"there are {', '.join(COMMANDS)}"
         parser.error(f"there is no command {named!r}: {advice}")
     options, unknown = parser.parse_known_args(arguments)
+    if unknown:
+        asked = parser if named is None else of_commands[named]
+        asked.error(unexpected(unknown, asked))
     if named is None:
         parser.print_help(sys.stderr)
         return BAD_INPUT
-    if unknown:
-        of_commands[named].error(unexpected(unknown, of_commands[named]))
     import numpy as np
 
     with np.errstate(all="ignore"), _told_in_shell_words(options):  # an overflow is inf or nan, and null in JSON
