@@ -70,6 +70,8 @@ def run(tmp_path, monkeypatch, capsys):
         ("Record(resolution=...)", "--resolution"),
         ("interpolate it by hs.load(...).resample(0.1), or", "interpolate it by --t, --u and --sample-time 0.1, or"),
         ("the tolerance is small, and loops=3", "the tolerance is small, and loops=3"),
+        ("no column 'y', the columns are: sample_time, u", "no column 'y', the columns are: sample_time, u"),
+        ("t and sample_time exclude each other", "t and --sample-time exclude each other"),
         ("--unit u=V, u='V' and x.seed=1", "--unit u=V, u='V' and x.seed=1"),
         ("--noise=gaussian or noise=gaussian", "--noise=gaussian or noise=gaussian"),
     ],
@@ -173,6 +175,9 @@ def test_the_only_column_of_a_file_is_the_input_of_a_simulation(run, tmp_path):
     hs.save(hs.Line(slope=2.0), "law.json")
     (tmp_path / "inputs.txt").write_text("1\n3\n")
     assert run("simulate", "law.json", "inputs.txt") == (0, "u,y\n1.0,2.0\n3.0,6.0\n", "")
+    assert run("simulate", "law.json", "inputs.txt", "--out", "-") == (0, "u,y\n1.0,2.0\n3.0,6.0\n", "")
+    assert '"y": [' in run("simulate", "law.json", "inputs.txt", "--json", "--out", "out.csv")[1]
+    assert (tmp_path / "out.csv").read_text() == "u,y\n1.0,2.0\n3.0,6.0\n"
 
 
 def test_the_nearest_name_is_found_whatever_the_spelling():

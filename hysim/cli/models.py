@@ -159,7 +159,8 @@ def to_identify(options: argparse.Namespace) -> Any:
     structure = {taken[name]: value == "yes" if name == "one_signed" else value for name, value in used.items()}
     if model is oscillator and options.initial is not None:
         structure["initial"], options.initial = options.initial, None  # its structure says how the record begins
-    return model.structure(**structure) if structure or model in (oscillator, linear) else model
+    is_structure_needed = structure or any(model is each for each in (oscillator, linear))
+    return model.structure(**structure) if is_structure_needed else model
 
 
 def _argument(model: Any, option: str) -> str | None:

@@ -38,13 +38,11 @@ def run(options: argparse.Namespace) -> int:
         values = {name: column.tolist() for name, column in columns.items()}
         return {"units": {name: labels[name] for name in columns if name in labels}, "columns": values}
 
-    files: outputs.Files = {
-        options.out: lambda: outputs.table(options.out, columns, labels),
-        options.plot: lambda: outputs.picture_of(simulation),
-    }
-    is_printed = options.out is None or options.json
-    text = (lambda: outputs.table(records.STANDARD, columns, labels).decode()) if is_printed else None
-    outputs.write(options, files, text, document)
+    files: dict[str | None, Any] = {options.plot: lambda: outputs.picture_of(simulation)}
+    if options.out is not None or not options.json:
+        path = options.out or records.STANDARD
+        files[path] = lambda: outputs.table(path, columns, labels)
+    outputs.write(options, files, (lambda: "") if options.json else None, document)
     return 0
 
 

@@ -62,7 +62,10 @@ def _translated(text: str, options: Mapping[str, str], is_first: bool) -> str:
         long = "|".join(name for name in options if len(name) > 1) or "-"
         text = re.sub(_BEGIN.format(long), lambda match: match["before"] + options[match["name"]], text)
     compound = "|".join(name for name in options if "_" in name)
-    return re.sub(rf"(?<![\w.\"'-])({compound})\b(?!=)", lambda m: options[m[1]], text) if compound else text
+    text, are, listed = text.partition(" are: ")  # names in a list, such as columns of a file, are no arguments
+    if compound:
+        text = re.sub(rf"(?<![\w.\"'-])({compound})\b(?!=)", lambda match: options[match[1]], text)
+    return text + are + listed
 
 
 def _option(argument: re.Match[str], flag: str) -> str:
