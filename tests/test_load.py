@@ -117,6 +117,27 @@ def test_a_comma_between_thousands_is_read_where_it_can_mean_nothing_else():
     assert load('u,y\n"1,000.5",1\n2.5,3\n').u.tolist() == [1000.5, 2.5]
 
 
+def test_a_header_above_the_names_is_skipped_and_the_lines_keep_their_numbers():
+    text = "LabVIEW Measurement\nSeparator\tTab\n\nt\tu\ty\n0\t1\t2\n1\t2\t{}\n"
+    assert load(text.format(4), skip=3).y.tolist() == [2.0, 4.0]
+    with pytest.raises(ValueError, match="line 6, column 'y': expected a finite number, got 'O'"):
+        load(text.format("O"), skip=3)
+    with pytest.raises(ValueError, match=r"line 1 names 1 columns, .* pass its number of lines as skip="):
+        load(text.format(4))
+    with pytest.raises(ValueError, match="skip must be a number of lines, got -1"):
+        load(text, skip=-1)
+
+
+def test_the_first_line_for_excel_names_the_delimiter():
+    assert load("sep=;\nu;y\n0,5;1\n1,5;2\n").u.tolist() == [0.5, 1.5]
+
+
+def test_other_signs_for_minus_are_read_and_times_of_day_are_refused():
+    assert load("u,y\n\u22121.5,1\n2,3\n").u.tolist() == [-1.5, 2.0]
+    with pytest.raises(ValueError, match=r"got '12:00:01' \(a time of day: write it in seconds, or load without time"):
+        load("t,u,y\n12:00:01,1,2\n12:00:02,2,3\n")
+
+
 @pytest.mark.parametrize(("sign", "decimal"), [(".", ","), (",", ".")])
 def test_one_sign_is_between_thousands_only_if_it_is_said_to_be(sign, decimal):
     text = f"u;y\n1{sign}000;1\n2{sign}500{decimal}5;2\n12;3\n"

@@ -26,6 +26,7 @@ _OUTPUT = "--y COLUMN  output: name or number of its column (default: y)"
 OF_A_TEXT = f"""--delimiter SIGN  sign between cells of a text, or {", ".join(_DELIMITERS)} (default: detected)
 --decimal .|,  sign before the decimals of a text (default: detected)
 --thousands SIGN  sign between thousands of a text (default: none, but where a number can mean nothing else)
+--skip N  number of lines at the top of a text that are neither samples nor names of columns
 --encoding NAME  encoding of a text, such as latin-1 (default: UTF-8, -16 or -32)"""
 """Options for a file of text."""
 
@@ -60,8 +61,6 @@ OPTIONS_WITH_WEIGHTS = f"""{OPTIONS.rstrip()}
 OPTIONS_OF_AN_INPUT = f"{FILE}\n\nrecord:\n{_INPUT}{_OTHERS}"
 """Options for a file that needs no column of the output."""
 
-SKIP = "--skip N  number of lines at the top of a ground motion that belong to its header, if it holds lines of numbers"
-
 
 def read(options: argparse.Namespace, file: str | None = None, *, uncut: bool = False) -> Record:
     """The record that the options describe, or that of another `file`; without an output column, y is u.
@@ -93,8 +92,6 @@ def read_input(options: argparse.Namespace, *, of_the_ground: bool) -> Record:
             names = ()  # a list, or a fault that is named where the file is read
         if "u" not in names:
             return cut(_ground_motion(options, source), options)
-    if options.skip is not None:
-        raise ValueError(f"--skip is for a ground motion: begin the lines at the top of {options.file} with #")
     if options.u is None:
         options.u = _only_column(options, source(), "u")
     return _read(options, options.file, source(), None, options.resolution)
@@ -106,7 +103,6 @@ def _ground_motion(options: argparse.Namespace, source: Callable[[], Any]) -> Re
 
     arguments = {"t": options.t, "units": dict(options.unit).get("u"), **text_options(options)}
     del arguments["thousands"]
-    arguments["skip"] = options.skip or 0
     if options.sample_time is None:
         return _of_the_ground(*load_ground_motion(source(), **arguments))
     step = positive("--sample-time", options.sample_time)
@@ -124,7 +120,8 @@ def _of_the_ground(t: FloatArray, acceleration: FloatArray) -> Record:
 def text_options(options: argparse.Namespace) -> dict[str, Any]:
     """The options of `OF_A_TEXT`, as `hysim.load` takes them."""
     delimiter = _DELIMITERS.get(options.delimiter, options.delimiter)
-    return {"delimiter": delimiter, **{name: vars(options)[name] for name in ("decimal", "thousands", "encoding")}}
+    others = {name: vars(options)[name] for name in ("decimal", "thousands", "encoding")}
+    return {"delimiter": delimiter, "skip": options.skip or 0, **others}
 
 
 def _repeatable(path: str) -> Callable[[], Any]:

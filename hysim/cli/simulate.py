@@ -56,7 +56,6 @@ COMMAND = Command(
     f"""
 {MODEL_IN}
 {records.OPTIONS_OF_AN_INPUT}
-{records.SKIP}
 --out OUT  the columns (default: the standard output)
 --plot LOOP.svg  draw the loop; of a structure, the loops of its elements
 --json  print the columns as JSON, beside a file if --out is used

@@ -24,6 +24,9 @@ _GROUPED = re.compile(
 )
 
 
+_CLOCK = re.compile(r"(\S+[ T])?\d{1,2}:\d\d(:\d\d([.,]\d*)?)?")
+
+
 class Signs(NamedTuple):
     """The decimal sign of a text, and the sign between its thousands if it is given."""
 
@@ -33,7 +36,7 @@ class Signs(NamedTuple):
 
 def parse(cell: str, signs: Signs) -> float | None:
     """The number in a cell, or None if it holds none."""
-    cell = _without_thousands(cell.strip(), signs)
+    cell = _without_thousands(cell.strip().replace("\u2212", "-"), signs)  # the minus sign of typesetters
     if signs.decimal == ",":
         if "." in cell or cell.endswith(","):
             return None
@@ -90,7 +93,9 @@ def _number(cell: str, line: int, label: str, signs: Signs) -> float:
 
 
 def _advice(cell: str, signs: Signs) -> str:
-    """What to pass if the point or the comma has the other meaning."""
+    """What to pass if the cell is a time of day, or the point or the comma has the other meaning."""
+    if _CLOCK.fullmatch(cell):
+        return " (a time of day: write it in seconds, or load without time: t=False)"
     other = {".": ",", ",": "."}[signs.decimal]
     name = {".": "point", ",": "comma"}[other]
     number = _GROUPED.fullmatch(cell)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hysim.files._arrays import NUMBERS, Array, Arrays
-from hysim.files._load import check_thousands, file_named, table_of
+from hysim.files._load import file_named, options_of_a_text, table_of
 from hysim.files._source import Source, opened
 from hysim.files._table import Table
 
@@ -38,6 +38,7 @@ def list_columns(
     delimiter: str | None = None,
     decimal: str | None = None,
     thousands: str | None = None,
+    skip: int = 0,
     encoding: str | None = None,
 ) -> tuple[FileColumn, ...]:
     """List the columns of a file that `hysim.load` reads.
@@ -46,7 +47,7 @@ def list_columns(
     ----------
     path : str, path or open file
         As of `hysim.load`.
-    delimiter, decimal, thousands, encoding : str, optional
+    delimiter, decimal, thousands, skip, encoding : optional
         As of `hysim.load`, for a text.
 
     Returns
@@ -67,8 +68,7 @@ def list_columns(
     >>> [(each.name, each.unit, each.highest) for each in hs.list_columns(text)]
     [('t', 's', 1.0), ('voltage', 'V', 5.0), ('note', '', nan)]
     """
-    check_thousands(thousands, decimal)
-    for_text = {"delimiter": delimiter, "decimal": decimal, "thousands": thousands, "encoding": encoding}
+    for_text = options_of_a_text(delimiter, decimal, thousands, skip, encoding)
     with opened(path) as source, file_named(source), table_of(source, for_text) as table:
         return tuple(_column(table, name, number) for name, number in _keys(table))
 

@@ -6,7 +6,7 @@ order; else it is a table with a column of times.
 """
 
 import re
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -142,9 +142,9 @@ def is_at2(path: Source, encoding: str | None = None) -> bool:
         return peer_header(text_of(source.content, source.name, encoding).split("\n", TOP)[:TOP]) is not None
 
 
-def column_names(path: Source, **for_text: str | None) -> tuple[str, ...]:
+def column_names(path: Source, **for_text: Any) -> tuple[str, ...]:
     """Names of the columns of a file, with the options for texts and the errors of `hysim.load`."""
-    for_text = {**dict.fromkeys(("delimiter", "decimal", "encoding")), **for_text}
+    for_text = {**dict.fromkeys(("delimiter", "decimal", "encoding")), **for_text, "skip": for_text.get("skip") or None}
     with opened(path) as source, file_named(source), table_of(source, for_text) as table:
         return tuple(table.labels)
 
@@ -185,8 +185,7 @@ def _of_text(text: str, choice: _Choice, skip: int, delimiter: str | None, decim
     except ValueError as error:
         if not by_column and (count := _count_in_list(text, decimal, skip)):
             raise UnreadableError(
-                f"{error}; if these are {count} accelerations in reading order, pass their sample_time= (on the "
-                "command line --sample-time)"
+                f"{error}; if these are {count} accelerations in reading order, pass their sample_time="
             ) from None
         raise
     return _of_table(table, choice)

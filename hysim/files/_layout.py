@@ -24,6 +24,7 @@ COMMENTS = ("#", "%")
 T = TypeVar("T")
 
 _LOOKED_AT = 100  # lines, of which the first half is from the top and the others are spread over the file
+_EXCEL = re.compile(r"sep=(.)", re.IGNORECASE)  # a first line for Excel, which names the delimiter
 _HEADING = re.compile(r"(?P<name>.*\S)\s*[\[(](?P<unit>[^\[\]()]*)[\])]")
 _WORD = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\[\]()]*[\])])?|\S+")
 
@@ -53,6 +54,8 @@ class Layout(NamedTuple):
 def layout(text: str, delimiter: str | None, decimal: str | None, thousands: str | None = None) -> Layout:
     """Detect the layout of a text with one sample a line; ValueError if it has none."""
     every = text.split("\n")
+    if (said := _EXCEL.fullmatch(every[0].strip())) is not None:
+        every[0], delimiter = "", delimiter or said[1]
     numbers = [k for k, line in enumerate(every, start=1) if line.strip() and not line.lstrip().startswith(COMMENTS)]
     require(numbers, "the file is empty, there is no header and no sample")
     lines = [every[k - 1] for k in numbers]
@@ -68,7 +71,11 @@ def layout(text: str, delimiter: str | None, decimal: str | None, thousands: str
     else:
         names = _commented(every[: numbers[0] - 1], delimiter, width, signs) or [str(k) for k in range(width)]
     is_named = len(names) == width
-    require(is_named, f"line {numbers[0]} names {len(names)} columns, most lines below have {width} cells")
+    require(
+        is_named,
+        f"line {numbers[0]} names {len(names)} columns, most lines below have {width} cells; if it is part of a header "
+        "above the names, pass its number of lines as skip=",
+    )
     columns = [_column(place, label) for place, label in enumerate(names)]
     if has_units:
         columns = [c._replace(unit=c.unit or _unit(cell)) for c, cell in zip(columns, top[1], strict=True)]
@@ -78,7 +85,8 @@ def layout(text: str, delimiter: str | None, decimal: str | None, thousands: str
             between = DELIMITERS.get(delimiter, repr(delimiter))
             raise ValueError(
                 f"line {number}: expected {width} cells, got {cells} (separated by {between}); correct the line, begin "
-                "it with # if it is no sample, or pass the sign between the cells as delimiter="
+                "it with # if it is no sample, pass the number of lines of a header above the columns as skip=, or the "
+                "sign between the cells as delimiter="
             )
     return result
 

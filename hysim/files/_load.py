@@ -7,7 +7,7 @@ numbers of the chosen columns become a record, or several, with gaps where a val
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Literal, TypedDict, Unpack, overload
+from typing import Any, Literal, TypedDict, Unpack, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -38,6 +38,7 @@ class _Options(TypedDict, total=False):
     delimiter: str | None
     decimal: Literal[".", ","] | None
     thousands: str | None
+    skip: int
     encoding: str | None
     units: Mapping[str, str] | None
     resolution: float | Literal["detect"] | None
@@ -59,6 +60,7 @@ def load(
     delimiter: str | None = None,
     decimal: Literal[".", ","] | None = None,
     thousands: str | None = None,
+    skip: int = 0,
     encoding: str | None = None,
     units: Mapping[str, str] | None = None,
     resolution: float | Literal["detect"] | None = None,
@@ -98,6 +100,9 @@ def load(
     thousands : str, optional
         Sign between thousands in a text. It need not be given if it is an apostrophe or a space, nor where a number can
         mean nothing else: ``1.000,5`` is 1000.5, but ``1.000`` is one unless ``thousands="."``.
+    skip : int, optional
+        Number of lines at the top of a text that are neither samples nor names of columns, such as the header of
+        LabVIEW.
     encoding : str, optional
         Encoding of a text; by default UTF-8, or UTF-16 or UTF-32 after their byte order mark.
     units : mapping, optional
@@ -141,10 +146,9 @@ def load(
         raise ValueError(f"delimiter must be one character, got {delimiter!r}")
     if decimal is not None and decimal not in DECIMALS:
         raise ValueError(f'decimal must be "." or ",", got {decimal!r}')
-    check_thousands(thousands, decimal)
     if isinstance(resolution, str) and resolution != "detect":
         raise ValueError(f'resolution must be a number or "detect", got {resolution!r}')
-    for_text = {"delimiter": delimiter, "decimal": decimal, "thousands": thousands, "encoding": encoding}
+    for_text = options_of_a_text(delimiter, decimal, thousands, skip, encoding)
     with opened(path) as source, file_named(source):
         with table_of(source, for_text) as table:
             columns = _columns(table, {"u": u, "y": y, "t": t})
@@ -167,13 +171,20 @@ def load(
     return records if on_missing == "split" else records[0]
 
 
-def check_thousands(thousands: str | None, decimal: str | None) -> None:
-    """Raise a ValueError unless the sign between thousands is a known one, and not the decimal sign."""
+def options_of_a_text(
+    delimiter: str | None, decimal: str | None, thousands: str | None, skip: int, encoding: str | None
+) -> dict[str, Any]:
+    """Options for a text by name, None where nothing is asked for; ValueError if one is no option for any text."""
+    if skip < 0:
+        raise ValueError(f"skip must be a number of lines, got {skip}")
     if thousands is not None and (thousands not in tuple(THOUSANDS) or thousands == decimal):
         raise ValueError(
             "thousands must be a point, a comma, an apostrophe or a space that is not the decimal sign, got "
             f"{thousands!r}"
         )
+    return {
+        "delimiter": delimiter, "decimal": decimal, "thousands": thousands, "skip": skip or None, "encoding": encoding,
+    }  # fmt: skip
 
 
 @contextmanager
@@ -187,10 +198,12 @@ def file_named(source: Opened) -> Iterator[None]:
 
 
 @contextmanager
-def table_of(source: Opened, for_text: Mapping[str, str | None]) -> Iterator[Table]:
+def table_of(source: Opened, for_text: Mapping[str, Any]) -> Iterator[Table]:
     """The table that a source holds, open to be read from."""
     if isinstance(source.content, (str, bytes)):
         text = text_of(source.content, source.name, for_text["encoding"])
+        rest = text.split("\n")[for_text.get("skip") or 0 :]
+        text = "\n".join([""] * (for_text.get("skip") or 0) + rest)  # the lines keep their numbers
         yield delimited(text, for_text["delimiter"], for_text["decimal"], for_text.get("thousands"))
         return
     for argument, value in for_text.items():
