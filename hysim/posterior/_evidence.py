@@ -222,9 +222,10 @@ def compare_evidence(
     --------
     >>> import hysim as hs
     >>> rec = hs.datasets.table1()
-    >>> result = hs.compare_evidence({"line": hs.Line, "play": hs.Play}, rec, noise="quantised", live_points=12)
-    >>> result.names[0]
-    'play'
+    >>> at_zero = hs.identify(hs.Line, rec, fixed={"offset": 0.0})
+    >>> result = hs.compare_evidence({"through zero": at_zero}, rec, live_points=6)
+    >>> result.sentence
+    'through zero is the only model'
     """
     records = several(record_or_records, "compare_evidence")
     if not models:
@@ -242,7 +243,7 @@ def compare_evidence(
         found = []
         for factor in FACTORS:
             own = (priors or {}).get(name)
-            found.append(log_evidence(fit, records, priors=own, factor=factor, seed=seed, **options))
+            found.append(log_evidence(fit, records, priors=own, factor=factor, **options))
             done += 1
             if progress is not None:
                 progress(done, len(FACTORS) * len(fits))

@@ -34,6 +34,9 @@ class LogEvidence(NamedTuple):
 def nested_evidence(target: Target, live_points: int, seed: int) -> LogEvidence:
     """ln Z from so many live points; its error falls with the root of their number."""
     dynesty = optional("dynesty", "nested sampling", "bayes")
+    if live_points <= 2 * target.n_dim:
+        least = 2 * target.n_dim + 1
+        raise ValueError(f"live_points must be at least {least} for {target.n_dim} parameters, got {live_points}")
     before = target.evaluations
 
     def log_likelihood(cube: FloatArray) -> FloatArray:
