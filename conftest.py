@@ -2,4 +2,10 @@
 
 from importlib.util import find_spec
 
-collect_ignore = [] if find_spec("skimage") else ["hysim/vision/_displacement.py"]
+_NEEDS = {
+    "hysim/vision/_displacement.py": ("skimage",),
+    "hysim/posterior/_sample.py": ("emcee",),
+    "hysim/posterior/_evidence.py": ("emcee", "dynesty"),
+    "hysim/plot/_posterior.py": ("emcee",),
+}
+collect_ignore = [path for path, packages in _NEEDS.items() if not all(map(find_spec, packages))]

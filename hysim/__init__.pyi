@@ -50,6 +50,12 @@ from hysim.export import to_fmu as to_fmu
 from hysim.export import to_page as to_page
 from hysim.comparison import compare as compare
 from hysim.comparison import Comparison as Comparison
+from hysim.posterior import sample_posterior as sample_posterior
+from hysim.posterior import Posterior as Posterior
+from hysim.posterior import Prediction as Prediction
+from hysim.posterior import compare_evidence as compare_evidence
+from hysim.posterior import Evidence as Evidence
+from hysim.posterior import EvidenceRow as EvidenceRow
 from hysim.sweeps import sweep as sweep
 from hysim.sweeps import Sweep as Sweep
 from hysim.sweeps import Sample as Sample

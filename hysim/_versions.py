@@ -8,7 +8,10 @@ from typing import Any
 from hysim._release import __version__
 
 DEPENDENCIES = ("numpy", "scipy", "numba", "matplotlib", "pysindy", "control", "threadpoolctl")
-EXTRAS = ("h5py", "scikit-image", "imageio", "pandas", "xarray", "dask", "distributed", "ziglang")
+EXTRAS = (
+    *("h5py", "scikit-image", "imageio", "pandas", "xarray", "dask", "distributed", "ziglang"),
+    *("emcee", "dynesty", "arviz"),
+)
 
 
 def show_versions() -> None:

@@ -33,7 +33,7 @@ RANKS = (
     ("simulation", "benchmarks"),
     ("identification",),
     ("discovery", "control"),
-    ("comparison", "sweeps", "rig", "export"),
+    ("comparison", "posterior", "sweeps", "rig", "export"),
     ("plot",),
     ("paper",),
     ("cli",),

@@ -19,6 +19,7 @@ from hysim.plot._files import FORMATS, save_svg, to_bytes, to_svg
 from hysim.plot._loops import animate, cycles, minor_loops, width
 from hysim.plot._maps import forc, residual_map
 from hysim.plot._outcomes import describing_function, displacement, selection, trade_off
+from hysim.plot._posterior import corner, evidence, prediction
 from hysim.plot._records import element_loops, history, loop, response, signals, traces
 from hysim.plot._style import DIVERGING, SEQUENTIAL, figure, house_style, panels
 from hysim.plot._sweeps import heat_map, parallel_coordinates, quantile_bands, sensitivities
@@ -31,10 +32,12 @@ __all__ = [
     "Figure",
     "animate",
     "comparison",
+    "corner",
     "cycles",
     "describing_function",
     "displacement",
     "element_loops",
+    "evidence",
     "figure",
     "forc",
     "heat_map",
@@ -47,6 +50,7 @@ __all__ = [
     "panels",
     "parallel_coordinates",
     "parameter",
+    "prediction",
     "quantile_bands",
     "residual_map",
     "residuals",

@@ -1,0 +1,69 @@
+"""The problem that `identify` has solved, put together again from its result."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.identification._assumptions import quiet_where_better
+from hysim.identification._problem import Problem, problem
+from hysim.identification._result import Identification
+from hysim.models.protocols import Identifiable
+from hysim.models.search_space import Freedom
+from hysim.records import Record
+
+__all__ = ["Problem", "again"]
+
+_SAME = 1e-3  # of the residual's rms: largest difference between the residuals of a fit and of its problem
+_ROUNDING = 1e-9  # of the output's size
+
+Bounds = Mapping[str, tuple[float, float]]
+Initial = str | Sequence[str] | None
+
+
+def again(fit: Identification, records: Sequence[Record], bounds: Bounds, initial: Initial) -> Problem:
+    """The problem that `fit` solves, beginning at its model, with `bounds` of parameters that are not linear.
+
+    States at the first sample are those of `initial`; by default they are free if they were, else held at their values.
+    A ValueError is raised if the model has no search box, or does not have the residual of the fit on these records.
+    """
+    model = fit.model
+    if not isinstance(model, Identifiable):
+        raise ValueError(f"a {type(model).__name__} has no search box of its own: its parameters cannot be sampled")
+    freedom, initial = _freedom(fit, model, records, initial)
+    paths, _ = quiet_where_better(model, records, freedom, initial)
+    plain = problem(model, paths, freedom, initial)
+    models = fit.models if len(fit.models) == len(records) else (model,)
+    _check_same(fit, plain, [problem(each, paths, freedom, initial).own.starts[0] for each in models])
+    inner = {name: pair for name, pair in bounds.items() if name not in plain.own.columns}
+    return problem(model, paths, replace(freedom, bounds=inner), initial) if inner else plain
+
+
+def _freedom(
+    fit: Identification, model: Identifiable, records: Sequence[Record], initial: Initial
+) -> tuple[Freedom, Initial]:
+    own = problem(model, records, Freedom(), None).own
+    names = {*own.names, *own.held}
+    free = tuple(dict.fromkeys(name if name in names else name.rpartition("[")[0] for name in fit.free_names))
+    left = () if initial is None else own.state
+    fixed = {name: value for name, value in fit.estimates.items() if name in names and name not in (*free, *left)}
+    if initial is None and set(own.state) & set(free):
+        initial = "free"
+    return Freedom(fixed, tuple(name for name in free if name not in left), {}), initial
+
+
+def _check_same(fit: Identification, problem: Problem, starts: Sequence[FloatArray]) -> None:
+    """A ValueError unless the problem has the residual of the fit; `starts` are the coordinates of each record."""
+    x = np.zeros(problem.n_x)
+    for part, own in zip(problem.parts, starts, strict=True):
+        present = part.coordinates >= 0
+        x[part.coordinates[present]] = own[present]
+    linear = [fit.estimates[name] for name in problem.space.linear]
+    residual = problem.y - problem.model(np.concatenate([x, linear])[np.newaxis])[0]
+    size = _SAME * fit.rmse + _ROUNDING * problem.scale
+    if residual.shape != fit.residual.shape or not np.abs(residual - fit.residual).max() <= size:
+        raise ValueError(
+            "the fit has other residuals on these records: pass the records that it was identified from, and initial= "
+            "as it was passed to identify"
+        )

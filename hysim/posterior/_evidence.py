@@ -1,0 +1,307 @@
+"""The verb `compare_evidence`, and its result."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from hysim._blas import one_blas_thread
+from hysim._frozen import check_choice, check_count, frozen
+from hysim._parallel import Progress
+from hysim._printing import aligned, listed, printed, summary_text
+from hysim.identification import Identification, identify
+from hysim.posterior._bridge import bridge_evidence
+from hysim.posterior._nested import LogEvidence, nested_evidence
+from hysim.posterior._priors import given
+from hysim.posterior._sample import posed, walkers_of
+from hysim.posterior._sampler import sampled
+from hysim.records import Record, several
+
+FACTORS = (0.5, 1.0, 2.0)
+"""Sizes of the boxes of the priors, in units of the boxes of the search."""
+
+DECIDED = 3.0
+"""Odds from which on a model is preferred: "positive" evidence (Kass and Raftery, J. Am. Stat. Assoc. 90, 1995)."""
+
+_ERRORS = 2.0  # standard errors of a difference by which the odds must be above that
+_DRAWS = 2_000  # effective ones, for bridge sampling
+_STEPS = 20_000
+
+
+@frozen
+class EvidenceRow:
+    """Evidence of one model.
+
+    Parameters
+    ----------
+    name : str
+    n_parameters : int
+        Free parameters, without sigma.
+    fit_percent : float
+        Of the identified model [%].
+    log_evidence, error : tuple of float
+        ln Z with the boxes of the priors halved, as they are, and doubled, and their standard errors.
+    n_evaluations : int
+        Number of parameter sets that were simulated.
+    """
+
+    name: str
+    n_parameters: int
+    fit_percent: float
+    log_evidence: tuple[float, ...]
+    error: tuple[float, ...]
+    n_evaluations: int
+
+
+@printed
+@frozen
+class Evidence:
+    """Evidences of models on the same records, and which model the data prefer.
+
+    Parameters
+    ----------
+    rows : tuple of EvidenceRow
+        One for each model, the largest evidence with the boxes of the search first.
+    factors : tuple of float
+        Sizes of the boxes in which the evidences were computed, in units of the boxes of the search.
+    noise : {"gaussian", "quantised", "robust"}
+    method : {"nested", "bridge"}
+    seed : int
+    """
+
+    rows: tuple[EvidenceRow, ...]
+    factors: tuple[float, ...] = FACTORS
+    noise: str
+    method: str
+    seed: int = 0
+
+    def __getitem__(self, name: str) -> EvidenceRow:
+        for row in self.rows:
+            if row.name == name:
+                return row
+        raise KeyError(f"no model is called {name!r}; the models are {', '.join(row.name for row in self.rows)}")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the models, the most probable first."""
+        return tuple(row.name for row in self.rows)
+
+    def probabilities(self, factor: float = 1.0) -> dict[str, float]:
+        """Posterior probability of each model with boxes of this size, if all are equally probable before."""
+        place = self.factors.index(factor)
+        logs = np.array([row.log_evidence[place] for row in self.rows])
+        share = np.exp(logs - logs.max())
+        return dict(zip(self.names, (share / share.sum()).tolist(), strict=True))
+
+    def odds(self, name: str, other: str) -> float:
+        """Least odds of a model against another one, over the sizes of the boxes."""
+        return math.exp(min(np.subtract(self[name].log_evidence, self[other].log_evidence).tolist()))
+
+    @property
+    def best(self) -> tuple[str, ...]:
+        """Most probable model for each size of the boxes."""
+        columns = np.array([row.log_evidence for row in self.rows])
+        return tuple(self.names[k] for k in columns.argmax(axis=0).tolist())
+
+    @property
+    def undecided(self) -> tuple[str, ...]:
+        """Models that are the most probable one, or not surely less probable than 1 : 3, for some size of the boxes."""
+        values = np.array([row.log_evidence for row in self.rows])
+        errors = np.array([row.error for row in self.rows])
+        top = values.argmax(axis=0)
+        behind = values.max(axis=0) - values
+        reach = math.log(DECIDED) + _ERRORS * np.hypot(errors, errors[top, np.arange(top.size)])
+        near = (behind <= np.where(behind == 0.0, 0.0, reach)).any(axis=1)
+        return tuple(name for name, is_near in zip(self.names, near.tolist(), strict=True) if is_near)
+
+    @property
+    def sentence(self) -> str:
+        """Which model the data prefer, in words; a preference holds with the boxes halved and doubled too."""
+        near = self.undecided
+        others = [name for name in self.names if name not in near]
+        if len(near) == 1:
+            if not others:
+                return f"{near[0]} is the only model"
+            odds = min(self.odds(near[0], other) for other in others)
+            return f"the data prefer {near[0]}, odds {_rounded(odds)} : 1, with every box"
+        reason = "it depends on the boxes" if len(set(self.best)) > 1 else "their odds are too near to 1 : 1"
+        return f"the data do not decide between {listed(near)}: {reason}{self._behind(others)}"
+
+    def _behind(self, others: Sequence[str]) -> str:
+        """The odds of the models that are not in question."""
+        if not others:
+            return ""
+        values = np.array([row.log_evidence for row in self.rows])
+        least = float(np.min(values.max(axis=0) - [self[name].log_evidence for name in others]))
+        return f"; each other model has odds of 1 : {_rounded(math.exp(least))} or less, with every box"
+
+    def summary(self) -> str:
+        """A table of all models, and the sentence."""
+        probable = self.probabilities()
+        boxes = [f"ln Z, boxes x {factor:g}" for factor in self.factors]
+        head = ["model", "parameters", "fit [%]", *boxes, "probability"]
+        table = [
+            [
+                row.name,
+                str(row.n_parameters),
+                f"{row.fit_percent:.2f}",
+                *(f"{value:.2f} +- {error:.2f}" for value, error in zip(row.log_evidence, row.error, strict=True)),
+                f"{probable[row.name]:.2g}",
+            ]
+            for row in self.rows
+        ]
+        return "\n".join([self._head(), *aligned([head, *table]), self.sentence])
+
+    def __str__(self) -> str:
+        probable = self.probabilities()
+        place = self.factors.index(1.0)
+        rows = {
+            row.name: f"ln Z {row.log_evidence[place]:.2f} +- {row.error[place]:.2f}, "
+            f"probability {probable[row.name]:.2g}"
+            for row in self.rows[:6]
+        }
+        return summary_text([self._head(), f"  {self.sentence}"], rows)
+
+    def _head(self) -> str:
+        return f"Evidence of {len(self.rows)} models, {self.noise} noise, by {self.method} sampling"
+
+
+def compare_evidence(
+    models: Mapping[str, Any],
+    record_or_records: Record | Sequence[Record],
+    *,
+    noise: str = "gaussian",
+    priors: Mapping[str, Mapping[str, Any]] | None = None,
+    initial: str | Sequence[str] | None = None,
+    method: str = "nested",
+    live_points: int = 500,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Evidence:
+    """Compare models by their evidence, the probability of the records under each model and its priors.
+
+    The evidence Z is the mean of the likelihood over the prior: a model with parameters that the records do not need
+    spreads its prior over what was not measured, and loses. It depends on the boxes of the priors. So it is computed
+    with all boxes halved about their centres, as they are, and doubled, and a model is preferred only if it is in all
+    three. The prior of sigma is common to all models, and stays.
+
+    Parameters
+    ----------
+    models : mapping
+        Name to a model class, a model or a structure, which is identified first, or to a result of `hysim.identify` on
+        the same records.
+    record_or_records : Record or sequence of Record
+    noise : {"gaussian", "quantised", "robust"}
+        As in `hysim.identify`.
+    priors : mapping, optional
+        Name of a model to its priors, as in `hysim.sample_posterior`. A distribution is not halved nor doubled.
+    initial : str or sequence of str, optional
+        As in `hysim.identify`, for all models.
+    method : {"nested", "bridge"}
+        Nested sampling by dynesty, or bridge sampling from draws of emcee.
+    live_points : int
+        Of nested sampling: the error of ln Z falls with the root of their number.
+    seed : int
+        The same seed gives the same evidences to the last bit.
+    progress : callable, optional
+        Called as ``progress(done, total)`` after each evidence.
+
+    Returns
+    -------
+    Evidence
+
+    Raises
+    ------
+    ValueError
+        If there is no model, an option is unknown, or a prior does not fit; see `hysim.sample_posterior`.
+    ImportError
+        If dynesty or emcee is not installed: ``pip install 'hysim[bayes]'``.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> rec = hs.datasets.table1()
+    >>> at_zero = hs.identify(hs.Line, rec, fixed={"offset": 0.0})
+    >>> result = hs.compare_evidence({"through zero": at_zero}, rec, live_points=6)
+    >>> result.sentence
+    'through zero is the only model'
+    """
+    records = several(record_or_records, "compare_evidence")
+    if not models:
+        raise ValueError("compare_evidence takes at least one model: {name: model}")
+    fits = {name: _fitted(model, records, noise, initial) for name, model in models.items()}
+    options: dict[str, Any] = {
+        "noise": noise,
+        "initial": initial,
+        "method": method,
+        "live_points": live_points,
+        "seed": seed,
+    }
+    rows, done = [], 0
+    for name, fit in fits.items():
+        found = []
+        for factor in FACTORS:
+            own = (priors or {}).get(name)
+            found.append(log_evidence(fit, records, priors=own, factor=factor, **options))
+            done += 1
+            if progress is not None:
+                progress(done, len(FACTORS) * len(fits))
+        rows.append(row_of(name, fit, found))
+    return Evidence(rows=ordered(rows), noise=noise, method=method, seed=seed)
+
+
+def log_evidence(
+    fit: Identification,
+    record_or_records: Record | Sequence[Record],
+    *,
+    noise: str | None = None,
+    priors: Mapping[str, Any] | None = None,
+    initial: str | Sequence[str] | None = None,
+    factor: float = 1.0,
+    method: str = "nested",
+    live_points: int = 500,
+    seed: int = 0,
+) -> LogEvidence:
+    """ln Z of one fit, its standard error, and the number of simulated sets, with boxes enlarged by `factor`.
+
+    The arguments are those of `compare_evidence`, and `priors` are those of this model.
+    """
+    records = several(record_or_records, "log_evidence")
+    check_choice("method", method, ("nested", "bridge"))
+    check_count("live_points", live_points)
+    with one_blas_thread():
+        posterior = posed(fit, records, noise, given(priors or {}), initial, factor)
+        if method == "nested":
+            return nested_evidence(posterior, live_points, seed)
+        walkers = walkers_of(posterior.n_dim, None)
+        chains = sampled(posterior, walkers=walkers, samples=_DRAWS, seed=seed, most_steps=_STEPS)
+        return bridge_evidence(posterior, chains, seed)
+
+
+def row_of(name: str, fit: Identification, evidences: Sequence[LogEvidence]) -> EvidenceRow:
+    """The row of a model."""
+    return EvidenceRow(
+        name=name,
+        n_parameters=fit.n_parameters,
+        fit_percent=fit.fit_percent,
+        log_evidence=tuple(each.value for each in evidences),
+        error=tuple(each.error for each in evidences),
+        n_evaluations=sum(each.evaluations for each in evidences),
+    )
+
+
+def ordered(rows: Sequence[EvidenceRow]) -> tuple[EvidenceRow, ...]:
+    """The rows, the largest evidence with the boxes of the search first."""
+    place = FACTORS.index(1.0)
+    return tuple(sorted(rows, key=lambda row: -row.log_evidence[place]))
+
+
+def _fitted(model: Any, records: Sequence[Record], noise: str, initial: str | Sequence[str] | None) -> Identification:
+    if isinstance(model, Identification):
+        return model
+    return identify(model, records if len(records) > 1 else records[0], noise=noise, initial=initial)
+
+
+def _rounded(odds: float) -> str:
+    return f"{odds:.2g}" if not 10.0 <= odds < 1e4 else f"{odds:.0f}"

@@ -1,0 +1,257 @@
+"""The posterior density of all parameters, for many sets at once.
+
+A point is q = (x', e, s'): the coordinates of the search x and ln sigma, each as the quantile of the standard normal
+distribution at its place in the box, x = lower + (upper - lower) Phi(x'), so that a flat prior becomes a normal one and
+a box has no sides; and one number for each linear parameter. The output y(x, b) = C(x) b + e0(x) is linear in b. With
+the units of the prior (`hysim.posterior._priors`), its centre c and standard deviations d, and s the spread of the
+noise, the regression
+
+    [C / s; 1 / d] w = [(y - e0) / s; c / d],    [C / s; 1 / d] = Q R,    w_0 = R^-1 (Q^T rhs)
+
+has the best linear parameters w_0 at this x, and w = w_0 + R^-1 e. This is a change of coordinates, |dw/de| =
+1 / |det R|, and no approximation: for normal noise and wide priors e is a standard normal vector whatever x is, so that
+chains need not follow the narrow ridges between linear and other parameters. All parameters are sampled; none is
+integrated out.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+from hysim._frozen import FloatArray
+from hysim.errors import SimulationError
+from hysim.identification.likelihood.densities import Density
+from hysim.identification.likelihood.refit import Problem
+from hysim.posterior._priors import SIGMA, Given, Linear, Searched, linear, of_sigma, searched
+
+_SAMPLES_AT_ONCE = 50_000
+_LOG_2PI = float(np.log(2.0 * np.pi))
+_EDGE = 1e-12  # share of a box next to its sides
+_LOWEST = -1e300
+_LARGEST = 1e100  # beyond it squares of squares overflow: such a set has diverged
+
+
+class Columns(NamedTuple):
+    """Of some sets: columns in the units of the prior, the target without them, these units, and which diverged."""
+
+    columns: FloatArray  # (n_sets, n_samples, n_linear)
+    target: FloatArray  # (n_sets, n_samples)
+    units: tuple[FloatArray, FloatArray, FloatArray]
+    is_lost: np.ndarray[Any, np.dtype[np.bool_]]
+
+
+@dataclass
+class Target:
+    """Posterior of a problem with a noise and priors; `evaluations` counts the sets that were simulated."""
+
+    problem: Problem
+    noise: Density
+    x_prior: Searched
+    b_prior: Linear
+    sigma_ends: tuple[float, float]  # of ln sigma
+    sigma_given: Given | None
+    evaluations: int = field(default=0)
+
+    @property
+    def n_x(self) -> int:
+        """Number of coordinates of the search."""
+        return self.problem.n_x
+
+    @property
+    def n_linear(self) -> int:
+        """Number of linear parameters."""
+        return len(self.problem.space.linear)
+
+    @property
+    def n_dim(self) -> int:
+        """Length of a point."""
+        return self.n_x + self.n_linear + 1
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The user's parameters, and sigma."""
+        return (*self.problem.space.names, SIGMA)
+
+    def priors_in_words(self) -> dict[str, str]:
+        """Name of each coordinate and linear parameter, and of sigma, to its prior."""
+        space, ends = self.problem.space, zip(self.x_prior.lower.tolist(), self.x_prior.upper.tolist(), strict=True)
+        words = {
+            name: f"flat from {low:.4g} to {high:.4g} in the coordinate of the search"
+            for name, (low, high) in zip(space.coordinates, ends, strict=True)
+        }
+        words |= {space.coordinates[k]: str(own) for k, (own, _) in self.x_prior.own.items()}
+        flat = f"flat, within {self.b_prior.reach:g} spans of the output of what it adds to it"
+        words |= {name: str(self.b_prior.given.get(k, flat)) for k, name in enumerate(space.linear)}
+        low, high = np.exp(self.sigma_ends).tolist()
+        return words | {SIGMA: str(self.sigma_given or f"flat in its logarithm from {low:.3g} to {high:.3g}")}
+
+    def log_posterior(self, q: FloatArray) -> FloatArray:
+        """Logarithm of likelihood times prior in the coordinates q (n_sets, n_dim), -inf outside of the priors."""
+        values = np.full(len(q), -np.inf)
+        x, e, log_sigma = self._parted(q)
+        prior = self._log_prior(q[:, : self.n_x], q[:, -1], x, log_sigma)
+        for places in self._chunks(np.flatnonzero(np.isfinite(prior))):
+            values[places] = prior[places] + self._given_x(x[places], e[places], log_sigma[places])
+        return values
+
+    def parameters(self, q: FloatArray) -> FloatArray:
+        """The user's parameters and sigma at points, (n_sets, n_names + 1)."""
+        theta = self.theta(q)
+        return np.column_stack([self.problem.named(theta), np.exp(self._parted(q)[2])])
+
+    def without_linear(self, q: FloatArray) -> FloatArray:
+        """v = (x', s') of points, (n_sets, n_x + 1)."""
+        return np.concatenate([q[:, : self.n_x], q[:, -1:]], axis=1)
+
+    def prior_draws(self, n: int, rng: np.random.Generator) -> FloatArray:
+        """Draws of v = (x', s') from the prior, (n, n_x + 1)."""
+        share = rng.random((n, self.n_x + 1))
+        x, log_sigma = self.x_prior.quantile(share[:, :-1]), self._sigma_quantile(share[:, -1])
+        return self._normal(x, log_sigma)
+
+    def marginal(self, v: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """About ln of the likelihood with the linear parameters integrated out, and ln of the prior of v, (n_sets,)."""
+        x, log_sigma = self._x_of(v[:, :-1]), self._log_sigma_of(v[:, -1])
+        prior = self._log_prior(v[:, :-1], v[:, -1], x, log_sigma)
+        values = np.full(len(v), _LOWEST)
+        for places in self._chunks(np.flatnonzero(np.isfinite(prior))):
+            parts, sigma = self._columns(x[places]), np.exp(log_sigma[places])
+            w, log_volume = self._from_normal(parts, np.zeros((len(places), self.n_linear)), sigma)
+            w = self.b_prior.inside(w, parts.units)
+            density = self.b_prior.log_density(w, parts.units) + log_volume + 0.5 * self.n_linear * _LOG_2PI
+            values[places] = np.maximum(self._log_likelihood(parts, w, sigma) + density, _LOWEST)
+        return values, prior
+
+    def theta(self, q: FloatArray) -> FloatArray:
+        """Coordinates and linear parameters of points, (n_sets, n_theta)."""
+        x, e, log_sigma = self._parted(q)
+        b = np.empty_like(e)
+        for places in self._chunks(np.arange(len(q))):
+            parts = self._columns(x[places])
+            w, _ = self._from_normal(parts, e[places], np.exp(log_sigma[places]))
+            b[places] = w * parts.units[0]
+        return np.concatenate([x, b], axis=1)
+
+    def log_likelihood_in_cube(self, cube: FloatArray) -> FloatArray:
+        """Logarithm of the likelihood at points of the unit cube (n_sets, n_dim), on which the prior is uniform."""
+        values = np.empty(len(cube))
+        for places in self._chunks(np.arange(len(cube))):
+            share = cube[places]
+            parts = self._columns(self.x_prior.quantile(share[:, : self.n_x]))
+            w = self.b_prior.quantile(share[:, self.n_x : -1], parts.units)
+            values[places] = self._log_likelihood(parts, w, np.exp(self._sigma_quantile(share[:, -1])))
+        return values
+
+    def _parted(self, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        return self._x_of(q[:, : self.n_x]), q[:, self.n_x : -1], self._log_sigma_of(q[:, -1])
+
+    def _x_of(self, normal: FloatArray) -> FloatArray:
+        lower, upper = self.x_prior.lower, self.x_prior.upper
+        return np.asarray(np.clip(lower + (upper - lower) * ndtr(normal), lower, upper))
+
+    def _log_sigma_of(self, normal: FloatArray) -> FloatArray:
+        low, high = self.sigma_ends
+        return np.asarray(np.clip(low + (high - low) * ndtr(normal), low, high))
+
+    def _normal(self, x: FloatArray, log_sigma: FloatArray) -> FloatArray:
+        lower, upper, (low, high) = self.x_prior.lower, self.x_prior.upper, self.sigma_ends
+        share = np.column_stack([(x - lower) / (upper - lower), (log_sigma - low) / (high - low)])
+        return np.asarray(ndtri(np.clip(share, _EDGE, 1.0 - _EDGE)))
+
+    def _log_prior(self, x_normal: FloatArray, normal: FloatArray, x: FloatArray, log_sigma: FloatArray) -> FloatArray:
+        """ln of the prior of v at these coordinates."""
+        low, high = self.sigma_ends
+        every = np.column_stack([x_normal, normal])
+        slopes = -0.5 * every**2 - 0.5 * _LOG_2PI  # of Phi
+        widths = np.log(self.x_prior.upper - self.x_prior.lower).sum() + np.log(high - low)
+        density = self.x_prior.log_density(x) + self._log_sigma_density(log_sigma)
+        return np.where(np.isfinite(every).all(axis=1), density + slopes.sum(axis=1) + widths, -np.inf)
+
+    def _chunks(self, places: Any) -> list[Any]:
+        size = max(1, _SAMPLES_AT_ONCE // self.problem.y.size)
+        return [places[k : k + size] for k in range(0, len(places), size)]
+
+    def _given_x(self, x: FloatArray, e: FloatArray, log_sigma: FloatArray) -> FloatArray:
+        parts, sigma = self._columns(x), np.exp(log_sigma)
+        w, log_volume = self._from_normal(parts, e, sigma)
+        return self._log_likelihood(parts, w, sigma) + self.b_prior.log_density(w, parts.units) + log_volume
+
+    def _log_likelihood(self, parts: Columns, w: FloatArray, sigma: FloatArray) -> FloatArray:
+        residual = parts.target - (parts.columns @ w[..., np.newaxis])[..., 0]
+        return np.where(parts.is_lost, -np.inf, self.noise.log_likelihood(residual, sigma))
+
+    def _columns(self, x: FloatArray) -> Columns:
+        self.evaluations += len(x)
+        columns, fixed = self._split(x)
+        target = self.problem.y - fixed
+        with np.errstate(invalid="ignore"):
+            is_lost = ~((np.abs(columns) < _LARGEST).all(axis=(1, 2)) & (np.abs(target) < _LARGEST).all(axis=1))
+        columns[is_lost], target[is_lost] = 0.0, 0.0
+        units = self.b_prior.units(columns)
+        return Columns(columns * units[0][:, np.newaxis], target, units, np.asarray(is_lost))
+
+    def _split(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Columns and fixed part; sets that the family refuses are not finite."""
+        try:
+            return self.problem.split(x)
+        except (ValueError, ArithmeticError, SimulationError):
+            n = len(x)
+            if n == 1:
+                samples = self.problem.y.size
+                return np.full((1, samples, self.n_linear), np.inf), np.full((1, samples), np.inf)
+            halves = [self._split(x[: n // 2]), self._split(x[n // 2 :])]
+            return np.concatenate([a for a, _ in halves]), np.concatenate([b for _, b in halves])
+
+    def _regression(self, parts: Columns, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The triangle R (n_sets, n_linear, n_linear) and Q^T times the right side (n_sets, n_linear)."""
+        _, centre, spread = parts.units
+        weight = 1.0 / self.noise.spread(sigma)
+        n_sets, n_samples, n = parts.columns.shape
+        both = np.zeros((n_sets, n_samples + n, n + 1))
+        both[:, :n_samples, :n] = parts.columns * weight[:, np.newaxis, np.newaxis]
+        both[:, :n_samples, n] = parts.target * weight[:, np.newaxis]
+        both[:, n_samples + np.arange(n), np.arange(n)] = 1.0 / spread
+        both[:, n_samples:, n] = centre / spread
+        rows = np.asarray(np.linalg.qr(both, mode="r"))
+        return rows[:, :n, :n], rows[:, :n, n]
+
+    def _from_normal(self, parts: Columns, e: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Linear parameters w in units of the prior, and ln |dw/de|."""
+        if not self.n_linear:
+            return e, np.zeros(len(e))
+        triangle, best = self._regression(parts, sigma)
+        w = np.asarray(np.linalg.solve(triangle, (best + e)[..., np.newaxis]), dtype=np.float64)[..., 0]
+        log_volume = -np.log(np.abs(np.diagonal(triangle, axis1=1, axis2=2))).sum(axis=1)
+        return w, log_volume
+
+    def _log_sigma_density(self, log_sigma: FloatArray) -> FloatArray:
+        low, high = self.sigma_ends
+        inside = (log_sigma >= low) & (log_sigma <= high)
+        if self.sigma_given is None:
+            return np.where(inside, -np.log(high - low), -np.inf)
+        bounded = np.clip(log_sigma, low, high)
+        return np.where(inside, self.sigma_given.log_density(np.exp(bounded)) + bounded, -np.inf)
+
+    def _sigma_quantile(self, share: FloatArray) -> FloatArray:
+        low, high = self.sigma_ends
+        if self.sigma_given is None:
+            return low + share * (high - low)
+        return np.clip(np.log(np.maximum(self.sigma_given.quantile(share), np.exp(low))), low, high)
+
+
+def target(
+    problem: Problem, noise: Density, priors: Mapping[str, Given], quantum: float | None, factor: float = 1.0
+) -> Target:
+    """The posterior of a problem; `factor` enlarges every box but that of sigma."""
+    low, high, own = of_sigma(problem, priors, quantum if noise.name == "quantised" else None)
+    return Target(
+        problem=problem.close(),
+        noise=noise,
+        x_prior=searched(problem, priors, factor),
+        b_prior=linear(problem, priors, factor),
+        sigma_ends=(low, high),
+        sigma_given=own,
+    )
