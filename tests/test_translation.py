@@ -12,7 +12,7 @@ from square_dahl import SquareDahl
 import hysim as hs
 from hysim.export._c import HELPERS
 from hysim.export._program import entries
-from hysim.export._routine import UntranslatableError
+from hysim.models.tracing.routine import UntranslatableError
 from hysim.export._translate import Translation
 from hysim.export._types import Scalar, Vector
 from hysim.kernels.stepping import complete

@@ -109,6 +109,12 @@ def linear_side(w: float, a: float, d: float, c: float, length: float) -> tuple[
         low = min(length, linear_turn(slope, d, c))
     if not linear_ramp(w, a, d, c, high) < 0.0:
         return after, length
+    return 0.0, ramp_zero(w, a, d, c, low, high)
+
+
+@kernel
+def ramp_zero(w: float, a: float, d: float, c: float, low: float, high: float) -> float:
+    """Length between `low` and `high` at which w' = a + d L - c w has fallen to w = 0."""
     x = high
     for _ in range(_MAX_NEWTON):
         value = linear_ramp(w, a, d, c, x)
@@ -117,7 +123,7 @@ def linear_side(w: float, a: float, d: float, c: float, length: float) -> tuple[
         if value == 0.0 or abs(trial - x) <= ROUNDING * x:
             break
         x = trial
-    return 0.0, x
+    return x
 
 
 @kernel
@@ -137,7 +143,7 @@ def linear_ramp(w: float, a: float, d: float, c: float, length: float) -> float:
 def linear_turn(slope: float, d: float, c: float) -> float:
     """Length at which w' = a + d L - c w is zero, from w' = `slope` at L = 0 on."""
     x = -c * slope / d
-    return -slope / d if abs(x) < ROUNDING else math.log1p(x) / c
+    return -slope / d * (1.0 - 0.5 * x) if abs(x) < ROUNDING else math.log1p(x) / c
 
 
 # ---------------------------------------------------------------------------------- other n

@@ -1,0 +1,102 @@
+"""One more step of each iteration to a root: what the forward mode differentiates in place of the iteration.
+
+Each function takes the results of the iteration, and then its arguments. The results come back unchanged to rounding,
+as functions of the arguments whose derivatives are those of the root.
+"""
+
+import math
+
+from hysim._frozen import FloatArray
+from hysim.kernels.charts import power_flow
+from hysim.kernels.duhem import place
+from hysim.kernels.magnetics import chan
+from hysim.kernels.magnetics.anhysteretic import curve
+from hysim.kernels.magnetics.jiles_atherton import ANISOTROPY, PINNING, averaged
+from hysim.kernels.zhu_wang import linear_ramp
+
+
+def degenerate(
+    change: float, left: float, end: float, w: float, a: float, c: float, n: float, length: float
+) -> tuple[float, float, float]:
+    """A flow on w' = a - c w^n where one of the terms has vanished, to first order in that term."""
+    if a == 0.0 or (c != 0.0 and abs(a) < abs(c)):
+        after = power_flow(w, c, n, length)
+        if w == 0.0:
+            return a * length, 0.0, a * length
+        slope = (after ** (1.0 - n) - w ** (1.0 - 2.0 * n) * after**n) / (c * (2.0 * n - 1.0)) if c != 0.0 else length
+        return after - w + a * slope, 0.0, after + a * slope
+    if a < 0.0 and w + a * length < 0.0:
+        return -w, length + w / a + c * w ** (n + 1.0) / (a * a * (n + 1.0)), 0.0
+    straight = w + a * length
+    bent = c * (straight ** (n + 1.0) - w ** (n + 1.0)) / (a * (n + 1.0))
+    return a * length - bent, 0.0, straight - bent
+
+
+def series_zero(x: float, powers: FloatArray, last: int, end: float) -> float:
+    """The place of the zero of a series."""
+    value, slope = place(powers, last, x)
+    return x - value / slope if slope != 0.0 else x
+
+
+def ramp_zero(x: float, w: float, a: float, d: float, c: float, low: float, high: float) -> float:
+    """The length to w = 0 on a linear decay under a ramp."""
+    value = linear_ramp(w, a, d, c, x)
+    slope = a + d * x - c * value
+    return x - value / slope if slope != 0.0 else x
+
+
+def arrival(
+    t: float, u: float, rate: float, x: float, time: float, side: float, begin: float, end: float
+) -> float:
+    """The moment at which a side of a gap is reached."""
+    carried = x * math.exp(-t / time)
+    slope = rate + carried / time
+    return t - (u + rate * t - carried - side) / slope if slope != 0.0 else t
+
+
+def field_inside(h: float, parameters: FloatArray, z: float, u: float) -> float:
+    """The field in a core behind an air gap, between the branches."""
+    gap, coercivity, knee = parameters[3], parameters[4], parameters[5]
+    stiffness, drop = 1.0 + gap * parameters[2], gap * parameters[1]
+    below, above = abs(h - coercivity) + knee, abs(h + coercivity) + knee
+    slope = stiffness + drop * knee * ((0.5 - 0.5 * z) / (below * below) + (0.5 + 0.5 * z) / (above * above))
+    return h - (stiffness * h + drop * chan.inside(h, z, coercivity, knee) - u) / slope
+
+
+def field_of(x: float, m: float, p: float) -> float:
+    """The x of an anhysteretic curve at m."""
+    if not abs(x) < math.inf:
+        return x
+    value, slope = curve(x, p)
+    return x + (m - value) / slope if slope > 0.0 else x
+
+
+def reversible(x: float, low: float, high: float, target: float, of_x: float, of_m: float, p: float) -> float:
+    """The effective field at which the magnetisation does not move irreversibly."""
+    m, slope = curve(x, p)
+    rise = of_x + of_m * slope
+    return x + (target - of_x * x - of_m * m) / rise if rise > 0.0 else x
+
+
+def solve(
+    x: float,
+    after: float,
+    m: float,
+    begin: float,
+    z: float,
+    before: float,
+    slope: float,
+    end: float,
+    target: float,
+    of_x: float,
+    of_m: float,
+    of_z: float,
+    parameters: FloatArray,
+) -> tuple[float, float, float]:
+    """The effective field on a branch of Jiles and Atherton, with the irreversible and the anhysteretic part there."""
+    moved = averaged(begin, z, x - begin, parameters)
+    here, steep = curve(x, parameters[ANISOTROPY])
+    climb = (here - moved) / parameters[PINNING]
+    rise = of_x + of_m * steep + of_z * climb
+    left = (target - of_x * x - of_m * here - of_z * moved) / rise if rise > 0.0 else 0.0
+    return x + left, moved + left * climb, here + left * steep
