@@ -72,6 +72,8 @@ def advance(u: float, z: float, du: float, parameters: FloatArray, scratch: Floa
     A, beta, gamma, n, delta = parameters[0], parameters[1], parameters[2], parameters[3], parameters[4]
     a, w, length = A + direction * delta * u, direction * z, abs(du)
     begin, stands = 0.0, False
+    if w == 0.0 and a != 0.0:
+        begin, w = -w / a + 0.0, 0.0  # nothing moves, but in derivatives: next to zero, z left it elsewhere
     # the forcing a + delta L changes its sign once, so there are no more than two zeros of z
     for _ in range(_MAX_SIDES):
         left, forcing = length - begin, a + delta * begin
@@ -340,6 +342,12 @@ def free_landing(w: float, a: float, d: float) -> float:
 
 
 @kernel
+def is_last(k: int, tail: float, room: float) -> bool:
+    """Whether a series may end with the term after this one: by what is left out, or since there is no room for more."""
+    return (tail <= room * (k + 2.0) and k > 0) or k == N_TERMS - 1
+
+
+@kernel
 def series(
     w: float,
     power: float,
@@ -364,7 +372,7 @@ def series(
         forcing = a if k == 0 else d * h if k == 1 else 0.0
         terms[rows + k + 1] = h * (forcing - c * terms[k]) / (k + 1.0)
         tail *= theta
-        if (tail <= room * (k + 2.0) and k > 0) or k == N_TERMS - 1:
+        if is_last(k, tail, room):
             total = 0.0
             for j in range(k + 1, -1, -1):
                 total += terms[rows + j]

@@ -6,13 +6,20 @@ as functions of the arguments whose derivatives are those of the root.
 
 import math
 
-from hysim._frozen import FloatArray
+import numpy as np
+
+from hysim._frozen import FloatArray, read_only
 from hysim.kernels.charts import power_flow
 from hysim.kernels.duhem import place
 from hysim.kernels.magnetics import chan
 from hysim.kernels.magnetics.anhysteretic import curve
 from hysim.kernels.magnetics.jiles_atherton import ANISOTROPY, PINNING, averaged
-from hysim.kernels.zhu_wang import linear_ramp
+from hysim.kernels.remainder import N_TERMS
+from hysim.kernels.zhu_wang import linear_ramp, moment
+
+_SHORT = 0.125  # of the forcing: its change on a short way
+_POINTS = 20  # of a rule on a panel as long as its distance from zero: what is left out is below a rounding
+_PLACES, _SHARES = (read_only(values) for values in np.polynomial.legendre.leggauss(_POINTS))
 
 
 def degenerate(
@@ -32,6 +39,23 @@ def degenerate(
     return a * length - bent, 0.0, straight - bent
 
 
+def ends(local: FloatArray, last: int, h: float, size: float, powers: FloatArray) -> bool:
+    """Whether a series may end before its last term; its rate may need the others."""
+    return False
+
+
+def worn_ends(
+    k: int, t: float, size: float, free: bool, pinches: bool, parameters: FloatArray, series: FloatArray
+) -> bool:
+    """As `ends`, for a law that wears off."""
+    return False
+
+
+def is_last(k: int, tail: float, room: float) -> bool:
+    """As `ends`, for a series that says so of each term."""
+    return k == N_TERMS - 1
+
+
 def series_zero(x: float, powers: FloatArray, last: int, end: float) -> float:
     """The place of the zero of a series."""
     value, slope = place(powers, last, x)
@@ -43,6 +67,33 @@ def ramp_zero(x: float, w: float, a: float, d: float, c: float, low: float, high
     value = linear_ramp(w, a, d, c, x)
     slope = a + d * x - c * value
     return x - value / slope if slope != 0.0 else x
+
+
+def take_off(
+    h: float, w: float, a: float, d: float, c: float, n: float, negligible: float, left: float
+) -> tuple[float, float]:
+    """A way from w = 0 and the value there, with the decay that is negligible beside it."""
+    way = left if h >= left else h
+    if w == 0.0:
+        return way, 0.0
+    return way, way * (a + 0.5 * d * way) - c * decay_from_zero(a, d, n, way)
+
+
+def decay_from_zero(a: float, d: float, n: float, length: float) -> float:
+    """Integral of (a L + d L^2 / 2)^n from 0 to `length`: as for a short way, and then by panels twice as long each."""
+    if a <= 0.0:
+        return (0.5 * d) ** n * length ** (2.0 * n + 1.0) / (2.0 * n + 1.0) if d > 0.0 else 0.0
+    end = length
+    while 0.5 * abs(d) * end > _SHORT * a:
+        end *= 0.5
+    total = moment(a, d, n, end)
+    while end < length:
+        half = 0.5 * end
+        for j in range(_POINTS):
+            at = end + half * (1.0 + _PLACES[j])
+            total += half * _SHARES[j] * (at * (a + 0.5 * d * at)) ** n
+        end *= 2.0
+    return total
 
 
 def arrival(

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 from hysim.kernels.tangents import rules
 from hysim.models.derivatives.body import Body
+from hysim.models.derivatives.iterations import in_place_of
 from hysim.models.derivatives.sources import argument_names, returned_kinds
 from hysim.models.tracing.routine import plain, routine
 
@@ -42,7 +43,7 @@ class Program:
 
         Raises UntranslatableError if the function, or one that it calls, is outside the subset.
         """
-        source = routine(plain(of))
+        source = routine(in_place_of(plain(of)))
         key = source.function, flags
         if key not in self._functions:
             names, has_rates = argument_names(source), True in flags

@@ -17,7 +17,7 @@ STEERING = frozenset(
         *(f"hysim.kernels.remainder.{name}" for name in ("fraction", "radius")),
         *(f"hysim.kernels.duhem.{name}" for name in ("serves", "untangled", "spread_within")),
         *(f"hysim.kernels.zhu_wang.{name}" for name in ("disc", "serves", "near", "free_length", "scale")),
-        *(f"hysim.kernels.baber_noori.{name}" for name in ("nearness", "short_way")),
+        *(f"hysim.kernels.baber_noori.{name}" for name in ("nearness",)),
         *(f"hysim.kernels.baber_noori_series.{name}" for name in ("serves", "clear", "spread_within")),
     }
 )
@@ -38,12 +38,27 @@ _AGAIN = {
     "hysim.kernels.boucwen.degenerate": "degenerate",
     "hysim.kernels.duhem.zero": "series_zero",
     "hysim.kernels.zhu_wang.ramp_zero": "ramp_zero",
+    "hysim.kernels.zhu_wang.take_off": "take_off",
     "hysim.kernels.magnetics.chan.field_inside": "field_inside",
     "hysim.kernels.magnetics.anhysteretic.field_of": "field_of",
     "hysim.kernels.magnetics.jiles_atherton.reversible": "reversible",
     "hysim.kernels.magnetics.jiles_atherton.solve": "solve",
     "hysim.kernels.friction.backlash.arrival": "arrival",
 }
+
+
+_WHOLE_SERIES = {
+    "hysim.kernels.duhem.ends": "ends",
+    "hysim.kernels.baber_noori_series.ends": "worn_ends",
+    "hysim.kernels.zhu_wang.is_last": "is_last",
+}
+"""Ends of series: a rate may need terms in which the value has none."""
+
+
+def in_place_of(function: Callable[..., Any]) -> Any:
+    """The function that is translated: itself, or one that ends no series before its last term."""
+    name = _WHOLE_SERIES.get(_name(function))
+    return function if name is None else getattr(import_module(_ROOTS), name)
 
 
 def steers(function: Callable[..., Any]) -> bool:
