@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from hysim._frozen import FloatArray, read_only
+from hysim.kernels.baber_noori_series import bell_within
 from hysim.kernels.charts import power_flow
 from hysim.kernels.duhem import place
 from hysim.kernels.magnetics import chan
@@ -49,6 +50,11 @@ def worn_ends(
 ) -> bool:
     """As `ends`, for a law that wears off."""
     return False
+
+
+def pinch_within(rw: float, re: float, parameters: FloatArray, series: FloatArray) -> float:
+    """Bound for a bell of depth one at least: that of none has a rate, too."""
+    return bell_within(rw, re, 1.0, parameters, series)
 
 
 def is_last(k: int, tail: float, room: float) -> bool:

@@ -309,10 +309,11 @@ class Expressions:
         return Dual(name, f"{name}__d")
 
     def _extreme(self, sign: str, operands: list[Dual]) -> Dual:
-        """The first of the smallest, or largest, numbers, as Python chooses it."""
+        """The smallest, or largest, number; of equal ones that which will be."""
         best = self.kept(Dual(operands[0].value, operands[0].rate or "0.0"))
         for each in operands[1:]:
-            self.emit(f"if {each.value} {sign} {best.value}:")
+            tie = f"{each.value} == {best.value} and {each.rate or '0.0'} {sign} {best.rate}"
+            self.emit(f"if {each.value} {sign} {best.value} or ({tie}):")
             self.emit(f"    {best.value} = {each.value}")
             self.emit(f"    {best.rate} = {each.rate or '0.0'}")
         return best

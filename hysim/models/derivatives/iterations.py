@@ -50,9 +50,10 @@ _AGAIN = {
 _WHOLE_SERIES = {
     "hysim.kernels.duhem.ends": "ends",
     "hysim.kernels.baber_noori_series.ends": "worn_ends",
+    "hysim.kernels.baber_noori_series.pinch_within": "pinch_within",
     "hysim.kernels.zhu_wang.is_last": "is_last",
 }
-"""Ends of series: a rate may need terms in which the value has none."""
+"""Ends and bounds of series: a rate may need terms that the value has not."""
 
 
 def in_place_of(function: Callable[..., Any]) -> Any:

@@ -65,7 +65,7 @@ def slopes(tape: Tape, numbers: Sequence[Number], fields: Sequence[float]) -> tu
             rates[place] = _rate(operation, inputs, values[place], moving, n_fields)
     zero = np.zeros(n_fields)
     found = [rates[each.place] if isinstance(each, Symbol) else zero for each in numbers]
-    return np.array([float(value(each)) for each in numbers]), np.array(found).reshape(-1, n_fields).T.copy()
+    return np.array([float(value(each)) for each in numbers]), np.array(found).reshape(len(numbers), n_fields).T.copy()
 
 
 def _rate(operation: str, inputs: list[Any], result: Any, moving: list[FloatArray | None], n_fields: int) -> FloatArray:
