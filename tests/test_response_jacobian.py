@@ -27,7 +27,10 @@ GENERAL = LAWS | {
     "ZhuWangBoucWen": hs.ZhuWangBoucWen(n=1.4, beta=0.8, gamma=-0.3, delta=0.2, z0=0.1),
     "GeneralizedBoucWen": hs.GeneralizedBoucWen(n=1.4, beta=0.8, gamma=-0.3, b2=0.1, b6=-0.1, z0=0.1),
     "ModifiedPrandtlIshlinskii": hs.ModifiedPrandtlIshlinskii(
-        thresholds=(0.0, 0.2, 0.5), weights=(1.0, 0.5, 0.3), dead_zones=(-0.4, 0.1, 0.3), dead_zone_weights=(0.2, 1.0, 0.4)
+        thresholds=(0.0, 0.2, 0.5),
+        weights=(1.0, 0.5, 0.3),
+        dead_zones=(-0.4, 0.1, 0.3),
+        dead_zone_weights=(0.2, 1.0, 0.4),
     ),
     "EnergyPlays": hs.EnergyPlays(thresholds=(0.03, 0.21, 0.52), weights=(1.0, 0.5, 0.3), field=0.3),
 }

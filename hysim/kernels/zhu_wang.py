@@ -343,7 +343,7 @@ def free_landing(w: float, a: float, d: float) -> float:
 
 @kernel
 def is_last(k: int, tail: float, room: float) -> bool:
-    """Whether a series may end with the term after this one: by what is left out, or since there is no room for more."""
+    """Whether a series may end with the next term: by what is left out, or since there is no room for more."""
     return (tail <= room * (k + 2.0) and k > 0) or k == N_TERMS - 1
 
 

@@ -102,9 +102,7 @@ def decay_from_zero(a: float, d: float, n: float, length: float) -> float:
     return total
 
 
-def arrival(
-    t: float, u: float, rate: float, x: float, time: float, side: float, begin: float, end: float
-) -> float:
+def arrival(t: float, u: float, rate: float, x: float, time: float, side: float, begin: float, end: float) -> float:
     """The moment at which a side of a gap is reached."""
     carried = x * math.exp(-t / time)
     slope = rate + carried / time
@@ -117,7 +115,7 @@ def field_inside(h: float, parameters: FloatArray, z: float, u: float) -> float:
     stiffness, drop = 1.0 + gap * parameters[2], gap * parameters[1]
     below, above = abs(h - coercivity) + knee, abs(h + coercivity) + knee
     slope = stiffness + drop * knee * ((0.5 - 0.5 * z) / (below * below) + (0.5 + 0.5 * z) / (above * above))
-    return h - (stiffness * h + drop * chan.inside(h, z, coercivity, knee) - u) / slope
+    return float(h - (stiffness * h + drop * chan.inside(h, z, coercivity, knee) - u) / slope)
 
 
 def field_of(x: float, m: float, p: float) -> float:

@@ -128,9 +128,7 @@ class RatedLaw(Identifiable, Composable, ABC):
         """
         return self.at_sample_time(sample_time).advance(u, state)
 
-    def response_jacobian(
-        self, u: npt.ArrayLike, sample_time: float, names: Iterable[str] | None = None
-    ) -> "Jacobian":
+    def response_jacobian(self, u: npt.ArrayLike, sample_time: float, names: Iterable[str] | None = None) -> "Jacobian":
         """Derivatives of the response by the numbers of the law; see `hysim.Law.response_jacobian`."""
         return self.at_sample_time(sample_time).response_jacobian(u, tuple(self.scalars) if names is None else names)
 

@@ -5,7 +5,15 @@ from collections.abc import Iterator
 from typing import Any
 
 from hysim.models.derivatives.expressions import Dual, Expressions, Library
-from hysim.models.derivatives.sources import assigned, body_of, called_function, is_kernel, returned_kinds, root_of, writes
+from hysim.models.derivatives.sources import (
+    assigned,
+    body_of,
+    called_function,
+    is_kernel,
+    returned_kinds,
+    root_of,
+    writes,
+)
 from hysim.models.tracing.routine import Routine
 
 _STEP = "    "
@@ -29,10 +37,12 @@ class Body:
     def __init__(self, library: Library, source: Routine, flags: dict[str, Any], has_rates: bool) -> None:
         self.source, self.flags, self.has_rates = source, flags, has_rates
         self.statements = body_of(source)
-        local = {node.id for node in ast.walk(source.tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+        local = {
+            node.id for node in ast.walk(source.tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
+        }
         known = {name: flag[0] for name, flag in flags.items() if isinstance(flag, tuple)}
         moving = {name for name, flag in flags.items() if flag is True}
-        self.of = Expressions(library, source, {*local, *flags} - known.keys(), known, moving, self._block)
+        self.of = Expressions(library, source, {*local, *flags} - known.keys(), known, moving)
         self._settle_activity()
 
     def arguments(self) -> list[str]:
@@ -116,7 +126,9 @@ class Body:
         elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
             self.of.results(node.value)
         elif isinstance(node, ast.Break | ast.Continue | ast.Pass):
-            self.of.emit("break" if isinstance(node, ast.Break) else "continue" if isinstance(node, ast.Continue) else "pass")
+            self.of.emit(
+                "break" if isinstance(node, ast.Break) else "continue" if isinstance(node, ast.Continue) else "pass"
+            )
         else:
             raise self.source.refusal(node, f"{type(node).__name__} is no statement of the subset")
 

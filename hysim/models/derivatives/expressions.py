@@ -8,7 +8,7 @@ import builtins
 import copy
 import math
 from collections.abc import Callable
-from types import BuiltinFunctionType, ModuleType
+from types import BuiltinFunctionType, FunctionType, ModuleType
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -76,7 +76,7 @@ class Expressions:
     """
 
     def __init__(
-        self, library: Library, source: Routine, local: set[str], known: dict[str, Any], moving: set[str], block: Any
+        self, library: Library, source: Routine, local: set[str], known: dict[str, Any], moving: set[str]
     ) -> None:
         self.library, self.source, self.local, self._known, self.moving = library, source, local, known, moving
         self.lines: list[str] = []
@@ -105,7 +105,7 @@ class Expressions:
     def _part_moves(self, node: ast.Subscript) -> bool:
         if isinstance(node.value, ast.Call) and is_kernel(self._callee(node.value)):
             kinds = self.kinds_moving(node.value, None)
-            return kinds[ast.literal_eval(node.slice)]
+            return kinds[_place(node)]
         if isinstance(node.value, ast.Attribute) and node.value.attr == "shape":
             return False
         return root_of(node) in self.moving
@@ -121,9 +121,13 @@ class Expressions:
         return [own and is_float for is_float in returned_kinds(routine(called))]
 
     def _builtin_moves(self, node: ast.Call, called: Any) -> bool:
-        if isinstance(node.func, ast.Attribute) and node.func.attr == "reshape" and not self._is_module(node.func.value):
+        if (
+            isinstance(node.func, ast.Attribute)
+            and node.func.attr == "reshape"
+            and not self._is_module(node.func.value)
+        ):
             return root_of(node) in self.moving
-        name = getattr(called, "__name__", "")
+        name = called.__name__ if isinstance(called, BuiltinFunctionType | FunctionType) else ""
         if called in (int, bool, len, range) or name in ("empty", "zeros", *_WITHOUT_RATE):
             return False
         if name == "copysign":
@@ -203,7 +207,7 @@ class Expressions:
         if not self.moves(node):
             return Dual(self.plain(node))
         if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Call) and is_kernel(self._callee(node.value)):
-            return self.results(node.value)[ast.literal_eval(node.slice)]
+            return self.results(node.value)[_place(node)]
         if isinstance(node, ast.Name | ast.Subscript):
             return Dual(*self.element(node))
         if isinstance(node, ast.BinOp):
@@ -383,7 +387,7 @@ class _Values(ast.NodeTransformer):
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
         owner = self.of.source.names.get(node.value.id) if isinstance(node.value, ast.Name) else None
         if isinstance(owner, ModuleType) and owner not in (math, np):
-            return self._global(node, node.attr, getattr(owner, node.attr))
+            return self._global(node, node.attr, vars(owner)[node.attr])
         if owner in (math, np):
             return ast.Attribute(ast.Name("math" if owner is math else "np", ast.Load()), node.attr, ast.Load())
         node.value = self.visit(node.value)
@@ -401,7 +405,12 @@ class _Values(ast.NodeTransformer):
     def visit_Compare(self, node: ast.Compare) -> ast.expr:
         pair = node.left, node.comparators[0]
         equality = len(node.ops) == 1 and isinstance(node.ops[0], ast.Eq | ast.NotEq)
-        if equality and is_general(self.of.source.function, *pair) and any(map(self.of.moves, pair)) and all(map(_is_atom, pair)):
+        if (
+            equality
+            and is_general(self.of.source.function, *pair)
+            and any(map(self.of.moves, pair))
+            and all(map(_is_atom, pair))
+        ):
             rates = [self.of.element(each)[1] if self.of.moves(each) else "0.0" for each in pair]
             sign, join = ("==", "and") if isinstance(node.ops[0], ast.Eq) else ("!=", "or")
             first, second = (ast.unparse(self.visit(each)) for each in pair)
@@ -424,6 +433,11 @@ class _Values(ast.NodeTransformer):
         function = self.of.library.function(called, still)
         kept = [each for each, flag in zip(node.args, flags, strict=True) if not isinstance(flag, tuple)]
         return ast.Call(ast.Name(function.name, ast.Load()), [self.visit(each) for each in kept], [])
+
+
+def _place(node: ast.Subscript) -> int:
+    """Which of the results of a call is taken."""
+    return int(ast.literal_eval(node.slice))
 
 
 def _is_atom(node: ast.expr) -> bool:

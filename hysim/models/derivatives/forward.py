@@ -65,13 +65,13 @@ class Program:
         self.constants[alias] = value
         module = source.function.__module__
         owner = inspect.getmodule(source.function)
-        if owner is not None and getattr(owner, name, None) is value and module != "__main__":
+        if owner is not None and vars(owner).get(name) is value and module != "__main__":
             self.imports[alias] = f"from {module} import {name} as {alias}"
         return alias
 
     def text(self, step: Translated, start: Translated) -> str:
         """The module, with ``along(parameters, parameters__d, state, state__d, u, y, y__d)`` at its end."""
-        helpers = ["@inner\n" + textwrap.dedent(inspect.getsource(getattr(rules, name))) for name in RULES]
+        helpers = ["@inner\n" + textwrap.dedent(inspect.getsource(vars(rules)[name])) for name in RULES]
         return "\n\n".join([*helpers, *self._texts, _ALONG.format(step=step.name, start=start.name)])
 
 
@@ -94,4 +94,3 @@ def module_text(step: Callable[..., Any], start: Callable[..., Any]) -> tuple[st
     flags = (True, True, False)
     translated = program.function(start, flags), program.function(step, flags)
     return program.text(translated[1], translated[0]), program
-

@@ -59,7 +59,7 @@ _WHOLE_SERIES = {
 def in_place_of(function: Callable[..., Any]) -> Any:
     """The function that is translated: itself, or one that ends no series before its last term."""
     name = _WHOLE_SERIES.get(_name(function))
-    return function if name is None else getattr(import_module(_ROOTS), name)
+    return function if name is None else vars(import_module(_ROOTS))[name]
 
 
 def steers(function: Callable[..., Any]) -> bool:
@@ -81,7 +81,7 @@ def is_general(function: Callable[..., Any], left: ast.expr, right: ast.expr) ->
 def one_more_step(function: Callable[..., Any]) -> Any:
     """The function that repeats the last step of an iteration: its results, and then the arguments; else None."""
     name = _AGAIN.get(_name(function))
-    return None if name is None else getattr(import_module(_ROOTS), name)
+    return None if name is None else vars(import_module(_ROOTS))[name]
 
 
 def _name(function: Callable[..., Any]) -> str:

@@ -17,7 +17,7 @@ from hysim._atomic import write_text
 from hysim.models.derivatives.forward import Program, module_text
 
 _HEAD = '"""Steps in forward mode; hysim writes this file and reads it again."""\n\nimport math\n\nimport numpy as np\n'
-_COMPILED = "\nfrom hysim.kernels._compile import inner, kernel\n"
+_COMPILED = "\nfrom hysim.kernels.tangents.compiling import inner, kernel\n"
 
 Along = Callable[..., int]
 
@@ -48,7 +48,7 @@ def _unchanged(function: Any) -> Any:
 
 
 def _in_memory(text: str, program: Program) -> Along:
-    from hysim.kernels._compile import closure
+    from hysim.kernels.tangents.compiling import closure
 
     names: dict[str, Any] = {**program.constants, "inner": closure, "kernel": closure}
     exec(compile(f"{_HEAD}\n\n{text}", "<derivative>", "exec"), names)
@@ -67,7 +67,8 @@ def _from_file(text: str) -> ModuleType | None:
             path.parent.mkdir(parents=True, exist_ok=True)
             write_text(path, text)
         specification = importlib.util.spec_from_file_location(name, path)
-        assert specification is not None and specification.loader is not None
+        assert specification is not None
+        assert specification.loader is not None
         module = importlib.util.module_from_spec(specification)
         specification.loader.exec_module(module)
     except OSError:

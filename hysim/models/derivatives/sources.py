@@ -3,6 +3,7 @@
 import ast
 from collections.abc import Callable, Iterator
 from functools import lru_cache
+from types import FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -48,13 +49,13 @@ def called_function(source: Routine, node: ast.expr) -> Any:
         return plain(source.names[node.id]) if node.id in source.names else None
     if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
         owner = source.names.get(node.value.id)
-        return plain(getattr(owner, node.attr, None)) if type(owner).__name__ == "module" else None
+        return plain(vars(owner).get(node.attr)) if isinstance(owner, ModuleType) else None
     return None
 
 
 def is_kernel(called: Any) -> bool:
     """Whether a callee is a function whose source is translated."""
-    return callable(called) and hasattr(called, "__code__") and called is not plain(borrowed)
+    return isinstance(called, FunctionType) and called is not plain(borrowed)
 
 
 @lru_cache(maxsize=1024)
