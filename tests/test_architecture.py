@@ -32,7 +32,7 @@ RANKS = (
     ("plants",),
     ("simulation", "benchmarks"),
     ("identification",),
-    ("discovery", "control"),
+    ("discovery", "control", "tracking"),
     ("comparison", "sweeps", "rig", "export"),
     ("plot",),
     ("paper",),
