@@ -6,7 +6,8 @@ The numbers theta walk at random; the memory follows from them by the exact step
 
 Sigma points: mean and covariance of (theta, z) are carried by 2 n points at +- sqrt(n) standard deviations, each moved
 by the step (the cubature rule; I. Arasaratnam and S. Haykin, IEEE Trans. Autom. Control 54 (2009) 1254). Where the
-errors of the last samples are too large for the noise, a number has jumped, and its variance is raised.
+errors of the last samples are too large for the noise, a number has jumped: the filter goes back to the first of them,
+raises the variances there, and comes again.
 Particles: many copies, weighted by how well they predict, and drawn anew from these weights; a few of them jump at each
 sample.
 """
@@ -43,43 +44,59 @@ class Filtered(NamedTuple):
     jumps: tuple[int, ...]
 
 
+class Belief(NamedTuple):
+    """Mean (n,) and covariance (n, n) of the coordinates and the memory, and the last input."""
+
+    mean: FloatArray
+    covariance: FloatArray
+    before: float
+
+
 def sigma_points(copies: Copies, x: FloatArray, walk: Walk, noise: float, u: FloatArray, y: FloatArray) -> Filtered:
     """The filter by sigma points from the coordinates `x` (n_names,)."""
     begun, count = copies.begun(float(u[0])), x.size
-    mean = np.concatenate([x, begun[1:]])
-    covariance = np.zeros((mean.size, mean.size))
-    covariance[:count, :count] = np.diag(walk.first**2)
+    covariance = np.zeros((x.size + begun.size - 1,) * 2)
+    covariance[range(count), range(count)] = walk.first**2
+    belief = Belief(np.concatenate([x, begun[1:]]), covariance, float(u[0]))
     means, deviations = np.empty((u.size, count)), np.empty((u.size, count))
     predicted, expected = np.empty(u.size), np.empty(u.size)
-    recent: list[float] = []
+    recent: list[tuple[Belief, float]] = []
     jumps: list[int] = []
-    before = float(u[0])
     for k in range(u.size):
-        covariance[range(count), range(count)] += walk.step**2
-        points = mean + _roots(covariance)
-        memory = np.column_stack([np.full(len(points), before), points[:, count:]])
-        outputs = copies.moved(points[:, :count], memory, before, float(u[k]))
-        points[:, count:] = memory[:, 1:]
-        usable = np.isfinite(outputs) & np.isfinite(points).all(axis=1)
-        points, outputs, before = points[usable], outputs[usable], float(u[k])
-        if not outputs.size:
-            raise ValueError(f"every copy of the law diverges at sample {k}: give a smaller drift")
-        mean, predicted[k] = points.mean(axis=0), outputs.mean()
-        apart, errors = points - mean, outputs - predicted[k]
-        covariance = apart.T @ apart / len(points)
-        variance = float(errors @ errors) / len(points) + noise**2
-        gain = apart.T @ errors / len(points) / variance
-        error = float(y[k]) - predicted[k]
-        mean = mean + gain * error
-        covariance -= variance * np.outer(gain, gain)
-        expected[k] = np.sqrt(variance)
-        recent.append(error**2 / variance)
-        if len(recent) >= _RECENT and np.mean(recent[-_RECENT:]) > _SURPRISE:
-            covariance[range(count), range(count)] += walk.jump**2
-            jumps.append(k)
-            recent = []
-        means[k], deviations[k] = mean[:count], np.sqrt(np.maximum(covariance.diagonal()[:count], 0.0))
+        last = belief
+        belief, predicted[k], expected[k] = _filtered(copies, last, walk.step, noise, float(u[k]), float(y[k]), k)
+        recent = [*recent[-_RECENT + 1 :], (last, ((y[k] - predicted[k]) / expected[k]) ** 2)]
+        if len(recent) == _RECENT and np.mean([square for _, square in recent]) > _SURPRISE and walk.jump.any():
+            begin = recent[0][0]
+            begin.covariance[range(count), range(count)] += walk.jump**2
+            belief, jumps, recent = begin, [*jumps, k], []
+            for j in range(k - _RECENT + 1, k + 1):
+                belief, _, _ = _filtered(copies, belief, walk.step, noise, float(u[j]), float(y[j]), j)
+        means[k] = belief.mean[:count]
+        deviations[k] = np.sqrt(np.maximum(belief.covariance.diagonal()[:count], 0.0))
     return Filtered(means, deviations, predicted, expected, tuple(jumps))
+
+
+def _filtered(
+    copies: Copies, last: Belief, step: FloatArray, noise: float, u: float, y: float, k: int
+) -> tuple[Belief, float, float]:
+    """The belief after the sample `k`, the output that was predicted, and the standard deviation expected of it."""
+    count, covariance = step.size, last.covariance.copy()
+    covariance[range(count), range(count)] += step**2
+    points = last.mean + _roots(covariance)
+    memory = np.column_stack([np.full(len(points), last.before), points[:, count:]])
+    outputs = copies.moved(points[:, :count], memory, last.before, u)
+    points[:, count:] = memory[:, 1:]
+    usable = np.isfinite(outputs) & np.isfinite(points).all(axis=1)
+    points, outputs = points[usable], outputs[usable]
+    if not outputs.size:
+        raise ValueError(f"every copy of the law diverges at sample {k}: give a smaller drift")
+    mean, predicted = points.mean(axis=0), float(outputs.mean())
+    apart, errors = points - mean, outputs - predicted
+    variance = float(errors @ errors) / len(points) + noise**2
+    gain = apart.T @ errors / len(points) / variance
+    after = apart.T @ apart / len(points) - variance * np.outer(gain, gain)
+    return Belief(mean + gain * (y - predicted), after, u), predicted, float(np.sqrt(variance))
 
 
 def _roots(covariance: FloatArray) -> FloatArray:
