@@ -37,6 +37,7 @@ from hysim.discovery import OscillatorDiscovery as OscillatorDiscovery
 from hysim.control import PID as PID
 from hysim.control import TrackingController as TrackingController
 from hysim.control import InverseFeedforward as InverseFeedforward
+from hysim.control import AdaptiveInverse as AdaptiveInverse
 from hysim.control import ModeInverse as ModeInverse
 from hysim.control import Shaper as Shaper
 from hysim.control import Notch as Notch
