@@ -1,12 +1,13 @@
 """An inverse of a law whose numbers are estimated while it runs, one sample at a time.
 
     theta_k = theta_(k-1) + K (m - y),   K = P g / (g' P g + noise^2),   P <- P + drift^2 - K g' P
+    z_k     <- z_k + (dz/dtheta) K (m - y)
     u_k: the input at which the law of theta_k has the output r
 
 m is the measured output at the last command, y the law's own there, and g its derivatives by the numbers, which
-are the differences to copies of the law with one number a little larger each: the copies remember their own past, so
-that g holds what the number has done to the memory (recursive prediction errors; L. Ljung and T. Soderstrom, Theory and
-Practice of Recursive Identification, 1983).
+are the differences to copies of the law with one number a little larger each. The copies remember their own past, so
+that g holds what a number has done to the memory z, and the memory is moved with the numbers (an extended Kalman filter
+of numbers and memory, whose only uncertainty is that of the numbers).
 
 The parameters of the step are affine in the numbers, base + sum delta_i rates_i. `parameters` is (numbers p, parameters
 of the step q, places of the law's state s, places of the search, noise^2, drift^2 (p), differences h (p), lowest (p) and
@@ -30,7 +31,10 @@ _SEARCH = float64(STEP, CONSTANTS, VECTOR, float64)
 
 @inner
 def estimate(parameters: FloatArray, state: FloatArray, error: float, g: FloatArray) -> None:
-    """Move the deltas and their covariance by one measurement, for the derivatives `g` of the output."""
+    """Move the deltas and their covariance by one measurement, for the derivatives `g` of the output.
+
+    The moves are left in the p places before the last p of the state.
+    """
     p = g.size
     delta, P = state[1 : 1 + p], state[1 + p : 1 + p + p * p].reshape((p, p))
     drift, lowest, highest = (
@@ -47,11 +51,26 @@ def estimate(parameters: FloatArray, state: FloatArray, error: float, g: FloatAr
         moved = 0.0
         for j in range(p):
             moved += P[i, j] * g[j]
-        delta[i] = min(max(delta[i] + moved / variance * error, lowest[i]), highest[i])
         state[state.size - 2 * p + i] = moved
+    moves = state[state.size - 2 * p : state.size - p]
     for i in range(p):
         for j in range(p):
-            P[i, j] -= state[state.size - 2 * p + i] * state[state.size - 2 * p + j] / variance
+            P[i, j] -= moves[i] * moves[j] / variance
+    for i in range(p):
+        before = delta[i]
+        delta[i] = min(max(delta[i] + moves[i] / variance * error, lowest[i]), highest[i])
+        moves[i] = delta[i] - before
+
+
+@inner
+def shift(moves: FloatArray, h: FloatArray, copies: FloatArray, law: FloatArray, s: int, k: int) -> None:
+    """Move the memory at the place k of all states to where numbers moved by `moves` would have taken it."""
+    total = 0.0
+    for i in range(h.size):
+        total += (copies[i * s + k] - law[k]) / h[i] * moves[i]
+    law[k] += total
+    for i in range(h.size):
+        copies[i * s + k] += total
 
 
 @kernel
@@ -81,6 +100,10 @@ def adapt(
     for i in range(p):
         g[i] = (outputs[i] - place[1]) / h[i]
     estimate(parameters, state, measurement - place[1], g)
+    for j in range(int(own[3])):
+        begin, count = int(own[inverses.N_SEARCHED + 2 * j]), int(own[inverses.N_SEARCHED + 2 * j + 1])
+        for k in range(max(begin, 1), begin + count):
+            shift(state[state.size - 2 * p : state.size - p], h, copies, law, s, k)
     for k in range(q):
         before[k], now[k] = now[k], base[k]
         for i in range(p):
