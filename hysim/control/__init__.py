@@ -1,5 +1,6 @@
 """Controllers, the loops they close, and measures of these loops."""
 
+from hysim.control._adaptive import AdaptiveInverse as AdaptiveInverse
 from hysim.control._assessment import assess_hysteresis as assess_hysteresis
 from hysim.control._assessment import assess_square_wave as assess_square_wave
 from hysim.control._assessment import assess_step as assess_step
@@ -9,7 +10,6 @@ from hysim.control._assessment_results import OpenLoop as OpenLoop
 from hysim.control._assessment_results import SquareWaveAssessment as SquareWaveAssessment
 from hysim.control._assessment_results import StepAssessment as StepAssessment
 from hysim.control._bandwidth import bandwidth as bandwidth
-from hysim.control._adaptive import AdaptiveInverse as AdaptiveInverse
 from hysim.control._feedforward import InverseFeedforward as InverseFeedforward
 from hysim.control._filters import DampingLoop as DampingLoop
 from hysim.control._filters import Notch as Notch

@@ -1,4 +1,4 @@
-"""Feed-forward by the inverse of a law whose numbers drift; its equations stand in `hysim.kernels.adaptation.inverse`."""
+"""Feed-forward by the inverse of a law whose numbers drift, with the equations of `hysim.kernels.adaptation.inverse`."""
 
 import functools
 import math
@@ -112,8 +112,7 @@ class AdaptiveInverse(SampledController):
         copies = [self._begun(parameters + size * rate, u0) for size, rate in zip(sizes, rates, strict=True)]
         drift = np.square(self.drift) * sample_time
         head = [count, parameters.size, own.size, places, self.noise**2]
-        unlimited = np.full(count, math.inf)
-        constants = [head, drift, sizes, -unlimited, unlimited, parameters, rates.ravel()]
+        constants = [head, drift, sizes, parameters, rates.ravel()]
         outputs = [output for output, _ in copies]
         covariance = np.diag(np.square(self.drift))
         state = [

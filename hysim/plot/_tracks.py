@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 
+from hysim._prefixes import in_unit
 from hysim.plot._style import one
 from hysim.tracking import ParameterTrack
 
@@ -57,14 +58,13 @@ def track(
     """
     name = result.names[0] if name is None else name
     path, (lower, upper) = result[name], result.band(name)
-    axes = one(ax)
     x = np.arange(path.size) if t is None else np.asarray(t)
-    axes.fill_between(x, lower, upper, alpha=0.25, linewidth=0.0, label="95 %")
-    axes.plot(x, path, label=f"by {result.method}s")
-    if truth is not None:
-        axes.plot(x, np.asarray(truth), color="#D55E00", linestyle="dashed", label="truth")
-    unit = (units or {}).get(name)
-    axes.set_xlabel("sample" if t is None else "t [s]")
-    axes.set_ylabel(name if not unit else f"{name} [{unit}]")
-    axes.legend()
+    with one(ax, height=3.0) as axes:
+        axes.fill_between(x, lower, upper, alpha=0.25, linewidth=0.0, label="95 %")
+        axes.plot(x, path, label=f"by {result.method}s")
+        if truth is not None:
+            axes.plot(x, np.asarray(truth), label="truth")
+        axes.set_xlabel("sample" if t is None else "t [s]")
+        axes.set_ylabel(in_unit(name, (units or {}).get(name, "")))
+        axes.legend()
     return axes

@@ -9,10 +9,10 @@ are the differences to copies of the law with one number a little larger each. T
 that g holds what a number has done to the memory z, and the memory is moved with the numbers (an extended Kalman filter
 of numbers and memory, whose only uncertainty is that of the numbers).
 
-The parameters of the step are affine in the numbers, base + sum delta_i rates_i. `parameters` is (numbers p, parameters
-of the step q, places of the law's state s, places of the search, noise^2, drift^2 (p), differences h (p), lowest (p) and
-highest (p) deltas, base (q), rates (p, q)), `state` is (last command, delta (p), P (p, p), outputs of the copies (p),
-parameters now, before and of a copy (q each), states of the copies (p, s), parameters of the search, its state).
+The parameters of the step are affine in the numbers, base + sum delta_i rates_i. `parameters` is (numbers p,
+parameters of the step q, places of the law's state s, places of the search, noise^2, drift^2 (p), differences h (p),
+base (q), rates (p, q)), `state` is (last command, delta (p), P (p, p), outputs of the copies (p), parameters now,
+before and of a copy (q each), states of the copies (p, s), parameters of the search, its state, room for 2 p numbers).
 """
 
 import math
@@ -37,11 +37,7 @@ def estimate(parameters: FloatArray, state: FloatArray, error: float, g: FloatAr
     """
     p = g.size
     delta, P = state[1 : 1 + p], state[1 + p : 1 + p + p * p].reshape((p, p))
-    drift, lowest, highest = (
-        parameters[N_HEAD : N_HEAD + p],
-        parameters[N_HEAD + 2 * p : N_HEAD + 3 * p],
-        parameters[N_HEAD + 3 * p : N_HEAD + 4 * p],
-    )
+    drift = parameters[N_HEAD : N_HEAD + p]
     variance = parameters[4]
     for i in range(p):
         P[i, i] += drift[i]
@@ -57,9 +53,8 @@ def estimate(parameters: FloatArray, state: FloatArray, error: float, g: FloatAr
         for j in range(p):
             P[i, j] -= moves[i] * moves[j] / variance
     for i in range(p):
-        before = delta[i]
-        delta[i] = min(max(delta[i] + moves[i] / variance * error, lowest[i]), highest[i])
-        moves[i] = delta[i] - before
+        moves[i] *= error / variance
+        delta[i] += moves[i]
 
 
 @inner
@@ -93,8 +88,8 @@ def adapt(
     own, at = state[at : at + places + q], at + places + q
     place = state[at : state.size - 2 * p]
     law = place[inverses.N_SEARCH : inverses.N_SEARCH + s]
-    h, base = parameters[N_HEAD + p : N_HEAD + 2 * p], parameters[N_HEAD + 4 * p : N_HEAD + 4 * p + q]
-    rates = parameters[N_HEAD + 4 * p + q :]
+    h, base = parameters[N_HEAD + p : N_HEAD + 2 * p], parameters[N_HEAD + 2 * p : N_HEAD + 2 * p + q]
+    rates = parameters[N_HEAD + 2 * p + q :]
 
     g = state[state.size - p :]
     for i in range(p):
