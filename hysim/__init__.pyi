@@ -28,6 +28,9 @@ from hysim.identification import Selection as Selection
 from hysim.identification import estimate_channel as estimate_channel
 from hysim.identification import parameter_curve as parameter_curve
 from hysim.identification import ParameterCurve as ParameterCurve
+from hysim.design import design_input as design_input
+from hysim.design import InputDesign as InputDesign
+from hysim.design import InputLimits as InputLimits
 from hysim.tracking import track_parameters as track_parameters
 from hysim.tracking import ParameterTrack as ParameterTrack
 from hysim.discovery import discover as discover

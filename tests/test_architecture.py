@@ -32,7 +32,7 @@ RANKS = (
     ("plants",),
     ("simulation", "benchmarks"),
     ("identification",),
-    ("discovery", "control", "tracking"),
+    ("discovery", "control", "tracking", "design"),
     ("comparison", "sweeps", "rig", "export"),
     ("plot",),
     ("paper",),
