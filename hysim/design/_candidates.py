@@ -1,23 +1,23 @@
 """Inputs by their turning points, and the usual ones beside which a design is judged."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.design._limits import InputLimits
 
+_HOLD = 0.02  # of the record, a pause at a turning point in the mean
 _TONES = (1, 3, 5, 7, 11)  # multiples of the lowest frequency of a multisine
 
 
-def through(levels: Sequence[float] | FloatArray, limits: InputLimits) -> FloatArray:
-    """The input (samples,) from zero to each level in turn at the full slew, held at the last one.
+def through(levels: FloatArray, limits: InputLimits, holds: FloatArray | None = None) -> FloatArray:
+    """The input (samples,) from zero to each level in turn at the full slew, held there for its time [s].
 
-    A level after which no time is left is cut off.
+    What comes after the end of the record is cut off; before it the last level is held.
     """
-    corners = np.concatenate([[0.0], np.asarray(levels)])
-    times = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(corners)))]) / limits.slew
-    return np.asarray(np.interp(limits.t, times, corners))
+    pauses = np.zeros(levels.size) if holds is None else holds
+    strokes = np.abs(np.diff(levels, prepend=0.0)) / limits.slew
+    times = np.concatenate([[0.0], np.cumsum(np.column_stack([strokes, pauses]).ravel())])
+    return np.asarray(np.interp(limits.t, times, np.append(0.0, np.repeat(levels, 2))))
 
 
 def usual(limits: InputLimits) -> dict[str, FloatArray]:
@@ -37,16 +37,16 @@ def usual(limits: InputLimits) -> dict[str, FloatArray]:
     }
 
 
-def random_levels(count: int, limits: InputLimits, rng: np.random.Generator) -> FloatArray:
-    """Turning points to alternate sides of each other, uniform between the limits."""
-    levels = rng.uniform(-1.0, 1.0, count)
-    for k in range(1, count):
-        before = levels[k - 1]
-        upwards = k % 2 == 0
-        levels[k] = rng.uniform(before, 1.0) if upwards else rng.uniform(-1.0, before)
-    return np.asarray(limits.amplitude * levels)
+def random_strokes(limits: InputLimits, rng: np.random.Generator) -> FloatArray:
+    """Turning points to alternate sides of each other, and how long each is held, (n_levels, 2), to fill the record.
 
-
-def most_levels(limits: InputLimits) -> int:
-    """Number of turning points of strokes of half the range, for the time that there is."""
-    return max(4, int(2.0 * limits.duration * limits.slew / limits.amplitude))
+    Some inputs have short strokes, and some hold most of their turning points.
+    """
+    strokes, bias, held = [], float(rng.uniform(0.3, 3.0)), float(rng.choice([0.0, 0.2, 0.6]))
+    last, time, side = 0.0, 0.0, 1.0 if rng.random() < 0.5 else -1.0
+    while time < limits.duration:
+        level = last + (side * limits.amplitude - last) * float(rng.random()) ** bias
+        hold = float(rng.exponential(_HOLD * limits.duration)) if rng.random() < held else 0.0
+        time, last, side = time + abs(level - last) / limits.slew + hold, level, -side
+        strokes.append((level, hold))
+    return np.array(strokes)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.design._candidates import most_levels, random_levels, through, usual
+from hysim.design._candidates import random_strokes, through, usual
 from hysim.design._criteria import Criterion, information, merit
 from hysim.design._limits import InputLimits
 from hysim.design._result import InputDesign
@@ -14,6 +14,7 @@ from hysim.models.law import Law
 
 _BEST = 4  # candidates that are improved
 _MOVE = 0.3  # of the amplitude: the first moves of a turning point; the last ones are a tenth of it
+_PAUSES, _PAUSE = 0.3, 0.1  # share of the moves that change a pause, and their size beside _MOVE in parts of the record
 
 
 def design_input(
@@ -29,9 +30,9 @@ def design_input(
 ) -> InputDesign:
     """Propose an input within limits that tells most of a law's numbers.
 
-    The input is a row of strokes at the full slew between turning points. They are drawn at random, and those of the
-    best candidates are moved as long as the Fisher information on the numbers grows: a search, which is not sure to
-    find the best input. The information depends on the law; begin with what is known of it, and repeat.
+    The input is a row of strokes at the full slew between turning points, at some of which it is held. They are drawn
+    at random, and those of the best candidates are moved as long as the Fisher information on the numbers grows: a
+    search, which is not sure to find the best input. Noise is taken as white, so that a pause is as good as any sample. The information depends on the law; begin with what is known of it, and repeat.
 
     Parameters
     ----------
@@ -78,22 +79,26 @@ def design_input(
 
     inputs = usual(bounds)
     known = {name: worth(each) for name, each in inputs.items()}
-    drawn = [random_levels(int(rng.integers(4, most_levels(bounds) + 1)), bounds, rng) for _ in range(candidates)]
-    order = sorted(drawn, key=lambda levels: -worth(through(levels, bounds)))[:_BEST]
-    improved = [_improved(levels, bounds, worth, moves, rng) for levels in order]
-    levels = max(improved, key=lambda each: worth(through(each, bounds)), default=np.empty(0))
-    u, best = through(levels, bounds), worth(through(levels, bounds))
+
+    def tried(strokes: FloatArray) -> float:
+        return worth(through(strokes[:, 0], bounds, strokes[:, 1]))
+
+    drawn = [random_strokes(bounds, rng) for _ in range(candidates)]
+    order = sorted(drawn, key=lambda strokes: -tried(strokes))[:_BEST]
+    improved = [_improved(strokes, bounds, tried, moves, rng) for strokes in order]
+    strokes = max(improved, key=tried, default=np.empty((0, 2)))
+    u, best = through(strokes[:, 0], bounds, strokes[:, 1]), tried(strokes)
     first = max(known, key=lambda name: known[name])
     if known[first] > best:
-        u, best, levels = inputs[first], known[first], np.empty(0)
+        u, best, strokes = inputs[first], known[first], np.empty((0, 2))
     if not best > 0.0:
         raise ValueError(f"no input within the limits tells {', '.join(names)} apart: free fewer of them")
     covariance = np.linalg.inv(law.response_jacobian(u, names).information(noise))
-    used = np.cumsum(np.abs(np.diff(levels, prepend=0.0))) / bounds.slew < bounds.duration
     return InputDesign(
         t=bounds.t,
         u=u,
-        levels=levels[used] if levels.size else levels,
+        levels=strokes[:, 0],
+        holds=strokes[:, 1],
         expected_stderr=dict(zip(names, np.sqrt(covariance.diagonal()).tolist(), strict=True)),
         efficiency={name: value / best for name, value in known.items()},
         criterion=criterion,
@@ -102,18 +107,21 @@ def design_input(
     )
 
 
-def _improved(levels: FloatArray, limits: InputLimits, worth: Any, moves: int, rng: np.random.Generator) -> FloatArray:
-    """The turning points after random moves of one at a time, those that are worth more being kept."""
-    best = worth(through(levels, limits))
+def _improved(strokes: FloatArray, limits: InputLimits, tried: Any, moves: int, rng: np.random.Generator) -> FloatArray:
+    """The strokes after random moves of one turning point or pause at a time, those that are worth more being kept."""
+    best = tried(strokes)
     for k in range(moves):
-        trial = levels.copy()
-        size = _MOVE * limits.amplitude * 0.1 ** (k / moves)
-        place = rng.integers(trial.size)
-        trial[place] = np.clip(trial[place] + size * rng.standard_normal(), -limits.amplitude, limits.amplitude)
-        value = worth(through(trial, limits))
+        trial, share = strokes.copy(), _MOVE * 0.1 ** (k / moves) * rng.standard_normal()
+        place = rng.integers(len(trial))
+        if rng.random() < _PAUSES:
+            trial[place, 1] = max(0.0, trial[place, 1] + _PAUSE * share * limits.duration)
+        else:
+            moved = trial[place, 0] + share * limits.amplitude
+            trial[place, 0] = min(max(moved, -limits.amplitude), limits.amplitude)
+        value = tried(trial)
         if value > best:
-            levels, best = trial, value
-    return levels
+            strokes, best = trial, value
+    return strokes
 
 
 def _checked(

@@ -16,8 +16,9 @@ class InputDesign:
     ----------
     t, u : array, shape (n_samples,)
         Times [s] and input [unit of u], which begins at zero.
-    levels : array, shape (n_levels,)
-        Turning points of the input [unit of u]; empty if a usual input was the best one.
+    levels, holds : array, shape (n_levels,)
+        Turning points of the input [unit of u] and how long it is held there [s]; the last ones may lie beyond the end.
+        Empty if a usual input was the best one.
     expected_stderr : mapping
         Names of the numbers to their standard errors, those of an efficient estimate [unit of each].
     efficiency : mapping
@@ -34,6 +35,7 @@ class InputDesign:
     t: FloatArray
     u: FloatArray
     levels: FloatArray
+    holds: FloatArray
     expected_stderr: Mapping[str, float]
     efficiency: Mapping[str, float]
     criterion: str
