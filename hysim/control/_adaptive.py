@@ -1,4 +1,7 @@
-"""Feed-forward by the inverse of a law whose numbers drift, with the equations of `hysim.kernels.adaptation.inverse`."""
+"""Feed-forward by the inverse of a law whose numbers drift.
+
+Its equations stand in `hysim.kernels.adaptation.inverse`.
+"""
 
 import functools
 import math
@@ -105,17 +108,18 @@ class AdaptiveInverse(SampledController):
         sizes = self._sizes()
         law0 = law.compiled(u0)._replace(step=compiled_step(law.step))
         own = self._own_state(law0, u0)
-        inverse = searched_inverse(law, law0._replace(state=own), limits=self.limits or (-math.inf, math.inf))
+        lowest, highest = self.limits or (-math.inf, math.inf)
+        inverse = searched_inverse(law, law0._replace(state=own), limits=(lowest, highest))
         search = inverse.parameters.copy()
         search[2] = 0.0  # what is known of the slopes holds for the numbers at the beginning
         places = search.size - parameters.size
         copies = [self._begun(parameters + size * rate, u0) for size, rate in zip(sizes, rates, strict=True)]
         drift = np.square(self.drift) * sample_time
         head = [count, parameters.size, own.size, places, self.noise**2]
-        constants = [head, drift, sizes, parameters, rates.ravel()]
+        constants: list[Any] = [head, drift, sizes, parameters, rates.ravel()]
         outputs = [output for output, _ in copies]
         covariance = np.diag(np.square(self.drift))
-        state = [
+        state: list[Any] = [
             [u0], np.zeros(count), covariance.ravel(), outputs, parameters, parameters, parameters,
             *(each for _, each in copies), search, inverse.state, np.zeros(2 * count),
         ]  # fmt: skip

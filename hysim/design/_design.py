@@ -32,7 +32,8 @@ def design_input(
 
     The input is a row of strokes at the full slew between turning points, at some of which it is held. They are drawn
     at random, and those of the best candidates are moved as long as the Fisher information on the numbers grows: a
-    search, which is not sure to find the best input. Noise is taken as white, so that a pause is as good as any sample. The information depends on the law; begin with what is known of it, and repeat.
+    search, which is not sure to find the best input. Noise is taken as white, so that a pause is as good as any sample.
+    The information depends on the law; begin with what is known of it, and repeat.
 
     Parameters
     ----------

@@ -52,7 +52,7 @@ class InputLimits:
     @property
     def t(self) -> FloatArray:
         """Times of the samples [s], shape (samples,)."""
-        return np.arange(self.samples) * self.sample_time
+        return np.asarray(np.arange(self.samples) * self.sample_time, dtype=float)
 
     @property
     def stride(self) -> float:
