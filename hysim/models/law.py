@@ -311,7 +311,7 @@ class Law(Composable, ABC):
         >>> import hysim as hs
         >>> jacobian = hs.BoucWen(n=1.5).response_jacobian([0.0, 1.0, 0.5], ("A", "n"))
         >>> jacobian["n"].round(6).tolist()
-        [0.0, 0.104338, 0.104338]
+        [0.0, 0.123057, 0.123057]
         """
         from hysim.models.derivatives.jacobian import response_jacobian  # scipy's functions, where they are needed
 

@@ -55,10 +55,10 @@ class Jacobian:
         >>> u = hs.signals.triangle(-1.0, 1.0, cycles=1, samples_per_cycle=20)
         >>> print(hs.Dahl(stiffness=2.0, coulomb=0.5).response_jacobian(u).summary())
         derivative of the response, 21 samples
-        stiffness  rms 0.0525  largest 0.11
-        coulomb    rms 0.749   largest 0.995
+        stiffness  rms 0.0674  largest 0.179
+        coulomb    rms 0.797   largest 0.997
         offset     rms 1       largest 1
-        z0         rms 0.292   largest 1
+        z0         rms 0.244   largest 1
         """
         width = max(map(len, self.names), default=0)
         lines = [f"derivative of the response, {len(self.matrix)} samples"]
