@@ -6,12 +6,13 @@ import pytest
 import hysim as hs
 
 LIMITS = hs.InputLimits(amplitude=2.0, slew=4.0, duration=8.0, sample_time=0.05)
+FEW = {"candidates": 40, "moves": 100}
 LAW, FREE, NOISE = hs.Dahl(stiffness=3.0, coulomb=0.5), ("stiffness", "coulomb", "offset"), 0.02
 
 
 @pytest.fixture(scope="module")
 def design():
-    return hs.design_input(LAW, limits=LIMITS, free=FREE, noise=NOISE)
+    return hs.design_input(LAW, limits=LIMITS, free=FREE, noise=NOISE, **FEW)
 
 
 def test_the_input_keeps_its_limits_and_tells_more_than_the_usual_ones(design):
@@ -55,7 +56,7 @@ def test_each_criterion_is_best_by_its_own_measure(design, criterion):
 
 def test_a_design_is_the_same_for_the_same_seed(design):
     again = hs.design_input(LAW, limits={"amplitude": 2.0, "slew": 4.0, "duration": 8.0, "sample_time": 0.05},
-                            free=FREE, noise=NOISE)  # fmt: skip
+                            free=FREE, noise=NOISE, **FEW)  # fmt: skip
     np.testing.assert_array_equal(again.u, design.u)
     assert "D-efficiency of" in str(again)
 

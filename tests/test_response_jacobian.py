@@ -34,8 +34,18 @@ GENERAL = LAWS | {
     ),
     "EnergyPlays": hs.EnergyPlays(thresholds=(0.03, 0.21, 0.52), weights=(1.0, 0.5, 0.3), field=0.3),
 }
-SLOW = {"ZhuWangBoucWen": ("n",), "BoucWen": ("beta", "n"), "GeneralizedBoucWen": ("b2",),
-        "JilesAtherton": ("a", "alpha", "c")}  # fmt: skip
+SLOW = {
+    "ZhuWangBoucWen": ("beta",),
+    "BoucWen": ("beta", "n"),
+    "GeneralizedBoucWen": ("b2",),
+    "JilesAtherton": ("alpha", "c"),
+    "linear BoucWen": ("A", "beta", "gamma", "z0"),
+    "quadratic BoucWen": ("A", "beta", "gamma", "z0"),
+    "Duhem": ("y0", "u' |z|"),
+    "Preisach": ("levels[1]", "weights[2]"),
+    "Chan": ("coercivity", "squareness", "gap"),
+}
+"""Numbers by which laws are differentiated that take long with 40 digits, and on four samples only."""
 NOT_IN_40_DIGITS = ("BoucWenBaberNoori", "PolynomialBoucWen", "PreisachRelays")  # too slow, and steps of others
 INPUT = np.array([0.13, 0.711, 0.37, -0.913, 0.214, 1.317, 0.93])
 

@@ -135,6 +135,7 @@ def reversible(x: float, low: float, high: float, target: float, of_x: float, of
 
 def solve(
     x: float,
+    rest: float,
     after: float,
     m: float,
     begin: float,
@@ -147,11 +148,11 @@ def solve(
     of_m: float,
     of_z: float,
     parameters: FloatArray,
-) -> tuple[float, float, float]:
-    """The effective field on a branch of Jiles and Atherton, with the irreversible and the anhysteretic part there."""
+) -> tuple[float, float, float, float]:
+    """The effective field on a branch of Jiles and Atherton, its rest, and both parts of the magnetisation there."""
     moved = averaged(begin, z, x - begin, parameters)
     here, steep = curve(x, parameters[ANISOTROPY])
     climb = (here - moved) / parameters[PINNING]
     rise = of_x + of_m * steep + of_z * climb
     left = (target - of_x * x - of_m * here - of_z * moved) / rise if rise > 0.0 else 0.0
-    return x + left, moved + left * climb, here + left * steep
+    return x + left, rest, moved + left * climb, here + left * steep
