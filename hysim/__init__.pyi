@@ -28,6 +28,11 @@ from hysim.identification import Selection as Selection
 from hysim.identification import estimate_channel as estimate_channel
 from hysim.identification import parameter_curve as parameter_curve
 from hysim.identification import ParameterCurve as ParameterCurve
+from hysim.design import design_input as design_input
+from hysim.design import InputDesign as InputDesign
+from hysim.design import InputLimits as InputLimits
+from hysim.tracking import track_parameters as track_parameters
+from hysim.tracking import ParameterTrack as ParameterTrack
 from hysim.discovery import discover as discover
 from hysim.discovery import discover_oscillator as discover_oscillator
 from hysim.discovery import Discovery as Discovery
@@ -35,6 +40,7 @@ from hysim.discovery import OscillatorDiscovery as OscillatorDiscovery
 from hysim.control import PID as PID
 from hysim.control import TrackingController as TrackingController
 from hysim.control import InverseFeedforward as InverseFeedforward
+from hysim.control import AdaptiveInverse as AdaptiveInverse
 from hysim.control import ModeInverse as ModeInverse
 from hysim.control import Shaper as Shaper
 from hysim.control import Notch as Notch
@@ -71,6 +77,7 @@ from hysim.metrics import CycleMetrics as CycleMetrics
 from hysim.metrics import magnetic_metrics as magnetic_metrics
 from hysim.metrics import MagneticMetrics as MagneticMetrics
 from hysim.models.law import Law as Law
+from hysim.models.derivatives.jacobian import Jacobian as Jacobian
 from hysim.models.model import family as family
 from hysim.models.parameters import Parameter as Parameter
 from hysim.laws.differential.boucwen import BoucWen as BoucWen

@@ -32,7 +32,7 @@ RANKS = (
     ("plants",),
     ("simulation", "benchmarks"),
     ("identification",),
-    ("discovery", "control"),
+    ("discovery", "control", "tracking", "design"),
     ("comparison", "posterior", "sweeps", "rig", "export"),
     ("plot",),
     ("paper",),

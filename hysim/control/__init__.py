@@ -1,5 +1,6 @@
 """Controllers, the loops they close, and measures of these loops."""
 
+from hysim.control._adaptive import AdaptiveInverse as AdaptiveInverse
 from hysim.control._assessment import assess_hysteresis as assess_hysteresis
 from hysim.control._assessment import assess_square_wave as assess_square_wave
 from hysim.control._assessment import assess_step as assess_step

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from hysim.export import _c
-from hysim.export._routine import UntranslatableError, plain
 from hysim.export._scope import (
     AND,
     CONDITIONAL,
@@ -33,6 +32,7 @@ from hysim.export._scope import (
 )
 from hysim.export._types import Known, Scalar, Several, Type, Vector
 from hysim.kernels.stepping import borrowed
+from hysim.models.tracing.routine import UntranslatableError, plain
 
 _OPERATORS = MappingProxyType({ast.Add: ("+", SUM), ast.Sub: ("-", SUM), ast.Mult: ("*", PRODUCT)})
 _COMPARED = MappingProxyType(

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
 from hysim.export import _c
-from hysim.export._routine import Routine
 from hysim.export._types import Type, Vector, joined
+from hysim.models.tracing.routine import Routine
 
 CONDITIONAL, OR, AND, EQUALITY, RELATION, SUM, PRODUCT, UNARY, PRIMARY = range(9)
 """How strongly the operators of C bind."""

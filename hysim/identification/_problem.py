@@ -298,9 +298,12 @@ class Problem:
         ends = np.where((x == self.space.upper)[..., np.newaxis], behind, ahead)
         return ends, np.einsum("sii->si", ends - x[:, np.newaxis])
 
-    def neighbours(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Points a small step ahead of and behind each `x` (n_sets, n_x) along each coordinate, and their distance."""
-        step = np.diag(_DIFFERENCE * (self.space.upper - self.space.lower))
+    def neighbours(self, x: FloatArray, share: float = 1.0) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Points a small step ahead of and behind each `x` (n_sets, n_x) along each coordinate, and their distance.
+
+        `share` is the part of the step by which a difference is usually taken.
+        """
+        step = np.diag(share * _DIFFERENCE * (self.space.upper - self.space.lower))
         ahead = np.minimum(x[:, np.newaxis] + step, self.space.upper)
         behind = np.maximum(x[:, np.newaxis] - step, self.space.lower)
         return ahead, behind, np.einsum("sii->si", ahead - behind)

@@ -7,6 +7,10 @@ model's output (1/sigma^2 for normal noise), and G = d(the user's parameters)/d(
 
 A coordinate at its search bound counts as known if it has an effect; it and a direction without effect have no
 standard error. The condition number is that of W^(1/2) J with columns of length one.
+
+J is computed by central differences over a millionth of the box. Where a part of that step gives another derivative,
+the output bends within the step, as at a stiff optimum in a wide box: there the derivatives of a law are its exact ones
+(`hysim.Law.response_jacobian`), and those of others, or of long records, differences over a shorter step.
 """
 
 from collections.abc import Sequence
@@ -15,12 +19,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from hysim._frozen import FloatArray
+from hysim.errors import SimulationError
 from hysim.identification._descent import named_slopes
 from hysim.identification._problem import Problem
+from hysim.models.derivatives.jacobian import FEW
+from hysim.models.law import Law
 
 _SINGULAR = 1e-7  # below this share of the largest, a direction of the scaled Jacobian is not identifiable
 _AT_SIDE = 1e-6  # in units of the box
 _MOST_NAMES = 4  # in a sentence
+_SHARE = 0.125  # of the step, by which a derivative is computed again
+_CLOSE = 1e-4  # difference of both, of the derivative, up to which the first one is taken
+_MOST_SHARES = 4  # beyond which the rounding of the output is most of a difference
 _TAKES_PART = 0.05  # share of a parameter in a direction, of the largest share in it, to be named
 
 
@@ -82,14 +92,61 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
 
 
 def output_slopes(problem: Problem, theta: FloatArray) -> FloatArray:
-    """dm/dtheta, (n_samples, n_theta), by central differences."""
+    """dm/dtheta, (n_samples, n_theta)."""
+    slopes, share = _differences(problem, theta, 1.0), _SHARE
+    if not problem.n_x or not np.isfinite(slopes).all():
+        return slopes
+    for _ in range(_MOST_SHARES):
+        shorter = _differences(problem, theta, share)
+        if not _apart(slopes, shorter):
+            return slopes
+        exact = _exact(problem, theta)
+        if exact is not None:
+            return exact
+        slopes, share = shorter, _SHARE * share
+    return slopes
+
+
+def _apart(slopes: FloatArray, shorter: FloatArray) -> bool:
+    """Whether the derivative by a coordinate is another one over a shorter step."""
+    with np.errstate(invalid="ignore"):
+        distance = np.linalg.norm(slopes - shorter, axis=0)
+        return bool((distance > _CLOSE * np.linalg.norm(shorter, axis=0)).any())
+
+
+def _differences(problem: Problem, theta: FloatArray, share: float) -> FloatArray:
     n_x = problem.n_x
     x, linear = theta[np.newaxis, :n_x], theta[n_x:]
-    ahead, behind, steps = (values[0] for values in problem.neighbours(x))
+    ahead, behind, steps = (values[0] for values in problem.neighbours(x, share))
     columns, fixed_part = problem.split(np.concatenate([ahead, behind, x]))
     outputs = columns @ linear + fixed_part
     with np.errstate(invalid="ignore"):
         return np.column_stack([(outputs[:n_x] - outputs[n_x : 2 * n_x]).T / steps, columns[-1]])
+
+
+def _exact(problem: Problem, theta: FloatArray) -> FloatArray | None:
+    """dm/dtheta along the step of a law; None where the model is none, or its records are long or repeat a cycle."""
+    family, names = problem.family, problem.space.names
+    is_short = problem.y.size * len(names) <= FEW and problem.below is None
+    if (
+        not isinstance(family, Law)
+        or not is_short
+        or any(part.before or part.record.channels for part in problem.parts)
+    ):
+        return None
+    by_names, rows = named_slopes(problem, theta[np.newaxis])[0], []
+    for k, part in enumerate(problem.parts):
+        try:
+            law = family.assemble(problem.estimates(theta, k))
+            own = [name for name in law.scalars if part.names.get(name, name) in names]
+            jacobian = law.response_jacobian(part.record.u, own)
+        except (ValueError, SimulationError):
+            return None
+        places = [names.index(part.names.get(name, name)) for name in own]
+        if len(own) + sum(len(each.names) for each in problem.parts if each is not part) < len(names):
+            return None
+        rows.append(jacobian.matrix @ by_names[places])
+    return np.concatenate(rows)
 
 
 def _unknown(problem: Problem, theta: FloatArray, reason: str) -> Uncertainty:

@@ -208,7 +208,15 @@ def spread_within(last: int, x: float, part: int, pinches: bool, parameters: Flo
 @inner
 def pinch_within(rw: float, re: float, parameters: FloatArray, series: FloatArray) -> float:
     """Bound of ``|h - its value at 0|`` where w and e go no further than rw and re, by the real part of X^2."""
+    return bell_within(rw, re, 0.0, parameters, series)
+
+
+@inner
+def bell_within(rw: float, re: float, least: float, parameters: FloatArray, series: FloatArray) -> float:
+    """As `pinch_within`, for a bell whose depth zeta_s is taken as `least` where it is less."""
     deeper, farther, wider = shifts(re, parameters, series)
+    if least > 0.0:
+        deeper = max(deeper, least * series[_FADED, 0] * math.expm1(min(abs(parameters[5]) * re, _LARGEST_EXPONENT)))
     x, width = abs(series[_X, 0]), abs(series[_WIDTH, 0])
     if not wider < 0.9 * width:
         return math.inf
@@ -218,7 +226,7 @@ def pinch_within(rw: float, re: float, parameters: FloatArray, series: FloatArra
         return math.inf
     highest = math.exp(exponent)
     change = min(highest * apart * (2.0 * x + apart), highest + series[_BELL, 0])
-    return float(abs(series[_DEPTH, 0]) * change + deeper * highest)
+    return float(max(least, abs(series[_DEPTH, 0])) * change + deeper * highest)
 
 
 @inner

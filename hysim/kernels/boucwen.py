@@ -51,7 +51,7 @@ _N_ALIKE = 2  # steps in one direction after another, from which on a run is tri
 def power_advance(z: float, du: float, A: float, beta: float, gamma: float, n: float, work: FloatArray) -> float:
     """As `advance` for other n than 1 and 2."""
     sign = 1.0 if (z > 0.0 and du > 0.0) or (z < 0.0 and du < 0.0) or (z == 0.0 and A > 0.0) else -1.0
-    w, left = abs(z), abs(du)
+    w, left = z if (du > 0.0) == (sign > 0.0) else -z, abs(du)  # |z|, and on this side of z = 0 its continuation
     while True:  # a second time only from w = 0, on the other side, where w grows
         forwards = (sign > 0.0) == (A > 0.0)
         c, side = (beta + gamma, _LOADING) if sign > 0.0 else (beta - gamma, _UNLOADING)

@@ -130,7 +130,7 @@ def linear_travel(along: float, A: float, k: float) -> float:
     """Length from H to 0 on H' = A - k H; H beyond A/k does not get there, unless by rounding."""
     x = k * along / A
     if abs(x) < _SMALL:
-        return -along / A
+        return -along / A * (1.0 + 0.5 * x)  # the second term is for derivatives, here and below
     return math.log1p(-x) / k if x < 1.0 else math.inf
 
 
@@ -193,7 +193,7 @@ def quadratic_travel(along: float, A: float, k: float) -> float:
     r = math.sqrt(abs(A * k))
     q = r * tangent
     if q < 1.0e-9:
-        return tangent
+        return tangent * (1.0 + A * k * tangent * tangent / 3.0)
     if A * k < 0.0:
         return math.atan(q) / r
     return math.atanh(q) / r if q < 1.0 else math.inf

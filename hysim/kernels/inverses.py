@@ -14,8 +14,9 @@ closed forms of their own; `searched` makes the inverse of any law from its step
 """
 
 import math
+from collections.abc import Callable
 
-from numba import float64
+from numba import float64, types
 
 from hysim._frozen import FloatArray
 from hysim.kernels import clamps
@@ -43,6 +44,8 @@ _AHEAD = 2.0**-26
 """Part of a branch: distance beyond its end at which the output is evaluated; a turn is missed by its square."""
 _SMALLEST = 2.0**-1022
 _SEARCH = float64(STEP, CONSTANTS, VECTOR, float64)
+SEARCH = types.FunctionType(_SEARCH)
+Search = Callable[[Step, FloatArray, FloatArray, float], float]
 
 
 # ---------------------------------------------------------------------------------- limits

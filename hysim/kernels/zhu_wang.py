@@ -72,6 +72,8 @@ def advance(u: float, z: float, du: float, parameters: FloatArray, scratch: Floa
     A, beta, gamma, n, delta = parameters[0], parameters[1], parameters[2], parameters[3], parameters[4]
     a, w, length = A + direction * delta * u, direction * z, abs(du)
     begin, stands = 0.0, False
+    if w == 0.0 and a != 0.0:
+        begin, w = -w / a + 0.0, 0.0  # nothing moves, but in derivatives: next to zero, z left it elsewhere
     # the forcing a + delta L changes its sign once, so there are no more than two zeros of z
     for _ in range(_MAX_SIDES):
         left, forcing = length - begin, a + delta * begin
@@ -109,6 +111,12 @@ def linear_side(w: float, a: float, d: float, c: float, length: float) -> tuple[
         low = min(length, linear_turn(slope, d, c))
     if not linear_ramp(w, a, d, c, high) < 0.0:
         return after, length
+    return 0.0, ramp_zero(w, a, d, c, low, high)
+
+
+@kernel
+def ramp_zero(w: float, a: float, d: float, c: float, low: float, high: float) -> float:
+    """Length between `low` and `high` at which w' = a + d L - c w has fallen to w = 0."""
     x = high
     for _ in range(_MAX_NEWTON):
         value = linear_ramp(w, a, d, c, x)
@@ -117,7 +125,7 @@ def linear_side(w: float, a: float, d: float, c: float, length: float) -> tuple[
         if value == 0.0 or abs(trial - x) <= ROUNDING * x:
             break
         x = trial
-    return 0.0, x
+    return x
 
 
 @kernel
@@ -137,7 +145,7 @@ def linear_ramp(w: float, a: float, d: float, c: float, length: float) -> float:
 def linear_turn(slope: float, d: float, c: float) -> float:
     """Length at which w' = a + d L - c w is zero, from w' = `slope` at L = 0 on."""
     x = -c * slope / d
-    return -slope / d if abs(x) < ROUNDING else math.log1p(x) / c
+    return -slope / d * (1.0 - 0.5 * x) if abs(x) < ROUNDING else math.log1p(x) / c
 
 
 # ---------------------------------------------------------------------------------- other n
@@ -334,6 +342,12 @@ def free_landing(w: float, a: float, d: float) -> float:
 
 
 @kernel
+def is_last(k: int, tail: float, room: float) -> bool:
+    """Whether a series may end with the next term: by what is left out, or since there is no room for more."""
+    return (tail <= room * (k + 2.0) and k > 0) or k == N_TERMS - 1
+
+
+@kernel
 def series(
     w: float,
     power: float,
@@ -358,7 +372,7 @@ def series(
         forcing = a if k == 0 else d * h if k == 1 else 0.0
         terms[rows + k + 1] = h * (forcing - c * terms[k]) / (k + 1.0)
         tail *= theta
-        if (tail <= room * (k + 2.0) and k > 0) or k == N_TERMS - 1:
+        if is_last(k, tail, room):
             total = 0.0
             for j in range(k + 1, -1, -1):
                 total += terms[rows + j]

@@ -23,6 +23,7 @@ from hysim.plot._posterior import corner, evidence, prediction
 from hysim.plot._records import element_loops, history, loop, response, signals, traces
 from hysim.plot._style import DIVERGING, SEQUENTIAL, figure, house_style, panels
 from hysim.plot._sweeps import heat_map, parallel_coordinates, quantile_bands, sensitivities
+from hysim.plot._tracks import track
 
 __all__ = [
     "DIVERGING",
@@ -62,6 +63,7 @@ __all__ = [
     "to_bytes",
     "to_svg",
     "traces",
+    "track",
     "trade_off",
     "width",
     "widths",

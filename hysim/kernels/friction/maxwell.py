@@ -32,7 +32,7 @@ def stuck_distance(along: float, stiffness: float, limit: float, slope: float) -
 def relaxed(along: float, begin: float, end: float, kappa: float) -> float:
     """Force of an element that slips while its limit goes evenly from `begin` to `end`."""
     decay = math.exp(-kappa)
-    average = -math.expm1(-kappa) / kappa if kappa > 0.0 else 1.0
+    average = -math.expm1(-kappa) / kappa if kappa > 0.0 else 1.0 - 0.5 * kappa
     return end + (along - begin) * decay - (end - begin) * average
 
 

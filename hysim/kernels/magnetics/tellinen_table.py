@@ -58,7 +58,7 @@ def decay(parameters: FloatArray, n: int, k: int, u: float, end: float) -> float
     x = (climb - rise) * length / width
     if x <= -1.0:
         return -math.inf
-    return float(-(behind / width) * (1.0 - 0.5 * x if abs(x) < _STRAIGHT else math.log1p(x) / x))
+    return float(-(behind / width) * (1.0 - 0.5 * x + x * x / 3.0 if abs(x) < _STRAIGHT else math.log1p(x) / x))
 
 
 @inner

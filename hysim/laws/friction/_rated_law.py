@@ -7,9 +7,9 @@ with one field more, from which all else is derived.
 
 import functools
 from abc import ABC
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, fields
-from typing import Any, ClassVar, Self, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +25,9 @@ from hysim.models.protocols import CompiledLaw, Identifiable, Startable, needed_
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.tables import Tables, arguments_of, scalars_of
 from hysim.records import Record
+
+if TYPE_CHECKING:
+    from hysim.models.derivatives.jacobian import Jacobian
 
 
 class RatedLaw(Identifiable, Composable, ABC):
@@ -124,6 +127,10 @@ class RatedLaw(Identifiable, Composable, ABC):
         The bits are those of one uncut input; arguments and errors are those of `response`.
         """
         return self.at_sample_time(sample_time).advance(u, state)
+
+    def response_jacobian(self, u: npt.ArrayLike, sample_time: float, names: Iterable[str] | None = None) -> "Jacobian":
+        """Derivatives of the response by the numbers of the law; see `hysim.Law.response_jacobian`."""
+        return self.at_sample_time(sample_time).response_jacobian(u, tuple(self.scalars) if names is None else names)
 
     def memory(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
         """Memory at the samples of `u`, shape (n_samples,), or (n_samples, n_memory) of a tuple; see `response`.

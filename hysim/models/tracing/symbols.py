@@ -5,7 +5,7 @@ operations are those of numpy; a symbol stands for a number or for a truth value
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -153,6 +153,11 @@ class Tape:
     def fields_of(self, number: Number) -> tuple[str, ...]:
         """Names of the fields on which a number depends."""
         return tuple(self.names[place] for place in self.needed((number,)) if place < len(self.names))
+
+    def operations(self, numbers: Iterable[Number]) -> Iterator[tuple[int, str, tuple[Number, ...]]]:
+        """Place, name and operands of each operation that leads to these numbers, in their order."""
+        for place in self.needed(numbers):
+            yield (place, *self._entries[place])
 
     def evaluate(self, numbers: Sequence[Number], values: Sequence[float]) -> list[float]:
         """The numbers for these values of the fields."""

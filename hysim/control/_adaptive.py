@@ -1,0 +1,157 @@
+"""Feed-forward by the inverse of a law whose numbers drift.
+
+Its equations stand in `hysim.kernels.adaptation.inverse`.
+"""
+
+import functools
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._frozen import FloatArray, read_only
+from hysim.control._sampled import Feedback, SampledController, check_limits, check_sample_time
+from hysim.kernels import stepping
+from hysim.kernels.adaptation.inverse import adaptive
+from hysim.models.compiled_step import compiled_step
+from hysim.models.derivatives.packing import packed_rates
+from hysim.models.inverse_search import searched_inverse
+from hysim.models.law import Law
+from hysim.models.model import family
+from hysim.models.protocols import CompiledController
+
+_DIFFERENCE = 1e-4  # of a number: how far its copy of the law is from the law
+_AFFINE = 1e-9  # of the parameters of a step: what of them may not be affine in the numbers
+_PROBE = 0.1  # of a number, where that is looked at
+
+_bound = functools.lru_cache(maxsize=64)(adaptive)
+
+
+@family
+class AdaptiveInverse(SampledController):
+    """Command by the inverse of a law whose numbers are estimated again at every sample.
+
+    The measurement is compared with the output of the law at the last command, and the numbers that are free move
+    towards those that predict it (a Kalman filter of a random walk). A sensor that is late, or a stage that takes time
+    between the law and the sensor, is not modelled, and is taken for a drift.
+
+    Parameters
+    ----------
+    law : law
+        A law with an inverse, and with the numbers at the beginning.
+    free : sequence of str
+        Numbers that drift, as in ``law.scalars``; the parameters of the law's step must be affine in them.
+    drift : sequence of float
+        For each the change that is expected within one second [unit of each].
+    noise : float
+        Standard deviation of the measurement [unit of y].
+    limits : (float, float), optional
+        Lowest and highest command [unit of u].
+
+    Raises
+    ------
+    TypeError
+        If the law is none that a step describes.
+    ValueError
+        If a name is unknown, the lengths differ, a drift or the noise is not positive, or the law has no inverse.
+
+    Examples
+    --------
+    The gain of the plant is 20 % lower than that of the law; the fixed inverse does not see it.
+
+    >>> import numpy as np, hysim as hs
+    >>> law = hs.BoucWen(feedthrough=1.0, gain=-0.5)
+    >>> plant = hs.BoucWen(feedthrough=1.0, gain=-0.4)
+    >>> t = 0.01 * np.arange(2000)
+    >>> r = 0.5 * np.sin(2.0 * t)
+    >>> adaptive = hs.AdaptiveInverse(law=law, free=("gain",), drift=(0.1,), noise=1e-3)
+    >>> run, fixed = (hs.close_loop(plant, each, t, r) for each in (adaptive, hs.InverseFeedforward(law=law)))
+    >>> late, later = slice(1000, -1), slice(1001, None)
+    >>> errors = [np.abs(each.y[later] - r[late]).max() for each in (run, fixed)]
+    >>> bool(errors[0] < 0.02 * errors[1])
+    True
+    """
+
+    law: Any
+    free: tuple[str, ...]
+    drift: tuple[float, ...]
+    noise: float
+    limits: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.law, Law):
+            raise TypeError(f"law must be a law that a step describes, such as BoucWen, got {type(self.law).__name__}")
+        if not self.free or len(self.free) != len(self.drift):
+            raise ValueError(f"free and drift must name as many numbers, got {len(self.free)} and {len(self.drift)}")
+        if unknown := [name for name in self.free if name not in self.law.scalars]:
+            raise ValueError(f"free has {unknown[0]!r}: a {type(self.law).__name__} has {', '.join(self.law.scalars)}")
+        if not (min(self.drift) > 0.0 and self.noise > 0.0):
+            raise ValueError("drift and noise must be positive")
+        check_limits(self.limits)
+        if self.law.workspace and self.law.resume is None:
+            raise ValueError(f"the workspace of a {type(self.law).__name__} cannot follow numbers that change")
+        self._rates()
+
+    def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
+        """Zeros: the measurement moves the numbers of the law, not the command itself."""
+        return np.zeros(np.shape(frequency), dtype=complex)
+
+    def linear(self, sample_time: float) -> Feedback:
+        """No feedback: the measurement moves the numbers of the law, not the command itself."""
+        return Feedback(np.zeros((0, 0)), np.zeros(0), np.zeros(0), 0.0)
+
+    def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
+        check_sample_time(sample_time)
+        law, count = self.law, len(self.free)
+        parameters, rates = self._rates()
+        sizes = self._sizes()
+        law0 = law.compiled(u0)._replace(step=compiled_step(law.step))
+        own = self._own_state(law0, u0)
+        lowest, highest = self.limits or (-math.inf, math.inf)
+        inverse = searched_inverse(law, law0._replace(state=own), limits=(lowest, highest))
+        search = inverse.parameters.copy()
+        search[2] = 0.0  # what is known of the slopes holds for the numbers at the beginning
+        places = search.size - parameters.size
+        copies = [self._begun(parameters + size * rate, u0) for size, rate in zip(sizes, rates, strict=True)]
+        drift = np.square(self.drift) * sample_time
+        head = [count, parameters.size, own.size, places, self.noise**2]
+        constants: list[Any] = [head, drift, sizes, parameters, rates.ravel()]
+        outputs = [output for output, _ in copies]
+        covariance = np.diag(np.square(self.drift))
+        state: list[Any] = [
+            [u0], np.zeros(count), covariance.ravel(), outputs, parameters, parameters, parameters,
+            *(each for _, each in copies), search, inverse.state, np.zeros(2 * count),
+        ]  # fmt: skip
+        step = _bound(compiled_step(law.step), stepping.unchanged if law.resume is None else law.resume)
+        return CompiledController(step, read_only(np.concatenate(constants), finite=False), np.concatenate(state))
+
+    def _sizes(self) -> FloatArray:
+        """Differences of the numbers by which the derivatives of the output are computed."""
+        values = np.array([self.law.scalars[name] for name in self.free])
+        return _DIFFERENCE * np.where(values == 0.0, 1.0, np.abs(values))
+
+    def _rates(self) -> tuple[FloatArray, FloatArray]:
+        """Parameters of the law's step, and their derivatives by the free numbers; ValueError if these are not all."""
+        law, rates = self.law, packed_rates(self.law, self.free)
+        if rates.memory_rates.any():
+            raise ValueError("the memory at the first sample does not drift: leave it out of free")
+        for name, rate in zip(self.free, rates.parameter_rates, strict=True):
+            moved = _PROBE * (law.scalars[name] or 1.0)
+            there = packed_rates(law.with_scalars({name: law.scalars[name] + moved}), self.free).parameters
+            apart = np.abs(there - rates.parameters - moved * rate).max()
+            if apart > _AFFINE * np.abs(there).max():
+                raise ValueError(f"the step of a {type(law).__name__} does not take {name} as it is: it cannot be free")
+        return rates.parameters, rates.parameter_rates
+
+    def _begun(self, parameters: FloatArray, u0: float) -> tuple[float, FloatArray]:
+        """Output at rest at `u0` of a copy of the law, and its state."""
+        front = self.law.packed[1]
+        state = np.concatenate([front, np.zeros(self.law.workspace)])
+        constants = read_only(parameters, finite=False)
+        self.law.start(constants, state, u0)
+        return float(self.law.step(constants, state, u0)), state
+
+    def _own_state(self, law: Any, u0: float) -> FloatArray:
+        """State of the law's own step at rest at `u0`."""
+        return self._begun(law.parameters, u0)[1]

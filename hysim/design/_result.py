@@ -1,0 +1,57 @@
+"""The result of `design_input`."""
+
+from collections.abc import Mapping
+
+from hysim._frozen import FloatArray, frozen
+from hysim._printing import printed, summary_text
+from hysim.design._limits import InputLimits
+
+
+@printed
+@frozen
+class InputDesign:
+    """An input, and what it is expected to tell of a law.
+
+    Attributes
+    ----------
+    t, u : array, shape (n_samples,)
+        Times [s] and input [unit of u], which begins at zero.
+    levels, holds : array, shape (n_levels,)
+        Turning points of the input [unit of u] and how long it is held there [s]; the last ones may lie beyond the end.
+        Empty if a usual input was the best one.
+    expected_stderr : mapping
+        Names of the numbers to their standard errors, those of an efficient estimate [unit of each].
+    efficiency : mapping
+        Names of the usual inputs to what they tell, in parts of what this one does: the ratio of the criterion, which
+        is proportional to the number of samples.
+    criterion : str
+        ``"D"``, ``"A"`` or ``"E"``.
+    noise : float
+        Standard deviation of the output for which all this holds [unit of y].
+    limits : InputLimits
+        The limits that it keeps.
+    """
+
+    t: FloatArray
+    u: FloatArray
+    levels: FloatArray
+    holds: FloatArray
+    expected_stderr: Mapping[str, float]
+    efficiency: Mapping[str, float]
+    criterion: str
+    noise: float
+    limits: InputLimits
+
+    def summary(self) -> str:
+        """The printed result as a text."""
+        return str(self)
+
+    def __str__(self) -> str:
+        head = f"InputDesign: {self.u.size} samples to {self.t[-1]:.4g} s, {self.levels.size} turning points"
+        stderr = ", ".join(f"{name} {value:.3g}" for name, value in list(self.expected_stderr.items())[:8])
+        beside = ", ".join(f"{name} {100.0 * value:.0f} %" for name, value in self.efficiency.items())
+        rows = {
+            "expected standard errors": f"{stderr} for noise of {self.noise:.3g}",
+            f"{self.criterion}-efficiency of": beside,
+        }
+        return summary_text([head], rows)

@@ -1,0 +1,145 @@
+"""Filters of numbers that drift and of the memory that they leave behind.
+
+    theta_k = theta_(k-1) + w_k,    (z_k, y_k) = step(theta_k, z_(k-1), u_k),    measured_k = y_k + noise
+
+The numbers theta walk at random; the memory follows from them by the exact step.
+
+Sigma points: mean and covariance of (theta, z) are carried by 2 n points at +- sqrt(n) standard deviations, each moved
+by the step (the cubature rule; I. Arasaratnam and S. Haykin, IEEE Trans. Autom. Control 54 (2009) 1254). Where the
+errors of the last samples are too large for the noise, a number has jumped: the filter goes back to the first of them,
+raises the variances there, and comes again.
+Particles: many copies, weighted by how well they predict, and drawn anew from these weights; a few of them jump at each
+sample.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.tracking._coordinates import Copies
+
+_SURPRISE = 3.0  # mean square of the last normalised errors, from which on a number has jumped
+_RECENT = 12  # errors that are looked at; after a jump as many pass before the next look
+_LEAST = 1e-13  # of the variances: keeps a covariance positive
+_JUMPING = 0.01  # share of the particles that jump at a sample
+_FEWEST = 0.5  # share of effective particles below which they are drawn anew
+
+
+class Walk(NamedTuple):
+    """Standard deviations of the coordinates: at the first sample, of the walk in one sample, and of a jump."""
+
+    first: FloatArray
+    step: FloatArray
+    jump: FloatArray
+
+
+class Filtered(NamedTuple):
+    """Means and standard deviations of the coordinates (n_samples, n_names), and predictions with their deviations."""
+
+    mean: FloatArray
+    deviation: FloatArray
+    predicted: FloatArray
+    expected_error: FloatArray
+    jumps: tuple[int, ...]
+
+
+class Belief(NamedTuple):
+    """Mean (n,) and covariance (n, n) of the coordinates and the memory, and the last input."""
+
+    mean: FloatArray
+    covariance: FloatArray
+    before: float
+
+
+def sigma_points(copies: Copies, x: FloatArray, walk: Walk, noise: float, u: FloatArray, y: FloatArray) -> Filtered:
+    """The filter by sigma points from the coordinates `x` (n_names,)."""
+    begun, count = copies.begun(float(u[0])), x.size
+    covariance = np.zeros((x.size + begun.size - 1,) * 2)
+    covariance[range(count), range(count)] = walk.first**2
+    belief = Belief(np.concatenate([x, begun[1:]]), covariance, float(u[0]))
+    means, deviations = np.empty((u.size, count)), np.empty((u.size, count))
+    predicted, expected = np.empty(u.size), np.empty(u.size)
+    recent: list[tuple[Belief, float]] = []
+    jumps: list[int] = []
+    for k in range(u.size):
+        last = belief
+        belief, predicted[k], expected[k] = _filtered(copies, last, walk.step, noise, float(u[k]), float(y[k]), k)
+        recent = [*recent[-_RECENT + 1 :], (last, ((y[k] - predicted[k]) / expected[k]) ** 2)]
+        if len(recent) == _RECENT and np.mean([square for _, square in recent]) > _SURPRISE and walk.jump.any():
+            begin = recent[0][0]
+            begin.covariance[range(count), range(count)] += walk.jump**2
+            belief, jumps, recent = begin, [*jumps, k], []
+            for j in range(k - _RECENT + 1, k + 1):
+                belief, _, _ = _filtered(copies, belief, walk.step, noise, float(u[j]), float(y[j]), j)
+        means[k] = belief.mean[:count]
+        deviations[k] = np.sqrt(np.maximum(belief.covariance.diagonal()[:count], 0.0))
+    return Filtered(means, deviations, predicted, expected, tuple(jumps))
+
+
+def _filtered(
+    copies: Copies, last: Belief, step: FloatArray, noise: float, u: float, y: float, k: int
+) -> tuple[Belief, float, float]:
+    """The belief after the sample `k`, the output that was predicted, and the standard deviation expected of it."""
+    count, covariance = step.size, last.covariance.copy()
+    covariance[range(count), range(count)] += step**2
+    points = last.mean + _roots(covariance)
+    memory = np.column_stack([np.full(len(points), last.before), points[:, count:]])
+    outputs = copies.moved(points[:, :count], memory, last.before, u)
+    points[:, count:] = memory[:, 1:]
+    usable = np.isfinite(outputs) & np.isfinite(points).all(axis=1)
+    points, outputs = points[usable], outputs[usable]
+    if not outputs.size:
+        raise ValueError(f"every copy of the law diverges at sample {k}: give a smaller drift")
+    mean, predicted = points.mean(axis=0), float(outputs.mean())
+    apart, errors = points - mean, outputs - predicted
+    variance = float(errors @ errors) / len(points) + noise**2
+    gain = apart.T @ errors / len(points) / variance
+    after = apart.T @ apart / len(points) - variance * np.outer(gain, gain)
+    return Belief(mean + gain * (y - predicted), after, u), predicted, float(np.sqrt(variance))
+
+
+def _roots(covariance: FloatArray) -> FloatArray:
+    """Points (2 n, n) about zero with this covariance."""
+    size = covariance.diagonal().copy()
+    scale = np.sqrt(np.where(size > 0.0, size, 1.0))
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    spread = scale[:, np.newaxis] * vectors * np.sqrt(np.maximum(values, _LEAST) * len(scale))
+    spread[size <= 0.0] = 0.0
+    return np.asarray(np.concatenate([spread.T, -spread.T]))
+
+
+def particles(
+    copies: Copies, x: FloatArray, walk: Walk, noise: float, u: FloatArray, y: FloatArray, count: int, seed: int
+) -> Filtered:
+    """The filter by particles from the coordinates `x` (n_names,)."""
+    rng = np.random.default_rng(seed)
+    points = x + walk.first * rng.standard_normal((count, x.size))
+    memory = np.tile(copies.begun(float(u[0])), (count, 1))
+    weights = np.full(count, 1.0 / count)
+    means, deviations = np.empty((u.size, x.size)), np.empty((u.size, x.size))
+    predicted, expected = np.empty(u.size), np.empty(u.size)
+    before = float(u[0])
+    for k in range(u.size):
+        points = points + walk.step * rng.standard_normal(points.shape)
+        jumping = rng.random(count) < _JUMPING
+        points[jumping] += walk.jump * rng.standard_normal((int(jumping.sum()), x.size))
+        outputs = copies.moved(points, memory, before, float(u[k]))
+        before = float(u[k])
+        usable = np.isfinite(outputs)
+        if not usable.any():
+            raise ValueError(f"every copy of the law diverges at sample {k}: give a smaller drift")
+        known = np.where(usable, outputs, 0.0)
+        weights = np.where(usable, weights, 0.0)
+        weights = weights / weights.sum()
+        predicted[k] = weights @ known
+        expected[k] = np.sqrt(weights @ (known - predicted[k]) ** 2 + noise**2)
+        log = -0.5 * ((float(y[k]) - known) / noise) ** 2
+        weights = weights * np.exp(log - log[usable].max())
+        weights = weights / weights.sum()
+        means[k] = weights @ points
+        deviations[k] = np.sqrt(weights @ (points - means[k]) ** 2)
+        if 1.0 / float(weights @ weights) < _FEWEST * count:
+            chosen = np.searchsorted(np.cumsum(weights), (np.arange(count) + rng.random()) / count).clip(max=count - 1)
+            points, memory, weights = points[chosen], memory[chosen], np.full(count, 1.0 / count)
+    return Filtered(means, deviations, predicted, expected, ())

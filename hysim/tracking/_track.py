@@ -1,0 +1,141 @@
+"""The verb `track_parameters`."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.models.law import Law
+from hysim.records import Record
+from hysim.tracking._coordinates import Coordinates, Copies, coordinates_of
+from hysim.tracking._filters import Filtered, Walk, particles, sigma_points
+from hysim.tracking._result import _BAND, ParameterTrack
+
+_DRIFT, _JUMP = 0.1, 0.2  # of the value, or of one where that is zero
+_MOST_MEMORIES = 40  # of a filter by sigma points
+_NORMAL = 1.4826  # standard deviations of the median of the sizes
+
+
+def track_parameters(
+    law: Law,
+    record: Record,
+    free: Sequence[str],
+    *,
+    drift: Mapping[str, float] | None = None,
+    jump: Mapping[str, float] | None = None,
+    noise: float | None = None,
+    method: Literal["sigma-point", "particle"] = "sigma-point",
+    particles_count: int = 500,
+    seed: int = 0,
+) -> ParameterTrack:
+    """Follow numbers of a law that drift along a record.
+
+    The numbers walk at random, and the law's memory follows from them by its exact step. A number that the law refuses
+    where it is negative is tracked by its logarithm.
+
+    Parameters
+    ----------
+    law : Law
+        A law with the numbers at the first sample, for instance the model of a fit to earlier data.
+    record : Record
+        Input and measured output.
+    free : sequence of str
+        Names of the numbers that drift, as in ``law.scalars``.
+    drift : mapping, optional
+        Names to the change that is expected over the whole record; by default a tenth of the value [unit of each].
+    jump : mapping, optional
+        Names to the size of a sudden change; by default a fifth of the value. Zero for none.
+    noise : float, optional
+        Standard deviation of the measurement; by default from the third differences of the output [unit of y].
+    method : {"sigma-point", "particle"}
+        Sigma points are quick, and made for a memory of a few numbers that change evenly. Particles take any law.
+    particles_count, seed : int
+        Number of the particles, and of their draws.
+
+    Returns
+    -------
+    ParameterTrack
+
+    Raises
+    ------
+    TypeError
+        If the law is none, or depends on the rate of its input.
+    ValueError
+        If a name is unknown, the noise is not positive, the method is unknown, or every copy of the law diverges.
+
+    Examples
+    --------
+    >>> import numpy as np, hysim as hs
+    >>> u = hs.signals.triangle(-1.0, 1.0, cycles=10, samples_per_cycle=40)
+    >>> law = hs.BoucWen(n=1.0, feedthrough=0.5)
+    >>> fades = np.linspace(1.0, 0.8, u.size)
+    >>> y = 0.5 * u + fades * law.memory(u) + 0.005 * np.random.default_rng(0).standard_normal(u.size)
+    >>> track = hs.track_parameters(law, hs.Record(u=u, y=y), ["gain"], drift={"gain": 0.2}, noise=0.005)
+    >>> bool(abs(track["gain"][-1] - 0.8) < 0.02)
+    True
+    """
+    if not isinstance(law, Law):
+        raise TypeError(f"law must be a law that a step describes, such as BoucWen, got {type(law).__name__}")
+    coordinates, spread = coordinates_of(law, free), _noise_of(record) if noise is None else float(noise)
+    if not spread > 0.0:
+        raise ValueError("noise must be positive: give the standard deviation of the measurement")
+    copies = Copies(law, coordinates)
+    walk = _walk(coordinates, drift, jump, len(record))
+    x = coordinates.encode(coordinates.values)
+    if method == "particle":
+        found = particles(copies, x, walk, spread, record.u, record.y, particles_count, seed)
+    elif method != "sigma-point":
+        raise ValueError(f'method must be "sigma-point" or "particle", got {method!r}')
+    elif copies.memory.size > _MOST_MEMORIES:
+        raise ValueError(f'this law remembers {copies.memory.size} numbers: use method="particle"')
+    else:
+        found = sigma_points(copies, x, walk, spread, record.u, record.y)
+    return _result(law, coordinates, found, record, method, spread)
+
+
+def _result(
+    law: Law, coordinates: Coordinates, found: Filtered, record: Record, method: str, noise: float
+) -> ParameterTrack:
+    values = coordinates.decode(found.mean)
+    last: dict[str, float] = dict(zip(coordinates.names, values[-1].tolist(), strict=True))
+    return ParameterTrack(
+        names=coordinates.names,
+        values=values,
+        lower=coordinates.decode(found.mean - _BAND * found.deviation),
+        upper=coordinates.decode(found.mean + _BAND * found.deviation),
+        predicted=found.predicted,
+        residual=record.y - found.predicted,
+        expected_error=found.expected_error,
+        jumps=found.jumps,
+        method=method,
+        noise=noise,
+        model=law.with_scalars(last),
+    )
+
+
+def _walk(
+    coordinates: Coordinates, drift: Mapping[str, float] | None, jump: Mapping[str, float] | None, n_samples: int
+) -> Walk:
+    sizes = np.where(coordinates.values == 0.0, 1.0, np.abs(coordinates.values))
+    drifts, jumps = (
+        coordinates.spread(_sizes(coordinates.names, given, share * sizes, what))
+        for given, share, what in ((drift, _DRIFT, "drift"), (jump, _JUMP, "jump"))
+    )
+    return Walk(drifts, drifts / np.sqrt(n_samples), jumps)
+
+
+def _sizes(names: Sequence[str], given: Mapping[str, Any] | None, usual: FloatArray, what: str) -> FloatArray:
+    given = {} if given is None else given
+    if unknown := [name for name in given if name not in names]:
+        raise ValueError(f"{what} has {unknown[0]!r}, which is not free")
+    sizes = np.array([float(given.get(name, own)) for name, own in zip(names, usual, strict=True)])
+    if not (sizes >= 0.0).all():
+        raise ValueError(f"{what} must not be negative, got {dict(given)}")
+    return sizes
+
+
+def _noise_of(record: Record) -> float:
+    """Standard deviation of white noise by the third differences of the output, which a smooth output does not have."""
+    third = np.diff(record.y, 3)
+    return float(_NORMAL * np.median(np.abs(third)) / np.sqrt(20.0)) if third.size else 0.0

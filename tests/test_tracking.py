@@ -1,0 +1,152 @@
+"""Parameters that drift: filters along a record, and an inverse that adapts."""
+
+import numpy as np
+import pytest
+
+import hysim as hs
+
+LAW = hs.BoucWen(beta=0.8, gamma=-0.2, feedthrough=0.3)
+U = hs.signals.triangle(-1.5, 1.5, cycles=12, samples_per_cycle=40)
+FADING = np.linspace(1.0, 0.8, U.size)
+NOISE = 0.005
+
+
+def moved(law, numbers, inputs):
+    """Outputs of a law whose numbers are others at each sample."""
+    state, y = law.first_state(float(inputs[0])), []
+    for k, u in enumerate(inputs.tolist()):
+        own = law.with_scalars({name: float(values[k]) for name, values in numbers.items()})
+        output, state = own.advance([u], state)
+        y.append(float(output[0]))
+    return np.array(y)
+
+
+@pytest.fixture(scope="module")
+def record():
+    y = moved(LAW, {"gain": FADING}, U)
+    return hs.Record(u=U, y=y + NOISE * np.random.default_rng(5).standard_normal(U.size))
+
+
+@pytest.mark.parametrize("method", ["sigma-point", "particle"])
+def test_a_gain_that_fades_is_followed(record, method):
+    track = hs.track_parameters(
+        LAW, record, ["gain"], drift={"gain": 0.2}, jump={"gain": 0.0}, noise=NOISE, method=method
+    )
+    lower, upper = track.band("gain")
+    assert np.abs(track["gain"][40:] - FADING[40:]).max() < 0.04
+    assert np.mean((lower <= FADING) & (upper >= FADING)) > 0.9
+    assert track.model.gain == pytest.approx(0.8, abs=0.03)
+    assert track.residual == pytest.approx(record.y - track.predicted)
+
+
+def test_errors_and_band_of_a_walk_are_those_that_the_filter_expects():
+    rng = np.random.default_rng(8)
+    gain = 1.0 + 0.2 / np.sqrt(U.size) * np.cumsum(rng.standard_normal(U.size))
+    y = moved(LAW, {"gain": gain}, U) + NOISE * rng.standard_normal(U.size)
+    walked = hs.Record(u=U, y=y)
+    track = hs.track_parameters(LAW, walked, ["gain"], drift={"gain": 0.2}, jump={"gain": 0.0}, noise=NOISE)
+    lower, upper = track.band("gain")
+    assert track.consistency == pytest.approx(1.0, abs=0.2)  # three standard deviations of the mean of 481 squares
+    assert 0.88 < np.mean((lower <= gain) & (gain <= upper)) < 0.99  # neighbouring errors are alike: about 60 count
+
+
+def test_the_step_is_exact_where_nothing_drifts():
+    """A walk of next to nothing leaves the memory of the law itself, whatever the measurement says."""
+    y = LAW.response(U)
+    track = hs.track_parameters(LAW, hs.Record(u=U, y=y + 0.1), ["gain"], drift={"gain": 0.0}, noise=1.0)
+    np.testing.assert_allclose(track.predicted, y, atol=1e-6)  # 1e-13 of a variance is kept: its root is 3e-7
+    assert track.jumps == ()
+
+
+def test_a_jump_is_seen_and_caught_up_with(record):
+    n = np.where(np.arange(U.size) < 240, 1.5, 2.2)
+    law = hs.BoucWen(beta=0.8, gamma=-0.2, n=1.5, feedthrough=0.3)
+    y = moved(law, {"n": n}, U) + NOISE * np.random.default_rng(6).standard_normal(U.size)
+    track = hs.track_parameters(law, hs.Record(u=U, y=y), ["n"], drift={"n": 0.05}, jump={"n": 0.5}, noise=NOISE)
+    assert len(track.jumps) == 1
+    assert 240 <= track.jumps[0] < 270
+    assert abs(track["n"][239] - 1.5) < 0.05
+    assert abs(track["n"][-1] - 2.2) < 0.15
+    blind = hs.track_parameters(law, hs.Record(u=U, y=y), ["n"], drift={"n": 0.05}, jump={"n": 0.0}, noise=NOISE)
+    assert blind.jumps == ()
+    assert abs(blind["n"][320] - 2.2) > 2.0 * abs(track["n"][320] - 2.2)
+
+
+def test_a_number_that_must_be_positive_stays_so(record):
+    law = hs.Dahl(stiffness=2.0, coulomb=0.5)
+    y = law.response(U) + 0.2 * np.random.default_rng(1).standard_normal(U.size)
+    track = hs.track_parameters(law, hs.Record(u=U, y=y), ["coulomb"], drift={"coulomb": 2.0}, noise=0.2)
+    assert (track.lower > 0.0).all()
+
+
+def test_noise_is_estimated_from_the_record(record):
+    track = hs.track_parameters(LAW, record, ["gain"])
+    assert track.noise == pytest.approx(NOISE, rel=0.2)
+
+
+def test_arguments_are_checked(record):
+    with pytest.raises(ValueError, match="free has 'slope': a BoucWen has A, beta"):
+        hs.track_parameters(LAW, record, ["slope"])
+    with pytest.raises(ValueError, match="z0 is the memory at the first sample"):
+        hs.track_parameters(LAW, record, ["z0"])
+    with pytest.raises(ValueError, match="drift has 'n', which is not free"):
+        hs.track_parameters(LAW, record, ["gain"], drift={"n": 1.0})
+    with pytest.raises(ValueError, match='method must be "sigma-point" or "particle"'):
+        hs.track_parameters(LAW, record, ["gain"], method="kalman")
+    plays = hs.PrandtlIshlinskii(thresholds=tuple(0.1 * k for k in range(50)), weights=(0.02,) * 50)
+    with pytest.raises(ValueError, match='remembers 51 numbers: use method="particle"'):
+        hs.track_parameters(plays, record, ["offset"])
+    with pytest.raises(TypeError, match="law must be a law that a step describes"):
+        hs.track_parameters(hs.PID(kp=1.0), record, ["kp"])
+    with pytest.raises(KeyError, match="'n' is not tracked: gain"):
+        hs.track_parameters(LAW, record, ["gain"], noise=NOISE)["n"]
+
+
+# ---------------------------------------------------------------------------------- an inverse that adapts
+
+LOOP_LAW = hs.BoucWen(beta=0.5, gamma=0.1, feedthrough=1.5, gain=-0.7)
+T = 0.01 * np.arange(U.size)
+
+
+def follow(controller, numbers, reference, noise=0.0):
+    """The output of the drifting plant under a controller that sees the last one."""
+    state, memory, rng, seen, y = controller.initial(0.01), LOOP_LAW.first_state(0.0), np.random.default_rng(2), 0.0, []
+    for k, r in enumerate(reference.tolist()):
+        u, state = controller.step(state, r, seen)
+        own = LOOP_LAW.with_scalars({name: float(values[k]) for name, values in numbers.items()})
+        output, memory = own.advance([u], memory)
+        y.append(float(output[0]))
+        seen = y[-1] + noise * rng.standard_normal()
+    return np.array(y), state
+
+
+def test_an_adaptive_inverse_of_the_true_law_is_the_fixed_one():
+    adaptive = hs.AdaptiveInverse(law=LOOP_LAW, free=("gain", "beta"), drift=(0.1, 0.1), noise=0.01)
+    fixed = hs.InverseFeedforward(law=LOOP_LAW)
+    runs = [hs.close_loop(LOOP_LAW, each, T, U) for each in (adaptive, fixed)]
+    np.testing.assert_allclose(runs[0].u, runs[1].u, atol=1e-9)
+
+
+def test_an_adaptive_inverse_follows_gain_and_shape():
+    """Both drift by a fifth; the memory of its law must follow the shape."""
+    numbers = {"gain": -0.7 * FADING, "beta": 0.5 * (2.0 - FADING)}
+    adaptive = hs.AdaptiveInverse(law=LOOP_LAW, free=("gain", "beta"), drift=(0.05, 0.05), noise=1e-3)
+    y, state = follow(adaptive, numbers, U, noise=1e-3)
+    fixed, _ = follow(hs.InverseFeedforward(law=LOOP_LAW), numbers, U, noise=1e-3)
+    last = slice(-80, None)
+    errors = [np.sqrt(np.mean((each[last] - U[last]) ** 2)) for each in (y, fixed)]
+    assert errors[0] < 0.05 * errors[1]
+    np.testing.assert_allclose(state.state[1:3], [0.14, 0.1], atol=0.03)  # where both have gone
+
+
+def test_numbers_that_the_step_does_not_take_as_they_are_are_refused():
+    with pytest.raises(ValueError, match="does not take coulomb as it is"):
+        hs.AdaptiveInverse(law=hs.Dahl(), free=("coulomb",), drift=(0.1,), noise=0.1)
+    with pytest.raises(ValueError, match="free and drift must name as many numbers, got 1 and 2"):
+        hs.AdaptiveInverse(law=LOOP_LAW, free=("gain",), drift=(0.1, 0.1), noise=0.1)
+    with pytest.raises(ValueError, match="does not drift"):
+        hs.AdaptiveInverse(law=LOOP_LAW, free=("z0",), drift=(0.1,), noise=0.1)
+    with pytest.raises(ValueError, match="drift and noise must be positive"):
+        hs.AdaptiveInverse(law=LOOP_LAW, free=("gain",), drift=(0.1,), noise=0.0)
+    with pytest.raises(TypeError, match="law must be a law that a step describes"):
+        hs.AdaptiveInverse(law=hs.PID(kp=1.0), free=("kp",), drift=(0.1,), noise=0.1)
