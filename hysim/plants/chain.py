@@ -209,8 +209,8 @@ class Chain:
 
         The delay of the sensor is no part of it: it may be one of the vibration.
         """
-        law, stage, linear = startable(self.hysteresis), self.stage, self.linear
-        row = [linear.D, 0.0, 0.0, *linear.C] if self._jumps and not at_end else stage.output
+        law, stage = startable(self.hysteresis), self.stage
+        row = stage.output if at_end else self.output_row
         order = stage.rest.size
         parts: list[Any] = [
             [law.state.size, at_end, self.sensor.quantum], self.amplifier.compiled(self.step).parameters,
@@ -224,6 +224,11 @@ class Chain:
             np.concatenate(state),
             _chain_start(law.step, law.start),
         )
+
+    @property
+    def output_row(self) -> FloatArray:
+        """Weights of the displacement just after each new command, as `SampledStage.output` has those just before."""
+        return read_only([self.linear.D, 0.0, 0.0, *self.linear.C]) if self._jumps else self.stage.output
 
     @property
     def _jumps(self) -> bool:
