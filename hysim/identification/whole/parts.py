@@ -1,7 +1,7 @@
 """A plant of several parts is searched part by part, and where that ends all parts are searched at once.
 
 1. The law alone, on the record of the slowest input: a global search.
-2. On the fastest record, with that law's shape and the creep's default, one mode after the other: the best of many
+2. On the fastest record, behind that law but for its gain and offset, one mode after the other: the best of many
    points descend. A mode is kept if it lowers the BIC by more than 10.
 3. On all records the parts descend beside the law's shape.
 4. All at once. What the records do not determine at that optimum, by its Fisher information, is held, and the search
@@ -9,7 +9,7 @@
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -26,6 +26,7 @@ from hysim.models.parts import own
 from hysim.models.protocols import Identifiable, Undecided
 from hysim.models.search_space import Freedom
 from hysim.models.whole.part_by_part import PartByPart
+from hysim.models.whole.scaled import Scaled
 from hysim.records import Record
 
 _THINNED = 500  # samples of the slow record, beside its reversals
@@ -71,6 +72,20 @@ class _Setting:
         attempt = problem(structure, records, self.freedom if freedom is None else freedom, initial)
         return attempt.weighted(weights).within(self.budget)
 
+    def about_parts(self) -> Freedom:
+        """The user's freedom without what is about the law and the creep."""
+
+        def others(names: Iterable[str]) -> list[str]:
+            return [name for name in names if not name.startswith(("hysteresis.", "creep."))]
+
+        freedom = self.freedom
+        return replace(
+            freedom,
+            fixed={name: freedom.fixed[name] for name in others(freedom.fixed)},
+            free=tuple(others(freedom.free)),
+            bounds={name: freedom.bounds[name] for name in others(freedom.bounds)},
+        )
+
     def beside(self, values: Mapping[str, float]) -> Freedom:
         """The user's freedom with further parameters that are fixed."""
         fixed = {name: value for name, value in values.items() if name not in self.freedom.fixed}
@@ -96,8 +111,8 @@ def begun_by_parts(
     budget = None if max_evaluations is None else Budget(_SHARE * max_evaluations * sum(map(len, records)))
     setting = _Setting(records, freedom, initial, weights, budget, seed)
     setting.problem(plant)  # refuses what does not fit before anything is searched
-    plant, shape = _with_law(plant, setting)
-    plant, known = _grown(plant, setting, shape)
+    plant, law, shape = _with_law(plant, setting)
+    plant, known = _grown(plant, law, setting)
     plant = _tried(plant, setting)
     known = _on_all(plant, setting, shape, known)
     whole = setting.problem(plant.begun(known))
@@ -108,8 +123,8 @@ def begun_by_parts(
     return Begun(plant, records, ends)
 
 
-def _with_law(plant: Any, setting: _Setting) -> tuple[Any, dict[str, float]]:
-    """The plant whose law begins where the law alone is best, and the parameters of the law's shape there."""
+def _with_law(plant: Any, setting: _Setting) -> tuple[Any, Any, dict[str, float]]:
+    """The plant whose law begins where the law alone is best, that law, and the parameters of its shape."""
     k = plant.slowest
     record, law = plant.static(setting.records[k]), plant.law
     freedom = setting.freedom
@@ -125,28 +140,24 @@ def _with_law(plant: Any, setting: _Setting) -> tuple[Any, dict[str, float]]:
     every = decided(law, [record], share, initial, weights).problems
     best, optima = chosen([each.thinned(_THINNED) or each for each in every], seed=setting.seed)
     if not optima:
-        return plant, {}
+        raise ValueError("every set of parameters of the law diverged on the slowest record: pass bounds=")
     estimates = best.estimates(best.completed(optima[0].x[np.newaxis])[0])
     model = best.family.assemble(estimates)
     start = model if isinstance(model, Identifiable) and not isinstance(law, Undecided) else best.family
     space = best.own
     searched = [name for name in space.names if name not in (*space.linear, *space.state)]
-    return plant.with_law(start), {f"hysteresis.{name}": estimates[name] for name in searched}
+    return plant.with_law(start), model, {f"hysteresis.{name}": estimates[name] for name in searched}
 
 
-def _grown(plant: Any, setting: _Setting, shape: Mapping[str, float]) -> tuple[Any, list[Coordinates]]:
+def _grown(plant: Any, law: Any, setting: _Setting) -> tuple[Any, list[Coordinates]]:
     """The plant with the modes that the fastest record shows, and the best coordinates of its parts there."""
-    creep = {name: value for name, value in plant.defaults.items() if name.startswith("creep.")}
-    freedom = setting.beside({**shape, **creep})
+    freedom = setting.about_parts()
     known: list[Coordinates] = []
     before = math.inf
     for each in plant.growing():
-        attempt = setting.problem(each, freedom, only=plant.fastest)
-        if not attempt.n_x:
-            ends, cost = np.empty((1, 0)), float(attempt.costs(np.empty((1, 0)))[0])
-        else:
-            ends = _found(attempt, each, known)
-            cost = float(attempt.costs(ends[:1])[0])
+        attempt = setting.problem(each.with_law(Scaled(law)), freedom, only=plant.fastest)
+        ends = _found(attempt, each, known) if attempt.n_x else np.empty((1, 0))
+        cost = float(attempt.costs(ends[:1])[0])
         criterion = information(max(cost, 1e-300) / attempt.n_samples, attempt.n_samples, len(attempt.space.names))
         if not criterion < before - _STRONG and (smaller := _left_out(plant, each, setting.freedom)) is not None:
             return smaller, known

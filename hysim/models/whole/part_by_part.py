@@ -35,10 +35,6 @@ class PartByPart(Protocol):
         """The noise that its sensor makes, as `identify` names it."""
 
     @property
-    def defaults(self) -> Mapping[str, float]:
-        """Values of the parts' parameters by name, where a search of them begins."""
-
-    @property
     def slowest(self) -> int:
         """The record on which the law is searched alone."""
 
@@ -53,7 +49,7 @@ class PartByPart(Protocol):
         """The plant with another law, or another start of it."""
 
     def growing(self) -> Sequence[Self]:
-        """The plant with more and more of its parts; each contains the one before, the last is the whole plant."""
+        """The plant with more and more of its parts but for slow ones; each contains the one before."""
 
     def points(self, space: SearchSpace, known: Sequence[Mapping[str, float]]) -> FloatArray:
         """Points of a space of this plant, spread over its last part, beside coordinates `known` of a smaller one."""

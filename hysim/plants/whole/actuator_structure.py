@@ -148,12 +148,6 @@ class ActuatorStructure(Identifiable):
         return "quantised" if self.sensor is not None and self.sensor.quantum else "gaussian"
 
     @property
-    def defaults(self) -> dict[str, float]:
-        """Where the parts begin, by name."""
-        boxes = {} if self.survey is None else self.parts([]).boxes()
-        return {f"{part}.{name}": value for part, (_, own) in boxes.items() for name, value in own.items()}
-
-    @property
     def slowest(self) -> int:
         """The record of the slowest input among those with a wide one."""
         return 0 if self.survey is None else int(self.survey.law)
@@ -172,8 +166,10 @@ class ActuatorStructure(Identifiable):
         return replace(self, law=law)
 
     def growing(self) -> Sequence["ActuatorStructure"]:
-        """The structure without modes, with the first one, and so on."""
-        return [replace(self, modes=k) for k in range(self.modes + 1)]
+        """The structure without modes, with the first one, and so on; a creep that is searched is left out."""
+        creep = self.creep if isinstance(self.creep, Creep) else False
+        known = {name: value for name, value in self.known.items() if not name.startswith("creep.")}
+        return [replace(self, modes=k, creep=creep, known=known) for k in range(self.modes + 1)]
 
     def points(self, space: SearchSpace, known: Sequence[Mapping[str, float]]) -> FloatArray:
         """Points of a space of this structure, spread over its last mode and its delay."""
