@@ -34,6 +34,7 @@ _SAME = 0.01  # distance of two points in units of the box, under which the bett
 _BEST, _KEPT = 4, 2  # points that descend on the fastest record, and on all
 _STRONG = 10.0  # difference of two BIC
 _MOST_ROUNDS = 8  # of what is held
+_IN_VAIN = 2  # trials in a row that are no better
 _SHARE = 0.5  # of the evaluations that the user allows
 
 Initial = str | Sequence[str] | None
@@ -187,13 +188,16 @@ def _left_out(plant: Any, each: Any, freedom: Freedom) -> Any:
 
 
 def _tried(plant: Any, setting: _Setting) -> Any:
-    """The best of the plant's trials."""
-    trials = plant.trials()
-    if len(trials) == 1:
-        return plant
-    problems = [setting.problem(each) for each in trials]
-    costs = [float(each.costs(each.space.starts[:1])[0]) for each in problems]
-    return trials[int(np.argmin(costs))]
+    """The best of the plant's trials, in whose order the sum of squares has one minimum."""
+    best, least, worse = plant, math.inf, 0
+    for trial in plant.trials():
+        if len(plant.trials()) == 1 or worse == _IN_VAIN:
+            break
+        attempt = setting.problem(trial)
+        ends = _descended(attempt, attempt.space.starts[:1], exact=False) if attempt.n_x else np.empty((1, 0))
+        cost = float(attempt.costs(ends)[0])
+        best, least, worse = (trial, cost, 0) if cost < least else (best, least, worse + 1)
+    return best
 
 
 def _on_all(

@@ -21,6 +21,8 @@ _LIGHT = (0.003, 0.012, 0.04)
 _NEAR, _N_NEAR = 0.04, 15  # share of a frequency about which finer ones are tried, and how many
 _SHARES = (-0.3, -0.05, 0.05, 0.3)  # gains of a further mode
 _DELAYS = (0.0, 1.5, 4.0, 10.0)  # samples
+_TIME_CONSTANT = "amplifier.time_constant"
+_SLOWER = (10.0, 50.0, 250.0)  # times the shortest time constant
 _MOST_BEGUN = 2  # sets of known coordinates beside which points are spread
 
 
@@ -44,6 +46,8 @@ def points(space: SearchSpace, modes: int, known: Sequence[Mapping[str, float]])
         axes[frequency] = np.linspace(low, high, count)
     axes |= {damping: np.log(_BROAD), gain: _SHARES} if modes else {}
     axes |= {"vibration.delay": _DELAYS} if modes < 2 else {}
+    if modes < 2 and _TIME_CONSTANT in space.coordinates:
+        axes[_TIME_CONSTANT] = space.lower[space.coordinates.index(_TIME_CONSTANT)] + np.log(_SLOWER)
     return _spread(space, axes, as_points(space, known)[:_MOST_BEGUN])
 
 
@@ -70,6 +74,8 @@ def _names(modes: int) -> tuple[str, str, str]:
 def _spread(space: SearchSpace, axes: Mapping[str, Any], base: FloatArray) -> FloatArray:
     """Every combination of values of the axes that the space has, beside each of the base points."""
     own = {name: values for name, values in axes.items() if name in space.coordinates}
+    if not own:
+        return base
     places = [space.coordinates.index(name) for name in own]
     grid = np.array(list(itertools.product(*own.values()))).reshape(-1, len(places))
     spread = np.repeat(base, len(grid), axis=0)
