@@ -123,7 +123,8 @@ def identify(
     (0.7, 2.0)
     """
     given = model_or_class.as_records(record_or_records) if isinstance(model_or_class, Recorded) else record_or_records
-    records, options = several(given, "identify"), _freedom(fixed or {}, free, bounds or {})
+    records: Sequence[Record] = several(given, "identify")
+    options = _freedom(fixed or {}, free, bounds or {})
     if intervals not in ("linear", "profile", "bootstrap"):
         raise ValueError(f'intervals must be "linear", "profile" or "bootstrap", got {intervals!r}')
     if noise not in (None, "gaussian", "quantised", "robust"):

@@ -9,7 +9,7 @@
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -73,18 +73,14 @@ class _Setting:
         attempt = problem(structure, records, self.freedom if freedom is None else freedom, initial)
         return attempt.weighted(weights).within(self.budget)
 
-    def about_parts(self) -> Freedom:
-        """The user's freedom without what is about the law and the creep."""
-
-        def others(names: Iterable[str]) -> list[str]:
-            return [name for name in names if not name.startswith(("hysteresis.", "creep."))]
-
+    def about(self, names: Container[str]) -> Freedom:
+        """The part of the user's freedom that is about these parameters."""
         freedom = self.freedom
         return replace(
             freedom,
-            fixed={name: freedom.fixed[name] for name in others(freedom.fixed)},
-            free=tuple(others(freedom.free)),
-            bounds={name: freedom.bounds[name] for name in others(freedom.bounds)},
+            fixed={name: value for name, value in freedom.fixed.items() if name in names},
+            free=tuple(name for name in freedom.free if name in names),
+            bounds={name: pair for name, pair in freedom.bounds.items() if name in names},
         )
 
     def beside(self, values: Mapping[str, float]) -> Freedom:
@@ -111,7 +107,8 @@ def begun_by_parts(
     plant, records = structure.over(records, freedom)
     budget = None if max_evaluations is None else Budget(_SHARE * max_evaluations * sum(map(len, records)))
     setting = _Setting(records, freedom, initial, weights, budget, seed)
-    setting.problem(plant)  # refuses what does not fit before anything is searched
+    trial = setting.problem(plant)  # refuses what does not fit before anything is searched
+    trial.split(0.5 * (trial.space.lower + trial.space.upper)[np.newaxis])
     plant, law, shape = _with_law(plant, setting)
     plant, known = _grown(plant, law, setting)
     plant = _tried(plant, setting)
@@ -152,11 +149,10 @@ def _with_law(plant: Any, setting: _Setting) -> tuple[Any, Any, dict[str, float]
 
 def _grown(plant: Any, law: Any, setting: _Setting) -> tuple[Any, list[Coordinates]]:
     """The plant with the modes that the fastest record shows, and the best coordinates of its parts there."""
-    freedom = setting.about_parts()
     known: list[Coordinates] = []
     before = math.inf
     for each in plant.growing():
-        attempt = setting.problem(each.with_law(Scaled(law)), freedom, only=plant.fastest)
+        attempt = setting.problem(each.with_law(Scaled(law)), setting.about(each.names), only=plant.fastest)
         ends = _found(attempt, each, known) if attempt.n_x else np.empty((1, 0))
         cost = float(attempt.costs(ends[:1])[0])
         criterion = information(max(cost, 1e-300) / attempt.n_samples, attempt.n_samples, len(attempt.space.names))

@@ -48,6 +48,10 @@ class PartByPart(Protocol):
     def with_law(self, law: Any) -> Self:
         """The plant with another law, or another start of it."""
 
+    @property
+    def names(self) -> frozenset[str]:
+        """Names of the parameters of the parts beside the law."""
+
     def growing(self) -> Sequence[Self]:
         """The plant with more and more of its parts but for slow ones; each contains the one before."""
 

@@ -24,7 +24,7 @@ from hysim.plants.creep import Creep
 from hysim.plants.sensor import Sensor
 from hysim.plants.whole import doubts, starts
 from hysim.plants.whole.columns import columns_through
-from hysim.plants.whole.creep_bank import checked_creep, creep_bank
+from hysim.plants.whole.creep_bank import CreepBank, checked_creep, creep_bank
 from hysim.plants.whole.linear_parts import LinearParts
 from hysim.plants.whole.survey import Survey
 from hysim.records import Record
@@ -84,8 +84,6 @@ class ActuatorStructure(Identifiable):
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The law's box and that of the other parts, side by side; ValueError without even times."""
-        if freedom.initial == "periodic":
-            raise ValueError('an actuator begins at rest, not in a cycle: initial="periodic" is not for it')
         if self.offsets == "own" and freedom.initial not in (None, "free"):
             raise ValueError('offsets="own" needs initial="free"; fix the memory by fixed={"hysteresis.z0": 0}')
         parts = self.parts([record])
@@ -93,7 +91,7 @@ class ActuatorStructure(Identifiable):
         known = {name: value for name, value in self.known.items() if name not in freedom.free}
         wished = replace(freedom, fixed={**known, **freedom.fixed})
         scaling = self.static(record) if self.scaled_on is None else self.scaled_on
-        own_spaces = {name: lambda free, name=name: parts.spaces({name: free})[name] for name in parts.boxes()}  # type: ignore[misc]
+        own_spaces = {name: lambda free, name=name: parts.spaces({name: free})[name] for name in parts.boxes()}
         spaces = declared({_LAW: lambda free: self.law.search_space(scaling, free), **own_spaces}, wished)
         space = together(spaces)
         state = (*space.state, _OFFSET) if self.offsets == "own" and _OFFSET in space.linear else space.state
@@ -109,7 +107,9 @@ class ActuatorStructure(Identifiable):
         return columns_through(self.law, law, others, lambda each: parts.stages(each, late), record)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        """The law's memory after what ran ahead of the record, an input that stood still."""
+        """The law's memory after an input that stood still; ValueError for one that moved."""
+        if np.ptp(record.u) > 0.0:
+            raise ValueError('an actuator begins at rest, not in a cycle: initial="periodic" is not for it')
         found = self.law.steady(own(parameters, _LAW), self.static(record))
         return {f"{_LAW}.{name}": value for name, value in found.items()}
 
@@ -134,9 +134,9 @@ class ActuatorStructure(Identifiable):
                 replace(record, resolution=quantum) if record.resolution is None else record for record in records
             ]
         bank = creep_bank(self.creep, survey.shortest, survey.longest)
-        idle = {} if bank is None else {f"creep.weights[{k}]": 0.0 for k in bank.idle}
+        idle = {f"creep.weights[{k}]": 0.0 for k in bank.idle} if isinstance(bank, CreepBank) else {}
         idle = {name: value for name, value in idle.items() if name not in {*freedom.free, *freedom.bounds}}
-        remarks = (bank.remark,) if bank is not None and idle else ()
+        remarks = (bank.remark,) if isinstance(bank, CreepBank) and idle else ()
         scaled_on = self.static(records[survey.law])
         structure = replace(self, survey=survey, scaled_on=scaled_on, known=idle, remarks=remarks)
         structure.parts([]).check(freedom)
@@ -164,6 +164,12 @@ class ActuatorStructure(Identifiable):
     def with_law(self, law: Any) -> "ActuatorStructure":
         """The structure with this law, or this start of it."""
         return replace(self, law=law)
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Names of the parameters of the parts beside the law."""
+        boxes = {} if self.survey is None else self.parts([]).boxes()
+        return frozenset(f"{part}.{each.name}" for part, (box, _) in boxes.items() for each in box)
 
     def growing(self) -> Sequence["ActuatorStructure"]:
         """The structure without modes, with the first one, and so on; a creep that is searched is left out."""
@@ -204,7 +210,7 @@ class ActuatorStructure(Identifiable):
         """The parts beside the law, for the records that the structure is for or else for these."""
         survey = self.survey if self.survey is not None or not records else Survey.of(records)
         bank: Any = self.creep
-        if survey is not None and not isinstance(bank, Creep):
+        if survey is not None:
             bank = creep_bank(bank, survey.shortest, survey.longest)
         return LinearParts(self.amplifier, bank, self.modes, self.delay, survey)
 

@@ -76,10 +76,10 @@ class CreepBank:
         return f"the records are too short or too coarse for creep at {times} s: its weights are held at 0"
 
 
-def creep_bank(creep: Any, shortest: float, longest: float) -> CreepBank | None:
-    """The bank for records with a `shortest` sample time and a `longest` duration [s]; None without one."""
-    if creep is False or creep is None:
-        return None
+def creep_bank(creep: Any, shortest: float, longest: float) -> CreepBank | Creep | None:
+    """The bank for records with a `shortest` sample time and a `longest` duration [s], or a creep that is known."""
+    if creep is False or creep is None or isinstance(creep, Creep):
+        return creep or None
     if creep is True:
         whole = Creep.per_decade(1.0, band=(_BAND[0], max(_BAND[1], longest)))
         return CreepBank(whole.time_constants, whole.weights)

@@ -95,7 +95,8 @@ class LinearParts:
         return Stages(amplifier, creep, vibration)
 
     def _vibration(self) -> tuple[tuple[Coordinate, ...], dict[str, float]]:
-        survey, box, defaults = self.survey, [], {}
+        survey, box = self.survey, []
+        defaults: dict[str, float] = {}
         highest = _BELOW_NYQUIST * survey.nyquist
         lowest = min(2.0 * math.pi * _PERIODS / survey.duration, 0.5 * highest)
         for k in range(self.modes):
