@@ -10,9 +10,9 @@ no record holds, is predicted; its error is that against the true displacement, 
 
 Beside it stand the law alone, identified on all records, and the law with a transfer function of two poles and a delay
 behind it, identified on the steps, the one record that shows a mode; that search takes longer, and runs on the first
-ten draws.
+five draws.
 
-    python experiments/46_whole_actuator.py [resume]     cases that are stored are kept with resume
+    python experiments/46_whole_actuator.py [CASES.jsonl]    with a file, its cases are kept and others are added to it
 """
 
 import json
@@ -31,9 +31,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 from results_folder import write_results
 
 RESULTS = Path(__file__).parent / "results" / "whole_actuator"
-CASES = RESULTS / "cases.jsonl"
 N_DRAWS, N_PLAYS = 50, 10
-N_OF_CASCADE = 10
+N_OF_CASCADE = 5
 FAST, MEDIUM, SLOW = 1.0 / 20e3, 1e-3, 0.02  # sample times [s]
 HIGHEST = 125.0  # V
 RANGE = 3.0  # um, of the sensor of 12 bits
@@ -157,25 +156,23 @@ def case(draw: int, model: str) -> Row:
     }  # fmt: skip
 
 
-def stored() -> dict[tuple[int, str], Row]:
+def stored(file: Path | None) -> dict[tuple[int, str], Row]:
     """Cases that were computed before."""
-    lines = CASES.read_text(encoding="utf-8").splitlines() if CASES.exists() else []
+    lines = file.read_text(encoding="utf-8").splitlines() if file is not None and file.exists() else []
     return {(row["draw"], row["model"]): row for row in map(json.loads, lines)}
 
 
-def computed(resume: bool) -> list[Row]:
-    """All cases, each stored as soon as it is known; all whole actuators first."""
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    if not resume:
-        CASES.unlink(missing_ok=True)
-    known = stored()
+def computed(file: Path | None) -> list[Row]:
+    """All cases, each stored in the file as soon as it is known; all whole actuators first."""
+    known = stored(file)
     for model, n in ((WHOLE, N_DRAWS), (ALONE, N_DRAWS), (CASCADE, N_OF_CASCADE)):
         for draw in range(n):
             if (draw, model) not in known:
                 known[draw, model] = case(draw, model)
-                with CASES.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(known[draw, model], allow_nan=False) + "\n")
                 print(draw, model, known[draw, model]["error_in_noise"], flush=True)
+                if file is not None:
+                    with file.open("a", encoding="utf-8") as lines:
+                        lines.write(json.dumps(known[draw, model], allow_nan=False) + "\n")
     return [known[key] for key in sorted(known)]
 
 
@@ -217,14 +214,14 @@ def coverage(cases: list[Row]) -> dict[str, Any]:
     }
 
 
-def main(smoke: bool = False, resume: bool = False) -> list[Row]:
+def main(smoke: bool = False, file: Path | None = None) -> list[Row]:
     """Measure, and unless it is a smoke run write table, figure and JSON."""
     if smoke:
         truth, structure, records, _ = stage(1)
         subject = hs.Actuator.structure(structure, creep=False, sensor=hs.Sensor(quantum=truth.sensor.quantum))
         fit = hs.identify(subject, [records[0][:1500:3], records[1][:800]], noise="gaussian")
         return [{"model": WHOLE, "fit_percent": fit.fit_percent}]
-    cases = computed(resume)
+    cases = computed(file)
     rows = [summary(cases, model) for model in (WHOLE, CASCADE, ALONE)]
     numbers = coverage(cases)
     write_results(RESULTS, rows, lambda _: draw(cases), numbers)
@@ -254,4 +251,4 @@ def draw(cases: list[Row]) -> Figure:
 
 
 if __name__ == "__main__":
-    main(resume="resume" in sys.argv)
+    main(file=Path(sys.argv[1]) if len(sys.argv) > 1 else None)

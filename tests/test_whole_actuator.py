@@ -217,6 +217,12 @@ def test_parameters_that_depend_on_a_channel_are_refused():
         hs.identify(hs.Actuator.structure(hs.Line), records(), depends={"hysteresis.slope": ("T", 1)})
 
 
+def test_a_search_that_ends_early_says_so():
+    found = hs.identify(hs.Actuator.structure(hs.Line), records(), max_evaluations=200)
+    assert not found.success
+    assert found.message.startswith("partial: the search stopped at max_evaluations=200")
+
+
 # ---------------------------------------------------------------------------------- from files
 
 

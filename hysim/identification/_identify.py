@@ -143,9 +143,11 @@ def identify(
             family = _family(model_or_class, depends)
             if isinstance(family, DependentStructure):
                 family = begun(family.over(records), records, options, initial, max_evaluations)
-            ends = None
+            ends, is_cut = None, False
             if isinstance(family, PartByPart):
-                family, records, ends = begun_by_parts(family, records, options, initial, shares, max_evaluations, seed)
+                family, records, ends, is_cut = begun_by_parts(
+                    family, records, options, initial, shares, max_evaluations, seed
+                )
                 noise = noise or family.noise
             paths, noisy = quiet_where_better(family, records, options, initial)
             choice = decided(family, paths, options, initial, shares, max_evaluations)
@@ -155,7 +157,7 @@ def identify(
             fit = _searched(searched, noise or "gaussian", intervals, left_out(cross_validate, records), seed, progress)
             fit = replace(fit, message="; ".join(filter(None, (fit.message, choice.sentence, noisy))))
             first, doubts = choice.problems[0], [swapped_columns(records)]
-            if is_partial := first.budget is not None and (first.budget.cut or not fit.success):
+            if is_partial := is_cut or (first.budget is not None and (first.budget.cut or not fit.success)):
                 stopped = f"partial: the search stopped at max_evaluations={max_evaluations}"
                 fit = replace(fit, success=False, message=f"{stopped}, better parameters may exist; {fit.message}")
             if not any(doubts) and not is_partial and not needs_time(fit.model):

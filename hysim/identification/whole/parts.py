@@ -47,6 +47,7 @@ class Begun(NamedTuple):
     structure: Any
     records: Sequence[Record]
     ends: FloatArray
+    cut: bool  # whether the user's number of evaluations has ended a part of the search
 
 
 @dataclass(frozen=True)
@@ -114,11 +115,11 @@ def begun_by_parts(
     plant = _tried(plant, setting)
     known = _on_all(plant, setting, shape, known)
     whole = setting.problem(plant.begun(known))
-    if not whole.n_x:
-        return Begun(plant, records, np.empty((1, 0)))
-    best = _descended(whole, whole.space.starts, exact=False)[:1]
-    plant, ends = _told_apart(plant, setting, whole, _descended(whole, best, exact=True))
-    return Begun(plant, records, ends)
+    ends = np.empty((1, 0))
+    if whole.n_x:
+        best = _descended(whole, _best_starts(whole), exact=False)[:1]
+        plant, ends = _told_apart(plant, setting, whole, _descended(whole, best, exact=True))
+    return Begun(plant, records, ends, budget is not None and budget.cut)
 
 
 def _with_law(plant: Any, setting: _Setting) -> tuple[Any, Any, dict[str, float]]:
@@ -190,7 +191,7 @@ def _tried(plant: Any, setting: _Setting) -> Any:
         if len(plant.trials()) == 1 or worse == _IN_VAIN:
             break
         attempt = setting.problem(trial)
-        ends = _descended(attempt, attempt.space.starts[:1], exact=False) if attempt.n_x else np.empty((1, 0))
+        ends = _descended(attempt, _best_starts(attempt)[:1], exact=False) if attempt.n_x else np.empty((1, 0))
         cost = float(attempt.costs(ends)[0])
         best, least, worse = (trial, cost, 0) if cost < least else (best, least, worse + 1)
     return best
@@ -203,7 +204,7 @@ def _on_all(
     attempt = setting.problem(plant.begun(known), setting.beside(shape))
     if not attempt.n_x:
         return []
-    return _parts_only(attempt, _descended(attempt, attempt.space.starts, exact=False)[:_KEPT])
+    return _parts_only(attempt, _descended(attempt, _best_starts(attempt), exact=False)[:_KEPT])
 
 
 def _told_apart(plant: Any, setting: _Setting, whole: Problem, ends: FloatArray) -> tuple[Any, FloatArray]:
@@ -220,7 +221,7 @@ def _told_apart(plant: Any, setting: _Setting, whole: Problem, ends: FloatArray)
         whole = setting.problem(plant.begun(known))
         if not whole.n_x:
             return plant, np.empty((1, 0))
-        ends = _descended(whole, whole.space.starts, exact=True)
+        ends = _descended(whole, _best_starts(whole)[:1], exact=True)
     return plant, ends
 
 
@@ -234,6 +235,12 @@ def _stderr(whole: Problem, theta: FloatArray) -> dict[str, float]:
     variance = float(np.average(residual**2, weights=whole.weights)) or 1e-300
     covariance = uncertainty(whole, theta, np.full(residual.size, 1.0 / variance)).covariance
     return dict(zip(whole.space.names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+
+
+def _best_starts(attempt: Problem) -> FloatArray:
+    """The best of the starts of a problem, of few all in their order."""
+    starts = attempt.space.starts
+    return starts if len(starts) <= 1 else apart(attempt.space, starts, attempt.costs(starts), _SAME, _BEST)
 
 
 def _descended(attempt: Problem, points: FloatArray, *, exact: bool) -> FloatArray:

@@ -27,13 +27,13 @@ _MOST_BEGUN = 2  # sets of known coordinates beside which points are spread
 
 
 def as_points(space: SearchSpace, known: Sequence[Mapping[str, float]]) -> FloatArray:
-    """Coordinates (n, n_x) by name, the missing ones as the space begins; without any the starts of the space."""
-    if not known:
-        return space.starts
-    points = np.repeat(space.starts[:1], len(known), axis=0)
-    for row, each in zip(points, known, strict=True):
-        row[:] = [each.get(name, value) for name, value in zip(space.coordinates, row, strict=True)]
-    return points
+    """Coordinates (n, n_x) by name, the missing ones as of each start of the space; without any these starts."""
+    rows = [
+        [each.get(name, value) for name, value in zip(space.coordinates, start, strict=True)]
+        for each in known or ({},)
+        for start in space.starts.tolist()
+    ]
+    return np.unique(rows, axis=0) if len(rows) > 1 else np.array(rows).reshape(len(rows), -1)
 
 
 def points(space: SearchSpace, modes: int, known: Sequence[Mapping[str, float]]) -> FloatArray:
