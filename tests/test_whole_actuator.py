@@ -55,6 +55,9 @@ def test_every_part_is_found_within_its_standard_errors(fit):
 
 def test_the_model_is_an_actuator_whose_response_is_the_fit(fit):
     cuts = [len(rec) for rec in records()][:1]
+    percent = fit.estimates[CREEP]
+    np.testing.assert_allclose(fit.model.creep.weights, hs.Creep.per_decade(percent).weights, rtol=1e-12)
+    assert fit.model.creep.step_response(0.1) == pytest.approx(1.0, rel=1e-12)
     for model, rec, residual in zip(fit.models, records(), np.split(fit.residual, cuts), strict=True):
         assert isinstance(model, hs.Actuator)
         np.testing.assert_allclose(model.response(rec.u, rec.sample_time), rec.y - residual, atol=1e-13)
@@ -72,7 +75,9 @@ def test_two_modes_and_offsets_of_each_record_are_found():
     vibration = hs.Modes(natural_frequencies=(500.0, 1400.0), damping_ratios=(0.05, 0.04), gains=(0.7, 0.3))
     slow, fast = records(hs.Actuator(hysteresis=hs.Line(slope=2.0), vibration=vibration), noise=1e-4)
     structure = hs.Actuator.structure(hs.Line, creep=False, modes=2, delay=False, offsets="own")
-    found = hs.identify(structure, [slow, dataclasses.replace(fast, y=fast.y + 3.0)]).estimates
+    fit = hs.identify(structure, [slow, dataclasses.replace(fast, y=fast.y + 3.0)])
+    assert fit.model.vibration.dc_gain == pytest.approx(1.0, rel=1e-12)
+    found = fit.estimates
     assert found[FREQUENCY.format(0)] == pytest.approx(500.0, rel=1e-3)
     assert found[FREQUENCY.format(1)] == pytest.approx(1400.0, rel=1e-3)
     assert found[GAIN.format(1)] == pytest.approx(0.3, rel=1e-2)
