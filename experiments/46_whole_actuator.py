@@ -24,14 +24,14 @@ from typing import Any
 import numpy as np
 
 import hysim as hs
-from hysim.plot import Figure, figure, panels
+from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
 from results_folder import write_results
 
 RESULTS = Path(__file__).parent / "results" / "whole_actuator"
 N_DRAWS, N_PLAYS = 50, 10
-N_OF_ALONE, N_OF_CASCADE = 20, 5
+N_OF_ALONE, N_OF_CASCADE = 25, 5
 FAST, MEDIUM, SLOW = 1.0 / 20e3, 1e-3, 0.02  # sample times [s]
 HIGHEST = 125.0  # V
 RANGE = 3.0  # um, of the sensor of 12 bits
@@ -232,20 +232,21 @@ def main(smoke: bool = False, file: Path | None = None) -> list[Row]:
 
 def draw(cases: list[Row]) -> Figure:
     """Errors of the predictions in the order of their sizes, and the creep that was found against the true one."""
-    canvas = figure(height=5.2)
-    upper, lower = panels(canvas, 2)
+    canvas = figure(height=3.6)
+    upper, lower = canvas.subplots(1, 2)
     for model, colour in ((ALONE, "#999999"), (CASCADE, "#E69F00"), (WHOLE, "#0072B2")):
         errors = sorted(each["error_in_noise"] for each in cases if each["model"] == model)
         upper.plot(np.arange(1, len(errors) + 1), errors, ".-", color=colour, label=model, markersize=4, linewidth=0.8)
     upper.axhline(1.5, color="#D55E00", linewidth=0.8, linestyle="dashed", label="1.5 times the noise")
     upper.set(yscale="log", xlabel="draws, in the order of the error", ylabel="error / sensor's noise")
-    upper.legend(fontsize=7)
+    upper.set_ylim(top=1e3)
+    upper.legend(fontsize=7, loc="upper right")
     for each in cases:
         if each["model"] == WHOLE and "creep.percent" in each["intervals"]:
             value, found, low, high = each["intervals"]["creep.percent"]
             lower.errorbar(value, found, [[found - low], [high - found]], fmt=".", color="#0072B2", markersize=4)
     lower.plot([0.5, 3.0], [0.5, 3.0], color="#D55E00", linewidth=0.8, linestyle="dashed")
-    lower.set(xlabel="true creep [% a decade]", ylabel="identified")
+    lower.set(xlabel="true creep [% a decade]", ylabel="identified [% a decade]")
     return canvas
 
 

@@ -1189,7 +1189,7 @@ def whole_actuator(result: Result) -> list[str]:
         f"{part.rpartition('.')[2].replace('_', ' ')} {number(value)} %" for part, value in parts.items()
     )
     beside = "; ".join(
-        f"{name} {number(row['median_error_in_noise'], 2)} (worst {number(row['worst_error_in_noise'], 2)}, "
+        f"{name} to {number(row['median_error_in_noise'], 2)} times (worst {number(row['worst_error_in_noise'], 2)}, "
         f"{row['draws']} draws)"
         for name, row in (("the law alone", alone), ("the law and a transfer function", cascade))
     )
