@@ -67,7 +67,8 @@ def test_a_delay_is_found_by_fractions_of_a_sample():
     for delay in (0.35e-3, 2.6e-3):
         stage = hs.Actuator(hysteresis=hs.Line(slope=2.0), vibration=hs.mode(600.0, 0.03, delay=delay))
         structure = hs.Actuator.structure(hs.Line, creep=False)
-        found = hs.identify(structure, record(stage, FAST, noise=1e-4), fixed={"vibration.damping_ratios[0]": 0.03})
+        bounds = {FREQUENCY.format(0): (300.0, 1200.0)}
+        found = hs.identify(structure, record(stage, FAST, noise=1e-4), bounds=bounds)
         assert found.estimates[DELAY] == pytest.approx(delay, abs=1e-6)
 
 
@@ -75,7 +76,8 @@ def test_two_modes_and_offsets_of_each_record_are_found():
     vibration = hs.Modes(natural_frequencies=(500.0, 1400.0), damping_ratios=(0.05, 0.04), gains=(0.7, 0.3))
     slow, fast = records(hs.Actuator(hysteresis=hs.Line(slope=2.0), vibration=vibration), noise=1e-4)
     structure = hs.Actuator.structure(hs.Line, creep=False, modes=2, delay=False, offsets="own")
-    fit = hs.identify(structure, [slow, dataclasses.replace(fast, y=fast.y + 3.0)])
+    bounds = {FREQUENCY.format(0): (300.0, 900.0), FREQUENCY.format(1): (900.0, 3000.0)}
+    fit = hs.identify(structure, [slow, dataclasses.replace(fast, y=fast.y + 3.0)], bounds=bounds)
     assert fit.model.vibration.dc_gain == pytest.approx(1.0, rel=1e-12)
     found = fit.estimates
     assert found[FREQUENCY.format(0)] == pytest.approx(500.0, rel=1e-3)

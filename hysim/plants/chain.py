@@ -102,7 +102,6 @@ class Chain:
             self.seen_in, at = whole_and_part((1.0 - part) * self.substeps)
             seen = seen_within(self.linear, self.step, self.delay, at, **between)
         self.outputs = read_only([self.stage.output, seen])
-        self._parameters = self._packed()
 
     @property
     def linear_block(self) -> FloatArray:
@@ -236,7 +235,8 @@ class Chain:
         takes_time = self.amplifier.dynamic or whole_and_part(self.delay / self.step)[1]
         return bool(not takes_time and self.linear.D)
 
-    def _packed(self) -> FloatArray:
+    @functools.cached_property
+    def _parameters(self) -> FloatArray:
         """The stages apart from the law, as `hysim.kernels.loop` takes them."""
         stage = self.stage
         head = [
