@@ -31,8 +31,10 @@ from hysim.records import Record
 
 _THINNED = 500  # samples of the slow record, beside its reversals
 _SAME = 0.01  # distance of two points in units of the box, under which the better one stands for both
-_BEST, _KEPT = 4, 2  # points that descend on the fastest record, and on all
+_APART = 0.03  # likewise of the first points on the fastest record
+_BEST, _KEPT = 8, 2  # points that descend on the fastest record, and on all
 _STRONG = 10.0  # difference of two BIC
+_BEST_OF_ALL = 4  # points that descend where the law is searched too
 _MOST_ROUNDS = 8  # of what is held
 _IN_VAIN = 2  # trials in a row that are no better
 _SHARE = 0.5  # of the evaluations that the user allows
@@ -167,10 +169,13 @@ def _found(attempt: Problem, plant: Any, known: Sequence[Coordinates]) -> FloatA
     """Ends of descents from the best points on the fastest record, the best first."""
     space = attempt.space
     points = plant.points(space, known)
-    best = apart(space, points, attempt.costs(points), _SAME, _BEST)
+    best = apart(space, points, attempt.costs(points), _APART, _BEST)
     points = plant.finer(space, best if len(best) else space.starts[:1])
     best = apart(space, points, attempt.costs(points), _SAME, _BEST)
-    return _descended(attempt, best, exact=False) if len(best) else space.starts[:1]
+    if not len(best):
+        return space.starts[:1]
+    ends = _descended(attempt, best, exact=False)
+    return apart(space, ends, attempt.costs(ends), _SAME, _BEST_OF_ALL)
 
 
 def _left_out(plant: Any, each: Any, freedom: Freedom) -> Any:
@@ -240,7 +245,7 @@ def _stderr(whole: Problem, theta: FloatArray) -> dict[str, float]:
 def _best_starts(attempt: Problem) -> FloatArray:
     """The best of the starts of a problem, of few all in their order."""
     starts = attempt.space.starts
-    return starts if len(starts) <= 1 else apart(attempt.space, starts, attempt.costs(starts), _SAME, _BEST)
+    return starts if len(starts) <= 1 else apart(attempt.space, starts, attempt.costs(starts), _SAME, _BEST_OF_ALL)
 
 
 def _descended(attempt: Problem, points: FloatArray, *, exact: bool) -> FloatArray:

@@ -18,9 +18,11 @@ MOST_LATE = 13  # samples of delay that are tried where no descent finds it
 _PER_DECADE = 55  # frequencies: a step is half the width of the narrower mode that is tried
 _BROAD = (0.03, 0.2)  # damping ratios
 _LIGHT = (0.003, 0.012, 0.04)
-_NEAR, _N_NEAR = 0.04, 15  # share of a frequency about which finer ones are tried, and how many
+_NEAR, _N_NEAR = 0.04, 11  # share of a frequency about which finer ones are tried, and how many
 _SHARES = (-0.3, -0.05, 0.05, 0.3)  # gains of a further mode
-_DELAYS = (0.0, 1.5, 4.0, 10.0)  # samples
+_DELAYS = (0.0, 1.5, 3.0, 6.0, 10.0)  # samples
+_NEAR_DELAYS = (-0.8, 0.0, 0.8)  # likewise, beside those of the best points
+_DELAY = "vibration.delay"
 _TIME_CONSTANT = "amplifier.time_constant"
 _SLOWER = (10.0, 50.0, 250.0)  # times the shortest time constant
 _MOST_BEGUN = 2  # sets of known coordinates beside which points are spread
@@ -45,14 +47,14 @@ def points(space: SearchSpace, modes: int, known: Sequence[Mapping[str, float]])
         count = 1 + int(np.ceil((high - low) / np.log(10.0) * _PER_DECADE))
         axes[frequency] = np.linspace(low, high, count)
     axes |= {damping: np.log(_BROAD), gain: _SHARES} if modes else {}
-    axes |= {"vibration.delay": _DELAYS} if modes < 2 else {}
+    axes |= {_DELAY: _DELAYS} if modes < 2 else {}
     if modes < 2 and _TIME_CONSTANT in space.coordinates:
         axes[_TIME_CONSTANT] = space.lower[space.coordinates.index(_TIME_CONSTANT)] + np.log(_SLOWER)
     return _spread(space, axes, as_points(space, known)[:_MOST_BEGUN])
 
 
 def finer(space: SearchSpace, modes: int, best: FloatArray) -> FloatArray:
-    """Points (n, n_x) of lighter dampings about the frequencies of the `best` ones, and these."""
+    """Points (n, n_x) of lighter dampings about the frequencies and delays of the `best` ones, and these."""
     frequency, damping, _ = _names(modes)
     if not {frequency, damping} & {*space.coordinates}:
         return best
@@ -62,6 +64,8 @@ def finer(space: SearchSpace, modes: int, best: FloatArray) -> FloatArray:
         if frequency in space.coordinates:
             centre = point[space.coordinates.index(frequency)]
             axes[frequency] = centre + np.linspace(-_NEAR, _NEAR, _N_NEAR)
+        if _DELAY in space.coordinates:
+            axes[_DELAY] = point[space.coordinates.index(_DELAY)] + np.array(_NEAR_DELAYS)
         about.append(_spread(space, axes, point[np.newaxis]))
     return np.concatenate([best, *about])
 
