@@ -20,8 +20,8 @@ def run(options: argparse.Namespace) -> int:
     from hysim.simulation import simulate
 
     model = models.to_identify(options)
-    if options.others and (options.weights is not None or options.sensor):
-        raise ValueError("--weights and --sensor are for one file: leave out the others, or use hysim.identify in Python")
+    if options.others and (options.weights is not None or options.sensor or options.y_file is not None):
+        raise ValueError("--weights, --sensor and --y-file are for one file: leave out the others, or use Python")
     record, weights = records.read_with_weights(options)
     others = [records.read(options, file) for file in options.others]
     measured: Any = sensors.of_structure(model, record, dict(options.sensor)) if options.sensor else record
