@@ -9,7 +9,7 @@ import pytest
 import hysim as hs
 from hysim.identification._assumptions import decided
 from hysim.identification._problem import problem, problems
-from hysim.identification._search import _descended, optima, polish
+from hysim.identification._search import descended, optima, polish
 from hysim.models.law import Law
 from hysim.models.model import every_family
 from hysim.models.search_space import Freedom
@@ -150,7 +150,7 @@ def test_what_holds_parameters_of_a_family_passes_its_stages_on():
 def test_amended_slopes_of_the_rough_law_lead_as_low_as_slopes_of_the_law():
     _, worn, *_ = problems(hs.BoucWenBaberNoori(), [RECORDS["pinching"]], Freedom(), None)
     starts = worn.begun(np.array([[0.3, 0.2, np.log(1.2), 0.4], [0.8, -0.3, 0.0, 0.0]])[:, : worn.simpler.n_x])
-    by_law = worn.costs(_descended(worn, starts, exact=True).theta[:, : worn.n_x])
+    by_law = worn.costs(descended(worn, starts, exact=True).theta[:, : worn.n_x])
     by_rough = [each.cost for each in polish(worn, starts)]
     assert min(by_rough) <= by_law.min() * (1.0 + ROUNDING)
 

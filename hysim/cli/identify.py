@@ -20,11 +20,14 @@ def run(options: argparse.Namespace) -> int:
     from hysim.simulation import simulate
 
     model = models.to_identify(options)
+    if options.others and (options.weights is not None or options.sensor or options.y_file is not None):
+        raise ValueError("--weights, --sensor and --y-file are for one file: leave out the others, or use Python")
     record, weights = records.read_with_weights(options)
+    others = [records.read(options, file) for file in options.others]
     measured: Any = sensors.of_structure(model, record, dict(options.sensor)) if options.sensor else record
     fit = identify(
         model,
-        measured,
+        [measured, *others] if others else measured,
         fixed=dict(options.fix),
         free=tuple(options.free),
         bounds=dict(options.bounds),
@@ -56,7 +59,7 @@ COMMAND = Command(
     "Identify a model's parameters by its error in free run, and print them with their standard errors. Exit code 1: "
     "the search did not converge.",
     f"""
-{records.OPTIONS_WITH_WEIGHTS}
+{records.OPTIONS_WITH_WEIGHTS.replace(records.FILE, records.FILES)}
 {models.OPTIONS}
 --sensor SENSOR=COLUMN...  what a sensor on a structure measured, by the names of hysim simulate, and its column:
     drift_0, or acceleration_2=roof (default: the structure's own output, in the column --y)
@@ -66,7 +69,7 @@ COMMAND = Command(
 --bounds NAME=LOW:HIGH...  bounds of a parameter: beta=0:2 [unit of the parameter]
 --depends NAME=CHANNEL:DEGREE...  parameter that is a polynomial in a channel: gain=T:1
 --initial free|rest|still|periodic  state at the first sample (default: chosen by the BIC, or free)
---noise gaussian|quantised|robust  noise of the output; quantised needs --resolution [default: gaussian]
+--noise gaussian|quantised|robust  noise of the output; quantised needs --resolution (default: gaussian)
 --intervals linear|profile|bootstrap  method of the 95 % intervals [default: linear]
 --cross-validate loo|cycles|K  leave out one sample at a time, one cycle, or one of K blocks
 --max-evaluations N  most parameter sets that the search simulates; a fit that ends by it is partial

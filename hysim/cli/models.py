@@ -38,6 +38,14 @@ oscillator: the model oscillator, a mass on a Bouc-Wen spring
 --oversampling N  steps of the simulation between two samples
 --period N  samples of a period, with --initial periodic
 --excitation force|base  whether the input is a force, or the acceleration of the base
+
+actuator: the model actuator, from records of several rates
+--law MODEL  law of the actuator, as --model (default: bouc-wen)
+--modes N  number of resonances, 0 to 3 (default: 1)
+--creep  creep that grows by so many percent a decade
+--creep-elements N  creep of so many log-spaced elements
+--delay  a dead time
+--first-order-amplifier  a time constant before the law
 """
 """The choice of a family and the options of its structure."""
 
@@ -50,6 +58,7 @@ _ARGUMENTS = {"plays": ("plays", "elements"), "relay_intervals": ("intervals",)}
 """Arguments of a structure that an option of another name stands for."""
 
 _NEEDED = ("poles", "zeros", "degree")
+_OF_ACTUATOR = ("law", "modes", "creep", "creep_elements", "delay", "first_order_amplifier")
 
 
 @runtime_checkable
@@ -144,6 +153,12 @@ def to_identify(options: argparse.Namespace) -> Any:
     """
     from hysim.models.model import FAMILIES
 
+    whole = {name: value for name in _OF_ACTUATOR if (value := vars(options)[name]) is not None and value is not False}
+    used = {name: vars(options)[name] for name in _STRUCTURAL if vars(options)[name] is not None}
+    if foreign := [*used] if options.model == "actuator" else [*whole]:
+        raise ValueError(f"--{foreign[0].replace('_', '-')} is no option of the model {options.model}")
+    if options.model == "actuator":
+        return _actuator(whole)
     model = model_or_family(options.model)
     oscillator, linear = (FAMILIES.get(name) for name in ("BoucWenOscillator", "TransferFunction"))  # if it is loaded
     if oscillator is not None and isinstance(model, oscillator):  # its numbers are searched anew, in the same setting
@@ -169,6 +184,17 @@ def _argument(model: Any, option: str) -> str | None:
         return None
     arguments = inspect.signature(model.structure).parameters
     return next((name for name in _ARGUMENTS.get(option, (option,)) if name in arguments), None)
+
+
+def _actuator(structure: dict[str, Any]) -> Any:
+    """The structure of an actuator with these options."""
+    return hysim.Actuator.structure(
+        model_or_family(structure.get("law", "bouc-wen")),
+        creep=structure.get("creep_elements", "creep" in structure),
+        modes=structure.get("modes", 1),
+        delay="delay" in structure,
+        amplifier="first-order" if "first_order_amplifier" in structure else None,
+    )
 
 
 def read(path: str) -> tuple[Any, dict[str, str]]:

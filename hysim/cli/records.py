@@ -21,6 +21,7 @@ DETECT = "detect"
 _DELIMITERS = {"tab": "\t", "semicolon": ";", "comma": ",", "blank": " "}
 
 FILE = "file FILE  text with one sample a line, NPZ, NPY, MAT or HDF5; or - for the standard input"
+FILES = f"{FILE}\nothers FILE...  further records with the same columns, such as those of other rates"
 _INPUT = "--u COLUMN  input: name of its column, or its number from 0 (default: u)"
 _OUTPUT = "--y COLUMN  output: name or number of its column (default: y)"
 OF_A_TEXT = f"""--delimiter SIGN  sign between cells of a text, or {", ".join(_DELIMITERS)} (default: detected)

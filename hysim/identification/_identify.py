@@ -23,10 +23,12 @@ from hysim.identification._searched import Search
 from hysim.identification.channels.starts import begun
 from hysim.identification.folds import left_out
 from hysim.identification.swapped import swapped_columns, swapped_for
+from hysim.identification.whole.parts import begun_by_parts
 from hysim.models.channels.dependent import Dependent, on_record
 from hysim.models.channels.structure import DependentStructure
 from hysim.models.protocols import Direct, Identifiable, Recorded, needs_time
 from hysim.models.search_space import Freedom
+from hysim.models.whole.part_by_part import PartByPart
 from hysim.records import Record, several
 
 
@@ -39,7 +41,7 @@ def identify(
     bounds: Mapping[str, tuple[float, float]] | None = None,
     depends: Mapping[str, tuple[str, int]] | None = None,
     initial: str | Sequence[str] | None = None,
-    noise: str = "gaussian",
+    noise: str | None = None,
     intervals: str = "linear",
     cross_validate: str | int | None = None,
     weights: npt.ArrayLike | Sequence[npt.ArrayLike] | None = None,
@@ -76,9 +78,10 @@ def identify(
         Whether the state at the first sample is identified, is rest at zero, is that of an input which stood still at
         its first value, or is what the cycle leaves behind with which the record begins. By default a single memory is
         free; for sums of plays, stops or relays and for transfer functions the BIC decides, and `message` says how.
-    noise : {"gaussian", "quantised", "robust"}
+    noise : {"gaussian", "quantised", "robust"}, optional
         Normal noise; normal noise before a sensor that rounds to multiples of `Record.resolution`; or Student's t with
-        4 degrees of freedom, for records with outliers.
+        4 degrees of freedom, for records with outliers. By default normal noise, or that of the sensor of a
+        `hysim.Actuator.structure`.
     intervals : {"linear", "profile", "bootstrap"}
         Intervals at 95 %: from the standard errors, by the profile of the likelihood, or from 500 records drawn anew.
     cross_validate : {None, "loo", "cycles", "records"} or int, optional
@@ -120,10 +123,11 @@ def identify(
     (0.7, 2.0)
     """
     given = model_or_class.as_records(record_or_records) if isinstance(model_or_class, Recorded) else record_or_records
-    records, options = several(given, "identify"), _freedom(fixed or {}, free, bounds or {})
+    records: Sequence[Record] = several(given, "identify")
+    options = _freedom(fixed or {}, free, bounds or {})
     if intervals not in ("linear", "profile", "bootstrap"):
         raise ValueError(f'intervals must be "linear", "profile" or "bootstrap", got {intervals!r}')
-    if noise not in ("gaussian", "quantised", "robust"):
+    if noise not in (None, "gaussian", "quantised", "robust"):
         raise ValueError(f'noise must be "gaussian", "quantised" or "robust", got {noise!r}')
     if not isinstance(seed, (int, np.integer)) or seed < 0:
         raise ValueError(f"seed must be an integer from 0 on, got {seed!r}")
@@ -132,20 +136,28 @@ def identify(
         check_count("max_evaluations", max_evaluations)
     with at_most(workers), one_blas_thread():
         if isinstance(model_or_class, Direct) and depends is None:
-            direct.refuse(model_or_class, options, noise, intervals, shares)
+            direct.refuse(model_or_class, options, noise or "gaussian", intervals, shares)
             fit = direct.identified(model_or_class, records, left_out(cross_validate, records), seed)
             doubts = [swapped_columns(records)]
         else:
             family = _family(model_or_class, depends)
             if isinstance(family, DependentStructure):
                 family = begun(family.over(records), records, options, initial, max_evaluations)
+            ends, is_cut = None, False
+            if isinstance(family, PartByPart):
+                family, records, ends, is_cut = begun_by_parts(
+                    family, records, options, initial, shares, max_evaluations, seed
+                )
+                noise = noise or family.noise
             paths, noisy = quiet_where_better(family, records, options, initial)
             choice = decided(family, paths, options, initial, shares, max_evaluations)
+            if ends is not None:
+                choice = choice._replace(problems=[replace(each, ends=ends) for each in choice.problems])
             searched = [in_units_of_noise(each, seed) for each in choice.problems]
-            fit = _searched(searched, noise, intervals, left_out(cross_validate, records), seed, progress)
+            fit = _searched(searched, noise or "gaussian", intervals, left_out(cross_validate, records), seed, progress)
             fit = replace(fit, message="; ".join(filter(None, (fit.message, choice.sentence, noisy))))
             first, doubts = choice.problems[0], [swapped_columns(records)]
-            if is_partial := first.budget is not None and (first.budget.cut or not fit.success):
+            if is_partial := is_cut or (first.budget is not None and (first.budget.cut or not fit.success)):
                 stopped = f"partial: the search stopped at max_evaluations={max_evaluations}"
                 fit = replace(fit, success=False, message=f"{stopped}, better parameters may exist; {fit.message}")
             if not any(doubts) and not is_partial and not needs_time(fit.model):

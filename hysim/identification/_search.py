@@ -133,7 +133,7 @@ def _found(
     if problem.ends is not None:
         condensed = problem.condensed()
         return _distinct(
-            polish(condensed, _apart(space, problem.ends, condensed.costs(problem.ends), _SAME, N_POLISHED_WHOLE))
+            polish(condensed, apart(space, problem.ends, condensed.costs(problem.ends), _SAME, N_POLISHED_WHOLE))
         )
     if problem.y.size > _LONG and (short := problem.thinned(_SHORT)) is not None:
         likely = optima(short, seed=seed, progress=progress, known=known, may_end=may_end, to=BRIEFLY)[
@@ -161,8 +161,8 @@ def _found(
     starts = _starts(problem, screened, seed, n_starts, np.concatenate([space.starts, begun]))
     if not len(starts):
         return []
-    reached = _descended(problem, starts, exact=False)
-    best = _apart(space, reached.theta[:, : problem.n_x], reached.loss, _SAME, N_POLISHED)
+    reached = descended(problem, starts, exact=False)
+    best = apart(space, reached.theta[:, : problem.n_x], reached.loss, _SAME, N_POLISHED)
     report = progress or (lambda done, total: None)
     report(1, 2)
     polished = polish(problem, best, to) if len(best) else []
@@ -197,7 +197,7 @@ def brief_optima(problem: Problem) -> tuple[FloatArray, FloatArray]:
             ends, costs = brief_optima(short)
             return ends, costs * problem.y.size / short.y.size
         ends = brief_optima(short)[0] if space.coordinates else np.empty((1, 0))
-        reached = _descended(condensed, ends[:1], exact=False, steps=N_BRIEF_WHOLE)
+        reached = descended(condensed, ends[:1], exact=False, steps=N_BRIEF_WHOLE)
         ends[0] = reached.theta[0, : condensed.n_x]
         return ends, condensed.costs(ends)
     problem = condensed
@@ -207,8 +207,8 @@ def brief_optima(problem: Problem) -> tuple[FloatArray, FloatArray]:
     best = _starts(problem, screened, 0, N_BRIEF_DESCENDING, space.starts, are_kept=False)
     if not len(best):
         return 0.5 * (space.lower + space.upper)[np.newaxis], np.array([math.inf])
-    reached = _descended(problem, best, exact=False)
-    ends = _apart(space, reached.theta[:, : problem.n_x], reached.loss, _SAME, N_POLISHED_WHOLE)
+    reached = descended(problem, best, exact=False)
+    ends = apart(space, reached.theta[:, : problem.n_x], reached.loss, _SAME, N_POLISHED_WHOLE)
     return (ends, problem.costs(ends)) if len(ends) else (best[:1], np.array([math.inf]))
 
 
@@ -217,15 +217,15 @@ def polish(problem: Problem, starts: FloatArray, to: int = FULLY) -> list[Optimu
     problem = problem.condensed()
     rough = problem.rough()
     if rough is problem or not len(starts):
-        reached = _descended(problem, starts, exact=True)
+        reached = descended(problem, starts, exact=True)
         if len(starts) and not reached.at_rest[best := int(reached.loss.argmin())]:
             alone = reached.theta[[best], : problem.n_x]
-            _replace(reached, [best], _descended(problem, alone, exact=True, steps=N_POLISHING_ALONE))
+            _replace(reached, [best], descended(problem, alone, exact=True, steps=N_POLISHING_ALONE))
         return _optima(problem, reached)
     gain, steps = (_GAIN, _BRIEF) if to == BRIEFLY else (_PASSED, _PASS)
 
     def ends(law: Problem, x: FloatArray) -> Reached:
-        reached = _descended(law, x, exact=True, nearly=rough, gain=gain, steps=steps)
+        reached = descended(law, x, exact=True, nearly=rough, gain=gain, steps=steps)
         return _amended(law, rough, reached.theta) if to == FULLY else reached
 
     return _closely(problem, starts, ends)
@@ -275,7 +275,7 @@ def _amended(problem: Problem, rough: Problem, theta: FloatArray) -> Reached:
         if not float(reached.loss[best[0]]) < before - 0.5 * problem.y.size * _PASSED:
             break
     rested = reached.at_rest[best]
-    _replace(reached, best, _descended(problem, reached.theta[best, : problem.n_x], exact=True, steps=_LAST))
+    _replace(reached, best, descended(problem, reached.theta[best, : problem.n_x], exact=True, steps=_LAST))
     reached.at_rest[best] |= rested
     return reached
 
@@ -288,7 +288,7 @@ def _replace(reached: Reached, places: list[int], others: Reached) -> None:
 def _pass(problem: Problem, rough: Problem, theta: FloatArray, *, gain: float, hopeless: float = math.inf) -> Reached:
     amended = _slopes(problem, theta) - _slopes(rough, theta)
     x = theta[:, : problem.n_x]
-    return _descended(problem, x, exact=True, nearly=rough, amended=amended, gain=gain, steps=_PASS, hopeless=hopeless)
+    return descended(problem, x, exact=True, nearly=rough, amended=amended, gain=gain, steps=_PASS, hopeless=hopeless)
 
 
 def _slopes(problem: Problem, theta: FloatArray) -> FloatArray:
@@ -308,10 +308,10 @@ def _staged(problem: Problem, stage: Stage, begun: FloatArray, seed: int) -> Flo
     points = np.concatenate([space.starts, begun, beside])
     cost = rough.costs(points)
     for n_best, steps in stage.rounds:
-        points = _apart(space, points, cost, _SAME, n_best)
-        reached = _descended(rough, points, exact=False, steps=steps)
+        points = apart(space, points, cost, _SAME, n_best)
+        reached = descended(rough, points, exact=False, steps=steps)
         points, cost = reached.theta[:, : problem.n_x], reached.loss
-    return _apart(space, points, cost, _SAME, N_STAGED)
+    return apart(space, points, cost, _SAME, N_STAGED)
 
 
 def _as_they_are(problem: Problem, x: FloatArray) -> list[Optimum]:
@@ -330,7 +330,7 @@ def _may_stay(problem: Problem, begun: FloatArray, points: FloatArray) -> bool:
     return is_rough or n * (math.log(before) - math.log(after)) > 0.5 * freed * math.log(n)
 
 
-def _descended(
+def descended(
     problem: Problem,
     starts: FloatArray,
     *,
@@ -353,7 +353,7 @@ def _starts(
 ) -> FloatArray:
     candidates = np.concatenate([given, _uniform(problem.space, screened, seed)])
     n_given = len(given) if are_kept else 0
-    return _apart(problem.space, candidates, problem.costs(candidates), _APART, most, n_given)
+    return apart(problem.space, candidates, problem.costs(candidates), _APART, most, n_given)
 
 
 def _uniform(space: SearchSpace, n: int, seed: int) -> FloatArray:
@@ -365,7 +365,7 @@ def _uniform(space: SearchSpace, n: int, seed: int) -> FloatArray:
     return np.asarray(np.clip(lower + unit * (upper - lower), space.lower, space.upper))
 
 
-def _apart(
+def apart(
     space: SearchSpace, points: FloatArray, cost: FloatArray, distance: float, most: int, n_given: int = 0
 ) -> FloatArray:
     """The first `n_given` points, and the best others that are apart from those already chosen."""

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from hysim._frozen import FloatArray, checked
-from hysim.models._joint_space import combined_variants, common_states, declared, together
-from hysim.models._parts import exchanged, labels, own, response_of
 from hysim.models._sum_search import assembled, started, time_of
 from hysim.models.composable import Composable, composed
+from hysim.models.joint_space import combined_variants, common_states, declared, together
+from hysim.models.parts import exchanged, labels, own, response_of
 from hysim.models.protocols import (
     Identifiable,
     LinearStage,

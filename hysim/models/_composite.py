@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim.models._parts import compiled_law, exchanged, labels, own
 from hysim.models.by_structure import ByStructure
 from hysim.models.composable import Composable
 from hysim.models.inverse_search import inverse_at_rest, inverse_response
+from hysim.models.parts import compiled_law, exchanged, labels, own
 from hysim.models.protocols import CompiledLaw, Continuable, Numbered, Startable, Stretched, needed_time, needs_time
 
 State = tuple[Any, ...]

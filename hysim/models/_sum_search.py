@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from hysim._frozen import FloatArray, checked, items
-from hysim.models._joint_space import combined_variants, common_states, declared, together, without_repetition
-from hysim.models._parts import checked_tuple, exchanged, labels, own, response_of
 from hysim.models.composable import Composable, composed
+from hysim.models.joint_space import combined_variants, common_states, declared, together, without_repetition
+from hysim.models.parts import checked_tuple, exchanged, labels, own, response_of
 from hysim.models.protocols import Identifiable, Responding, Variant, needs_time
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record

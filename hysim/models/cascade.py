@@ -10,7 +10,9 @@ from hysim._frozen import FloatArray, read_only
 from hysim.kernels.stepping import one_behind_the_other
 from hysim.models._cascade_search import CascadeStructure
 from hysim.models._composite import Composite, State, continued, known_slopes
-from hysim.models._parts import (
+from hysim.models.compiled_step import startable
+from hysim.models.model import family
+from hysim.models.parts import (
     check_parts,
     compiled_law,
     compiled_pair,
@@ -19,8 +21,6 @@ from hysim.models._parts import (
     self_started,
     startable_pair,
 )
-from hysim.models.compiled_step import startable
-from hysim.models.model import family
 from hysim.models.protocols import CompiledLaw, Startable
 
 __all__ = ["Cascade", "CascadeStructure"]

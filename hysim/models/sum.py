@@ -9,10 +9,10 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, read_only
 from hysim.kernels.stepping import side_by_side
 from hysim.models._composite import Composite, State, continued, known_slopes
-from hysim.models._parts import check_parts, compiled_law, compiled_pair, labels, response_of, startable_pair
 from hysim.models._sum_search import SumStructure
 from hysim.models.compiled_step import startable
 from hysim.models.model import family
+from hysim.models.parts import check_parts, compiled_law, compiled_pair, labels, response_of, startable_pair
 from hysim.models.protocols import CompiledLaw, Startable
 
 __all__ = ["Sum", "SumStructure"]

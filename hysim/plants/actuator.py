@@ -29,6 +29,7 @@ from hysim.plants.sampled import Stage, Vibration
 from hysim.plants.sensor import Sensor
 from hysim.plants.state_space import linear_plant
 from hysim.plants.transfer_function import TransferFunction
+from hysim.plants.whole.actuator_structure import ActuatorStructure
 
 
 def is_law(value: Any) -> bool:
@@ -91,6 +92,88 @@ class Actuator:
                 f"hysteresis must be a law that a loop can step, such as BoucWen, got {type(self.hysteresis).__name__}"
             )
         object.__setattr__(self, "vibration", as_vibration(self.vibration))
+
+    @classmethod
+    def structure(
+        cls,
+        hysteresis: Any,
+        *,
+        creep: bool | int | npt.ArrayLike | Creep = True,
+        modes: int = 1,
+        amplifier: str | Amplifier | None = None,
+        delay: bool = True,
+        sensor: Sensor | None = None,
+        offsets: str = "shared",
+    ) -> ActuatorStructure:
+        """An actuator for `hysim.identify`, on one or several records with time: law, creep, modes and delay at once.
+
+        Records of different rates tell the parts apart: a slow one shows the law and the creep, a fast one, whose
+        input has corners or steps, the modes and the delay. What the records do not determine is held, and the message
+        of the result says so.
+
+        Parameters
+        ----------
+        hysteresis : law, its class or its structure
+            Its parameters are ``hysteresis.beta``, ...
+        creep : bool, int, sequence of float or Creep
+            True for the bank of `Creep.per_decade`, whose growth is ``creep.percent``; a number of log-spaced elements
+            between the shortest sample time and the duration of the longest record, with ``creep.percent`` and a
+            ``creep.slope`` (their growth changes by the factor 10^slope from a decade to the next); time constants [s]
+            with free weights ``creep.weights[k]``, relative to the instant response; or a creep that is known.
+        modes : int
+            Resonances, from 0 to 3: ``vibration.natural_frequencies[k]`` [rad/s], ``vibration.damping_ratios[k]``, and
+            of several ``vibration.gains[k]`` for k > 0. They are searched up to half the highest sampling rate.
+        amplifier : {"first-order"} or Amplifier, optional
+            A time constant ``amplifier.time_constant`` [s] to be identified, or an amplifier that is known.
+        delay : bool
+            Whether there is a dead time ``vibration.delay`` [s]. It need not be a whole number of samples, but without
+            a mode or a slow amplifier the records show it to a sample only.
+        sensor : Sensor, optional
+            What the records were read by: its delay is taken into account, and its quantum makes the noise of
+            `hysim.identify` ``"quantised"`` where no other is asked for.
+        offsets : {"shared", "own"}
+            Whether all records have one offset of the law, or each its own.
+
+        Returns
+        -------
+        ActuatorStructure
+            For `hysim.identify`, `hysim.select` and `hysim.compare`. The model is an `Actuator` whose `response` to
+            each record's input is the fit (with a sensor that has a delay, what its sensor sees).
+
+        Raises
+        ------
+        ValueError, TypeError
+            If an argument is none of these.
+
+        Notes
+        -----
+        A record begins at rest, creep included, as every response does, and its input is held between the samples. A
+        law with a single memory has its own at the first sample of each record (``hysteresis.z0``); plays begin at rest
+        at zero unless ``initial=`` says otherwise.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import hysim as hs
+        >>> stage = hs.Actuator(hysteresis=hs.Play(threshold=0.2), vibration=hs.mode(300.0, 0.05, delay=0.4e-3))
+        >>> slow, fast = np.sin(np.linspace(0.0, 9.0, 90)), np.repeat([0.0, 1.0, -0.5, 0.5], 40)
+        >>> recs = [
+        ...     hs.Record(u=u, y=stage.response(u, h), t=h * np.arange(u.size)) for u, h in ((slow, 0.1), (fast, 1e-3))
+        ... ]
+        >>> fit = hs.identify(hs.Actuator.structure(hs.Play, creep=False), recs)
+        >>> round(fit.estimates["vibration.natural_frequencies[0]"], 3), round(fit.estimates["vibration.delay"], 6)
+        (300.0, 0.0004)
+        """
+        return ActuatorStructure(
+            family=cls,
+            law=hysteresis,
+            creep=creep,
+            modes=modes,
+            amplifier=amplifier,
+            delay=delay,
+            sensor=sensor,
+            offsets=offsets,
+        )
 
     @property
     def dynamic(self) -> bool:

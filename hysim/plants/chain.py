@@ -102,7 +102,6 @@ class Chain:
             self.seen_in, at = whole_and_part((1.0 - part) * self.substeps)
             seen = seen_within(self.linear, self.step, self.delay, at, **between)
         self.outputs = read_only([self.stage.output, seen])
-        self._parameters = self._packed()
 
     @property
     def linear_block(self) -> FloatArray:
@@ -209,8 +208,8 @@ class Chain:
 
         The delay of the sensor is no part of it: it may be one of the vibration.
         """
-        law, stage, linear = startable(self.hysteresis), self.stage, self.linear
-        row = [linear.D, 0.0, 0.0, *linear.C] if self._jumps and not at_end else stage.output
+        law, stage = startable(self.hysteresis), self.stage
+        row = stage.output if at_end else self.output_row
         order = stage.rest.size
         parts: list[Any] = [
             [law.state.size, at_end, self.sensor.quantum], self.amplifier.compiled(self.step).parameters,
@@ -226,12 +225,18 @@ class Chain:
         )
 
     @property
+    def output_row(self) -> FloatArray:
+        """Weights of the displacement just after each new command, as `SampledStage.output` has those just before."""
+        return read_only([self.linear.D, 0.0, 0.0, *self.linear.C]) if self._jumps else self.stage.output
+
+    @property
     def _jumps(self) -> bool:
         """Whether the displacement jumps with the command."""
         takes_time = self.amplifier.dynamic or whole_and_part(self.delay / self.step)[1]
         return bool(not takes_time and self.linear.D)
 
-    def _packed(self) -> FloatArray:
+    @functools.cached_property
+    def _parameters(self) -> FloatArray:
         """The stages apart from the law, as `hysim.kernels.loop` takes them."""
         stage = self.stage
         head = [

@@ -14,11 +14,11 @@ import numpy.typing as npt
 
 from hysim._channels import Channels, checked_channels, steady, taken, value_in
 from hysim._frozen import FloatArray, read_only
-from hysim.models._parts import response_of
 from hysim.models.channels.polynomial import ChannelPolynomial
 from hysim.models.channels.structure import DependentStructure
 from hysim.models.channels.varying import response_along
 from hysim.models.model import family
+from hysim.models.parts import response_of
 from hysim.models.protocols import Numbered, Responding, needs_time
 from hysim.records import Record
 

@@ -26,6 +26,7 @@ from hysim.models.channels.varying import check_memory_is_its_own, columns_along
 from hysim.models.protocols import Identifiable, Recorded, Staged, Undecided, Variant
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.stages import Simpler, Stage
+from hysim.models.whole.part_by_part import PartByPart
 from hysim.records import Record
 
 Places = Mapping[str, tuple[float, ...]]
@@ -48,7 +49,7 @@ class DependentStructure(Identifiable):
 
     def __post_init__(self) -> None:
         law, depends = self.law, self.depends
-        if not isinstance(law, Identifiable) or isinstance(law, type | Recorded):
+        if not isinstance(law, Identifiable) or isinstance(law, type | Recorded | PartByPart):
             raise TypeError(f"depends is for laws and sums of them, got {law!r}")
         if not depends:
             raise ValueError('depends names no parameter: give a mapping such as {"gain": ("T", 1)}')

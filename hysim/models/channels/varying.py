@@ -15,10 +15,10 @@ from hysim._frozen import FloatArray, read_only
 from hysim._parallel import in_chunks
 from hysim.errors import SimulationError
 from hysim.kernels import stepping
-from hysim.models._parts import labels, own, response_of
 from hysim.models._sum_search import SumStructure
 from hysim.models.compiled_step import compiled_start, compiled_step
 from hysim.models.law import Law
+from hysim.models.parts import labels, own, response_of
 from hysim.models.protocols import Identifiable, Sampled
 from hysim.models.search_space import Parameters
 from hysim.models.sum import Sum

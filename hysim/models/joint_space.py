@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.models._parts import own
+from hysim.models.parts import own
 from hysim.models.protocols import Undecided, Variant
 from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record

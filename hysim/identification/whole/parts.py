@@ -1,0 +1,264 @@
+"""A plant of several parts is searched part by part, and where that ends all parts are searched at once.
+
+1. The law alone, on the record of the slowest input: a global search.
+2. On the fastest record, behind that law but for its gain and offset, one mode after the other: the best of many
+   points descend. A mode is kept if it lowers the BIC by more than 10.
+3. On all records the parts descend beside the law's shape.
+4. All at once. What the records do not determine at that optimum, by its Fisher information, is held, and the search
+   goes on without it.
+"""
+
+import math
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.identification._assumptions import decided
+from hysim.identification._budget import Budget
+from hysim.identification._problem import Problem, problem
+from hysim.identification._search import apart, chosen, descended
+from hysim.identification._uncertainty import uncertainty
+from hysim.metrics.criteria import information
+from hysim.models.parts import own
+from hysim.models.protocols import Identifiable, Undecided
+from hysim.models.search_space import Freedom
+from hysim.models.whole.part_by_part import PartByPart
+from hysim.models.whole.scaled import Scaled
+from hysim.records import Record
+
+_THINNED = 500  # samples of the slow record, beside its reversals
+_SAME = 0.01  # distance of two points in units of the box, under which the better one stands for both
+_APART = 0.03  # likewise of the first points on the fastest record
+_BEST, _KEPT = 8, 2  # points that descend on the fastest record, and on all
+_STRONG = 10.0  # difference of two BIC
+_BEST_OF_ALL = 4  # points that descend where the law is searched too
+_MOST_ROUNDS = 8  # of what is held
+_IN_VAIN = 2  # trials in a row that are no better
+_SHARE = 0.5  # of the evaluations that the user allows
+
+Initial = str | Sequence[str] | None
+Coordinates = Mapping[str, float]
+
+
+class Begun(NamedTuple):
+    """A plant and the records as its search takes them, and coordinates (n_sets, n_x) where it begins."""
+
+    structure: Any
+    records: Sequence[Record]
+    ends: FloatArray
+    cut: bool  # whether the user's number of evaluations has ended a part of the search
+
+
+@dataclass(frozen=True)
+class _Setting:
+    """What the user says."""
+
+    records: Sequence[Record]
+    freedom: Freedom
+    initial: Initial
+    weights: Sequence[FloatArray] | None
+    budget: Budget | None
+    seed: int
+
+    def problem(self, structure: Any, freedom: Freedom | None = None, only: int | None = None) -> Problem:
+        """The problem of a structure on all records, or on one."""
+        places = range(len(self.records)) if only is None else [only]
+        weights = None if self.weights is None else [self.weights[k] for k in places]
+        if weights is not None and not any(each.any() for each in weights):
+            weights = None
+        initial = self.initial
+        if initial is not None and not isinstance(initial, str):
+            initial = [initial[k] for k in places]
+        records = [self.records[k] for k in places]
+        attempt = problem(structure, records, self.freedom if freedom is None else freedom, initial)
+        return attempt.weighted(weights).within(self.budget)
+
+    def about(self, names: Container[str]) -> Freedom:
+        """The part of the user's freedom that is about these parameters."""
+        freedom = self.freedom
+        return replace(
+            freedom,
+            fixed={name: value for name, value in freedom.fixed.items() if name in names},
+            free=tuple(name for name in freedom.free if name in names),
+            bounds={name: pair for name, pair in freedom.bounds.items() if name in names},
+        )
+
+    def beside(self, values: Mapping[str, float]) -> Freedom:
+        """The user's freedom with further parameters that are fixed."""
+        fixed = {name: value for name, value in values.items() if name not in self.freedom.fixed}
+        return replace(
+            self.freedom,
+            fixed={**self.freedom.fixed, **fixed},
+            free=tuple(name for name in self.freedom.free if name not in fixed),
+            bounds={name: pair for name, pair in self.freedom.bounds.items() if name not in fixed},
+        )
+
+
+def begun_by_parts(
+    structure: PartByPart,
+    records: Sequence[Record],
+    freedom: Freedom,
+    initial: Initial,
+    weights: Sequence[FloatArray] | None,
+    max_evaluations: int | None,
+    seed: int,
+) -> Begun:
+    """The structure where the search part by part ends, with what it holds; ValueError as of `identify`."""
+    plant, records = structure.over(records, freedom)
+    budget = None if max_evaluations is None else Budget(_SHARE * max_evaluations * sum(map(len, records)))
+    setting = _Setting(records, freedom, initial, weights, budget, seed)
+    trial = setting.problem(plant)  # refuses what does not fit before anything is searched
+    trial.split(0.5 * (trial.space.lower + trial.space.upper)[np.newaxis])
+    plant, law, shape = _with_law(plant, setting)
+    plant, known = _grown(plant, law, setting)
+    plant = _tried(plant, setting)
+    known = _on_all(plant, setting, shape, known)
+    whole = setting.problem(plant.begun(known))
+    ends = np.empty((1, 0))
+    if whole.n_x:
+        best = _descended(whole, _best_starts(whole), exact=False)[:1]
+        plant, ends = _told_apart(plant, setting, whole, _descended(whole, best, exact=True))
+    return Begun(plant, records, ends, budget is not None and budget.cut)
+
+
+def _with_law(plant: Any, setting: _Setting) -> tuple[Any, Any, dict[str, float]]:
+    """The plant whose law begins where the law alone is best, that law, and the parameters of its shape."""
+    k = plant.slowest
+    record, law = plant.static(setting.records[k]), plant.law
+    freedom = setting.freedom
+    share = Freedom(
+        fixed=own(freedom.fixed, "hysteresis"),
+        free=tuple(own(dict.fromkeys(freedom.free), "hysteresis")),
+        bounds=own(freedom.bounds, "hysteresis"),
+    )
+    initial = setting.initial if setting.initial is None or isinstance(setting.initial, str) else setting.initial[k]
+    if initial is None and isinstance(law, Undecided):
+        initial = "rest"
+    weights = None if setting.weights is None else [setting.weights[k]]
+    every = decided(law, [record], share, initial, weights).problems
+    best, optima = chosen([each.thinned(_THINNED) or each for each in every], seed=setting.seed)
+    if not optima:
+        raise ValueError("every set of parameters of the law diverged on the slowest record: pass bounds=")
+    estimates = best.estimates(best.completed(optima[0].x[np.newaxis])[0])
+    model = best.family.assemble(estimates)
+    start = model if isinstance(model, Identifiable) and not isinstance(law, Undecided) else best.family
+    space = best.own
+    searched = [name for name in space.names if name not in (*space.linear, *space.state)]
+    return plant.with_law(start), model, {f"hysteresis.{name}": estimates[name] for name in searched}
+
+
+def _grown(plant: Any, law: Any, setting: _Setting) -> tuple[Any, list[Coordinates]]:
+    """The plant with the modes that the fastest record shows, and the best coordinates of its parts there."""
+    known: list[Coordinates] = []
+    before = math.inf
+    for each in plant.growing():
+        attempt = setting.problem(each.with_law(Scaled(law)), setting.about(each.names), only=plant.fastest)
+        ends = _found(attempt, each, known) if attempt.n_x else np.empty((1, 0))
+        cost = float(attempt.costs(ends[:1])[0])
+        criterion = information(max(cost, 1e-300) / attempt.n_samples, attempt.n_samples, len(attempt.space.names))
+        if not criterion < before - _STRONG and (smaller := _left_out(plant, each, setting.freedom)) is not None:
+            return smaller, known
+        known, before = _parts_only(attempt, ends), criterion
+    return plant, known
+
+
+def _found(attempt: Problem, plant: Any, known: Sequence[Coordinates]) -> FloatArray:
+    """Ends of descents from the best points on the fastest record, the best first."""
+    space = attempt.space
+    points = plant.points(space, known)
+    best = apart(space, points, attempt.costs(points), _APART, _BEST)
+    points = plant.finer(space, best if len(best) else space.starts[:1])
+    best = apart(space, points, attempt.costs(points), _SAME, _BEST)
+    if not len(best):
+        return space.starts[:1]
+    ends = _descended(attempt, best, exact=False)
+    return apart(space, ends, attempt.costs(ends), _SAME, _BEST_OF_ALL)
+
+
+def _left_out(plant: Any, each: Any, freedom: Freedom) -> Any:
+    """The plant without the modes that `each` has first; None where the user insists on one."""
+    smaller = plant
+    for _ in range(1 + plant.modes - each.modes):
+        less = smaller.smaller(freedom)
+        if less is None:
+            return None
+        smaller = less[0]
+    return smaller
+
+
+def _tried(plant: Any, setting: _Setting) -> Any:
+    """The best of the plant's trials, in whose order the sum of squares has one minimum."""
+    best, least, worse = plant, math.inf, 0
+    for trial in plant.trials():
+        if len(plant.trials()) == 1 or worse == _IN_VAIN:
+            break
+        attempt = setting.problem(trial)
+        ends = _descended(attempt, _best_starts(attempt)[:1], exact=False) if attempt.n_x else np.empty((1, 0))
+        cost = float(attempt.costs(ends)[0])
+        best, least, worse = (trial, cost, 0) if cost < least else (best, least, worse + 1)
+    return best
+
+
+def _on_all(
+    plant: Any, setting: _Setting, shape: Mapping[str, float], known: Sequence[Coordinates]
+) -> list[Coordinates]:
+    """The best coordinates of the parts on all records, beside the law's shape."""
+    attempt = setting.problem(plant.begun(known), setting.beside(shape))
+    if not attempt.n_x:
+        return []
+    return _parts_only(attempt, _descended(attempt, _best_starts(attempt), exact=False)[:_KEPT])
+
+
+def _told_apart(plant: Any, setting: _Setting, whole: Problem, ends: FloatArray) -> tuple[Any, FloatArray]:
+    """The plant without what the records do not determine, and where its search ends."""
+    for _ in range(_MOST_ROUNDS):
+        theta = whole.completed(ends[:1])[0]
+        spread = _stderr(whole, theta)
+        doubts = plant.doubts(whole.estimates(theta), setting.freedom)
+        sizes = [_excess(spread[doubt.name], doubt.largest) for doubt in doubts if doubt.name in spread]
+        if not sizes or max(sizes) <= 1.0:
+            break
+        known = _parts_only(whole, ends[:1])
+        plant = _tried([doubt for doubt in doubts if doubt.name in spread][int(np.argmax(sizes))].without, setting)
+        whole = setting.problem(plant.begun(known))
+        if not whole.n_x:
+            return plant, np.empty((1, 0))
+        ends = _descended(whole, _best_starts(whole)[:1], exact=True)
+    return plant, ends
+
+
+def _excess(stderr: float, largest: float) -> float:
+    return math.inf if math.isnan(stderr) else stderr / largest
+
+
+def _stderr(whole: Problem, theta: FloatArray) -> dict[str, float]:
+    """Standard errors by name at `theta`."""
+    residual = whole.y - whole.model(theta[np.newaxis])[0]
+    variance = float(np.average(residual**2, weights=whole.weights)) or 1e-300
+    covariance = uncertainty(whole, theta, np.full(residual.size, 1.0 / variance)).covariance
+    return dict(zip(whole.space.names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+
+
+def _best_starts(attempt: Problem) -> FloatArray:
+    """The best of the starts of a problem, of few all in their order."""
+    starts = attempt.space.starts
+    return starts if len(starts) <= 1 else apart(attempt.space, starts, attempt.costs(starts), _SAME, _BEST_OF_ALL)
+
+
+def _descended(attempt: Problem, points: FloatArray, *, exact: bool) -> FloatArray:
+    """Ends (n_sets, n_x) of descents, the best first."""
+    reached = descended(attempt, points, exact=exact)
+    order = np.argsort(reached.loss, kind="stable")
+    return np.asarray(reached.theta[order, : attempt.n_x])
+
+
+def _parts_only(attempt: Problem, ends: FloatArray) -> list[Coordinates]:
+    """Coordinates by name, without those of the law."""
+    names = attempt.space.coordinates
+    return [
+        {name: value for name, value in zip(names, row, strict=True) if not name.startswith("hysteresis.")}
+        for row in ends.tolist()
+    ]

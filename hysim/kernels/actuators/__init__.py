@@ -1,0 +1,1 @@
+"""Outputs of a law through the linear stages of an actuator."""

@@ -1,0 +1,46 @@
+"""A law that is known but for its gain and offset, for the search of what stands behind it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hysim._frozen import FloatArray
+from hysim.models.parts import response_of
+from hysim.models.protocols import Identifiable, law_at, needs_time
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.records import Record
+
+_COLUMNS = ("gain", "offset")
+
+
+@dataclass(frozen=True)
+class Scaled(Identifiable):
+    """The output of `law` times a gain, and an offset."""
+
+    law: Any
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """No coordinates: both parameters are linear."""
+        return SearchSpace(
+            coordinates=(),
+            lower=np.empty(0),
+            upper=np.empty(0),
+            starts=np.empty((1, 0)),
+            names=_COLUMNS,
+            columns=_COLUMNS,
+            linear=_COLUMNS,
+            held={},
+            parameters=lambda x: {},
+        )
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """The law's output, one, and zero, (1, n_samples, 3)."""
+        law = law_at(self.law, record.sample_time) if needs_time(self.law) else self.law
+        y = response_of(law, record.u, record.sample_time if needs_time(law) else None)
+        return np.stack([y, np.ones_like(y), np.zeros_like(y)], axis=-1)[np.newaxis]
+
+    def assemble(self, parameters: Mapping[str, float]) -> Any:
+        """The law itself."""
+        return self.law

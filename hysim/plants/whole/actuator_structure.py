@@ -1,0 +1,222 @@
+"""An actuator to be identified: amplifier, law, creep, modes and delay at once.
+
+    u -> amplifier -> law -> creep -> modes, delay -> y
+
+What is behind the law is linear: the output is affine in what the law is affine in, and only the law's other
+parameters and those of the parts are searched. The search begins part by part (`hysim.models.whole`): the law where
+the input is slow, the modes and the delay on the fastest record, beside a creep of 1 % a decade, and then all at once.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import field, replace
+from typing import Any
+
+import numpy as np
+
+from hysim._frozen import FloatArray, checked
+from hysim.models.joint_space import declared, together
+from hysim.models.parts import own
+from hysim.models.protocols import Identifiable
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.whole.part_by_part import Doubt
+from hysim.plants.amplifier import Amplifier
+from hysim.plants.creep import Creep
+from hysim.plants.sensor import Sensor
+from hysim.plants.whole import doubts, starts
+from hysim.plants.whole.columns import columns_through
+from hysim.plants.whole.creep_bank import CreepBank, checked_creep, creep_bank
+from hysim.plants.whole.linear_parts import LinearParts
+from hysim.plants.whole.survey import Survey
+from hysim.records import Record
+
+MOST_MODES = 3
+_LAW, _OFFSET = "hysteresis", "hysteresis.offset"
+
+
+@checked
+class ActuatorStructure(Identifiable):
+    """An actuator to be identified; see `hysim.Actuator.structure`, whose class is `family`."""
+
+    family: type
+    law: Any
+    creep: Any
+    modes: int
+    amplifier: Any
+    delay: bool
+    sensor: Any
+    offsets: str
+    survey: Any = None
+    scaled_on: Any = None  # the record that scales the law's box
+    known: Mapping[str, float] = field(default_factory=dict)  # parameters that are held beside those of the user
+    remarks: tuple[str, ...] = ()
+    starting: Any = ()  # coordinates by name
+
+    def __post_init__(self) -> None:
+        if self.law is None:
+            raise ValueError("hysteresis is needed: a law, its class or structure, such as hs.BoucWen or hs.Line")
+        law = self.law() if isinstance(self.law, type) else self.law
+        if not isinstance(law, Identifiable):
+            raise TypeError(f"hysteresis must be a law that can be identified, got {type(law).__name__}")
+        object.__setattr__(self, "law", law)
+        object.__setattr__(self, "creep", checked_creep(self.creep))
+        if isinstance(self.modes, bool) or self.modes not in range(MOST_MODES + 1):
+            raise ValueError(f"modes must be a number from 0 to {MOST_MODES}, got {self.modes!r}")
+        if not isinstance(self.amplifier, Amplifier | None) and self.amplifier != "first-order":
+            raise ValueError(f'amplifier must be None, "first-order" or an Amplifier, got {self.amplifier!r}')
+        if not isinstance(self.delay, bool):
+            raise TypeError(f"delay must be True or False, got {self.delay!r}: fix it by fixed= of identify")
+        if not isinstance(self.sensor, Sensor | None):
+            raise TypeError(f"sensor must be a Sensor, got {type(self.sensor).__name__}")
+        if self.offsets not in ("shared", "own"):
+            raise ValueError(f'offsets must be "shared" or "own", got {self.offsets!r}')
+
+    def __str__(self) -> str:
+        law = type(self.law).__name__.removesuffix("Structure")
+        parts = [
+            f"{self.modes} mode{'s' * (self.modes > 1)}" * bool(self.modes),
+            "creep" * (self.creep not in (None, False)),
+            "delay" * self.delay,
+            "amplifier" * (self.amplifier is not None),
+        ]
+        return f"Actuator of {', '.join([law, *filter(None, parts)])}"
+
+    # ------------------------------------------------------------------------------ as `identify` sees it
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """The law's box and that of the other parts, side by side; ValueError without even times."""
+        if self.offsets == "own" and freedom.initial not in (None, "free"):
+            raise ValueError('offsets="own" needs initial="free"; fix the memory by fixed={"hysteresis.z0": 0}')
+        parts = self.parts([record])
+        parts.check(freedom)
+        known = {name: value for name, value in self.known.items() if name not in freedom.free}
+        wished = replace(freedom, fixed={**known, **freedom.fixed})
+        scaling = self.static(record) if self.scaled_on is None else self.scaled_on
+        own_spaces = {name: lambda free, name=name: parts.spaces({name: free})[name] for name in parts.boxes()}
+        spaces = declared({_LAW: lambda free: self.law.search_space(scaling, free), **own_spaces}, wished)
+        space = together(spaces)
+        state = (*space.state, _OFFSET) if self.offsets == "own" and _OFFSET in space.linear else space.state
+        points = np.clip(starts.as_points(space, self.starting), space.lower, space.upper)
+        return replace(space, starts=points, screened=0, regions={}, state=state)
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """The law's columns through the parts behind it, (n_sets, n_samples, n_columns + 1)."""
+        late = 0.0 if self.sensor is None else self.sensor.delay
+        parts = self.parts([record])
+        others = {name: value for name, value in parameters.items() if not name.startswith(f"{_LAW}.")}
+        law = own(parameters, _LAW)
+        return columns_through(self.law, law, others, lambda each: parts.stages(each, late), record)
+
+    def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
+        """The law's memory after an input that stood still; ValueError for one that moved."""
+        if np.ptp(record.u) > 0.0:
+            raise ValueError('an actuator begins at rest, not in a cycle: initial="periodic" is not for it')
+        found = self.law.steady(own(parameters, _LAW), self.static(record))
+        return {f"{_LAW}.{name}": value for name, value in found.items()}
+
+    def assemble(self, parameters: Mapping[str, float]) -> Any:
+        """The actuator with these parameters."""
+        stages = self.parts([]).stages(parameters)
+        law = self.law.assemble(own(parameters, _LAW))
+        return self.family(hysteresis=law, sensor=self.sensor, **stages._asdict())
+
+    def notes(self, record: Record, model: Any) -> tuple[str, ...]:
+        """What the records do not determine, and at which values it is held."""
+        return self.remarks
+
+    # ------------------------------------------------------------------------------ as its search begins
+
+    def over(self, records: Sequence[Record], freedom: Freedom) -> tuple["ActuatorStructure", Sequence[Record]]:
+        """The structure for these records, in the resolution of the sensor where they say none."""
+        survey = Survey.of(records)
+        quantum = 0.0 if self.sensor is None else self.sensor.quantum
+        if quantum:
+            records = [
+                replace(record, resolution=quantum) if record.resolution is None else record for record in records
+            ]
+        bank = creep_bank(self.creep, survey.shortest, survey.longest)
+        idle = {f"creep.weights[{k}]": 0.0 for k in bank.idle} if isinstance(bank, CreepBank) else {}
+        idle = {name: value for name, value in idle.items() if name not in {*freedom.free, *freedom.bounds}}
+        remarks = (bank.remark,) if isinstance(bank, CreepBank) and idle else ()
+        scaled_on = self.static(records[survey.law])
+        structure = replace(self, survey=survey, scaled_on=scaled_on, known=idle, remarks=remarks)
+        structure.parts([]).check(freedom)
+        return structure, records
+
+    @property
+    def noise(self) -> str:
+        """That of a sensor that rounds, or the normal one."""
+        return "quantised" if self.sensor is not None and self.sensor.quantum else "gaussian"
+
+    @property
+    def slowest(self) -> int:
+        """The record of the slowest input among those with a wide one."""
+        return 0 if self.survey is None else int(self.survey.law)
+
+    @property
+    def fastest(self) -> int:
+        """The record with the shortest sample time."""
+        return 0 if self.survey is None else int(self.survey.fastest)
+
+    def static(self, record: Record) -> Record:
+        """The record with the voltage that a known amplifier makes of its command."""
+        return replace(record, u=self.amplifier.voltage(record.u)) if isinstance(self.amplifier, Amplifier) else record
+
+    def with_law(self, law: Any) -> "ActuatorStructure":
+        """The structure with this law, or this start of it."""
+        return replace(self, law=law)
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Names of the parameters of the parts beside the law."""
+        boxes = {} if self.survey is None else self.parts([]).boxes()
+        return frozenset(f"{part}.{each.name}" for part, (box, _) in boxes.items() for each in box)
+
+    def growing(self) -> Sequence["ActuatorStructure"]:
+        """The structure without modes, with the first one, and so on; a creep that is searched is left out."""
+        creep = self.creep if isinstance(self.creep, Creep) else False
+        known = {name: value for name, value in self.known.items() if not name.startswith("creep.")}
+        return [replace(self, modes=k, creep=creep, known=known) for k in range(self.modes + 1)]
+
+    def points(self, space: SearchSpace, known: Sequence[Mapping[str, float]]) -> FloatArray:
+        """Points of a space of this structure, spread over its last mode and its delay."""
+        return starts.points(space, self.modes, known)
+
+    def finer(self, space: SearchSpace, best: FloatArray) -> FloatArray:
+        """Points about the best of `points`, and these."""
+        return starts.finer(space, self.modes, best)
+
+    def trials(self) -> Sequence["ActuatorStructure"]:
+        """The structure with each delay that samples tell apart, where the output jumps with the command."""
+        if not self.delay or self.modes or self.amplifier == "first-order" or "vibration.delay" in self.known:
+            return [self]
+        if isinstance(self.amplifier, Amplifier) and self.amplifier.dynamic:
+            return [self]
+        step = self.survey.shortest
+        return [self._delayed(k, step) for k in range(starts.MOST_LATE)]
+
+    def begun(self, starting: Sequence[Mapping[str, float]]) -> "ActuatorStructure":
+        """The structure with a search that begins at these coordinates by name."""
+        return replace(self, starting=tuple(dict(each) for each in starting))
+
+    def smaller(self, freedom: Freedom) -> tuple["ActuatorStructure", str] | None:
+        """The structure without its last mode; None where it has none, or the user names one of its parameters."""
+        return doubts.without_last_mode(self, freedom)
+
+    def doubts(self, estimates: Mapping[str, float], freedom: Freedom) -> Sequence[Doubt]:
+        """The parts that the records may not determine at these values of all parameters."""
+        return doubts.doubts(self, estimates, freedom)
+
+    def parts(self, records: Sequence[Record]) -> LinearParts:
+        """The parts beside the law, for the records that the structure is for or else for these."""
+        survey = self.survey if self.survey is not None or not records else Survey.of(records)
+        bank: Any = self.creep
+        if survey is not None:
+            bank = creep_bank(bank, survey.shortest, survey.longest)
+        return LinearParts(self.amplifier, bank, self.modes, self.delay, survey)
+
+    def _delayed(self, k: int, step: float) -> "ActuatorStructure":
+        delay = 0.0 if not k else (k - 0.5) * step
+        words = "above 0 s" if not k else f"between {(k - 1) * step:g} and {k * step:g} s"
+        remark = f"without a mode the held command shows a delay to a sample only: it is held at {delay:g} s"
+        remark += f", {words} all are alike" * bool(k)
+        return replace(self, known={**self.known, "vibration.delay": delay}, remarks=(*self.remarks, remark))
