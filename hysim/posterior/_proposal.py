@@ -108,15 +108,15 @@ def mixture(v: FloatArray, n_linear: int, rng: np.random.Generator) -> Proposal:
 
 
 def _shapes(centres: FloatArray, v: FloatArray, covariance: FloatArray) -> FloatArray:
-    """Root of the covariance of the particles near each centre, (n_centres, n_v, n_v)."""
+    """Root of the covariance of the particles near each centre, (n_centres, n_v, n_v), by way of white coordinates."""
     root = np.linalg.cholesky(covariance)
     near, every = (np.linalg.solve(root, each.T).T for each in (centres, v))
     distances = np.sum(near**2, axis=1)[:, np.newaxis] - 2.0 * near @ every.T + np.sum(every**2, axis=1)
     count = min(len(v), max(int(_NEIGHBOURS * len(v)), 4 * v.shape[1] + 4))
-    chosen = v[np.argpartition(distances, count - 1, axis=1)[:, :count]]
+    chosen = every[np.argpartition(distances, count - 1, axis=1)[:, :count]]
     off = chosen - chosen.mean(axis=1, keepdims=True)
     local = np.swapaxes(off, 1, 2) @ off / count
-    return np.linalg.cholesky(local + 1e-6 * covariance)
+    return np.asarray(root @ np.linalg.cholesky(local + 1e-6 * np.eye(v.shape[1])))
 
 
 def _regular(covariance: FloatArray) -> FloatArray:
