@@ -125,8 +125,11 @@ def _is_masked(values: Any) -> bool:
 
 def _freeze(cls: type[T], *, finite: bool) -> type[T]:
     check = getattr(cls, "__post_init__", None)  # a class may have none, or inherit it
+    prepare = getattr(cls, "_prepare", None)  # for arguments that say more than their numbers
 
     def coerce_then_check(self: Any) -> None:
+        if prepare is not None:
+            prepare(self)
         for name, coerce in _coercions(type(self), finite).items():  # type: ignore[arg-type]
             object.__setattr__(self, name, coerce(vars(self)[name], name))
         if check is not None:

@@ -19,7 +19,8 @@ RANKS = (
         "_cycles",
         "_resolution",
         "_prefixes",
-    ),  # the turning points of an input, the quantum of a sensor, units
+        "interop",
+    ),  # the turning points of an input, the quantum of a sensor, units, tables of other libraries
     (
         "_drift",
         "_excursions",

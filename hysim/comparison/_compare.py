@@ -25,7 +25,7 @@ from hysim.metrics import LoopMetrics, loop_metrics
 from hysim.models.candidates import candidates, is_identifiable, is_searched
 from hysim.models.channels.dependent import on_record
 from hysim.models.protocols import Direct, Responding, needs_time
-from hysim.records import Record, several
+from hysim.records import Record, as_record, several
 from hysim.simulation import simulate
 
 _SHORT = 200  # samples; leaving one out at a time costs as many fits as there are samples
@@ -246,8 +246,8 @@ def _trial(records: Sequence[Record], test: Record | int | None) -> _Trial | Non
     if test is None:
         return None
     record = records[-1]
-    if isinstance(test, Record):
-        return _Trial(record, test, begin=0, own_state=True)
+    if (drive := as_record(test, "compare")) is not None:
+        return _Trial(record, drive, begin=0, own_state=True)
     if not isinstance(test, int) or isinstance(test, bool):
         raise TypeError(f"test takes a Record or a number of last cycles, got {test!r}")
     loops = measured_cycles(record.u, test, TOLERANCE)

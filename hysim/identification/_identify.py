@@ -57,8 +57,9 @@ def identify(
     model_or_class : model, model class or structure
         `hysim.BoucWen`, `hysim.TransferFunction.structure(poles=4, zeros=1)`, ... The search begins at the defaults of
         a class, or at the values of an instance, such as a `hysim.Structure`.
-    record_or_records : Record or sequence of Record
+    record_or_records : Record, table, or sequence of them
         Input and output, and for models with dynamics the time; of a `hysim.Structure` also `hysim.StructureRecord`.
+        A table, such as a DataFrame, has columns u and y, and t or an index of times; see `hysim.load`.
         Several records share all parameters but the state at the first sample: where it is free, each has its own,
         ``z0[0]``, ``z0[1]``, ...
     fixed : mapping, optional

@@ -10,6 +10,7 @@ from hysim._printing import aligned, printed, summary_text
 from hysim.identification._identify import identify
 from hysim.identification._result import Identification
 from hysim.identification.sharing import sharing
+from hysim.interop import frame
 from hysim.records import Record
 
 CRITERIA: dict[str, Callable[[Identification], float]] = {
@@ -64,6 +65,15 @@ class Selection:
         ]
         header, *lines = aligned([["candidate", "parameters", "fit [%]", "rmse", self.criterion], *rows])
         return "\n".join([header, "-" * len(header), *lines])
+
+    def to_frame(self) -> Any:
+        """The candidates as a `pandas.DataFrame`, one row each, the best first; ImportError without pandas."""
+        names = ("n_parameters", "fit_percent", "rmse", "cv_rmse", "fpe", "aic", "bic", "success", "message")
+        return frame(
+            {name: [vars(fit)[name] for fit in self.fits.values()] for name in names},
+            index=("candidate", [*self.fits]),
+            notes={"criterion": self.criterion},
+        )
 
 
 def select(
