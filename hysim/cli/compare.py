@@ -47,15 +47,15 @@ def run(options: argparse.Namespace) -> int:
 
 def _subjects(name: str) -> dict[str, Any]:
     """Subjects of the comparison for a family's name, a file or an import path."""
-    from hysim.models.candidates import candidates
+    from hysim.models.candidates import candidates_named
 
     model = models.model_or_family(name)
     if name.endswith(".json") or models.is_import_path(name):
         return {models.name_of(name): model}
-    family = model.__name__
-    of_family = {each: subject for each, subject in candidates().items() if each.split()[0] == family}
-    if not of_family:
-        raise ValueError(f"the model {name} cannot be compared without further arguments: give a .json file")
+    try:
+        of_family = candidates_named(model.__name__)
+    except ValueError:
+        raise ValueError(f"the model {name} cannot be compared without further arguments: give a .json file") from None
     return of_family if len(of_family) > 1 else dict.fromkeys([name], *of_family.values())
 
 

@@ -22,7 +22,7 @@ from hysim.errors import SimulationError
 from hysim.identification import Identification, identify
 from hysim.identification.sharing import sharing
 from hysim.metrics import LoopMetrics, loop_metrics
-from hysim.models.candidates import candidates, is_identifiable, is_searched
+from hysim.models.candidates import candidates, candidates_named, is_identifiable, is_searched
 from hysim.models.channels.dependent import on_record
 from hysim.models.protocols import Direct, Responding, needs_time
 from hysim.records import Record, as_record, several
@@ -36,7 +36,7 @@ _FAILURES = (ValueError, TypeError, ArithmeticError, SimulationError)
 
 
 def compare(
-    models: Mapping[str, Any] | str | None,
+    models: Mapping[str, Any] | Sequence[Any] | str | None,
     record_or_records: Record | Sequence[Record],
     *,
     cross_validate: str | int | None = "auto",
@@ -51,9 +51,10 @@ def compare(
 
     Parameters
     ----------
-    models : mapping, "all" or None
+    models : mapping, list, "all" or None
         Name to a model; to a result of `identify` or `discover`; to a class or structure, which is identified on the
-        record; or, with several records, to a list of models or results, one for each of them. ``"all"``, or None, is
+        record; or, with several records, to a list of models or results, one for each of them. A name of a family, such
+        as ``"bouc-wen"``, stands for it, and a list of names or classes for a mapping. ``"all"``, or None, is
         every family that can be identified without further arguments; those that cannot be identified on this record
         are listed with the reason.
     record_or_records : Record or sequence of Record
@@ -224,11 +225,12 @@ class _Protocol:
         return metrics.fit_percent(test.y, y), metrics.rmse(test.y, y)
 
 
-def _subjects(models: Mapping[str, Any] | str | None, n_records: int) -> dict[str, Any]:
+def _subjects(models: Mapping[str, Any] | Sequence[Any] | str | None, n_records: int) -> dict[str, Any]:
     if models is None or (isinstance(models, str) and models == "all"):
         return candidates()
-    if not isinstance(models, Mapping):
-        raise TypeError(f'compare takes a mapping of names to models, or "all", got {models!r}')
+    if isinstance(models, str) or not isinstance(models, Mapping):
+        models = _named([models] if isinstance(models, str) else models)
+    models = {name: _meant(each) for name, each in models.items()}
     if not models:
         raise ValueError("there is nothing to compare: give at least one model by name")
     for name, subject in models.items():
@@ -239,7 +241,29 @@ def _subjects(models: Mapping[str, Any] | str | None, n_records: int) -> dict[st
         members = subject if isinstance(subject, list | tuple) else [subject]
         if not all(is_identifiable(each) or isinstance(model_of(each), Responding) for each in members):
             raise TypeError(f"compare takes a model, a result, a model class or a structure, got {subject!r} as {name}")
-    return dict(models)
+    return models
+
+
+def _named(models: Any) -> dict[str, Any]:
+    """Families by their names; the candidates of a family by theirs."""
+    if not isinstance(models, Sequence) or not all(isinstance(each, str | type) for each in models):
+        raise TypeError(
+            f'compare takes a mapping of names to models, a list of families or their names, or "all", got {models!r}'
+        )
+    named = [candidates_named(each) if isinstance(each, str) else {each.__name__: each} for each in models]
+    return {name: subject for subjects in named for name, subject in subjects.items()}
+
+
+def _meant(subject: Any) -> Any:
+    """A subject, or the one candidate of the family that it names."""
+    if not isinstance(subject, str):
+        return subject
+    subjects = candidates_named(subject)
+    if len(subjects) > 1:
+        raise ValueError(
+            f"{subject!r} stands for several models, {', '.join(subjects)}: give [{subject!r}], or one of them"
+        )
+    return next(iter(subjects.values()))
 
 
 def _trial(records: Sequence[Record], test: Record | int | None) -> _Trial | None:

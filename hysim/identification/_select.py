@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from hysim._frozen import frozen
+from hysim._frozen import check_choice, frozen
 from hysim._parallel import Progress
 from hysim._printing import aligned, printed, summary_text
 from hysim.identification._identify import identify
@@ -127,8 +127,7 @@ def select(
     >>> hs.select([hs.Line, hs.SingleValued], rec).name
     'SingleValued'
     """
-    if criterion not in CRITERIA:
-        raise ValueError(f"criterion must be one of {', '.join(CRITERIA)}, got {criterion!r}")
+    check_choice("criterion", criterion, CRITERIA)
     if criterion == "cv_rmse" and cross_validate is None:
         raise ValueError('criterion="cv_rmse" needs a cross-validation: cross_validate="loo", or a number of blocks')
     named, report = _named(candidates), progress or (lambda done, total: None)
