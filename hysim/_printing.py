@@ -4,6 +4,7 @@ The text is the ``__str__`` of a result, its first line the ``repr``; notebooks 
 """
 
 import csv
+import importlib
 import io
 import math
 import textwrap
@@ -14,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 LINES, LETTERS = 10, 100
+_NOTEBOOKS = "hysim.notebooks"
 
 T = TypeVar("T")
 
@@ -25,8 +27,9 @@ def printed(cls: type[T]) -> type[T]:
 
 
 def shown(cls: type[T]) -> type[T]:
-    """Let notebooks show the text of ``str``."""
+    """Let notebooks show the text of ``str``, and the page that `hysim.notebooks` makes of some classes."""
     cls._repr_mimebundle_ = _bundle  # type: ignore[attr-defined]
+    cls._repr_html_ = _page  # type: ignore[attr-defined]
     return cls
 
 
@@ -122,6 +125,12 @@ def _cut(name: str, text: str) -> str:
 
 def _first_line(self: object) -> str:
     return f"<{str(self).partition(chr(10))[0]}>"
+
+
+def _page(self: object) -> str | None:
+    """A page with a figure. What draws it knows the results: it is above them, and loaded by its name."""
+    page: str | None = importlib.import_module(_NOTEBOOKS).page(self)
+    return page
 
 
 def _bundle(self: object, include: object = None, exclude: object = None) -> dict[str, str]:

@@ -36,6 +36,7 @@ RANKS = (
     ("discovery", "control", "tracking", "design"),
     ("comparison", "posterior", "sweeps", "rig", "export"),
     ("plot",),
+    ("notebooks",),
     ("paper",),
     ("cli",),
     ("__main__",),

@@ -84,7 +84,7 @@ def test_nothing_is_guessed_where_nothing_is_near():
     assert nearest("stiffness", ["beta", "gamma"]) is None
     assert meant("stiffness", ["beta", "gamma"]) == ""
     assert meant(3, ["beta"]) == ""
-    with pytest.raises(AttributeError, match="no attribute 'something_else'$"):
+    with pytest.raises(AttributeError, match=r"no attribute 'something_else'$"):
         _ = hs.something_else
 
 

@@ -133,7 +133,7 @@ class Comparison:
     test: Record | None = None
 
     __str__ = _tables.to_words
-    _repr_html_ = _tables.to_html
+    to_html = _tables.to_html
     to_text = _tables.to_text
     to_markdown = _tables.to_markdown
     to_latex = _tables.to_latex
