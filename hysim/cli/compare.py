@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from hysim.cli import models, outputs, records
 from hysim.cli.options import JSON, SEED, Command
+from hysim.errors import Interrupted
 
 if TYPE_CHECKING:
     from hysim.comparison import Comparison
@@ -24,16 +25,21 @@ def run(options: argparse.Namespace) -> int:
     subjects: dict[str, Any] = {}
     for name in options.model:
         subjects |= _subjects(name)
-    table = compare(
-        subjects or None,
-        record,
-        cross_validate=options.cross_validate or "auto",
-        test=test,
-        seed=options.seed,
-        progress=(shown := outputs.progress()),
-        max_evaluations=options.max_evaluations,
-        announce=outputs.announce if shown else None,
-    )
+    try:
+        table = compare(
+            subjects or None,
+            record,
+            cross_validate=options.cross_validate or "auto",
+            test=test,
+            seed=options.seed,
+            progress=(shown := outputs.progress()),
+            max_evaluations=options.max_evaluations,
+            announce=shown.announce if shown else None,
+        )
+    except Interrupted as interrupt:
+        if not options.json:
+            print(interrupt.finished.to_text())
+        raise
     files: outputs.Files = {
         options.out: lambda: _best(table, record),
         options.csv: lambda: table.to_csv(),

@@ -18,7 +18,7 @@ from hysim._frozen import FloatArray
 from hysim._parallel import Progress, map_on_threads
 from hysim.comparison._records import OneByOne, Result, model_of, models_on, together
 from hysim.comparison._result import Comparison, ComparisonRow
-from hysim.errors import SimulationError
+from hysim.errors import Interrupted, SimulationError
 from hysim.identification import Identification, identify
 from hysim.identification.sharing import sharing
 from hysim.metrics import LoopMetrics, loop_metrics
@@ -88,6 +88,8 @@ def compare(
         If there is nothing to compare, or the record has no complete cycle, or fewer than the test needs.
     TypeError
         If `record` is no Record, or a subject cannot be compared.
+    Interrupted
+        A `KeyboardInterrupt`, after Ctrl-C, if some models were compared: its `finished` is their `Comparison`.
 
     Examples
     --------
@@ -107,18 +109,29 @@ def compare(
         cross_validate = "loo" if sum(map(len, records)) <= _SHORT else _BLOCKS
     protocol = _Protocol(records, _last_loop(training), cross_validate, seed, trial, max_evaluations, announce)
     names = list(subjects)
-    with sharing():
-        results = map_on_threads(
-            lambda k: protocol.row(names[k], subjects[names[k]]), len(names), workers=workers, progress=progress
+    done: dict[str, ComparisonRow | str] = {}
+
+    def compared(k: int) -> None:
+        done[names[k]] = protocol.row(names[k], subjects[names[k]])
+
+    def of_those_done() -> Comparison:
+        by_name = {name: done[name] for name in names if name in done}
+        return Comparison(
+            record=training,
+            loop=protocol.measured,
+            rows=tuple(row for row in by_name.values() if isinstance(row, ComparisonRow)),
+            failed={name: reason for name, reason in by_name.items() if isinstance(reason, str)},
+            test=trial.record if trial else None,
         )
-    by_name = dict(zip(names, results, strict=True))
-    return Comparison(
-        record=training,
-        loop=protocol.measured,
-        rows=tuple(row for row in by_name.values() if isinstance(row, ComparisonRow)),
-        failed={name: reason for name, reason in by_name.items() if isinstance(reason, str)},
-        test=trial.record if trial else None,
-    )
+
+    try:
+        with sharing():
+            map_on_threads(compared, len(names), workers=workers, progress=progress)
+    except KeyboardInterrupt:
+        if not done:
+            raise
+        raise Interrupted(f"{len(done)} of {len(names)} models were compared", of_those_done()) from None
+    return of_those_done()
 
 
 def _last_loop(record: Record) -> LoopMetrics:

@@ -105,7 +105,9 @@ def _comparison(comparison: Any) -> str:
         return str(comparison.to_html())
     record, row = comparison.record, comparison[best]
     model = SimpleNamespace(u=record.u, y=row.y, t=record.t, name=best, units=record.units)
-    return comparison.to_html() + figure(lambda ax: plot.loop(record, model, ax=ax), f"the record, and {best} over it")
+    return str(comparison.to_html()) + figure(
+        lambda ax: plot.loop(record, model, ax=ax), f"the record, and {best} over it"
+    )
 
 
 def _selection(selection: Any) -> str:
