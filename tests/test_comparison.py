@@ -114,9 +114,10 @@ def test_without_a_resolution_there_are_no_quanta(table1):
         ({}, "table", ValueError, "nothing to compare"),
         ({"line": hs.Line}, "branch", ValueError, "cycle"),
         ({"line": hs.Line}, None, TypeError, "takes a Record"),
-        ({"word": "bouc-wen"}, "table", TypeError, "takes a model"),
+        ({"word": "bouc-wn"}, "table", ValueError, "no family 'bouc-wn'"),
+        ({"number": 3}, "table", TypeError, "takes a model"),
         ({"class": hs.Sensor}, "table", TypeError, "takes a model"),
-        ("bouc-wen", "table", TypeError, "takes a mapping"),
+        (3, "table", TypeError, "takes a mapping"),
     ],
 )
 def test_wrong_arguments_are_named(table1, subjects, record, error, message):
