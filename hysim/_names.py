@@ -18,7 +18,7 @@ def nearest(name: object, known: Iterable[object]) -> str | None:
     from difflib import get_close_matches  # which is loaded with the first error, not with hysim
 
     forms = {plain(each): each for each in map(str, known)}
-    near = get_close_matches(plain(str(name)), forms, n=1, cutoff=0.7)
+    near = get_close_matches(plain(str(name)), forms, n=1)
     return forms[near[0]] if near else None
 
 

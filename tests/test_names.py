@@ -92,9 +92,8 @@ def test_nothing_is_guessed_where_nothing_is_near():
     ("arguments", "said"),
     [
         (("idntify",), "did you mean identify?"),
-        (("identify", "loop.csv", "--modle", "dahl"), "there is no option --modle; did you mean --model?"),
-        (("identify", "loop.csv", "--model", "dahll"), "did you mean 'dahl'?"),
-        (("identify", "loop.csv", "--model", "dahl", "--initial=perodic"), "did you mean periodic?"),
+        (("identify", "loop.csv", "--model", "dahl", "--bonds", "c=0:1"), "did you mean --bounds?"),
+        (("identify", "loop.csv", "--model", "dahll"), "did you mean dahl?"),
         (("identify", "loop.csv", "--model", "dahl", "--fix", "coulom=1"), "did you mean 'coulomb'?"),
         (("identify", "loop.csv", "--model", "dahl", "--u", "voltag"), "did you mean 'voltage'?"),
     ],

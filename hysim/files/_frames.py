@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim._names import meant
-from hysim.files._table import Column, Notes, listed, number_of, positive
+from hysim.files._table import Column, Notes, listed, nearest, number_of, positive
 from hysim.interop import ForeignTable, unit_in
 
 
@@ -42,7 +41,7 @@ class Frame:
         if isinstance(key, str):
             number = number_of(key, "columns", labels, [f"{label} [{units.get(label)}]" for label in labels])
             if number is None:
-                raise ValueError(f"no column {key!r}, the columns are: {listed(labels)}{meant(key, labels)}")
+                raise ValueError(f"no column {key!r}, the columns are: {listed(labels)}{nearest(key, labels)}")
         elif not 0 <= (number := operator.index(key)) < len(labels):
             raise ValueError(f"no column {key}, there are columns 0 to {len(labels) - 1}")
         return Column(number, labels[number], unit_in(self.table, number))
