@@ -35,5 +35,5 @@ def among(name: object, known: Iterable[object]) -> str:
 
 
 def plain(name: str) -> str:
-    """A name without what people write in different ways: capitals, hyphens, underscores and blanks."""
-    return name.lower().replace("-", "").replace("_", "").replace(" ", "")
+    """A name without what people write in different ways: capitals, hyphens, underscores, points and blanks."""
+    return name.lower().replace("-", "").replace("_", "").replace(" ", "").replace(".", "")
