@@ -44,6 +44,7 @@ extensions = [
     "sphinx.ext.autosummary",
     "numpydoc",
     "mathml",
+    "notebook_cells",
 ]
 html_math_renderer = "mathml"
 exclude_patterns = ["_build"]

@@ -7,7 +7,7 @@ the bare import costs the standard library only.
 import importlib
 from typing import Any
 
-from hysim._names import MODULE_OF
+from hysim._names import MODULE_OF, meant
 from hysim._release import __version__ as __version__
 
 __all__ = ["__version__", *MODULE_OF]
@@ -15,7 +15,8 @@ __all__ = ["__version__", *MODULE_OF]
 
 def __getattr__(name: str) -> Any:
     if name not in MODULE_OF:
-        raise AttributeError(f"module 'hysim' has no attribute {name!r}")
+        words = f"module 'hysim' has no attribute {name!r}{meant(name, __all__)}"
+        raise AttributeError(words, name=name, obj=None)  # without the object: Python would guess once more
     is_module = MODULE_OF[name] == __name__
     value: Any = importlib.import_module(f"hysim.{name}" if is_module else MODULE_OF[name])
     globals()[name] = value = value if is_module else vars(value)[name]

@@ -16,6 +16,8 @@ from typing import Any, TypeVar, dataclass_transform
 import numpy as np
 import numpy.typing as npt
 
+from hysim._names import among, meant
+
 FloatArray = npt.NDArray[np.float64]
 T = TypeVar("T")
 
@@ -89,7 +91,7 @@ def vectors(**values: npt.ArrayLike) -> list[FloatArray]:
 def check_choice(name: str, value: object, choices: Iterable[object]) -> None:
     """Raise a ValueError if the argument of this name is not one of the choices."""
     if value not in (known := tuple(choices)):
-        raise ValueError(f"{name} must be one of {', '.join(map(str, known))}, got {value!r}")
+        raise ValueError(f"{name} must be one of {', '.join(map(str, known))}, got {value!r}{meant(value, known)}")
 
 
 def check_count(name: str, value: object) -> None:
@@ -125,8 +127,11 @@ def _is_masked(values: Any) -> bool:
 
 def _freeze(cls: type[T], *, finite: bool) -> type[T]:
     check = getattr(cls, "__post_init__", None)  # a class may have none, or inherit it
+    prepare = getattr(cls, "_prepare", None)  # for arguments that say more than their numbers
 
     def coerce_then_check(self: Any) -> None:
+        if prepare is not None:
+            prepare(self)
         for name, coerce in _coercions(type(self), finite).items():  # type: ignore[arg-type]
             object.__setattr__(self, name, coerce(vars(self)[name], name))
         if check is not None:
@@ -136,7 +141,27 @@ def _freeze(cls: type[T], *, finite: bool) -> type[T]:
     cls.__eq__ = _equal  # type: ignore[method-assign]
     cls.__hash__ = _hash  # type: ignore[method-assign]
     cls.__reduce__ = _reduce  # type: ignore[method-assign]
-    return dataclasses.dataclass(frozen=True, kw_only=True, eq=False)(cls)
+    return _with_advice(dataclasses.dataclass(frozen=True, kw_only=True, eq=False)(cls))
+
+
+def _with_advice(cls: type[T]) -> type[T]:
+    """Let the constructor name its parameters, and the one that may have been meant, where one is unknown."""
+    generated: Any = cls.__init__
+
+    @functools.wraps(generated)
+    def construct(self: Any, *arguments: Any, **values: Any) -> None:
+        try:
+            generated(self, *arguments, **values)
+        except TypeError:
+            known = [field.name for field in dataclasses.fields(cls)]  # type: ignore[arg-type]
+            unknown = next((name for name in values if name not in known), None)
+            if unknown is None and not arguments:
+                raise
+            what = "takes no positional argument" if unknown is None else f"has no parameter {unknown!r}"
+            raise TypeError(f"{cls.__name__} {what}; by name it takes {among(unknown, known)}") from None
+
+    cls.__init__ = construct  # type: ignore[method-assign]
+    return cls
 
 
 @functools.cache

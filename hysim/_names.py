@@ -1,5 +1,9 @@
-"""The public names in reading order, and the modules that hold them, as the stub of the front door lists them."""
+"""The public names in reading order, and the modules that hold them, as the stub of the front door lists them.
 
+Beside them the one helper that finds the name which was meant.
+"""
+
+from collections.abc import Iterable
 from pathlib import Path
 
 _LINES = Path(__file__).with_name("__init__.pyi").read_text(encoding="utf-8").splitlines()
@@ -7,3 +11,29 @@ _WORDS = [line.split() for line in _LINES]  # "from hysim.records import Record 
 
 MODULE_OF = {words[3]: words[1] for words in _WORDS if words[:1] == ["from"]}
 """Public name to the module that holds it; ``hysim`` for a module of that name."""
+
+
+def nearest(name: object, known: Iterable[object]) -> str | None:
+    """The known name that is nearest to a misspelt one, whatever its capitals, hyphens and underscores; else None."""
+    from difflib import get_close_matches  # which is loaded with the first error, not with hysim
+
+    forms = {plain(each): each for each in map(str, known)}
+    near = get_close_matches(plain(str(name)), forms, n=1)
+    return forms[near[0]] if near else None
+
+
+def meant(name: object, known: Iterable[object]) -> str:
+    """The end of a message about an unknown name: the nearest known one, or nothing."""
+    near = nearest(name, known)
+    return "" if near is None else f"; did you mean {near!r}?"
+
+
+def among(name: object, known: Iterable[object]) -> str:
+    """The known names in a row, and the one that may have been meant by an unknown one."""
+    names = [*map(str, known)]
+    return f"{', '.join(names)}{meant(name, names)}"
+
+
+def plain(name: str) -> str:
+    """A name without what people write in different ways: capitals, hyphens, underscores, points and blanks."""
+    return name.lower().replace("-", "").replace("_", "").replace(" ", "").replace(".", "")

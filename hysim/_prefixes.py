@@ -54,6 +54,11 @@ def in_unit(name: str, unit: str) -> str:
     return f"{name} [{printed(unit)}]" if unit else name
 
 
+def in_brackets(unit: str) -> str:
+    """A unit as a part of another one: ``(mm/s)`` for ``mm/s``, which would be ambiguous behind a stroke."""
+    return f"({unit})" if re.search(r"[/ *·]", unit) and not unit.startswith("(") else unit
+
+
 def printed(unit: str) -> str:
     """A unit with its micro sign and its square: `µm` for ``"um"``, `m/s²` for ``"m/s^2"``."""
     return re.sub(r"\bu(?=(m|s|V|A|N)\b)", "µ", unit).replace("^2", "²")

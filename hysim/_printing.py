@@ -4,16 +4,33 @@ The text is the ``__str__`` of a result, its first line the ``repr``; notebooks 
 """
 
 import csv
+import importlib
 import io
 import math
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 LINES, LETTERS = 10, 100
+_NOTEBOOKS = "hysim.notebooks"
+
+_PICTURES = {
+    "Record": "hs.plot.loop(record) or hs.plot.history(record)",
+    "Simulation": "hs.plot.loop(run) or hs.plot.history(run)",
+    "Identification": "hs.plot.identification(fit, record)",
+    "ClosedLoop": "hs.plot.response(run)",
+    "Comparison": "hs.plot.comparison(table)",
+    "Discovery": "hs.plot.selection(discovery)",
+    "OscillatorDiscovery": "hs.plot.selection(discovery)",
+    "Tuning": "hs.plot.trade_off(tuning)",
+    "Sweep": 'hs.plot.parallel_coordinates(study, "output")',
+    "SobolIndices": 'hs.plot.sensitivities(indices, "output")',
+    "LoopMetrics": "hs.plot.width(metrics)",
+}
+"""What draws a result, by the name of its class."""
 
 T = TypeVar("T")
 
@@ -21,12 +38,14 @@ T = TypeVar("T")
 def printed(cls: type[T]) -> type[T]:
     """Give a class that has a ``__str__`` a ``repr`` of one line, and let notebooks show all lines."""
     cls.__repr__ = _first_line  # type: ignore[method-assign]
+    cls.__getattr__ = _no_attribute  # type: ignore[attr-defined]
     return shown(cls)
 
 
 def shown(cls: type[T]) -> type[T]:
-    """Let notebooks show the text of ``str``."""
+    """Let notebooks show the text of ``str``, and the page that `hysim.notebooks` makes of some classes."""
     cls._repr_mimebundle_ = _bundle  # type: ignore[attr-defined]
+    cls._repr_html_ = _page  # type: ignore[attr-defined]
     return cls
 
 
@@ -122,6 +141,20 @@ def _cut(name: str, text: str) -> str:
 
 def _first_line(self: object) -> str:
     return f"<{str(self).partition(chr(10))[0]}>"
+
+
+def _no_attribute(self: object, name: str) -> NoReturn:
+    """Say what draws a result where somebody calls its `plot`: results know nothing of pictures."""
+    message = f"{type(self).__name__!r} object has no attribute {name!r}"
+    if name == "plot":
+        message += f": pictures are functions of results, {_PICTURES.get(type(self).__name__, 'see hs.plot')}"
+    raise AttributeError(message)
+
+
+def _page(self: object) -> str | None:
+    """A page with a figure. What draws it knows the results: it is above them, and loaded by its name."""
+    page: str | None = importlib.import_module(_NOTEBOOKS).page(self)
+    return page
 
 
 def _bundle(self: object, include: object = None, exclude: object = None) -> dict[str, str]:

@@ -31,6 +31,21 @@ from hysim.plants.resampling import decimated, interpolated
 from hysim.records import Record
 from hysim.signals import multisine
 
+__all__ = [
+    "LINES",
+    "PERIOD",
+    "SAMPLE_RATE",
+    "SWEEP_LENGTH",
+    "noel_schoukens",
+    "noel_schoukens_plant",
+    "simulate_official",
+]
+
+
+def __dir__() -> list[str]:
+    return __all__
+
+
 SAMPLE_RATE = 750.0
 PERIOD = 8192
 SWEEP_LENGTH = 153_000

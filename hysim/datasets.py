@@ -13,6 +13,13 @@ import numpy as np
 from hysim._frozen import FloatArray
 from hysim.records import Record
 
+__all__ = ["PIXEL", "SQUARE_WAVE_FREQUENCY", "table1", "table2"]
+
+
+def __dir__() -> list[str]:
+    return __all__
+
+
 PIXEL = 0.0763
 """Table 1's resolution [um]: every displacement is a whole multiple of it, to 5 nm."""
 

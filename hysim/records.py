@@ -20,8 +20,9 @@ from hysim._drift import drift
 from hysim._excursions import full_amplitude, protocol
 from hysim._frozen import FloatArray, checked, wrong_axes
 from hysim._prefixes import power_of_ten
-from hysim._printing import extent, printed, quantity, summary_text
+from hysim._printing import extent, listed, printed, quantity, summary_text
 from hysim._resolution import output_quantum
+from hysim.interop import channels_of, frame, table_in, told_by, unit_in
 
 T = TypeVar("T", float, FloatArray)
 
@@ -46,9 +47,12 @@ class Record:
     y : array, shape (n,)
         Output, for instance a displacement [``units["y"]``].
     t : array, shape (n,), optional
-        Strictly increasing times of the samples [``units["t"]``]; rate-independent laws need none.
+        Strictly increasing times of the samples [``units["t"]``]; rate-independent laws need none. By default those in
+        the index of `u` and `y`, where these are a Series of pandas or a DataArray of xarray: dates, time spans, an
+        index called t or time, or floats without a name. Whole numbers without a name number the rows.
     units : mapping, optional
-        Labels of the units of ``"t"``, ``"u"``, ``"y"`` and the channels, which are not checked.
+        Labels of the units of ``"t"``, ``"u"``, ``"y"`` and the channels, which are not checked. By default of a Series
+        or a DataArray ``attrs["units"]``.
     resolution : float, optional
         Quantum of the output's sensor [unit of y].
     name : str, optional
@@ -60,7 +64,8 @@ class Record:
     Raises
     ------
     ValueError
-        If lengths differ, a value is not finite or the time does not increase; the message names the sample.
+        If lengths differ, a value is not finite or the time does not increase; the message names the sample. If the
+        times in the indexes of `u` and `y` differ.
     TypeError
         If the values are not numbers.
 
@@ -82,6 +87,13 @@ class Record:
     resolution: float | None = None
     name: str = ""
     channels: Channels = field(default_factory=dict)
+
+    def _prepare(self) -> None:
+        """Take times and units that columns of other libraries state, where none are given."""
+        if not type(self.u) is type(self.y) is np.ndarray and isinstance(self.units, Mapping):
+            t, units = told_by(self.u, self.y, self.t, self.units)
+            object.__setattr__(self, "t", t)
+            object.__setattr__(self, "units", units)
 
     def __post_init__(self) -> None:
         for name, values in self._signals().items():
@@ -406,6 +418,24 @@ class Record:
         """
         return output_quantum(self.y)
 
+    def to_frame(self) -> Any:
+        """The record as a `pandas.DataFrame`, with the time as index; ImportError without pandas.
+
+        Columns are u, y and the channels that vary. Units, name, resolution and the other channels are its
+        ``attrs``, from which `hysim.load` makes an equal record.
+        """
+        varying = along(self.channels)
+        return frame(
+            {"u": self.u, "y": self.y, **varying},
+            index=None if self.t is None else ("t", self.t),
+            units=self.units,
+            notes={
+                "name": self.name,
+                "resolution": self.resolution,
+                "channels": {name: name if name in varying else value for name, value in self.channels.items()},
+            },
+        )
+
     def _sample_at(self, place: float) -> int:
         if isinstance(place, (int, np.integer)) and not isinstance(place, bool):
             return int(place)
@@ -415,13 +445,42 @@ class Record:
 
 
 def several(records: Any, verb: str) -> tuple[Record, ...]:
-    """One record or a sequence of them as a tuple; other arguments are errors that name the `verb`."""
-    records = (records,) if isinstance(records, Record) else records
-    if not isinstance(records, Sequence) or not all(isinstance(record, Record) for record in records):
+    """One record or a sequence of them as a tuple; other arguments are errors that name the `verb`.
+
+    Tables of other libraries with the columns u and y are records, too.
+    """
+    if (single := as_record(records, verb)) is not None:
+        return (single,)
+    members = [as_record(each, verb) for each in records] if isinstance(records, Sequence) else [None]
+    if any(each is None for each in members):
         raise TypeError(f"{verb} takes a Record or several of them, got {type(records).__name__}: hs.Record(u=u, y=y)")
-    if not records:
+    if not members:
         raise ValueError(f"{verb} takes a Record or several of them: no record was given")
-    return tuple(records)
+    return tuple(each for each in members if each is not None)
+
+
+def as_record(value: Any, verb: str) -> Record | None:
+    """A record, as it is or in a table of another library with the columns u and y; None for what is neither."""
+    if isinstance(value, Record):
+        return value
+    table = table_in(value)
+    if table is None:
+        return None
+    if missing := [name for name in ("u", "y") if name not in table.labels]:
+        raise ValueError(
+            f"{verb} takes a table with the columns u and y, got a {table.kind} without {listed(missing)}, with "
+            f"{listed(table.labels)}: name the columns by hs.load(table, u=..., y=...)"
+        )
+    places = {name: table.labels.index(name) for name in ("u", "y", "t") if name in table.labels}
+    channels = channels_of(table)
+    units = dict(table.units) | {name: unit for name, place in places.items() if (unit := unit_in(table, place))}
+    return Record(
+        **{name: table.read(place) for name, place in places.items()},
+        units={name: unit for name, unit in units.items() if name in ("t", "u", "y", *channels)},
+        resolution=table.notes.get("resolution"),
+        name=table.notes.get("name", ""),
+        channels=channels,
+    )
 
 
 def check_increasing(t: FloatArray) -> None:

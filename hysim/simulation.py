@@ -4,15 +4,19 @@ from collections.abc import Mapping
 from dataclasses import field
 from typing import Any, Protocol, runtime_checkable
 
+import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen, vectors
 from hysim._printing import extent, printed, summary_text
+from hysim.interop import dataset, frame
 from hysim.models.protocols import Remembering, Responding, needs_time
 from hysim.records import check_increasing, even_step
 
 _BY_NODE = frozenset({"displacement", "velocity", "acceleration"})
 """Signals with a column for each mass, as their peaks: masses are nodes 1, 2, ..., because node 0 is the ground."""
+
+_BY_ELEMENT = frozenset({"drift", "force"})
 
 _PEAK = "peak_"
 
@@ -83,6 +87,52 @@ class Simulation:
         first = {name: self.signals[name] for name in ("t", "u", "y", "z") if name in self.signals}
         named = {name: columns_of(name, values) for name, values in (first | dict(self.signals)).items()}
         return {label: column for columns in named.values() for label, column in columns.items()}
+
+    def to_frame(self) -> Any:
+        """The `columns` as a `pandas.DataFrame`, with the time as index; ImportError without pandas.
+
+        ``attrs["units"]`` holds the unit of each column.
+        """
+        return frame_of_signals(self.columns, self.units)
+
+    def to_xarray(self) -> Any:
+        """The signals as an `xarray.Dataset` along t, or along sample without a time; ImportError without xarray.
+
+        The second axis of a signal of several masses is ``node``, counted from 1, of one of several elements
+        ``element``, and of another one, such as a memory, its own name with ``_0``.
+        """
+        return dataset_of_signals(self.signals, self.units)
+
+
+def frame_of_signals(columns: Mapping[str, FloatArray], units: Mapping[str, str]) -> Any:
+    """Columns as a `pandas.DataFrame` with t as its index, and units by the columns' names in ``attrs["units"]``."""
+    known = {label: unit for label in columns if (unit := _unit_of(label, units)) is not None}
+    others = {label: values for label, values in columns.items() if label != "t"}
+    return frame(others, index=("t", columns["t"]) if "t" in columns else None, units=known)
+
+
+def dataset_of_signals(signals: Mapping[str, FloatArray], units: Mapping[str, str]) -> Any:
+    """Signals by name, of shape (n,) or (n, m), as an `xarray.Dataset`; see `Simulation.to_xarray`."""
+    first = "t" if "t" in signals else "sample"
+    variables, coordinates = {}, {first: signals["t"]} if "t" in signals else {}
+    for name, values in signals.items():
+        axes = [first, *([_second_axis(name)] if values.ndim == 2 else [])]
+        if "node" in axes:
+            coordinates["node"] = np.arange(1, values.shape[1] + 1)
+        if name != "t":
+            variables[name] = (axes, values)
+    return dataset(variables, coordinates, units=units)
+
+
+def _second_axis(name: str) -> str:
+    signal = name.removeprefix(_PEAK)
+    return "node" if signal in _BY_NODE else "element" if signal in _BY_ELEMENT else f"{name}_0"
+
+
+def _unit_of(label: str, units: Mapping[str, str]) -> str | None:
+    """The unit of a column: that of its own name, or of the signal that it is one column of."""
+    signal, _, number = label.rpartition("_")
+    return units.get(label, units.get(signal) if number.isdigit() else None)
 
 
 def columns_of(name: str, values: FloatArray) -> dict[str, FloatArray]:

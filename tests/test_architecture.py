@@ -19,7 +19,8 @@ RANKS = (
         "_cycles",
         "_resolution",
         "_prefixes",
-    ),  # the turning points of an input, the quantum of a sensor, units
+        "interop",
+    ),  # the turning points of an input, the quantum of a sensor, units, tables of other libraries
     (
         "_drift",
         "_excursions",
@@ -35,6 +36,7 @@ RANKS = (
     ("discovery", "control", "tracking", "design"),
     ("comparison", "posterior", "sweeps", "rig", "export"),
     ("plot",),
+    ("notebooks",),
     ("paper",),
     ("cli",),
     ("__main__",),

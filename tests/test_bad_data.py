@@ -122,7 +122,11 @@ def test_a_perfect_line_has_intervals_no_wider_than_its_quantum(noise, kind):
 @pytest.mark.parametrize(
     ("options", "error", "message"),
     [
-        ({"noise": "quantized"}, ValueError, 'noise must be "gaussian", "quantised" or "robust", got \'quantized\''),
+        (
+            {"noise": "quantized"},
+            ValueError,
+            "got 'quantized'; did you mean 'quantised'",
+        ),
         ({"intervals": "profiles"}, ValueError, "intervals must be .* got 'profiles'"),
         ({"initial": "periodc"}, ValueError, "initial must be .* got 'periodc'"),
         ({"cross_validate": "lou"}, ValueError, "cross_validate must be .* got 'lou'"),

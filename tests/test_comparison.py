@@ -12,7 +12,9 @@ import pytest
 from scipy import signal, stats
 
 import hysim as hs
+from hysim.cli import main
 from hysim.comparison._verdict import contrasts, holm, probability
+from hysim.errors import Interrupted
 from hysim.models import candidates as registry
 from hysim.models.model import FAMILIES
 
@@ -112,9 +114,10 @@ def test_without_a_resolution_there_are_no_quanta(table1):
         ({}, "table", ValueError, "nothing to compare"),
         ({"line": hs.Line}, "branch", ValueError, "cycle"),
         ({"line": hs.Line}, None, TypeError, "takes a Record"),
-        ({"word": "bouc-wen"}, "table", TypeError, "takes a model"),
+        ({"word": "bouc-wn"}, "table", ValueError, "no family 'bouc-wn'"),
+        ({"number": 3}, "table", TypeError, "takes a model"),
         ({"class": hs.Sensor}, "table", TypeError, "takes a model"),
-        ("bouc-wen", "table", TypeError, "takes a mapping"),
+        (3, "table", TypeError, "takes a mapping"),
     ],
 )
 def test_wrong_arguments_are_named(table1, subjects, record, error, message):
@@ -177,6 +180,34 @@ def test_the_number_of_threads_does_not_change_a_bit(table1, quick):
     assert done == [(k, 5) for k in range(1, 6)]
     with pytest.raises(ValueError, match="workers"):
         hs.compare({"line": hs.Line}, table1, workers=0)
+
+
+def test_an_interrupt_keeps_the_models_that_were_compared(table1):
+    def interrupt(done, total):
+        if done == 2:
+            raise KeyboardInterrupt
+
+    models = {"line": hs.Line, "curve": hs.SingleValued, "play": hs.Play}
+    with pytest.raises(Interrupted, match="models were compared") as caught:
+        hs.compare(models, table1, workers=1, progress=interrupt)
+    finished = caught.value.finished
+    assert [row.name for row in finished.rows][:2] == ["line", "curve"]
+    assert finished["line"] == hs.compare({"line": hs.Line}, table1)["line"]
+    with pytest.raises(KeyboardInterrupt) as caught:
+        hs.compare({"line": hs.Line}, table1, announce=lambda name: interrupt(2, 2))
+    assert not isinstance(caught.value, Interrupted)
+
+
+def test_the_command_line_prints_the_models_that_were_compared(monkeypatch, capsys, tmp_path, table1):
+    def interrupted(*_, **__):
+        raise Interrupted("1 of 2", hs.Comparison(record=table1, loop=hs.loop_metrics(table1.u, table1.y), rows=()))
+
+    hs.save_record(table1, tmp_path / "loop.csv")
+    monkeypatch.setattr("hysim.comparison.compare", interrupted)
+    assert main(["compare", str(tmp_path / "loop.csv")]) == 130
+    printed = capsys.readouterr()
+    assert printed.out.startswith("model")
+    assert printed.err == "hysim: interrupted\n"
 
 
 def test_what_cannot_be_identified_is_a_row_with_its_reason(quick):

@@ -405,3 +405,10 @@ def test_a_record_that_ends_a_little_beyond_its_level_keeps_its_last_cycle(first
     one_sided = np.interp(np.arange(200) / 199, [0.0, 0.5, 1.0], [first, 1.0, first - beyond])
     assert len(hs.cycle_metrics(u, u**3)) == 1
     assert len(hs.cycle_metrics(one_sided, one_sided**2)) == 1
+
+
+def test_units_that_are_quotients_stand_in_brackets():
+    u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=40)
+    table = hs.cycle_metrics(u, hs.BoucWen().response(u))
+    assert "(kN/(mm/s))" in (text := table.to_text({"u": "mm/s", "y": "kN"})) or "[kN/(mm/s)]" in text
+    assert "kN/mm/s" not in text

@@ -196,7 +196,7 @@ def test_a_monotone_loading_is_refused_in_every_form():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"route": "input"}, "route must be one of 'auto', 'memory', 'output', got 'input'"),
+        ({"route": "input"}, "route must be one of auto, memory, output, got 'input'"),
         ({"degree": -1}, "degree must be a whole number from 0 up, got -1"),
         ({"degree": True}, "degree must be a whole number"),
         ({"library": "fourier"}, 'library must be "bouc-wen", "duhem" or names of terms'),
@@ -208,8 +208,8 @@ def test_a_monotone_loading_is_refused_in_every_form():
         ({"signs": {"u' z^9": 1}}, "'u' y\\^9' is not in the library|\"u' y\\^9\" is not in the library"),
         ({"signs": {"u'": 2}}, "must be 1 or -1, got 2"),
         ({"optimizer": "lasso"}, "optimizer must be one of STLSQ, SR3, SSR, FROLS, got 'lasso'"),
-        ({"derivative": "spline"}, "derivative must be one of 'auto', 'smoothed', 'weak', got 'spline'"),
-        ({"initial": "periodic"}, "initial must be one of 'auto', 'free', 'rest', got 'periodic'"),
+        ({"derivative": "spline"}, "derivative must be one of auto, smoothed, weak, got 'spline'"),
+        ({"initial": "periodic"}, "initial must be one of auto, free, rest, got 'periodic'"),
         ({"cross_validate": 1}, 'cross_validate must be "loo"'),
         ({"cross_validate": "all"}, 'cross_validate must be "loo"'),
         ({"route": "oscillator"}, "an oscillator has its own verb: hs.discover_oscillator"),

@@ -13,7 +13,11 @@ import hysim as hs
 
 DOCS = Path(__file__).parent.parent / "docs"
 PAGES = sorted(DOCS.glob("*.md"))
-NEEDS = {"camera": pytest.mark.extra("skimage"), "posterior": pytest.mark.extra("emcee")}
+NEEDS = {
+    "camera": pytest.mark.extra("skimage"),
+    "dataframes": pytest.mark.extra("pandas", "xarray"),
+    "posterior": pytest.mark.extra("emcee"),
+}
 
 WITHOUT_FIGURE = {"scope", "versions"}  # a list of what is not there, and a table of versions
 

@@ -304,7 +304,7 @@ def test_a_text_that_is_too_large_is_refused_unread(tmp_path):
         hs.load(tmp_path / "loop.csv")
     with pytest.raises(ValueError, match=r"stream is too large"):
         hs.load(_Endless())
-    with pytest.raises(TypeError, match="load takes a path or an open file, got int"):
+    with pytest.raises(TypeError, match="load takes a path, an open file or a DataFrame, got int"):
         hs.load(5)
 
 

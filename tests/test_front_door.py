@@ -51,3 +51,12 @@ def test_no_submodule_takes_the_place_of_a_public_name():
 def test_an_unknown_name_is_an_attribute_error():
     with pytest.raises(AttributeError, match="no attribute 'boucwen'"):
         _ = hysim.boucwen
+
+
+@pytest.mark.parametrize("name", ["datasets", "benchmarks", "metrics", "signals", "plot", "rig", "vision"])
+def test_public_modules_show_their_own_names_only(name):
+    module = getattr(hysim, name)
+    shown = [each for each in dir(module) if not each.startswith("_")]
+    modules = [value for each in shown if isinstance(value := getattr(module, each), types.ModuleType)]
+    assert not [value for value in modules if not value.__name__.startswith("hysim.")]
+    assert set(module.__all__) <= set(dir(module))

@@ -280,12 +280,14 @@ def test_progress_is_shown_on_a_terminal_only(monkeypatch):
     monkeypatch.setattr("sys.stderr", terminal := Terminal())
     times = iter([0.0, 0.5, 1.0, 2.0])
     monkeypatch.setattr("hysim.cli.outputs.time", SimpleNamespace(monotonic=lambda: next(times)))
-    show = outputs.progress()
+    show = outputs.progress("dahl")
     show(1, 4)
     show(2, 4)
+    show.announce("Play")
     show(4, 4)
-    first, second, third = terminal.getvalue().split("\r\x1b[K")[1:]
-    assert (first, second, third) == ("1/4", "2/4, 2 a second, 0:00:01 left", "4/4, 3 a second, 0:00:00 left\n")
+    shown = terminal.getvalue().split("\r\x1b[K")[1:]
+    assert shown[:3] == ["dahl: 1 of 4", "dahl: 2 of 4, 0:00:01 left", "Play: 2 of 4, 0:00:01 left"]
+    assert shown[3] == "Play: 4 of 4\n"
     count = outputs.progress()
     count(7, 0)  # of an unknown total
     assert terminal.getvalue().endswith("7")

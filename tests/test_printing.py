@@ -1,5 +1,7 @@
 """What is printed says what matters in at most ten lines of at most a hundred letters, and no array."""
 
+import copy
+import pickle
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -118,3 +120,19 @@ def test_what_is_long_is_cut_within_its_lines(name):
     text = summary_text(["Head"], {name: "word " * 100, "empty": ""})
     assert text.count("\n") == 2
     assert text.endswith("...")
+
+
+def test_a_result_that_cannot_draw_itself_says_what_draws_it():
+    import re
+
+    from hysim import _printing
+
+    for name, calls in _printing._PICTURES.items():
+        for function in re.findall(r"hs\.plot\.(\w+)\(", calls):
+            assert callable(getattr(hs.plot, function)), (name, function)
+    with pytest.raises(AttributeError, match=r"'Record' .*'plot': .* hs.plot.loop\(record\) or hs.plot.history"):
+        RECORD.plot()
+    with pytest.raises(AttributeError, match=r"'Record' object has no attribute 'something'$"):
+        _ = RECORD.something
+    assert not hasattr(RECORD, "plot")
+    assert pickle.loads(pickle.dumps(RECORD)) == copy.deepcopy(RECORD) == RECORD

@@ -10,7 +10,7 @@ import numpy as np
 from hysim._printing import extent, folded, quantity
 from hysim.cli import outputs
 from hysim.cli.designs import CYCLES, Task
-from hysim.control import HysteresisAssessment, StepAssessment, Tuning
+from hysim.control import HysteresisAssessment, StepAssessment, Tuning, driven_by
 from hysim.metrics import rmse
 from hysim.models.model import in_brief
 from hysim.models.storage import to_document
@@ -91,6 +91,7 @@ def _head(design: Design) -> Iterator[str]:
 
 def _triangle(design: Design) -> Iterator[str]:
     result, task, y = design.triangle, design.task, design.units.get("y", "")
+    driven = driven_by(result.closed)
     is_lag = result.is_lag
     reduction = result.lag_reduction_percent if is_lag else result.hysteresis_reduction_percent
     yield f"triangle    {task.low:.4g} to {quantity(task.high, y)}, {1.0 / task.period:.4g} Hz, cycle {CYCLES}"
@@ -98,12 +99,12 @@ def _triangle(design: Design) -> Iterator[str]:
         f"{'lag' if is_lag else 'hysteresis'} reduction",
         f"{reduction:.2f} %" if result.loop.stable else f"none: {result.loop.message}",
     )
-    yield _row("width", f"open {result.open_width:.4g}, closed {quantity(result.closed_width, y)}")
+    yield _row("width", f"open {result.open_width:.4g}, {driven} {quantity(result.closed_width, y)}")
     if not is_lag:
         yield _row(
-            "width without the memory", f"open {result.open_lag_width:.4g}, closed {quantity(result.lag_width, y)}"
+            "width without the memory", f"open {result.open_lag_width:.4g}, {driven} {quantity(result.lag_width, y)}"
         )
-    yield _row("tracking rms", f"open {design.open_tracking_rms:.4g}, closed {quantity(result.tracking_rms, y)}")
+    yield _row("tracking rms", f"open {design.open_tracking_rms:.4g}, {driven} {quantity(result.tracking_rms, y)}")
     yield _row("closure gap", quantity(result.closure_gap, y))
 
 
@@ -116,7 +117,7 @@ def _step(design: Design) -> Iterator[str]:
     for name, value in outputs.scalars(reduction).items():
         percent = "does not exist" if math.isnan(value) else f"{value:.2f} %"
         yield _row(name.removesuffix("_percent").replace("_", " "), percent)
-    for name, response in (("open", reduction.open), ("closed", reduction.closed)):
+    for name, response in (("open", reduction.open), (driven_by(design.step.closed), reduction.closed)):
         times = f"98 % after {response.t98:.4g} s, settled after {response.settling_time:.4g} s"
         yield _row(name, f"overshoot {response.overshoot:.2f} %, {times}")
 
@@ -150,8 +151,9 @@ def picture(design: Design) -> "Figure":
     reference = triangle.closed.reference[last]
     both = {"u": units["y"], "y": units["y"]} if "y" in units else {}
     t = design.step.closed.t
-    loops = {"open loop": triangle.open_y, "closed loop": triangle.closed.y}
-    steps = {"open loop": (t, design.step.open_y), "closed loop": (t, design.step.closed.y)}
+    driven = {"closed": "closed loop"}.get(driven_by(triangle.closed), "inverse")
+    loops = {"open loop": triangle.open_y, driven: triangle.closed.y}
+    steps = {"open loop": (t, design.step.open_y), driven: (t, design.step.closed.y)}
 
     def draw(canvas: "Figure") -> None:
         upper, lower = canvas.subplots(2)

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from hysim.cli import models, outputs, records
 from hysim.cli.options import JSON, SEED, Command
+from hysim.errors import Interrupted
 
 if TYPE_CHECKING:
     from hysim.comparison import Comparison
@@ -24,16 +25,21 @@ def run(options: argparse.Namespace) -> int:
     subjects: dict[str, Any] = {}
     for name in options.model:
         subjects |= _subjects(name)
-    table = compare(
-        subjects or None,
-        record,
-        cross_validate=options.cross_validate or "auto",
-        test=test,
-        seed=options.seed,
-        progress=(shown := outputs.progress()),
-        max_evaluations=options.max_evaluations,
-        announce=outputs.announce if shown else None,
-    )
+    try:
+        table = compare(
+            subjects or None,
+            record,
+            cross_validate=options.cross_validate or "auto",
+            test=test,
+            seed=options.seed,
+            progress=(shown := outputs.progress()),
+            max_evaluations=options.max_evaluations,
+            announce=shown.announce if shown else None,
+        )
+    except Interrupted as interrupt:
+        if not options.json:
+            print(interrupt.finished.to_text())
+        raise
     files: outputs.Files = {
         options.out: lambda: _best(table, record),
         options.csv: lambda: table.to_csv(),
@@ -47,15 +53,15 @@ def run(options: argparse.Namespace) -> int:
 
 def _subjects(name: str) -> dict[str, Any]:
     """Subjects of the comparison for a family's name, a file or an import path."""
-    from hysim.models.candidates import candidates
+    from hysim.models.candidates import candidates_named
 
     model = models.model_or_family(name)
     if name.endswith(".json") or models.is_import_path(name):
         return {models.name_of(name): model}
-    family = model.__name__
-    of_family = {each: subject for each, subject in candidates().items() if each.split()[0] == family}
-    if not of_family:
-        raise ValueError(f"the model {name} cannot be compared without further arguments: give a .json file")
+    try:
+        of_family = candidates_named(model.__name__)
+    except ValueError:
+        raise ValueError(f"the model {name} cannot be compared without further arguments: give a .json file") from None
     return of_family if len(of_family) > 1 else dict.fromkeys([name], *of_family.values())
 
 

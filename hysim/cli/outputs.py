@@ -207,27 +207,35 @@ def loop_of_model(record: "Record", model: Any) -> "Figure":
     return loop(record, Curve(run.u, run.y, run.t, type(model).__name__, run.units))
 
 
-def announce(name: str) -> None:
-    """The model whose turn begins, on the standard error behind the tasks done."""
-    print(f"\r\x1b[K{name} ...", end="", file=sys.stderr, flush=True)
-
-
-def progress() -> Callable[[int, int], None] | None:
-    """Tasks done, their rate and the remaining time, on the standard error if that is a terminal.
+class Progress:
+    """One line on the standard error: what is at work, how much is done, and how long the rest may take.
 
     A total of 0 stands for an unknown total.
     """
-    if not sys.stderr.isatty():
-        return None
-    begin: list[tuple[float, int]] = []
 
-    def show(done: int, total: int) -> None:
-        begin[1:] = [(time.monotonic(), done)]
-        elapsed, computed = begin[-1][0] - begin[0][0], done - begin[0][1]
-        rate = computed / max(elapsed, 1e-9)
-        text = f"{done}/{total}" if total else f"{done}"
-        if total and rate > 0.0:
-            text += f", {rate:.3g} a second, {timedelta(seconds=round((total - done) / rate))} left"
-        print(f"\r\x1b[K{text}", end="\n" if 0 < total <= done else "", file=sys.stderr, flush=True)
+    def __init__(self, name: str = "") -> None:
+        self.name, self.counted = name, ""
+        self.begin: tuple[float, int] | None = None
 
-    return show
+    def __call__(self, done: int, total: int) -> None:
+        now = time.monotonic()
+        first, before = self.begin = self.begin or (now, done)
+        rate = (done - before) / max(now - first, 1e-9)
+        self.counted = f"{done} of {total}" if total else f"{done}"
+        if total and rate > 0 and done < total:
+            self.counted += f", {timedelta(seconds=round((total - done) / rate))} left"
+        self._show(end="\n" if 0 < total <= done else "")
+
+    def announce(self, name: str) -> None:
+        """Name the model whose turn begins; those done are not counted anew."""
+        self.name = name
+        self._show()
+
+    def _show(self, end: str = "") -> None:
+        text = ": ".join(filter(None, (self.name, self.counted)))
+        print(f"\r\x1b[K{text}", end=end, file=sys.stderr, flush=True)
+
+
+def progress(name: str = "") -> Progress | None:
+    """Progress of work on a model or a file of this name if the standard error is a terminal, else None."""
+    return Progress(name) if sys.stderr.isatty() else None

@@ -18,14 +18,14 @@ from hysim._frozen import FloatArray
 from hysim._parallel import Progress, map_on_threads
 from hysim.comparison._records import OneByOne, Result, model_of, models_on, together
 from hysim.comparison._result import Comparison, ComparisonRow
-from hysim.errors import SimulationError
+from hysim.errors import Interrupted, SimulationError
 from hysim.identification import Identification, identify
 from hysim.identification.sharing import sharing
 from hysim.metrics import LoopMetrics, loop_metrics
-from hysim.models.candidates import candidates, is_identifiable, is_searched
+from hysim.models.candidates import candidates, candidates_named, is_identifiable, is_searched
 from hysim.models.channels.dependent import on_record
 from hysim.models.protocols import Direct, Responding, needs_time
-from hysim.records import Record, several
+from hysim.records import Record, as_record, several
 from hysim.simulation import simulate
 
 _SHORT = 200  # samples; leaving one out at a time costs as many fits as there are samples
@@ -36,7 +36,7 @@ _FAILURES = (ValueError, TypeError, ArithmeticError, SimulationError)
 
 
 def compare(
-    models: Mapping[str, Any] | str | None,
+    models: Mapping[str, Any] | Sequence[Any] | str | None,
     record_or_records: Record | Sequence[Record],
     *,
     cross_validate: str | int | None = "auto",
@@ -51,9 +51,10 @@ def compare(
 
     Parameters
     ----------
-    models : mapping, "all" or None
+    models : mapping, list, "all" or None
         Name to a model; to a result of `identify` or `discover`; to a class or structure, which is identified on the
-        record; or, with several records, to a list of models or results, one for each of them. ``"all"``, or None, is
+        record; or, with several records, to a list of models or results, one for each of them. A name of a family, such
+        as ``"bouc-wen"``, stands for it, and a list of names or classes for a mapping. ``"all"``, or None, is
         every family that can be identified without further arguments; those that cannot be identified on this record
         are listed with the reason.
     record_or_records : Record or sequence of Record
@@ -87,6 +88,8 @@ def compare(
         If there is nothing to compare, or the record has no complete cycle, or fewer than the test needs.
     TypeError
         If `record` is no Record, or a subject cannot be compared.
+    Interrupted
+        A `KeyboardInterrupt`, after Ctrl-C, if some models were compared: its `finished` is their `Comparison`.
 
     Examples
     --------
@@ -106,18 +109,29 @@ def compare(
         cross_validate = "loo" if sum(map(len, records)) <= _SHORT else _BLOCKS
     protocol = _Protocol(records, _last_loop(training), cross_validate, seed, trial, max_evaluations, announce)
     names = list(subjects)
-    with sharing():
-        results = map_on_threads(
-            lambda k: protocol.row(names[k], subjects[names[k]]), len(names), workers=workers, progress=progress
+    done: dict[str, ComparisonRow | str] = {}
+
+    def compared(k: int) -> None:
+        done[names[k]] = protocol.row(names[k], subjects[names[k]])
+
+    def of_those_done() -> Comparison:
+        by_name = {name: done[name] for name in names if name in done}
+        return Comparison(
+            record=training,
+            loop=protocol.measured,
+            rows=tuple(row for row in by_name.values() if isinstance(row, ComparisonRow)),
+            failed={name: reason for name, reason in by_name.items() if isinstance(reason, str)},
+            test=trial.record if trial else None,
         )
-    by_name = dict(zip(names, results, strict=True))
-    return Comparison(
-        record=training,
-        loop=protocol.measured,
-        rows=tuple(row for row in by_name.values() if isinstance(row, ComparisonRow)),
-        failed={name: reason for name, reason in by_name.items() if isinstance(reason, str)},
-        test=trial.record if trial else None,
-    )
+
+    try:
+        with sharing():
+            map_on_threads(compared, len(names), workers=workers, progress=progress)
+    except KeyboardInterrupt:
+        if not done:
+            raise
+        raise Interrupted(f"{len(done)} of {len(names)} models were compared", of_those_done()) from None
+    return of_those_done()
 
 
 def _last_loop(record: Record) -> LoopMetrics:
@@ -224,11 +238,12 @@ class _Protocol:
         return metrics.fit_percent(test.y, y), metrics.rmse(test.y, y)
 
 
-def _subjects(models: Mapping[str, Any] | str | None, n_records: int) -> dict[str, Any]:
+def _subjects(models: Mapping[str, Any] | Sequence[Any] | str | None, n_records: int) -> dict[str, Any]:
     if models is None or (isinstance(models, str) and models == "all"):
         return candidates()
-    if not isinstance(models, Mapping):
-        raise TypeError(f'compare takes a mapping of names to models, or "all", got {models!r}')
+    if isinstance(models, str) or not isinstance(models, Mapping):
+        models = _named([models] if isinstance(models, str) else models)
+    models = {name: _meant(each) for name, each in models.items()}
     if not models:
         raise ValueError("there is nothing to compare: give at least one model by name")
     for name, subject in models.items():
@@ -239,15 +254,37 @@ def _subjects(models: Mapping[str, Any] | str | None, n_records: int) -> dict[st
         members = subject if isinstance(subject, list | tuple) else [subject]
         if not all(is_identifiable(each) or isinstance(model_of(each), Responding) for each in members):
             raise TypeError(f"compare takes a model, a result, a model class or a structure, got {subject!r} as {name}")
-    return dict(models)
+    return models
+
+
+def _named(models: Any) -> dict[str, Any]:
+    """Families by their names; the candidates of a family by theirs."""
+    if not isinstance(models, Sequence) or not all(isinstance(each, str | type) for each in models):
+        raise TypeError(
+            f'compare takes a mapping of names to models, a list of families or their names, or "all", got {models!r}'
+        )
+    named = [candidates_named(each) if isinstance(each, str) else {each.__name__: each} for each in models]
+    return {name: subject for subjects in named for name, subject in subjects.items()}
+
+
+def _meant(subject: Any) -> Any:
+    """A subject, or the one candidate of the family that it names."""
+    if not isinstance(subject, str):
+        return subject
+    subjects = candidates_named(subject)
+    if len(subjects) > 1:
+        raise ValueError(
+            f"{subject!r} stands for several models, {', '.join(subjects)}: give [{subject!r}], or one of them"
+        )
+    return next(iter(subjects.values()))
 
 
 def _trial(records: Sequence[Record], test: Record | int | None) -> _Trial | None:
     if test is None:
         return None
     record = records[-1]
-    if isinstance(test, Record):
-        return _Trial(record, test, begin=0, own_state=True)
+    if (drive := as_record(test, "compare")) is not None:
+        return _Trial(record, drive, begin=0, own_state=True)
     if not isinstance(test, int) or isinstance(test, bool):
         raise TypeError(f"test takes a Record or a number of last cycles, got {test!r}")
     loops = measured_cycles(record.u, test, TOLERANCE)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from hysim._frozen import FloatArray, check_choice, frozen
+from hysim._names import among
 from hysim._printing import bic_in_words, listed, printed, summary_text
 from hysim.comparison import _tables
 from hysim.comparison._verdict import Contrast, contrasts
@@ -132,7 +133,7 @@ class Comparison:
     test: Record | None = None
 
     __str__ = _tables.to_words
-    _repr_html_ = _tables.to_html
+    to_html = _tables.to_html
     to_text = _tables.to_text
     to_markdown = _tables.to_markdown
     to_latex = _tables.to_latex
@@ -145,7 +146,7 @@ class Comparison:
                 return row
         if name in self.failed:
             raise KeyError(f"{name!r} could not be compared: {self.failed[name]}")
-        raise KeyError(f"no model {name!r}: there are {', '.join(row.name for row in self.rows)}")
+        raise KeyError(f"no model {name!r}: there are {among(name, [row.name for row in self.rows])}")
 
     def ranked(self, criterion: str = "cv_rmse") -> tuple[ComparisonRow, ...]:
         """The rows by a measure, the smallest first; rows without the measure are left out.

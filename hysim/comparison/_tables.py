@@ -6,7 +6,7 @@ import re
 from typing import Any, NamedTuple
 
 from hysim._printing import aligned, csv_text, folded, summary_text
-from hysim._versions import optional
+from hysim.interop import frame, heading
 
 Value = str | int | float | bool
 _WIDE = 110  # letters in a line of text
@@ -150,8 +150,13 @@ def to_columns(comparison: Any) -> dict[str, list[Value | None]]:
 
 
 def to_frame(comparison: Any) -> Any:
-    """Every measure as a DataFrame of pandas, which must be installed, one row a model."""
-    return optional("pandas", "to_frame", "tables").DataFrame(to_columns(comparison))
+    """Every measure as a `pandas.DataFrame`, one row a model; ImportError without pandas.
+
+    ``attrs`` holds the units of the columns by their headings, the record's name and the verdict.
+    """
+    units = {each.heading: unit for each in columns(comparison) if (unit := heading(each.heading)[1])}
+    notes = {"record": comparison.record.name, "verdict": comparison.verdict}
+    return frame(to_columns(comparison), units=units, notes=notes)
 
 
 def _short(comparison: Any) -> list[list[str]]:

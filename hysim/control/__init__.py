@@ -9,6 +9,7 @@ from hysim.control._assessment_results import HysteresisAssessment as Hysteresis
 from hysim.control._assessment_results import OpenLoop as OpenLoop
 from hysim.control._assessment_results import SquareWaveAssessment as SquareWaveAssessment
 from hysim.control._assessment_results import StepAssessment as StepAssessment
+from hysim.control._assessment_results import driven_by as driven_by
 from hysim.control._bandwidth import bandwidth as bandwidth
 from hysim.control._feedforward import InverseFeedforward as InverseFeedforward
 from hysim.control._filters import DampingLoop as DampingLoop

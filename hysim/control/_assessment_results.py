@@ -4,6 +4,7 @@ from hysim._frozen import FloatArray, frozen
 from hysim._printing import extent, printed, summary_text
 from hysim.control._loop import ClosedLoop
 from hysim.control._loop_assessment import LoopAssessment
+from hysim.control._tracking import is_fed_back
 from hysim.metrics import LoopMetrics, VibrationReduction, loop_metrics, reduction_percent
 
 
@@ -105,7 +106,7 @@ class HysteresisAssessment:
             {
                 "not stable": self.loop.message,
                 "open width": f"{self.open_width:.4g}, without the memory {self.open_lag_width:.4g}",
-                "closed width": f"{self.closed_width:.4g}, without the memory {self.lag_width:.4g}",
+                f"{driven_by(self.closed)} width": f"{self.closed_width:.4g}, without the memory {self.lag_width:.4g}",
                 "closure gap": f"{self.closure_gap:.4g}",
                 "secant gain": f"{self.secant_gain:.4g}",
                 "voltage": extent(self.closed.u),
@@ -177,3 +178,8 @@ class SquareWaveAssessment:
             ],
             {"not stable": self.loop.message},
         )
+
+
+def driven_by(run: ClosedLoop) -> str:
+    """What drives the plant, in a word: "closed" for a loop with feedback, "inverse" for a controller without it."""
+    return "closed" if is_fed_back(run.conditions["controller"]) else "inverse"

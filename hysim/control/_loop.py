@@ -21,6 +21,10 @@ from hysim.plants.chain import Signals
 from hysim.plants.structures.controlled import Controlled, ControlledStructure
 from hysim.plants.structures.structure import Structure
 from hysim.records import even_step
+from hysim.simulation import columns_of, dataset_of_signals, frame_of_signals
+
+_OF_REFERENCE = ("reference", "error", "y", "measurement")
+_OF_COMMAND = ("command", "drive", "u")
 
 
 @printed
@@ -86,6 +90,35 @@ class ClosedLoop:
                 ),
             },
         )
+
+    @property
+    def columns(self) -> dict[str, FloatArray]:
+        """Signals as the columns of a table, each of shape (n,), t first; as in `Simulation.columns`."""
+        named = (columns_of(name, values) for name, values in self._arrays.items())
+        return {label: column for columns in named for label, column in columns.items()}
+
+    def to_frame(self) -> Any:
+        """The `columns` as a `pandas.DataFrame`, with the time as index; ImportError without pandas.
+
+        ``attrs["units"]`` holds the unit of each column.
+        """
+        return frame_of_signals(self.columns, self._signal_units)
+
+    def to_xarray(self) -> Any:
+        """The signals as an `xarray.Dataset` along t, as in `Simulation.to_xarray`; ImportError without xarray."""
+        return dataset_of_signals(self._arrays, self._signal_units)
+
+    @property
+    def _arrays(self) -> dict[str, FloatArray]:
+        own = {name: vars(self)[name] for name in (*_OF_REFERENCE, *_OF_COMMAND, "z")}
+        every = {"t": self.t, **own, **self.signals}
+        return {name: values for name, values in every.items() if values is not None}
+
+    @property
+    def _signal_units(self) -> dict[str, str]:
+        """Units by the signals' names."""
+        like = {**dict.fromkeys(_OF_REFERENCE, "y"), **dict.fromkeys(_OF_COMMAND, "u")}
+        return {name: self.units[signal] for name, signal in like.items() if signal in self.units} | dict(self.units)
 
 
 def close_loop(

@@ -177,3 +177,10 @@ class TrackingController(SampledController):
         ]  # fmt: skip
         readings = np.full(chain.samples_late + 2, chain.displacement(rest))
         return counts, chain.linear_block, np.concatenate([rest.x, rest.past, readings])
+
+
+def is_fed_back(controller: object) -> bool:
+    """Whether a controller uses the measurement: an inverse alone does not, and closes no loop."""
+    if isinstance(controller, TrackingController):
+        return controller.feedback is not None or controller.damping is not None
+    return not isinstance(controller, InverseFeedforward)

@@ -25,7 +25,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import minimize
 
-from hysim._frozen import FloatArray, read_only
+from hysim._frozen import FloatArray, check_choice, read_only
 from hysim.control._loop import RestingPlant, as_actuator, sample_time_of
 from hysim.control._margins import LinearLoop
 from hysim.control._protocols import limits_of
@@ -110,8 +110,7 @@ def tune(
     >>> tuning.success, tuning.max_sensitivity <= 2.0, tuning.objective < 0.005
     (True, True, True)
     """
-    if objective not in OBJECTIVES:
-        raise ValueError(f"objective must be one of {', '.join(OBJECTIVES)}, got {objective!r}")
+    check_choice("objective", objective, OBJECTIVES)
     loop = _SimulatedLoop(plant, t, reference, OBJECTIVES[objective], _each(limits, controller), transient, u0)
     plants = [loop.actuator, *map(as_actuator, variations)]
     specification = Specification(plants, loop.cycle, loop.h, max_sensitivity, max_voltage_noise)

@@ -17,7 +17,7 @@ import numpy as np
 
 from hysim import metrics
 from hysim._blas import one_blas_thread
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, check_choice
 from hysim._parallel import Progress
 from hysim.discovery import _laws, _pysindy
 from hysim.discovery._judgement import HYSTERESIS, LAG, NO_STRUCTURE, Competitors, Judgement, competitors, doubts, judge
@@ -145,8 +145,7 @@ def discover(
         ("derivative", derivative, ("auto", *FORMS)),
         ("initial", initial, ("auto", "free", "rest")),
     ):
-        if value not in allowed:
-            raise ValueError(f"{name} must be one of {', '.join(map(repr, allowed))}, got {value!r}")
+        check_choice(name, value, allowed)
     of_memory, *of_output = (
         replace(each, rests=_rests(initial, each, records)) for each in _libraries(route, library, degree, symmetry)
     )

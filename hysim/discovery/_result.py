@@ -10,6 +10,7 @@ from hysim._frozen import FloatArray, frozen
 from hysim._printing import printed, summary_text, wrapped
 from hysim.discovery._judgement import Judgement
 from hysim.identification.json_forms import Stored
+from hysim.interop import frame
 from hysim.laws.differential.terms import latex
 from hysim.plants.transfer_function import TransferFunction
 
@@ -98,6 +99,20 @@ class _Discovered(Stored, ABC):
             states = states[:1]
         return "; ".join(
             ", ".join(f"{name} = {form.format(value)}" for name, value in state.items()) for state in states
+        )
+
+    def to_frame(self) -> Any:
+        """The terms as a `pandas.DataFrame`, one row each, by their names; ImportError without pandas.
+
+        The columns are coefficient and stderr, nan where it is unknown. ``attrs`` has the equation and the verdict.
+        """
+        return frame(
+            {
+                "coefficient": [float(value) for value in self.coefficients.values()],
+                "stderr": [float(self.stderr.get(name, math.nan)) for name in self.coefficients],
+            },
+            index=("term", [*self.coefficients]),
+            notes={"equation": self.equation, "verdict": self.verdict},
         )
 
     def _spread(self, name: str) -> str:

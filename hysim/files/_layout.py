@@ -16,6 +16,7 @@ from typing import NamedTuple, TypeVar
 
 from hysim.files._cells import MISSING, Signs, parse
 from hysim.files._table import Column, require
+from hysim.interop import heading
 
 DELIMITERS = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "white space"}
 DECIMALS = (".", ",")
@@ -25,7 +26,6 @@ T = TypeVar("T")
 
 _LOOKED_AT = 100  # lines, of which the first half is from the top and the others are spread over the file
 _EXCEL = re.compile(r"sep=(.)", re.IGNORECASE)  # a first line for Excel, which names the delimiter
-_HEADING = re.compile(r"(?P<name>.*\S)\s*[\[(](?P<unit>[^\[\]()]*)[\])]")
 _WORD = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\[\]()]*[\])])?|\S+")
 
 
@@ -183,8 +183,7 @@ def _commented(above: list[str], delimiter: str, width: int, signs: Signs) -> li
 
 
 def _column(place: int, label: str) -> Column:
-    parts = _HEADING.fullmatch(label.strip())
-    return Column(place, parts["name"], parts["unit"].strip()) if parts else Column(place, label.strip(), "")
+    return Column(place, *heading(label))
 
 
 def _unit(cell: str) -> str:

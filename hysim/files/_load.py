@@ -16,6 +16,7 @@ from hysim._frozen import FloatArray, check_choice
 from hysim._resolution import output_quantum
 from hysim.files._cells import THOUSANDS
 from hysim.files._delimited import delimited
+from hysim.files._frames import Frame
 from hysim.files._hdf5 import hdf5
 from hysim.files._layout import DECIMALS
 from hysim.files._mat import mat
@@ -67,7 +68,7 @@ def load(
     name: str | None = None,
     channels: Sequence[str] | Mapping[str, str | int | float] | None = None,
 ) -> Record | tuple[Record, ...]:
-    """Load a record from a file: text, NPZ, NPY, MAT or HDF5.
+    """Load a record from a file: text, NPZ, NPY, MAT or HDF5; or from a table in memory, such as a DataFrame.
 
     The format is read from the file's first bytes. A text has one sample a line; blank lines and lines that begin
     with ``#`` or ``%`` are skipped. Delimiter and decimal sign are those that give the most numbers. A first line of
@@ -80,9 +81,14 @@ def load(
     ``x[0,1]``. Its unit is an attribute `units` in HDF5, or a text beside it called ``u_units``. A missing value is
     nan. HDF5, and MATLAB's ``-v7.3``, need h5py. A file of `hysim.save_record` needs no further arguments.
 
+    A table in memory is a frame of pandas, polars or the like, a table of Arrow or a dataset of xarray. Its columns are
+    taken by name; ``voltage [V]`` is a name with a unit here, too, and ``attrs["units"]`` of pandas and xarray holds
+    units by name. An index of dates, of time spans, of floats without a name, or with the name t or time is the column
+    t; dates and time spans become seconds. None, NA and NaT are missing values.
+
     Parameters
     ----------
-    path : str, path or open file
+    path : str, path, open file or table
         An open file of text or of bytes is read from its current position. A text, or an open file, may have 0.5 GB;
         an array 2 GB.
     u, y : str or int, optional
@@ -110,7 +116,8 @@ def load(
     resolution : float or "detect", optional
         Quantum of the output's sensor [unit of y], in place of the file's; or ``"detect"`` it from the values.
     name : str, optional
-        Name of the record; by default the one in the file, or the file's name without its ending.
+        Name of the record; by default the one in the file or in the table's ``attrs``, or the file's name without its
+        ending.
     channels : sequence of str, or mapping, optional
         Further columns by their names, or names of channels to columns, by name or by number; a float is the value of a
         channel that is constant: ``{"T": "temp", "current": 0.5}``. By default those that the file of
@@ -126,7 +133,7 @@ def load(
     FileNotFoundError
         If there is no such file.
     TypeError
-        If `path` is neither a path nor an open file.
+        If `path` is neither a path, nor an open file, nor a table.
     ValueError
         If the file is damaged or too large, a column is unknown, a row is too long or short, a value is missing or not
         finite, lengths differ, the time does not increase, or an argument for text is used with another format. The
@@ -163,7 +170,8 @@ def load(
         elif resolution is None and columns["y"].label == "y":
             resolution = table.notes.resolution
         if name is None:
-            name = Path(source.name).stem if table.notes.name is None else table.notes.name
+            unstated = "" if isinstance(source.content, Frame) else Path(source.name).stem
+            name = unstated if table.notes.name is None else table.notes.name
         records = tuple(
             _record(signals, places, dict(zip(columns, values[:, part], strict=True)), labels, resolution, name)
             for part in parts
@@ -208,8 +216,11 @@ def table_of(source: Opened, for_text: Mapping[str, Any]) -> Iterator[Table]:
         return
     for argument, value in for_text.items():
         if value is not None:
-            raise ValueError(f"{argument} is for text, this is a file of the format {source.format}: leave it out")
-    if source.format in ("hdf5", "mat7.3"):
+            form = source.name if isinstance(source.content, Frame) else f"a file of the format {source.format}"
+            raise ValueError(f"{argument} is for text, this is {form}: leave it out")
+    if isinstance(source.content, Frame):
+        yield source.content
+    elif source.format in ("hdf5", "mat7.3"):
         with hdf5(source.content, source.path, matlab=source.format != "hdf5") as table:
             yield table
     else:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from hysim._printing import csv_text
 from hysim._versions import optional
 from hysim.files._arrays import NOTES, UNITS
 from hysim.files._table import Notes
-from hysim.records import Record
+from hysim.records import Record, as_record
 
 _VARIABLE = re.compile(r"[A-Za-z]\w{0,30}", re.ASCII)  # of MATLAB
 _PLAIN_NAME = re.compile(r"[^\W\d][\w.-]*(?: [\w.-]+)*")
@@ -41,8 +41,8 @@ def save_record(record: Record, path: str | Path) -> None:
 
     Parameters
     ----------
-    record : Record
-        The record.
+    record : Record or table
+        The record, or a table with the columns u and y, as in `hysim.identify`.
     path : str or path
         File to write, with one of these endings.
 
@@ -51,7 +51,7 @@ def save_record(record: Record, path: str | Path) -> None:
     ValueError
         If the ending is another one, h5py is missing for HDF5, or a name or a unit cannot be written.
     TypeError
-        If `record` is not a Record.
+        If `record` is neither; the message says what to call for a model or a result.
     OSError
         If the folder cannot be written to.
 
@@ -67,14 +67,39 @@ def save_record(record: Record, path: str | Path) -> None:
     ...     print(hs.load(path) == rec)
     True
     """
-    if not isinstance(record, Record):
-        raise TypeError(f"save_record takes a Record, got {type(record).__name__}")
+    if (own := as_record(record, "save_record")) is None:
+        raise TypeError(f"save_record takes a Record, got {type(record).__name__}: {_advice(record)}")
+    record = own
     varying = along(record.channels)
     columns = {} if record.t is None else {"t": record.t}
     columns |= {"u": record.u, "y": record.y, **varying}
     _check_columns(varying, path)
     channels = {name: name if name in varying else value for name, value in record.channels.items()}
     write_all({path: packed(columns, path, Notes(record.units, record.resolution, record.name, channels))})
+
+
+@runtime_checkable
+class _InputOutput(Protocol):
+    """A simulation, a closed loop."""
+
+    @property
+    def u(self) -> Any: ...
+    @property
+    def y(self) -> Any: ...
+
+
+@runtime_checkable
+class _Responding(Protocol):
+    """A model."""
+
+    def response(self, u: Any, /) -> Any: ...
+
+
+def _advice(value: Any) -> str:
+    """What to call for something that is not a record."""
+    if isinstance(value, _InputOutput):
+        return "make one by hs.Record(u=result.u, y=result.y, t=result.t)"
+    return "hs.save(model, path) writes a model" if isinstance(value, _Responding) else "hs.Record(u=u, y=y)"
 
 
 def _check_columns(names: Iterable[str], path: str | Path) -> None:

@@ -8,7 +8,10 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple, Protocol, TextIO, runtime_checkable
 
-Source = str | os.PathLike[str] | TextIO | BinaryIO
+from hysim.files._frames import Frame
+from hysim.interop import table_in
+
+Source = str | os.PathLike[str] | TextIO | BinaryIO | Any  # Any stands for tables of other libraries
 
 MOST_TEXT = 500_000_000
 """Most bytes of a text file, and of any stream: a text takes ten times as much memory to read."""
@@ -19,11 +22,14 @@ _PIECE = 1 << 20  # bytes that are read of a stream at once
 
 
 class Opened(NamedTuple):
-    """Name, format and content of a source, which is read if it is a text, and its path if it is a file with one."""
+    """Name, format and content of a source, which is read if it is a text, and its path if it is a file with one.
+
+    The content of a DataFrame or the like is its table.
+    """
 
     name: str
     format: str
-    content: str | bytes | BinaryIO
+    content: str | bytes | BinaryIO | Frame
     path: Path | None = None
 
 
@@ -49,8 +55,10 @@ def opened(source: Source) -> Iterator[Opened]:
                 yield _stream(path.name, file)
     elif isinstance(source, _Readable):
         yield _stream(Path(str(source.name)).name if isinstance(source, _Named) else "stream", source)
+    elif (table := table_in(source)) is not None:
+        yield Opened(f"the {table.kind}", "frame", Frame(table))
     else:
-        raise TypeError(f"load takes a path or an open file, got {type(source).__name__}")
+        raise TypeError(f"load takes a path, an open file or a DataFrame, got {type(source).__name__}")
 
 
 def format_of(head: bytes) -> str:

@@ -5,10 +5,10 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from typing import Any, NamedTuple, Protocol
 
 from hysim._frozen import FloatArray
+from hysim._names import nearest as nearest_of
 
 _LONGEST_REASON = 200  # letters
 
@@ -107,9 +107,8 @@ def listed(names: Sequence[str], most: int = 20) -> str:
 
 def nearest(key: str, names: Sequence[str]) -> str:
     """The name that may be meant by a key, as the end of a message; an empty text if none is near."""
-    folded = {name.casefold(): name for name in names}
-    near = get_close_matches(key.casefold(), folded, n=1)
-    return f"; did you mean {shown(folded[near[0]])}?" if near else ""
+    near = nearest_of(key, names)
+    return "" if near is None else f"; did you mean {shown(near)}?"
 
 
 def channels_in(text: Any) -> dict[str, str | float]:

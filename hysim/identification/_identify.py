@@ -3,13 +3,13 @@
 import inspect
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields, replace
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._blas import one_blas_thread
-from hysim._frozen import FloatArray, check_count, read_only
+from hysim._frozen import FloatArray, check_choice, check_count, read_only
 from hysim._parallel import Progress, at_most
 from hysim.identification import _direct as direct
 from hysim.identification._assumptions import decided, in_units_of_noise, quiet_where_better
@@ -24,6 +24,7 @@ from hysim.identification.channels.starts import begun
 from hysim.identification.folds import left_out
 from hysim.identification.swapped import swapped_columns, swapped_for
 from hysim.identification.whole.parts import begun_by_parts
+from hysim.models.candidates import family_named
 from hysim.models.channels.dependent import Dependent, on_record
 from hysim.models.channels.structure import DependentStructure
 from hysim.models.protocols import Direct, Identifiable, Recorded, needs_time
@@ -54,11 +55,13 @@ def identify(
 
     Parameters
     ----------
-    model_or_class : model, model class or structure
-        `hysim.BoucWen`, `hysim.TransferFunction.structure(poles=4, zeros=1)`, ... The search begins at the defaults of
-        a class, or at the values of an instance, such as a `hysim.Structure`.
-    record_or_records : Record or sequence of Record
+    model_or_class : model, model class, structure or str
+        `hysim.BoucWen`, `hysim.TransferFunction.structure(poles=4, zeros=1)`, ..., or the name of a family, such as
+        ``"bouc-wen"``. The search begins at the defaults of a class, or at the values of an instance, such as a
+        `hysim.Structure`.
+    record_or_records : Record, table, or sequence of them
         Input and output, and for models with dynamics the time; of a `hysim.Structure` also `hysim.StructureRecord`.
+        A table, such as a DataFrame, has columns u and y, and t or an index of times; see `hysim.load`.
         Several records share all parameters but the state at the first sample: where it is free, each has its own,
         ``z0[0]``, ``z0[1]``, ...
     fixed : mapping, optional
@@ -122,13 +125,14 @@ def identify(
     >>> round(fit.estimates["beta"], 6), round(fit.estimates["gain"], 6)
     (0.7, 2.0)
     """
+    if isinstance(model_or_class, str):
+        model_or_class = family_named(model_or_class)
     given = model_or_class.as_records(record_or_records) if isinstance(model_or_class, Recorded) else record_or_records
     records: Sequence[Record] = several(given, "identify")
     options = _freedom(fixed or {}, free, bounds or {})
-    if intervals not in ("linear", "profile", "bootstrap"):
-        raise ValueError(f'intervals must be "linear", "profile" or "bootstrap", got {intervals!r}')
-    if noise not in (None, "gaussian", "quantised", "robust"):
-        raise ValueError(f'noise must be "gaussian", "quantised" or "robust", got {noise!r}')
+    check_choice("intervals", intervals, ("linear", "profile", "bootstrap"))
+    if noise is not None:
+        check_choice("noise", noise, ("gaussian", "quantised", "robust"))
     if not isinstance(seed, (int, np.integer)) or seed < 0:
         raise ValueError(f"seed must be an integer from 0 on, got {seed!r}")
     shares = _weights(weights, records)
@@ -229,7 +233,7 @@ def _family(model_or_class: Any, depends: Mapping[str, tuple[str, int]] | None) 
     if isinstance(family, Direct) and depends is not None:
         raise TypeError(f"depends is for laws and sums of them, got {family!r}")
     if not isinstance(family, Identifiable):
-        raise TypeError(f"identify takes a model, a model class or a structure, got {model_or_class!r}")
+        raise TypeError(f"identify takes a model, a model class or a structure, got {_in_words(model_or_class)}")
     belongs_to_the_class = inspect.ismethod(family.search_space)
     if isinstance(model_or_class, type) and not belongs_to_the_class:
         required = [f.name for f in fields(model_or_class) if f.default is MISSING and f.default_factory is MISSING]
@@ -240,6 +244,19 @@ def _family(model_or_class: Any, depends: Mapping[str, tuple[str, int]] | None) 
             )
         family = model_or_class()
     return family if depends is None else Dependent.structure(family, depends)
+
+
+@runtime_checkable
+class _Structured(Protocol):
+    """A class whose models are identified by their structure."""
+
+    def structure(self) -> Any: ...
+
+
+def _in_words(subject: Any) -> str:
+    if isinstance(subject, type) and isinstance(subject, _Structured):
+        return f"the class {subject.__name__}: pass its structure, hs.{subject.__name__}.structure(...)"
+    return repr(subject)
 
 
 def _density(noise: str, problem: Problem) -> Noise:

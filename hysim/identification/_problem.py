@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from hysim._channels import taken
 from hysim._frozen import FloatArray
+from hysim._names import meant
 from hysim._repeats import repeated_cycle
 from hysim.identification._budget import Budget
 from hysim.identification._regression import least_squares, triangle
@@ -412,7 +413,7 @@ def _kinds(initial: str | Sequence[str] | None, n: int) -> list[str | None]:
         raise ValueError(f"initial must be one word, or one for each of the {n} records, got {initial!r}")
     for kind in kinds:
         if kind not in (STATES if initial is not None else (None,)):
-            raise ValueError(f"initial must be {STATES_IN_WORDS}, got {kind!r}")
+            raise ValueError(f"initial must be {STATES_IN_WORDS}, got {kind!r}{meant(kind, STATES)}")
     return kinds
 
 

@@ -10,6 +10,7 @@ from hysim._frozen import FloatArray, frozen
 from hysim._printing import bic_in_words, printed, summary_text, wrapped
 from hysim.identification._profile import Profile
 from hysim.identification.json_forms import Stored
+from hysim.interop import frame
 
 
 @frozen
@@ -186,6 +187,27 @@ class Identification(Stored):
         lines += [f"  best {name}: fit {best.fit_percent:.2f} %" for name, best in self.regions.items()]
         lines.append(f"  {self.message}")
         return "\n".join([*lines, *(["Warnings"] if self.warnings else []), *(f"  {each}" for each in self.warnings)])
+
+    def to_frame(self) -> Any:
+        """The parameters as a `pandas.DataFrame`, one row each, by their names; ImportError without pandas.
+
+        The columns are estimate, stderr, lower and upper (of the interval at 95 %) and free; unknown numbers are nan,
+        also those of a parameter that was held. ``attrs`` has the family and the measures of the fit.
+        """
+        names, unknown = [*self.estimates], float("nan")
+        ends = [self.intervals.get(name, (unknown, unknown)) for name in names]
+        return frame(
+            {
+                "estimate": [float(self.estimates[name]) for name in names],
+                "stderr": [float(self.stderr.get(name, unknown)) for name in names],
+                "lower": [float(lower) for lower, _ in ends],
+                "upper": [float(upper) for _, upper in ends],
+                "free": [name in self.free_names for name in names],
+            },
+            index=("parameter", names),
+            notes={"family": type(self.model).__name__, "success": self.success, "message": self.message}
+            | {name: float(vars(self)[name]) for name in ("fit_percent", "rmse", "cv_rmse", "fpe", "aic", "bic")},
+        )
 
     def _line(self, name: str) -> str:
         lower, upper = self.intervals[name]

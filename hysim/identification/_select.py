@@ -4,12 +4,13 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from hysim._frozen import frozen
+from hysim._frozen import check_choice, frozen
 from hysim._parallel import Progress
 from hysim._printing import aligned, printed, summary_text
 from hysim.identification._identify import identify
 from hysim.identification._result import Identification
 from hysim.identification.sharing import sharing
+from hysim.interop import frame
 from hysim.records import Record
 
 CRITERIA: dict[str, Callable[[Identification], float]] = {
@@ -65,6 +66,15 @@ class Selection:
         header, *lines = aligned([["candidate", "parameters", "fit [%]", "rmse", self.criterion], *rows])
         return "\n".join([header, "-" * len(header), *lines])
 
+    def to_frame(self) -> Any:
+        """The candidates as a `pandas.DataFrame`, one row each, the best first; ImportError without pandas."""
+        names = ("n_parameters", "fit_percent", "rmse", "cv_rmse", "fpe", "aic", "bic", "success", "message")
+        return frame(
+            {name: [vars(fit)[name] for fit in self.fits.values()] for name in names},
+            index=("candidate", [*self.fits]),
+            notes={"criterion": self.criterion},
+        )
+
 
 def select(
     candidates: Mapping[str, Any] | Sequence[Any],
@@ -117,8 +127,7 @@ def select(
     >>> hs.select([hs.Line, hs.SingleValued], rec).name
     'SingleValued'
     """
-    if criterion not in CRITERIA:
-        raise ValueError(f"criterion must be one of {', '.join(CRITERIA)}, got {criterion!r}")
+    check_choice("criterion", criterion, CRITERIA)
     if criterion == "cv_rmse" and cross_validate is None:
         raise ValueError('criterion="cv_rmse" needs a cross-validation: cross_validate="loo", or a number of blocks')
     named, report = _named(candidates), progress or (lambda done, total: None)

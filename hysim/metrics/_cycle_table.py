@@ -28,6 +28,7 @@ import numpy.typing as npt
 from hysim._cycles import ROUNDING, TOLERANCE, too_few
 from hysim._excursions import Loops, protocol
 from hysim._frozen import FloatArray, frozen
+from hysim._prefixes import in_brackets
 from hysim._printing import aligned, csv_text, extent, folded, printed, quantity, summary_text
 from hysim.metrics._loop import COUNTERCLOCKWISE, FORCE, LoopMetrics, measure, samples_of_a_loop
 
@@ -53,7 +54,10 @@ class _Column:
         """The unit made of those of u and y; empty if one of them is unknown."""
         if not {"u", "y"} & set(self.unit) <= units.keys():
             return ""
-        return self.unit.replace("y", "\0").replace("u", units.get("u", "")).replace("\0", units.get("y", ""))
+        u, y = (units.get(name, "") for name in ("u", "y"))
+        if "/" in self.unit:
+            u, y = in_brackets(u), in_brackets(y)
+        return self.unit.replace("y", "\0").replace("u", u).replace("\0", y)
 
 
 _COLUMNS = (

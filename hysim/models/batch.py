@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
+from hysim._names import meant
 from hysim._parallel import in_chunks
 from hysim.metrics.rows import LoopRows
 
@@ -72,7 +73,9 @@ class Batch(NamedTuple):
 
     def _measure(self, reduce: Reduction, target: npt.ArrayLike | None) -> Callable[[Sets, FloatArray], FloatArray]:
         if reduce not in REDUCTIONS:
-            raise ValueError(f"reduce must be one of {', '.join(REDUCTIONS)} or None, got {reduce!r}")
+            raise ValueError(
+                f"reduce must be one of {', '.join(REDUCTIONS)} or None, got {reduce!r}{meant(reduce, REDUCTIONS)}"
+            )
         if (reduce == "sse") != (target is not None):
             raise ValueError('reduce="sse" takes a target, and nothing else does')
         if target is not None:

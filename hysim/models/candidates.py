@@ -1,14 +1,20 @@
 """The models that the registry offers to `hysim.compare`: every family that can be identified without being told more.
 
+A family is also known by its name, however it is written: ``"bouc-wen"``, ``"BoucWen"``, ``"bouc_wen"``.
+
 A public family is its own candidate. One that is identified through a structure, or only from a start, names in a class
 method ``candidates()`` what is tried instead; one that makes no sense without being told more names nothing.
 """
 
+import importlib
 from typing import Any
 
-from hysim._names import MODULE_OF
-from hysim.models.model import every_family
+from hysim._names import MODULE_OF, meant, plain
+from hysim.models.model import FAMILIES, ROOMS, every_family
 from hysim.models.protocols import Direct, Identifiable, Offering
+
+SHORT = {"zhuwang": "ZhuWangBoucWen", "babernoori": "BoucWenBaberNoori"}
+"""Families by the plain forms of their short names."""
 
 
 def candidates() -> dict[str, Any]:
@@ -24,6 +30,38 @@ def candidates() -> dict[str, Any]:
     for name in (*MODULE_OF, *(name for name in families if name not in MODULE_OF)):
         if name in families:
             found |= _of_family(name, families[name])
+    return found
+
+
+def family_named(name: str) -> Any:
+    """The family of this name, whatever its capitals, hyphens and underscores.
+
+    Those of hysim are known without being loaded, those of the user once they are defined. ValueError, with the name
+    that may have been meant, if there is none.
+
+    Examples
+    --------
+    >>> family_named("bouc-wen").__name__
+    'BoucWen'
+    """
+    public = [each for each, module in MODULE_OF.items() if module.startswith(ROOMS)]
+    known = {plain(each): each for each in (*FAMILIES, *public)} | SHORT
+    if (family := known.get(plain(name))) is not None:
+        if family in public:
+            importlib.import_module(MODULE_OF[family])  # enters it into the families
+        if family in FAMILIES:
+            return FAMILIES[family]
+    raise ValueError(f"there is no family {name!r}{meant(name, every_family())}")
+
+
+def candidates_named(name: str) -> dict[str, Any]:
+    """What `hysim.compare` tries of the family of this name, by the names of rows; ValueError if there is nothing."""
+    family = family_named(name)
+    found = _of_family(family.__name__, family)
+    if not found:
+        raise ValueError(
+            f"the family {family.__name__} needs more than its name: give a structure, or a model to start from"
+        )
     return found
 
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from hysim._frozen import FloatArray
+from hysim._names import among
 from hysim.models.parts import own
 from hysim.models.protocols import Undecided, Variant
 from hysim.models.search_space import Freedom, SearchSpace
@@ -83,7 +84,7 @@ def declared(spaces: Mapping[str, Space], freedom: Freedom) -> dict[str, SearchS
     for argument, names in wishes.items():
         for name in names:
             if name not in known:
-                raise ValueError(f"{argument} names {name!r}; the parameters are {', '.join(known)}")
+                raise ValueError(f"{argument} names {name!r}; the parameters are {among(name, known)}")
     return {label: _of_part(label, space, freedom) for label, space in spaces.items()}
 
 

@@ -16,7 +16,7 @@ from hysim._printing import shown, summary_text, value_in_words, wrapped
 
 T = TypeVar("T")
 
-_ROOMS = ("hysim.models.", "hysim.laws.", "hysim.plants.")  # where hysim's own families are
+ROOMS = ("hysim.models.", "hysim.laws.", "hysim.plants.")  # where hysim's own families are
 
 FAMILIES: dict[str, type] = {}
 
@@ -71,6 +71,6 @@ def _models_in(name: str, value: Any) -> dict[str, Any]:
 def every_family() -> dict[str, type]:
     """The registry after every public model of hysim has entered its family."""
     for module in dict.fromkeys(MODULE_OF.values()):
-        if module.startswith(_ROOMS):
+        if module.startswith(ROOMS):
             importlib.import_module(module)
     return FAMILIES

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from hysim._frozen import FloatArray, frozen
+from hysim._names import among, meant
 
 Parameters = Mapping[str, Any]
 """User's names to floats or to arrays of shape (n_sets,)."""
@@ -90,7 +91,7 @@ class Freedom:
     def starts_at_rest(self, default: str = "free") -> bool:
         """Whether the initial state is not free, where the user says nothing by the family's default."""
         if self.initial not in (None, *STATES):
-            raise ValueError(f"initial must be {STATES_IN_WORDS}, got {self.initial!r}")
+            raise ValueError(f"initial must be {STATES_IN_WORDS}, got {self.initial!r}{meant(self.initial, STATES)}")
         return (self.initial or default) != "free"
 
     def held(
@@ -110,7 +111,7 @@ class Freedom:
         for argument, names in (("fixed", tuple(self.fixed)), ("free", self.free)):
             for name in names:
                 if name not in defaults:
-                    raise ValueError(f"{argument} names {name!r}; the parameters are {', '.join(defaults)}")
+                    raise ValueError(f"{argument} names {name!r}; the parameters are {among(name, defaults)}")
         if both := set(self.fixed) & set(self.free):
             raise ValueError(f"{sorted(both)[0]!r} is both fixed and free")
         held = {name: 0.0 for name in at_rest if name not in self.free}
@@ -128,7 +129,7 @@ class Freedom:
         """
         for name, pair in self.bounds.items():
             if name not in defaults or name in held:
-                raise ValueError(f"bounds name {name!r}, which is not free; the parameters are {', '.join(defaults)}")
+                raise ValueError(f"bounds name {name!r}, which is not free; the parameters are {among(name, defaults)}")
             if len(pair) != 2 or not pair[0] < pair[1]:
                 raise ValueError(f"bounds of {name!r} must be (lower, upper) with lower < upper, got {pair}")
         return {name: (float(lower), float(upper)) for name, (lower, upper) in self.bounds.items()}

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -58,10 +58,35 @@ def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None
 def to_json(model: Any, *, units: Mapping[str, str] | None = None) -> str:
     """The text that `save` writes."""
     if not is_model(model):
-        raise TypeError(f"save takes a model of hysim, got {type(model).__name__}")
+        raise TypeError(f"save takes a model of hysim, got {type(model).__name__}{_advice(model)}")
     document = {"hysim": __version__, **to_document(model), "units": dict(units or {})}
     _check_depth(document)
     return json.dumps(document, indent=2, allow_nan=False) + "\n"
+
+
+@runtime_checkable
+class _WithModel(Protocol):
+    """A result of `identify` or `discover`."""
+
+    @property
+    def model(self) -> Any: ...
+
+
+@runtime_checkable
+class _InputOutput(Protocol):
+    """A record, a simulation."""
+
+    @property
+    def u(self) -> Any: ...
+    @property
+    def y(self) -> Any: ...
+
+
+def _advice(value: Any) -> str:
+    """What to call for something that is not a model."""
+    if isinstance(value, _WithModel):
+        return ": hs.save(result.model, path) writes its model, result.to_json() is the text of all of it"
+    return ": hs.save_record(record, path) writes a record" if isinstance(value, _InputOutput) else ""
 
 
 def load_model(path: str | Path) -> Any:

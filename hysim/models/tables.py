@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
+from hysim._names import among
 from hysim.models.search_space import Parameters
 
 Tables = Mapping[str, FloatArray]
@@ -50,7 +51,7 @@ def tables_of(
     elements = {name: value for name, value in parameters.items() if "[" in name}
     for name in (*whole, *(name.partition("[")[0] for name in elements)):
         if name not in defaults:
-            raise TypeError(f"unknown parameter {name!r}: {family} has {', '.join(defaults)}")
+            raise TypeError(f"unknown parameter {name!r}: {family} has {among(name, defaults)}")
     tables = {name: _table(name, value, np.ndim(defaults[name])) for name, value in whole.items()}
     columns = {name: _table(name, value, 0) for name, value in elements.items()}
     lengths = {name: len(table) for name, table in {**tables, **columns, "u": inputs}.items() if len(table) != 1}

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import expm
 
-from hysim._frozen import FloatArray, check_whole, items, read_only
+from hysim._frozen import FloatArray, check_choice, check_whole, items, read_only
 from hysim.errors import SimulationError
 from hysim.kernels import oscillator as kernels
 from hysim.kernels.boucwen import prepare
@@ -119,8 +119,7 @@ class BoucWenOscillator:
             raise TypeError(f"law must be a BoucWen or a PolynomialBoucWen, got {type(self.law).__name__}")
         options = {"excitation": ("force", "base"), "hold": ("foh", "zoh"), "method": METHODS}
         for name, allowed in options.items():
-            if items(self)[name] not in allowed:
-                raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {items(self)[name]!r}")
+            check_choice(name, items(self)[name], allowed)
         if self.substeps is not None:
             check_whole(self.substeps, "substeps")
         if len(self.initial_state) not in (0, 2):

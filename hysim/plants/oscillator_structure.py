@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray, check_whole, checked, items
+from hysim._frozen import FloatArray, check_choice, check_whole, checked, items
 from hysim._parallel import in_chunks
 from hysim.errors import SimulationError
 from hysim.laws.differential import _boucwen_search
@@ -61,8 +61,7 @@ class OscillatorStructure(Identifiable):
             "excitation": ("force", "base"),
         }
         for name, allowed in options.items():
-            if items(self)[name] not in allowed:
-                raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {items(self)[name]!r}")
+            check_choice(name, items(self)[name], allowed)
         for name, number in {"oversampling": self.oversampling, "period": self.period or 1}.items():
             check_whole(number, name)
         for factor in self.decimation:

@@ -10,7 +10,7 @@ from hysim._frozen import FloatArray
 from hysim._prefixes import in_unit, label
 from hysim.control import ClosedLoop
 from hysim.plot._style import MANY, MEASURED, AxesArray, joined, line, one, several
-from hysim.records import Record
+from hysim.records import Record, as_record
 from hysim.simulation import Simulation, columns_of, has_elements
 
 _DRAWN = {"zoh": "steps-post", "foh": "default"}
@@ -87,6 +87,7 @@ def loop(*results: InputOutput, ax: Axes | None = None) -> Axes:
     """
     if not results:
         raise ValueError("there is nothing to draw: give at least one result with u and y")
+    results = tuple(as_record(result, "loop") or result for result in results)
     named = list(zip(results, names_of(results), strict=True))
     records = [(result, name) for result, name in named if isinstance(result, Record)]
     others = [(result, name) for result, name in named if not isinstance(result, Record)]

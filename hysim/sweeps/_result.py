@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen
+from hysim._names import among
 from hysim._printing import csv_text, printed, summary_text
 from hysim._versions import optional
 from hysim.sweeps._seeds import seeds
@@ -63,7 +64,7 @@ class Sweep:
     def __getitem__(self, name: str) -> Column:
         columns = {**self.columns, **self.arrays}
         if name not in columns:
-            raise KeyError(f"no column {name!r}: there are {', '.join(columns)}")
+            raise KeyError(f"no column {name!r}: there are {among(name, columns)}")
         return columns[name]
 
     @property

@@ -8,7 +8,8 @@ so are the calls in a message, such as ``BoucWen(n=1.0)``.
 import re
 import shlex
 from collections.abc import Iterable, Mapping
-from difflib import get_close_matches
+
+from hysim._names import nearest
 
 OTHER_NAMES = {
     "acceleration": "u", "channels": "channel", "elements": "plays", "fixed": "fix", "units": "unit",
@@ -99,12 +100,5 @@ def _typed(word: str) -> str:
 
 def suggestion(word: str, known: Iterable[str]) -> str:
     """``did you mean NAME?`` for the nearest of some names, an empty text if none is near."""
-    names = {_bare(name): name for name in known}
-    bare = _bare(word)
-    near = [bare] if bare in names else get_close_matches(bare, names, n=1)
-    return f"did you mean {names[near[0]]}?" if near else ""
-
-
-def _bare(name: str) -> str:
-    """The name in small letters, without hyphens, points and lines below, so that spellings of one name agree."""
-    return re.sub(r"[-_.\s]", "", name.partition("=")[0]).lower()
+    near = nearest(word.partition("=")[0], known)
+    return "" if near is None else f"did you mean {near}?"

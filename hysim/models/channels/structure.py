@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from hysim._channels import value_in
 from hysim._frozen import FloatArray, checked
+from hysim._names import among
 from hysim.models.channels.polynomial import ChannelPolynomial, names_of, places, weights
 from hysim.models.channels.space import expanded
 from hysim.models.channels.varying import check_memory_is_its_own, columns_along
@@ -69,7 +70,7 @@ class DependentStructure(Identifiable):
         spans = {}
         for name, (channel, degree) in self.depends.items():
             if name not in (known := (*space.names, *space.held)):
-                raise ValueError(f"depends names {name!r}; the parameters are {', '.join(known)}")
+                raise ValueError(f"depends names {name!r}; the parameters are {among(name, known)}")
             if name in space.state:
                 raise ValueError(f"{name!r} is the state at the first sample of a record, and depends on no channel")
             owners = [f"record {k}" if len(records) > 1 else "the record" for k in range(len(records))]

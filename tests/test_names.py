@@ -1,0 +1,111 @@
+"""Families are known by their names, and a misspelt name is answered with the one that may have been meant."""
+
+import pytest
+
+import hysim as hs
+from hysim._names import MODULE_OF, meant, nearest
+from hysim.cli import main
+from hysim.models.candidates import candidates, candidates_named, family_named
+from hysim.models.model import every_family
+
+RECORD = hs.datasets.table1()
+
+
+@pytest.mark.parametrize("form", [str, str.lower, str.upper, lambda name: "_".join(name), lambda name: "-".join(name)])
+def test_every_family_is_known_by_its_name_in_any_form(form):
+    for name, family in every_family().items():
+        if name in MODULE_OF:
+            assert family_named(form(name)) is family
+
+
+def test_every_candidate_of_the_registry_comes_by_the_name_of_its_family():
+    every = candidates()
+    by_name = {}
+    for family in dict.fromkeys(name.split()[0] for name in every):
+        by_name |= candidates_named(family)
+    assert by_name == every
+
+
+def test_no_two_families_share_a_name_that_people_write():
+    plain = [name.lower() for name in every_family()]
+    assert len(set(plain)) == len(plain)
+
+
+@pytest.mark.parametrize("name", ["bouc-wen", "BoucWen", "boucwen", "Bouc_Wen"])
+def test_verbs_take_the_name_of_a_family(name):
+    fixed = {"n": 1.0, "feedthrough": 0.0, "offset": 0.0, "z0": 0.0}
+    assert hs.identify(name, RECORD, fixed=fixed) == hs.identify(hs.BoucWen, RECORD, fixed=fixed)
+
+
+def test_compare_and_select_take_names():
+    wanted = hs.compare({"Line": hs.Line, "SingleValued": hs.SingleValued}, RECORD)
+    for models in (["line", "single-valued"], [hs.Line, "SingleValued"]):
+        assert [row.name for row in hs.compare(models, RECORD).rows] == ["Line", "SingleValued"]
+    assert hs.compare({"Line": "line", "SingleValued": "singlevalued"}, RECORD) == wanted
+    assert [row.name for row in hs.compare("line", RECORD).rows] == ["Line"]
+    assert list(hs.select(["line", "single-valued"], RECORD).fits) == ["single-valued", "line"]
+    assert [*candidates_named("duhem")] == ["Duhem of degree 1", "Duhem of degree 2"]
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "message"),
+    [
+        (lambda: hs.BoucWenn, AttributeError, "no attribute 'BoucWenn'; did you mean 'BoucWen'?"),
+        (lambda: hs.indentify, AttributeError, "did you mean 'identify'?"),
+        (lambda: hs.BoucWen(betta=1.0), TypeError, "BoucWen has no parameter 'betta'; .*; did you mean 'beta'?"),
+        (lambda: hs.PID(kpp=1.0), TypeError, "PID has no parameter 'kpp'; .*; did you mean 'kp'?"),
+        (lambda: hs.BoucWen(1.0), TypeError, "no positional argument; by name it takes A, beta"),
+        (lambda: hs.identify("bouc-wn", RECORD), ValueError, "no family 'bouc-wn'; did you mean 'BoucWen'?"),
+        (lambda: hs.compare(["dahll"], RECORD), ValueError, "no family 'dahll'; did you mean 'Dahl'?"),
+        (lambda: hs.compare({"a": "duhem"}, RECORD), ValueError, "stands for several models"),
+        (lambda: hs.compare([hs.Line()], RECORD), TypeError, "a list of families or their names"),
+        (lambda: hs.compare(["lugre"], RECORD), ValueError, "LuGre needs more than its name"),
+        (lambda: hs.identify("boucweninverse", RECORD), ValueError, "there is no family 'boucweninverse'"),
+        (lambda: hs.identify(hs.TransferFunction, RECORD), TypeError, r"hs.TransferFunction.structure\(...\)"),
+        (lambda: hs.identify(hs.BoucWen, RECORD, fixed={"betta": 1}), ValueError, "did you mean 'beta'?"),
+        (lambda: hs.identify(hs.BoucWen, RECORD, free=["gama"]), ValueError, "did you mean 'gamma'?"),
+        (lambda: hs.identify(hs.BoucWen, RECORD, bounds={"ofset": (0, 1)}), ValueError, "did you mean 'offset'?"),
+        (lambda: hs.identify(hs.BoucWen, RECORD, initial="perodic"), ValueError, "did you mean 'periodic'?"),
+        (lambda: hs.identify(hs.BoucWen, RECORD, noise="gausian"), ValueError, "did you mean 'gaussian'?"),
+        (lambda: hs.identify(hs.BoucWen, RECORD, intervals="profiles"), ValueError, "did you mean 'profile'?"),
+        (lambda: hs.select([hs.Line], RECORD, criterion="bicc"), ValueError, "did you mean 'bic'?"),
+        (lambda: hs.BoucWen.responses({"betta": [1.0]}, [0.0]), TypeError, "did you mean 'beta'?"),
+        (lambda: hs.BoucWen.responses({}, [0.0], reduce="pek"), ValueError, "reduce must be one of"),
+        (lambda: hs.compare({"line": hs.Line}, RECORD)["lin"], KeyError, "did you mean 'line'?"),
+        (lambda: hs.discover(RECORD, route="memry"), ValueError, "did you mean 'memory'?"),
+    ],
+)
+def test_a_misspelt_name_is_answered_with_the_one_that_was_meant(call, error, message):
+    with pytest.raises(error, match=message.replace("?", r"\?")):
+        call()
+
+
+def test_nothing_is_guessed_where_nothing_is_near():
+    assert nearest("stiffness", ["beta", "gamma"]) is None
+    assert meant("stiffness", ["beta", "gamma"]) == ""
+    assert meant(3, ["beta"]) == ""
+    with pytest.raises(AttributeError, match=r"no attribute 'something_else'$"):
+        _ = hs.something_else
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("idntify",), "did you mean identify?"),
+        (("identify", "loop.csv", "--model", "dahl", "--bonds", "c=0:1"), "did you mean --bounds?"),
+        (("identify", "loop.csv", "--model", "dahll"), "did you mean dahl?"),
+        (("identify", "loop.csv", "--model", "dahl", "--fix", "coulom=1"), "did you mean 'coulomb'?"),
+        (("identify", "loop.csv", "--model", "dahl", "--u", "voltag"), "did you mean 'voltage'?"),
+    ],
+)
+def test_the_command_line_guesses_too(arguments, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "loop.csv").write_text("u,y,voltage\n0,0,0\n1,1,1\n0,0.1,0\n1,1,1\n0,0.1,0\n")
+    try:
+        code = main(arguments)
+    except SystemExit as end:
+        code = end.code
+    printed = capsys.readouterr()
+    assert (code, printed.out) == (2, "")
+    assert said in printed.err
+    assert printed.err.count("\n") == 1
