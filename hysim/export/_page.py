@@ -30,12 +30,12 @@ from hysim.records import Record
 LARGEST = 300_000
 """Most bytes of a page."""
 
-_SCRIPTS = ("step.js", "inputs.js", "measures.js", "draw.js", "code.js", "page.js")
+_SCRIPTS = ("step.js", "inputs.js", "measures.js", "draw.js", "memory.js", "equations.js", "code.js", "page.js")
 _SAMPLES = 200  # of the input on which the sliders' ends are found
 
 
 class Shown(NamedTuple):
-    """A model of a page, the input between which it begins, and labels of units.
+    """A model of a page, the input between which it begins, labels of units, and the group in which it is listed.
 
     The plays of a Prandtl-Ishlinskii law with `stack` have equal weights and even thresholds, and sliders for both.
     """
@@ -44,6 +44,7 @@ class Shown(NamedTuple):
     between: tuple[float, float] | None = None
     units: Mapping[str, str] = MappingProxyType({})
     stack: bool = False
+    group: str = ""
 
 
 def to_page(
@@ -144,6 +145,7 @@ def _model(name: str, shown: Shown, parts: Parts, record: Record | None) -> dict
     summary, equation = about(thing)
     return {
         "name": name,
+        "group": shown.group,
         "about": summary,
         "equation": equation,
         "node": node,
