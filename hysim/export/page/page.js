@@ -2,7 +2,7 @@
 
 const STEPS = 400;  // positions of a slider
 const KINDS = ["triangle", "sine", "fading", "minor loops", "reversals"];
-const SHARES = [0, 1, -1, 0.6, -0.2, 0.4, -0.6, 1];  // where the input turns at first if its reversals are typed
+const SHARES = [0, 1, -1, 1, -0.4, 0.5, -0.4, 1];  // where the input turns at first if its reversals are typed
 const FILM = 8;  // seconds in which an input is played
 const part = (id) => document.getElementById(id);
 
@@ -16,7 +16,13 @@ function element(name, attributes = {}, ...children) {
   return made;
 }
 
-const shortened = (value, digits = 4) => (Number.isFinite(value) ? String(Number(value.toPrecision(digits))).replace("-", "−") : "–");
+// A number of few digits, with an exponent where it would be long.
+function digitsOf(value, digits) {
+  const rounded = Number(value.toPrecision(digits));
+  return rounded !== 0 && Math.abs(rounded) < 1e-4 ? rounded.toExponential() : String(rounded);
+}
+
+const shortened = (value, digits = 4) => (Number.isFinite(value) ? digitsOf(value, digits).replace(/^-/, "−") : "–");
 
 // A number with a slider and a box for its digits; `changed` is called with the new value.
 class Control {
@@ -61,7 +67,7 @@ class Control {
   show() {
     this.slider.value = this.position();
     this.slider.setAttribute("aria-valuetext", `${shortened(this.value)} ${this.spec.unit ?? ""}`.trim());
-    this.box.value = Number(this.value.toPrecision(6));
+    this.box.value = digitsOf(this.value, 6);
     this.element.classList.toggle("changed", this.value !== this.spec.value);
   }
 }
