@@ -1,7 +1,7 @@
 """Pages for a browser: a law's loop that follows sliders, in one HTML file that needs nothing else.
 
 The page computes with the step of the law, as WebAssembly; see `hysim.export._page_modules`. Files of the folder `page`
-are its parts: markup, style, and script, joined in the order of `_SCRIPTS`.
+are its parts: markup, style, and script, joined in the order of `_PARTS`.
 """
 
 import base64
@@ -30,7 +30,7 @@ from hysim.records import Record
 LARGEST = 300_000
 """Most bytes of a page."""
 
-_SCRIPTS = ("step.js", "inputs.js", "measures.js", "draw.js", "memory.js", "equations.js", "code.js", "page.js")
+_PARTS = ("step", "inputs", "measures", "draw", "memory", "equations", "code", "control", "page")
 _SAMPLES = 200  # of the input on which the sliders' ends are found
 
 
@@ -125,7 +125,7 @@ def page_text(models: Mapping[str, Shown], record: Record | None = None, *, titl
         title=escape(title or next(iter(models))),
         version=__version__,
         style=folder.joinpath("page.css").read_text(encoding="utf-8").strip(),
-        script="\n".join(folder.joinpath(name).read_text(encoding="utf-8").strip() for name in _SCRIPTS),
+        script="\n".join(folder.joinpath(f"{name}.js").read_text(encoding="utf-8").strip() for name in _PARTS),
         packs=",\n".join(_expression(pack, k) for k, pack in enumerate(packs)),
         data=_for_script(json.dumps(data, separators=(",", ":"), ensure_ascii=False)),
     )
