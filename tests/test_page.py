@@ -114,7 +114,7 @@ def test_the_equation_of_the_output_names_every_number_that_is_linear_in_it(mode
         for law in _parts(shown.model):
             text = output_of(type(law))
             if text or not isinstance(law, hs.Preisach):  # whose sum over a density has no short form
-                assert linear & set(law.arguments) <= set(re.findall(r"\w+", text)), name
+                assert linear & set(vars(law)) <= set(re.findall(r"\w+", text)), name
     assert output_of(hs.Cascade) == ""
 
 

@@ -83,7 +83,7 @@ def _devices() -> dict[str, Shown]:
         "Friction damper and spring": Shown(friction, (-8.0, 8.0), _DAMPER),
         "Magnetorheological damper": Shown(damper, (-8.0, 8.0), _DAMPER),
         "Baber-Noori: wear and pinching": Shown(pinching, (-4.0, 4.0), _DAMPER),
-        "Benchmark of Noël and Schoukens": Shown(noel_schoukens_plant().law, (-2e-3, 2e-3), {"u": "m", "y": "N"}),
+        "Noël-Schoukens benchmark": Shown(noel_schoukens_plant().law, (-2e-3, 2e-3), {"u": "m", "y": "N"}),
         "Steel core": Shown(steel, (-5e3, 5e3), {"u": "A/m", "y": "T"}),
     }
 

@@ -46,7 +46,8 @@ class Page {
     const { model } = this, changed = () => (this.later(), this.share());
     part("model").value = k;
     part("about").innerHTML = model.about;
-    part("equation").textContent = model.equation;
+    const clauses = (line) => line.split(/(?<=, {3,})(?=\S)/).map((clause) => element("span", {}, clause));
+    part("equation").replaceChildren(...model.equation.split("\n").flatMap((line) => [...clauses(line), "\n"]));
     part("equation").hidden = !model.equation;
     this.controls = model.controls.map((spec) => new Control(spec, changed));
     part("parameters").replaceChildren(...this.controls.map((control) => control.element));
