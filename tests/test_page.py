@@ -524,6 +524,20 @@ def test_reversals_of_ones_own_make_the_loop_that_python_makes(browser, tmp_path
 
 @pytest.mark.browser
 @pytest.mark.extra("websockets")
+def test_a_film_of_the_input_runs_until_it_is_paused_and_its_moment_is_in_the_address(browser, tmp_path):
+    page = to_page(hs.Play(), tmp_path / "page.html")
+    browser.open(page)
+    browser.value("document.getElementById('play').click()")
+    wait_for(lambda: 0.01 < browser.value("window.hysim.passed") < 1.0)
+    assert browser.value("document.getElementById('play').textContent") == "Pause"
+    browser.value("document.getElementById('play').click()")
+    state = browser.drawn()
+    browser.open(page, state["address"])
+    assert browser.drawn()["moment"] == state["moment"] < len(state["u"]) - 1
+
+
+@pytest.mark.browser
+@pytest.mark.extra("websockets")
 def test_no_model_of_the_explorer_is_wider_than_a_telephone(browser, models, tmp_path):
     browser.send("Emulation.setDeviceMetricsOverride", width=390, height=844, deviceScaleFactor=1, mobile=True)
     browser.open(explorer(tmp_path / "explorer.html"))

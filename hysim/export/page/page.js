@@ -26,7 +26,7 @@ class Page {
     part("shorter").addEventListener("click", () => this.turn(this.reversals.slice(0, Math.max(2, this.reversals.length - 1))));
     part("moment").addEventListener("input", () => (this.stop(), this.moveTo(part("moment").value / STEPS)));
     part("moment").addEventListener("change", () => this.share());
-    part("play").addEventListener("click", () => (this.playing ? this.stop() : this.play()));
+    part("play").addEventListener("click", () => (this.playing ? (this.stop(), this.share()) : this.play()));
     part("link").addEventListener("click", () => this.copy(location.href, part("link")));
     part("copy").addEventListener("click", () => this.copy(part("code").textContent, part("copy")));
     window.addEventListener("hashchange", () => (this.read(), this.refit()));
@@ -100,6 +100,7 @@ class Page {
       this.moveTo(Math.min(1, Math.max(0, from + (now - begin) / 1000 / FILM)));
       this.playing = this.passed < 1 ? requestAnimationFrame(next) : undefined;
       part("play").textContent = this.playing ? "Pause" : "Play";
+      if (!this.playing) this.share();
     };
     this.playing = requestAnimationFrame(next);
   }
