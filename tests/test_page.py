@@ -17,10 +17,11 @@ import numpy as np
 import pytest
 
 import hysim as hs
+from hysim._cycles import TOLERANCE, complete_cycles
 from hysim.cli import main
 from hysim.export import explorer
 from hysim.export._page import LARGEST, Shown, page_text, to_page
-from hysim.export._page_model import steps_of
+from hysim.export._page_model import output_of, steps_of
 from hysim.export._page_modules import FOLDER, c_source, compiled, module_of
 from hysim.export._page_presets import presets
 from hysim.models.model import every_family
@@ -104,6 +105,17 @@ def test_every_slider_begins_at_the_law_and_ends_inside_what_it_takes(models, tm
             scale = control.get("scale")
             if len(control["places"]) == 1 and not scale and not shown.stack:
                 assert model["values"][control["places"][0]] == control["value"], (name, control)
+
+
+def test_the_equation_of_the_output_names_every_number_that_is_linear_in_it(models):
+    assert output_of(hs.BoucWen) == "offset + feedthrough u + gain z"
+    linear = {"offset", "gain", "feedthrough", "saturation", "slope", "weight"}
+    for name, shown in models.items():
+        for law in _parts(shown.model):
+            text = output_of(type(law))
+            if text or not isinstance(law, hs.Preisach):  # whose sum over a density has no short form
+                assert linear & set(vars(law)) <= set(re.findall(r"\w+", text)), name
+    assert output_of(hs.Cascade) == ""
 
 
 def test_the_explorer_has_every_family_of_laws(models, tmp_path):
@@ -409,6 +421,131 @@ def test_axes_stay_while_a_slider_moves_until_they_are_fitted(browser, tmp_path)
     browser.value("document.getElementById('refit').click()")
     assert browser.value("window.hysim.limits") != limits
     assert browser.value("document.getElementById('refit').className") == ""
+
+
+@pytest.mark.browser
+@pytest.mark.extra("websockets")
+def test_a_double_click_fits_the_axes(browser, tmp_path):
+    browser.open(to_page(hs.BoucWen(), tmp_path / "page.html"))
+    limits = browser.value("window.hysim.limits")
+    browser.press(0, "End")
+    browser.value("document.getElementById('loop').dispatchEvent(new MouseEvent('dblclick'))")
+    assert browser.value("window.hysim.limits") != limits
+
+
+@pytest.mark.browser
+@pytest.mark.extra("websockets")
+def test_the_equation_of_the_output_has_the_numbers_of_the_sliders(browser, tmp_path):
+    def shown():
+        return browser.value("document.getElementById('output').textContent")
+
+    law = hs.PolynomialBoucWen(gain=-0.5, offset=0.25, input_coefficients=(0.5, 0.0, -2e-6))
+    browser.open(to_page(law, tmp_path / "law.html"))
+    assert shown() == "y = offset + sum c_k u^k + gain z\n  = 0.25 + 0.5 u − 2e-6 u³ − 0.5 z"
+    offset = browser.value("window.hysim.model.controls.findIndex(control => control.name === 'offset')")
+    top = browser.press(offset, "End")["values"][5]
+    assert shown().split("= ")[2].startswith(f"{top:.3g} + 0.5 u")
+    browser.open(to_page(hs.Stop(threshold=0.5, gain=2.0, offset=-1.0) + hs.Dashpot(c=1.0), tmp_path / "sum.html"))
+    assert shown() == "Stop     y = −1 + 2 (u - z)\nDashpot  y = u'"
+    browser.open(to_page(hs.MaxwellSlip(stiffness=(1.0, 3.0), slips=(0.2, 0.5)), tmp_path / "stops.html"))
+    assert shown().endswith("= (u - z₀) + 3 (u - z₁)")
+
+
+@pytest.mark.browser
+@pytest.mark.extra("websockets")
+def test_the_plays_that_are_drawn_are_those_of_python_at_the_moment(browser, models, tmp_path):
+    browser.open(explorer(tmp_path / "explorer.html"))
+    drawn = 0
+    for place, (name, shown) in enumerate(models.items()):
+        state = browser.choose("model", str(place))
+        if state["memory"] is None:
+            continue
+        drawn += 1
+        browser.choose("kind", "fading")
+        for share in (0, 137, 400):
+            browser.value(
+                f"(() => {{ const moment = document.getElementById('moment'); moment.value = {share};"
+                " moment.dispatchEvent(new Event('input')); })()"
+            )
+            state = browser.drawn()
+            memory, u = state["memory"], np.array(state["u"][: state["moment"] + 1])
+            assert state["moment"] == round(share / 400 * (len(state["u"]) - 1))
+            assert memory["u"] == u[-1]
+            if "rate" not in name:
+                z = np.atleast_1d(shown.model.memory(u)[-1])
+                np.testing.assert_allclose(memory["z"], z, rtol=0.0, atol=1e-12 * np.ptp(shown.between), err_msg=name)
+            inside = np.abs(np.subtract(memory["z"], u[-1])) <= np.array(memory["thresholds"]) * (1 + 1e-12) + 1e-12
+            assert inside.all() or not memory["cone"], name
+    assert drawn == 9
+
+
+@pytest.mark.browser
+@pytest.mark.extra("websockets")
+def test_reversals_of_ones_own_make_the_loop_that_python_makes(browser, tmp_path):
+    rng = np.random.default_rng(5)
+    page = to_page(hs.BoucWen(feedthrough=0.2), tmp_path / "page.html")
+    lists = [np.round(rng.uniform(-1.0, 1.0, rng.integers(2, 9)), 2).tolist() for _ in range(12)]
+    lists += [[0, 1, 2, -2, 2], [2, -2, -1.985, -2, 2], [0, 1, -1, 0.97, -0.3, 0.3], [1, -1, 1, 0.995, 1, -1]]
+    browser.open(page)
+    browser.choose("kind", "reversals")
+    measured = 0
+    for turns in lists:
+        browser.value(
+            f"(() => {{ const box = document.getElementById('reversals'); box.value = {json.dumps(turns)}.join('; ');"
+            " box.dispatchEvent(new Event('change')); })()"
+        )
+        state = browser.drawn()
+        assert state["input"]["reversals"] == [turn for k, turn in enumerate(turns) if not k or turn != turns[k - 1]]
+        cycles = complete_cycles(np.array(state["u"]), TOLERANCE)
+        assert bool(cycles) == (state["measures"] is not None), turns
+        if cycles:
+            measured += 1
+            assert_as_python(state)
+    assert measured > 3
+    browser.open(page, state["address"])
+    assert browser.drawn()["u"] == state["u"]
+    before = state["input"]["reversals"]
+    browser.value(
+        "document.getElementById('loop').dispatchEvent(new MouseEvent('click', {clientX: 700, clientY: 300}))"
+    )
+    *others, last = browser.drawn()["input"]["reversals"]
+    assert others == before
+    low, high = browser.value("window.hysim.limits[0]")
+    assert low <= last <= high
+    browser.value("document.getElementById('shorter').click()")
+    assert browser.drawn()["input"]["reversals"] == before
+    browser.value(
+        "(() => { const box = document.getElementById('reversals'); box.value = '1, x';"
+        " box.dispatchEvent(new Event('change')); })()"
+    )
+    assert browser.drawn()["input"]["reversals"] == before
+    assert browser.value("document.getElementById('reversals').ariaInvalid") == "true"
+
+
+@pytest.mark.browser
+@pytest.mark.extra("websockets")
+def test_a_film_of_the_input_runs_until_it_is_paused_and_its_moment_is_in_the_address(browser, tmp_path):
+    page = to_page(hs.Play(), tmp_path / "page.html")
+    browser.open(page)
+    browser.value("document.getElementById('play').click()")
+    wait_for(lambda: 0.01 < browser.value("window.hysim.passed") < 1.0)
+    assert browser.value("document.getElementById('play').textContent") == "Pause"
+    browser.value("document.getElementById('play').click()")
+    state = browser.drawn()
+    browser.open(page, state["address"])
+    assert browser.drawn()["moment"] == state["moment"] < len(state["u"]) - 1
+
+
+@pytest.mark.browser
+@pytest.mark.extra("websockets")
+def test_no_model_of_the_explorer_is_wider_than_a_telephone(browser, models, tmp_path):
+    browser.send("Emulation.setDeviceMetricsOverride", width=390, height=844, deviceScaleFactor=1, mobile=True)
+    browser.open(explorer(tmp_path / "explorer.html"))
+    for place, name in enumerate(models):
+        browser.choose("model", str(place))
+        browser.choose("kind", "reversals")
+        assert browser.value("document.documentElement.scrollWidth") <= 390, name
+    browser.send("Emulation.setDeviceMetricsOverride", width=1280, height=900, deviceScaleFactor=1, mobile=False)
 
 
 @pytest.mark.browser

@@ -1,7 +1,7 @@
 """Pages for a browser: a law's loop that follows sliders, in one HTML file that needs nothing else.
 
 The page computes with the step of the law, as WebAssembly; see `hysim.export._page_modules`. Files of the folder `page`
-are its parts: markup, style, and script, joined in the order of `_SCRIPTS`.
+are its parts: markup, style, and script, joined in the order of `_PARTS`.
 """
 
 import base64
@@ -30,12 +30,12 @@ from hysim.records import Record
 LARGEST = 300_000
 """Most bytes of a page."""
 
-_SCRIPTS = ("step.js", "inputs.js", "measures.js", "draw.js", "code.js", "page.js")
+_PARTS = ("step", "inputs", "measures", "draw", "memory", "equations", "code", "control", "page")
 _SAMPLES = 200  # of the input on which the sliders' ends are found
 
 
 class Shown(NamedTuple):
-    """A model of a page, the input between which it begins, and labels of units.
+    """A model of a page, the input between which it begins, labels of units, and the group in which it is listed.
 
     The plays of a Prandtl-Ishlinskii law with `stack` have equal weights and even thresholds, and sliders for both.
     """
@@ -44,6 +44,7 @@ class Shown(NamedTuple):
     between: tuple[float, float] | None = None
     units: Mapping[str, str] = MappingProxyType({})
     stack: bool = False
+    group: str = ""
 
 
 def to_page(
@@ -124,7 +125,7 @@ def page_text(models: Mapping[str, Shown], record: Record | None = None, *, titl
         title=escape(title or next(iter(models))),
         version=__version__,
         style=folder.joinpath("page.css").read_text(encoding="utf-8").strip(),
-        script="\n".join(folder.joinpath(name).read_text(encoding="utf-8").strip() for name in _SCRIPTS),
+        script="\n".join(folder.joinpath(f"{name}.js").read_text(encoding="utf-8").strip() for name in _PARTS),
         packs=",\n".join(_expression(pack, k) for k, pack in enumerate(packs)),
         data=_for_script(json.dumps(data, separators=(",", ":"), ensure_ascii=False)),
     )
@@ -144,6 +145,7 @@ def _model(name: str, shown: Shown, parts: Parts, record: Record | None) -> dict
     summary, equation = about(thing)
     return {
         "name": name,
+        "group": shown.group,
         "about": summary,
         "equation": equation,
         "node": node,

@@ -1,7 +1,7 @@
 """Models as pages compute them: laws by their modules, sums and cascades of them."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from html import escape
 from inspect import getdoc
@@ -13,12 +13,15 @@ from hysim._frozen import FloatArray
 from hysim.export._packing import packing
 from hysim.export._page_controls import Control, by_fields, controls_of
 from hysim.export._page_modules import Kernels, kernels_of, module_of
+from hysim.kernels import clamps, play_sums
+from hysim.kernels.magnetics import energy_plays
 from hysim.laws.dashpot import Dashpot
 from hysim.laws.operators.rate_dependent_prandtl_ishlinskii import RateDependentPrandtlIshlinskii
 from hysim.laws.static import SingleValued
 from hysim.models.cascade import Cascade
 from hysim.models.law import Law
 from hysim.models.sum import Sum
+from hysim.models.tracing.routine import plain
 
 
 @dataclass
@@ -52,7 +55,7 @@ def node_of(thing: Any, u: FloatArray, parts: Parts, prefix: str = "") -> dict[s
         parts.timed = True
         size = 2.0 * abs(thing.c) or 1.0
         parts.controls.append(Control("c", thing.c, -size, size, (0,)).to_json(first, prefix))
-        return {"rate": first, "name": "hs.Dashpot", "fields": [["c", first, 1.0]]}
+        return {"rate": first, "name": "hs.Dashpot", "fields": [["c", first, 1.0]], "output": output_of(Dashpot)}
     if isinstance(thing, RateDependentPrandtlIshlinskii):
         return _at_sample_time(thing, u, parts, prefix)
     if not isinstance(thing, Law):
@@ -95,8 +98,23 @@ def _law(law: Law, parts: Parts, first: int) -> dict[str, Any]:
         "work": state.size - len(packed.memory),
         "first": first,
         "free": [names.index(name) for name in packed.fields],
+        "output": output_of(type(law)),
+        **_plays(law, kernels.step),
         **_printed(law, first),
     }
+
+
+def _plays(law: Law, step: Callable[..., float]) -> dict[str, Any]:
+    """Place of the first threshold among the parameters of plays, whose weights follow; `cone` is whether each play
+    lies between u - r and u + r."""
+    coefficients = int(law.packed[0][0]) if step is plain(clamps.bent_step) else 0
+    first = {
+        plain(clamps.step): clamps.N_OUTPUT,
+        plain(clamps.bent_step): clamps.N_BENT + coefficients,
+        plain(energy_plays.step): energy_plays.N_HEAD,
+        plain(play_sums.step): play_sums.N_HEAD,
+    }.get(step)
+    return {} if first is None else {"plays": first, "cone": step is not plain(play_sums.step)}
 
 
 def steps_of(thing: Any) -> list[Kernels]:
@@ -148,7 +166,8 @@ def _at_sample_time(law: RateDependentPrandtlIshlinskii, u: FloatArray, parts: P
     size = 4.0 * law.beta or 0.1
     parts.controls.append(Control("beta", law.beta, 0.0, size, (place,)).to_json(first, prefix))
     fields = [["beta" if name == "width" else name, *rest] for name, *rest in node["fields"]]
-    return {**node, "kind": type(law).__name__, "name": _name(type(law)), "fields": fields, "per_time": [place]}
+    names_of = {"kind": type(law).__name__, "name": _name(type(law)), "output": output_of(type(law))}
+    return {**node, **names_of, "fields": fields, "per_time": [place]}
 
 
 def _name(family: type) -> str:
@@ -169,6 +188,13 @@ def about(thing: Any) -> tuple[str, str]:
     block = re.search(r"::\n\n((?:    .*\n|\n)+)", text.split("\nParameters\n")[0] + "\n")
     equation = "" if block is None else "\n".join(line[4:] for line in block.group(1).strip("\n").split("\n"))
     return re.sub(r"``?([^`]+)``?", r"<code>\1</code>", summary), equation
+
+
+def output_of(family: type) -> str:
+    """Right side of the equation of y in the docstring of a family; empty if it has none."""
+    text = (getdoc(family) or "").split("\nParameters\n")[0]
+    found = re.search(r"\b[yF] *= ((?:offset|c u').*?)(?=``|,\s|\n|$)", text)
+    return "" if found is None else found.group(1)
 
 
 def heading(thing: Any) -> str:

@@ -59,7 +59,7 @@ function codeOf(model, values, drive, record) {
     lines.push(wrapped(`turns = [${turns.map(inPython).join(", ")}]`));
     lines.push(`u = np.interp(np.arange(${each} * (len(turns) - 1) + 1) / ${each}, range(len(turns)), turns)`);
   }
-  lines.push(`y = law.response(u${time})`, "print(hs.loop_metrics(u, y))");
+  lines.push(`y = law.response(u${time})`, drive.cycle ? "print(hs.loop_metrics(u, y))" : "print(y)");
   return lines.join("\n");
 }
 

@@ -70,7 +70,9 @@ function axes({ pen, width, height }, xs, ys, { xlabel, ylabel, colour, countX, 
   pen.textBaseline = "middle";
   pen.fillText(ylabel, 0, 0);
   pen.restore();
-  return { x, y, box };
+  const inputAt = (place) => xs[0] + ((place - box.left) / (box.right - box.left)) * (xs[1] - xs[0]);
+  const outputAt = (place) => ys[0] + ((box.bottom - place) / (box.bottom - box.top)) * (ys[1] - ys[0]);
+  return { x, y, box, inputAt, outputAt };
 }
 
 function line(pen, at, us, ys, from, to) {
@@ -103,7 +105,7 @@ function within(pen, { left, right, top, bottom }, draw) {
 }
 
 // Output against input: the model, the model as it was at first, the measured points, and where the loop is widest.
-function drawLoop(canvas, limits, { u, y, first, measured, path, measures, labels }) {
+function drawLoop(canvas, limits, { u, y, first, measured, path, measures, moment, labels }) {
   const sheet = prepared(canvas), { pen } = sheet, colour = colours();
   const at = axes(sheet, ...limits, { ...labels, colour });
   within(pen, at.box, () => {
@@ -116,6 +118,7 @@ function drawLoop(canvas, limits, { u, y, first, measured, path, measures, label
     pen.strokeStyle = colour.model, pen.lineWidth = 1.25, pen.globalAlpha = path ? 0.55 : 1;
     line(pen, at, u, y, 0, u.length);
     pen.globalAlpha = 1;
+    if (moment < u.length - 1) dot(pen, at.x(u[moment]), at.y(y[moment]), colour);
     if (!path) return;
     pen.lineWidth = 2.25;
     line(pen, at, u, y, ...path);
@@ -130,7 +133,14 @@ function drawLoop(canvas, limits, { u, y, first, measured, path, measures, label
       pen.stroke();
     }
   });
-  return at.box.left;
+  return at;
+}
+
+function dot(pen, x, y, colour) {
+  pen.fillStyle = colour.ink;
+  pen.beginPath();
+  pen.arc(x, y, 4.5, 0, 2 * Math.PI);
+  pen.fill();
 }
 
 function drawPoints(pen, at, u, y, colour) {
@@ -152,7 +162,7 @@ function drawPoints(pen, at, u, y, colour) {
 }
 
 // Input against time, or against the number of samples; the measured cycle is drawn strongly.
-function drawInput(canvas, limits, { u, path, labels, least }) {
+function drawInput(canvas, limits, { u, path, moment, labels, least }) {
   const sheet = prepared(canvas), { pen } = sheet, colour = colours();
   const at = axes(sheet, [0, Math.max(u.length - 1, 1)], limits, { ...labels, colour, countY: 2, least });
   const places = Array.from(u, (_, k) => k);
@@ -161,55 +171,7 @@ function drawInput(canvas, limits, { u, path, labels, least }) {
     line(pen, at, places, u, 0, u.length);
     pen.strokeStyle = colour.model, pen.lineWidth = 2;
     if (path) line(pen, at, places, u, ...path);
+    if (moment < u.length - 1) dot(pen, at.x(moment), at.y(u[moment]), colour);
   });
-}
-
-// The plane of relays (a up, b down): those below the staircase that the input has left are up.
-function drawPlane(canvas, { levels, weights, u, labels }) {
-  const sheet = prepared(canvas), { pen } = sheet, colour = colours();
-  const low = levels[0], high = levels.at(-1), limits = [low, high];
-  const at = axes(sheet, limits, limits, { ...labels, colour, countX: 3, countY: 3 });
-  const largest = Math.max(...weights.map(Math.abs), Number.MIN_VALUE);
-  const x = levels.map(at.x), y = levels.map(at.y);
-  within(pen, at.box, () => {
-    let k = 0;
-    for (let i = 0; i + 1 < levels.length; i++) {
-      for (let j = 0; j <= i; j++, k++) {
-        pen.globalAlpha = Math.min(1, Math.abs(weights[k]) / largest);
-        pen.fillStyle = weights[k] >= 0 ? colour.model : colour.measured;
-        pen.fillRect(x[j], y[i + 1], x[j + 1] - x[j] + 0.5, y[i] - y[i + 1] + 0.5);
-      }
-    }
-    pen.globalAlpha = 1;
-    pen.strokeStyle = colour.ink, pen.lineWidth = 2;
-    pen.beginPath();
-    for (const [a, b] of staircase(u, low, high)) pen.lineTo(at.x(b), at.y(a));
-    pen.stroke();
-    pen.strokeStyle = colour.axis, pen.lineWidth = 1;
-    pen.beginPath();
-    pen.moveTo(at.x(low), at.y(low)), pen.lineTo(at.x(high), at.y(high));
-    pen.stroke();
-  });
-}
-
-// Corners (a, b) of the line that an input leaves in the plane of the relays, all of which were down before it.
-function staircase(u, low, high) {
-  const extremes = [low];
-  for (const raw of u) {
-    const value = Math.min(Math.max(raw, low), high);
-    for (;;) {
-      const n = extremes.length, last = extremes[n - 1];
-      if (value === last) break;
-      const rising = value > last, wasRising = n % 2 === 0;
-      if (n > 1 && rising === wasRising) extremes.pop();
-      else if (n > 1 && (rising ? value >= extremes[n - 2] : value <= extremes[n - 2])) extremes.splice(n - 2, 2);
-      else {
-        extremes.push(value);
-        break;
-      }
-      if (!extremes.length) extremes.push(low);
-    }
-  }
-  const corners = extremes.slice(1).map((value, k) => [Math.max(value, extremes[k]), Math.min(value, extremes[k])]);
-  return [...corners, [extremes.at(-1), extremes.at(-1)]];
+  return at;
 }

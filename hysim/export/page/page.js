@@ -1,74 +1,17 @@
 // The page: sliders, their setting in the address, and what follows from it.
 
-const STEPS = 400;  // positions of a slider
-const KINDS = ["triangle", "sine", "fading", "minor loops"];
-const part = (id) => document.getElementById(id);
-
-function element(name, attributes = {}, ...children) {
-  const made = document.createElement(name);
-  for (const [key, value] of Object.entries(attributes)) {
-    if (value === true) made.setAttribute(key, "");
-    else if (value !== false && value !== undefined) made.setAttribute(key, value);
-  }
-  made.append(...children);
-  return made;
-}
-
-const shortened = (value, digits = 4) => (Number.isFinite(value) ? String(Number(value.toPrecision(digits))).replace("-", "−") : "–");
-
-// A number with a slider and a box for its digits; `changed` is called with the new value.
-class Control {
-  constructor(spec, changed) {
-    Object.assign(this, { spec, changed, value: spec.value });
-    const id = `control-${spec.name.replace(/[^\w-]/g, "_")}`;
-    this.slider = element("input", { type: "range", id, min: 0, max: spec.whole ? spec.upper - spec.lower : STEPS, step: 1, "data-name": spec.name });
-    this.box = element("input", { type: "number", step: "any", "aria-label": `${spec.name}, value` });
-    const label = element("label", { for: id }, spec.label ?? spec.name, ...(spec.unit ? [" ", element("small", {}, spec.unit)] : []));
-    this.element = element("div", { class: "control" }, label, this.box, this.slider);
-    this.slider.addEventListener("input", () => this.set(this.at(Number(this.slider.value)), true));
-    this.box.addEventListener("change", () => {
-      const value = this.box.valueAsNumber;
-      this.set(Number.isFinite(value) ? Math.min(Math.max(value, spec.lower), spec.upper) : this.value, true);
-    });
-    this.show();
-  }
-
-  // Value at a position: of few digits, so that it can be read and copied.
-  at(position) {
-    const { lower, upper, log, whole } = this.spec;
-    if (whole) return lower + position;
-    if (position <= 0) return lower;
-    if (position >= STEPS) return upper;
-    if (log) return Number((lower * (upper / lower) ** (position / STEPS)).toPrecision(4));
-    const digits = Math.min(100, Math.max(0, 2 - Math.floor(Math.log10((upper - lower) / STEPS))));
-    return Number((lower + ((upper - lower) * position) / STEPS).toFixed(digits));
-  }
-
-  position() {
-    const { lower, upper, log, whole } = this.spec;
-    if (whole) return this.value - lower;
-    return STEPS * (log ? Math.log(this.value / lower) / Math.log(upper / lower) : (this.value - lower) / (upper - lower));
-  }
-
-  set(value, tell = false) {
-    this.value = value;
-    this.show();
-    if (tell) this.changed();
-  }
-
-  show() {
-    this.slider.value = this.position();
-    this.slider.setAttribute("aria-valuetext", `${shortened(this.value)} ${this.spec.unit ?? ""}`.trim());
-    this.box.value = Number(this.value.toPrecision(6));
-    this.element.classList.toggle("changed", this.value !== this.spec.value);
-  }
-}
+const KINDS = ["triangle", "sine", "fading", "minor loops", "reversals"];
+const SHARES = [0, 1, -1, 1, -0.4, 0.5, -0.4, 1];  // where the input turns at first if its reversals are typed
+const FILM = 8;  // seconds in which an input is played
 
 class Page {
   constructor(data, steps) {
     Object.assign(this, { data, steps, times: [], controls: [], inputs: [] });
     this.cycle = data.record && data.record.cycle ? cycleOf(data.record.u, data.record.cycle) : null;
-    part("model").append(...data.models.map((model, k) => element("option", { value: k }, model.name)));
+    for (const group of new Set(data.models.map((model) => model.group))) {
+      const options = data.models.flatMap((model, k) => (model.group === group ? [element("option", { value: k }, model.name)] : []));
+      part("model").append(...(group ? [element("optgroup", { label: group }, ...options)] : options));
+    }
     part("models").hidden = data.models.length < 2;
     part("kind").append(...[...(data.record ? ["record"] : []), ...KINDS].map((kind) =>
       element("option", { value: kind }, kind === "record" ? `measured: ${data.record.name}` : kind)));
@@ -76,6 +19,14 @@ class Page {
     part("kind").addEventListener("change", () => (this.showInputs(), this.refit(), this.share()));
     part("reset").addEventListener("click", () => (this.choose(this.chosen), this.refit(), this.share()));
     part("refit").addEventListener("click", () => this.refit());
+    part("loop").addEventListener("dblclick", () => part("kind").value === "reversals" || this.refit());
+    part("loop").addEventListener("click", (event) => this.add(this.places.loop.inputAt(event.offsetX)));
+    part("input").addEventListener("click", (event) => this.add(this.places.input.outputAt(event.offsetY)));
+    part("reversals").addEventListener("change", () => (this.drawReversals(), this.refit(), this.share()));
+    part("shorter").addEventListener("click", () => this.turn(this.reversals.slice(0, Math.max(2, this.reversals.length - 1))));
+    part("moment").addEventListener("input", () => (this.stop(), this.moveTo(part("moment").value / STEPS)));
+    part("moment").addEventListener("change", () => this.share());
+    part("play").addEventListener("click", () => (this.playing ? (this.stop(), this.share()) : this.play()));
     part("link").addEventListener("click", () => this.copy(location.href, part("link")));
     part("copy").addEventListener("click", () => this.copy(part("code").textContent, part("copy")));
     window.addEventListener("hashchange", () => (this.read(), this.refit()));
@@ -95,19 +46,77 @@ class Page {
     const { model } = this, changed = () => (this.later(), this.share());
     part("model").value = k;
     part("about").innerHTML = model.about;
-    part("equation").textContent = model.equation;
+    const clauses = (line) => line.split(/(?<=, {3,})(?=\S)/).map((clause) => element("span", {}, clause));
+    part("equation").replaceChildren(...model.equation.split("\n").flatMap((line) => [...clauses(line), "\n"]));
     part("equation").hidden = !model.equation;
     this.controls = model.controls.map((spec) => new Control(spec, changed));
     part("parameters").replaceChildren(...this.controls.map((control) => control.element));
     this.inputs = model.inputs.map((spec) => new Control(spec, changed));
     part("inputs").replaceChildren(...this.inputs.map((control) => control.element));
     part("kind").value = this.data.record ? "record" : model.kind;
+    const [amplitude, middle] = ["amplitude", "middle"].map((name) => model.inputs.find((spec) => spec.name === name).value);
+    this.reversals = this.usual = SHARES.map((share) => Number((middle + share * amplitude).toPrecision(4)));
+    part("reversals").value = this.reversals.join(", ");
+    part("moment").max = STEPS;
+    this.stop();
+    this.moveTo(1);
     this.showInputs();
+  }
+
+  // ------------------------------------------------------------------------------ reversals of the user's
+
+  drawReversals() {
+    const turns = reversalsIn(part("reversals").value);
+    this.reversals = turns ?? this.reversals;
+    part("reversals").setAttribute("aria-invalid", !turns);
+    part("reversals-help").classList.toggle("wrong", !turns);
+  }
+
+  turn(reversals) {
+    part("reversals").value = reversals.join(", ");
+    this.drawReversals();
+    this.later();
+    this.share();
+  }
+
+  // One reversal more, where the user points.
+  add(input) {
+    if (part("kind").value !== "reversals") return;
+    const [low, high] = this.limits[0], digits = Math.min(100, Math.max(0, 2 - Math.floor(Math.log10(high - low))));
+    this.turn([...this.reversals, Number(Math.min(Math.max(input, low), high).toFixed(digits))]);
+  }
+
+  // ------------------------------------------------------------------------------ a moment of the input, and a film
+
+  moveTo(share) {
+    this.passed = share;
+    part("moment").value = STEPS * share;
+    this.later();
+  }
+
+  play() {
+    const from = this.passed < 1 ? this.passed : 0, begin = performance.now();
+    const next = (now) => {
+      this.moveTo(Math.min(1, Math.max(0, from + (now - begin) / 1000 / FILM)));
+      this.playing = this.passed < 1 ? requestAnimationFrame(next) : undefined;
+      part("play").textContent = this.playing ? "Pause" : "Play";
+      if (!this.playing) this.share();
+    };
+    this.playing = requestAnimationFrame(next);
+  }
+
+  stop() {
+    cancelAnimationFrame(this.playing);
+    this.playing = undefined;
+    part("play").textContent = "Play";
   }
 
   showInputs() {
     const kind = part("kind").value;
-    const used = { amplitude: true, middle: true, cycles: true, "smaller loops": ["fading", "minor loops"].includes(kind), period: this.model.timed };
+    const isTyped = kind === "reversals", usual = !isTyped;
+    part("typed").hidden = !isTyped;
+    part("loop").classList.toggle("pointed", isTyped), part("input").classList.toggle("pointed", isTyped);
+    const used = { amplitude: usual, middle: usual, cycles: usual, "smaller loops": ["fading", "minor loops"].includes(kind), period: this.model.timed };
     for (const control of this.inputs) control.element.hidden = kind === "record" ? control.spec.name !== "period" || !this.model.timed : !used[control.spec.name];
   }
 
@@ -119,6 +128,8 @@ class Page {
     for (const control of [...this.controls, ...this.inputs]) {
       if (control.value !== control.spec.value) setting.set(control.spec.name, control.value);
     }
+    if (part("kind").value === "reversals" && this.reversals !== this.usual) setting.set("reversals", this.reversals.join(" "));
+    if (this.passed < 1) setting.set("moment", this.passed);
     const text = `${setting}`;
     try {
       history.replaceState(null, "", text ? `#${text}` : "#");
@@ -136,6 +147,12 @@ class Page {
       const { name, lower, upper } = control.spec, value = Number(setting.get(name));
       if (setting.has(name) && Number.isFinite(value)) control.set(Math.min(Math.max(value, lower), upper));
     }
+    if (setting.has("reversals")) {
+      part("reversals").value = setting.get("reversals").split(" ").join(", ");
+      this.drawReversals();
+    }
+    const moment = Number(setting.get("moment"));
+    if (setting.has("moment") && moment >= 0 && moment <= 1) this.moveTo(moment);
     this.showInputs();
   }
 
@@ -174,6 +191,7 @@ class Page {
   input() {
     const kind = part("kind").value, { record } = this.data;
     const setting = Object.fromEntries(this.inputs.map(({ spec, value }) => [spec.name === "smaller loops" ? "smaller" : spec.name, value]));
+    if (kind === "reversals") setting.reversals = this.reversals;
     const key = JSON.stringify([this.chosen, kind, setting]);
     if (this.drive?.key !== key) {
       const made = kind === "record" ? { u: record.u, cycle: this.cycle } : generated({ ...setting, kind });
@@ -211,23 +229,38 @@ class Page {
     this.limits ??= [padded(range(drive.u)), padded(range(outputs.flatMap((each) => range(each))))];
     const isFirst = this.controls.every((control) => control.value === control.spec.value);
     const { labels } = this.model, path = drive.cycle && !drive.cycle.cuts.length ? drive.cycle.path : null;
-    const least = drawLoop(part("loop"), this.limits, {
-      u: drive.u, y, measures, path, first: isFirst ? null : drive.first, measured: isMeasured ? record.y : null,
+    const moment = Math.round(this.passed * (drive.u.length - 1));
+    const loop = drawLoop(part("loop"), this.limits, {
+      u: drive.u, y, measures, path, moment, first: isFirst ? null : drive.first, measured: isMeasured ? record.y : null,
       labels: { xlabel: labels.u, ylabel: labels.y },
     });
-    drawInput(part("input"), this.limits[0], { u: drive.u, path, labels: { ylabel: labels.unit.u || "u" }, least });
-    this.drawMemory(drive.u, values);
-    this.state = { model: this.model.name, values, u: drive.u, y, measures, fit, input: { kind: drive.kind, ...drive.setting } };
+    const input = drawInput(part("input"), this.limits[0], { u: drive.u, path, moment, labels: { ylabel: labels.unit.u || "u" }, least: loop.box.left });
+    this.places = { loop, input };
+    const memory = finite ? this.drawMemory(drive.u.slice(0, moment + 1), values) : null;
+    this.state = { model: this.model.name, values, u: drive.u, y, measures, fit, moment, memory, input: { kind: drive.kind, ...drive.setting } };
     this.tell(finite, isFirst, isMeasured);
     this.times.push(performance.now() - begin);
   }
 
   drawMemory(u, values) {
-    const { plane, labels } = this.model;
-    part("memory").hidden = !plane;
-    if (!plane) return;
-    const levels = plane.levels.map((place) => values[place]), weights = plane.weights.map((place) => values[place]);
-    drawPlane(part("plane"), { levels, weights, u, labels: { xlabel: "down at", ylabel: "up at" } });
+    const { plane, node, labels } = this.model, hasPlays = lawsOf(node).some((law) => "plays" in law);
+    part("memory").hidden = !plane && !hasPlays;
+    if (plane) {
+      const levels = plane.levels.map((place) => values[place]), weights = plane.weights.map((place) => values[place]);
+      part("memory-name").textContent = "Relays";
+      part("memory-key").textContent = "Darker: more weight. Hatched: up.";
+      drawPlane(part("plane"), { levels, weights, u, labels: { xlabel: "down at", ylabel: "up at" } });
+    }
+    if (!hasPlays) return null;
+    response(node, values, u, this.steps, this.drive.sampleTime);
+    const plays = playsOf(node), { unit } = labels;
+    part("memory-name").textContent = "Plays";
+    part("memory-key").textContent = plays.cone
+      ? "Larger: more weight. A play on an edge of the grey cone u ± r is pushed, one within it rests."
+      : "Larger: more weight. Dashed: the input.";
+    const inputs = node.cascade ? padded(range([...plays.z, plays.u])) : this.limits[0];
+    drawPlays(part("plane"), inputs, { ...plays, labels: { xlabel: `threshold ${unit.u ? `[${unit.u}]` : "r"}`, ylabel: "position z" } });
+    return plays;
   }
 
   tell(finite, isFirst, isMeasured) {
@@ -246,6 +279,9 @@ class Page {
     const facts = factsOf(node, values);
     rows(part("law-rows"), facts);
     part("law").hidden = !facts.length;
+    const output = outputLines(node, values);
+    part("output").textContent = output.join("\n");
+    part("output").hidden = !output.length;
     part("code").textContent = codeOf(this.model, values, this.drive, this.data.record);
     part("loop").setAttribute("aria-label", described(measures, labels));
   }

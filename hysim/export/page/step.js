@@ -16,7 +16,8 @@ class Step {
     return new Step((await WebAssembly.instantiate(await inflated(text))).instance);
   }
 
-  // Outputs at the inputs u; memory is the front of the state before the first sample, its first place that of u.
+  // Outputs at the inputs u, and the state after them; memory is the front of the state before the first sample, its
+  // first place that of u.
   outputs(parameters, memory, work, u) {
     const { memory: linear, __heap_base: base, begin, run } = this.exports;
     const sizes = [parameters.length, memory.length + work, u.length, u.length];
@@ -33,7 +34,7 @@ class Step {
     const [p, s, x, y] = places.map((place) => first + 8 * place);
     begin(p, sizes[0], s, sizes[1], u[0]);
     run(p, sizes[0], s, sizes[1], x, y, u.length);
-    return room.slice(places[3]);
+    return { y: room.slice(places[3]), state: room.slice(places[1], places[2]) };
   }
 }
 
@@ -52,7 +53,9 @@ function response(node, values, u, steps, sampleTime) {
   const fields = free.map((place) => values[first + place] / (perTime.includes(place) ? sampleTime : 1));
   const [parameters, memory] = sizes.map((size) => new Float64Array(size));
   node.packed(fields, parameters, memory);
-  return steps[node.module].outputs(parameters, memory, node.work, u);
+  const { y, state } = steps[node.module].outputs(parameters, memory, node.work, u);
+  node.last = { parameters, state };
+  return y;
 }
 
 function lawsOf(node) {
