@@ -111,7 +111,7 @@ def evidence(evidence: Evidence, ax: Axes | None = None) -> Axes:
     places = np.arange(len(evidence.rows), dtype=float)
     values = np.array([row.log_evidence for row in evidence.rows])
     errors = np.array([row.error for row in evidence.rows])
-    with one(ax, height=1.0 + 0.34 * len(evidence.rows)) as axes:
+    with one(ax, height=1.3 + 0.34 * len(evidence.rows)) as axes:
         for k, factor in enumerate(evidence.factors):
             axes.errorbar(
                 values[:, k] - values[:, k].max(),
@@ -128,7 +128,7 @@ def evidence(evidence: Evidence, ax: Axes | None = None) -> Axes:
         axes.set_yticks(places, evidence.names)
         axes.invert_yaxis()
         axes.set(xlabel="ln evidence, less that of the best model")
-        axes.legend(loc="lower left")
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3)
     return axes
 
 
