@@ -36,6 +36,7 @@ class EvidenceRow:
     Parameters
     ----------
     name : str
+        Name of the model.
     n_parameters : int
         Free parameters, without sigma.
     fit_percent : float
@@ -68,6 +69,7 @@ class Evidence:
     noise : {"gaussian", "quantised", "robust"}
     method : {"nested", "bridge"}
     seed : int
+        Seed of the draws.
     """
 
     rows: tuple[EvidenceRow, ...]
@@ -192,6 +194,7 @@ def compare_evidence(
         Name to a model class, a model or a structure, which is identified first, or to a result of `hysim.identify` on
         the same records.
     record_or_records : Record or sequence of Record
+        The records that all models are to explain.
     noise : {"gaussian", "quantised", "robust"}
         As in `hysim.identify`.
     priors : mapping, optional

@@ -48,6 +48,7 @@ class Prediction:
     Parameters
     ----------
     u : array, shape (n_samples,) [unit of u]
+        Input.
     outputs : array, shape (n, n_samples) [unit of y]
         One output for each draw; a draw whose output diverges is left out.
     measured : array, shape (n, n_samples) [unit of y]

@@ -50,6 +50,7 @@ class Posterior:
     n_evaluations : int
         Number of parameter sets that were simulated.
     seed : int
+        Seed of the draws.
     warnings : tuple of str
         Sentences on chains that do not agree or are too short.
     """
