@@ -30,7 +30,7 @@ _PICTURES = {
     "SobolIndices": 'hs.plot.sensitivities(indices, "output")',
     "LoopMetrics": "hs.plot.width(metrics)",
 }
-"""What draws a result, by the name of its class."""
+"""Functions that draw a result, by the name of its class."""
 
 T = TypeVar("T")
 

@@ -181,5 +181,5 @@ class SquareWaveAssessment:
 
 
 def driven_by(run: ClosedLoop) -> str:
-    """What drives the plant, in a word: "closed" for a loop with feedback, "inverse" for a controller without it."""
+    """The drive of the plant in a word: "closed" for a loop with feedback, "inverse" for a controller without it."""
     return "closed" if is_fed_back(run.conditions["controller"]) else "inverse"

@@ -32,7 +32,7 @@ def information(law: Law, names: tuple[str, ...], u: FloatArray, noise: float) -
 
 
 def merit(matrix: FloatArray, criterion: Criterion) -> float:
-    """What is maximised, a number that is proportional to the number of samples; zero if a direction is not seen.
+    """Measure to maximise, a number that is proportional to the number of samples; zero if a direction is not seen.
 
     D is the root of the determinant, A the harmonic mean of the eigenvalues, E the smallest one.
     """

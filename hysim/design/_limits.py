@@ -1,4 +1,4 @@
-"""What an actuator and its amplifier allow."""
+"""Limits of an actuator and its amplifier."""
 
 import math
 

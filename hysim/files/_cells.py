@@ -93,7 +93,7 @@ def _number(cell: str, line: int, label: str, signs: Signs) -> float:
 
 
 def _advice(cell: str, signs: Signs) -> str:
-    """What to pass if the cell is a time of day, or the point or the comma has the other meaning."""
+    """Advice on a cell that is a time of day, or whose point or comma has the other meaning."""
     if _CLOCK.fullmatch(cell):
         return " (a time of day: write it in seconds, or load without time: t=False)"
     other = {".": ",", ",": "."}[signs.decimal]

@@ -96,7 +96,7 @@ class _Responding(Protocol):
 
 
 def _advice(value: Any) -> str:
-    """What to call for something that is not a record."""
+    """Name of the function to call for something that is not a record."""
     if isinstance(value, _InputOutput):
         return "make one by hs.Record(u=result.u, y=result.y, t=result.t)"
     return "hs.save(model, path) writes a model" if isinstance(value, _Responding) else "hs.Record(u=u, y=y)"

@@ -31,7 +31,7 @@ class _DataArray(Protocol):
 
 @runtime_checkable
 class _Noted(Protocol):
-    """What has notes: a Series, a DataArray, a frame."""
+    """A table that has notes: a Series, a DataArray, a frame."""
 
     @property
     def attrs(self) -> Any: ...

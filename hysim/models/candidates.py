@@ -55,7 +55,7 @@ def family_named(name: str) -> Any:
 
 
 def candidates_named(name: str) -> dict[str, Any]:
-    """What `hysim.compare` tries of the family of this name, by the names of rows; ValueError if there is nothing."""
+    """Candidates of `hysim.compare` in the family of this name, by the names of rows; ValueError if there is none."""
     family = family_named(name)
     found = _of_family(family.__name__, family)
     if not found:

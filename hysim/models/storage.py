@@ -83,7 +83,7 @@ class _InputOutput(Protocol):
 
 
 def _advice(value: Any) -> str:
-    """What to call for something that is not a model."""
+    """Name of the function to call for something that is not a model."""
     if isinstance(value, _WithModel):
         return ": hs.save(result.model, path) writes its model, result.to_json() is the text of all of it"
     return ": hs.save_record(record, path) writes a record" if isinstance(value, _InputOutput) else ""

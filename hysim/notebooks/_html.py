@@ -44,7 +44,7 @@ def _cells(cells: Sequence[str]) -> str:
 
 
 def figure(draw: Callable[[Any], object], alternative: str) -> str:
-    """What a function draws on new Axes, with a text in its place for those who cannot see it."""
+    """Picture that a function draws on new Axes, with a text in its place for those who cannot see it."""
     with plot.house_style():
         canvas = plot.figure(*_SIZE)
         draw(canvas.add_subplot())

@@ -149,7 +149,7 @@ def pid_standard(Kp: float, Ti: float, Td: float, *, derivative_filter: float = 
 
 
 def in_time_unit(model: TransferFunction, unit: float) -> TransferFunction:
-    """The same plant with time counted in `unit` seconds: G(s / unit)."""
+    """This plant with time counted in `unit` seconds: G(s / unit)."""
     num, den = (
         tuple(c / unit**power for c, power in zip(side, range(len(side) - 1, -1, -1), strict=True))
         for side in (model.num, model.den)
@@ -171,5 +171,5 @@ def step_response(model: TransferFunction, duration: float = 20.0) -> tuple[Floa
 
 
 def unit_step(model: TransferFunction, time: FloatArray) -> FloatArray:
-    """The same at even times from zero [unit of time], exact at each: a step is held from sample to sample."""
+    """Displacement at even times from zero [unit of time], exact at each: a step is held from sample to sample."""
     return replace(model, hold="zoh", sample="start").response(np.ones_like(time), float(time[1]))

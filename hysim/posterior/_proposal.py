@@ -67,7 +67,7 @@ class Proposal:
         return np.asarray(self.log_density_of_v(v) - 0.5 * np.sum(e**2, axis=1) - constant)
 
     def log_density_of_v(self, v: FloatArray) -> FloatArray:
-        """The same for v alone."""
+        """Logarithm of the density of v alone, (n_sets,)."""
         n_v, n_parts = v.shape[1], len(self.centres)
         inverse, offset, scale = self._prepared
         places = (v @ inverse).reshape(len(v), n_parts, n_v) - offset

@@ -35,7 +35,7 @@ _LARGEST = 1e100  # beyond it squares of squares overflow: such a set has diverg
 
 
 class Columns(NamedTuple):
-    """Of some sets: columns in the units of the prior, the target without them, these units, and which diverged."""
+    """Regression: columns in the units of the prior, the target without them, these units, and which diverged."""
 
     columns: FloatArray  # (n_sets, n_samples, n_linear)
     target: FloatArray  # (n_sets, n_samples)

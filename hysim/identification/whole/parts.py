@@ -54,7 +54,7 @@ class Begun(NamedTuple):
 
 @dataclass(frozen=True)
 class _Setting:
-    """What the user says."""
+    """Choices of the user."""
 
     records: Sequence[Record]
     freedom: Freedom

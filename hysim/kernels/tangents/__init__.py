@@ -1,1 +1,1 @@
-"""What the derivatives of steps need beside the steps: rules of functions, and one more step of each iteration."""
+"""Derivatives of steps need this beside the steps: rules of functions, and one more step of each iteration."""

@@ -165,7 +165,7 @@ class Expressions:
         return f"_v{self._count}"
 
     def kept(self, dual: Dual) -> Dual:
-        """The same values in names that nothing else changes."""
+        """These values in names that nothing else changes."""
         if _is_number(dual.value) and dual.rate is None:
             return dual
         name = self.fresh()

@@ -53,7 +53,7 @@ _WHOLE_SERIES = {
     "hysim.kernels.baber_noori_series.pinch_within": "pinch_within",
     "hysim.kernels.zhu_wang.is_last": "is_last",
 }
-"""Ends and bounds of series: a rate may need terms that the value has not."""
+"""Ends and bounds of series: a rate may need terms that the value does not need."""
 
 
 def in_place_of(function: Callable[..., Any]) -> Any:

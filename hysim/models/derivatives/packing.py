@@ -27,7 +27,7 @@ class PackedRates(NamedTuple):
 
 
 def packed_rates(law: Any, names: Sequence[str]) -> PackedRates:
-    """What `law.pack` has for the law's numbers, and its derivatives by those in `names`.
+    """The array of `law.pack` for the law's numbers, and its derivatives by those in `names`.
 
     Raises ValueError if the parameters of the step are no arithmetic expressions of a number.
     """

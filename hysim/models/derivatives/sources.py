@@ -1,4 +1,4 @@
-"""What the forward mode asks of a function: what it returns, and whether it writes to its arrays."""
+"""Questions of the forward mode to a function: what it returns, and whether it writes to its arrays."""
 
 import ast
 from collections.abc import Callable, Iterator

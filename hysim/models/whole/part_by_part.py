@@ -71,7 +71,7 @@ class PartByPart(Protocol):
         """The plant without its last part that the user does not insist on, and a remark that says so."""
 
     def doubts(self, estimates: Mapping[str, float], freedom: Freedom) -> Sequence[Doubt]:
-        """What the records may not determine at these values of all parameters."""
+        """Parameters that the records may not determine at these values of all parameters."""
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """As of `Identifiable`."""

@@ -120,7 +120,7 @@ class ActuatorStructure(Identifiable):
         return self.family(hysteresis=law, sensor=self.sensor, **stages._asdict())
 
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
-        """What the records do not determine, and at which values it is held."""
+        """Parameters that the records do not determine, and the values at which they are held."""
         return self.remarks
 
     # ------------------------------------------------------------------------------ as its search begins
@@ -144,7 +144,7 @@ class ActuatorStructure(Identifiable):
 
     @property
     def noise(self) -> str:
-        """That of a sensor that rounds, or the normal one."""
+        """Noise of a sensor that rounds, or the normal one."""
         return "quantised" if self.sensor is not None and self.sensor.quantum else "gaussian"
 
     @property

@@ -40,14 +40,14 @@ class CreepBank:
 
     @property
     def coordinates(self) -> tuple[Coordinate, ...]:
-        """What is searched."""
+        """Coordinates that are searched."""
         if self.unit is None:
             return tuple(Coordinate(f"weights[{k}]", -1.0, 4.0) for k in range(len(self.time_constants)))
         return (_PERCENT, _SLOPE) if self.sloped else (_PERCENT,)
 
     @property
     def defaults(self) -> dict[str, float]:
-        """Where the search begins."""
+        """Starts of the search."""
         if self.unit is None:
             idle = {f"weights[{k}]": 0.0 for k in self.idle}
             return {each.name: _START_OF_WEIGHTS for each in self.coordinates} | idle

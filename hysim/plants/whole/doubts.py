@@ -1,4 +1,4 @@
-"""What records may not determine of an actuator, and what is assumed then.
+"""Parts of an actuator that records may not determine, and what is assumed then.
 
 A parameter counts as not determined if its standard error is larger than its use: 1 % a decade of creep (or half of
 it), a quarter of a frequency, two samples of a delay (or all of it). It is held where its part has no effect; a mode
@@ -55,7 +55,7 @@ def without_last_mode(structure: Any, freedom: Freedom) -> tuple[Any, str] | Non
 
 
 def _doubt(structure: Any, name: str, value: float, freedom: Freedom) -> Doubt | None:
-    """What may be wrong with one parameter, and the structure without it."""
+    """A reason to doubt one parameter, and the structure without it."""
 
     def held(at: float, why: str, unit: str = "") -> Any:
         remark = f"the records do not tell {why}: {name} is held at {at:g}{unit}"

@@ -36,7 +36,7 @@ _TIME_CONSTANT = (0.05, 0.1)  # of its sample time, and of its duration
 
 
 class Stages(NamedTuple):
-    """What an actuator has beside its law."""
+    """Linear parts of an actuator beside its law."""
 
     amplifier: Amplifier | None
     creep: Creep | None

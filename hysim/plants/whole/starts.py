@@ -1,4 +1,4 @@
-"""Where the search for a mode and a delay begins: points spread over their box on the fastest record.
+"""Starts of the search for a mode and a delay: points spread over their box on the fastest record.
 
 A light mode is found from afar by a broad one: at a first pass of wide dampings a grid of frequencies is dense enough,
 at a second one, about the best of it, light dampings are tried. All other coordinates have the values that are known.

@@ -1,4 +1,4 @@
-"""What records show of an actuator before anything is identified: their rates, and which is for which part."""
+"""Survey of the records of an actuator before anything is identified: their rates, and which is for which part."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
