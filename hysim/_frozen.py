@@ -153,11 +153,13 @@ def _with_advice(cls: type[T]) -> type[T]:
         try:
             generated(self, *arguments, **values)
         except TypeError:
-            known = [field.name for field in dataclasses.fields(cls)]  # type: ignore[arg-type]
+            fields = dataclasses.fields(cls)  # type: ignore[arg-type]
+            known, by_place = [field.name for field in fields], sum(not field.kw_only for field in fields)
             unknown = next((name for name in values if name not in known), None)
-            if unknown is None and not arguments:
+            if unknown is None and len(arguments) <= by_place:
                 raise
-            what = "takes no positional argument" if unknown is None else f"has no parameter {unknown!r}"
+            most = f"at most {by_place} positional argument" if by_place else "no positional argument"
+            what = f"takes {most}" if unknown is None else f"has no parameter {unknown!r}"
             raise TypeError(f"{cls.__name__} {what}; by name it takes {among(unknown, known)}") from None
 
     cls.__init__ = construct  # type: ignore[method-assign]

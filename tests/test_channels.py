@@ -139,7 +139,7 @@ def test_the_magnetisation_is_kept_where_a_constant_of_a_core_changes(name):
     core = hs.Dependent(law=law, polynomials=(polynomial(name, value, 1.2 * value, at=(20.0, 80.0)),))
     y, (field, magnetisation) = [], (u[0], law.z0)
     for k in range(u.size):
-        output, state = core.at(T=float(T[k])).advance(u[k : k + 1], (field, magnetisation, 0.0))
+        output, state = core.at(T=float(T[k])).advance(u[k : k + 1], (field, magnetisation, 0.0, 0.0))
         (field, magnetisation), _ = state[:2], y.append(output[0])
     np.testing.assert_allclose(core.response(u, channels={"T": T}), y, rtol=0.0, atol=1e-13 * np.ptp(y))
 

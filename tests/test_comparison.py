@@ -443,7 +443,12 @@ def test_another_record_begins_with_a_state_of_its_own():
 
 
 def test_a_frame_holds_the_columns_of_the_csv(quick, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pandas", SimpleNamespace(DataFrame=dict))
+    class Frame(dict):
+        def __init__(self, columns, index):
+            super().__init__(columns)
+            assert index is None
+
+    monkeypatch.setitem(sys.modules, "pandas", SimpleNamespace(DataFrame=Frame))
     frame = quick.to_frame()
     assert list(frame) == next(csv.reader(io.StringIO(quick.to_csv())))
     assert frame["model"] == [*(row.name for row in quick.rows), "untold"]

@@ -315,5 +315,5 @@ def test_files_and_streams_are_named_in_errors(tmp_path):
         hs.load_ground_motion(path)
     with pytest.raises(FileNotFoundError):
         hs.load_ground_motion(tmp_path / "none.AT2")
-    with pytest.raises(TypeError, match="takes a path or an open file"):
+    with pytest.raises(TypeError, match="takes a path, an open file or a DataFrame"):
         hs.load_ground_motion(3)

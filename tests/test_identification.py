@@ -201,7 +201,7 @@ def test_records_that_say_nothing_are_refused(table1):
     with pytest.raises(ValueError, match="7 parameters cannot be estimated"):
         hs.identify(hs.BoucWen, table1[:5])
     with pytest.raises(TypeError, match="takes a model"):
-        hs.identify("bouc-wen", table1)
+        hs.identify(1.0, table1)
     with pytest.raises(TypeError, match="takes a Record"):
         hs.identify(hs.BoucWen, table1.y)
     with pytest.raises(TypeError, match="no defaults for p, q"):

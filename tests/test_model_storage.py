@@ -101,7 +101,7 @@ def test_a_typo_in_a_parameter_is_an_error(model):
         ("{}", "does not hold a model"),
         (
             '{"family": "Ising", "parameters": {}}',
-            "family 'Ising'; there are Actuator, Amplifier, BoucWen, ",
+            "family 'Ising'; there are Actuator, AdaptiveInverse, Amplifier, BoucWen, ",
         ),
         ('{"family": "BoucWen", "parameters": {"bta": 1}}', "bta"),
         ('{"family": "BoucWen", "parameters": {"beta": NaN}}', "beta must be finite"),
