@@ -1,0 +1,153 @@
+"""Which model do the paper's 52 points prefer, and how surely?
+
+The evidence of a model is the mean of its likelihood over its priors: the probability that it gives to the points
+before it has seen them. The points are rounded to pixels of the camera, and so is the likelihood (noise "quantised").
+Priors are flat in the box of the search, and linear parameters flat within three spans of the output of what they add
+to it. Evidences depend on these boxes. Each is therefore computed with all boxes halved, as they are, and doubled, and
+a preference counts only where the three agree.
+
+ln Z comes from bridge sampling, and with the boxes of the search from nested sampling too, by dynesty, which shares
+nothing with it but the likelihood. "Duhem, 5 terms" keeps the terms that `hysim.discover` found on all points, and its
+box stands about the coefficients that it found: the evidence does not count that search. The memory of every model is
+free at the first point.
+
+Each evidence is stored when it is there; `python experiments/49_evidence.py resume` goes on after those.
+"""
+
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import hysim as hs
+from hysim.plot import Figure, figure
+from hysim.posterior import FACTORS, Evidence, EvidenceRow, log_evidence
+
+sys.path.insert(0, str(Path(__file__).parent))
+from results_folder import write_results
+
+RESULTS = Path(__file__).parent / "results" / "evidence"
+FIVE_TERMS = {"u'": 0.024, "u' y^2": -0.0013, "|u'|": -0.007, "|u'| u": 0.00024, "|u'| y^2": -0.003}
+LIVE_POINTS = 250
+
+Row = dict[str, Any]
+
+
+def models() -> dict[str, tuple[Any, dict[str, float]]]:
+    """Models, the quicker ones first, and what is held of them."""
+    return {
+        "line": (hs.Line, {}),
+        "Play": (hs.Play, {}),
+        "Dahl": (hs.Dahl, {}),
+        "Coleman-Hodgdon": (hs.ColemanHodgdon, {}),
+        "Bouc-Wen, n = 1": (hs.BoucWen, {"n": 1.0}),
+        "Bouc-Wen, quadratic input, n = 1": (hs.PolynomialBoucWen, {"n": 1.0}),
+        "Bouc-Wen": (hs.BoucWen, {}),
+        "Duhem, 5 terms": (hs.Duhem.from_terms(FIVE_TERMS), {}),
+    }
+
+
+def measured(name: str, factor: float, method: str, live_points: int = LIVE_POINTS) -> Row:
+    """One evidence."""
+    rec = hs.datasets.table1()
+    family, held = models()[name]
+    fit = hs.identify(family, rec, fixed=held)
+    began = time.process_time()
+    found = log_evidence(fit, rec, noise="quantised", factor=factor, method=method, live_points=live_points)
+    return {
+        "model": name,
+        "n_parameters": fit.n_parameters,
+        "fit_percent": fit.fit_percent,
+        "factor": factor,
+        "method": method,
+        "log_evidence": found.value,
+        "error": found.error,
+        "evaluations": found.evaluations,
+        "cpu_seconds": time.process_time() - began,
+    }
+
+
+def tasks() -> list[tuple[str, float, str]]:
+    """Every evidence, those of bridge sampling first."""
+    bridge = [(name, factor, "bridge") for factor in (1.0, 0.5, 2.0) for name in models()]
+    return [*bridge, *((name, 1.0, "nested") for name in models())]
+
+
+def as_evidence(rows: list[Row]) -> Evidence:
+    """The evidences by bridge sampling of models that have all three."""
+    by_model: dict[str, dict[float, Row]] = {}
+    for row in rows:
+        if row["method"] == "bridge":
+            by_model.setdefault(row["model"], {})[row["factor"]] = row
+    complete = [
+        EvidenceRow(
+            name=name,
+            n_parameters=each[1.0]["n_parameters"],
+            fit_percent=each[1.0]["fit_percent"],
+            log_evidence=tuple(each[factor]["log_evidence"] for factor in FACTORS),
+            error=tuple(each[factor]["error"] for factor in FACTORS),
+            n_evaluations=sum(row["evaluations"] for row in each.values()),
+        )
+        for name, each in by_model.items()
+        if len(each) == len(FACTORS)
+    ]
+    ordered = sorted(complete, key=lambda row: -row.log_evidence[FACTORS.index(1.0)])
+    return Evidence(rows=tuple(ordered), noise="quantised", method="bridge")
+
+
+def main(smoke: bool = False, resume: bool = False) -> list[Row]:
+    """Measure, print and write table, figure and result."""
+    if smoke:
+        return [measured("line", 1.0, "bridge"), measured("line", 1.0, "nested", live_points=40)]
+    rows = _stored() if resume else []
+    done = {(row["model"], row["factor"], row["method"]) for row in rows}
+    for task in tasks():
+        if task not in done:
+            rows.append(measured(*task))
+            print(
+                {key: rows[-1][key] for key in ("model", "factor", "method", "log_evidence", "error", "cpu_seconds")},
+                flush=True,
+            )
+            _write(rows)
+    return rows
+
+
+def _stored() -> list[Row]:
+    stored = RESULTS / "result.json"
+    return json.loads(stored.read_text())["rows"] if stored.exists() else []
+
+
+def _write(rows: list[Row]) -> None:
+    found = as_evidence(rows)
+    if not found.rows:
+        RESULTS.mkdir(parents=True, exist_ok=True)
+        (RESULTS / "result.json").write_text(json.dumps({"rows": rows}, indent=2) + "\n", encoding="utf-8")
+        return
+    numbers = {
+        "sentence": found.sentence,
+        "undecided": list(found.undecided),
+        "probabilities": {str(factor): found.probabilities(factor) for factor in FACTORS},
+        "largest_error": max(max(row.error) for row in found.rows),
+        "largest_difference_of_methods": _largest_difference(rows),
+    }
+    write_results(RESULTS, rows, lambda _: draw(found), numbers)
+
+
+def _largest_difference(rows: list[Row]) -> float | None:
+    """Largest difference of ln Z by nested sampling and by bridge sampling, in their standard errors together."""
+    values = {(row["model"], row["factor"], row["method"]): row for row in rows}
+    pairs = [(row, values[row["model"], 1.0, "bridge"]) for row in rows if row["method"] == "nested"]
+    sizes = [abs(a["log_evidence"] - b["log_evidence"]) / (a["error"] ** 2 + b["error"] ** 2) ** 0.5 for a, b in pairs]
+    return max(sizes, default=None)
+
+
+def draw(found: Evidence) -> Figure:
+    """ln Z below that of the best model."""
+    canvas = figure(height=1.3 + 0.34 * len(found.rows))
+    hs.plot.evidence(found, canvas.add_subplot())
+    return canvas
+
+
+if __name__ == "__main__":
+    main(resume="resume" in sys.argv[1:])
