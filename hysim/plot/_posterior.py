@@ -128,7 +128,7 @@ def evidence(evidence: Evidence, ax: Axes | None = None) -> Axes:
         axes.set_yticks(places, evidence.names)
         axes.invert_yaxis()
         axes.set(xlabel="ln evidence, less that of the best model")
-        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3)
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
     return axes
 
 
