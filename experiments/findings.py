@@ -1102,8 +1102,8 @@ def evidence(result: Result) -> list[str]:
     seconds = [row["cpu_seconds"] for row in whole]
     return [
         f"Of {len(ordered)} models (a general exponent and Duhem laws are still to come), with the rounding to pixels "
-        f"as noise, and boxes of the priors halved, as they are and doubled: {result['sentence']}. With the boxes as they "
-        f"are, ln Z below {ordered[0]['model']}: {values}; errors by "
+        f"as noise, and boxes of the priors halved, as they are and doubled: {result['sentence']}. With the boxes as "
+        f"they are, ln Z below {ordered[0]['model']}: {values}; errors by "
         f"bridge sampling at most {error_of(result['largest_error'])}. Half boxes cut off the optimum of some models. "
         f"An evidence takes {number(median(seconds))} s of processor time in the median and "
         f"{number(max(seconds))} s at worst.",
