@@ -4,14 +4,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, read_only
 from hysim.design import _search as search
 from hysim.design._candidates import random_segments, random_strokes, through, triangles, usual, usual_of_many_speeds
-from hysim.design._criteria import Criterion
+from hysim.design._criteria import Criterion, spreads
 from hysim.design._limits import InputLimits
 from hysim.design._result import InputDesign
-from hysim.design._subjects import LawAlone, Subject
+from hysim.design._subjects import LawAlone, Subject, sizes_of
 from hysim.design._whole import whole_actuator
 from hysim.models.law import Law
 from hysim.plants.whole.actuator_structure import ActuatorStructure
@@ -30,6 +31,7 @@ def design_input(
     noise: float | None = None,
     criterion: Criterion = "D",
     highest_frequency: float | None = None,
+    beside: Mapping[str, npt.ArrayLike] | None = None,
     candidates: int = 100,
     moves: int = 300,
     seed: int = 0,
@@ -63,6 +65,8 @@ def design_input(
     highest_frequency : float, optional
         Of the random-phase multisine that stands beside a design for an actuator; by default twice that of the fastest
         mode [Hz].
+    beside : mapping, optional
+        Names to inputs of your own, (n_samples,) each, that are judged beside the usual ones.
     candidates, moves : int
         Random inputs, and changes of each of the best ones.
     seed : int
@@ -97,16 +101,18 @@ def design_input(
         drawn += [random_segments(bounds, rng) for _ in range(candidates)]
     else:
         inputs, drawn = usual(bounds), [random_strokes(bounds, rng) for _ in range(candidates)]
+    inputs |= _own(beside or {}, bounds)
     every = [u for variants in inputs.values() for u in variants]
     subject, unseen = search.determined(subject, [*every, *(through(strokes, bounds) for strokes in drawn)])
     worth = search.value_of(subject, criterion)
-    known = {name: [worth(each) for each in variants] for name, variants in inputs.items()}
+    known = {
+        name: max(((worth(u), u) for u in variants), key=lambda each: each[0]) for name, variants in inputs.items()
+    }
     move = search.one_redrawn if in_time else search.one_moved
     strokes, best = search.searched(drawn, worth, bounds, move, moves, rng)
-    u, first = through(strokes, bounds), max(known, key=lambda name: max(known[name]))
-    if max(known[first]) > best:
-        best, strokes = max(known[first]), np.empty((0, 3))
-        u = inputs[first][int(np.argmax(known[first]))]
+    u, first = through(strokes, bounds), max(known, key=lambda name: known[name][0])
+    if known[first][0] > best:
+        (best, u), strokes = known[first], np.empty((0, 3))
     if not best > 0.0:
         raise ValueError(f"no input within the limits tells {', '.join(subject.names)} apart: free fewer of them")
     covariance = subject.covariance(u)
@@ -117,13 +123,28 @@ def design_input(
         holds=strokes[:, 1],
         expected_stderr=dict(zip(subject.names, np.sqrt(covariance.diagonal()).tolist(), strict=True)),
         covariance=covariance,
-        efficiency={name: max(values) / best for name, values in known.items()},
-        usual={name: inputs[name][int(np.argmax(values))] for name, values in known.items()},
+        efficiency={name: value / best for name, (value, _) in known.items()},
+        beside={name: each for name, (_, each) in known.items()},
+        beside_stderr={name: _stderr(subject, each) for name, (_, each) in known.items()},
         criterion=criterion,
         noise=subject.noise,
         limits=bounds,
         remarks=(*subject.remarks, *unseen, *_weak(subject, covariance)),
     )
+
+
+def _own(beside: Mapping[str, npt.ArrayLike], limits: InputLimits) -> dict[str, list[FloatArray]]:
+    inputs = {name: read_only(u, f"beside[{name!r}]", ndim=1) for name, u in beside.items()}
+    for name, u in inputs.items():
+        if u.size != limits.samples:
+            raise ValueError(f"beside[{name!r}] must hold {limits.samples} samples, got {u.size}")
+    return {name: [u] for name, u in inputs.items()}
+
+
+def _stderr(subject: Subject, u: FloatArray) -> dict[str, float]:
+    """Expected standard errors by name; infinite for numbers that an input does not determine."""
+    errors = sizes_of(subject.values) * spreads(subject.information(u))
+    return dict(zip(subject.names, errors.tolist(), strict=True))
 
 
 def _weak(subject: Subject, covariance: FloatArray) -> list[str]:

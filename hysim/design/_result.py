@@ -28,8 +28,11 @@ class InputDesign:
     efficiency : mapping
         Names of the usual inputs to what they tell, in parts of what this one does: the ratio of the criterion, which
         is proportional to the number of samples.
-    usual : mapping
-        Names of the usual inputs to these inputs, shape (n_samples,) each; for an actuator the best of a few speeds.
+    beside : mapping
+        Names of the usual inputs, and of those of your own, to the inputs, shape (n_samples,) each; for an actuator the
+        usual ones are the best of a few speeds.
+    beside_stderr : mapping
+        Their names to the standard errors that are expected of them, by name.
     criterion : str
         ``"D"``, ``"A"`` or ``"E"``.
     noise : float
@@ -47,7 +50,8 @@ class InputDesign:
     expected_stderr: Mapping[str, float]
     covariance: FloatArray
     efficiency: Mapping[str, float]
-    usual: Mapping[str, FloatArray]
+    beside: Mapping[str, FloatArray]
+    beside_stderr: Mapping[str, Mapping[str, float]]
     criterion: str
     noise: float
     limits: InputLimits
@@ -65,12 +69,15 @@ class InputDesign:
 
     def __str__(self) -> str:
         head = f"InputDesign: {self.u.size} samples to {self.t[-1]:.4g} s, {self.levels.size} turning points"
-        stderr = ", ".join(f"{name} {value:.3g}" for name, value in list(self.expected_stderr.items())[:12])
         beside = ", ".join(f"{name} {100.0 * value:.0f} %" for name, value in self.efficiency.items())
-        rows = {
-            "expected standard errors": f"{stderr} for noise of {self.noise:.3g}",
-            f"{self.criterion}-efficiency of": beside,
-        }
-        if self.remarks:
-            rows["but"] = "; ".join(self.remarks)
-        return summary_text([head], rows)
+        rows = self._by_part() | {f"{self.criterion}-efficiency of": beside}
+        rows["but"] = "; ".join(self.remarks)
+        return summary_text([head, f"  expected standard errors for noise of {self.noise:.3g}:"], rows)
+
+    def _by_part(self) -> dict[str, str]:
+        """Expected standard errors of a law, or of each part of an actuator."""
+        parts: dict[str, list[str]] = {}
+        for name, value in self.expected_stderr.items():
+            part, _, short = name.rpartition(".")
+            parts.setdefault(part or "law", []).append(f"{short} {value:.3g}")
+        return {part: ", ".join(each[:12]) for part, each in parts.items()}

@@ -13,7 +13,6 @@ from hysim.design._subjects import Subject, sizes_of
 
 _BEST = 4  # candidates that are improved
 _MOVE = 0.3  # of the amplitude: the first moves of a turning point; the last ones are a tenth of it
-_LARGEST = 1e300
 _PAUSES, _PAUSE = 0.3, 0.1  # share of the moves that change a pause, and their size beside _MOVE in parts of the record
 
 Move = Callable[[FloatArray, InputLimits, np.random.Generator, float], FloatArray]
@@ -35,14 +34,15 @@ def determined(subject: Subject, inputs: Sequence[FloatArray]) -> tuple[Subject,
     kept = np.arange(len(names))
     while kept.size:
         errors = sizes[kept] * np.min([spreads(each[np.ix_(kept, kept)]) for each in known], axis=0)
-        excess = np.where(np.isinf(allowed[kept]), 0.0, errors / np.minimum(allowed[kept], _LARGEST))
+        excess = np.where(np.isinf(allowed[kept]), 0.0, errors / allowed[kept])
         worst = int(np.argmax(excess))
         if not excess[worst] > 1.0:
             break
-        place, error = kept[worst], "unknown" if np.isinf(errors[worst]) else f"{errors[worst]:.3g} at best"
+        place = kept[worst]
+        enough = f" well enough: {errors[worst]:.3g} at best, and {allowed[place]:.3g} is needed"
         remarks.append(
-            f"no input within the limits determines {names[place]}, {subject.values[place]:.4g}, well enough: its "
-            f"expected standard error is {error}, and {allowed[place]:.3g} is needed. It is taken as known"
+            f"no input within the limits determines {names[place]}{enough * bool(np.isfinite(errors[worst]))}; "
+            f"it is taken as known, {subject.values[place]:.4g}"
         )
         kept = np.delete(kept, worst)
     for name in names:

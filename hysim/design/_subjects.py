@@ -29,7 +29,7 @@ class Subject(Protocol):
 
     @property
     def tolerances(self) -> Mapping[str, float]:
-        """Names to the largest standard error with which a number counts as determined, where it may be left out."""
+        """Largest standard errors with which numbers count as determined, by name; others may not be left out."""
 
     @property
     def remarks(self) -> tuple[str, ...]:

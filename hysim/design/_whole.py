@@ -22,6 +22,7 @@ from hysim.plants.whole.linear_parts import BELOW_NYQUIST, FREQUENCY
 from hysim.records import Record
 
 _LAW = "hysteresis"
+_LARGEST = 1e300  # standard error
 
 
 @dataclass(frozen=True)
@@ -45,8 +46,10 @@ class WholeActuator:
 
     @property
     def tolerances(self) -> Mapping[str, float]:
-        """Those of `identify`, beyond which a parameter counts as not determined."""
-        return {doubt.name: doubt.largest for doubt in self.structure.doubts(self.known, Freedom())}
+        """Those of `identify`, beyond which a parameter counts as not determined; for others any that is finite."""
+        return dict.fromkeys(self.names, _LARGEST) | {
+            doubt.name: doubt.largest for doubt in self.structure.doubts(self.known, Freedom())
+        }
 
     def information(self, u: FloatArray) -> FloatArray:
         slopes = self.expected.jacobian(replace(self.record, u=u))
@@ -86,7 +89,7 @@ def whole_actuator(
     known = _known(structure, shared)
     if unknown := [name for name in shared if name not in known and not name.startswith("vibration.")]:
         raise ValueError(f"values has {unknown[0]!r}; the parameters are {among(unknown[0], known)}")
-    names = None if free is None else [_of_all(name) for name in free]
+    names = None if free is None else list(dict.fromkeys(map(_of_all, free)))
     expected = _expected(structure, record, known, names)
     return WholeActuator(structure, record, known, expected, _noise(structure.sensor, noise), remarks)
 

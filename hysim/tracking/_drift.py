@@ -12,18 +12,18 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
-from hysim.tracking._filters import Filtered
 
 _STEPS = (1.0, 0.5, 0.25)  # decades
 _LEAST, _MOST = -4.0, 1.0  # decades beside the first sizes
 
 
 def most_likely(
-    filtered: Callable[[FloatArray], Filtered], sizes: FloatArray, searched: npt.NDArray[np.bool_]
-) -> tuple[FloatArray, Filtered]:
-    """The most likely sizes (n_names,), of which only some are searched, and the filter with them."""
-    exponents = np.zeros(sizes.size)
-    best = filtered(sizes)
+    log_likelihood: Callable[[FloatArray], float], sizes: FloatArray, searched: npt.NDArray[np.bool_]
+) -> FloatArray:
+    """The most likely sizes (n_names,), of which only some are searched."""
+    if not searched.any():
+        return sizes
+    exponents, best = np.zeros(sizes.size), log_likelihood(sizes)
     for step in _STEPS:
         moved = True
         while moved:
@@ -32,7 +32,7 @@ def most_likely(
                 for direction in (-step, step):
                     trial = exponents.copy()
                     trial[k] = min(max(trial[k] + direction, _LEAST), _MOST)
-                    found = best if trial[k] == exponents[k] else filtered(sizes * 10.0**trial)
-                    if found.log_likelihood > best.log_likelihood:
-                        exponents, best, moved = trial, found, True
-    return sizes * 10.0**exponents, best
+                    value = best if trial[k] == exponents[k] else log_likelihood(sizes * 10.0**trial)
+                    if value > best:
+                        exponents, best, moved = trial, value, True
+    return np.asarray(sizes * 10.0**exponents)

@@ -94,14 +94,16 @@ def track_parameters(
     )
     first = coordinates.spread(drifts)
 
-    def filtered(sizes: FloatArray) -> Filtered:
+    def filtered(sizes: FloatArray, by: str) -> Filtered:
         walk = Walk(first, coordinates.spread(sizes) / np.sqrt(len(record)), coordinates.spread(jumps))
-        if method == "particle":
+        if by == "particle":
             return particles(copies, x, walk, spread, record.u, record.y, particles_count, seed)
         return sigma_points(copies, x, walk, spread, record.u, record.y)
 
     searched = np.array([name not in (drift or {}) for name in coordinates.names])
-    drifts, found = most_likely(filtered, drifts, searched)
+    by = "particle" if copies.memory.size > _MOST_MEMORIES else "sigma-point"
+    drifts = most_likely(lambda sizes: filtered(sizes, by).log_likelihood, drifts, searched)
+    found = filtered(drifts, method)
     return _result(law, coordinates, found, record, method, spread, drifts, searched)
 
 
