@@ -8,10 +8,10 @@ parameters that are 10 % off (frequency: 5 %), a triangle and a fading triangle,
 these parameters, and the better of two random-phase multisines with all tones up to twice the frequency of the mode.
 
 Each stage is identified from the first record with each of the four others, with the same options; the family of the
-law, its n = 1, its memory of zero at the first samples and the number of modes are told. The errors of the parameters are given in units of the standard errors
-that are expected with the designed input at the true parameters, and of those expected with the record's own input:
-both from differences of whole responses. A further record, which no fit sees, is predicted: a sine of 17 Hz, then steps
-held for 0.1 s; its error is in units of the sensor's noise.
+law, its n = 1, its memory of zero at the first samples and the number of modes are told. The errors of the parameters
+are given in units of the standard errors that are expected with the designed input at the true parameters, and of those
+expected with the record's own input: both from differences of whole responses. A further record, which no fit sees, is
+predicted: a sine of 17 Hz, then steps held for 0.1 s; its error is in units of the sensor's noise.
 
     python experiments/51_design.py [CASES.jsonl]    with a file, its cases are kept and others are added to it
 """

@@ -97,22 +97,22 @@ def design_input(
     rng, in_time = np.random.default_rng(seed), isinstance(plant, ActuatorStructure)
     if in_time:
         inputs = usual_of_many_speeds(bounds, _highest(highest_frequency, values or {}, bounds), rng)
-        drawn = [*triangles(bounds), *triangles(bounds, fading=True)]
-        drawn += [random_segments(bounds, rng) for _ in range(candidates)]
     else:
-        inputs, drawn = usual(bounds), [random_strokes(bounds, rng) for _ in range(candidates)]
+        inputs = usual(bounds)
+    drawn = [*triangles(bounds), *triangles(bounds, fading=True)] if in_time else []
+    drawn += [(random_segments if in_time else random_strokes)(bounds, rng) for _ in range(candidates)]
     inputs |= _own(beside or {}, bounds)
     every = [u for variants in inputs.values() for u in variants]
     subject, unseen = search.determined(subject, [*every, *(through(strokes, bounds) for strokes in drawn)])
     worth = search.value_of(subject, criterion)
-    known = {
+    judged = {
         name: max(((worth(u), u) for u in variants), key=lambda each: each[0]) for name, variants in inputs.items()
     }
     move = search.one_redrawn if in_time else search.one_moved
     strokes, best = search.searched(drawn, worth, bounds, move, moves, rng)
-    u, first = through(strokes, bounds), max(known, key=lambda name: known[name][0])
-    if known[first][0] > best:
-        (best, u), strokes = known[first], np.empty((0, 3))
+    u, first = through(strokes, bounds), max(judged.values(), key=lambda each: each[0])
+    if first[0] > best:
+        (best, u), strokes = first, np.empty((0, 3))
     if not best > 0.0:
         raise ValueError(f"no input within the limits tells {', '.join(subject.names)} apart: free fewer of them")
     covariance = subject.covariance(u)
@@ -123,9 +123,9 @@ def design_input(
         holds=strokes[:, 1],
         expected_stderr=dict(zip(subject.names, np.sqrt(covariance.diagonal()).tolist(), strict=True)),
         covariance=covariance,
-        efficiency={name: value / best for name, (value, _) in known.items()},
-        beside={name: each for name, (_, each) in known.items()},
-        beside_stderr={name: _stderr(subject, each) for name, (_, each) in known.items()},
+        efficiency={name: value / best for name, (value, _) in judged.items()},
+        beside={name: each for name, (_, each) in judged.items()},
+        beside_stderr={name: _stderr(subject, each) for name, (_, each) in judged.items()},
         criterion=criterion,
         noise=subject.noise,
         limits=bounds,

@@ -27,6 +27,8 @@ class Found(NamedTuple):
 
 def determined(subject: Subject, inputs: Sequence[FloatArray]) -> tuple[Subject, tuple[str, ...]]:
     """The subject without the numbers that none of these inputs determines, and a remark on each."""
+    if not subject.tolerances:
+        return subject, ()
     names, sizes = subject.names, sizes_of(subject.values)
     remarks: list[str] = []
     known = [subject.information(u) for u in inputs]
