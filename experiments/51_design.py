@@ -2,10 +2,11 @@
 
 Simulated stages: the law of Table 1 (a quadratic Bouc-Wen law, whose beta, gamma and gain are drawn about it), a creep
 of 0.5 to 3 % a decade, a mode of 100 to 400 Hz with a damping ratio of 0.01 to 0.05, a delay of up to three samples,
-and a sensor of 12 bits with noise of one bit rms. A first record is a slow triangle of one second, 100 samples. For
-the second one, of 0.6 s at 2 kHz, from 0 to 100 V at up to 20 000 V/s, there are four inputs: one that is designed for
-parameters that are 10 % off (frequency: 5 %), a triangle and a fading triangle, each the best of several speeds for
-these parameters, and the better of two random-phase multisines with all tones up to twice the frequency of the mode.
+and a sensor of 12 bits with noise of one bit rms. A first record has slow triangles of three sizes, 221 samples in
+2.2 s. For the second one, of 0.6 s at 2 kHz, from 0 to 100 V at up to 20 000 V/s, there are four inputs: one that is
+designed for parameters that are 10 % off (frequency: 5 %), a triangle and a fading triangle, each the best of several
+speeds for these parameters, and the better of two random-phase multisines with all tones up to twice the frequency of
+the mode.
 
 Each stage is identified from the first record with each of the four others, with the same options; the family of the
 law, its n = 1, its memory of zero at the first samples and the number of modes are told. The errors of the parameters
@@ -45,7 +46,8 @@ FREE = (
     *("creep.percent", FREQUENCY, DAMPING, "vibration.delay"),
 )
 FIXED = {"hysteresis.n": 1.0, "hysteresis.z0": 0.0}
-SLOW, SLOW_STEP = np.append(hs.signals.triangle(0.0, 100.0, cycles=1, samples_per_cycle=90), np.zeros(9)), 0.01
+SLOW_STEP, CORNERS = 0.01, (0.0, 100.0, 0.0, 60.0, 20.0, 80.0, 0.0)  # s, V
+SLOW = np.interp(2.0 * np.arange(221), np.cumsum(np.abs(np.diff(CORNERS, prepend=0.0))), CORNERS)  # 200 V/s
 CANDIDATES, MOVES = 100, 100
 PREDICTED_STEP = 0.5e-3
 Row = dict[str, Any]
@@ -81,7 +83,7 @@ def stage(draw: int) -> tuple[hs.Actuator, dict[str, float]]:
         hysteresis=law,
         creep=hs.Creep.per_decade(parts["creep.percent"]),
         vibration=hs.mode(parts[FREQUENCY], parts[DAMPING], delay=parts["vibration.delay"]),
-        sensor=hs.Sensor(quantum=quantum, noise=quantum, seed=draw),
+        sensor=hs.Sensor(quantum=quantum, noise=quantum, seed=3000 + draw),
     )
     return truth, {name: float(value) for name, value in parts.items()}
 
@@ -108,7 +110,7 @@ def designs(draw: int) -> tuple[dict[str, np.ndarray], float]:
         values=off(parts, 0.1) | off({FREQUENCY: parts[FREQUENCY]}, 0.05),
         candidates=CANDIDATES,
         moves=MOVES,
-        seed=draw,
+        seed=5000 + draw,
     )
     return {DESIGNED: design.u, **design.beside}, time.process_time() - begin
 
@@ -170,7 +172,7 @@ def cases(draw: int, inputs: dict[str, np.ndarray], design_seconds: float) -> li
     """One row for each input of a draw."""
     truth, parts = stage(draw)
     errors_of = {name: expected(truth, parts, u) for name, u in inputs.items()}
-    first = record(replace(truth, sensor=replace(truth.sensor, seed=draw + 500)), SLOW, SLOW_STEP)
+    first = record(replace(truth, sensor=replace(truth.sensor, seed=4000 + draw)), SLOW, SLOW_STEP)
     values = {f"hysteresis.{name}": value for name, value in truth.hysteresis.scalars.items()} | parts
     unseen = predicted_input(np.random.default_rng(2000 + draw))
     rows = []
