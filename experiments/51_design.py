@@ -34,7 +34,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from results_folder import write_results
 
 RESULTS = Path(__file__).parent / "results" / "design"
-N_DRAWS = 6
+N_DRAWS = 5
 DESIGNED = "designed"
 INPUTS = (DESIGNED, "triangle", "fading triangle", "multisine")
 LIMITS = hs.InputLimits(amplitude=50.0, centre=50.0, slew=2e4, duration=0.6, sample_time=0.5e-3)
@@ -284,7 +284,7 @@ def draw(rows: list[Row], inputs: dict[str, np.ndarray]) -> Figure:
             values = sorted(v for row in own for v in (row[key].values() if key else [row["error_in_noise"]]))
             share = np.arange(1, len(values) + 1) / len(values)
             axes.plot(values, share, ".-", color=colours[name], markersize=2, linewidth=0.8, label=name)
-        axes.set(xscale="log", xlabel=label, ylabel="share")
+        axes.set(xscale="log" if key else "linear", xlabel=label, ylabel="share of the cases")
         axes.legend(fontsize=6)
     return canvas
 

@@ -18,7 +18,7 @@ from hysim.models.parts import own
 from hysim.models.search_space import Freedom
 from hysim.plants.sensor import Sensor
 from hysim.plants.whole.actuator_structure import ActuatorStructure
-from hysim.plants.whole.linear_parts import BELOW_NYQUIST, FREQUENCY
+from hysim.plants.whole.linear_parts import BELOW_NYQUIST, DAMPING, FREQUENCY, GAIN
 from hysim.records import Record
 
 _LAW = "hysteresis"
@@ -82,14 +82,16 @@ def whole_actuator(
         )
     shared = {_of_all(name): value for name, value in values.items()}
     law = law.with_scalars({name: value for name, value in own(shared, _LAW).items() if name in law.scalars})
+    all_modes = {f"vibration.{name}[{k}]" for name in (FREQUENCY, DAMPING, GAIN) for k in range(structure.modes)}
     structure, remarks = _without_fast_modes(replace(structure, law=law), limits, shared)
     u = usual(limits)["triangle"][0]
     record = Record(u=u, y=law.response(structure.static(Record(u=u, y=u)).u), t=limits.t)
     structure, _ = structure.over([record], Freedom())
     known = _known(structure, shared)
-    if unknown := [name for name in shared if name not in known and not name.startswith("vibration.")]:
+    left_out = all_modes - known.keys()
+    if unknown := [name for name in shared if name not in known and name not in left_out]:
         raise ValueError(f"values has {unknown[0]!r}; the parameters are {among(unknown[0], known)}")
-    names = None if free is None else list(dict.fromkeys(map(_of_all, free)))
+    names = None if free is None else [name for name in dict.fromkeys(map(_of_all, free)) if name not in left_out]
     expected = _expected(structure, record, known, names)
     return WholeActuator(structure, record, known, expected, _noise(structure.sensor, noise), remarks)
 
