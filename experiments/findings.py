@@ -1098,9 +1098,9 @@ def design(result: Result) -> list[str]:
         f"Identified, the median error of a parameter in the standard errors expected of the designed input is "
         f"{error_of(designed[unit])} with it (worst {error_of(designed[worst])}), with the others {errors}.",
         f"An unseen record is predicted to these parts of the noise in the median: {predictions}. The determinant "
-        "of the covariance is no measure of this prediction, for which the multisine is best here, and the fading triangle "
-        "tells the mode better. The design was made for parameters that are 10 % off; family of the law, sharpness and "
-        "memory are told.",
+        "of the covariance is no measure of this prediction, for which the multisine is best here, and the fading "
+        "triangle tells the mode better. The design was made for parameters that are 10 % off; family of the law, "
+        "sharpness and memory are told.",
     ]
 
 
