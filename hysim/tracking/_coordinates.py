@@ -7,9 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim.kernels._compile import by_address
 from hysim.kernels.adaptation.copies import step_each
-from hysim.kernels.stepping import START, STEP
+from hysim.kernels.stepping import START, STEP, by_address
 from hysim.models.compiled_step import compiled_start, compiled_step
 from hysim.models.law import Law
 from hysim.models.tables import tables_of
