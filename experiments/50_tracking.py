@@ -4,10 +4,13 @@ The law is a Bouc-Wen law (beta = 0.8, gamma = -0.2, a feedthrough of 0.3, told)
 40 cycles of a triangle and whose exponent jumps from 1.5 to 2.2 at 60 % of them; the output has white noise of 0.3 %
 of its range (told).
 
-1. `hs.track_parameters` by sigma points and by particles, told that the gain drifts by 0.2 and the exponent may jump
-   by 0.5; beside them recursive least squares with a forgetting factor, of what is linear (gain, feedthrough, offset)
+1. `hs.track_parameters` by sigma points and by particles, told that the exponent may jump by 0.5: with the most likely
+   sizes of the drift, which is the default, and told a drift of 0.2 of the gain and 0.1 of the exponent; beside them
+   recursive least squares with a forgetting factor, of what is linear (gain, feedthrough, offset)
    with the memory of the law at the beginning, the factor being the best of a few for the error of the gain (told).
-2. The same drift in a loop: the inverse of the law at the beginning, and `hs.AdaptiveInverse`, along 40 cycles of a
+2. 12 records of 20 cycles on which both numbers do walk at random, from the law on, by 0.2 and by 7 % (in the
+   logarithm), without jumps: coverage of the bands with the most likely sizes.
+3. The same drift in a loop: the inverse of the law at the beginning, and `hs.AdaptiveInverse`, along 40 cycles of a
    triangle in the displacement. The reduction of hysteresis is that of the last cycle, beside the same plant driven
    with reference / secant gain.
 
@@ -30,6 +33,7 @@ RESULTS = Path(__file__).parent / "results" / "tracking"
 N_SEEDS, CYCLES, SAMPLES, REACH = 5, 40, 40, 1.5
 FALL, BEFORE, AFTER, JUMP_AT, NOISE_PERCENT = 0.2, 1.5, 2.2, 0.6, 0.3
 DRIFT, JUMP = {"gain": 0.2, "n": 0.1}, {"gain": 0.0, "n": 0.5}
+N_WALKS, WALK_CYCLES, WALK = 12, 20, {"gain": 0.2, "n": 0.07}
 FORGETTING = (0.9, 0.95, 0.98, 0.99, 0.995, 0.999)
 SETTLED = 2  # cycles after the jump that are left out where the paths are judged between jumps
 SAMPLE_TIME = 0.01
@@ -59,10 +63,16 @@ class DriftingPlant:
         return float(y[0])
 
 
-def record(cycles: int, seed: int) -> tuple[hs.Record, float]:
+def walks(n_samples: int, rng: np.random.Generator) -> dict[str, np.ndarray]:
+    """Gain and exponent that walk at random."""
+    gain, n = (np.cumsum(size * rng.standard_normal(n_samples)) / np.sqrt(n_samples) for size in WALK.values())
+    return {"gain": 1.0 + gain, "n": BEFORE * np.exp(n)}
+
+
+def record(truth: dict[str, np.ndarray], cycles: int, seed: int) -> tuple[hs.Record, float]:
     """A record of the law that drifts, and the standard deviation of its noise."""
     u = hs.signals.triangle(-REACH, REACH, cycles=cycles, samples_per_cycle=SAMPLES)
-    plant = DriftingPlant(LAW, paths(u.size))
+    plant = DriftingPlant(LAW, truth)
     plant.state = LAW.first_state(float(u[0]))
     y = np.array([plant.moved(float(each)) for each in u])
     noise = 0.01 * NOISE_PERCENT * float(np.ptp(y))
@@ -88,31 +98,29 @@ def rms(values: np.ndarray) -> float:
 
 def followed(cycles: int, seed: int) -> tuple[list[Row], Any]:
     """What each method makes of one record."""
-    rec, noise = record(cycles, seed)
-    truth = paths(len(rec))
+    truth = paths(cycles * SAMPLES + 1)
+    rec, noise = record(truth, cycles, seed)
     place = np.arange(len(rec)) - int(JUMP_AT * len(rec))
     calm = (place < 0) | (place >= SETTLED * SAMPLES)
     rows: list[Row] = []
     tracks = {}
     for method in ("sigma-point", "particle"):
-        track = hs.track_parameters(
-            LAW, rec, ("gain", "n"), drift=DRIFT, jump=JUMP, noise=noise, method=method, seed=seed
-        )
-        tracks[method] = track
-        held = {name: (track.band(name)[0] <= truth[name]) & (truth[name] <= track.band(name)[1]) for name in truth}
-        rows.append(
-            {
-                "part": "tracking",
-                "method": method,
-                "seed": seed,
-                "gain_error_percent": 100.0 * rms(track["gain"] - truth["gain"]),
-                "n_error": rms(track["n"] - truth["n"]),
-                "n_error_calm": rms((track["n"] - truth["n"])[calm]),
-                "coverage_gain_percent": 100.0 * float(held["gain"].mean()),
-                "coverage_n_percent": 100.0 * float(held["n"].mean()),
-                "prediction_rms_noise": rms(track.residual) / noise,
-            }
-        )
+        for told, drift in (("most likely", None), ("told", DRIFT)):
+            track = hs.track_parameters(
+                LAW, rec, ("gain", "n"), drift=drift, jump=JUMP, noise=noise, method=method, seed=seed
+            )
+            tracks[method, told] = track
+            rows.append(
+                {
+                    "part": "tracking",
+                    "method": method,
+                    "drift": told,
+                    "seed": seed,
+                    **judged(track, truth),
+                    "n_error_calm": rms((track["n"] - truth["n"])[calm]),
+                    "prediction_rms_noise": rms(track.residual) / noise,
+                }
+            )
     least = {each: recursive_least_squares(rec, each) for each in FORGETTING}
     best = min(FORGETTING, key=lambda each: rms(least[each][0] - truth["gain"]))
     sharpest = min(FORGETTING, key=lambda each: rms(least[each][1]))
@@ -126,7 +134,29 @@ def followed(cycles: int, seed: int) -> tuple[list[Row], Any]:
             "prediction_rms_noise": rms(least[sharpest][1]) / noise,
         }
     )
-    return rows, (truth, tracks["sigma-point"], least[best][0])
+    return rows, (truth, tracks["sigma-point", "most likely"], least[best][0])
+
+
+def judged(track: hs.ParameterTrack, truth: dict[str, np.ndarray]) -> Row:
+    """Errors of the paths, share of the samples at which the bands hold the truth, and sizes of the drift."""
+    held = {name: (track.band(name)[0] <= truth[name]) & (truth[name] <= track.band(name)[1]) for name in truth}
+    return {
+        "gain_error_percent": 100.0 * rms(track["gain"] - truth["gain"]),
+        "n_error": rms(track["n"] - truth["n"]),
+        "coverage_gain_percent": 100.0 * float(held["gain"].mean()),
+        "coverage_n_percent": 100.0 * float(held["n"].mean()),
+        "drift_gain": track.drift["gain"],
+        "drift_n": track.drift["n"],
+    }
+
+
+def walked(cycles: int, seed: int) -> Row:
+    """What sigma points make of numbers that walk at random."""
+    rng = np.random.default_rng(100 + seed)
+    truth = walks(cycles * SAMPLES + 1, rng)
+    rec, noise = record(truth, cycles, seed)
+    track = hs.track_parameters(LAW, rec, ("gain", "n"), jump=dict.fromkeys(JUMP, 0.0), noise=noise)
+    return {"part": "walk", "method": "sigma-point", "drift": "most likely", "seed": seed, **judged(track, truth)}
 
 
 # ---------------------------------------------------------------------------------- in a loop
@@ -183,9 +213,10 @@ def main(smoke: bool = False) -> list[Row]:
     seeds, cycles = (range(1), 4) if smoke else (range(N_SEEDS), CYCLES)
     results = [followed(cycles, seed) for seed in seeds]
     rows = [row for found, _ in results for row in found]
+    walking = [walked(2 if smoke else WALK_CYCLES, seed) for seed in range(1 if smoke else N_WALKS)]
     loops = [row for seed in seeds for jumps in (False, True) for row in in_loop(cycles, seed, jumps)]
     columns = dict.fromkeys([*rows[0], *loops[0]])
-    rows = [{**columns, **row} for row in (*rows, *loops)]
+    rows = [{**columns, **row} for row in (*rows, *walking, *loops)]
     if not smoke:
         write_results(RESULTS, rows, lambda _: draw(results[0][1]), {"noise_percent": NOISE_PERCENT})
     for row in rows:

@@ -27,7 +27,7 @@ def test_the_input_keeps_its_limits_and_tells_more_than_the_usual_ones(design):
 def test_usual_inputs_keep_the_limits_too():
     from hysim.design._candidates import usual
 
-    for u in usual(LIMITS).values():
+    for (u,) in usual(LIMITS).values():
         assert np.abs(u).max() <= 2.0
         assert np.abs(np.diff(u)).max() <= 0.2 * (1.0 + 1e-9)
 
@@ -72,5 +72,7 @@ def test_arguments_are_checked():
         hs.InputLimits(amplitude=1.0, slew=1.0, duration=0.5, sample_time=0.1)
     with pytest.raises(ValueError, match="no input within the limits tells A, gain, beta, gamma apart"):
         hs.design_input(hs.BoucWen(), limits=LIMITS, free=("A", "gain", "beta", "gamma"), candidates=4, moves=2)
-    with pytest.raises(TypeError, match="law must be a law that a step describes"):
+    with pytest.raises(
+        TypeError, match=r"takes a law that a step describes, such as BoucWen, or an Actuator\.structure"
+    ):
         hs.design_input(hs.PID(kp=1.0), limits=LIMITS, free=FREE)

@@ -79,8 +79,64 @@ def test_a_number_that_must_be_positive_stays_so(record):
     assert (track.lower > 0.0).all()
 
 
+def scalar_filter(y, known, slopes, first, step, noise):
+    """Means, variances and the log-likelihood of a walk x with y = known + slopes x, by Kalman's equations."""
+    x, variance, total, means = 1.0, first**2, 0.0, []
+    for measured, rest, slope in zip(y, known, slopes, strict=True):
+        variance += step**2
+        error, spread = measured - rest - slope * x, slope**2 * variance + noise**2
+        total -= 0.5 * (error**2 / spread + np.log(2.0 * np.pi * spread))
+        x += variance * slope / spread * error
+        variance *= noise**2 / spread
+        means.append(x)
+    return np.array(means), total
+
+
+def test_of_a_gain_the_filter_is_that_of_kalman_with_its_likelihood(record):
+    """The output is linear in the gain, whose law has the same memory whatever the gain."""
+    drift = 0.1
+    track = hs.track_parameters(LAW, record, ["gain"], drift={"gain": drift}, jump={"gain": 0.0}, noise=NOISE)
+    step = drift / np.sqrt(U.size)
+    means, total = scalar_filter(record.y, 0.3 * U, LAW.memory(U), drift, step, NOISE)
+    np.testing.assert_allclose(track["gain"], means, atol=1e-6)  # 1e-13 of a variance is kept
+    assert track.log_likelihood == pytest.approx(total, abs=1e-3)
+    assert track.searched == ()
+
+
+def test_the_most_likely_drift_is_found_and_reported(record):
+    short, fading, u = record[:241], FADING[:241], U[:241]
+    options = {"jump": {"gain": 0.0}, "noise": NOISE}
+    track = hs.track_parameters(LAW, short, ["gain"], **options)
+    assert track.searched == ("gain",)
+    assert "(most likely)" in str(track)
+    for factor in (0.3, 3.0):
+        step = factor * track.drift["gain"] / np.sqrt(u.size)
+        _, total = scalar_filter(short.y, 0.3 * u, LAW.memory(u), 0.1, step, NOISE)
+        assert total < track.log_likelihood
+    lower, upper = track.band("gain")
+    assert np.mean((lower <= fading) & (upper >= fading)) > 0.9
+    wide = hs.track_parameters(LAW, short, ["gain"], drift={"gain": 0.2}, **options)
+    assert wide.searched == ()
+    assert wide.drift == {"gain": 0.2}
+    assert np.mean(upper - lower) < 0.8 * np.mean(np.subtract(*wide.band("gain")[::-1]))
+
+
+def test_of_two_drifts_one_may_be_given(record):
+    short = record[:61]
+    track = hs.track_parameters(LAW, short, ["gain", "beta"], drift={"beta": 0.05}, jump={"gain": 0.0}, noise=NOISE)
+    assert track.searched == ("gain",)
+    assert track.drift["beta"] == 0.05
+
+
+def test_the_likelihood_of_particles_is_near_that_of_sigma_points(record):
+    options = {"drift": {"gain": 0.2}, "jump": {"gain": 0.0}, "noise": NOISE}
+    exact, drawn = (hs.track_parameters(LAW, record, ["gain"], method=method, **options).log_likelihood
+                    for method in ("sigma-point", "particle"))  # fmt: skip
+    assert drawn == pytest.approx(exact, abs=5.0)  # 500 particles: about one off in a few seeds
+
+
 def test_noise_is_estimated_from_the_record(record):
-    track = hs.track_parameters(LAW, record, ["gain"])
+    track = hs.track_parameters(LAW, record, ["gain"], drift={"gain": 0.1})
     assert track.noise == pytest.approx(NOISE, rel=0.2)
 
 
@@ -91,7 +147,7 @@ def test_arguments_are_checked(record):
         hs.track_parameters(LAW, record, ["z0"])
     with pytest.raises(ValueError, match="drift has 'n', which is not free"):
         hs.track_parameters(LAW, record, ["gain"], drift={"n": 1.0})
-    with pytest.raises(ValueError, match='method must be "sigma-point" or "particle"'):
+    with pytest.raises(ValueError, match="method must be one of sigma-point, particle, got 'kalman'"):
         hs.track_parameters(LAW, record, ["gain"], method="kalman")
     plays = hs.PrandtlIshlinskii(thresholds=tuple(0.1 * k for k in range(50)), weights=(0.02,) * 50)
     with pytest.raises(ValueError, match='remembers 51 numbers: use method="particle"'):
@@ -99,7 +155,7 @@ def test_arguments_are_checked(record):
     with pytest.raises(TypeError, match="law must be a law that a step describes"):
         hs.track_parameters(hs.PID(kp=1.0), record, ["kp"])
     with pytest.raises(KeyError, match="'n' is not tracked: gain"):
-        hs.track_parameters(LAW, record, ["gain"], noise=NOISE)["n"]
+        hs.track_parameters(LAW, record, ["gain"], drift={"gain": 0.1}, noise=NOISE)["n"]
 
 
 # ---------------------------------------------------------------------------------- an inverse that adapts

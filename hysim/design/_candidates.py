@@ -1,4 +1,8 @@
-"""Inputs by their turning points, and the usual ones beside which a design is judged."""
+"""Inputs by their turning points, and the usual ones beside which a design is judged.
+
+Strokes are an array (n_strokes, 3): the turning point about the centre, how long it is held [s], and the speed on the
+way to it in parts of the full slew.
+"""
 
 import numpy as np
 
@@ -7,46 +11,144 @@ from hysim.design._limits import InputLimits
 
 _HOLD = 0.02  # of the record, a pause at a turning point in the mean
 _TONES = (1, 3, 5, 7, 11)  # multiples of the lowest frequency of a multisine
+_SEGMENTS = (1, 2, 4, 8)  # of an input to a plant that depends on time
+_SLOWEST = 2.0  # decades below the full slew, in which the speed of a segment is drawn
+_SHORTER = 1.0  # decades below _HOLD, likewise
+_SHORTEST, _LONGEST = 0.02, 0.5  # of the record, a segment that is drawn anew
+_SPEEDS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of usual inputs, in parts of the full slew
 
 
-def through(levels: FloatArray, limits: InputLimits, holds: FloatArray | None = None) -> FloatArray:
-    """The input (samples,) from zero to each level in turn at the full slew, held there for its time [s].
+def through(strokes: FloatArray, limits: InputLimits) -> FloatArray:
+    """The input (samples,) from the centre to each turning point in turn, held there for its time.
 
     What comes after the end of the record is cut off; before it the last level is held.
     """
-    pauses = np.zeros(levels.size) if holds is None else holds
-    strokes = np.abs(np.diff(levels, prepend=0.0)) / limits.slew
-    times = np.concatenate([[0.0], np.cumsum(np.column_stack([strokes, pauses]).ravel())])
-    return np.asarray(np.interp(limits.t, times, np.append(0.0, np.repeat(levels, 2))))
+    levels, holds, speeds = strokes.T
+    times = np.abs(np.diff(levels, prepend=0.0)) / (limits.slew * speeds)
+    places = np.concatenate([[0.0], np.cumsum(np.column_stack([times, holds]).ravel())])
+    return np.asarray(limits.centre + np.interp(limits.t, places, np.append(0.0, np.repeat(levels, 2))))
 
 
-def usual(limits: InputLimits) -> dict[str, FloatArray]:
+def usual(limits: InputLimits) -> dict[str, list[FloatArray]]:
     """A triangle, one that fades and a multisine, each as large and as fast as the limits allow."""
-    period = 4.0 * limits.amplitude / limits.slew
-    cycles = max(1.0, limits.duration / period)
-    count = max(2, round(2.0 * cycles))
-    signs = np.where(np.arange(2 * count) % 2 == 0, 1.0, -1.0)
-    fading = np.linspace(1.0, 0.0, 2 * count, endpoint=False)
+    cycles = _cycles(limits)
     time, reach = limits.t / limits.duration, np.zeros(limits.samples)
     for k, tone in enumerate(_TONES):
         reach = reach + np.sin(2.0 * np.pi * max(1, round(cycles / 2.0)) * tone * time + np.pi * k**2 / len(_TONES))
     return {
-        "triangle": through(limits.amplitude * signs, limits),
-        "fading triangle": through(limits.amplitude * signs * fading, limits),
-        "multisine": limits.fitted(limits.amplitude * reach / float(np.abs(reach).max())),
+        "triangle": [through(triangle(limits), limits)],
+        "fading triangle": [through(triangle(limits, fading=True), limits)],
+        "multisine": [limits.fitted(limits.centre + limits.amplitude * reach / float(np.abs(reach).max()))],
     }
 
 
+def usual_of_many_speeds(limits: InputLimits, highest: float, rng: np.random.Generator) -> dict[str, list[FloatArray]]:
+    """As `usual`, the triangles at several speeds, and random-phase multisines with every tone up to `highest` [Hz].
+
+    The tones of the first multisine are of one size, those of the second fall with the frequency.
+    """
+    return {
+        "triangle": [through(each, limits) for each in triangles(limits)],
+        "fading triangle": [through(each, limits) for each in triangles(limits, fading=True)],
+        "multisine": [_multisine(limits, highest, power, rng) for power in (0.0, -1.0)],
+    }
+
+
+def triangles(limits: InputLimits, *, fading: bool = False) -> list[FloatArray]:
+    """Strokes of triangles of several speeds that have more than a cycle in the record, or else the fastest."""
+    speeds = [speed for speed in _SPEEDS if _cycles(limits, speed) > 1.0] or [1.0]
+    return [triangle(limits, speed, fading=fading) for speed in speeds]
+
+
+def triangle(limits: InputLimits, speed: float = 1.0, *, fading: bool = False) -> FloatArray:
+    """Strokes of a triangle of the full amplitude, or of one that fades to nothing."""
+    count = max(2, round(2.0 * _cycles(limits, speed)))
+    levels = limits.amplitude * np.where(np.arange(2 * count) % 2 == 0, 1.0, -1.0)
+    if fading:
+        levels *= np.linspace(1.0, 0.0, 2 * count, endpoint=False)
+    return np.column_stack([levels, np.zeros(levels.size), np.full(levels.size, speed)])
+
+
+def _cycles(limits: InputLimits, speed: float = 1.0) -> float:
+    return max(1.0, limits.duration * speed * limits.slew / (4.0 * limits.amplitude))
+
+
+def _multisine(limits: InputLimits, highest: float, power: float, rng: np.random.Generator) -> FloatArray:
+    tones = np.arange(1, max(2, 1 + min(int(highest * limits.duration), (limits.samples - 1) // 2)))
+    spectrum = np.zeros(limits.samples // 2 + 1, dtype=complex)
+    spectrum[tones] = tones**power * np.exp(2j * np.pi * rng.random(tones.size))
+    reach = np.fft.irfft(spectrum, limits.samples)
+    largest = min(limits.amplitude / np.abs(reach).max(), limits.stride / np.abs(np.diff(reach)).max())
+    return limits.fitted(limits.centre + largest * reach)
+
+
 def random_strokes(limits: InputLimits, rng: np.random.Generator) -> FloatArray:
-    """Turning points to alternate sides of each other, and how long each is held, (n_levels, 2), to fill the record.
+    """Strokes at the full slew to alternate sides, to fill the record.
 
     Some inputs have short strokes, and some hold most of their turning points.
     """
-    strokes, bias, held = [], float(rng.uniform(0.3, 3.0)), float(rng.choice([0.0, 0.2, 0.6]))
-    last, time, side = 0.0, 0.0, 1.0 if rng.random() < 0.5 else -1.0
-    while time < limits.duration:
+    return _segment(limits, rng, 0.0, limits.duration, _HOLD * limits.duration)
+
+
+def random_segments(limits: InputLimits, rng: np.random.Generator) -> FloatArray:
+    """Strokes of several segments, each with lengths, speeds and holds of its own, to fill the record."""
+    count = int(rng.choice(_SEGMENTS))
+    strokes = np.empty((0, 3))
+    for end in np.append(np.sort(rng.random(count - 1)), 1.0):
+        lasting = end * limits.duration - lasts(strokes, limits)
+        if lasting > 0.0:
+            strokes = np.concatenate([strokes, random_segment(limits, rng, _last(strokes), lasting)])
+    return strokes
+
+
+def random_segment(limits: InputLimits, rng: np.random.Generator, last: float, lasting: float) -> FloatArray:
+    """Strokes of one length, speed and share of holds, from a level `last` on, for a time [s]."""
+    hold = _HOLD * limits.duration * 10.0 ** (-_SHORTER * float(rng.random()))
+    speed = 10.0 ** (-_SLOWEST * float(rng.random()))
+    return _segment(limits, rng, last, lasting, hold, speed, least=limits.sample_time)
+
+
+def with_another_segment(strokes: FloatArray, limits: InputLimits, rng: np.random.Generator) -> FloatArray:
+    """The strokes with a random stretch drawn anew."""
+    ends = np.cumsum(_times(strokes, limits))
+    lasting = limits.duration * _SHORTEST * (_LONGEST / _SHORTEST) ** float(rng.random())
+    begin = float(rng.random()) * (limits.duration - lasting)
+    first, behind = np.searchsorted(ends, [begin, begin + lasting])
+    before = strokes[:first]
+    segment = random_segment(limits, rng, _last(before), lasting)
+    return np.concatenate([before, segment, strokes[behind:]])
+
+
+def lasts(strokes: FloatArray, limits: InputLimits) -> float:
+    """Duration of strokes from the centre on [s]."""
+    return float(_times(strokes, limits).sum())
+
+
+def _times(strokes: FloatArray, limits: InputLimits) -> FloatArray:
+    return np.asarray(np.abs(np.diff(strokes[:, 0], prepend=0.0)) / (limits.slew * strokes[:, 2]) + strokes[:, 1])
+
+
+def _last(strokes: FloatArray) -> float:
+    return float(strokes[-1, 0]) if len(strokes) else 0.0
+
+
+def _segment(
+    limits: InputLimits,
+    rng: np.random.Generator,
+    last: float,
+    lasting: float,
+    mean_hold: float,
+    speed: float = 1.0,
+    least: float = 0.0,
+) -> FloatArray:
+    """Strokes of a speed to alternate sides, each with its hold at least of a duration [s]."""
+    rows, bias, held = [], float(rng.uniform(0.3, 3.0)), float(rng.choice([0.0, 0.2, 0.6]))
+    time, side = 0.0, 1.0 if rng.random() < 0.5 else -1.0
+    while time < lasting:
         level = last + (side * limits.amplitude - last) * float(rng.random()) ** bias
-        hold = float(rng.exponential(_HOLD * limits.duration)) if rng.random() < held else 0.0
-        time, last, side = time + abs(level - last) / limits.slew + hold, level, -side
-        strokes.append((level, hold))
-    return np.array(strokes)
+        hold = float(rng.exponential(mean_hold)) if rng.random() < held else 0.0
+        moving = abs(level - last) / (limits.slew * speed)
+        hold = max(hold, least - moving)
+        time, last, side = time + moving + hold, level, -side
+        rows.append((level, hold, speed))
+    return np.array(rows)

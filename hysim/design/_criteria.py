@@ -1,34 +1,14 @@
-"""How much a record would tell of the numbers of a law: its Fisher information, and one number of it."""
+"""One number of a Fisher information, and what it leaves undetermined."""
 
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.models.law import Law
 
 Criterion = Literal["D", "A", "E"]
-_DIFFERENCE = 1e-4  # of a number, or of one where that is smaller: both errors of a central difference are near 1e-8
 _LEAST = 1e-12  # eigenvalue of an information of columns of length one, below which a direction is not determined
-
-
-def sizes_of(law: Law, names: tuple[str, ...]) -> FloatArray:
-    """Units in which numbers are judged: their sizes, one for zeros."""
-    values = np.array([law.scalars[name] for name in names])
-    return np.where(values == 0.0, 1.0, np.abs(values))
-
-
-def information(law: Law, names: tuple[str, ...], u: FloatArray, noise: float) -> FloatArray:
-    """Information on the numbers in units of their sizes, (n_names, n_names), by central differences."""
-    steps = _DIFFERENCE * sizes_of(law, names)
-    own: dict[str, Any] = {name: np.full(2 * len(names), law.scalars[name]) for name in names}
-    for k, name in enumerate(names):
-        own[name][2 * k] += steps[k]
-        own[name][2 * k + 1] -= steps[k]
-    outputs = law.outputs(own, u)
-    with np.errstate(invalid="ignore"):
-        slopes = (outputs[0::2] - outputs[1::2]) / (2.0 * _DIFFERENCE * noise)
-    return np.asarray(slopes @ slopes.T) if np.isfinite(slopes).all() else np.zeros((len(names),) * 2)
+_TAKES_PART = 1e-3  # share of a number in such a direction, from which on it is not determined
 
 
 def merit(matrix: FloatArray, criterion: Criterion) -> float:
@@ -44,3 +24,14 @@ def merit(matrix: FloatArray, criterion: Criterion) -> float:
     if criterion == "A":
         return float(len(matrix) / np.trace(np.linalg.inv(matrix)))
     return float(np.linalg.eigvalsh(matrix)[0])
+
+
+def spreads(matrix: FloatArray) -> FloatArray:
+    """Standard errors (n_names,) of an information; infinite where it does not determine a number."""
+    size = np.sqrt(np.maximum(matrix.diagonal(), 0.0))
+    usable = np.where(size > 0.0, size, 1.0)
+    values, vectors = np.linalg.eigh(matrix / np.outer(usable, usable))
+    seen = values > _LEAST
+    variances = (vectors[:, seen] ** 2 / values[seen]).sum(axis=1)
+    unseen = (np.abs(vectors[:, ~seen]) > _TAKES_PART).any(axis=1) | (size == 0.0)
+    return np.asarray(np.where(unseen, np.inf, np.sqrt(variances) / usable))

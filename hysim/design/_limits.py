@@ -14,13 +14,15 @@ class InputLimits:
     Parameters
     ----------
     amplitude : float
-        Largest size of the input [unit of u].
+        Largest distance of the input from the centre [unit of u].
     slew : float
         Largest size of its rate [unit of u / s].
     duration : float
         Length of the record [s].
     sample_time : float
         Time between two samples [s].
+    centre : float
+        Where the input begins [unit of u].
 
     Raises
     ------
@@ -38,6 +40,7 @@ class InputLimits:
     slew: float
     duration: float
     sample_time: float
+    centre: float = 0.0
 
     def __post_init__(self) -> None:
         check_positive(amplitude=self.amplitude, slew=self.slew, duration=self.duration, sample_time=self.sample_time)
@@ -60,8 +63,9 @@ class InputLimits:
         return self.slew * self.sample_time
 
     def fitted(self, u: FloatArray) -> FloatArray:
-        """An input (samples,) within the limits that follows `u` as fast as the slew allows, from zero on."""
-        inside, kept, last = np.clip(u, -self.amplitude, self.amplitude), np.empty(u.size), 0.0
+        """An input (samples,) within the limits that follows `u` as fast as the slew allows, from the centre on."""
+        low, high = self.centre - self.amplitude, self.centre + self.amplitude
+        inside, kept, last = np.clip(u, low, high), np.empty(u.size), self.centre
         for k, wanted in enumerate(inside.tolist()):
             last = min(max(wanted, last - self.stride), last + self.stride)
             kept[k] = last

@@ -91,10 +91,10 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
     return Uncertainty(covariance, spread @ spread.T, together, output, condition, redundant, tuple(reasons))
 
 
-def output_slopes(problem: Problem, theta: FloatArray) -> FloatArray:
-    """dm/dtheta, (n_samples, n_theta)."""
+def output_slopes(problem: Problem, theta: FloatArray, *, refined: bool = True) -> FloatArray:
+    """dm/dtheta, (n_samples, n_theta), refined where the output bends within the step of a difference."""
     slopes, share = _differences(problem, theta, 1.0), _SHARE
-    if not problem.n_x or not np.isfinite(slopes).all():
+    if not refined or not problem.n_x or not np.isfinite(slopes).all():
         return slopes
     for _ in range(_MOST_SHARES):
         shorter = _differences(problem, theta, share)

@@ -7,6 +7,7 @@ they return codes.
 """
 
 import contextlib
+import functools
 import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
@@ -85,8 +86,12 @@ class Addressed(types.WrapperAddressProtocol):
     def __init__(self, function: Any, signature: Any) -> None:
         self.function, self._signature = function, signature
 
-    def __wrapper_address__(self) -> int:
+    @functools.cached_property
+    def _address(self) -> int:
         return int(_get_wrapper_address(self.function, self._signature))
+
+    def __wrapper_address__(self) -> int:
+        return self._address
 
     def signature(self) -> Any:
         return self._signature

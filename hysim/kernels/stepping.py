@@ -19,7 +19,8 @@ from numba import float64, int64, types, void
 from hysim._frozen import FloatArray
 from hysim.kernels._compile import Addressed as Addressed
 from hysim.kernels._compile import borrowed as borrowed
-from hysim.kernels._compile import by_address, closure, signed_closure, signed_kernel
+from hysim.kernels._compile import by_address as by_address
+from hysim.kernels._compile import closure, signed_closure, signed_kernel
 
 VECTOR = types.Array(float64, 1, "C")
 CONSTANTS = types.Array(float64, 1, "C", readonly=True)

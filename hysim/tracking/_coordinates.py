@@ -1,13 +1,14 @@
 """Numbers of a law as coordinates of a filter: their logarithms where the law refuses negative ones."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
 from hysim.kernels.adaptation.copies import step_each
+from hysim.kernels.stepping import START, STEP, by_address
 from hysim.models.compiled_step import compiled_start, compiled_step
 from hysim.models.law import Law
 from hysim.models.tables import tables_of
@@ -56,6 +57,12 @@ def _must_be_positive(law: Law, name: str) -> bool:
     return False
 
 
+def _place(name: str) -> tuple[str, int]:
+    """Field of a number, and its place there."""
+    field, _, place = name.partition("[")
+    return field, int(place[:-1]) if place else 0
+
+
 class Copies:
     """Copies of a law with other numbers, moved sample by sample.
 
@@ -69,9 +76,12 @@ class Copies:
 
     def __init__(self, law: Law, coordinates: Coordinates) -> None:
         self._law, self._coordinates = law, coordinates
-        self._step, self._start = compiled_step(law.step), compiled_start(law.start)
+        self._step = by_address(compiled_step(law.step), STEP.signature)
+        self._start = by_address(compiled_start(law.start), START.signature)
         self.memory = law.packed[1].copy()
         self._state = np.zeros(self.memory.size + law.workspace)
+        self._one, _ = tables_of(type(law).__name__, law.arguments, {}, np.zeros(1))
+        self._places = [_place(name) for name in coordinates.names]
 
     def begun(self, u0: float) -> FloatArray:
         """The memory before a first sample at `u0`."""
@@ -86,7 +96,13 @@ class Copies:
 
     def _packed(self, x: FloatArray) -> FloatArray:
         law = self._law
-        sets: Mapping[str, Any] = dict(zip(self._coordinates.names, self._coordinates.decode(x).T, strict=True))
-        tables, _ = tables_of(type(law).__name__, law.arguments, sets, np.zeros(1))
+        tables = self._tables(len(x))
+        for place, column in zip(self._places, self._coordinates.decode(x).T, strict=True):
+            field, k = place
+            tables[field][:, k] = column
         with np.errstate(all="ignore"):
             return read_only(law.pack(law.completed(tables)).parameters, finite=False)
+
+    def _tables(self, n_copies: int) -> dict[str, FloatArray]:
+        """Tables of every field, to be written to."""
+        return {name: np.repeat(table, n_copies, axis=0) for name, table in self._one.items()}

@@ -12,6 +12,7 @@ Particles: many copies, weighted by how well they predict, and drawn anew from t
 sample.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ _SURPRISE = 3.0  # mean square of the last normalised errors, from which on a nu
 _RECENT = 12  # errors that are looked at; after a jump as many pass before the next look
 _LEAST = 1e-13  # of the variances: keeps a covariance positive
 _JUMPING = 0.01  # share of the particles that jump at a sample
+_LOG_ROOT_2PI = 0.5 * math.log(2.0 * math.pi)
 _FEWEST = 0.5  # share of effective particles below which they are drawn anew
 
 
@@ -35,13 +37,18 @@ class Walk(NamedTuple):
 
 
 class Filtered(NamedTuple):
-    """Means and standard deviations of the coordinates (n_samples, n_names), and predictions with their deviations."""
+    """Means and standard deviations of the coordinates (n_samples, n_names), and predictions with their deviations.
+
+    The logarithm of the likelihood is that of the errors of predictions one sample ahead. After a jump the samples that
+    came again count with their second predictions, and the place of the jump with one over the number of samples.
+    """
 
     mean: FloatArray
     deviation: FloatArray
     predicted: FloatArray
     expected_error: FloatArray
     jumps: tuple[int, ...]
+    log_likelihood: float
 
 
 class Belief(NamedTuple):
@@ -59,22 +66,29 @@ def sigma_points(copies: Copies, x: FloatArray, walk: Walk, noise: float, u: Flo
     covariance[range(count), range(count)] = walk.first**2
     belief = Belief(np.concatenate([x, begun[1:]]), covariance, float(u[0]))
     means, deviations = np.empty((u.size, count)), np.empty((u.size, count))
-    predicted, expected = np.empty(u.size), np.empty(u.size)
+    predicted, expected, log_density = np.empty(u.size), np.empty(u.size), np.empty(u.size)
     recent: list[tuple[Belief, float]] = []
     jumps: list[int] = []
     for k in range(u.size):
         last = belief
         belief, predicted[k], expected[k] = _filtered(copies, last, walk.step, noise, float(u[k]), float(y[k]), k)
+        log_density[k] = _log_normal(float(y[k]) - predicted[k], expected[k])
         recent = [*recent[-_RECENT + 1 :], (last, ((y[k] - predicted[k]) / expected[k]) ** 2)]
         if len(recent) == _RECENT and np.mean([square for _, square in recent]) > _SURPRISE and walk.jump.any():
             begin = recent[0][0]
             begin.covariance[range(count), range(count)] += walk.jump**2
             belief, jumps, recent = begin, [*jumps, k], []
             for j in range(k - _RECENT + 1, k + 1):
-                belief, _, _ = _filtered(copies, belief, walk.step, noise, float(u[j]), float(y[j]), j)
+                belief, again, spread = _filtered(copies, belief, walk.step, noise, float(u[j]), float(y[j]), j)
+                log_density[j] = _log_normal(float(y[j]) - again, spread)
         means[k] = belief.mean[:count]
         deviations[k] = np.sqrt(np.maximum(belief.covariance.diagonal()[:count], 0.0))
-    return Filtered(means, deviations, predicted, expected, tuple(jumps))
+    log_likelihood = float(log_density.sum()) - len(jumps) * math.log(u.size)
+    return Filtered(means, deviations, predicted, expected, tuple(jumps), log_likelihood)
+
+
+def _log_normal(error: float, deviation: float) -> float:
+    return -0.5 * (error / deviation) ** 2 - math.log(deviation) - _LOG_ROOT_2PI
 
 
 def _filtered(
@@ -119,7 +133,7 @@ def particles(
     weights = np.full(count, 1.0 / count)
     means, deviations = np.empty((u.size, x.size)), np.empty((u.size, x.size))
     predicted, expected = np.empty(u.size), np.empty(u.size)
-    before = float(u[0])
+    before, log_likelihood = float(u[0]), 0.0
     for k in range(u.size):
         points = points + walk.step * rng.standard_normal(points.shape)
         jumping = rng.random(count) < _JUMPING
@@ -135,11 +149,13 @@ def particles(
         predicted[k] = weights @ known
         expected[k] = np.sqrt(weights @ (known - predicted[k]) ** 2 + noise**2)
         log = -0.5 * ((float(y[k]) - known) / noise) ** 2
-        weights = weights * np.exp(log - log[usable].max())
+        most = log[usable].max()
+        weights = weights * np.exp(log - most)
+        log_likelihood += most + math.log(weights.sum()) - math.log(noise) - _LOG_ROOT_2PI
         weights = weights / weights.sum()
         means[k] = weights @ points
         deviations[k] = np.sqrt(weights @ (points - means[k]) ** 2)
         if 1.0 / float(weights @ weights) < _FEWEST * count:
             chosen = np.searchsorted(np.cumsum(weights), (np.arange(count) + rng.random()) / count).clip(max=count - 1)
             points, memory, weights = points[chosen], memory[chosen], np.full(count, 1.0 / count)
-    return Filtered(means, deviations, predicted, expected, ())
+    return Filtered(means, deviations, predicted, expected, (), float(log_likelihood))

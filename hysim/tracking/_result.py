@@ -1,5 +1,6 @@
 """The result of `track_parameters`."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,12 @@ class ParameterTrack:
         ``"sigma-point"`` or ``"particle"``.
     noise : float
         Standard deviation of the measurement [unit of y].
+    drift : mapping
+        Names to the standard deviation of the walk over the whole record [unit of each].
+    searched : tuple of str
+        Names whose drift was not given: it is the most likely one.
+    log_likelihood : float
+        Logarithm of the likelihood of the errors.
     model : law
         The law with the last estimates.
     """
@@ -44,6 +51,9 @@ class ParameterTrack:
     jumps: tuple[int, ...]
     method: str
     noise: float
+    drift: Mapping[str, float]
+    searched: tuple[str, ...]
+    log_likelihood: float
     model: Any
 
     def __getitem__(self, name: str) -> FloatArray:
@@ -77,7 +87,12 @@ class ParameterTrack:
             f"[{self.lower[-1, k]:.4g}, {self.upper[-1, k]:.4g}] at 95 %"
             for k, name in enumerate(self.names[:6])
         }
-        notes = {"consistency": f"{self.consistency:.3g} (near 1 if noise and drift are what was said)"}
+        sizes = ", ".join(
+            f"{name} {size:.3g}{' (most likely)' if name in self.searched else ''}"
+            for name, size in list(self.drift.items())[:6]
+        )
+        notes = {"drift over the record": sizes}
+        notes |= {"consistency": f"{self.consistency:.3g} (near 1 if noise and drift are what was said)"}
         if self.jumps:
             notes["jumps"] = f"at samples {', '.join(map(str, self.jumps[:8]))}"
         return summary_text([head], rows | notes)

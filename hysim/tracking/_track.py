@@ -4,11 +4,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, check_choice
 from hysim.models.law import Law
 from hysim.records import Record
 from hysim.tracking._coordinates import Coordinates, Copies, coordinates_of
+from hysim.tracking._drift import most_likely
 from hysim.tracking._filters import Filtered, Walk, particles, sigma_points
 from hysim.tracking._result import _BAND, ParameterTrack
 
@@ -43,7 +45,9 @@ def track_parameters(
     free : sequence of str
         Names of the numbers that drift, as in ``law.scalars``.
     drift : mapping, optional
-        Names to the change that is expected over the whole record; by default a tenth of the value [unit of each].
+        Names to the change that is expected over the whole record, as the standard deviation of a random walk [unit of
+        each]. By default the size for which the errors of predictions one sample ahead are most likely, which takes
+        some twenty passes of the filter for each name; the number at the first sample is then known to a tenth.
     jump : mapping, optional
         Names to the size of a sudden change; by default a fifth of the value. Zero for none.
     noise : float, optional
@@ -80,22 +84,38 @@ def track_parameters(
     coordinates, spread = coordinates_of(law, free), _noise_of(record) if noise is None else float(noise)
     if not spread > 0.0:
         raise ValueError("noise must be positive: give the standard deviation of the measurement")
-    copies = Copies(law, coordinates)
-    walk = _walk(coordinates, drift, jump, len(record))
-    x = coordinates.encode(coordinates.values)
-    if method == "particle":
-        found = particles(copies, x, walk, spread, record.u, record.y, particles_count, seed)
-    elif method != "sigma-point":
-        raise ValueError(f'method must be "sigma-point" or "particle", got {method!r}')
-    elif copies.memory.size > _MOST_MEMORIES:
+    check_choice("method", method, ("sigma-point", "particle"))
+    copies, x = Copies(law, coordinates), coordinates.encode(coordinates.values)
+    if method == "sigma-point" and copies.memory.size > _MOST_MEMORIES:
         raise ValueError(f'this law remembers {copies.memory.size} numbers: use method="particle"')
-    else:
-        found = sigma_points(copies, x, walk, spread, record.u, record.y)
-    return _result(law, coordinates, found, record, method, spread)
+    drifts, jumps = (
+        _sizes(coordinates, given, share, what)
+        for given, share, what in ((drift, _DRIFT, "drift"), (jump, _JUMP, "jump"))
+    )
+    first = coordinates.spread(drifts)
+
+    def filtered(sizes: FloatArray, by: str) -> Filtered:
+        walk = Walk(first, coordinates.spread(sizes) / np.sqrt(len(record)), coordinates.spread(jumps))
+        if by == "particle":
+            return particles(copies, x, walk, spread, record.u, record.y, particles_count, seed)
+        return sigma_points(copies, x, walk, spread, record.u, record.y)
+
+    searched = np.array([name not in (drift or {}) for name in coordinates.names])
+    by = "particle" if copies.memory.size > _MOST_MEMORIES else "sigma-point"
+    drifts = most_likely(lambda sizes: filtered(sizes, by).log_likelihood, drifts, searched)
+    found = filtered(drifts, method)
+    return _result(law, coordinates, found, record, method, spread, drifts, searched)
 
 
 def _result(
-    law: Law, coordinates: Coordinates, found: Filtered, record: Record, method: str, noise: float
+    law: Law,
+    coordinates: Coordinates,
+    found: Filtered,
+    record: Record,
+    method: str,
+    noise: float,
+    drifts: FloatArray,
+    searched: npt.NDArray[np.bool_],
 ) -> ParameterTrack:
     values = coordinates.decode(found.mean)
     last: dict[str, float] = dict(zip(coordinates.names, values[-1].tolist(), strict=True))
@@ -110,26 +130,20 @@ def _result(
         jumps=found.jumps,
         method=method,
         noise=noise,
+        drift=dict(zip(coordinates.names, drifts.tolist(), strict=True)),
+        searched=tuple(np.array(coordinates.names)[searched].tolist()),
+        log_likelihood=found.log_likelihood,
         model=law.with_scalars(last),
     )
 
 
-def _walk(
-    coordinates: Coordinates, drift: Mapping[str, float] | None, jump: Mapping[str, float] | None, n_samples: int
-) -> Walk:
-    sizes = np.where(coordinates.values == 0.0, 1.0, np.abs(coordinates.values))
-    drifts, jumps = (
-        coordinates.spread(_sizes(coordinates.names, given, share * sizes, what))
-        for given, share, what in ((drift, _DRIFT, "drift"), (jump, _JUMP, "jump"))
-    )
-    return Walk(drifts, drifts / np.sqrt(n_samples), jumps)
-
-
-def _sizes(names: Sequence[str], given: Mapping[str, Any] | None, usual: FloatArray, what: str) -> FloatArray:
+def _sizes(coordinates: Coordinates, given: Mapping[str, Any] | None, share: float, what: str) -> FloatArray:
+    """Sizes of changes (n_names,), those that are not given in parts of the values."""
     given = {} if given is None else given
-    if unknown := [name for name in given if name not in names]:
+    if unknown := [name for name in given if name not in coordinates.names]:
         raise ValueError(f"{what} has {unknown[0]!r}, which is not free")
-    sizes = np.array([float(given.get(name, own)) for name, own in zip(names, usual, strict=True)])
+    usual = share * np.where(coordinates.values == 0.0, 1.0, np.abs(coordinates.values))
+    sizes = np.array([float(given.get(name, own)) for name, own in zip(coordinates.names, usual, strict=True)])
     if not (sizes >= 0.0).all():
         raise ValueError(f"{what} must not be negative, got {dict(given)}")
     return sizes

@@ -5,6 +5,7 @@ at rest, so that each column passes through it by itself, exactly as an `Actuato
 Of many sets of parameters those that share the law's, or those of the other parts, share the work on them.
 """
 
+import functools
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -78,7 +79,9 @@ def _distinct(parameters: Parameters, n_sets: int) -> tuple[list[dict[str, float
     return [dict(zip(names, row, strict=True)) for row in rows.tolist()], np.ravel(which)
 
 
+@functools.lru_cache(maxsize=64)
 def _chain(stages: Stages, step: float) -> Chain:
+    """The stages at a sample time; where inputs are compared, they are the same for all of them."""
     return Chain(
         amplifier=stages.amplifier,
         hysteresis=None,

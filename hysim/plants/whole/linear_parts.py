@@ -27,7 +27,7 @@ from hysim.plants.whole.creep_bank import CreepBank
 from hysim.plants.whole.survey import Survey
 
 FREQUENCY, DAMPING, GAIN = "natural_frequencies", "damping_ratios", "gains"
-_BELOW_NYQUIST = 0.98
+BELOW_NYQUIST = 0.98
 _PERIODS = 2.0  # of the slowest mode in the fastest record, at least
 _DAMPING = (1e-4, 1.5)
 _GAIN = (-0.95, 0.95)  # of a mode beside the first one
@@ -97,7 +97,7 @@ class LinearParts:
     def _vibration(self) -> tuple[tuple[Coordinate, ...], dict[str, float]]:
         survey, box = self.survey, []
         defaults: dict[str, float] = {}
-        highest = _BELOW_NYQUIST * survey.nyquist
+        highest = BELOW_NYQUIST * survey.nyquist
         lowest = min(2.0 * math.pi * _PERIODS / survey.duration, 0.5 * highest)
         for k in range(self.modes):
             names = [f"{name}[{k}]" for name in (FREQUENCY, DAMPING, GAIN)]
