@@ -23,12 +23,16 @@ from hysim.posterior._target import Target
 
 _PARTICLES, _PARTICLES_EACH = 1024, 256  # at most, and for each number in v
 _CENTRES, _CENTRES_EACH = 384, 64  # likewise
+_FEWEST_EACH = 4  # distinct particles for each number in v and one more: fewer shape no mixture
 _NEIGHBOURS = 0.02  # share of the particles that shape a part of the mixture
 _WIDTHS = (0.1, 0.2, 0.4, 0.7, 1.0)  # of the parts, in units of that shape
 _WIDE = 0.1  # share of the part around all
-_FREEDOM = 5.0
+_FREEDOM = 5  # at least
+_BLOCK = 64  # points whose distances to all parts stay in the processor's cache
 _NORMAL_SPREAD = 1.05  # of e: a little wider than the standard normal distribution
-_MOVES = 6  # of each particle at each power
+_MOVES = 6  # of each particle between two looks at the mean of ln L
+_LEVEL = 0.1  # rise of power times that mean in so many moves, from which on it counts as level
+_MOST_LOOKS = 12  # at each power
 _HALF = 0.5
 _WHOLE = 0.15  # share of the moves by a whole difference
 _EARLY = 0.6  # power of the likelihood whose particles shape some parts of the mixture
@@ -50,10 +54,16 @@ class Proposal:
     n_x: int
     n_linear: int
 
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom: 5 or 6, such that the exponent of the density is a whole number."""
+        n_v: int = self.centres.shape[1]
+        return _FREEDOM + (_FREEDOM + n_v) % 2
+
     def draw(self, n: int, rng: np.random.Generator) -> FloatArray:
         """Points (n, n_dim)."""
         part = rng.choice(self.share.size, n, p=self.share)
-        heavy = np.sqrt(rng.chisquare(_FREEDOM, n) / _FREEDOM)[:, np.newaxis]
+        heavy = np.sqrt(rng.chisquare(self.freedom, n) / self.freedom)[:, np.newaxis]
         normal = rng.standard_normal((n, self.centres.shape[1])) / heavy
         v = self.centres[part] + (self.roots[part] @ normal[..., np.newaxis])[..., 0]
         e = _NORMAL_SPREAD * rng.standard_normal((n, self.n_linear))
@@ -68,11 +78,16 @@ class Proposal:
 
     def log_density_of_v(self, v: FloatArray) -> FloatArray:
         """Logarithm of the density of v alone, (n_sets,)."""
+        blocks = [self._log_density_of_block(v[k : k + _BLOCK]) for k in range(0, len(v), _BLOCK)]
+        return np.concatenate(blocks) if blocks else np.empty(0)
+
+    def _log_density_of_block(self, v: FloatArray) -> FloatArray:
         n_v, n_parts = v.shape[1], len(self.centres)
         inverse, offset, scale = self._prepared
-        places = (v @ inverse).reshape(len(v), n_parts, n_v) - offset
-        squares = np.einsum("spi,spi->sp", places, places)
-        return np.asarray(np.log((1.0 + squares / _FREEDOM) ** (-0.5 * (_FREEDOM + n_v)) @ scale))
+        places = (v @ inverse - offset).reshape(len(v), n_v, n_parts)
+        places *= places
+        parts: FloatArray = 1.0 / (1.0 + places.sum(axis=1) / self.freedom)
+        return np.asarray(np.log(_power(parts, (self.freedom + n_v) // 2) @ scale))
 
     def beside(self, other: "Proposal") -> "Proposal":
         """This proposal with another one that has a small share."""
@@ -82,14 +97,22 @@ class Proposal:
 
     @cached_property
     def _prepared(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Inverse roots side by side, centres times these, and the factor of each part."""
+        """Inverse roots side by side, a coordinate of all parts together; centres times these; factor of each part."""
         n_parts, n_v = self.centres.shape
         inverse: FloatArray = np.asarray(np.linalg.inv(self.roots), dtype=np.float64)
-        half = 0.5 * (_FREEDOM + n_v)
-        constant = math.lgamma(half) - math.lgamma(0.5 * _FREEDOM) - 0.5 * n_v * math.log(_FREEDOM * math.pi)
-        scale = self.share * np.exp(constant) / np.abs(np.diagonal(self.roots, axis1=1, axis2=2)).prod(axis=1)
-        columns = inverse.transpose(2, 0, 1).reshape(n_v, n_parts * n_v)
-        return columns, np.einsum("pij,pj->pi", inverse, self.centres), scale
+        ends = math.lgamma(0.5 * (self.freedom + n_v)) - math.lgamma(0.5 * self.freedom)
+        constant = math.exp(ends - 0.5 * n_v * math.log(self.freedom * math.pi))
+        scale = self.share * constant / np.abs(np.diagonal(self.roots, axis1=1, axis2=2)).prod(axis=1)
+        columns = inverse.transpose(2, 1, 0).reshape(n_v, n_v * n_parts)
+        return columns, np.einsum("pij,pj->ip", inverse, self.centres).ravel(), scale
+
+
+def _power(base: FloatArray, exponent: int) -> FloatArray:
+    """A whole power, by squares: faster than a general one."""
+    if exponent == 1:
+        return base
+    root = _power(base, exponent // 2)
+    return root * root * base if exponent % 2 else root * root
 
 
 def mixture(v: FloatArray, n_linear: int, rng: np.random.Generator) -> Proposal:
@@ -126,9 +149,14 @@ def _regular(covariance: FloatArray) -> FloatArray:
 def proposal_for(target: Target, rng: np.random.Generator) -> tuple[Proposal, Proposal]:
     """The proposal that the particles shape, improved by draws from itself with weights until these are even enough.
 
-    The second one reaches farther, and is a part of the first.
+    The second one reaches farther, and is a part of the first. Improvement ends where few draws have all the weight.
     """
     v, early = particles(target, rng)
+    if min(_distinct(v), _distinct(early)) < _fewest(target):
+        raise ValueError(
+            f"the posterior was not found: {_distinct(v)} of {len(v)} draws from the priors are left beside the "
+            "records; pass narrower priors"
+        )
     reaching = mixture(early, target.n_linear, rng)
     proposal = mixture(v, target.n_linear, rng).beside(reaching)
     drawn, logs = np.empty((0, target.n_dim)), np.empty(0)
@@ -144,9 +172,20 @@ def proposal_for(target: Target, rng: np.random.Generator) -> tuple[Proposal, Pr
         weight = np.exp(log_weight - log_weight.max())
         drawn = np.concatenate([drawn, q])
         logs = np.concatenate([logs, weight / weight.sum() * share])
-        chosen = drawn[_resampled(logs / logs.sum(), rng, len(q))]
-        proposal = mixture(target.without_linear(chosen), target.n_linear, rng).beside(reaching)
+        chosen = target.without_linear(drawn[_resampled(logs / logs.sum(), rng, len(q))])
+        if _distinct(chosen) < _fewest(target):
+            break
+        proposal = mixture(chosen, target.n_linear, rng).beside(reaching)
     return best, reaching
+
+
+def _distinct(v: FloatArray) -> int:
+    return len(np.unique(v, axis=0))
+
+
+def _fewest(target: Target) -> int:
+    """Number of distinct particles that can shape a mixture."""
+    return _FEWEST_EACH * (target.n_x + 2)
 
 
 def _even(log_weight: FloatArray) -> float:
@@ -169,12 +208,24 @@ def particles(target: Target, rng: np.random.Generator) -> tuple[FloatArray, Flo
         weight = np.exp(step * (value - value.max()))
         chosen = _resampled(weight / weight.sum(), rng, len(v))
         v, value, prior = v[chosen], value[chosen], prior[chosen]
-        for _ in range(_MOVES):
-            v, value, prior = _moved(target, v, value, prior, power, rng)
+        v, value, prior = _settled(target, v, value, prior, power, rng)
         early = v if power <= _EARLY or not early.size else early
         if power >= 1.0:
             break
     return v, early
+
+
+def _settled(
+    target: Target, v: FloatArray, value: FloatArray, prior: FloatArray, power: float, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """All particles after moves that have brought their mean likelihood to its level at this power."""
+    for _ in range(_MOST_LOOKS):
+        before = float(value.mean())
+        for _ in range(_MOVES):
+            v, value, prior = _moved(target, v, value, prior, power, rng)
+        if power * (float(value.mean()) - before) < _LEVEL:
+            break
+    return v, value, prior
 
 
 def _next_power(value: FloatArray, most: float) -> float:

@@ -1,0 +1,88 @@
+"""The proposal against densities that are known: targets in whose place a few formulas stand."""
+
+import numpy as np
+import pytest
+from scipy import special, stats
+
+from hysim.posterior._bridge import _error
+from hysim.posterior._proposal import mixture, particles, proposal_for
+
+
+class Known:
+    """A target of numbers with a standard normal prior and the given ln L, without linear parameters."""
+
+    n_linear = 0
+
+    def __init__(self, n, log_likelihood):
+        self.n_x, self.n_dim, self.log_likelihood = n - 1, n, log_likelihood
+
+    def prior_draws(self, n, rng):
+        return rng.standard_normal((n, self.n_dim))
+
+    def marginal(self, v):
+        return self.log_likelihood(v), stats.norm.logpdf(v).sum(axis=1)
+
+    def log_posterior(self, q):
+        return sum(self.marginal(q))
+
+    def without_linear(self, q):
+        return q
+
+
+class Deceived(Known):
+    """A target whose particles follow the prior, and whose posterior is a needle."""
+
+    def log_posterior(self, q):
+        return -1e6 * np.sum((q - 0.5) ** 2, axis=1)
+
+
+def of_spike(n, power, width):
+    """L = (width^2 + r^2)^-power about a point: broad at low powers, and all of it within the width at power 1."""
+    return Known(n, lambda v: -power * np.log(width**2 + np.sum((v - 0.5) ** 2, axis=1)))
+
+
+@pytest.mark.parametrize("n", [1, 2, 5, 6])
+def test_the_density_is_that_of_the_mixture_of_t_distributions(n):
+    rng = np.random.default_rng(n)
+    found = mixture(rng.standard_normal((200, n)) @ rng.standard_normal((n, n)), 0, rng)
+    points = found.draw(100, rng)  # more than one block
+    parts = [
+        share * stats.multivariate_t(centre, root @ root.T, df=found.freedom).pdf(points)
+        for share, centre, root in zip(found.share, found.centres, found.roots, strict=True)
+    ]
+    np.testing.assert_allclose(found.log_density_of_v(points), np.log(np.sum(parts, axis=0)), rtol=1e-9, atol=1e-12)
+
+
+def test_particles_follow_a_likelihood_that_collapses_to_a_spike():
+    """r^2 / width^2 has a beta prime distribution: E ln(1 + r^2 / width^2) = digamma(k) - digamma(k - n / 2)."""
+    n, k, width = 4, 5.0, 1e-3
+    target = of_spike(n, k, width)
+    v, _ = particles(target, np.random.default_rng(0))
+    expected = -k * (2.0 * np.log(width) + special.digamma(k) - special.digamma(k - 0.5 * n))
+    spread = k * np.sqrt(special.polygamma(1, k - 0.5 * n) - special.polygamma(1, k))
+    assert target.log_likelihood(v).mean() == pytest.approx(expected, abs=0.25 * spread)  # of 1024, not independent
+
+
+def test_an_improvement_in_which_one_draw_has_all_weight_ends_with_the_best_proposal():
+    target = Deceived(4, lambda v: np.zeros(len(v)))
+    found, _ = proposal_for(target, np.random.default_rng(0))
+    assert found.share.sum() == pytest.approx(1.0)
+    assert np.isfinite(found.log_density(target.prior_draws(50, np.random.default_rng(1)))).all()
+
+
+def test_a_posterior_in_which_one_draw_of_the_prior_lies_is_an_error():
+    centre = np.random.default_rng(0).standard_normal((1, 3))  # the first draw of that seed
+
+    def log_likelihood(v):
+        return np.where((v == centre).all(axis=1), 0.0, -1e300)
+
+    with pytest.raises(ValueError, match=r"the posterior was not found: 1 of .* pass narrower priors"):
+        proposal_for(Known(3, log_likelihood), np.random.default_rng(0))
+
+
+def test_walkers_that_do_not_meet_give_no_evidence():
+    together = np.random.default_rng(0).standard_normal((100, 8))
+    apart = together + np.where(np.arange(8) < 4, 0.0, 20.0)
+    of_proposal = np.zeros(1000)
+    assert np.isfinite(_error(together.ravel(), of_proposal, 0.5, (100, 8)))
+    assert _error(apart.ravel(), of_proposal, 0.5, (100, 8)) == np.inf
