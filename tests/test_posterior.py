@@ -5,6 +5,7 @@ With known sigma, y = C b + noise and flat priors that are wide, b is normal abo
     Z = (2 pi sigma^2)^(-(n - d)/2) |C^T C|^(-1/2) exp(-S / (2 sigma^2)) prod (1 / width of the prior).
 """
 
+import dataclasses
 import math
 import sys
 
@@ -363,6 +364,15 @@ def test_a_preference_holds_with_every_box_or_is_none():
     )
     assert near.undecided == ("a", "b")
     assert sum(near.probabilities(2.0).values()) == pytest.approx(1.0)
+
+
+def test_a_model_whose_evidence_was_not_found_stays_in_question():
+    found = evidence(**{"law, n = 1": (0.0, 0.0, 0.0), "b": (-40.0, -50.0, -60.0), "c": (-40.0, -50.0, -60.0)})
+    assert found.sentence.startswith('the data prefer "law, n = 1", odds')
+    lost = dataclasses.replace(found["b"], error=(0.1, math.inf, 0.1))
+    unsure = dataclasses.replace(found, rows=(found.rows[0], lost, found.rows[2]))
+    assert unsure.undecided == ("law, n = 1", "b")
+    assert 'do not decide between "law, n = 1" and b: the evidence of b was not found;' in unsure.sentence
 
 
 def test_without_emcee_the_extra_is_named(monkeypatch):

@@ -26,7 +26,7 @@ DECIDED = 3.0
 
 _ERRORS = 2.0  # standard errors of a difference by which the odds must be above that
 _DRAWS = 2_000  # effective ones, for bridge sampling
-_STEPS = 20_000
+_STEPS = 6_000  # at most: with fewer draws the error is larger, and says so
 
 
 @frozen
@@ -42,7 +42,8 @@ class EvidenceRow:
     fit_percent : float
         Of the identified model [%].
     log_evidence, error : tuple of float
-        ln Z with the boxes of the priors halved, as they are, and doubled, and their standard errors.
+        ln Z with the boxes of the priors halved, as they are, and doubled, and their standard errors; an error is
+        infinite where bridge sampling has not found ln Z.
     n_evaluations : int
         Number of parameter sets that were simulated.
     """
@@ -124,11 +125,18 @@ class Evidence:
         others = [name for name in self.names if name not in near]
         if len(near) == 1:
             if not others:
-                return f"{near[0]} is the only model"
+                return f"{_quoted(near[0])} is the only model"
             odds = min(self.odds(near[0], other) for other in others)
-            return f"the data prefer {near[0]}, odds {_rounded(odds)} : 1, with every box"
-        reason = "it depends on the boxes" if len(set(self.best)) > 1 else "their odds are too near to 1 : 1"
-        return f"the data do not decide between {listed(near)}: {reason}{self._behind(others)}"
+            return f"the data prefer {_quoted(near[0])}, odds {_rounded(odds)} : 1, with every box"
+        return f"the data do not decide between {listed([*map(_quoted, near)])}: {self._reason}{self._behind(others)}"
+
+    @property
+    def _reason(self) -> str:
+        """Why the data do not decide between several models."""
+        lost = [_quoted(row.name) for row in self.rows if not np.isfinite(row.error).all()]
+        if lost:
+            return f"the evidence of {listed(lost)} was not found"
+        return "it depends on the boxes" if len(set(self.best)) > 1 else "their odds are too near to 1 : 1"
 
     def _behind(self, others: Sequence[str]) -> str:
         """The odds of the models that are not in question."""
@@ -304,6 +312,10 @@ def _fitted(model: Any, records: Sequence[Record], noise: str, initial: str | Se
     if isinstance(model, Identification):
         return model
     return identify(model, records if len(records) > 1 else records[0], noise=noise, initial=initial)
+
+
+def _quoted(name: str) -> str:
+    return f'"{name}"' if "," in name else name
 
 
 def _rounded(odds: float) -> str:
