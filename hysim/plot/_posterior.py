@@ -14,6 +14,8 @@ from hysim.records import Record
 _BINS = 30
 _SHARES = (0.39, 0.86)  # of the draws: one and two standard deviations of a normal distribution of two numbers
 _OUTLIERS = 0.002  # of the draws, on each side, that are not shown
+_FAR = -30.0  # ln of an evidence so far below the best one that a linear axis would hide the others
+_TICKS = (0.0, -1.0, -2.0, -3.0, -10.0, -30.0, -100.0, -300.0, -1e3, -1e4, -1e5)
 _SHADES = ("#cfe2f0", "#6aa5cf")
 
 
@@ -94,8 +96,8 @@ def prediction(
 def evidence(evidence: Evidence, ax: Axes | None = None) -> Axes:
     """Draw ln Z of each model below that of the best, with its boxes as they are, halved and doubled.
 
-    Bars are two standard errors to each side. Left of the dotted line a model has odds of less than 1 : 3 against the
-    best one.
+    Bars are two standard errors to each side. The axis is logarithmic beyond -3 if a model is far behind. Left of the
+    dotted line a model has odds of less than 1 : 3 against the best one.
 
     Examples
     --------
@@ -128,6 +130,12 @@ def evidence(evidence: Evidence, ax: Axes | None = None) -> Axes:
         axes.set_yticks(places, evidence.names)
         axes.invert_yaxis()
         axes.set(xlabel="ln evidence, less that of the best model")
+        if (least := float((values - values.max(axis=0)).min())) < _FAR:
+            axes.set_xscale("symlog", linthresh=3.0, linscale=0.9)
+            ticks = [tick for tick in _TICKS if tick > 1.5 * least]
+            axes.set_xticks(ticks, [f"{tick:g}".replace("-", "−") for tick in ticks])
+            axes.set_xlim(1.6 * least, 0.5)
+            axes.minorticks_off()
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
     return axes
 
