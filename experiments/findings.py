@@ -1146,18 +1146,23 @@ def channels(result: Result) -> list[str]:
 
 def evidence(result: Result) -> list[str]:
     """Which model the paper's points prefer."""
-    bridge = [row for row in result["rows"] if row["method"] == "bridge"]
-    whole = [row for row in bridge if sum(each["model"] == row["model"] for each in bridge) == 3]
-    ordered = sorted((row for row in whole if row["factor"] == 1.0), key=lambda row: -row["log_evidence"])
+    bridge, nested = (where(result["rows"], method=name) for name in ("bridge", "nested"))
+    found = [row for row in bridge if row["error"] is not None]
+    whole = [row for row in found if len(where(found, model=row["model"])) == 3]
+    ordered = sorted(where(whole, factor=1.0), key=lambda row: -row["log_evidence"])
     require(result["largest_error"] < 0.3, "errors of ln Z are small")
     values = ", ".join(f"{row['model']} {row['log_evidence'] - ordered[0]['log_evidence']:.1f}" for row in ordered[1:])
-    seconds = [row["cpu_seconds"] for row in whole]
+    seconds = column(whole, "cpu_seconds")
+    beside = sum(the(found, model=row["model"], factor=1.0)["cpu_seconds"] for row in nested)
     return [
-        f"Of {len(ordered)} models (a general exponent and Duhem laws are still to come), with the rounding to pixels "
-        f"as noise, and boxes of the priors halved, as they are and doubled: {result['sentence']}. With the boxes as "
-        f"they are, ln Z below {ordered[0]['model']}: {values}; errors by "
-        f"bridge sampling at most {error_of(result['largest_error'])}. Half boxes cut off the optimum of some models. "
-        f"An evidence takes {number(median(seconds))} s of processor time in the median and "
+        f"Of {len(ordered)} models, with the rounding to pixels as noise, and boxes of the priors halved, as they are "
+        f"and doubled: {result['sentence']}. With the boxes as they are, ln Z below {ordered[0]['model']}: {values}; "
+        f"errors by bridge sampling at most {error_of(result['largest_error'])}. Half boxes cut off the optimum of "
+        "some models.",
+        f"Nested sampling of {len(nested)} of them, with errors of {span(column(nested, 'error'), 2)}, differs by at "
+        f"most {number(result['largest_difference_of_methods'], 2)} standard errors, and takes "
+        f"{number(sum(column(nested, 'cpu_seconds')) / beside, 2)} times the processor time of bridge sampling.",
+        f"An evidence by bridge sampling takes {number(median(seconds))} s of processor time in the median and "
         f"{number(max(seconds))} s at worst.",
     ]
 

@@ -13,7 +13,7 @@ from hysim.cli import main
 MODELS = ["eq1-printed", "tf-identified", "bouc-wen", "bouc-wen-asymmetric", "sindy", "line", "single-valued"]
 FIGURES = [
     "figure3", "figure4", "figure5", "figure9", "figure10", "figure12", "figure13", "figure14",
-    "loops", "widths", "residuals", "discovery", "hysteresis", "dwell", "camera", "periods", "opening",
+    "loops", "widths", "residuals", "discovery", "hysteresis", "dwell", "camera", "periods", "opening", "evidence",
 ]  # fmt: skip
 
 
@@ -41,7 +41,7 @@ def test_every_promised_file_is_there(reproduction):
     assert {path.name for path in (folder / "figures").iterdir()} == {f"{name}.svg" for name in FIGURES}
     assert {path.name for path in (folder / "tables").iterdir()} == {
         "models.csv", "outputs.csv", "widths.csv", "parameters.csv", "claims.csv", "control.csv", "camera.csv",
-        "periods.csv", "dwell.csv",
+        "periods.csv", "dwell.csv", "evidence.csv",
     }  # fmt: skip
 
 

@@ -16,6 +16,7 @@ from hysim.paper.camera import CameraLoop
 from hysim.paper.dwell import DwellWidth
 from hysim.paper.loops import PERIOD, HysteresisCase, SquareCase, StepCase
 from hysim.paper.periods import PERIODS, PeriodCurve
+from hysim.posterior import Evidence
 from hysim.records import Record
 
 _MARK = "#B34700"
@@ -201,6 +202,14 @@ def periods_figure(curves: Sequence[PeriodCurve]) -> plot.Figure:
     ax.set(xscale="log", xlabel="Period of the triangle [s]", ylabel="Reduction [%]")
     ax.set_xticks(PERIODS, [f"{period:g}" for period in PERIODS])
     ax.minorticks_off()
+    return canvas
+
+
+@plot.house_style()
+def evidence_figure(found: Evidence) -> plot.Figure:
+    """ln of the evidence of each model, for each size of the boxes."""
+    canvas = plot.figure(height=1.3 + 0.34 * len(found.rows))
+    plot.evidence(found, canvas.add_subplot())
     return canvas
 
 

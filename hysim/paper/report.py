@@ -13,10 +13,12 @@ from hysim.paper.chapters.camera import needed
 from hysim.paper.chapters.claims import claims_chapter, counts
 from hysim.paper.chapters.control import control_chapter, definitions
 from hysim.paper.chapters.linear import dwell_chapter, identification_section
+from hysim.paper.chapters.preference import preference_chapter
 from hysim.paper.equations import EQUATION_1, EQUATION_7
 from hysim.paper.findings import Findings
 from hysim.paper.markup import Drawn, complex_number, equation, figure, folded, heading, number, paragraph, ratio, table
 from hysim.paper.nested import nested_errors, of_discovered
+from hysim.paper.preference import preference
 from hysim.paper.study import Study, cross_validated
 
 _OPEN = ("claims", "control", "measured")
@@ -42,6 +44,7 @@ def report_page(findings: Findings, drawn: Drawn) -> str:
         Chapter("linear", "The paper's linear models", _linear(findings, drawn)),
         Chapter("bouc-wen", "The Bouc-Wen models", _bouc_wen(study)),
         Chapter("discovered", "The discovered law", _discovered(study, drawn)),
+        Chapter("preferred", "Which model the points prefer", preference_chapter(drawn)),
         Chapter("dwell", "Loop width against dwell", dwell_chapter(findings.dwell, drawn)),
         Chapter("definitions", "How the numbers are defined", _definitions()),
     ]
@@ -84,7 +87,7 @@ def _lead(findings: Findings, drawn: Drawn) -> str:
             f"each voltage can do better than {single.fit_percent:.2f} %: what is missing is memory. With it, a "
             f"Bouc-Wen law with {law.n_parameters} parameters fits to {law.fit_percent:.2f} % and opens "
             f"{law.max_width:.3f} µm; a law that SINDy discovers fits to {sindy.fit_percent:.2f} % and opens "
-            f"{sindy.max_width:.3f} µm."
+            f"{sindy.max_width:.3f} µm. {preference()}"
         )
     )
 

@@ -29,6 +29,7 @@ from hysim.paper.equations import EQUATION_1, EQUATION_4, EQUATION_6, EQUATION_7
 from hysim.paper.findings import Findings, find
 from hysim.paper.loops import control_measures
 from hysim.paper.periods import period_rows
+from hysim.paper.preference import preference_measures, preference_rows, stored_evidence
 from hysim.paper.report import report_page
 from hysim.paper.study import Progress, model_measures
 from hysim.plot import Figure, to_svg
@@ -148,6 +149,7 @@ def _paper_drawings(computed: Findings) -> dict[str, str]:
             "dwell": figures.dwell_figure(computed.dwell),
             "camera": figures.camera_figure(computed.cameras),
             "periods": figures.periods_figure(computed.periods),
+            "evidence": figures.evidence_figure(stored_evidence()),
         }
     )
 
@@ -172,6 +174,7 @@ def _summary(computed: Findings) -> dict[str, Any]:
         "claims": [{key: vars(claim)[key] for key in _CLAIM} for claim in computed.claims],
         "control": {**control_measures(computed.loops), "camera": camera_measures(computed.cameras)},
         "dwell": [dwell_measures(width) for width in computed.dwell],
+        "evidence": preference_measures(),
     }
 
 
@@ -199,6 +202,7 @@ def _tables(computed: Findings, summary: dict[str, Any]) -> dict[str, str]:
         "camera": _by_columns(summary["control"]["camera"]),
         "periods": _by_columns(period_rows(computed.periods)),
         "dwell": _by_columns(summary["dwell"]),
+        "evidence": _by_columns(preference_rows()),
     }
     return {f"tables/{name}.csv": _csv(table) for name, table in named.items()}
 

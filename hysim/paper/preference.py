@@ -1,0 +1,120 @@
+"""Which model the points of Table 1 prefer, from stored evidences.
+
+`hysim reproduce` samples no posterior: `experiments/49_evidence.py` does, and stores ln Z of each model in
+`hysim/data/table1_evidence.csv`, with the boxes of the priors halved, as they are, and doubled. Noise is the rounding
+to pixels and a normal part, and every memory is free at the first point.
+"""
+
+import csv
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from hysim._printing import listed
+from hysim.paper.nested import NestedError, nested_errors
+from hysim.posterior import FACTORS, Evidence, EvidenceRow
+
+FILE = "table1_evidence.csv"
+BOXES = dict(zip(FACTORS, ("halved", "as they are", "doubled"), strict=True))
+"""Sizes of the boxes in words."""
+
+_APART = 2.0  # standard errors of a difference that counts
+
+
+@cache
+def stored_evidence() -> Evidence:
+    """The stored evidences by bridge sampling, the largest with the boxes as they are first."""
+    return Evidence(rows=tuple(map(_row, _lines())), factors=FACTORS, noise="quantised", method="bridge")
+
+
+@cache
+def by_nested_sampling() -> Mapping[str, tuple[float, float]]:
+    """ln Z by nested sampling, and its standard error, of the models that have it, with the boxes as they are."""
+    return {
+        line["model"]: (float(line["nested_ln_evidence"]), float(line["nested_error"]))
+        for line in _lines()
+        if line["nested_ln_evidence"]
+    }
+
+
+def left_out(name: str) -> NestedError | None:
+    """The error of a model at points that its search has not seen, its memory free at the first point."""
+    return next((each for each in nested_errors() if each.model == name and each.start in ("free", "")), None)
+
+
+def preference() -> str:
+    """Which model the points prefer, and how surely; one sentence."""
+    found = stored_evidence()
+    boxes = listed([BOXES[factor] for factor in found.factors])
+    return f"Of {len(found.rows)} models, {found.sentence} (the boxes of their priors {boxes})."
+
+
+def beside_nested() -> str:
+    """How the most probable model stands in nested cross-validation, in two sentences."""
+    first = stored_evidence().names[0]
+    error = left_out(first)
+    if error is None:
+        return f'Nested cross-validation was not run for "{first}".'
+    kept = ", its terms chosen with the point," if error.terms_kept else ""
+    agrees = "does not contradict" if error.behind < _APART else "contradicts"
+    return (
+        "Nested cross-validation asks how far a model is off at a point that is left out of its search. There "
+        f'"{first}", the most probable one with the boxes as they are,{kept} errs by {error.left_out_rmse:.4f} µm; '
+        f"that is {max(error.behind, 0.0):.1f} standard errors behind the best of those searched without the point, "
+        f"which {agrees} the evidence."
+    )
+
+
+def preference_measures() -> dict[str, Any]:
+    """The evidences as the summary has them."""
+    found = stored_evidence()
+    return {
+        "sentence": preference(),
+        "noise": found.noise,
+        "boxes": list(found.factors),
+        "undecided": list(found.undecided),
+        "best": list(found.best),
+        "models": {name: _measures(found, name) for name in found.names},
+    }
+
+
+def preference_rows() -> list[dict[str, Any]]:
+    """One line for each model: ln Z and its standard error for each size of the boxes, and by nested sampling."""
+    rows = []
+    for each in stored_evidence().rows:
+        row: dict[str, Any] = {"model": each.name, "parameters": each.n_parameters}
+        for factor, value, error in zip(FACTORS, each.log_evidence, each.error, strict=True):
+            row |= {f"ln_evidence_x{factor:g}": value, f"error_x{factor:g}": error}
+        nested = by_nested_sampling().get(each.name, (None, None))
+        rows.append(row | dict(zip(("nested_ln_evidence", "nested_error"), nested, strict=True)))
+    return rows
+
+
+def _measures(found: Evidence, name: str) -> dict[str, Any]:
+    row, error = found[name], left_out(name)
+    return {
+        "n_parameters": row.n_parameters,
+        "log_evidence": list(row.log_evidence),
+        "error": list(row.error),
+        "probability": [found.probabilities(factor)[name] for factor in found.factors],
+        "nested_sampling": list(by_nested_sampling().get(name, ())) or None,
+        "left_out_rmse_um": None if error is None else error.left_out_rmse,
+    }
+
+
+@cache
+def _lines() -> tuple[dict[str, str], ...]:
+    text = (files("hysim") / "data" / FILE).read_text(encoding="utf-8")
+    return tuple(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
+
+
+def _row(line: Mapping[str, str]) -> EvidenceRow:
+    return EvidenceRow(
+        name=line["model"],
+        n_parameters=int(line["n_parameters"]),
+        fit_percent=float(line["fit_percent"]),
+        log_evidence=tuple(float(line[f"ln_evidence_x{factor:g}"]) for factor in FACTORS),
+        error=tuple(float(line[f"error_x{factor:g}"]) for factor in FACTORS),
+        n_evaluations=int(line["n_evaluations"]),
+    )
