@@ -17,7 +17,7 @@ from hysim._frozen import FloatArray
 from hysim._versions import optional
 from hysim.posterior._target import Target
 
-_WALK = 20  # steps for each parameter: with 25 in all, ln Z of a bent posterior in five was 4 to 5 too low
+_WALK = 40  # steps for each parameter: with 25 in all, ln Z of a bent posterior in five was 4 to 5 too low
 _QUEUE = 5  # share of the live points that are replaced together: one in so many
 _REMAINS = 0.01  # of ln Z: what may be missing at the end
 _LOWEST = -1e300  # ln L of a set that has diverged
