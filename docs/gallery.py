@@ -117,12 +117,21 @@ def _cards(entries: Iterable[tuple[str, str, str, Any, str]]) -> str:
     return "\n".join(["::::{container} gallery", *cards, "::::"])
 
 
+def frames() -> dict[str, str]:
+    """Addresses of the explorer with a family that is all of a model or its first part, by the families' full names."""
+    addresses: dict[str, str] = {}
+    models = presets().items()
+    for whole in (True, False):
+        for preset, each in models:
+            parts = [each.model] if whole else getattr(each.model, "parts", ())
+            address = f"{EXPLORER}#{urlencode({'model': preset})}"
+            addresses = {**{f"hysim.{type(part).__name__}": address for part in parts}, **addresses}
+    return {name: address for name, address in addresses.items() if name.removeprefix("hysim.") in families()}
+
+
 def _sliders(name: str) -> str:
-    """A link to the explorer with this family, if it is there."""
-    for preset, each in presets().items():
-        if type(each.model).__name__ == name:
-            return f' <a href="{EXPLORER}#{urlencode({"model": preset})}">Sliders.</a>'
-    return ""
+    """A link to the sliders on the page of this family, if it has some."""
+    return f' <a href="reference/hysim.{name}.html#sliders">Sliders.</a>' if f"hysim.{name}" in frames() else ""
 
 
 def _first_sentence(value: Any) -> str:

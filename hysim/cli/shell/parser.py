@@ -1,6 +1,7 @@
 """Parser of the command line: help with groups of commands and examples, and errors in one line."""
 
 import argparse
+import itertools
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NoReturn
@@ -54,6 +55,13 @@ def in_groups(groups: Mapping[str, Sequence[Command]]) -> str:
         "\n".join([f"{title}:", *(f"  {command.name:<{width}}  {command.help}" for command in commands)])
         for title, commands in groups.items()
     )
+
+
+def unknown_options(words: Iterable[str], parser: argparse.ArgumentParser) -> list[str]:
+    """Options among the words, as far as a word ``--``, that a command does not have, not even in full length."""
+    known = parser._option_string_actions
+    options = [word for word in itertools.takewhile(lambda word: word != "--", words) if word.startswith("--")]
+    return [word for word in options if not any(each.startswith(word.partition("=")[0]) for each in known)]
 
 
 def unexpected(words: Sequence[str], parser: argparse.ArgumentParser) -> str:
