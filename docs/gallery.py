@@ -125,13 +125,24 @@ def frames() -> dict[str, str]:
         for preset, each in models:
             parts = [each.model] if whole else getattr(each.model, "parts", ())
             address = f"{EXPLORER}#{urlencode({'model': preset})}"
-            addresses = {**{f"hysim.{type(part).__name__}": address for part in parts}, **addresses}
-    return {name: address for name, address in addresses.items() if name.removeprefix("hysim.") in families()}
+            addresses = {
+                **{f"hysim.{type(part).__name__}": address for part in parts},
+                **addresses,
+            }
+    return {
+        name: address
+        for name, address in addresses.items()
+        if name.removeprefix("hysim.") in families()
+    }
 
 
 def _sliders(name: str) -> str:
     """A link to the sliders on the page of this family, if it has some."""
-    return f' <a href="reference/hysim.{name}.html#sliders">Sliders.</a>' if f"hysim.{name}" in frames() else ""
+    return (
+        f' <a href="reference/hysim.{name}.html#sliders">Sliders.</a>'
+        if f"hysim.{name}" in frames()
+        else ""
+    )
 
 
 def _first_sentence(value: Any) -> str:

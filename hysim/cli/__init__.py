@@ -101,7 +101,7 @@ def _run(arguments: list[str]) -> int:
     named = next((argument for argument in arguments if not argument.startswith("-")), None)
     parser, of_commands = parsers(named if named in COMMANDS and arguments[0] == named else None)
     if named is not None and named not in COMMANDS:
-        advice = suggestion(named, COMMANDS) or f"there are {', '.join(COMMANDS)}"
+        advice = suggestion(named, ["--help", *COMMANDS]) or f"there are {', '.join(COMMANDS)}"
         parser.error(f"there is no command {named!r}: {advice}")
     asked = parser if named is None else of_commands[named]
     own = arguments if named is None else arguments[arguments.index(named) + 1 :]

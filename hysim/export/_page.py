@@ -120,9 +120,7 @@ def page_text(models: Mapping[str, Shown], record: Record | None = None, *, titl
     modules: dict[str, bytes] = {}
     packs: list[str] = []
     time = 0.5 * _PERIOD * _BRANCHES / _SAMPLES
-    described = [
-        _model(name, shown, Parts(modules, packs, sample_time=time), record) for name, shown in models.items()
-    ]
+    described = [_model(name, shown, Parts(modules, packs, sample_time=time), record) for name, shown in models.items()]
     codes = {name: gzip.decompress(module) for name, module in modules.items()}  # smaller if compressed together
     data = {
         "models": described,

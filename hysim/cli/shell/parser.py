@@ -24,6 +24,13 @@ class Parser(argparse.ArgumentParser):
         """Print an error and the command with the help, and exit with 2."""
         self.exit(BAD_INPUT, f"{self.prog}: error: {one_line(message)} (see {self.prog} --help)\n")
 
+    def _check_value(self, action: argparse.Action, value: object) -> None:
+        """Refuse a value that is none of the words of an option, with the one that may be meant."""
+        if action.choices is not None and value not in action.choices:
+            words = f"expected {', '.join(map(str, action.choices))}, got {str(value)!r}"
+            near = suggestion(str(value), map(str, action.choices))
+            raise argparse.ArgumentError(action, f"{words}: {near}" if near else words)
+
     def format_help(self) -> str:
         """The help; names of models are looked up here, since loading every family takes seconds."""
         command: Command | None = self.get_default("command")
@@ -34,7 +41,9 @@ class Parser(argparse.ArgumentParser):
 
 def _ends(command: Command) -> Iterable[str]:
     """Paragraphs at the end of a command's help."""
-    if models.FORMS in command.options:
+    if models.OPTIONS in command.options:
+        yield f"Names of models: {', '.join(models.names_to_identify())}. A structure is a model in a file."
+    elif models.FORMS in command.options:
         yield f"Names of models: {', '.join(models.names())}."
     if command.examples:
         yield "examples:\n" + textwrap.indent(command.examples.strip(), "  ")

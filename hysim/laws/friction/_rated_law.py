@@ -215,9 +215,7 @@ class AtSampleTime(Law):
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box of the family for samples that are the law's sample time apart."""
         timed = replace(record, t=self.scalars["sample_time"] * np.arange(len(record)))
-        return declared_space(
-            self.searched, (), self.scalars, self.initial, record, freedom, units=rate_spans(timed)
-        )
+        return declared_space(self.searched, (), self.scalars, self.initial, record, freedom, units=rate_spans(timed))
 
     @classmethod
     def initial_memory(cls, tables: Tables, *, further: int = 0) -> FloatArray:

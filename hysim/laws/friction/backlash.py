@@ -19,8 +19,8 @@ class ElasticBacklash(RatedLaw):
         x = u - center - b,    |b| <= half_gap
 
     u is the twist between the two sides, b the part of it that the gap takes, x the twist of the shaft. In the gap the
-    shaft, without load, untwists as x' = -(stiffness / damping) x, so that contact ends before the shaft has no twist, and neither
-    side ever pulls. Without damping it is a dead zone, which has no memory.
+    shaft, without load, untwists as x' = -(stiffness / damping) x, so that contact ends before the shaft has no twist,
+    and neither side ever pulls. Without damping it is a dead zone, which has no memory.
 
     Parameters
     ----------
