@@ -117,23 +117,20 @@ def _cards(entries: Iterable[tuple[str, str, str, Any, str]]) -> str:
     return "\n".join(["::::{container} gallery", *cards, "::::"])
 
 
+@cache
 def frames() -> dict[str, str]:
-    """Addresses of the explorer with a family that is all of a model or its first part, by the families' full names."""
+    """Addresses of the explorer with each family, in the model of fewest parts, by the families' full names."""
     addresses: dict[str, str] = {}
     models = presets().items()
-    for whole in (True, False):
-        for preset, each in models:
-            parts = [each.model] if whole else getattr(each.model, "parts", ())
+    for preset, each in sorted(models, key=lambda named: len(_parts(named[1].model))):
+        for part in _parts(each.model):
             address = f"{EXPLORER}#{urlencode({'model': preset})}"
-            addresses = {
-                **{f"hysim.{type(part).__name__}": address for part in parts},
-                **addresses,
-            }
-    return {
-        name: address
-        for name, address in addresses.items()
-        if name.removeprefix("hysim.") in families()
-    }
+            addresses.setdefault(f"hysim.{type(part).__name__}", address)
+    return addresses
+
+
+def _parts(model: Any) -> tuple[Any, ...]:
+    return model.parts if isinstance(model, hs.Sum) else (model,)
 
 
 def _sliders(name: str) -> str:
