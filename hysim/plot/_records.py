@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from hysim._frozen import FloatArray
 from hysim._prefixes import in_unit, label
 from hysim.control import ClosedLoop
-from hysim.plot._style import MANY, MEASURED, AxesArray, joined, line, one, several
+from hysim.plot._style import MANY, MEASURED, AxesArray, joined, line, one, several, upright
 from hysim.records import Record, as_record
 from hysim.simulation import Simulation, columns_of, has_elements
 
@@ -135,7 +135,7 @@ def history(result: InputOutput, axes: Sequence[Axes] | AxesArray | None = None,
         if n == 3:
             panels[2].plot(t, z, **line(1))
         for ax, signal in zip(panels, "yuz", strict=False):
-            ax.set_ylabel(label(units, signal))
+            upright(ax, label(units, signal))
         panels[-1].set_xlabel("Sample" if time is None else label(units, "t"))
     return panels
 
@@ -164,7 +164,7 @@ def signals(result: Simulation, *names: str, axes: Sequence[Axes] | AxesArray | 
             columns = columns_of(name, result.signals[name])
             for k, (column, values) in enumerate(columns.items()):
                 ax.plot(t, values, label=column, **line(k))
-            ax.set_ylabel(_axis_of(name, result.units))
+            upright(ax, _axis_of(name, result.units))
             if 1 < len(columns) <= _MOST_NAMED:
                 ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         panels[-1].set_xlabel("Sample" if result.t is None else label(result.units, "t"))
