@@ -15,8 +15,8 @@ from hysim.export._page_controls import FEW, Control, by_fields, controls_of
 from hysim.export._page_modules import Kernels, kernels_of, module_of
 from hysim.kernels import clamps, play_sums
 from hysim.kernels.magnetics import energy_plays
-from hysim.laws._rate_part import RatePart
-from hysim.laws.friction._rated_law import RatedLaw
+from hysim.laws.dashpot import Dashpot
+from hysim.laws.friction.rated_law import RatedLaw
 from hysim.laws.magnetic.excess_loss import ExcessLoss
 from hysim.laws.operators.rate_dependent_prandtl_ishlinskii import RateDependentPrandtlIshlinskii
 from hysim.laws.static import SingleValued
@@ -58,7 +58,7 @@ def node_of(thing: Any, u: FloatArray, parts: Parts, prefix: str = "") -> dict[s
     first = len(parts.values)
     if isinstance(thing, SingleValued):
         return {"knots": [thing.u.tolist(), thing.y.tolist()], "name": "hs.SingleValued", "fields": []}
-    if isinstance(thing, RatePart):
+    if isinstance(thing, Dashpot | ExcessLoss):
         return _of_rate(thing, parts, prefix)
     if isinstance(thing, RatedLaw):
         return _rated(thing, u, parts, prefix)
@@ -178,7 +178,7 @@ def _at_sample_time(law: RateDependentPrandtlIshlinskii, u: FloatArray, parts: P
     return {**node, **names_of, "fields": fields, "per_time": [place]}
 
 
-def _of_rate(part: RatePart, parts: Parts, prefix: str) -> dict[str, Any]:
+def _of_rate(part: Dashpot | ExcessLoss, parts: Parts, prefix: str) -> dict[str, Any]:
     """A part that is a power of the velocity of the input, times a coefficient."""
     first, parts.timed = len(parts.values), True
     parts.values.append(part.c)

@@ -3,7 +3,7 @@
 from typing import ClassVar
 
 from hysim.kernels.friction import backlash as kernels
-from hysim.laws.friction._rated_law import RatedLaw, check_signs
+from hysim.laws.friction.rated_law import RatedLaw, check_signs
 from hysim.models.model import family
 from hysim.models.parameters import Parameter
 from hysim.models.tables import Tables

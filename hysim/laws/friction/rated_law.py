@@ -214,7 +214,8 @@ class AtSampleTime(Law):
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box of the family for samples that are the law's sample time apart."""
-        timed = replace(record, t=self.scalars["sample_time"] * np.arange(len(record)))
+        times = np.asarray(self.scalars["sample_time"] * np.arange(len(record)), dtype=np.float64)
+        timed = replace(record, t=times)
         return declared_space(self.searched, (), self.scalars, self.initial, record, freedom, units=rate_spans(timed))
 
     @classmethod
