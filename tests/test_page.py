@@ -478,7 +478,7 @@ def test_the_plays_that_are_drawn_are_those_of_python_at_the_moment(browser, mod
                 np.testing.assert_allclose(memory["z"], z, rtol=0.0, atol=1e-12 * np.ptp(shown.between), err_msg=name)
             inside = np.abs(np.subtract(memory["z"], u[-1])) <= np.array(memory["thresholds"]) * (1 + 1e-12) + 1e-12
             assert inside.all() or not memory["cone"], name
-    assert drawn == 9
+    assert drawn == 10
 
 
 @pytest.mark.browser
