@@ -21,6 +21,7 @@ from gallery import (  # noqa: E402
     LOOP_FOLDER,
     draw_families,
     family_cards,
+    frames,
     picture_cards,
     plant_cards,
 )
@@ -33,6 +34,9 @@ SEARCHED = (
     "creep",
     "backlash",
     "S-function",
+    "friction",
+    "posterior",
+    "drift",
     "piezo actuator",
     "magnetorheological damper",
 )
@@ -188,6 +192,7 @@ myst_substitutions = {
     ),
 }
 
+autosummary_context = {"frames": frames()}
 autosummary_generate = write_reference(HERE / "reference")
 draw_families(HERE / LOOP_FOLDER)
 

@@ -117,12 +117,29 @@ def _cards(entries: Iterable[tuple[str, str, str, Any, str]]) -> str:
     return "\n".join(["::::{container} gallery", *cards, "::::"])
 
 
+@cache
+def frames() -> dict[str, str]:
+    """Addresses of the explorer with each family, in the model of fewest parts, by the families' full names."""
+    addresses: dict[str, str] = {}
+    models = presets().items()
+    for preset, each in sorted(models, key=lambda named: len(_parts(named[1].model))):
+        for part in _parts(each.model):
+            address = f"{EXPLORER}#{urlencode({'model': preset})}"
+            addresses.setdefault(f"hysim.{type(part).__name__}", address)
+    return addresses
+
+
+def _parts(model: Any) -> tuple[Any, ...]:
+    return model.parts if isinstance(model, hs.Sum) else (model,)
+
+
 def _sliders(name: str) -> str:
-    """A link to the explorer with this family, if it is there."""
-    for preset, each in presets().items():
-        if type(each.model).__name__ == name:
-            return f' <a href="{EXPLORER}#{urlencode({"model": preset})}">Sliders.</a>'
-    return ""
+    """A link to the sliders on the page of this family, if it has some."""
+    return (
+        f' <a href="reference/hysim.{name}.html#sliders">Sliders.</a>'
+        if f"hysim.{name}" in frames()
+        else ""
+    )
 
 
 def _first_sentence(value: Any) -> str:

@@ -18,7 +18,9 @@ def nearest(name: object, known: Iterable[object]) -> str | None:
     from difflib import get_close_matches  # which is loaded with the first error, not with hysim
 
     forms = {plain(each): each for each in map(str, known)}
-    near = get_close_matches(plain(str(name)), forms, n=1)
+    word = plain(str(name))
+    near = get_close_matches(word, forms, n=3)
+    near.sort(key=lambda each: sorted(each) != sorted(word))  # two letters in each other's place before all else
     return forms[near[0]] if near else None
 
 

@@ -86,6 +86,17 @@ def test_the_gallery_has_every_law_every_plant_and_every_picture(gallery):
     assert all((DOCS / figure).exists() for figure in figures)
 
 
+def test_every_law_of_the_gallery_has_sliders_on_its_page(gallery):
+    frames, template = gallery.frames(), (DOCS / "_templates" / "autosummary" / "class.rst").read_text()
+    cards = gallery.family_cards()
+    names = {f"hysim.{name}" for name in gallery.families() if name != "SingleValued"}  # a curve of knots
+    assert frames.keys() == names
+    assert all(cards.count(f'"reference/{name}.html#sliders"') == 1 for name in frames)
+    assert frames["hysim.LuGre"] == "explorer.html#model=Friction%3A+LuGre"
+    assert frames["hysim.Dashpot"].startswith("explorer.html#model=Magnetorheological")
+    assert '<iframe id="sliders" src="../{{ frames[fullname] }}"' in template
+
+
 def test_a_law_of_the_gallery_shows_a_loop_where_its_shape_changes(gallery):
     for name in ("LuGre", "GeneralizedMaxwellSlip", "ElasticBacklash", "BoucWen"):
         law, between, _ = gallery.example_of(name)

@@ -24,6 +24,8 @@ from hysim.export._page import LARGEST, Shown, page_text, to_page
 from hysim.export._page_model import output_of, steps_of
 from hysim.export._page_modules import FOLDER, c_source, compiled, module_of
 from hysim.export._page_presets import presets
+from hysim.laws._rate_part import RatePart
+from hysim.laws.friction.rated_law import RatedLaw
 from hysim.models.model import every_family
 from hysim.paper.reproduction import browser_page
 
@@ -121,8 +123,7 @@ def test_the_equation_of_the_output_names_every_number_that_is_linear_in_it(mode
 def test_the_explorer_has_every_family_of_laws(models, tmp_path):
     shown = {type(part).__name__ for each in models.values() for part in _parts(each.model)}
     laws = {name for name, family in every_family().items() if family.__module__.startswith("hysim.laws.")}
-    friction = {name for name in laws if every_family()[name].__module__.startswith("hysim.laws.friction.")}
-    assert laws - shown <= {"SingleValued", "ExcessLoss"} | friction  # a curve of knots; no module has a clock
+    assert laws - shown == {"SingleValued"}  # a curve of knots
     assert explorer(tmp_path / "explorer.html").stat().st_size < LARGEST
 
 
@@ -173,8 +174,9 @@ def test_modules_compute_what_python_computes(models, name):
     low, high = shown.between
     u = low + (high - low) * np.concatenate([rng.random(200), np.linspace(0.0, 1.0, 40), np.full(3, 0.5)])
     for law in _parts(shown.model):
-        if isinstance(law, hs.Dashpot):
+        if isinstance(law, RatePart):
             continue
+        law = law.at_sample_time(0.01) if isinstance(law, RatedLaw) else law
         expected = law.response(u)
         np.testing.assert_allclose(by_module(law, u), expected, rtol=0.0, atol=1e-12 * np.ptp(expected))
 
@@ -472,11 +474,11 @@ def test_the_plays_that_are_drawn_are_those_of_python_at_the_moment(browser, mod
             assert state["moment"] == round(share / 400 * (len(state["u"]) - 1))
             assert memory["u"] == u[-1]
             if "rate" not in name:
-                z = np.atleast_1d(shown.model.memory(u)[-1])
+                z = np.atleast_1d(_parts(shown.model)[0].memory(u)[-1])
                 np.testing.assert_allclose(memory["z"], z, rtol=0.0, atol=1e-12 * np.ptp(shown.between), err_msg=name)
             inside = np.abs(np.subtract(memory["z"], u[-1])) <= np.array(memory["thresholds"]) * (1 + 1e-12) + 1e-12
             assert inside.all() or not memory["cone"], name
-    assert drawn == 9
+    assert drawn == 10
 
 
 @pytest.mark.browser

@@ -549,3 +549,19 @@ def test_cycles_are_coloured_by_their_number():
     assert (np.diff(lightness) > 0.0).all()
     with pytest.raises(ValueError, match="constant"):
         hs.plot.cycles(hs.Record(u=[1.0, 1.0], y=[0.0, 0.0]))
+
+
+def test_a_label_that_is_longer_than_its_panel_has_its_unit_in_a_second_line():
+    record = hs.Record(u=[0.0, 1.0, 0.0], y=[0.0, 1.0, 0.5], units={"u": "V", "y": "um"})
+    low, high = (hs.plot.figure(3.4, height).subplots(2) for height in (2.5, 6.0))
+    assert [ax.get_ylabel() for ax in hs.plot.history(record, low)] == ["Displacement\n[µm]", "Voltage [V]"]
+    assert [ax.get_ylabel() for ax in hs.plot.history(record, high)] == ["Displacement [µm]", "Voltage [V]"]
+
+
+def test_histories_of_two_models_on_the_same_axes_differ_by_their_lines():
+    record, panels = hs.datasets.table1(), hs.plot.figure().subplots(2)
+    for result in (record, hs.simulate(hs.Line(slope=0.02), None, record.u), hs.simulate(LAW, None, record.u)):
+        hs.plot.history(result, panels)
+    _, line, law = panels[0].lines
+    assert line.get_color() != law.get_color()
+    assert line.get_linestyle() != law.get_linestyle()

@@ -10,7 +10,7 @@ from frame_laws import FAMILIES, JUMPING, LAWS, SMOOTH, bouc_wen
 from scipy.linalg import eigvals, expm
 
 import hysim as hs
-from hysim.laws.friction._rated_law import RatedLaw
+from hysim.laws.friction.rated_law import RatedLaw
 from hysim.models.candidates import every_family
 from hysim.models.protocols import Stepwise, needs_time
 

@@ -32,7 +32,7 @@ from hysim.cli import (
 )
 from hysim.cli.options import Command
 from hysim.cli.shell import completion, signals
-from hysim.cli.shell.parser import BAD_INPUT, Parser, in_groups, one_line, unexpected
+from hysim.cli.shell.parser import BAD_INPUT, Parser, in_groups, one_line, unexpected, unknown_options
 from hysim.cli.shell.words import in_shell_words, suggestion
 from hysim.errors import SimulationError
 
@@ -101,11 +101,14 @@ def _run(arguments: list[str]) -> int:
     named = next((argument for argument in arguments if not argument.startswith("-")), None)
     parser, of_commands = parsers(named if named in COMMANDS and arguments[0] == named else None)
     if named is not None and named not in COMMANDS:
-        advice = suggestion(named, COMMANDS) or f"there are {', '.join(COMMANDS)}"
+        advice = suggestion(named, ["--help", *COMMANDS]) or f"there are {', '.join(COMMANDS)}"
         parser.error(f"there is no command {named!r}: {advice}")
+    asked = parser if named is None else of_commands[named]
+    own = arguments if named is None else arguments[arguments.index(named) + 1 :]
+    if misspelt := unknown_options(own, asked):  # which argparse would take for a required option that is missing
+        asked.error(unexpected(misspelt, asked))
     options, unknown = parser.parse_known_args(arguments)
     if unknown:
-        asked = parser if named is None else of_commands[named]
         asked.error(unexpected(unknown, asked))
     if named is None:
         parser.print_help(sys.stderr)

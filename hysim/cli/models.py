@@ -49,7 +49,11 @@ actuator: the model actuator, from records of several rates
 """
 """The choice of a family and the options of its structure."""
 
-_SHORT = {"zhu-wang": "ZhuWangBoucWen", "baber-noori": "BoucWenBaberNoori", "oscillator": "BoucWenOscillator"}
+_SHORT = {
+    "zhu-wang": "ZhuWangBoucWen", "baber-noori": "BoucWenBaberNoori", "lugre": "LuGre",
+    "oscillator": "BoucWenOscillator",
+}  # fmt: skip
+_PLANTS = ("oscillator", "actuator")
 _STRUCTURAL = (
     "plays", "relay_intervals", "one_signed", "degree", "poles", "zeros", "sample", "hold", "oversampling", "period",
     "excitation",
@@ -77,6 +81,20 @@ def names() -> list[str]:
     return [short.get(name, _hyphenated(name)) for name in families]
 
 
+def names_to_identify() -> list[str]:
+    """Names of all models that `hysim identify` takes: those to compare, further laws and plants."""
+    from hysim.models.candidates import is_identifiable
+    from hysim.models.model import every_family
+
+    short = {family: name for name, family in _SHORT.items()}
+    laws = [
+        short.get(name, _hyphenated(name))
+        for name, law in every_family().items()
+        if law.__module__.startswith("hysim.laws.") and is_identifiable(law)
+    ]
+    return [*dict.fromkeys([*names(), *laws, *_PLANTS])]
+
+
 def family(name: str) -> Any:
     """The family with a name such as ``bouc-wen``; a ValueError, which lists the names, if there is none."""
     from hysim.models.model import FAMILIES
@@ -84,9 +102,11 @@ def family(name: str) -> Any:
     public = _public()
     law = resolved(f"hysim:{public[name]}") if name in public else None
     if law is None or FAMILIES.get(public[name]) is not law:
-        known = [*names(), "oscillator"]
+        known = names_to_identify()
         near = suggestion(name, known) or f"give one of {', '.join(known)}"
         raise ValueError(f"there is no model {name!r}: {near} (models of your own: MODEL.json or module:name)")
+    if name == "structure":
+        raise ValueError("a structure has no default: give one in a file, MODEL.json, which hs.save writes")
     return law
 
 
@@ -168,7 +188,10 @@ def to_identify(options: argparse.Namespace) -> Any:
     used = {name: vars(options)[name] for name in _STRUCTURAL if vars(options)[name] is not None}
     taken = {name: argument for name in _STRUCTURAL if (argument := _argument(model, name))}
     if foreign := [name for name in used if name not in taken]:
-        raise ValueError(f"--{foreign[0].replace('_', '-')} is no option of the model {options.model}")
+        others = [name for name in names_to_identify() if _argument(family(name), foreign[0])]
+        raise ValueError(
+            f"--{foreign[0].replace('_', '-')} is no option of the model {options.model}, but of {', '.join(others)}"
+        )
     if missing := [name for name in _NEEDED if name in taken and name not in used]:
         raise ValueError(f"the model {options.model} needs --{missing[0]}")
     structure = {taken[name]: value == "yes" if name == "one_signed" else value for name, value in used.items()}

@@ -184,12 +184,15 @@ class Discovery(_Discovered):
         judged, rates = self.judgement, ", ".join(f"{rate:g}" for rate in self.judgement.rates)
         rows = {
             "route": self.route,
-            "held-out rmse": ", ".join(f"{name} {value:.4g}" for name, value in judged.held_out.items()),
+            "held-out rmse": ", ".join(
+                f"{name} {value:.4g}" for name, value in judged.held_out.items() if not math.isnan(value)
+            ),
             "cross-validated rmse": "" if math.isnan(self.cv_rmse) else f"{self.cv_rmse:.4g}",
         }
         for name, widths in judged.widths.items() if full else ():
-            percent = ", ".join(f"{100.0 * width:.2f} %" for width in widths)
-            rows[f"relative width of the {name} at {rates} times the rate"] = percent
+            if not all(map(math.isnan, widths)):
+                percent = ", ".join(f"{100.0 * width:.2f} %" for width in widths)
+                rows[f"relative width of the {name} at {rates} times the rate"] = percent
         return rows
 
 

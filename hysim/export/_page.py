@@ -5,6 +5,7 @@ are its parts: markup, style, and script, joined in the order of `_PARTS`.
 """
 
 import base64
+import gzip
 import json
 from collections.abc import Mapping
 from html import escape
@@ -32,12 +33,15 @@ LARGEST = 300_000
 
 _PARTS = ("step", "inputs", "measures", "draw", "memory", "equations", "code", "control", "page")
 _SAMPLES = 200  # of the input on which the sliders' ends are found
+_BRANCHES = 5  # of the same input
+_PERIOD = 1.0  # of the input at first [s]
 
 
 class Shown(NamedTuple):
     """A model of a page, the input between which it begins, labels of units, and the group in which it is listed.
 
     The plays of a Prandtl-Ishlinskii law with `stack` have equal weights and even thresholds, and sliders for both.
+    `kind` is the input with which it begins.
     """
 
     model: Any
@@ -45,6 +49,7 @@ class Shown(NamedTuple):
     units: Mapping[str, str] = MappingProxyType({})
     stack: bool = False
     group: str = ""
+    kind: str = "triangle"
 
 
 def to_page(
@@ -114,10 +119,13 @@ def page_text(models: Mapping[str, Shown], record: Record | None = None, *, titl
     """The page as a text; the same arguments give the same text."""
     modules: dict[str, bytes] = {}
     packs: list[str] = []
-    described = [_model(name, shown, Parts(modules, packs), record) for name, shown in models.items()]
+    time = 0.5 * _PERIOD * _BRANCHES / _SAMPLES
+    described = [_model(name, shown, Parts(modules, packs, sample_time=time), record) for name, shown in models.items()]
+    codes = {name: gzip.decompress(module) for name, module in modules.items()}  # smaller if compressed together
     data = {
         "models": described,
-        "modules": {name: base64.b64encode(module).decode() for name, module in modules.items()},
+        "modules": {name: len(code) for name, code in codes.items()},
+        "code": base64.b64encode(compressed(b"".join(codes.values()))).decode(),
         "record": None if record is None else _record(record),
     }
     folder = files("hysim.export").joinpath("page")
@@ -137,8 +145,8 @@ def _model(name: str, shown: Shown, parts: Parts, record: Record | None) -> dict
     if not low < high:
         raise ValueError(f"between must be (lowest, highest input), got {(low, high)}")
     middle, amplitude = 0.5 * (low + high), 0.5 * (high - low)
-    quarters = np.arange(_SAMPLES + 1) / _SAMPLES * 5.0
-    u = middle + amplitude * np.interp(quarters, np.arange(6), [0.0, 1.0, -1.0, 1.0, -0.5, 0.5])
+    branches = np.arange(_SAMPLES + 1) / _SAMPLES * _BRANCHES
+    u = middle + amplitude * np.interp(branches, np.arange(_BRANCHES + 1), [0.0, 1.0, -1.0, 1.0, -0.5, 0.5])
     node = node_of(thing, u, parts)
     if shown.stack:
         parts.controls[:], node["stack"] = _stack(parts.controls, thing), True
@@ -152,7 +160,7 @@ def _model(name: str, shown: Shown, parts: Parts, record: Record | None) -> dict
         "values": parts.values,
         "controls": parts.controls,
         "inputs": _inputs(amplitude, middle, parts.timed),
-        "kind": "triangle",
+        "kind": shown.kind,
         "timed": parts.timed,
         "labels": {
             **{signal: label(units, signal) for signal in ("u", "y")},
@@ -172,7 +180,7 @@ def _inputs(amplitude: float, middle: float, timed: bool) -> list[dict[str, Any]
         {"name": "smaller loops", "value": 4, "lower": 0, "upper": 12, "whole": True},
     ]
     if timed:
-        sliders.append({"name": "period", "value": 1.0, "lower": 0.01, "upper": 100.0, "log": True, "unit": "s"})
+        sliders.append({"name": "period", "value": _PERIOD, "lower": 0.01, "upper": 100.0, "log": True, "unit": "s"})
     return sliders
 
 

@@ -18,7 +18,7 @@ from hysim.records import Record
 _MOST = 3  # elements of a tuple that have a slider each; longer ones have one for all
 _FIRST, _LAST = 1e-5, 1e3  # changes of a number that are tried, in sizes of itself
 _TINY, _SMALL, _LARGE = 0.02, 0.25, 1.0  # changes of the output, in its spans
-_FEW = 100  # samples of the input on which changes are computed
+FEW = 100  # samples of the input on which changes are computed
 _DECADE = 10.0
 _FACTOR = 4.0  # of a slider that scales a tuple
 
@@ -74,7 +74,7 @@ class _Reach:
     """How far the numbers of a law can be moved on an input."""
 
     def __init__(self, law: Law, u: FloatArray) -> None:
-        self.law, self.u = law, u[:: max(1, len(u) // _FEW)]
+        self.law, self.u = law, u[:: max(1, len(u) // FEW)]
         self.y = law.response(self.u)
         self.span = float(np.ptp(self.y)) or 1.0
         self.boxes = _boxes(law, Record(u=self.u, y=self.y))

@@ -11,11 +11,13 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.export._packing import packing
-from hysim.export._page_controls import Control, by_fields, controls_of
+from hysim.export._page_controls import FEW, Control, by_fields, controls_of
 from hysim.export._page_modules import Kernels, kernels_of, module_of
 from hysim.kernels import clamps, play_sums
 from hysim.kernels.magnetics import energy_plays
 from hysim.laws.dashpot import Dashpot
+from hysim.laws.friction.rated_law import RatedLaw
+from hysim.laws.magnetic.excess_loss import ExcessLoss
 from hysim.laws.operators.rate_dependent_prandtl_ishlinskii import RateDependentPrandtlIshlinskii
 from hysim.laws.static import SingleValued
 from hysim.models.cascade import Cascade
@@ -23,16 +25,22 @@ from hysim.models.law import Law
 from hysim.models.sum import Sum
 from hysim.models.tracing.routine import plain
 
+_CLOCK = "sample_time"
+
 
 @dataclass
 class Parts:
-    """Parts of the models of a page: modules by name, functions that pack, numbers and sliders."""
+    """Parts of the models of a page: modules by name, functions that pack, numbers and sliders.
+
+    `sample_time` is that of the input on which the ends of sliders are found [s].
+    """
 
     modules: dict[str, bytes] = field(default_factory=dict)
     packs: list[str] = field(default_factory=list)
     values: list[float] = field(default_factory=list)
     controls: list[dict[str, Any]] = field(default_factory=list)
     timed: bool = False
+    sample_time: float = 1.0
 
 
 def node_of(thing: Any, u: FloatArray, parts: Parts, prefix: str = "") -> dict[str, Any]:
@@ -50,12 +58,10 @@ def node_of(thing: Any, u: FloatArray, parts: Parts, prefix: str = "") -> dict[s
     first = len(parts.values)
     if isinstance(thing, SingleValued):
         return {"knots": [thing.u.tolist(), thing.y.tolist()], "name": "hs.SingleValued", "fields": []}
-    if isinstance(thing, Dashpot):
-        parts.values.append(thing.c)
-        parts.timed = True
-        size = 2.0 * abs(thing.c) or 1.0
-        parts.controls.append(Control("c", thing.c, -size, size, (0,)).to_json(first, prefix))
-        return {"rate": first, "name": "hs.Dashpot", "fields": [["c", first, 1.0]], "output": output_of(Dashpot)}
+    if isinstance(thing, Dashpot | ExcessLoss):
+        return _of_rate(thing, parts, prefix)
+    if isinstance(thing, RatedLaw):
+        return _rated(thing, u, parts, prefix)
     if isinstance(thing, RateDependentPrandtlIshlinskii):
         return _at_sample_time(thing, u, parts, prefix)
     if not isinstance(thing, Law):
@@ -122,7 +128,9 @@ def steps_of(thing: Any) -> list[Kernels]:
     if isinstance(thing, (Sum, Cascade)):
         members = thing.parts if isinstance(thing, Sum) else thing.stages
         return [kernels for member in members for kernels in steps_of(member)]
-    law = thing.at(1.0) if isinstance(thing, RateDependentPrandtlIshlinskii) else thing
+    if isinstance(thing, RateDependentPrandtlIshlinskii):
+        thing = thing.at(1.0)
+    law = thing.at_sample_time(1.0) if isinstance(thing, RatedLaw) else thing
     return [kernels_of(_general(law))] if isinstance(law, Law) else []
 
 
@@ -170,6 +178,30 @@ def _at_sample_time(law: RateDependentPrandtlIshlinskii, u: FloatArray, parts: P
     return {**node, **names_of, "fields": fields, "per_time": [place]}
 
 
+def _of_rate(part: Dashpot | ExcessLoss, parts: Parts, prefix: str) -> dict[str, Any]:
+    """A part that is a power of the velocity of the input, times a coefficient."""
+    first, parts.timed = len(parts.values), True
+    parts.values.append(part.c)
+    size = 2.0 * abs(part.c) or 1.0
+    parts.controls.append(Control("c", part.c, -size, size, (0,)).to_json(first, prefix))
+    words = {"name": _name(type(part)), "fields": [["c", first, 1.0]], "output": output_of(type(part))}
+    return {"rate": first, "power": 0.5 if isinstance(part, ExcessLoss) else 1.0, **words}
+
+
+def _rated(law: RatedLaw, u: FloatArray, parts: Parts, prefix: str) -> dict[str, Any]:
+    """A law that depends on the rate of its input, whose first number is the page's sample time."""
+    first, parts.timed = len(parts.values), True
+    coarse = u[:: max(1, len(u) // FEW)]
+    timed = law.at_sample_time(parts.sample_time * (len(u) - 1) / (len(coarse) - 1))
+    node = _law(timed, parts, first)
+    names = list(timed.scalars)
+    free = tuple(names[place] for place in node["free"] if names[place] != _CLOCK)
+    parts.controls += [control.to_json(first, prefix) for control in controls_of(timed, free, coarse)]
+    fields = [each for each in node["fields"] if each[0] != _CLOCK]
+    words = {"kind": type(law).__name__, "name": _name(type(law)), "output": output_of(type(law))}
+    return {**node, **words, "fields": fields, "clock": names.index(_CLOCK)}
+
+
 def _name(family: type) -> str:
     return f"hs.{family.__name__}" if family.__module__.startswith("hysim.") else family.__name__
 
@@ -193,7 +225,7 @@ def about(thing: Any) -> tuple[str, str]:
 def output_of(family: type) -> str:
     """Right side of the equation of y in the docstring of a family; empty if it has none."""
     text = (getdoc(family) or "").split("\nParameters\n")[0]
-    found = re.search(r"\b[yF] *= ((?:offset|c u').*?)(?=``|,\s|\n|$)", text)
+    found = re.search(r"\b[yFT] *= ((?:offset|c (?:u'|sign)).*?)(?=``|,\s| {3}|\n|$)", text)
     return "" if found is None else found.group(1)
 
 

@@ -13,6 +13,7 @@ from hysim.benchmarks import noel_schoukens_plant
 from hysim.export._page import Shown, page_text
 
 _DAMPER = {"u": "mm", "y": "kN"}
+_CONTACT = {"u": "mm", "y": "N"}
 _UNIT, _WIDE = (-1.0, 1.0), (-2.0, 2.0)
 _MOST_PLAYS = 20
 
@@ -22,6 +23,7 @@ def presets() -> dict[str, Shown]:
     groups = {
         "Differential laws": _differential(),
         "Plays, stops, relays": _operators(),
+        "Friction and backlash": _contacts(),
         "Magnetic cores": _cores(),
         "Devices": _devices(),
     }
@@ -113,6 +115,8 @@ def _operators() -> dict[str, Shown]:
 
 def _cores() -> dict[str, Shown]:
     core = hs.EnergyPlays(thresholds=(0.0, 0.2, 0.5), weights=(0.2, 0.6, 0.4), field=0.15)
+    static = hs.MaxwellSlip(stiffness=(200.0, 100.0, 50.0), slips=(0.2, 0.5, 1.0))
+    losses = static + hs.Dashpot(c=4.0) + hs.ExcessLoss(c=10.0)
     table = hs.TellinenTable(
         inputs=(-2.0, -1.0, 0.0, 1.0, 2.0), lower=(-1.0, -0.9, -0.5, 0.6, 1.0), upper=(-1.0, -0.6, 0.5, 0.9, 1.0)
     )
@@ -124,6 +128,24 @@ def _cores() -> dict[str, Shown]:
         "Magnetic core: Tellinen's branches from a table": Shown(table, _WIDE),
         "Magnetic core: Chan": Shown(hs.Chan(coercivity=0.4, squareness=0.5), _WIDE),
         "Magnetic core: energy-based plays": Shown(core, _WIDE),
+        "Magnetic core: static, eddy current and excess field": Shown(
+            losses, _UNIT, {"u": "T", "y": "A/m"}, kind="sine"
+        ),
+    }
+
+
+def _contacts() -> dict[str, Shown]:
+    bristles = hs.LuGre(sigma0=20.0, sigma1=0.1, sigma2=0.02, coulomb=1.0, breakaway=1.5, stribeck_velocity=2.0)
+    curve = hs.StribeckFriction(coulomb=1.0, breakaway=1.5, breakaway_velocity=1.0, viscous=0.05)
+    slips = hs.GeneralizedMaxwellSlip(
+        stiffness=(20.0, 10.0, 5.0), weights=(0.4, 0.3, 0.3), stribeck_velocity=2.0, attraction=50.0, viscous=0.02
+    )
+    shaft = hs.ElasticBacklash(stiffness=2.0, damping=0.05, half_gap=0.4)
+    return {
+        "Friction: LuGre": Shown(bristles, _UNIT, _CONTACT, kind="sine"),
+        "Friction: Stribeck": Shown(curve, _UNIT, _CONTACT, kind="sine"),
+        "Friction: Maxwell slip with a lag": Shown(slips, _UNIT, _CONTACT, kind="sine"),
+        "Backlash of an elastic shaft": Shown(shaft, _UNIT, {"u": "rad", "y": "N m"}, kind="sine"),
     }
 
 

@@ -149,7 +149,7 @@ class Identification(Stored):
 
     def __str__(self) -> str:
         state = "" if self.success else ", NOT converged"
-        free = [f"{name} {self.estimates[name]:.4g} +- {self.stderr[name]:.2g}" for name in self.free_names]
+        free = [f"{name} {self.estimates[name]:.4g}{_error_in_words(self.stderr[name])}" for name in self.free_names]
         fixed = [f"{name} {value:.4g}" for name, value in self.estimates.items() if name not in self.free_names]
         width = self.loop_width
         return summary_text(
@@ -211,7 +211,8 @@ class Identification(Stored):
 
     def _line(self, name: str) -> str:
         lower, upper = self.intervals[name]
-        return f"  {name} = {self.estimates[name]:.6g} +- {self.stderr[name]:.2g}  [{lower:.5g}, {upper:.5g}]"
+        ends = "" if np.isnan(lower) and np.isnan(upper) else f"  [{lower:.5g}, {upper:.5g}]"
+        return f"  {name} = {self.estimates[name]:.6g}{_error_in_words(self.stderr[name])}{ends}"
 
     def _fit_in_words(self) -> str:
         return "fit not defined" if np.isnan(self.fit_percent) else f"fit {self.fit_percent:.2f} %"
@@ -226,3 +227,7 @@ class Identification(Stored):
         if not np.isnan(self.whiteness):
             words.append(f"p = {self.whiteness:.2g} if white")
         return ", ".join(words)
+
+
+def _error_in_words(stderr: float) -> str:
+    return ", standard error unknown" if np.isnan(stderr) else f" +- {stderr:.2g}"

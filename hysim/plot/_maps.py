@@ -74,8 +74,9 @@ def residual_map(
             ax.grid(visible=False)
             ax.pcolormesh(edges, np.arange(len(table) + 1) + 0.5, table, **scale, **_SEAMLESS)
             ax.set_title(name, loc="left")
-            ax.set(xlabel=label(record.units, "u"), ylabel="Cycle")
+            ax.set_xlabel(label(record.units, "u"))
             ax.yaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+        panels[0].set_ylabel("Cycle")
         panels[0].figure.colorbar(ScalarMappable(**scale), ax=list(panels), label=in_unit("Residual", unit))
     return panels
 

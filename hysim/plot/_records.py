@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from hysim._frozen import FloatArray
 from hysim._prefixes import in_unit, label
 from hysim.control import ClosedLoop
-from hysim.plot._style import MANY, MEASURED, AxesArray, joined, line, one, several
+from hysim.plot._style import MANY, MEASURED, POINTS, AxesArray, joined, line, one, several, upright
 from hysim.records import Record, as_record
 from hysim.simulation import Simulation, columns_of, has_elements
 
@@ -110,8 +110,9 @@ def history(result: InputOutput, axes: Sequence[Axes] | AxesArray | None = None,
     """Draw output, input and, if there is one, memory against time, one over the other.
 
     `result` is a Record, a Simulation or anything with arrays `u` and `y`; without times they are drawn against the
-    sample's number. With two `axes` the memory z is left out. `hold` is ``"zoh"``, which draws the input as steps, or
-    ``"foh"``, straight lines; another word is a ValueError. The result has shape (2,) or (3,).
+    sample's number. With two `axes` the memory z is left out. Models on the same `axes` differ by their lines. `hold`
+    is ``"zoh"``, which draws the input as steps, or ``"foh"``, straight lines; another word is a ValueError. The result
+    has shape (2,) or (3,).
 
     Examples
     --------
@@ -126,16 +127,17 @@ def history(result: InputOutput, axes: Sequence[Axes] | AxesArray | None = None,
     t = np.arange(float(result.u.size)) if time is None else time
     end = 2.0 * t[-1] - t[-2] if t.size > 1 else t[-1]
     units = units_of(result)
-    is_dense = result.u.size > MANY
-    style = joined(result.u.size) | ({"linewidth": 1.2} if is_dense else {}) if isinstance(result, Record) else line(0)
+    thin = {"linewidth": 1.2} if result.u.size > MANY else {}
     n = 2 if z is None or (axes is not None and np.size(np.asarray(axes)) == 2) else 3
     with several(axes, n, height=2.1 if n == 2 else 1.9) as panels:
-        panels[0].plot(t, result.y, **style)
+        before = sum(drawn.get_color() != POINTS for drawn in panels[0].lines)  # models on the same Axes
+        measured = isinstance(result, Record)
+        panels[0].plot(t, result.y, **(joined(result.u.size) | thin if measured else line(before)))
         panels[1].plot(np.append(t, end), np.append(result.u, result.u[-1]), color=MEASURED, drawstyle=_DRAWN[hold])
         if n == 3:
             panels[2].plot(t, z, **line(1))
         for ax, signal in zip(panels, "yuz", strict=False):
-            ax.set_ylabel(label(units, signal))
+            upright(ax, label(units, signal))
         panels[-1].set_xlabel("Sample" if time is None else label(units, "t"))
     return panels
 
@@ -164,7 +166,7 @@ def signals(result: Simulation, *names: str, axes: Sequence[Axes] | AxesArray | 
             columns = columns_of(name, result.signals[name])
             for k, (column, values) in enumerate(columns.items()):
                 ax.plot(t, values, label=column, **line(k))
-            ax.set_ylabel(_axis_of(name, result.units))
+            upright(ax, _axis_of(name, result.units))
             if 1 < len(columns) <= _MOST_NAMED:
                 ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         panels[-1].set_xlabel("Sample" if result.t is None else label(result.units, "t"))

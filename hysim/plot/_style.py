@@ -15,6 +15,7 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap, ListedColormap
 from matplotlib.figure import Figure
+from matplotlib.textpath import TextPath
 
 AxesArray = npt.NDArray[np.object_]
 
@@ -39,6 +40,7 @@ _JOINED: dict[str, Any] = {
     "markeredgecolor": MEASURED,
 }
 _SMALLEST = 1.0  # dot [pt]
+_GAPS = 1.1  # a label may reach into the gaps between panels, and constrained layout makes these smaller
 _BROAD = 2.6  # line of a record [pt]: that of a model is seen over it
 
 SEQUENTIAL = ListedColormap(matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, 256)), "hysim_sequential")
@@ -132,6 +134,14 @@ def several(
     with house_style():
         canvas = plt.figure(figsize=(WIDTH, height * math.ceil(n / columns)), layout="constrained")
         yield panels(canvas, n, columns=columns, sharex=sharex, sharey=sharey)
+
+
+def upright(ax: Axes, text: str) -> None:
+    """Set the label of the vertical axis; its unit stands in a second line where the panel is too low for one line."""
+    height = _GAPS * 72.0 * ax.get_position().height * ax.get_figure(root=True).get_figheight()  # type: ignore[union-attr]
+    font = ax.yaxis.label.get_fontproperties()
+    is_long = TextPath((0.0, 0.0), text, size=font.get_size_in_points(), prop=font).get_extents().width > height
+    ax.set_ylabel(text.replace(" [", "\n[") if is_long else text)
 
 
 def line(k: int) -> dict[str, Any]:

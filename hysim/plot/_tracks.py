@@ -8,7 +8,7 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 
 from hysim._prefixes import in_unit
-from hysim.plot._style import one
+from hysim.plot._style import line, one
 from hysim.tracking import ParameterTrack
 
 
@@ -60,10 +60,10 @@ def track(
     path, (lower, upper) = result[name], result.band(name)
     x = np.arange(path.size) if t is None else np.asarray(t)
     with one(ax, height=3.0) as axes:
-        axes.fill_between(x, lower, upper, alpha=0.25, linewidth=0.0, label="95 %")
-        axes.plot(x, path, label=f"by {result.method}s")
+        axes.fill_between(x, lower, upper, alpha=0.25, linewidth=0.0, label="95 %", color=line(0)["color"])
+        axes.plot(x, path, label=f"by {result.method}s", **line(0))
         if truth is not None:
-            axes.plot(x, np.asarray(truth), label="truth")
+            axes.plot(x, np.asarray(truth), label="truth", **line(1))
         axes.set_xlabel("sample" if t is None else "t [s]")
         axes.set_ylabel(in_unit(name, (units or {}).get(name, "")))
         axes.legend()

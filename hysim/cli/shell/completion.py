@@ -46,7 +46,7 @@ hysim completion fish
 
 
 def _options(parser: argparse.ArgumentParser) -> Iterator[_Option]:
-    names = models.names()
+    names = models.names_to_identify()
     for action in parser._actions:
         help_ = " ".join((action.help or "").replace("%%", "%").split()).partition("; ")[0]
         is_model = action.metavar == "MODEL" and "--model" in action.option_strings

@@ -1,6 +1,7 @@
 """Parser of the command line: help with groups of commands and examples, and errors in one line."""
 
 import argparse
+import itertools
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NoReturn
@@ -23,6 +24,13 @@ class Parser(argparse.ArgumentParser):
         """Print an error and the command with the help, and exit with 2."""
         self.exit(BAD_INPUT, f"{self.prog}: error: {one_line(message)} (see {self.prog} --help)\n")
 
+    def _check_value(self, action: argparse.Action, value: object) -> None:
+        """Refuse a value that is none of the words of an option, with the one that may be meant."""
+        if action.choices is not None and value not in action.choices:
+            words = f"expected {', '.join(map(str, action.choices))}, got {str(value)!r}"
+            near = suggestion(str(value), map(str, action.choices))
+            raise argparse.ArgumentError(action, f"{words}: {near}" if near else words)
+
     def format_help(self) -> str:
         """The help; names of models are looked up here, since loading every family takes seconds."""
         command: Command | None = self.get_default("command")
@@ -33,7 +41,9 @@ class Parser(argparse.ArgumentParser):
 
 def _ends(command: Command) -> Iterable[str]:
     """Paragraphs at the end of a command's help."""
-    if models.FORMS in command.options:
+    if models.OPTIONS in command.options:
+        yield f"Names of models: {', '.join(models.names_to_identify())}. A structure is a model in a file."
+    elif models.FORMS in command.options:
         yield f"Names of models: {', '.join(models.names())}."
     if command.examples:
         yield "examples:\n" + textwrap.indent(command.examples.strip(), "  ")
@@ -54,6 +64,13 @@ def in_groups(groups: Mapping[str, Sequence[Command]]) -> str:
         "\n".join([f"{title}:", *(f"  {command.name:<{width}}  {command.help}" for command in commands)])
         for title, commands in groups.items()
     )
+
+
+def unknown_options(words: Iterable[str], parser: argparse.ArgumentParser) -> list[str]:
+    """Options among the words, as far as a word ``--``, that a command does not have, not even in full length."""
+    known = parser._option_string_actions
+    options = [word for word in itertools.takewhile(lambda word: word != "--", words) if word.startswith("--")]
+    return [word for word in options if not any(each.startswith(word.partition("=")[0]) for each in known)]
 
 
 def unexpected(words: Sequence[str], parser: argparse.ArgumentParser) -> str:

@@ -29,6 +29,7 @@ _PHRASES = (
     ("hysim.to_c and hysim.to_fmu", "hysim c and hysim fmu"),
     (", names as in Structure.scalars", ""),
 )
+_BOUNDS = re.compile(r"bounds of '([^']+)' must be \(lower, upper\) with lower < upper, got \(([^,]+), ([^)]+)\)")
 _RESAMPLED = re.compile(r"hs\.load\(\.\.\.\)\.resample\(([^)]*)\)")
 _CALL = re.compile(r"\b[A-Za-z_]\w*\((?:[^()]|\([^()]*\))*\)")
 _VALUE = r"""(?:("[^"]*"|'[^']*'|\[[^\]]*\]|\{[^}]*\}|False|True|-?\d(?:[\w.+-]*\w)?)|(?!\w))"""
@@ -40,6 +41,7 @@ _BEGIN = r"(?P<before>^(?:\S+: )?)(?P<name>{})(?= (?:must|is|are|has|takes|names
 def in_shell_words(message: str, flags: Mapping[str, str]) -> str:
     """The message with options in place of arguments; `flags` are the options of a command by the names of values."""
     message = _RESAMPLED.sub(r"--t, --u and --sample-time \1", message)
+    message = _BOUNDS.sub(r"--bounds \1=LOW:HIGH needs LOW below HIGH, got \2:\3", message)
     for phrase, words in _PHRASES:
         message = message.replace(phrase, words)
     options = {**flags, **{name: flags[other] for name, other in OTHER_NAMES.items() if other in flags}}

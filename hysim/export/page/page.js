@@ -316,8 +316,7 @@ function loopRows(loop, { u, y }) {
 
 async function opened(data, packs) {
   for (const model of data.models) for (const law of lawsOf(model.node)) law.packed = packs[law.pack];
-  const names = Object.keys(data.modules);
-  const steps = Object.fromEntries(await Promise.all(names.map(async (name) => [name, await Step.of(data.modules[name])])));
+  const steps = await Step.all(data.modules, await inflated(data.code));
   if (data.record) {
     for (const signal of ["u", "y"]) data.record[signal] = new Float64Array(await inflated(data.record[signal]));
   }

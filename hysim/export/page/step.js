@@ -12,8 +12,11 @@ class Step {
     if (this.exports._initialize) this.exports._initialize();
   }
 
-  static async of(text) {
-    return new Step((await WebAssembly.instantiate(await inflated(text))).instance);
+  // The steps of modules by their names; `sizes` of the modules in the code, which stand one behind the other.
+  static async all(sizes, code) {
+    const ends = Object.values(sizes).map((_, k, all) => all.slice(0, k + 1).reduce((sum, size) => sum + size));
+    return Object.fromEntries(await Promise.all(Object.entries(sizes).map(async ([name, size], k) =>
+      [name, new Step((await WebAssembly.instantiate(code.slice(ends[k] - size, ends[k]))).instance)])));
   }
 
   // Outputs at the inputs u, and the state after them; memory is the front of the state before the first sample, its
@@ -48,9 +51,13 @@ function response(node, values, u, steps, sampleTime) {
     return node.cascade.reduce((signal, stage) => response(stage, values, signal, steps, sampleTime), u);
   }
   if (node.knots) return Float64Array.from(u, (value) => interpolated([value], ...node.knots)[0]);
-  if ("rate" in node) return u.map((value, k) => (values[node.rate] * (value - u[Math.max(k - 1, 0)])) / sampleTime);
-  const { first, free, per_time: perTime = [], sizes } = node;
-  const fields = free.map((place) => values[first + place] / (perTime.includes(place) ? sampleTime : 1));
+  if ("rate" in node) {
+    const velocities = u.map((value, k) => (value - u[Math.max(k - 1, 0)]) / sampleTime);
+    return velocities.map((v) => values[node.rate] * Math.sign(v) * Math.abs(v) ** node.power);
+  }
+  const { first, free, per_time: perTime = [], clock, sizes } = node;
+  const number = (place) => (place === clock ? sampleTime : values[first + place] / (perTime.includes(place) ? sampleTime : 1));
+  const fields = free.map(number);
   const [parameters, memory] = sizes.map((size) => new Float64Array(size));
   node.packed(fields, parameters, memory);
   const { y, state } = steps[node.module].outputs(parameters, memory, node.work, u);

@@ -3,7 +3,7 @@
 from typing import ClassVar
 
 from hysim.kernels.friction import backlash as kernels
-from hysim.laws.friction._rated_law import RatedLaw, check_signs
+from hysim.laws.friction.rated_law import RatedLaw, check_signs
 from hysim.models.model import family
 from hysim.models.parameters import Parameter
 from hysim.models.tables import Tables
@@ -15,19 +15,19 @@ class ElasticBacklash(RatedLaw):
 
     ::
 
-        T = offset + k x + c x'     in contact,    T = offset     in the gap
+        T = offset + stiffness x + damping x'    in contact,    offset    in the gap
         x = u - center - b,    |b| <= half_gap
 
     u is the twist between the two sides, b the part of it that the gap takes, x the twist of the shaft. In the gap the
-    shaft, without load, untwists as x' = -(k / c) x, so that contact ends before the shaft has no twist, and neither
-    side ever pulls. Without damping it is a dead zone, which has no memory.
+    shaft, without load, untwists as x' = -(stiffness / damping) x, so that contact ends before the shaft has no twist,
+    and neither side ever pulls. Without damping it is a dead zone, which has no memory.
 
     Parameters
     ----------
     stiffness : float
-        k, positive [unit of y / unit of u].
+        Positive [unit of y / unit of u].
     damping : float
-        c, not negative [unit of y s / unit of u].
+        Not negative [unit of y s / unit of u].
     half_gap : float
         Half the width of the gap, not negative [unit of u].
     center : float

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim.kernels.friction import lugre as kernels
-from hysim.laws.friction._rated_law import RatedLaw, check_signs, curve
+from hysim.laws.friction.rated_law import RatedLaw, check_signs, curve
 from hysim.models.model import family
 from hysim.models.parameters import Parameter
 from hysim.models.tables import Tables

@@ -8,7 +8,7 @@ with one field more, from which all else is derived.
 import functools
 from abc import ABC
 from collections.abc import Iterable, Mapping
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, fields, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 import numpy as np
@@ -211,6 +211,12 @@ class AtSampleTime(Law):
     @classmethod
     def check(cls, tables: Tables) -> None:
         cls.family.check(tables)
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """The box of the family for samples that are the law's sample time apart."""
+        times = np.asarray(self.scalars["sample_time"] * np.arange(len(record)), dtype=np.float64)
+        timed = replace(record, t=times)
+        return declared_space(self.searched, (), self.scalars, self.initial, record, freedom, units=rate_spans(timed))
 
     @classmethod
     def initial_memory(cls, tables: Tables, *, further: int = 0) -> FloatArray:
