@@ -123,14 +123,8 @@ class ActuatorStructure(Identifiable):
         if isinstance(self.law, ModalGains):
             return self._by_mode(self.law, parts, others, record)
         blocks = [
-            columns_through(
-                law,
-                shape,
-                others,
-                lambda each, name=name: parts.stages(each, late, name),  # type: ignore[misc]
-                seen_by(record, name),
-            )
-            for name, law, shape in self._laws(own(parameters, _LAW))
+            columns_through(law, shape, parts.of_input(others, name), partial(parts.stages, late=late, name=name), seen)
+            for name, law, shape, seen in self._laws(own(parameters, _LAW), record)
         ]
         return side_by_side(blocks)
 
@@ -267,17 +261,23 @@ class ActuatorStructure(Identifiable):
         gains = not isinstance(self.law, ModalGains)
         return LinearParts(self.amplifier, bank, self.modes, self.delay, survey, self.inputs, gains)
 
-    def _laws(self, parameters: Parameters) -> list[tuple[str, Any, Parameters]]:
-        """The law of each input, and its parameters."""
+    def _laws(self, parameters: Parameters, record: Record) -> list[tuple[str, Any, Parameters, Record]]:
+        """Each input, its law, the law's parameters, and the record as the law sees it."""
         if not isinstance(self.law, InputSum):
-            return [(MAIN, self.law, parameters)]
-        return [(name, law, own(parameters, name)) for name, law in self.law.laws.items()]
+            return [(MAIN, self.law, parameters, record)]
+        return [(name, law, own(parameters, name), seen_by(record, name)) for name, law in self.law.laws.items()]
 
     def _by_mode(self, law: ModalGains, parts: LinearParts, others: Parameters, record: Record) -> FloatArray:
         """Columns (n_sets, n_samples, n_columns + 1) of the inputs through each mode, one, and zero."""
-        stages = [partial(parts.one_mode, k=k) for k in range(self.modes)] or [parts.stages]
         seen = [seen_by(record, name) for name in self.inputs]
-        blocks = [columns_through(law, {}, others, each, one) for each in stages for one in seen]
+        behind = [(parts.of_mode(others, k), partial(parts.one_mode, k=k)) for k in range(self.modes)]
+        blocks = [
+            columns_through(law, {}, mine, stages, one)
+            for mine, stages in behind or [(others, parts.stages)]
+            for one in seen
+        ]
+        n_sets = max(len(block) for block in blocks)
+        blocks = [np.broadcast_to(block, (n_sets, *block.shape[1:])) for block in blocks]
         return np.concatenate([*(block[..., :1] for block in blocks), blocks[0][..., 1:]], axis=-1)
 
     def _offsets(self, linear: Sequence[str]) -> list[str]:

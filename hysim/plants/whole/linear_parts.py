@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from hysim.models.parameters import Coordinate, space_of
-from hysim.models.search_space import Freedom, SearchSpace
+from hysim.models.search_space import Freedom, Parameters, SearchSpace
 from hysim.plants.amplifier import Amplifier
 from hysim.plants.creep import Creep
 from hysim.plants.modes import Modes
@@ -97,6 +97,16 @@ class LinearParts:
         """The stages with one of the modes, of the gain one."""
         stages = replace(self, modes=0).stages(values)
         return stages._replace(vibration=self._modes(values, [k], (1.0,), getattr(stages.vibration, "delay", 0.0)))
+
+    def of_input(self, values: Parameters, name: str) -> Parameters:
+        """The parameters but the gains of the other inputs."""
+        others = {self.gain_of(k, other) for k in range(self.modes) for other in self.inputs if other != name}
+        return {each: value for each, value in values.items() if each.removeprefix("vibration.") not in others}
+
+    def of_mode(self, values: Parameters, k: int) -> Parameters:
+        """The parameters but those of the other modes."""
+        others = {f"vibration.{each}[{j}]" for each in (FREQUENCY, DAMPING) for j in range(self.modes) if j != k}
+        return {each: value for each, value in values.items() if each not in others}
 
     def gain_of(self, k: int, name: str) -> str:
         """Name of the gain of a mode for an input."""
