@@ -39,7 +39,8 @@ OUTPUTS = {"tip": (2.0 / 3.0, -1.0 / 3.0, -1.0 / 3.0), "tilt": (0.0, 3.0**-0.5, 
 SAMPLE_TIME = 1.0 / 6400.0  # [s]
 AHEAD, HALF = 1024, 4096  # samples that run ahead, until the modes have decayed, and those that are learnt from
 LEVELS, LEARNT = (100, 200, 300), (100, 300)  # mV
-FREQUENCIES = (640.0, 808.0, 920.0, 990.0, 1315.0, 2120.0, 2280.0, 2540.0)  # Hz, where the responses peak
+FREQUENCIES = (640.0, 808.0, 920.0, 990.0, 1315.0, 1440.0, 1685.0, 2120.0, 2280.0, 2540.0, 2800.0, 3120.0)
+"""Where the measured responses peak [Hz], and one near the end for what is beyond."""
 DAMPING_RATIO, DELAY = 0.012, 5e-5
 THRESHOLDS = (0.0, 0.05, 0.15, 0.3, 0.6)  # V
 LINES = "lines"
@@ -98,10 +99,12 @@ def error_percent(model: hs.MultiInputActuator, rec: hs.Record, ahead: int = AHE
     return 100.0 * float(np.sqrt(np.mean(residual**2)) / np.std(rec.y[ahead:]))
 
 
-def first_guess(rec: hs.Record, ahead: int = AHEAD) -> hs.MultiInputActuator:
+def first_guess(
+    rec: hs.Record, ahead: int = AHEAD, peaks: Sequence[float] = FREQUENCIES
+) -> hs.MultiInputActuator:
     """Modes at the peaks of the responses, with the gains that fit a record best."""
     common = {"damping_ratios": (DAMPING_RATIO,), "gains": (1.0,), "delay": DELAY}
-    frequencies = tuple(2.0 * np.pi * f for f in FREQUENCIES)
+    frequencies = tuple(2.0 * np.pi * f for f in peaks)
     alone = [hs.Actuator(vibration=hs.Modes(natural_frequencies=(w,), **common)) for w in frequencies]
     inputs = [rec.u, *(rec.channel(name) for name in INPUTS[1:])]
     columns = np.stack([each.response(u, SAMPLE_TIME) for u in inputs for each in alone], axis=1)
@@ -172,3 +175,77 @@ def computed(folder: Path, file: Path | None) -> list[Row]:
                 with file.open("a", encoding="utf-8") as stored:
                     stored.write(json.dumps(row, allow_nan=False) + "\n")
     return [known[output, name] for output in OUTPUTS for name in (*LAWS, *ALONE)]
+
+
+# ---------------------------------------------------------------------------------- results
+
+
+def table_row(row: Row) -> Row:
+    """A case without its model and its message."""
+    own = {name: row[name] for name in ("output", "model", "n_parameters", "train_percent")}
+    tests = {f"test_{level}_percent": row["test_percent"][str(level)] for level in LEVELS}
+    return own | tests | {"cpu_seconds": row["cpu_seconds"], "success": row["success"]}
+
+
+def twin(laws: Sequence[Any], peak: float) -> hs.MultiInputActuator:
+    """A simulated axis: these laws behind one mode."""
+    mode = hs.Modes(natural_frequencies=(2.0 * np.pi * peak,), damping_ratios=(0.02,), gains=(1.0,), delay=DELAY)
+    return hs.MultiInputActuator(
+        inputs=INPUTS, actuators=tuple(hs.Actuator(hysteresis=law, vibration=mode) for law in laws)
+    )
+
+
+def smoke_run() -> list[Row]:
+    """Lines and plays on a simulated axis, whose plays are told."""
+    weights_of = ((2.0, 0.4, 0.3, 0.3, 0.2), (-1.0, -0.2, -0.2, -0.1, -0.1), (0.5, 0.1, 0.1, 0.1, 0.1))
+    truth = twin([hs.PrandtlIshlinskii(thresholds=THRESHOLDS, weights=w) for w in weights_of], 800.0)
+    ahead, rng = 100, np.random.default_rng(0)
+    u = rng.uniform(-1.0, 1.0, (300, 3))
+    rec = record(u, np.zeros(len(u)), 300, ahead)
+    y = truth.response_of(rec)[ahead:] + 1e-3 * rng.standard_normal(len(u))
+    rec = record(u, y, 300, ahead)
+    start, rows = first_guess(rec, ahead, (790.0,)), []
+    for name in (LINES, "Prandtl-Ishlinskii"):
+        fit = identified(name, [rec], start, ahead)
+        rows.append({"model": name, "train_percent": error_percent(fit.model, rec, ahead)})
+    return rows
+
+
+def main(smoke: bool = False, folder: Path | None = None, file: Path | None = None) -> list[Row]:
+    """Measure, and unless it is a smoke run write table, figure and JSON."""
+    if smoke:
+        return smoke_run()
+    if folder is None:
+        raise ValueError("the folder with fsm_subset.npz is needed: python experiments/47_mirror.py FOLDER")
+    cases = computed(folder, file)
+    rows = [table_row(row) for row in cases]
+    frequencies = {f"{row['output']}, {row['model']}": row["frequencies_hz"] for row in cases if row["model"] in ALONE}
+    write_results(RESULTS, rows, draw, {"frequencies_hz": frequencies})
+    for row in rows:
+        print(row)
+    return rows
+
+
+def draw(rows: list[Row]) -> Figure:
+    """Error on the realisation that was left out against the level, by output and model."""
+    canvas = figure(height=3.2)
+    colours = dict(zip((*LAWS, *ALONE), ("#000000", "#0072B2", "#D55E00", "#009E73", "#999999", "#CC79A7"), strict=False))
+    axes = canvas.subplots(1, 2, sharey=True)
+    for ax, output in zip(axes, OUTPUTS, strict=True):
+        for row in rows:
+            if row["output"] == output:
+                errors = [row[f"test_{level}_percent"] for level in LEVELS]
+                dashes = "dashed" if row["model"] in ALONE else "solid"
+                ax.plot(
+                    LEVELS, errors, "o", color=colours[row["model"]], linestyle=dashes, label=row["model"], markersize=4
+                )
+        ax.set(title=output, xlabel="amplitude [mV]", xticks=LEVELS, ylim=(0.0, None))
+    axes[0].set_ylabel("error / standard deviation [%]")
+    axes[1].legend(fontsize=7)
+    return canvas
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 2:
+        sys.exit(__doc__)
+    main(folder=Path(sys.argv[1]), file=Path(sys.argv[2]) if len(sys.argv) > 2 else None)

@@ -140,7 +140,7 @@ class Actuator:
             Whether all records have one offset of the law, or each its own.
         start : Actuator or MultiInputActuator, optional
             Of the same inputs and as many modes: the search begins with its modes and its delay beside the starts of
-            the laws, and no part is searched alone. So other laws are tried behind which the modes are known nearly.
+            the laws, no part is searched alone, and no mode is left out. So several laws are tried before the same modes.
 
         Returns
         -------

@@ -41,11 +41,11 @@ def doubts(structure: Any, estimates: Mapping[str, float], freedom: Freedom) -> 
 
 
 def without_last_mode(structure: Any, freedom: Freedom) -> tuple[Any, str] | None:
-    """The structure with one mode less, and a remark; None where the user names one of its parameters."""
+    """The structure with one mode less, and a remark; None where the user names its parameters, or the modes."""
     k = structure.modes - 1
     gains = [structure.parts([]).gain_of(k, name) for name in structure.inputs]
     own = {f"vibration.{name}" for name in (f"{FREQUENCY}[{k}]", f"{DAMPING}[{k}]", *gains)}
-    if k < 0 or own & {*freedom.fixed, *freedom.free, *freedom.bounds}:
+    if k < 0 or structure.start is not None or own & {*freedom.fixed, *freedom.free, *freedom.bounds}:
         return None
     box = {each.name: each for each in structure.parts([]).boxes()["vibration"][0]}[f"{FREQUENCY}[{k}]"]
     low, high = box.lower / (2.0 * math.pi), box.upper / (2.0 * math.pi)
