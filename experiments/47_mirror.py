@@ -99,9 +99,7 @@ def error_percent(model: hs.MultiInputActuator, rec: hs.Record, ahead: int = AHE
     return 100.0 * float(np.sqrt(np.mean(residual**2)) / np.std(rec.y[ahead:]))
 
 
-def first_guess(
-    rec: hs.Record, ahead: int = AHEAD, peaks: Sequence[float] = FREQUENCIES
-) -> hs.MultiInputActuator:
+def first_guess(rec: hs.Record, ahead: int = AHEAD, peaks: Sequence[float] = FREQUENCIES) -> hs.MultiInputActuator:
     """Modes at the peaks of the responses, with the gains that fit a record best."""
     common = {"damping_ratios": (DAMPING_RATIO,), "gains": (1.0,), "delay": DELAY}
     frequencies = tuple(2.0 * np.pi * f for f in peaks)
@@ -229,7 +227,9 @@ def main(smoke: bool = False, folder: Path | None = None, file: Path | None = No
 def draw(rows: list[Row]) -> Figure:
     """Error on the realisation that was left out against the level, by output and model."""
     canvas = figure(height=3.2)
-    colours = dict(zip((*LAWS, *ALONE), ("#000000", "#0072B2", "#D55E00", "#009E73", "#999999", "#CC79A7"), strict=False))
+    colours = dict(
+        zip((*LAWS, *ALONE), ("#000000", "#0072B2", "#D55E00", "#009E73", "#999999", "#CC79A7"), strict=False)
+    )
     axes = canvas.subplots(1, 2, sharey=True)
     for ax, output in zip(axes, OUTPUTS, strict=True):
         for row in rows:

@@ -127,15 +127,13 @@ REFUSED = {
     "the record 'at 1' has no channel 'right'; it has 'left'": lambda: hs.identify(
         structure(), [without_channel(rec) for rec in RECORDS]
     ),
-    'must have a law for the input "u" of the record, got laws for \'right\'': lambda: hs.Actuator.structure(
+    "must have a law for the input \"u\" of the record, got laws for 'right'": lambda: hs.Actuator.structure(
         {"right": hs.Line}
     ),
     "modes must be a number from 0 to 20": lambda: structure(modes=21),
     "a sensor with a delay is for one input": lambda: structure(sensor=hs.Sensor(delay=1e-3)),
     "start has 2 modes behind u, and modes=1": lambda: hs.identify(structure(modes=1, start=STAGE), RECORDS),
-    "start has the inputs u; hysteresis those of u, right": lambda: hs.identify(
-        structure(start=branch("u")), RECORDS
-    ),
+    "start has the inputs u; hysteresis those of u, right": lambda: hs.identify(structure(start=branch("u")), RECORDS),
     "fixed names 'hysteresis.slope'; the parameters are hysteresis.u": lambda: hs.identify(
         structure(), RECORDS, fixed={"hysteresis.slope": 1.0}
     ),

@@ -140,13 +140,15 @@ class Actuator:
             Whether all records have one offset of the law, or each its own.
         start : Actuator or MultiInputActuator, optional
             Of the same inputs and as many modes: the search begins with its modes and its delay beside the starts of
-            the laws, no part is searched alone, and no mode is left out. So several laws are tried before the same modes.
+            the laws, no part is searched alone, and no mode is left out: so several laws are tried before the same
+            modes.
 
         Returns
         -------
         ActuatorStructure
             For `hysim.identify`, `hysim.select` and `hysim.compare`. The model is an `Actuator` (of several inputs a
-            `MultiInputActuator`) whose `response` to each record's input is the fit (with a sensor that has a delay, what its sensor sees).
+            `MultiInputActuator`) whose `response` to each record's input is the fit (with a sensor that has a delay,
+            what its sensor sees).
 
         Raises
         ------

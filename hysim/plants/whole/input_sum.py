@@ -36,9 +36,7 @@ class InputSum(Identifiable):
         seen = {name: seen_by(record, name) for name in self.laws}
         spaces = {name: lambda free, name=name: self.laws[name].search_space(seen[name], free) for name in self.laws}
         joint = together(declared(spaces, freedom))
-        return without_repetition(
-            joint, lambda x: self.regressors(joint.parameters(x), record)[..., :-1], {}, freedom
-        )
+        return without_repetition(joint, lambda x: self.regressors(joint.parameters(x), record)[..., :-1], {}, freedom)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """The laws' columns one after the other, (n_sets, n_samples, n_columns + 1)."""
@@ -51,12 +49,13 @@ class InputSum(Identifiable):
         return InputSum({name: law.assemble(own(parameters, name)) for name, law in self.laws.items()})
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        """The laws' memories after inputs that stood still."""
-        return {
-            f"{name}.{state}": value
-            for name, law in self.laws.items()
-            for state, value in law.steady(own(parameters, name), seen_by(record, name)).items()
-        }
+        """The laws' memories after inputs that stood still at their first values."""
+        found: dict[str, Any] = {}
+        for name, law in self.laws.items():
+            seen = seen_by(record, name)
+            still = replace(seen, u=np.full(len(seen), seen.u[0]))
+            found |= {f"{name}.{state}": value for state, value in law.steady(own(parameters, name), still).items()}
+        return found
 
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
         """None: the laws are seen only through what is behind them."""
@@ -109,9 +108,10 @@ class ModalGains(Identifiable):
 def checked_laws(laws: Mapping[str, Any]) -> InputSum:
     """Laws by name as `InputSum`; ValueError or TypeError if a name or a law is none."""
     if MAIN not in laws:
+        names = ", ".join(map(repr, laws))
         raise ValueError(
-            f'hysteresis must have a law for the input "{MAIN}" of the record, got laws for {", ".join(map(repr, laws))}'
-            f": name one of them {MAIN!r}, the others are channels of the record"
+            f'hysteresis must have a law for the input "{MAIN}" of the record, got laws for {names}: name one of them '
+            f"{MAIN!r}, the others are channels of the record"
         )
     begun = {name: law() if isinstance(law, type) else law for name, law in laws.items()}
     for name, law in begun.items():
