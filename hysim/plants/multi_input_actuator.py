@@ -54,7 +54,7 @@ class MultiInputActuator:
     actuators: tuple[Any, ...]
 
     def __post_init__(self) -> None:
-        names = (self.inputs,) if isinstance(self.inputs, str) else tuple(self.inputs)
+        names = tuple(self.inputs)
         if not all(isinstance(name, str) for name in names):
             raise TypeError(f"inputs must be names, got {names!r}")
         object.__setattr__(self, "inputs", names)

@@ -266,7 +266,7 @@ def _descended(attempt: Problem, points: FloatArray, *, exact: bool) -> FloatArr
 def _parts_only(attempt: Problem, ends: FloatArray) -> list[Coordinates]:
     """Coordinates by name, without those of the law."""
     names, plant = attempt.space.coordinates, attempt.family
-    known = [
+    known: list[Coordinates] = [
         {name: value for name, value in zip(names, row, strict=True) if not name.startswith("hysteresis.")}
         for row in ends.tolist()
     ]

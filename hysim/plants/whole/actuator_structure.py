@@ -32,7 +32,7 @@ from hysim.plants.whole import doubts, starts
 from hysim.plants.whole.columns import columns_through
 from hysim.plants.whole.creep_bank import CreepBank, checked_creep, creep_bank
 from hysim.plants.whole.input_sum import MAIN, InputSum, ModalGains, checked_laws, seen_by, side_by_side
-from hysim.plants.whole.linear_parts import LinearParts, vibrations_of
+from hysim.plants.whole.linear_parts import LinearParts, Stages, vibrations_of
 from hysim.plants.whole.survey import Survey
 from hysim.records import Record
 
@@ -270,12 +270,10 @@ class ActuatorStructure(Identifiable):
     def _by_mode(self, law: ModalGains, parts: LinearParts, others: Parameters, record: Record) -> FloatArray:
         """Columns (n_sets, n_samples, n_columns + 1) of the inputs through each mode, one, and zero."""
         seen = [seen_by(record, name) for name in self.inputs]
-        behind = [(parts.of_mode(others, k), partial(parts.one_mode, k=k)) for k in range(self.modes)]
-        blocks = [
-            columns_through(law, {}, mine, stages, one)
-            for mine, stages in behind or [(others, parts.stages)]
-            for one in seen
-        ]
+        behind: list[tuple[Parameters, partial[Stages]]] = [(others, partial(parts.stages))]
+        if self.modes:
+            behind = [(parts.of_mode(others, k), partial(parts.one_mode, k=k)) for k in range(self.modes)]
+        blocks = [columns_through(law, {}, mine, stages, one) for mine, stages in behind for one in seen]
         n_sets = max(len(block) for block in blocks)
         blocks = [np.broadcast_to(block, (n_sets, *block.shape[1:])) for block in blocks]
         return np.concatenate([*(block[..., :1] for block in blocks), blocks[0][..., 1:]], axis=-1)
