@@ -154,6 +154,12 @@ def test_what_does_not_fit_is_refused_with_a_sentence(sentence):
         REFUSED[sentence]()
 
 
+@pytest.mark.parametrize("start", [hs.Line(), hs.MultiInputActuator(inputs=("u",), actuators=(hs.Line(),))])
+def test_a_start_that_is_no_actuator_is_refused(start):
+    with pytest.raises(TypeError, match="start must be an Actuator, or a MultiInputActuator of them, got"):
+        structure(start=start)
+
+
 def test_a_law_that_is_none_is_refused():
     with pytest.raises(TypeError, match=r"hysteresis\['right'\] must be a law that can be identified, got int"):
         hs.Actuator.structure({"u": hs.Line, "right": 3})

@@ -83,6 +83,9 @@ class ActuatorStructure(Identifiable):
             raise TypeError(f"sensor must be a Sensor, got {type(self.sensor).__name__}")
         if len(self.inputs) > 1 and self.sensor is not None and self.sensor.delay:
             raise ValueError("a sensor with a delay is for one input: of several inputs it is a part of the delay")
+        branches = self.start.actuators if isinstance(self.start, MultiInputActuator) else (self.start,)
+        if self.start is not None and not all(isinstance(each, self.family) for each in branches):
+            raise TypeError(f"start must be an Actuator, or a MultiInputActuator of them, got {self.start!r}")
         if self.offsets not in ("shared", "own"):
             raise ValueError(f'offsets must be "shared" or "own", got {self.offsets!r}')
 

@@ -22,6 +22,7 @@ from hysim.models.search_space import Freedom, Parameters, SearchSpace
 from hysim.plants.amplifier import Amplifier
 from hysim.plants.creep import Creep
 from hysim.plants.modes import Modes
+from hysim.plants.multi_input_actuator import MultiInputActuator
 from hysim.plants.sampled import Vibration
 from hysim.plants.transfer_function import TransferFunction
 from hysim.plants.whole.creep_bank import CreepBank
@@ -95,8 +96,8 @@ class LinearParts:
 
     def one_mode(self, values: Mapping[str, float], k: int) -> Stages:
         """The stages with one of the modes, of the gain one."""
-        stages = replace(self, modes=0).stages(values)
-        return stages._replace(vibration=self._modes(values, [k], (1.0,), getattr(stages.vibration, "delay", 0.0)))
+        vibration = self._modes(values, [k], (1.0,), values["vibration.delay"] if self.delay else 0.0)
+        return replace(self, modes=0).stages(values)._replace(vibration=vibration)
 
     def of_input(self, values: Parameters, name: str) -> Parameters:
         """The parameters but the gains of the other inputs."""
@@ -166,8 +167,9 @@ class LinearParts:
 
 
 def vibrations_of(start: Any, inputs: Sequence[str], modes: int) -> dict[str, Modes]:
-    """The modes behind each input of an actuator; ValueError or TypeError if it has not these inputs, or others."""
-    actuators = dict(zip(start.inputs, start.actuators, strict=True)) if hasattr(start, "inputs") else {MAIN: start}
+    """The modes behind each input of an actuator; ValueError if it has other inputs, or not so many modes."""
+    several = isinstance(start, MultiInputActuator)
+    actuators = dict(zip(start.inputs, start.actuators, strict=True)) if several else {MAIN: start}
     if tuple(actuators) != tuple(inputs):
         raise ValueError(f"start has the inputs {', '.join(actuators)}; hysteresis those of {', '.join(inputs)}")
     found = {name: each.vibration for name, each in actuators.items()}
