@@ -1298,7 +1298,6 @@ def mirror(result: Result) -> list[str]:
     }  # fmt: skip
     outer = [ratio for own in ratios.values() for levels in own for ratio in (levels[0], levels[2])]
     between = [levels[1] for own in ratios.values() for levels in own]
-    best = min(ratios, key=lambda name: sum(map(sum, ratios[name])))
     shifts, crossed = [], []
     for output in outputs:
         low, high = (result["frequencies_hz"][f"{output}, lines at {level} mV"] for level in (100, 300))
@@ -1313,8 +1312,8 @@ def mirror(result: Result) -> list[str]:
         f"200 and 300 mV, in percent of the standard deviation: {each}. It is a subset of the published test, whose "
         f"baselines are {_three(published['linear'])} for one linear model and {_three(published['nonlinear'])} for a "
         "nonlinear one.",
-        f"Laws before the modes have {span(outer, 3)} times the error of lines at the two levels that were learnt, and "
-        f"{span(between, 3)} times at the level between; the least of all have those of {best}.",
+        f"Laws before the modes ({listed(list(ratios))}) have {span(outer, 3)} times the error of lines at the two "
+        f"levels that were learnt, and {span(between, 3)} times at the level between.",
         "What they lack is in the modes: identified at one level alone, lines leave at 300 mV "
         f"{' and '.join(crossed)}, and the frequencies below 1.1 kHz lie {span([-shift for shift in shifts], 2)} % "
         "lower at 300 mV than at 100.",
