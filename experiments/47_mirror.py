@@ -237,7 +237,7 @@ def draw(rows: list[Row]) -> Figure:
                 ax.plot(
                     LEVELS, errors, "o", color=colours[row["model"]], linestyle=dashes, label=row["model"], markersize=4
                 )
-        ax.set(title=output, xlabel="amplitude [mV]", xticks=LEVELS, ylim=(0.0, None))
+        ax.set(title=output, xlabel="amplitude [mV]", xticks=LEVELS, ylim=(0.0, 36.0))
     axes[0].set_ylabel("error / standard deviation [%]")
     axes[1].legend(fontsize=7)
     return canvas
