@@ -132,6 +132,7 @@ from hysim.plants.creep import Creep as Creep
 from hysim.plants.amplifier import Amplifier as Amplifier
 from hysim.plants.sensor import Sensor as Sensor
 from hysim.plants.actuator import Actuator as Actuator
+from hysim.plants.multi_input_actuator import MultiInputActuator as MultiInputActuator
 from hysim.laws.static import Line as Line
 from hysim.laws.static import SingleValued as SingleValued
 from hysim.models.storage import save as save

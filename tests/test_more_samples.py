@@ -23,7 +23,8 @@ spec.loader.exec_module(experiment)
 N_CASES = 2 if numba.config.DISABLE_JIT else 8
 
 NOT_RATE_INDEPENDENT = {
-    *("TransferFunction", "Dashpot", "ExcessLoss", "Actuator", "BoucWenOscillator", "Structure", "Dependent"),
+    *("TransferFunction", "Dashpot", "ExcessLoss", "Actuator", "MultiInputActuator", "BoucWenOscillator"),
+    *("Structure", "Dependent"),
     *("LuGre", "StribeckFriction", "GeneralizedMaxwellSlip", "ElasticBacklash"),  # test_friction.py has them
 }
 """Between two samples the input of these, or a channel, is held, or goes on a line: with more it is another input."""

@@ -104,6 +104,7 @@ class Actuator:
         delay: bool = True,
         sensor: Sensor | None = None,
         offsets: str = "shared",
+        start: Any = None,
     ) -> ActuatorStructure:
         """An actuator for `hysim.identify`, on one or several records with time: law, creep, modes and delay at once.
 
@@ -113,8 +114,10 @@ class Actuator:
 
         Parameters
         ----------
-        hysteresis : law, its class or its structure
-            Its parameters are ``hysteresis.beta``, ...
+        hysteresis : law, its class or its structure, or mapping of them
+            Its parameters are ``hysteresis.beta``, ... A mapping has a law for each of several inputs: of the record's
+            input by the name ``"u"``, of its channels by their names. Their outputs are added, the parameters are
+            ``hysteresis.u2.beta``, ..., and the model is a `MultiInputActuator`.
         creep : bool, int, sequence of float or Creep
             True for the bank of `Creep.per_decade`, whose growth is ``creep.percent``; a number of log-spaced elements
             between the shortest sample time and the duration of the longest record, with ``creep.percent`` and a
@@ -122,7 +125,9 @@ class Actuator:
             with free weights ``creep.weights[k]``, relative to the instant response; or a creep that is known.
         modes : int
             Resonances, from 0 to 3: ``vibration.natural_frequencies[k]`` [rad/s], ``vibration.damping_ratios[k]``, and
-            of several ``vibration.gains[k]`` for k > 0. They are searched up to half the highest sampling rate.
+            of several ``vibration.gains[k]`` for k > 0. They are searched up to half the highest sampling rate. Of
+            several inputs up to 20, and each input has gains of its own, ``vibration.gains[k].u2``, which are relative
+            to its output at rest.
         amplifier : {"first-order"} or Amplifier, optional
             A time constant ``amplifier.time_constant`` [s] to be identified, or an amplifier that is known.
         delay : bool
@@ -133,17 +138,22 @@ class Actuator:
             `hysim.identify` ``"quantised"`` where no other is asked for.
         offsets : {"shared", "own"}
             Whether all records have one offset of the law, or each its own.
+        start : Actuator or MultiInputActuator, optional
+            Of the same inputs and as many modes: the search begins with its modes and its delay beside the starts of
+            the laws, no part is searched alone, and no mode is left out: so several laws are tried before the same
+            modes.
 
         Returns
         -------
         ActuatorStructure
-            For `hysim.identify`, `hysim.select` and `hysim.compare`. The model is an `Actuator` whose `response` to
-            each record's input is the fit (with a sensor that has a delay, what its sensor sees).
+            For `hysim.identify`, `hysim.select` and `hysim.compare`. The model is an `Actuator` (of several inputs a
+            `MultiInputActuator`) whose `response` to each record's input is the fit (with a sensor that has a delay,
+            what its sensor sees).
 
         Raises
         ------
         ValueError, TypeError
-            If an argument is none of these.
+            If an argument is none of these; later of `hysim.identify`, if a record has not the channel of an input.
 
         Notes
         -----
@@ -173,6 +183,7 @@ class Actuator:
             delay=delay,
             sensor=sensor,
             offsets=offsets,
+            start=start,
         )
 
     @property

@@ -6,6 +6,9 @@
 3. On all records the parts descend beside the law's shape.
 4. All at once. What the records do not determine at that optimum, by its Fisher information, is held, and the search
    goes on without it.
+
+Of several inputs no record shows a law alone: modes are searched behind the inputs themselves, with gains that are
+solved for, and then all at once. Where the user knows an actuator like it, the search begins with its modes.
 """
 
 import math
@@ -26,7 +29,6 @@ from hysim.models.parts import own
 from hysim.models.protocols import Identifiable, Undecided
 from hysim.models.search_space import Freedom
 from hysim.models.whole.part_by_part import PartByPart
-from hysim.models.whole.scaled import Scaled
 from hysim.records import Record
 
 _THINNED = 500  # samples of the slow record, beside its reversals
@@ -112,10 +114,16 @@ def begun_by_parts(
     setting = _Setting(records, freedom, initial, weights, budget, seed)
     trial = setting.problem(plant)  # refuses what does not fit before anything is searched
     trial.split(0.5 * (trial.space.lower + trial.space.upper)[np.newaxis])
-    plant, law, shape = _with_law(plant, setting)
-    plant, known = _grown(plant, law, setting)
-    plant = _tried(plant, setting)
-    known = _on_all(plant, setting, shape, known)
+    if (begins := plant.begins()) is not None:
+        known = [begins]
+    elif len(plant.inputs) > 1:
+        plant, known = _grown(plant, None, setting)
+        plant = _tried(plant, setting)
+    else:
+        plant, law, shape = _with_law(plant, setting)
+        plant, known = _grown(plant, law, setting)
+        plant = _tried(plant, setting)
+        known = _on_all(plant, setting, shape, known)
     whole = setting.problem(plant.begun(known))
     ends = np.empty((1, 0))
     if whole.n_x:
@@ -155,7 +163,7 @@ def _grown(plant: Any, law: Any, setting: _Setting) -> tuple[Any, list[Coordinat
     known: list[Coordinates] = []
     before = math.inf
     for each in plant.growing():
-        attempt = setting.problem(each.with_law(Scaled(law)), setting.about(each.names), only=plant.fastest)
+        attempt = setting.problem(each.behind(law), setting.about(each.behind(law).names), only=plant.fastest)
         ends = _found(attempt, each, known) if attempt.n_x else np.empty((1, 0))
         cost = float(attempt.costs(ends[:1])[0])
         criterion = information(max(cost, 1e-300) / attempt.n_samples, attempt.n_samples, len(attempt.space.names))
@@ -257,8 +265,12 @@ def _descended(attempt: Problem, points: FloatArray, *, exact: bool) -> FloatArr
 
 def _parts_only(attempt: Problem, ends: FloatArray) -> list[Coordinates]:
     """Coordinates by name, without those of the law."""
-    names = attempt.space.coordinates
-    return [
+    names, plant = attempt.space.coordinates, attempt.family
+    known: list[Coordinates] = [
         {name: value for name, value in zip(names, row, strict=True) if not name.startswith("hysteresis.")}
         for row in ends.tolist()
     ]
+    if not isinstance(plant, PartByPart) or len(plant.inputs) == 1:
+        return known
+    solved = [plant.solved(attempt.estimates(theta)) for theta in attempt.completed(ends)]
+    return [{**own, **gains} for own, gains in zip(known, solved, strict=True)]

@@ -34,6 +34,12 @@ def through(
     B0, B1, B2, C = B[0], B[1], B[2], row[3:]
     is_whole = not (B1.any() or B2.any())
     x, moved = np.empty(order), np.empty(order)
+    begin, end = np.zeros(order, np.int64), np.zeros(order, np.int64)  # of each row's numbers that are not zero
+    for i in range(creeping, order):
+        begin[i] = order
+        for j in range(order):
+            if A[i - creeping, j] != 0.0:
+                begin[i], end[i] = min(begin[i], j), j + 1
     for c in range(n_columns):
         first = w[c, 0]
         newer, older, oldest = first, first, first
@@ -51,7 +57,7 @@ def through(
                     out[c, k] = total
                 for i in range(creeping, order):
                     following = B0[i] * newer
-                    for j in range(order):
+                    for j in range(begin[i], end[i]):
                         following += A[i - creeping, j] * x[j]
                     moved[i] = following
                 for i in range(creeping):

@@ -48,6 +48,18 @@ class PartByPart(Protocol):
     def with_law(self, law: Any) -> Self:
         """The plant with another law, or another start of it."""
 
+    inputs: tuple[str, ...]
+    """Names of its inputs, each with a law."""
+
+    def behind(self, law: Any) -> Self:
+        """The plant behind a law that is known but for its gain, or behind several inputs as they are."""
+
+    def solved(self, estimates: Mapping[str, float]) -> Mapping[str, float]:
+        """Coordinates by name of what was solved for behind the inputs as they are, and is a coordinate behind laws."""
+
+    def begins(self) -> Mapping[str, float] | None:
+        """Coordinates of the parts that grow, where the user lets the search begin at them; else None."""
+
     @property
     def names(self) -> frozenset[str]:
         """Names of the parameters of the parts beside the law."""

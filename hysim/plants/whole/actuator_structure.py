@@ -2,6 +2,9 @@
 
     u -> amplifier -> law -> creep -> modes, delay -> y
 
+Of several inputs each has a law, and the outputs of all are added: creep, frequencies, dampings and delay are common,
+and each input excites the modes by gains of its own (`hysim.plants.whole.input_sum`).
+
 What is behind the law is linear: the output is affine in what the law is affine in, and only the law's other
 parameters and those of the parts are searched. The search begins part by part (`hysim.models.whole`): the law where
 the input is slow, the modes and the delay on the fastest record, beside a creep of 1 % a decade, and then all at once.
@@ -9,6 +12,7 @@ the input is slow, the modes and the delay on the fastest record, beside a creep
 
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,17 +23,21 @@ from hysim.models.parts import own
 from hysim.models.protocols import Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.whole.part_by_part import Doubt
+from hysim.models.whole.scaled import Scaled
 from hysim.plants.amplifier import Amplifier
 from hysim.plants.creep import Creep
+from hysim.plants.multi_input_actuator import MultiInputActuator
 from hysim.plants.sensor import Sensor
 from hysim.plants.whole import doubts, starts
 from hysim.plants.whole.columns import columns_through
 from hysim.plants.whole.creep_bank import CreepBank, checked_creep, creep_bank
-from hysim.plants.whole.linear_parts import LinearParts
+from hysim.plants.whole.input_sum import MAIN, InputSum, ModalGains, checked_laws, seen_by, side_by_side
+from hysim.plants.whole.linear_parts import LinearParts, Stages, vibrations_of
 from hysim.plants.whole.survey import Survey
 from hysim.records import Record
 
 MOST_MODES = 3
+MOST_MODES_OF_SEVERAL = 20  # inputs: their gains are solved for, one mode after the other
 _LAW, _OFFSET = "hysteresis", "hysteresis.offset"
 
 
@@ -50,28 +58,40 @@ class ActuatorStructure(Identifiable):
     known: Mapping[str, float] = field(default_factory=dict)  # parameters that are held beside those of the user
     remarks: tuple[str, ...] = ()
     starting: Any = ()  # coordinates by name
+    start: Any = None  # an actuator from whose vibration the search begins
+    inputs: tuple[str, ...] = (MAIN,)
 
     def __post_init__(self) -> None:
         if self.law is None:
             raise ValueError("hysteresis is needed: a law, its class or structure, such as hs.BoucWen or hs.Line")
         law = self.law() if isinstance(self.law, type) else self.law
+        if isinstance(law, Mapping):
+            law = checked_laws(law)
+            object.__setattr__(self, "inputs", tuple(law.laws))
         if not isinstance(law, Identifiable):
             raise TypeError(f"hysteresis must be a law that can be identified, got {type(law).__name__}")
         object.__setattr__(self, "law", law)
         object.__setattr__(self, "creep", checked_creep(self.creep))
-        if isinstance(self.modes, bool) or self.modes not in range(MOST_MODES + 1):
-            raise ValueError(f"modes must be a number from 0 to {MOST_MODES}, got {self.modes!r}")
+        most = MOST_MODES if len(self.inputs) == 1 else MOST_MODES_OF_SEVERAL
+        if isinstance(self.modes, bool) or self.modes not in range(most + 1):
+            raise ValueError(f"modes must be a number from 0 to {most}, got {self.modes!r}")
         if not isinstance(self.amplifier, Amplifier | None) and self.amplifier != "first-order":
             raise ValueError(f'amplifier must be None, "first-order" or an Amplifier, got {self.amplifier!r}')
         if not isinstance(self.delay, bool):
             raise TypeError(f"delay must be True or False, got {self.delay!r}: fix it by fixed= of identify")
         if not isinstance(self.sensor, Sensor | None):
             raise TypeError(f"sensor must be a Sensor, got {type(self.sensor).__name__}")
+        if len(self.inputs) > 1 and self.sensor is not None and self.sensor.delay:
+            raise ValueError("a sensor with a delay is for one input: of several inputs it is a part of the delay")
+        branches = self.start.actuators if isinstance(self.start, MultiInputActuator) else (self.start,)
+        if self.start is not None and not all(isinstance(each, self.family) for each in branches):
+            raise TypeError(f"start must be an Actuator, or a MultiInputActuator of them, got {self.start!r}")
         if self.offsets not in ("shared", "own"):
             raise ValueError(f'offsets must be "shared" or "own", got {self.offsets!r}')
 
     def __str__(self) -> str:
-        law = type(self.law).__name__.removesuffix("Structure")
+        each = self.law.laws.values() if isinstance(self.law, InputSum) else [self.law]
+        law = " + ".join(type(law).__name__.removesuffix("Structure") for law in each)
         parts = [
             f"{self.modes} mode{'s' * (self.modes > 1)}" * bool(self.modes),
             "creep" * (self.creep not in (None, False)),
@@ -94,7 +114,7 @@ class ActuatorStructure(Identifiable):
         own_spaces = {name: lambda free, name=name: parts.spaces({name: free})[name] for name in parts.boxes()}
         spaces = declared({_LAW: lambda free: self.law.search_space(scaling, free), **own_spaces}, wished)
         space = together(spaces)
-        state = (*space.state, _OFFSET) if self.offsets == "own" and _OFFSET in space.linear else space.state
+        state = (*space.state, *self._offsets(space.linear)) if self.offsets == "own" else space.state
         points = np.clip(starts.as_points(space, self.starting), space.lower, space.upper)
         return replace(space, starts=points, screened=0, regions={}, state=state)
 
@@ -103,8 +123,13 @@ class ActuatorStructure(Identifiable):
         late = 0.0 if self.sensor is None else self.sensor.delay
         parts = self.parts([record])
         others = {name: value for name, value in parameters.items() if not name.startswith(f"{_LAW}.")}
-        law = own(parameters, _LAW)
-        return columns_through(self.law, law, others, lambda each: parts.stages(each, late), record)
+        if isinstance(self.law, ModalGains):
+            return self._by_mode(self.law, parts, others, record)
+        blocks = [
+            columns_through(law, shape, parts.of_input(others, name), partial(parts.stages, late=late, name=name), seen)
+            for name, law, shape, seen in self._laws(own(parameters, _LAW), record)
+        ]
+        return side_by_side(blocks)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
         """The law's memory after an input that stood still; ValueError for one that moved."""
@@ -115,9 +140,14 @@ class ActuatorStructure(Identifiable):
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
         """The actuator with these parameters."""
-        stages = self.parts([]).stages(parameters)
-        law = self.law.assemble(own(parameters, _LAW))
-        return self.family(hysteresis=law, sensor=self.sensor, **stages._asdict())
+        parts, law = self.parts([]), self.law.assemble(own(parameters, _LAW))
+        if not isinstance(law, InputSum):
+            return self.family(hysteresis=law, sensor=self.sensor, **parts.stages(parameters)._asdict())
+        actuators = [
+            self.family(hysteresis=each, **parts.stages(parameters, name=name)._asdict())
+            for name, each in law.laws.items()
+        ]
+        return MultiInputActuator(inputs=self.inputs, actuators=tuple(actuators))
 
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
         """Parameters that the records do not determine, and the values at which they are held."""
@@ -158,12 +188,31 @@ class ActuatorStructure(Identifiable):
         return 0 if self.survey is None else int(self.survey.fastest)
 
     def static(self, record: Record) -> Record:
-        """The record with the voltage that a known amplifier makes of its command."""
-        return replace(record, u=self.amplifier.voltage(record.u)) if isinstance(self.amplifier, Amplifier) else record
+        """The record with the voltages that a known amplifier makes of its commands."""
+        if not isinstance(self.amplifier, Amplifier):
+            return record
+        others = {name: self.amplifier.voltage(seen_by(record, name).u) for name in self.inputs if name != MAIN}
+        return replace(record, u=self.amplifier.voltage(record.u), channels={**record.channels, **others})
 
     def with_law(self, law: Any) -> "ActuatorStructure":
         """The structure with this law, or this start of it."""
         return replace(self, law=law)
+
+    def behind(self, law: Any) -> "ActuatorStructure":
+        """The structure behind a law that is known but for its gain, or behind several inputs as they are."""
+        return replace(self, law=Scaled(law) if len(self.inputs) == 1 else ModalGains(self.inputs, self.modes))
+
+    def solved(self, estimates: Mapping[str, float]) -> dict[str, float]:
+        """Coordinates by name of what was solved for behind a known law, and is a coordinate beside another one."""
+        if not isinstance(self.law, ModalGains):
+            return {}
+        return {f"vibration.{name}": value for name, value in self.law.shares(own(estimates, _LAW)).items()}
+
+    def begins(self) -> Mapping[str, float] | None:
+        """Coordinates of the vibration at which the user lets the search begin."""
+        if self.start is None:
+            return None
+        return self.parts([]).coordinates_of(vibrations_of(self.start, self.inputs, self.modes))
 
     @property
     def names(self) -> frozenset[str]:
@@ -212,7 +261,30 @@ class ActuatorStructure(Identifiable):
         bank: Any = self.creep
         if survey is not None:
             bank = creep_bank(bank, survey.shortest, survey.longest)
-        return LinearParts(self.amplifier, bank, self.modes, self.delay, survey)
+        gains = not isinstance(self.law, ModalGains)
+        return LinearParts(self.amplifier, bank, self.modes, self.delay, survey, self.inputs, gains)
+
+    def _laws(self, parameters: Parameters, record: Record) -> list[tuple[str, Any, Parameters, Record]]:
+        """Each input, its law, the law's parameters, and the record as the law sees it."""
+        if not isinstance(self.law, InputSum):
+            return [(MAIN, self.law, parameters, record)]
+        return [(name, law, own(parameters, name), seen_by(record, name)) for name, law in self.law.laws.items()]
+
+    def _by_mode(self, law: ModalGains, parts: LinearParts, others: Parameters, record: Record) -> FloatArray:
+        """Columns (n_sets, n_samples, n_columns + 1) of the inputs through each mode, one, and zero."""
+        seen = [seen_by(record, name) for name in self.inputs]
+        behind: list[tuple[Parameters, partial[Stages]]] = [(others, partial(parts.stages))]
+        if self.modes:
+            behind = [(parts.of_mode(others, k), partial(parts.one_mode, k=k)) for k in range(self.modes)]
+        blocks = [columns_through(law, {}, mine, stages, one) for mine, stages in behind for one in seen]
+        n_sets = max(len(block) for block in blocks)
+        blocks = [np.broadcast_to(block, (n_sets, *block.shape[1:])) for block in blocks]
+        return np.concatenate([*(block[..., :1] for block in blocks), blocks[0][..., 1:]], axis=-1)
+
+    def _offsets(self, linear: Sequence[str]) -> list[str]:
+        """The offsets of the laws that are free."""
+        names = [_OFFSET] if len(self.inputs) == 1 else [f"{_LAW}.{name}.offset" for name in self.inputs]
+        return [name for name in names if name in linear]
 
     def _delayed(self, k: int, step: float) -> "ActuatorStructure":
         delay = 0.0 if not k else (k - 0.5) * step

@@ -47,14 +47,16 @@ def columns_through(
         blocks |= {(drive, k): np.ascontiguousarray(block.T) for k, block in zip(mine, columns, strict=True)}
     first = _first_of_equal(drives)
     n_columns = len(next(iter(blocks.values())))
-    out = np.empty((n_sets, n_columns, len(record)))
+    pairs, which = np.unique(np.stack([of_parts, of_law], axis=1), axis=0, return_inverse=True)
+    out = np.empty((len(pairs), n_columns, len(record)))
 
     def work(start: int, stop: int) -> None:
         for k in range(start, stop):
-            _pass(chains[of_parts[k]], blocks[first[of_parts[k]], int(of_law[k])], out[k])
+            part, own_law = pairs[k].tolist()
+            _pass(chains[part], blocks[first[part], own_law], out[k])
 
-    in_chunks(work, n_sets, minimum=_SETS_PER_THREAD, n_samples=len(record))
-    return np.asarray(out.transpose(0, 2, 1))
+    in_chunks(work, len(pairs), minimum=_SETS_PER_THREAD, n_samples=len(record))
+    return np.asarray(out[np.ravel(which)].transpose(0, 2, 1))
 
 
 def _pass(chain: Chain, w: FloatArray, out: FloatArray) -> None:

@@ -41,10 +41,11 @@ def doubts(structure: Any, estimates: Mapping[str, float], freedom: Freedom) -> 
 
 
 def without_last_mode(structure: Any, freedom: Freedom) -> tuple[Any, str] | None:
-    """The structure with one mode less, and a remark; None where the user names one of its parameters."""
+    """The structure with one mode less, and a remark; None where the user names its parameters, or the modes."""
     k = structure.modes - 1
-    own = {f"vibration.{name}[{k}]" for name in (FREQUENCY, DAMPING, GAIN)}
-    if k < 0 or own & {*freedom.fixed, *freedom.free, *freedom.bounds}:
+    gains = [structure.parts([]).gain_of(k, name) for name in structure.inputs]
+    own = {f"vibration.{name}" for name in (f"{FREQUENCY}[{k}]", f"{DAMPING}[{k}]", *gains)}
+    if k < 0 or structure.start is not None or own & {*freedom.fixed, *freedom.free, *freedom.bounds}:
         return None
     box = {each.name: each for each in structure.parts([]).boxes()["vibration"][0]}[f"{FREQUENCY}[{k}]"]
     low, high = box.lower / (2.0 * math.pi), box.upper / (2.0 * math.pi)
@@ -76,6 +77,8 @@ def _doubt(structure: Any, name: str, value: float, freedom: Freedom) -> Doubt |
         return Doubt(name, value, smaller)
     if DAMPING in name:
         return Doubt(name, value + _USUAL_DAMPING, held(_USUAL_DAMPING, "the damping of a mode"))
+    if GAIN in name and len(structure.inputs) > 1:  # an input may well leave a mode at rest
+        return None
     less = without_last_mode(structure, freedom)
     largest = _SHARE_OF_FREQUENCY * value if FREQUENCY in name else _GAIN
     return None if less is None else Doubt(name, largest, less[0])
