@@ -5,7 +5,11 @@ import pytest
 from scipy import special, stats
 
 from hysim.posterior._bridge import _error
-from hysim.posterior._proposal import mixture, particles, proposal_for
+from hysim.posterior._mixture import mixture
+from hysim.posterior._optima import around_optima
+from hysim.posterior._proposal import particles, proposal_for
+
+NOWHERE = np.empty((0, 9))
 
 
 class Known:
@@ -44,8 +48,8 @@ def of_spike(n, power, width):
 @pytest.mark.parametrize("n", [1, 2, 5, 6])
 def test_the_density_is_that_of_the_mixture_of_t_distributions(n):
     rng = np.random.default_rng(n)
-    found = mixture(rng.standard_normal((200, n)) @ rng.standard_normal((n, n)), 0, rng)
-    points = found.draw(100, rng)  # more than one block
+    found = mixture(rng.standard_normal((200, n)) @ rng.standard_normal((n, n)), np.ones(200), 0, rng)
+    points = found.draw(100, rng)
     parts = [
         share * stats.multivariate_t(centre, root @ root.T, df=found.freedom).pdf(points)
         for share, centre, root in zip(found.share, found.centres, found.roots, strict=True)
@@ -63,9 +67,40 @@ def test_particles_follow_a_likelihood_that_collapses_to_a_spike():
     assert target.log_likelihood(v).mean() == pytest.approx(expected, abs=0.25 * spread)  # of 1024, not independent
 
 
+def test_an_optimum_that_particles_miss_has_its_share_of_the_posterior():
+    """Half of the posterior is a needle of width 1e-4 in four numbers: one draw of the prior in 1e14 is in it."""
+    needle, width, n = np.full(4, 1.5), 1e-4, 4
+    broad = stats.multivariate_normal(np.zeros(n), 0.25 * np.eye(n))
+    narrow = stats.multivariate_normal(needle, width**2 * np.eye(n))
+
+    def log_likelihood(v):
+        return np.logaddexp(broad.logpdf(v), narrow.logpdf(v)) - stats.norm.logpdf(v).sum(axis=1)
+
+    target = Known(n, log_likelihood)
+    target.optima = needle[np.newaxis] + width
+    rng = np.random.default_rng(0)
+    found, _ = proposal_for(target, around_optima(target, rng), rng)
+    q = found.draw(4000, rng)
+    weight = np.exp(target.log_posterior(q) - found.log_density(q))
+    in_needle = np.linalg.norm(q - needle, axis=1) < 10.0 * width
+    assert weight[in_needle].sum() / weight.sum() == pytest.approx(0.5, abs=0.05)
+    missed, _ = proposal_for(target, NOWHERE[:, :n], np.random.default_rng(0))
+    assert np.linalg.norm(missed.draw(4000, rng) - needle, axis=1).min() > 10.0 * width
+
+
+def test_a_mixture_is_that_of_weighted_points():
+    """Points are drawn evenly, and weighted by a normal density."""
+    rng, normal = np.random.default_rng(0), stats.multivariate_normal([1.0, -0.5], [[1.0, 0.5], [0.5, 0.5]])
+    v = rng.uniform(-4.0, 4.0, (4000, 2))
+    found = mixture(v, normal.pdf(v), 0, rng)
+    drawn = found.draw(20_000, rng)
+    weight = np.exp(normal.logpdf(drawn) - found.log_density(drawn))
+    assert weight.sum() ** 2 / np.sum(weight**2) > 0.7 * len(drawn)
+
+
 def test_an_improvement_in_which_one_draw_has_all_weight_ends_with_the_best_proposal():
     target = Deceived(4, lambda v: np.zeros(len(v)))
-    found, _ = proposal_for(target, np.random.default_rng(0))
+    found, _ = proposal_for(target, NOWHERE[:, :4], np.random.default_rng(0))
     assert found.share.sum() == pytest.approx(1.0)
     assert np.isfinite(found.log_density(target.prior_draws(50, np.random.default_rng(1)))).all()
 
@@ -77,7 +112,7 @@ def test_a_posterior_in_which_one_draw_of_the_prior_lies_is_an_error():
         return np.where((v == centre).all(axis=1), 0.0, -1e300)
 
     with pytest.raises(ValueError, match=r"the posterior was not found: 1 of .* pass narrower priors"):
-        proposal_for(Known(3, log_likelihood), np.random.default_rng(0))
+        proposal_for(Known(3, log_likelihood), NOWHERE[:, :3], np.random.default_rng(0))
 
 
 def test_walkers_that_do_not_meet_give_no_evidence():

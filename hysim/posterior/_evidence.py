@@ -285,7 +285,7 @@ def log_evidence(
         posterior = posed(fit, records, noise, given(priors or {}), initial, factor)
         if method == "nested":
             return nested_evidence(posterior, live_points, seed)
-        walkers = walkers_of(posterior.n_dim, None)
+        walkers = walkers_of(posterior.n_dim, None, _DRAWS)
         chains = sampled(posterior, walkers=walkers, samples=_DRAWS, seed=seed, most_steps=_STEPS)
         return bridge_evidence(posterior, chains, seed)
 

@@ -10,7 +10,7 @@ from hysim._frozen import FloatArray, check_count
 from hysim._parallel import Progress
 from hysim.identification import Identification
 from hysim.identification.likelihood.densities import density
-from hysim.identification.likelihood.refit import Problem, again
+from hysim.identification.likelihood.refit import Problem, again, optima
 from hysim.posterior._chains import effective_samples, split_rhat
 from hysim.posterior._priors import Given, check_names, given
 from hysim.posterior._result import LARGEST_RHAT, Posterior
@@ -18,7 +18,8 @@ from hysim.posterior._sampler import Chains, sampled
 from hysim.posterior._target import Target, target
 from hysim.records import Record, several
 
-_WALKERS, _WALKERS_PER_DIMENSION = 128, 4
+_WALKERS, _WALKERS_PER_DIMENSION = 128, 4  # at most, and at least
+_SAMPLES_PER_WALKER = 25  # effective ones: of shorter paths R-hat is large by chance
 _MOST_STEPS = 100_000
 
 
@@ -59,7 +60,7 @@ def sample_posterior(
     samples : int
         Number of effective samples of each parameter.
     walkers : int, optional
-        Number of walkers, even; by default 128, or four times the number of parameters if that is more.
+        Number of walkers, even; by default one for 25 samples, but at most 128, and at least four for each parameter.
     most_steps : int
         Steps of the walkers after which sampling ends in any case.
     seed : int
@@ -96,7 +97,7 @@ def sample_posterior(
     own = given(priors or {})
     with one_blas_thread():
         posterior = posed(fit, records, noise, own, initial)
-        number = walkers_of(posterior.n_dim, walkers)
+        number = walkers_of(posterior.n_dim, walkers, samples)
         chains = sampled(
             posterior,
             walkers=number,
@@ -123,13 +124,16 @@ def posed(
     bounds = {name: (prior.low, prior.high) for name, prior in priors.items() if name in names}
     problem = again(fit, records, bounds, initial)
     check_names(problem, fit.free_names, priors)
-    return target(problem, kind, priors, records[0].resolution, factor)
+    posterior = target(problem, kind, priors, records[0].resolution, factor)
+    posterior.begin_at(optima(fit, problem, bounds, initial), fit.sigma)
+    return posterior
 
 
-def walkers_of(n_dim: int, walkers: int | None) -> int:
+def walkers_of(n_dim: int, walkers: int | None, samples: int) -> int:
     """Number of walkers; a ValueError for one that is odd, or less than twice the number of parameters."""
     if walkers is None:
-        return max(_WALKERS, 2 * ((_WALKERS_PER_DIMENSION * n_dim + 1) // 2))
+        wanted = min(_WALKERS, samples // _SAMPLES_PER_WALKER)
+        return max(wanted, _WALKERS_PER_DIMENSION * n_dim) // 2 * 2
     check_count("walkers", walkers)
     if walkers % 2 or walkers < 2 * n_dim:
         raise ValueError(f"walkers must be even, and at least {2 * n_dim} for {n_dim} parameters, got {walkers}")
@@ -138,9 +142,9 @@ def walkers_of(n_dim: int, walkers: int | None) -> int:
 
 def described(fit: Identification, posterior: Target, chains: Chains, samples: int, seed: int) -> Posterior:
     """The result."""
-    n_draws, n_walkers, _ = chains.q.shape
-    table = posterior.parameters(chains.flat)
-    paths = {name: table[:, k].reshape(n_draws, n_walkers) for k, name in enumerate(posterior.names)}
+    n_walkers = chains.q.shape[1]
+    table = chains.parameters.reshape(-1, len(posterior.names))
+    paths = {name: chains.parameters[..., k] for k, name in enumerate(posterior.names)}
     effective = {name: effective_samples(path) for name, path in paths.items()}
     rhat = {name: split_rhat(path) for name, path in paths.items()}
     return Posterior(

@@ -4,7 +4,7 @@ Half of the moves are independent draws from a proposal close to the posterior (
 from one optimum to another; half are moves of differential evolution along the difference of two other walkers
 (C. ter Braak, Stat. Comput. 16 (2006) 239; B. Nelson, E. Ford and M. Payne, Astrophys. J. Suppl. 210 (2014) 11).
 
-The walkers begin in the proposal. Runs that double their length warm the ensemble up, until one is 20 times as long as
+The walkers begin in the proposal. Runs that double their length warm the ensemble up, until one is ten times as long as
 its correlation; after each, the proposal may be shaped anew by their paths. It is not changed any more then.
 """
 
@@ -17,12 +17,14 @@ import numpy as np
 from hysim._frozen import FloatArray
 from hysim._versions import optional
 from hysim.posterior._chains import effective_samples, split_rhat
-from hysim.posterior._proposal import Proposal, mixture, proposal_for
+from hysim.posterior._mixture import Proposal, mixture
+from hysim.posterior._optima import around_optima
+from hysim.posterior._proposal import EARLY_SHARE, proposal_for
 from hysim.posterior._target import Target
 
 _FIRST = 100  # steps of the first run
 _SHAPING = 4096  # points of the walkers' paths that shape a proposal
-_LONG = 20.0  # correlation times of a run, from which on the ensemble counts as warm
+_LONG = 10.0  # correlation times of a run, from which on the ensemble counts as warm
 _DRAWS_PER_TIME = 4.0  # that are kept in a correlation time
 _SLACK = 1.05  # draws more than needed, as the estimate of the correlation has an error
 _AT_LEAST = 8  # steps of a run
@@ -31,12 +33,13 @@ _TRIED = 20  # points of the proposal for each walker that begins
 
 @dataclass(frozen=True)
 class Chains:
-    """Points (n_draws, n_walkers, n_dim), ln p (n_draws, n_walkers), the share of moves that were accepted.
+    """Points (n_draws, n_walkers, n_dim), the user's parameters and sigma there, and ln p (n_draws, n_walkers).
 
-    `proposal` is one that does not depend on these draws.
+    `acceptance` is the share of the moves that were accepted, and `proposal` one that does not depend on these draws.
     """
 
     q: FloatArray
+    parameters: FloatArray
     log_density: FloatArray
     acceptance: float
     proposal: Proposal
@@ -62,10 +65,10 @@ def sampled(
     most_steps: int,
     progress: Callable[[int, int], None] | None = None,
 ) -> Chains:
-    """Chains with about so many effective samples of each number, or with `most_steps` steps if these come first."""
+    """Chains with so many effective samples of each parameter, or with `most_steps` steps if these come first."""
     emcee = optional("emcee", "sampling a posterior", "bayes")
     rng = np.random.default_rng(seed)
-    proposal, reaching = proposal_for(target, rng)
+    proposal, reaching = proposal_for(target, around_optima(target, rng), rng)
     sampler = _Ensemble(emcee, target, walkers, proposal, reaching)
     state = emcee.State(
         _first(target, proposal, walkers, rng),
@@ -75,18 +78,22 @@ def sampled(
     thin = max(1, int(tau / _DRAWS_PER_TIME))
     parts: list[Any] = []
     effective = 0.0
-    while (effective < samples and spent < most_steps) or not parts:
+    while True:
         missing = _SLACK * (samples - effective) * tau / walkers
         draws = max(_AT_LEAST, min(int(missing / thin) + 1, (most_steps - spent) // thin))
         state, q, log_density = sampler.run(state, draws, thin)
         spent += draws * thin
         parts.append((q, log_density))
-        q = np.concatenate([part for part, _ in parts])
+        q, log_density = (np.concatenate(each) for each in zip(*parts, strict=True))
         effective = worst(q)[0]
+        if is_enough := effective >= samples or spent >= most_steps:  # in these coordinates
+            parameters = target.parameters(q.reshape(-1, target.n_dim)).reshape(*q.shape[:2], -1)
+            effective = worst(parameters)[0]
         tau = max(len(q) * thin * walkers / effective, 1.0)
         if progress is not None:
             progress(min(int(effective), samples), samples)
-    return Chains(q, np.concatenate([part for _, part in parts]), sampler.acceptance, sampler.proposal)
+        if is_enough and (effective >= samples or spent >= most_steps):
+            return Chains(q, parameters, log_density, sampler.acceptance, sampler.proposal)
 
 
 class _Ensemble:
@@ -102,11 +109,9 @@ class _Ensemble:
             target.log_posterior,
             vectorize=True,
             moves=[
-                (moves.MHMove(self._independent), 0.5),
+                (moves.MHMove(self._independent), 0.7),
                 (moves.DEMove(), 0.15),
-                (moves.DEMove(gamma0=0.15), 0.15),
-                (moves.DEMove(gamma0=0.03), 0.1),
-                (moves.DESnookerMove(), 0.1),
+                (moves.DEMove(gamma0=0.1), 0.15),
             ],
         )
 
@@ -138,7 +143,8 @@ class _Ensemble:
         """Shape the proposal by one half of these paths, if that has the larger density on the other half."""
         half = len(q) // 2
         first, second = (_some(part.reshape(-1, q.shape[2]), rng) for part in (q[:half], q[half:]))
-        trial = mixture(self.target.without_linear(first), self.target.n_linear, rng).beside(self.reaching)
+        v = self.target.without_linear(first)
+        trial = mixture(v, np.ones(len(v)), self.target.n_linear, rng).beside(self.reaching, EARLY_SHARE)
         if trial.log_density(second).mean() > self.proposal.log_density(second).mean():
             self.proposal = trial
 

@@ -45,7 +45,10 @@ class Columns(NamedTuple):
 
 @dataclass
 class Target:
-    """Posterior of a problem with a noise and priors; `evaluations` counts the sets that were simulated."""
+    """Posterior of a problem with a noise and priors.
+
+    `evaluations` counts the sets that were simulated; `optima` are points v (n_optima, n_x + 1), the best first.
+    """
 
     problem: Problem
     noise: Density
@@ -54,6 +57,7 @@ class Target:
     sigma_ends: tuple[float, float]  # of ln sigma
     sigma_given: Given | None
     evaluations: int = field(default=0)
+    optima: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
 
     @property
     def n_x(self) -> int:
@@ -111,6 +115,10 @@ class Target:
         share = rng.random((n, self.n_x + 1))
         x, log_sigma = self.x_prior.quantile(share[:, :-1]), self._sigma_quantile(share[:, -1])
         return self._normal(x, log_sigma)
+
+    def begin_at(self, x: FloatArray, sigma: float) -> None:
+        """Take coordinates of optima (n_optima, n_x), and the sigma that they have."""
+        self.optima = self._normal(x, np.full(len(x), np.log(sigma)))
 
     def marginal(self, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """About ln of the likelihood with the linear parameters integrated out, and ln of the prior of v, (n_sets,)."""

@@ -13,7 +13,7 @@ from hysim.models.protocols import Identifiable
 from hysim.models.search_space import Freedom
 from hysim.records import Record
 
-__all__ = ["Problem", "again"]
+__all__ = ["Problem", "again", "optima"]
 
 _SAME = 1e-3  # of the residual's rms: largest difference between the residuals of a fit and of its problem
 _ROUNDING = 1e-9  # of the output's size
@@ -36,8 +36,25 @@ def again(fit: Identification, records: Sequence[Record], bounds: Bounds, initia
     plain = problem(model, paths, freedom, initial)
     models = fit.models if len(fit.models) == len(records) else (model,)
     _check_same(fit, plain, [problem(each, paths, freedom, initial).own.starts[0] for each in models])
-    inner = {name: pair for name, pair in bounds.items() if name not in plain.own.columns}
+    inner = _inner(bounds, plain)
     return problem(model, paths, replace(freedom, bounds=inner), initial) if inner else plain
+
+
+def optima(fit: Identification, known: Problem, bounds: Bounds, initial: Initial) -> FloatArray:
+    """Coordinates (n_optima, n_x) of the fit and of its rivals, the best first, in the problem that `again` has made.
+
+    Several records have the state of the first one.
+    """
+    paths = [part.record for part in known.parts]
+    freedom, initial = _freedom(fit, known.family, paths, initial)
+    freedom = replace(freedom, bounds=_inner(bounds, known))
+    models = [fit.model, *(rival.model for rival in fit.rivals)]
+    return np.array([problem(model, paths, freedom, initial).space.starts[0] for model in models])
+
+
+def _inner(bounds: Bounds, known: Problem) -> dict[str, tuple[float, float]]:
+    """Bounds of parameters that are not linear."""
+    return {name: pair for name, pair in bounds.items() if name not in known.own.columns}
 
 
 def _freedom(
