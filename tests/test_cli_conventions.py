@@ -165,6 +165,23 @@ def test_a_comparison_is_whole_in_json_and_its_best_model_is_written(run, tmp_pa
     assert hs.load_model(tmp_path / "best.json") == LAW
 
 
+@pytest.mark.extra("emcee")
+def test_a_posterior_is_printed_and_a_folder_of_files_written(run, tmp_path):
+    sampled = ("posterior", "loop.csv", *COLUMNS, "--model", "line", "--samples", "200", "--prior", "slope=0:1")
+    code, out, err = run(*sampled, "--out", tmp_path / "new" / "folder", "--json")
+    folder = tmp_path / "new" / "folder"
+    assert (code, err) == (0, "")
+    assert out == (folder / "posterior.json").read_text()
+    document = json.loads(out)
+    assert [each["name"] for each in document["parameters"]] == ["offset", "slope", "sigma"]
+    assert document["priors"]["slope"] == "flat from 0 to 1"
+    assert {path.name for path in folder.iterdir()} == {"parameters.csv", "samples.csv", "corner.svg", "posterior.json"}
+    draws = np.loadtxt(folder / "samples.csv", delimiter=",", skiprows=1)
+    medians = np.genfromtxt(folder / "parameters.csv", delimiter=",", skip_header=1, usecols=1)
+    np.testing.assert_array_equal(np.median(draws, axis=0), medians)
+    assert [each["median"] for each in document["parameters"]] == medians.tolist()
+
+
 def test_a_study_is_told_as_json_and_drawn(run, tmp_path):
     picture = tmp_path / "study.svg"
     code, out, err = run("sweep", "study.toml", "--out", tmp_path / "rows.sqlite", "--plot", picture, "--json")

@@ -26,6 +26,7 @@ from hysim.cli import (
     outputs,
     page,
     plot,
+    posterior,
     reproduce,
     simulate,
     sweep,
@@ -38,7 +39,7 @@ from hysim.errors import SimulationError
 
 GROUPS: Mapping[str, Sequence[Command]] = {
     "look at a file": (example.COMMAND, columns.COMMAND, metrics.COMMAND, plot.COMMAND),
-    "from a file to a model": (identify.COMMAND, compare.COMMAND, discover.COMMAND),
+    "from a file to a model": (identify.COMMAND, posterior.COMMAND, compare.COMMAND, discover.COMMAND),
     "use a model": (simulate.COMMAND, control.COMMAND, page.COMMAND),
     "take a model elsewhere": (c.COMMAND, fmu.COMMAND),
     "many simulations": (sweep.COMMAND,),

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen, read_only
-from hysim._printing import printed, summary_text, wrapped
+from hysim._printing import aligned, csv_text, printed, summary_text, wrapped
 from hysim._versions import optional
 from hysim.posterior._prediction import Prediction, predicted
 
@@ -86,6 +86,11 @@ class Posterior:
         return {name: float(draws.mean()) for name, draws in self.samples.items()}
 
     @property
+    def median(self) -> dict[str, float]:
+        """Median of each parameter."""
+        return {name: float(np.median(draws)) for name, draws in self.samples.items()}
+
+    @property
     def covariance(self) -> FloatArray:
         """Covariance of the parameters, shape (n_names, n_names), in the order of `names`."""
         return np.atleast_2d(np.cov(self.table, rowvar=False))
@@ -133,6 +138,10 @@ class Posterior:
         """
         return predicted(self, read_only(u, "u", ndim=1), t, n, _tails(level), seed)
 
+    def to_csv(self) -> str:
+        """All draws with every digit, one in a line, below the names."""
+        return csv_text([self.names, *self.table.tolist()])
+
     def to_arviz(self) -> Any:
         """The draws as the installed arviz holds them: a DataTree, or InferenceData before arviz 1.0.
 
@@ -150,16 +159,15 @@ class Posterior:
             return arviz.from_dict({"posterior": posterior, "sample_stats": stats})
 
     def summary(self) -> str:
-        """All parameters with mean, standard deviation, interval, effective samples and R-hat."""
-        ends = self.interval()
-        lines = [self._head()]
+        """All parameters with median, interval, mean, standard deviation, effective samples and R-hat."""
+        ends, median = self.interval(), self.median
+        table = [["parameter", "median", "interval at 95 %", "mean", "deviation", "effective", "R-hat"]]
         for name, draws in self.samples.items():
             low, high = ends[name]
-            lines.append(
-                f"  {name} = {draws.mean():.6g} +- {draws.std(ddof=1):.2g}  [{low:.5g}, {high:.5g}]  "
-                f"{self.effective_samples[name]:.0f} effective, R-hat {self.rhat[name]:.3f}"
-            )
-        lines += [f"  prior of {name}: {words}" for name, words in self.priors.items()]
+            values = f"{median[name]:.5g}", f"{low:.5g} to {high:.5g}", f"{draws.mean():.5g}"
+            trust = f"{draws.std(ddof=1):.2g}", f"{self.effective_samples[name]:.0f}", f"{self.rhat[name]:.3f}"
+            table.append([name, *values, *trust])
+        lines = [self._head(), *aligned(table), *(f"  prior of {name}: {words}" for name, words in self.priors.items())]
         return "\n".join([*lines, *(["Warnings"] if self.warnings else []), *(f"  {each}" for each in self.warnings)])
 
     def __str__(self) -> str:

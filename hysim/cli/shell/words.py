@@ -12,7 +12,8 @@ from collections.abc import Iterable, Mapping
 from hysim._names import nearest
 
 OTHER_NAMES = {
-    "acceleration": "u", "channels": "channel", "elements": "plays", "fixed": "fix", "units": "unit",
+    "acceleration": "u", "channels": "channel", "elements": "plays", "fixed": "fix", "priors": "prior",
+    "units": "unit",
 }  # fmt: skip
 """Arguments whose option has another name, and that name."""
 
