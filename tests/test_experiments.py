@@ -8,6 +8,7 @@ import pytest
 
 EXPERIMENTS = sorted((Path(__file__).parent.parent / "experiments").glob("[0-9]*.py"))
 NEEDS = dict.fromkeys(("29_registration", "30_virtual_rig"), pytest.mark.extra("skimage"))
+NEEDS["48_posterior"] = pytest.mark.extra("emcee")
 NEEDS["49_evidence"] = pytest.mark.extra("emcee", "dynesty")
 
 
