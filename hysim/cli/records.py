@@ -9,7 +9,7 @@ from typing import Any
 
 from hysim._frozen import FloatArray
 from hysim.cli.options import positive
-from hysim.cli.ranges import cut
+from hysim.cli.shell.ranges import cut
 from hysim.records import Record
 
 STANDARD = "-"

@@ -32,7 +32,7 @@ EARLY_SHARE = 0.2  # of the mixture
 _MOST_POWERS = 100
 _IMPROVING = 4  # draws that improve a proposal, for each particle
 _ROUNDS = 3
-_EVEN_ENOUGH = 0.35  # effective share of the draws
+_EVEN_ENOUGH = 0.45  # effective share of the draws
 
 
 def proposal_for(target: Target, near: FloatArray, rng: np.random.Generator) -> tuple[Proposal, Proposal]:

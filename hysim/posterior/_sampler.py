@@ -25,7 +25,7 @@ from hysim.posterior._target import Target
 _FIRST = 100  # steps of the first run
 _SHAPING = 4096  # points of the walkers' paths that shape a proposal
 _LONG = 10.0  # correlation times of a run, from which on the ensemble counts as warm
-_DRAWS_PER_TIME = 4.0  # that are kept in a correlation time
+_DRAWS_PER_TIME = 2.0  # that are kept in a correlation time
 _SLACK = 1.05  # draws more than needed, as the estimate of the correlation has an error
 _AT_LEAST = 8  # steps of a run
 _TRIED = 20  # points of the proposal for each walker that begins
@@ -77,6 +77,7 @@ def sampled(
     state, tau, spent = sampler.warmed(state, most_steps, rng)
     thin = max(1, int(tau / _DRAWS_PER_TIME))
     parts: list[Any] = []
+    parameters = np.empty((0, walkers, len(target.names)))
     effective = 0.0
     while True:
         missing = _SLACK * (samples - effective) * tau / walkers
@@ -87,7 +88,8 @@ def sampled(
         q, log_density = (np.concatenate(each) for each in zip(*parts, strict=True))
         effective = worst(q)[0]
         if is_enough := effective >= samples or spent >= most_steps:  # in these coordinates
-            parameters = target.parameters(q.reshape(-1, target.n_dim)).reshape(*q.shape[:2], -1)
+            further = target.parameters(q[len(parameters) :].reshape(-1, target.n_dim))
+            parameters = np.concatenate([parameters, further.reshape(-1, *parameters.shape[1:])])
             effective = worst(parameters)[0]
         tau = max(len(q) * thin * walkers / effective, 1.0)
         if progress is not None:
