@@ -202,7 +202,7 @@ def draw(rows: list[Row]) -> Figure:
     axes.axhline(95.0, color="#777777", linewidth=0.8, linestyle="dashed")
     axes.plot(places, shares, color="#0072B2", marker="o", linestyle="none")
     axes.set_xticks(places, [row["parameter"] for row in rows])
-    axes.set(ylabel="Intervals that hold\nthe truth [%]", ylim=(80.0, 101.0))
+    axes.set(ylabel="Intervals that hold\nthe truth [%]", ylim=(min(80.0, *shares) - 3.0, 102.0))
     return canvas
 
 

@@ -26,7 +26,8 @@ def around_optima(target: Target, rng: np.random.Generator) -> FloatArray:
 
 
 def _spread(target: Target, start: FloatArray, rng: np.random.Generator) -> FloatArray:
-    sizes = np.exp(rng.uniform(*np.log(_SIZES), (_BEGUN * _EACH, 1)))
+    shortest, longest = np.log(_SIZES).tolist()
+    sizes = np.exp(rng.uniform(shortest, longest, (_BEGUN * _EACH, 1)))
     v = np.clip(start, -_FARTHEST, _FARTHEST) + sizes * rng.standard_normal((len(sizes), start.size))
     value, prior = target.marginal(v)
     likely = np.argsort(-(value + prior + rng.gumbel(size=len(v))))[:_EACH]
