@@ -15,7 +15,7 @@ from scipy import stats
 
 import hysim as hs
 from hysim.identification.likelihood.densities import density
-from hysim.posterior import _nested, log_evidence
+from hysim.posterior import _nested, _sampler, log_evidence
 from hysim.posterior._bridge import bridge_evidence
 from hysim.posterior._chains import effective_samples, split_rhat
 from hysim.posterior._priors import REACH, given, scaled_box
@@ -257,6 +257,16 @@ def test_samples_of_a_line_have_its_distribution():
     low, high = post.interval(0.9)["slope"]
     assert np.mean((post.samples["slope"] > low) & (post.samples["slope"] < high)) == pytest.approx(0.9, abs=1e-3)
     np.testing.assert_allclose(np.sqrt(np.diag(post.covariance)), post.table.std(axis=0, ddof=1))
+
+
+@pytest.mark.extra("emcee")
+def test_the_share_of_accepted_moves_does_not_depend_on_how_many_draws_are_kept(monkeypatch):
+    rec = cubic_record(n=9)
+    fit = hs.identify(hs.Line, rec)
+    every = hs.sample_posterior(fit, rec, samples=200, walkers=32).acceptance
+    monkeypatch.setattr(_sampler, "_DRAWS_PER_TIME", 0.2)
+    assert hs.sample_posterior(fit, rec, samples=200, walkers=32).acceptance == pytest.approx(every, abs=0.15)
+    assert every > 0.3
 
 
 @pytest.mark.extra("emcee")

@@ -1,7 +1,7 @@
 """Draws from a posterior by emcee: an ensemble of walkers, all evaluated at once.
 
-Half of the moves are independent draws from a proposal close to the posterior (`hysim.posterior._proposal`), which go
-from one optimum to another; half are moves of differential evolution along the difference of two other walkers
+Most moves are independent draws from a proposal close to the posterior (`hysim.posterior._proposal`), which go from one
+optimum to another; the others are moves of differential evolution along the difference of two other walkers
 (C. ter Braak, Stat. Comput. 16 (2006) 239; B. Nelson, E. Ford and M. Payne, Astrophys. J. Suppl. 210 (2014) 11).
 
 The walkers begin in the proposal. Runs that double their length warm the ensemble up, until one is ten times as long as
@@ -126,7 +126,7 @@ class _Ensemble:
         """The state after the run, points (draws, n_walkers, n_dim), and ln p (draws, n_walkers)."""
         self.sampler.reset()
         state = self.sampler.run_mcmc(state, draws, thin_by=thin)
-        self.acceptance = float(self.sampler.backend.accepted.mean()) / (draws * thin)
+        self.acceptance = float(self.sampler.backend.accepted.mean()) / draws  # the backend counts kept moves alone
         return state, self.sampler.get_chain(), self.sampler.get_log_prob()
 
     def warmed(self, state: Any, most_steps: int, rng: np.random.Generator) -> tuple[Any, float, int]:
