@@ -31,9 +31,9 @@ def folder(tmp_path, monkeypatch):
     rows = zip(u.tolist(), law.response(u).tolist(), strict=True)
     (tmp_path / "loop.csv").write_text("voltage,displacement\n" + "".join(f"{a},{b}\n" for a, b in rows))
     hs.save(law, tmp_path / "law.json")
-    for name in ("loop.svg", "loop.json", "loop.c", "loop.h", "loop.html"):
+    for name in ("loop.svg", "loop.json", "loop.c", "loop.h", "loop.html", "samples.csv"):
         shutil.copy(tmp_path / "loop.csv", tmp_path / name)
-    for name in ("law.svg", "law.c", "law.h", "law.csv", "law.fmu", "law.html"):
+    for name in ("law.svg", "law.c", "law.h", "law.csv", "law.fmu", "law.html", "posterior.json"):
         shutil.copy(tmp_path / "law.json", tmp_path / name)
     (tmp_path / "width.py").write_text("def width(beta):\n    return beta\n")
     (tmp_path / "study.toml").write_text(STUDY)
@@ -54,6 +54,8 @@ CASES = [
     ("identify", "loop.csv", *COLUMNS, "--model", "line", "--out", "loop.csv"),
     ("identify", "loop.csv", *COLUMNS, "--model", "law.json", "--out", "law.json"),
     ("identify", "loop.svg", *COLUMNS, "--model", "line", "--plot", "loop.svg"),
+    ("posterior", "samples.csv", *COLUMNS, "--model", "line", "--out", "."),
+    ("posterior", "loop.csv", *COLUMNS, "--model", "posterior.json", "--out", "."),
     ("discover", "loop.csv", *COLUMNS, "--out", "loop.csv"),
     ("discover", "loop.svg", *COLUMNS, "--plot", "loop.svg"),
     ("compare", "loop.csv", *COLUMNS, "--model", "line", "--csv", "loop.csv"),

@@ -190,7 +190,7 @@ def test_a_structure_takes_its_own_options_and_no_other_family_does(run):
     assert code == 0
     assert out.startswith("TransferFunction: fit")
     code, _, err = run("identify", "loop.csv", *COLUMNS, "--model", "line", "--poles", 1)
-    assert (code, err) == (2, "hysim: error: --poles is no option of the model line\n")
+    assert (code, err) == (2, "hysim: error: --poles is no option of the model line, but of transfer-function\n")
     code, _, err = run("identify", "loop.csv", *COLUMNS, "--model", "transfer-function", "--poles", 1)
     assert (code, err) == (2, "hysim: error: the model transfer-function needs --zeros\n")
 

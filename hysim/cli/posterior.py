@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 SUCCESS, NOT_CONVERGED = 0, 1
 
+_RESULTS = _TABLE, _DRAWS, _PICTURE, _DOCUMENT = "parameters.csv", "samples.csv", "corner.svg", "posterior.json"
 _PANEL = 1.25  # width of a panel of the corner picture [inch]
 _SETTINGS = ("noise", "resolution", "priors", "n_evaluations", "seed", "warnings")
 
@@ -27,6 +28,7 @@ def run(options: argparse.Namespace) -> int:
     measured: Any = [records.read(options, file) for file in (options.file, *options.others)]
     measured = measured if options.others else measured[0]
     if options.out is not None:
+        outputs.keep([options.file, *options.others, options.model], (str(Path(options.out, each)) for each in _RESULTS))
         Path(options.out).mkdir(parents=True, exist_ok=True)
     fit = identify(
         model,
@@ -52,10 +54,10 @@ def _files(out: str | None, posterior: "Posterior") -> outputs.Files:
     if out is None:
         return {}
     return {
-        str(Path(out, "parameters.csv")): lambda: _table(posterior),
-        str(Path(out, "samples.csv")): posterior.to_csv,
-        str(Path(out, "corner.svg")): lambda: _picture(posterior),
-        str(Path(out, "posterior.json")): lambda: outputs.to_json(_document(posterior)),
+        str(Path(out, _TABLE)): lambda: _table(posterior),
+        str(Path(out, _DRAWS)): posterior.to_csv,
+        str(Path(out, _PICTURE)): lambda: _corner(posterior),
+        str(Path(out, _DOCUMENT)): lambda: outputs.to_json(_document(posterior)),
     }
 
 
@@ -87,7 +89,7 @@ def _document(posterior: "Posterior") -> dict[str, Any]:
     return {"family": type(posterior.model).__name__, "parameters": _rows(posterior), **settings}
 
 
-def _picture(posterior: "Posterior") -> "Figure":
+def _corner(posterior: "Posterior") -> "Figure":
     from hysim import plot
 
     n = len(posterior.names)
