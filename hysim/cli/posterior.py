@@ -28,7 +28,8 @@ def run(options: argparse.Namespace) -> int:
     measured: Any = [records.read(options, file) for file in (options.file, *options.others)]
     measured = measured if options.others else measured[0]
     if options.out is not None:
-        outputs.keep([options.file, *options.others, options.model], (str(Path(options.out, each)) for each in _RESULTS))
+        results = [str(Path(options.out, name)) for name in _RESULTS]
+        outputs.keep([options.file, *options.others, options.model], results)
         Path(options.out).mkdir(parents=True, exist_ok=True)
     fit = identify(
         model,
