@@ -27,6 +27,7 @@ _SHAPING = 4096  # points of the walkers' paths that shape a proposal
 _LONG = 10.0  # correlation times of a run, from which on the ensemble counts as warm
 _DRAWS_PER_TIME = 2.0  # that are kept in a correlation time
 _SLACK = 1.05  # draws more than needed, as the estimate of the correlation has an error
+_PORTION, _LAST = 0.5, 0.1  # of the missing draws, and of all: what is drawn before the correlation is looked at again
 _AT_LEAST = 8  # steps of a run
 _TRIED = 20  # points of the proposal for each walker that begins
 
@@ -80,7 +81,8 @@ def sampled(
     parameters = np.empty((0, walkers, len(target.names)))
     effective = 0.0
     while True:
-        missing = _SLACK * (samples - effective) * tau / walkers
+        portion = max(_PORTION * (samples - effective), _LAST * samples)  # tau is known badly at first
+        missing = _SLACK * portion * tau / walkers
         draws = max(_AT_LEAST, min(int(missing / thin) + 1, (most_steps - spent) // thin))
         state, q, log_density = sampler.run(state, draws, thin)
         spent += draws * thin
