@@ -39,7 +39,7 @@ class MultiInputActuator:
 
     See Also
     --------
-    hysim.Actuator.structure : what `hysim.identify` takes.
+    hysim.Actuator.structure : What `hysim.identify` takes.
 
     Examples
     --------
