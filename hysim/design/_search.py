@@ -105,5 +105,5 @@ def one_redrawn(strokes: FloatArray, limits: InputLimits, rng: np.random.Generat
 
 
 def value_of(subject: Subject, criterion: Criterion) -> Callable[[FloatArray], float]:
-    """What an input is worth."""
+    """The worth of an input."""
     return lambda u: merit(subject.information(u), criterion)

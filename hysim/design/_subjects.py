@@ -1,4 +1,4 @@
-"""What an input is designed for: numbers, and the information that an input would give on them."""
+"""Subjects of a design: numbers, and the information that an input would give on them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -13,7 +13,7 @@ _DIFFERENCE = 1e-4  # of a number, or of one where that is smaller: both errors 
 
 
 class Subject(Protocol):
-    """What an input is designed for."""
+    """Numbers for which an input is designed."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -33,7 +33,7 @@ class Subject(Protocol):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What is left out from the beginning."""
+        """Remarks on numbers that are left out from the beginning."""
 
     def information(self, u: FloatArray) -> FloatArray:
         """Fisher information on the numbers in units of their sizes, (n_names, n_names); zeros if it diverges."""

@@ -1,4 +1,4 @@
-"""What a record that is not measured yet would tell: the derivatives of its output by parameters that are known.
+"""Information of a record that is not measured yet: the derivatives of its output by parameters that are known.
 
 They are those of the residual that `hysim.identify` makes small, by the same code.
 """
