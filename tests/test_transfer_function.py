@@ -328,17 +328,17 @@ def test_regressors_with_unlike_delays_are_those_of_each():
 
 def test_standard_errors_are_those_of_many_draws():
     true = hs.TransferFunction(num=(9.0,), den=(1.0, 2.0, 9.0))
-    u = np.repeat(np.random.default_rng(5).choice([-1.0, 1.0], 125), 4)
+    u = np.repeat(np.random.default_rng(5).choice([-1.0, 1.0], 250), 4)
     clean, t = true.response(u, 0.1), 0.1 * np.arange(u.size)
     structure = hs.TransferFunction.structure(poles=2, zeros=0)
     found, stderr = [], []
-    for seed in range(20):
+    for seed in range(30):
         y = clean + 0.3 * np.random.default_rng(seed).standard_normal(u.size)
         fit = hs.identify(structure, hs.Record(u=u, y=y, t=t))
         found.append([fit.estimates[name] for name in fit.free_names])
         stderr.append([fit.stderr[name] for name in fit.free_names])
     ratio = np.std(found, axis=0, ddof=1) / np.sqrt(np.mean(np.square(stderr), axis=0))
-    assert ratio == pytest.approx(1.0, abs=4 / np.sqrt(2 * 20))  # four sampling errors of a standard deviation
+    assert ratio == pytest.approx(1.0, abs=4 / np.sqrt(2 * 30))  # four sampling errors of a standard deviation
 
 
 def test_a_fit_to_table_1_says_what_the_record_cannot_show():
