@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from hysim._frozen import FloatArray, frozen
 from hysim._names import among, meant
 
@@ -77,6 +79,22 @@ class SearchSpace:
     screened: int | None = None
     drawn: tuple[FloatArray, FloatArray] | None = None
     encoded: Callable[[Mapping[str, float]], FloatArray] | None = None
+
+    @classmethod
+    def without_coordinates(cls, names: tuple[str, ...]) -> "SearchSpace":
+        """The space of parameters that are all linear."""
+        none = np.empty(0)
+        return cls(
+            coordinates=(),
+            lower=none,
+            upper=none,
+            starts=np.empty((1, 0)),
+            names=names,
+            columns=names,
+            linear=names,
+            held={},
+            parameters=lambda x: {},
+        )
 
 
 @dataclass(frozen=True)

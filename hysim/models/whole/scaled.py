@@ -23,17 +23,7 @@ class Scaled(Identifiable):
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """No coordinates: both parameters are linear."""
-        return SearchSpace(
-            coordinates=(),
-            lower=np.empty(0),
-            upper=np.empty(0),
-            starts=np.empty((1, 0)),
-            names=_COLUMNS,
-            columns=_COLUMNS,
-            linear=_COLUMNS,
-            held={},
-            parameters=lambda x: {},
-        )
+        return SearchSpace.without_coordinates(_COLUMNS)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """The law's output, one, and zero, (1, n_samples, 3)."""

@@ -72,17 +72,7 @@ class ModalGains(Identifiable):
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """No coordinates: all parameters are linear."""
         columns = (*(self._name(k, name) for k in range(max(self.modes, 1)) for name in self.inputs), "offset")
-        return SearchSpace(
-            coordinates=(),
-            lower=np.empty(0),
-            upper=np.empty(0),
-            starts=np.empty((1, 0)),
-            names=columns,
-            columns=columns,
-            linear=columns,
-            held={},
-            parameters=lambda x: {},
-        )
+        return SearchSpace.without_coordinates(columns)
 
     def shares(self, gains: Mapping[str, float]) -> dict[str, float]:
         """The gains of each input but in the first mode, relative to their sum, by mode and input."""
