@@ -2,14 +2,22 @@
 
 import importlib.util
 import json
+import sys
 from pathlib import Path
 
 import pytest
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "experiments"))
+from browser import BROWSER
 
 EXPERIMENTS = sorted((Path(__file__).parent.parent / "experiments").glob("[0-9]*.py"))
 NEEDS = dict.fromkeys(("29_registration", "30_virtual_rig"), pytest.mark.extra("skimage"))
 NEEDS["48_posterior"] = pytest.mark.extra("emcee")
 NEEDS["49_evidence"] = pytest.mark.extra("emcee", "dynesty")
+NEEDS["52_page_redraw"] = (
+    pytest.mark.extra("websockets"),
+    pytest.mark.skipif(BROWSER is None, reason="no chromium is installed"),
+)
 
 
 @pytest.mark.parametrize(
