@@ -63,6 +63,19 @@ def test_the_model_is_an_actuator_whose_response_is_the_fit(fit):
         np.testing.assert_allclose(model.response(rec.u, rec.sample_time), rec.y - residual, atol=1e-13)
 
 
+def test_one_fast_record_is_enough_where_the_law_alone_explains_little_of_it():
+    step, n = 5e-4, 160
+    t = step * np.arange(n)
+    u = 0.5 - np.exp(-t / 0.1) / np.pi * np.arcsin(np.cos(2.0 * np.pi * 40.0 * t))
+    law = hs.Dahl(stiffness=12.0, coulomb=0.5)
+    stage = hs.Actuator(hysteresis=law, vibration=hs.mode(700.0, 0.02, delay=0.3e-3))
+    rec = record(stage, (u, step))
+    fit = hs.identify(hs.Actuator.structure(hs.Dahl, creep=False), rec, initial="rest")
+    assert np.std(fit.residual) < 1.1e-3
+    assert fit.estimates[FREQUENCY.format(0)] == pytest.approx(700.0, rel=1e-3)
+    assert fit.estimates["hysteresis.coulomb"] == pytest.approx(0.5, rel=0.02)
+
+
 def test_a_delay_is_found_by_fractions_of_a_sample():
     for delay in (0.35e-3, 2.6e-3):
         stage = hs.Actuator(hysteresis=hs.Line(slope=2.0), vibration=hs.mode(600.0, 0.03, delay=delay))

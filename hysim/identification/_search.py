@@ -301,7 +301,7 @@ def _slopes(problem: Problem, theta: FloatArray) -> FloatArray:
 def _staged(problem: Problem, stage: Stage, begun: FloatArray, seed: int) -> FloatArray:
     """Points (n_sets, n_x) to polish: random ones in what the stage frees, beside the `begun`, after its rounds."""
     space, rough = problem.space, problem.rough()
-    drawn = _uniform(space, stage.drawn, seed)
+    drawn = spread(space, stage.drawn, seed)
     around = begun if len(begun) else space.starts
     freed = np.array([name in stage.names for name in space.coordinates])
     beside = np.where(freed, drawn, around[np.arange(len(drawn)) % len(around)])
@@ -351,12 +351,13 @@ def descended(
 def _starts(
     problem: Problem, screened: int, seed: int, most: int, given: FloatArray, *, are_kept: bool = True
 ) -> FloatArray:
-    candidates = np.concatenate([given, _uniform(problem.space, screened, seed)])
+    candidates = np.concatenate([given, spread(problem.space, screened, seed)])
     n_given = len(given) if are_kept else 0
     return apart(problem.space, candidates, problem.costs(candidates), _APART, most, n_given)
 
 
-def _uniform(space: SearchSpace, n: int, seed: int) -> FloatArray:
+def spread(space: SearchSpace, n: int, seed: int) -> FloatArray:
+    """Points (n, n_x) of a scrambled Sobol sequence in the part of the box that is searched."""
     from scipy.stats import qmc
 
     sequence = qmc.Sobol(space.lower.size, rng=np.random.default_rng(seed))

@@ -7,6 +7,10 @@
 4. All at once. What the records do not determine at that optimum, by its Fisher information, is held, and the search
    goes on without it.
 
+Where the law alone leaves more than a hundredth of the span, its record is not slow, and the law may be wrong. The
+search then begins a second time with the modes, behind the input itself, beside which many laws are tried. From
+each end it goes on beyond whole samples of delay, and the end of the lower BIC stands.
+
 Of several inputs no record shows a law alone: modes are searched behind the inputs themselves, with gains that are
 solved for, and then all at once. Where the user knows an actuator like it, the search begins with its modes.
 """
@@ -22,7 +26,7 @@ from hysim._frozen import FloatArray
 from hysim.identification._assumptions import decided
 from hysim.identification._budget import Budget
 from hysim.identification._problem import Problem, problem
-from hysim.identification._search import apart, chosen, descended
+from hysim.identification._search import apart, chosen, descended, spread
 from hysim.identification._uncertainty import uncertainty
 from hysim.metrics.criteria import information
 from hysim.models.parts import own
@@ -36,6 +40,9 @@ _SAME = 0.01  # distance of two points in units of the box, under which the bett
 _APART = 0.03  # likewise of the first points on the fastest record
 _BEST, _KEPT = 8, 2  # points that descend on the fastest record, and on all
 _STRONG = 10.0  # difference of two BIC
+_ENOUGH = 0.01  # error of the law alone beside the resolution, in spans of the output: with a larger one it moves
+_SPREAD_LAWS = 1024  # laws beside parts that were searched without one
+_APART_LAWS = 0.05  # likewise
 _BEST_OF_ALL = 4  # points that descend where the law is searched too
 _MOST_ROUNDS = 8  # of what is held
 _IN_VAIN = 2  # trials in a row that are no better
@@ -43,6 +50,27 @@ _SHARE = 0.5  # of the evaluations that the user allows
 
 Initial = str | Sequence[str] | None
 Coordinates = Mapping[str, float]
+
+
+class _Law(NamedTuple):
+    """A law that was searched alone, the parameters of its shape, and whether it explains its record."""
+
+    model: Any
+    shape: Mapping[str, float]
+    is_enough: bool
+
+
+class _End(NamedTuple):
+    """A plant, its problem on all records, and the best coordinates (1, n_x) of one search."""
+
+    plant: Any
+    whole: Problem
+    ends: FloatArray
+
+    def criterion(self) -> float:
+        """Bayesian information criterion."""
+        n = self.whole.n_samples
+        return information(max(float(self.whole.costs(self.ends)[0]), 1e-300) / n, n, len(self.whole.space.names))
 
 
 class Begun(NamedTuple):
@@ -115,25 +143,37 @@ def begun_by_parts(
     trial = setting.problem(plant)  # refuses what does not fit before anything is searched
     trial.split(0.5 * (trial.space.lower + trial.space.upper)[np.newaxis])
     if (begins := plant.begins()) is not None:
-        known = [begins]
+        end = _all_at_once(plant, [begins], setting)
     elif len(plant.inputs) > 1:
-        plant, known = _grown(plant, None, setting)
-        plant = _tried(plant, setting)
+        end = _all_at_once(*_behind_inputs(plant, None, setting), setting)
     else:
-        plant, law, shape = _with_law(plant, setting)
-        plant, known = _grown(plant, law, setting)
-        plant = _tried(plant, setting)
-        known = _on_all(plant, setting, shape, known)
-    whole = setting.problem(plant.begun(known))
-    ends = np.empty((1, 0))
-    if whole.n_x:
-        best = _descended(whole, _best_starts(whole), exact=False)[:1]
-        plant, ends = _told_apart(plant, setting, whole, _descended(whole, best, exact=True))
+        end = _searched(plant, setting)
+    plant, ends = end.plant, end.ends
+    if end.whole.n_x:
+        plant, ends = _told_apart(plant, setting, end.whole, _descended(end.whole, ends, exact=True))
     return Begun(plant, records, ends, budget is not None and budget.cut)
 
 
-def _with_law(plant: Any, setting: _Setting) -> tuple[Any, Any, dict[str, float]]:
-    """The plant whose law begins where the law alone is best, that law, and the parameters of its shape."""
+def _searched(plant: Any, setting: _Setting) -> _End:
+    """The best end of a search from the law on, and where its record moves, of one from the modes on."""
+    plant, law = _with_law(plant, setting)
+    grown, known = _behind_inputs(plant, law.model, setting)
+    first = _all_at_once(grown, _on_all(grown, setting, law.shape, known), setting)
+    if law.is_enough:
+        return first
+    grown, known = _behind_inputs(plant, None, setting)
+    second = _all_at_once(grown, known, setting, spread_laws=True)
+    return min(map(_gone_on, (first, second)), key=_End.criterion)
+
+
+def _gone_on(end: _End) -> _End:
+    """The best end of descents that begin about an end."""
+    points = end.plant.beyond(end.whole.space, end.ends)
+    return end._replace(ends=_descended(end.whole, points, exact=False)[:1]) if len(points) > 1 else end
+
+
+def _with_law(plant: Any, setting: _Setting) -> tuple[Any, _Law]:
+    """The plant whose law begins where the law alone is best, and that law."""
     k = plant.slowest
     record, law = plant.static(setting.records[k]), plant.law
     freedom = setting.freedom
@@ -155,7 +195,36 @@ def _with_law(plant: Any, setting: _Setting) -> tuple[Any, Any, dict[str, float]
     start = model if isinstance(model, Identifiable) and not isinstance(law, Undecided) else best.family
     space = best.own
     searched = [name for name in space.names if name not in (*space.linear, *space.state)]
-    return plant.with_law(start), model, {f"hysteresis.{name}": estimates[name] for name in searched}
+    shape = {f"hysteresis.{name}": estimates[name] for name in searched}
+    error = math.sqrt(optima[0].cost / best.n_samples)
+    is_enough = error <= _ENOUGH * float(np.ptp(record.y)) + (record.resolution or 0.0)
+    return plant.with_law(start), _Law(model, shape, is_enough)
+
+
+def _behind_inputs(plant: Any, law: Any, setting: _Setting) -> tuple[Any, list[Coordinates]]:
+    """The plant and coordinates of its parts, behind a known law, or behind several inputs as they are."""
+    plant, known = _grown(plant, law, setting)
+    return _tried(plant, setting), known
+
+
+def _all_at_once(plant: Any, known: Sequence[Coordinates], setting: _Setting, spread_laws: bool = False) -> _End:
+    """Where the search for all parts ends that begins at these coordinates, and at laws all over their box if asked."""
+    whole = setting.problem(plant.begun(known))
+    if not whole.n_x:
+        return _End(plant, whole, np.empty((1, 0)))
+    starts = _best_starts(whole)
+    if spread_laws:
+        starts = np.concatenate([starts, _beside_laws(whole, starts[:1], setting.seed)])
+    return _End(plant, whole, _descended(whole, starts, exact=False)[:1])
+
+
+def _beside_laws(whole: Problem, begun: FloatArray, seed: int) -> FloatArray:
+    """The best points of many laws beside the other coordinates of one point."""
+    space = whole.space
+    of_law = [k for k, name in enumerate(space.coordinates) if name.startswith("hysteresis.")]
+    points = np.repeat(begun, _SPREAD_LAWS, axis=0)
+    points[:, of_law] = spread(space, _SPREAD_LAWS, seed)[:, of_law]
+    return apart(space, points, whole.costs(points), _APART_LAWS, _BEST)
 
 
 def _grown(plant: Any, law: Any, setting: _Setting) -> tuple[Any, list[Coordinates]]:

@@ -52,7 +52,7 @@ class PartByPart(Protocol):
     """Names of its inputs, each with a law."""
 
     def behind(self, law: Any) -> Self:
-        """The plant behind a law that is known but for its gain, or behind several inputs as they are."""
+        """The plant behind a law that is known but for its gain, or behind its inputs as they are."""
 
     def solved(self, estimates: Mapping[str, float]) -> Mapping[str, float]:
         """Coordinates by name of what was solved for behind the inputs as they are, and is a coordinate behind laws."""
@@ -72,6 +72,9 @@ class PartByPart(Protocol):
 
     def finer(self, space: SearchSpace, best: FloatArray) -> FloatArray:
         """Points about the best of `points`, and these."""
+
+    def beyond(self, space: SearchSpace, end: FloatArray) -> FloatArray:
+        """The end (1, n_x) of a descent that may rest too early, and points (n, n_x) from which others may go on."""
 
     def trials(self) -> Sequence[Self]:
         """The plant with each value of what no descent finds; itself alone where there is nothing of the kind."""

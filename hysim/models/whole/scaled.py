@@ -17,7 +17,7 @@ _COLUMNS = ("gain", "offset")
 
 @dataclass(frozen=True)
 class Scaled(Identifiable):
-    """The output of `law` times a gain, and an offset."""
+    """The output of `law`, or of None the input itself, times a gain, and an offset."""
 
     law: Any
 
@@ -27,9 +27,12 @@ class Scaled(Identifiable):
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """The law's output, one, and zero, (1, n_samples, 3)."""
-        law = law_at(self.law, record.sample_time) if needs_time(self.law) else self.law
-        y = response_of(law, record.u, record.sample_time if needs_time(law) else None)
+        y = record.u if self.law is None else self._response(record)
         return np.stack([y, np.ones_like(y), np.zeros_like(y)], axis=-1)[np.newaxis]
+
+    def _response(self, record: Record) -> FloatArray:
+        law = law_at(self.law, record.sample_time) if needs_time(self.law) else self.law
+        return response_of(law, record.u, record.sample_time if needs_time(law) else None)
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
         """The law itself."""

@@ -234,6 +234,10 @@ class ActuatorStructure(Identifiable):
         """Points about the best of `points`, and these."""
         return starts.finer(space, self.modes, best)
 
+    def beyond(self, space: SearchSpace, end: FloatArray) -> FloatArray:
+        """The end of a descent, and points of other delays."""
+        return starts.between_samples(space, end)
+
     def trials(self) -> Sequence["ActuatorStructure"]:
         """The structure with each delay that samples tell apart, where the output jumps with the command."""
         if not self.delay or self.modes or self.amplifier == "first-order" or "vibration.delay" in self.known:

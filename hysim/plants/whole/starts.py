@@ -22,6 +22,7 @@ _NEAR, _N_NEAR = 0.04, 11  # share of a frequency about which finer ones are tri
 _SHARES = (-0.3, -0.05, 0.05, 0.3)  # gains of a further mode
 _DELAYS = (0.0, 1.5, 3.0, 6.0, 10.0)  # samples
 _NEAR_DELAYS = (-0.8, 0.0, 0.8)  # likewise, beside those of the best points
+_MIDDLES = (-1.5, -0.5, 0.5, 1.5, 2.5)  # samples from a whole delay
 _DELAY = "vibration.delay"
 _TIME_CONSTANT = "amplifier.time_constant"
 _SLOWER = (10.0, 50.0, 250.0)  # times the shortest time constant
@@ -68,6 +69,17 @@ def finer(space: SearchSpace, modes: int, best: FloatArray) -> FloatArray:
             axes[_DELAY] = point[space.coordinates.index(_DELAY)] + np.array(_NEAR_DELAYS)
         about.append(_spread(space, axes, point[np.newaxis]))
     return np.concatenate([best, *about])
+
+
+def between_samples(space: SearchSpace, end: FloatArray) -> FloatArray:
+    """The end (1, n_x) of a descent, and points with delays in the middle of the samples about its own.
+
+    Slopes by the delay jump at whole samples, where a descent may rest that should go on.
+    """
+    if _DELAY not in space.coordinates:
+        return end
+    whole = np.round(end[0, space.coordinates.index(_DELAY)])
+    return np.unique(np.concatenate([end, _spread(space, {_DELAY: whole + np.array(_MIDDLES)}, end)]), axis=0)
 
 
 def _names(modes: int) -> tuple[str, str, str]:
