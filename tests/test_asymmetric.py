@@ -237,3 +237,11 @@ def test_on_a_one_sided_input_the_terms_that_are_alike_are_held():
 def test_it_is_stored_to_the_bit(family, tmp_path):
     hs.save(law(family, 1.3), tmp_path / "law.json")
     assert hs.load_model(tmp_path / "law.json") == law(family, 1.3)
+
+
+@pytest.mark.parametrize("n", [0.6, 1.0, 2.5])
+@pytest.mark.parametrize("first", [5e-324, 1e-308, -1e-305])
+def test_a_memory_that_is_hardly_a_number_is_as_good_as_none(n, first):
+    law = hs.ZhuWangBoucWen(beta=0.3, gamma=0.1, n=n, delta=-0.01)
+    for end in (3.0, -3.0):
+        np.testing.assert_allclose(law.response([0.0, first, end])[-1], law.response([0.0, end])[-1], rtol=1e-12)

@@ -41,6 +41,7 @@ _RAMP = read_only([(-1.0) ** k / math.factorial(k + 2) for k in range(N_RAMP)]) 
 _RAMP_REACH = 0.75  # the terms left out are below 1e-18 here
 _LARGEST_EXPONENT = 709.0
 _SMALLEST = 2.0**-1022
+_TINY = 2.0**-1000
 _LARGEST = 1.7976931348623157e308
 _MAX_NEWTON = 1000  # more than the largest exponent: down a growing exponential, Newton's rule goes 1/|c| at a time
 _AHEAD = 16.0  # times the length that is sure before, of a step whose terms tell how much of it they serve
@@ -72,8 +73,8 @@ def advance(u: float, z: float, du: float, parameters: FloatArray, scratch: Floa
     A, beta, gamma, n, delta = parameters[0], parameters[1], parameters[2], parameters[3], parameters[4]
     a, w, length = A + direction * delta * u, direction * z, abs(du)
     begin, stands = 0.0, False
-    if w == 0.0 and a != 0.0:
-        begin, w = -w / a + 0.0, 0.0  # nothing moves, but in derivatives: next to zero, z left it elsewhere
+    if abs(w) < _TINY and a != 0.0:  # series about such a memory overflow
+        begin, w = -w / a + 0.0, 0.0  # next to zero, z left it elsewhere; at zero that moves derivatives alone
     # the forcing a + delta L changes its sign once, so there are no more than two zeros of z
     for _ in range(_MAX_SIDES):
         left, forcing = length - begin, a + delta * begin
