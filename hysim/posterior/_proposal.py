@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
+from hysim.posterior._growth import grown
 from hysim.posterior._mixture import FEWEST_EACH, Proposal, mixture
 from hysim.posterior._target import Target
 
@@ -33,6 +34,7 @@ _MOST_POWERS = 100
 _IMPROVING = 4  # draws that improve a proposal, for each particle
 _ROUNDS = 3
 _EVEN_ENOUGH = 0.45  # effective share of the draws
+_POOR = 0.1  # of the best proposal: one that is worse has to grow
 
 
 def proposal_for(target: Target, near: FloatArray, rng: np.random.Generator) -> tuple[Proposal, Proposal]:
@@ -65,7 +67,7 @@ def proposal_for(target: Target, near: FloatArray, rng: np.random.Generator) -> 
         if weights.sum() ** 2 < _fewest(target) * (weights**2).sum():
             break
         proposal = mixture(drawn, weights, target.n_linear, rng).beside(reaching, EARLY_SHARE)
-    return best, reaching
+    return (best, reaching) if best_share > _POOR else grown(best, target, rng)
 
 
 def _of(v: FloatArray, target: Target, rng: np.random.Generator) -> Proposal:
