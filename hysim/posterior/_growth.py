@@ -54,7 +54,7 @@ def _log_density(target: Target, v: FloatArray) -> FloatArray:
 
 def _density(parts: Proposal, v: FloatArray) -> FloatArray:
     """Density times the number of points that were drawn."""
-    return _EACH * len(parts.centres) * parts.densities(v)[0].sum(axis=1)
+    return np.asarray(_EACH * len(parts.centres) * parts.densities(v)[0].sum(axis=1))
 
 
 def _weights(log_density: FloatArray, total: FloatArray) -> FloatArray:
