@@ -1208,8 +1208,8 @@ def _not_mixed(result: Result) -> str:
     spans = span(result["draws"][seed]["span"] for seed in seeds)
     return (
         f" {len(seeds)} draws (seeds {', '.join(map(str, seeds))}) have fewer than 400 effective samples after 6 000 "
-        f"steps, and count all the same; without them it is {result['pooled_percent_of_mixed']:.1f} %. Their laws come "
-        f"near to divergence, with outputs that span {spans} µm."
+        f"steps, and count all the same; without them it is {result['pooled_percent_of_mixed']:.1f} %. Their outputs "
+        f"span {spans} µm."
     )
 
 
